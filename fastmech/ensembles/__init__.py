@@ -1,0 +1,1 @@
+"""Thousands of trajectories at once: blocks of lanes on threads, statuses, disturbed motion."""

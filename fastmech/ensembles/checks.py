@@ -1,0 +1,72 @@
+"""Arguments of the public functions, checked and cast once: kernels assume clean arrays."""
+
+from __future__ import annotations
+
+import math
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastmech.errors import InputError
+
+
+def number(name: str, value: Any, unit: str, *, above: float = -math.inf, least: float = -math.inf) -> float:
+    """A finite number greater than ``above`` and not less than ``least``.
+
+    Raises:
+        InputError: it is something else.
+    """
+    allowed = f"must be a finite number of {unit}" if unit else "must be a finite number"
+    if above > -math.inf:
+        allowed += f" greater than {above:g}"
+    if least > -math.inf:
+        allowed += f" not less than {least:g}"
+    right_type = isinstance(value, Real) and not isinstance(value, bool)
+    if not right_type or not math.isfinite(value) or not value > above or not value >= least:
+        raise InputError(f"{name} = {value!r}: {allowed}")
+    return float(value)
+
+
+def whole_number(name: str, value: Any, *, least: int) -> int:
+    """An integer not less than ``least``.
+
+    Raises:
+        InputError: it is something else.
+    """
+    if not isinstance(value, Integral) or isinstance(value, bool) or value < least:
+        raise InputError(f"{name} = {value!r}: must be an integer not less than {least}")
+    return int(value)
+
+
+def states(name: str, values: ArrayLike, columns: int) -> NDArray[np.float64]:
+    """An array of shape (n, columns); a single state becomes one row. Values need not be finite.
+
+    Raises:
+        InputError: not numbers, or another shape.
+    """
+    try:
+        array = np.array(values, dtype=np.float64, order="C", ndmin=2)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: must be numbers of shape (n, {columns})") from None
+    if array.ndim != 2 or array.shape[1] != columns:
+        raise InputError(f"{name}: has shape {np.shape(values)}, must be (n, {columns})")
+    return array
+
+
+def rising_times(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """Times [s], finite, not negative, strictly rising, at least one.
+
+    Raises:
+        InputError: they are not.
+    """
+    try:
+        times = np.array(values, dtype=np.float64, ndmin=1)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: must be times in s") from None
+    if times.ndim != 1 or not times.size:
+        raise InputError(f"{name}: has shape {times.shape}, must be a row of at least one time")
+    if not np.isfinite(times).all() or times[0] < 0 or (np.diff(times) <= 0).any():
+        raise InputError(f"{name}: must be finite, not negative and strictly rising times in s")
+    return times

@@ -1,0 +1,132 @@
+"""Driver of explicit Runge-Kutta methods with a fixed step over one block of lanes.
+
+The driver knows neither the mechanism nor the method: a block right-hand side and an observer come as
+first-class functions (one indirect call a stage and block), the tableau as arrays. Stage sums run over the
+block's flat memory, at most four terms a pass.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from fastmech.jit import CUBE, INTEGERS, MATRIX, OBSERVER, OBSERVER_SIGNATURE, RHS, VECTOR, inlined, kernel
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+BlockRHS = Callable[[float, Floats, Floats, Floats], None]
+Observer = Callable[[float, Floats, Floats, Floats], None]
+
+
+@inlined
+def add_stages(z: Floats, K: Floats, h: float, stage: Integers, weight: Floats, k: int, stop: int) -> None:
+    """z += h * sum of weight[k:stop] times the stages they belong to."""
+    n = z.shape[0]
+    while k < stop:
+        terms = min(4, stop - k)
+        w0 = h * weight[k]
+        K0 = K[stage[k]]
+        if terms == 1:
+            for i in range(n):
+                z[i] += w0 * K0[i]
+        elif terms == 2:
+            w1 = h * weight[k + 1]
+            K1 = K[stage[k + 1]]
+            for i in range(n):
+                z[i] += w0 * K0[i] + w1 * K1[i]
+        elif terms == 3:
+            w1, w2 = h * weight[k + 1], h * weight[k + 2]
+            K1, K2 = K[stage[k + 1]], K[stage[k + 2]]
+            for i in range(n):
+                z[i] += w0 * K0[i] + w1 * K1[i] + w2 * K2[i]
+        else:
+            w1, w2, w3 = h * weight[k + 1], h * weight[k + 2], h * weight[k + 3]
+            K1, K2, K3 = K[stage[k + 1]], K[stage[k + 2]], K[stage[k + 3]]
+            for i in range(n):
+                z[i] += w0 * K0[i] + w1 * K1[i] + w2 * K2[i] + w3 * K3[i]
+        k += terms
+
+
+@inlined
+def start_stage(
+    z: Floats, y: Floats, K: Floats, h: float, stage: Integers, weight: Floats, k: int, stop: int
+) -> int:
+    """z = y + h * (the first at most four terms); returns the index of the first term left out."""
+    n = z.shape[0]
+    terms = min(4, stop - k)
+    w0 = h * weight[k]
+    K0 = K[stage[k]]
+    if terms == 1:
+        for i in range(n):
+            z[i] = y[i] + w0 * K0[i]
+    elif terms == 2:
+        w1 = h * weight[k + 1]
+        K1 = K[stage[k + 1]]
+        for i in range(n):
+            z[i] = y[i] + (w0 * K0[i] + w1 * K1[i])
+    elif terms == 3:
+        w1, w2 = h * weight[k + 1], h * weight[k + 2]
+        K1, K2 = K[stage[k + 1]], K[stage[k + 2]]
+        for i in range(n):
+            z[i] = y[i] + (w0 * K0[i] + w1 * K1[i] + w2 * K2[i])
+    else:
+        w1, w2, w3 = h * weight[k + 1], h * weight[k + 2], h * weight[k + 3]
+        K1, K2, K3 = K[stage[k + 1]], K[stage[k + 2]], K[stage[k + 3]]
+        for i in range(n):
+            z[i] = y[i] + (w0 * K0[i] + w1 * K1[i] + w2 * K2[i] + w3 * K3[i])
+    return k + terms
+
+
+@kernel(OBSERVER_SIGNATURE)
+def observe_nothing(t: float, Y: Floats, params: Floats, record: Floats) -> None:
+    """The observer of runs that keep nothing but states."""
+
+
+@kernel(
+    types.void(
+        RHS, OBSERVER, INTEGERS, INTEGERS, VECTOR, VECTOR, VECTOR, INTEGERS, MATRIX, VECTOR, VECTOR, MATRIX, CUBE
+    )
+)
+def integrate_block(
+    rhs: BlockRHS,
+    observe: Observer,
+    start: Integers,
+    stage: Integers,
+    weight: Floats,
+    nodes: Floats,
+    times: Floats,
+    steps: Integers,
+    Y: Floats,
+    params: Floats,
+    observer_params: Floats,
+    record: Floats,
+    out: Floats,
+) -> None:
+    """Take a block through all output times.
+
+    ``times`` holds the start and then every output time, ``steps[j]`` the number of steps from ``times[j]``
+    to ``times[j + 1]``. ``Y`` (dim, lanes) is the start and is advanced in place; ``out`` (outputs, dim,
+    lanes) receives the states; ``record`` is what ``observe`` keeps, called after every step. A step's time
+    is computed from its index, so rounding does not accumulate.
+    """
+    stages = nodes.shape[0]
+    dim, lanes = Y.shape
+    K = np.empty((stages, dim * lanes))
+    z = np.empty(dim * lanes)
+    Z = z.reshape(dim, lanes)
+    y = Y.reshape(dim * lanes)
+    for j in range(steps.shape[0]):
+        h = (times[j + 1] - times[j]) / max(steps[j], 1)
+        for step in range(steps[j]):
+            t = times[j] + step * h
+            rhs(t, Y, K[0].reshape(dim, lanes), params)
+            for s in range(1, stages):
+                k = start_stage(z, y, K, h, stage, weight, start[s], start[s + 1])
+                add_stages(z, K, h, stage, weight, k, start[s + 1])
+                rhs(t + nodes[s] * h, Z, K[s].reshape(dim, lanes), params)
+            add_stages(y, K, h, stage, weight, start[stages], start[stages + 1])
+            observe(times[j] + (step + 1) * h, Y, observer_params, record)
+        out[j] = Y

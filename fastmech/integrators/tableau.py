@@ -1,0 +1,126 @@
+"""Butcher tableaus: a method is data, checked when it is built."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import combinations_with_replacement
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: A rooted tree as the sorted tuple of its root's sub-trees; ``()`` is a single node.
+Tree = tuple["Tree", ...]
+
+#: Largest residual of an order condition that rounding explains; coefficients reach a few hundred.
+ORDER_TOLERANCE = 1e-12
+
+
+def rooted_trees(order: int) -> list[Tree]:
+    """All rooted trees with ``order`` nodes (Hairer, Norsett, Wanner, *Solving ODEs I*, section II.2)."""
+    if order == 1:
+        return [()]
+    return [tree for partition in _partitions(order - 1, order - 1) for tree in _forests(partition)]
+
+
+def _partitions(n: int, largest: int) -> list[tuple[int, ...]]:
+    if n == 0:
+        return [()]
+    return [(k, *rest) for k in range(min(n, largest), 0, -1) for rest in _partitions(n - k, k)]
+
+
+def _forests(sizes: tuple[int, ...]) -> list[Tree]:
+    forests: list[Tree] = [()]
+    for size in sorted(set(sizes)):
+        choices = list(combinations_with_replacement(rooted_trees(size), sizes.count(size)))
+        forests = [forest + choice for forest in forests for choice in choices]
+    return forests
+
+
+def _size_and_density(tree: Tree) -> tuple[int, int]:
+    size, density = 1, 1
+    for child in tree:
+        child_size, child_density = _size_and_density(child)
+        size += child_size
+        density *= child_density
+    return size, density * size
+
+
+@dataclass(frozen=True)
+class Packed:
+    """A tableau without its zeros, row after row (the last row holds the weights): what the driver reads."""
+
+    start: NDArray[np.int64]
+    stage: NDArray[np.int64]
+    weight: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Tableau:
+    """An explicit Runge-Kutta method.
+
+    ``a`` holds the rows of the strictly lower triangle (the first stage's row is empty), ``b`` the weights,
+    ``c`` the nodes. Building one checks shapes, row sums and every order condition up to ``order``.
+
+    Raises:
+        ValueError: a shape is wrong, a row does not sum to its node, or an order condition fails.
+    """
+
+    name: str
+    order: int
+    a: Sequence[Sequence[float]]
+    b: Sequence[float]
+    c: Sequence[float]
+    source: str = field(repr=False)
+
+    def __post_init__(self) -> None:
+        stages = len(self.b)
+        if len(self.a) != stages or len(self.c) != stages:
+            raise ValueError(f"{self.name}: a, b and c disagree on the number of stages")
+        for i, row in enumerate(self.a):
+            if len(row) != i:
+                raise ValueError(f"{self.name}: row {i} of a has {len(row)} entries, must have {i}")
+            if abs(sum(row) - self.c[i]) > ORDER_TOLERANCE:
+                raise ValueError(f"{self.name}: row {i} of a sums to {sum(row)}, its node is {self.c[i]}")
+        for order in range(1, self.order + 1):
+            worst = self.order_residual(order)
+            if worst > ORDER_TOLERANCE:
+                raise ValueError(f"{self.name}: a condition of order {order} fails by {worst:.1e}")
+
+    @property
+    def stages(self) -> int:
+        """Right-hand sides a step."""
+        return len(self.b)
+
+    @cached_property
+    def matrix(self) -> NDArray[np.float64]:
+        """Coefficients as a full square matrix, shape (stages, stages)."""
+        full = np.zeros((self.stages, self.stages))
+        for i, row in enumerate(self.a):
+            full[i, :i] = row
+        return full
+
+    def order_residual(self, order: int) -> float:
+        """Largest residual of the conditions of exactly this order: b . Phi(tree) = 1/density(tree)."""
+        return max(
+            abs(float(np.dot(self.b, self._elementary_weights(tree))) - 1.0 / _size_and_density(tree)[1])
+            for tree in rooted_trees(order)
+        )
+
+    def _elementary_weights(self, tree: Tree) -> NDArray[np.float64]:
+        weights = np.ones(self.stages)
+        for child in tree:
+            weights *= self.matrix @ self._elementary_weights(child)
+        return weights
+
+    @cached_property
+    def packed(self) -> Packed:
+        """The tableau without its zeros."""
+        rows = [*self.a, self.b]
+        entries = [[(j, w) for j, w in enumerate(row) if w != 0.0] for row in rows]
+        return Packed(
+            start=np.cumsum([0, *(len(row) for row in entries)], dtype=np.int64),
+            stage=np.array([j for row in entries for j, _ in row], dtype=np.int64),
+            weight=np.array([w for row in entries for _, w in row], dtype=np.float64),
+        )

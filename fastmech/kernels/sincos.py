@@ -1,0 +1,47 @@
+"""Sine and cosine without branches, so that a loop over lanes becomes packed instructions.
+
+Numba from PyPI has no vector mathematics library: every ``math.sin`` in a loop is a scalar call. Here the
+argument is reduced by multiples of pi/2 in three parts (Cody and Waite, *Software Manual for the Elementary
+Functions*, 1980, chapter 8), two polynomials give sine and cosine on [-pi/4, pi/4], and the quadrant is
+applied by selection. The polynomials' coefficients and the parts of pi/2 are those of the FreeBSD
+mathematics library (``k_sin.c``, ``k_cos.c``, ``e_rem_pio2.c``; Sun Microsystems 1993).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fastmech.jit import inlined
+
+#: Largest angle [rad] for which the reduction is used: multiples up to 2**20 keep its first products exact.
+REDUCTION_LIMIT = 1.0e6
+
+_TWO_OVER_PI = 0.6366197723675814
+_HALF_PI_1 = 1.57079632673412561417e00  # first 33 bits of pi/2
+_HALF_PI_2 = 6.07710050630396597660e-11  # next 33 bits
+_HALF_PI_3 = 2.02226624879595063154e-21  # the rest, rounded
+
+_S1, _S2, _S3 = -1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04
+_S4, _S5, _S6 = 2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10
+_C1, _C2, _C3 = 4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05
+_C4, _C5, _C6 = -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11
+
+
+@inlined
+def sincos(x: float) -> tuple[float, float]:
+    """Sine and cosine of ``x`` [rad], ``abs(x) <= REDUCTION_LIMIT``; NaN gives NaN.
+
+    Beyond the limit the result is inaccurate: block kernels compute such lanes again with the library's
+    functions.
+    """
+    n = np.floor(x * _TWO_OVER_PI + 0.5)
+    r = ((x - n * _HALF_PI_1) - n * _HALF_PI_2) - n * _HALF_PI_3
+    half = np.floor(0.5 * n)
+    odd = n - 2.0 * half  # 1.0 where the quadrant swaps sine and cosine
+    sign = 1.0 - 2.0 * (half - 2.0 * np.floor(0.5 * half))
+    z = r * r
+    s = r + r * z * (_S1 + z * (_S2 + z * (_S3 + z * (_S4 + z * (_S5 + z * _S6)))))
+    c = 1.0 - 0.5 * z + z * z * (_C1 + z * (_C2 + z * (_C3 + z * (_C4 + z * (_C5 + z * _C6)))))
+    sine = sign * (c if odd > 0.5 else s)
+    cosine = sign * (-s if odd > 0.5 else c)
+    return sine, cosine

@@ -1,0 +1,71 @@
+"""The scene in the seven coefficients (and the decay rate) that its motion depends on.
+
+Dividing the equations of motion by m2 l^2 leaves fewer numbers than the scene has parameters. Everything
+in this sub-package that moves or balances the mechanism works with them ("reduced" quantities, those of
+the mechanism divided by m2 l^2); energies and forces in SI units are m2 l^2 times as large.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Parameters(Protocol):
+    """What the mechanism needs to know of a scene (SI units, paper's Table 1)."""
+
+    @property
+    def m1(self) -> float: ...
+    @property
+    def m2(self) -> float: ...
+    @property
+    def m3(self) -> float: ...
+    @property
+    def l(self) -> float: ...
+    @property
+    def c1(self) -> float: ...
+    @property
+    def c2(self) -> float: ...
+    @property
+    def beta(self) -> float: ...
+    @property
+    def g(self) -> float: ...
+    @property
+    def F0(self) -> float: ...
+    @property
+    def alpha(self) -> float: ...
+
+
+class Coefficients(NamedTuple):
+    """Reduced coefficients of a scene; ``np.array(coefficients)`` is what kernels are given."""
+
+    mass: float  #: m1/m2
+    slider: float  #: m3/m2
+    lift: float  #: ((m1 + m2) g l - c2 l^2) / (m2 l^2) [1/s^2], the pull on phi
+    spring: float  #: c1/m2 [1/s^2]
+    gravity: float  #: g/l [1/s^2]
+    force: float  #: F0/(m2 l) [1/s^2]
+    damping: float  #: beta/m2 [1/s]
+    decay: float  #: alpha [1/s]
+
+
+def reduce(scene: Parameters) -> Coefficients:
+    """Reduced coefficients of ``scene`` (equations of motion over m2 l^2)."""
+    m1, m2, l = scene.m1, scene.m2, scene.l
+    return Coefficients(
+        mass=m1 / m2,
+        slider=scene.m3 / m2,
+        lift=((m1 + m2) * scene.g / l - scene.c2) / m2,
+        spring=scene.c1 / m2,
+        gravity=scene.g / l,
+        force=scene.F0 / (m2 * l),
+        damping=scene.beta / m2,
+        decay=scene.alpha,
+    )
+
+
+def force(scene: Parameters, t: float | NDArray[np.float64]) -> NDArray[np.float64]:
+    """Force F(t) = F0 exp(-alpha t) on M2 along +x [N] (paper, section 2)."""
+    return scene.F0 * np.exp(-scene.alpha * np.asarray(t, dtype=np.float64))

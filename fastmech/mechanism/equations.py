@@ -1,0 +1,94 @@
+"""Equations of motion, solved for the highest derivatives: Lagrange's (13) and the canonical ones (14).
+
+Reduced quantities throughout (see :mod:`fastmech.mechanism.reduced`): forces and momenta over m2 l^2.
+``force`` is the reduced force at this instant; ``None`` for it or for ``damping`` leaves the term out of
+the compiled code.
+"""
+
+from __future__ import annotations
+
+from fastmech.jit import inlined
+from fastmech.mechanism.reduced import (
+    christoffel,
+    metric_11,
+    metric_determinant,
+    potential_gradient,
+    slider_ratio,
+)
+
+
+@inlined
+def rates_from_momenta(p1: float, p2: float, s12: float, determinant: float) -> tuple[float, float]:
+    """(phi', theta') from reduced momenta: q' = a^-1 p."""
+    phi_dot = (p1 - s12 * p2) / determinant
+    return phi_dot, p2 - s12 * phi_dot
+
+
+@inlined
+def momenta_from_rates(
+    phi_dot: float, theta_dot: float, mass: float, slider: float, k: float, s12: float
+) -> tuple[float, float]:
+    """Reduced generalized momenta p = a q', paper, section 3."""
+    return metric_11(mass, slider, k) * phi_dot + s12 * theta_dot, s12 * phi_dot + theta_dot
+
+
+@inlined
+def lagrange_accelerations(
+    s1: float,
+    c1: float,
+    s2: float,
+    c2: float,
+    phi_dot: float,
+    theta_dot: float,
+    mass: float,
+    slider: float,
+    lift: float,
+    spring: float,
+    gravity: float,
+    force: float | None,
+    damping: float | None,
+) -> tuple[float, float]:
+    """(phi'', theta'') [rad/s^2] from Lagrange's equations in covariant form, paper (13)."""
+    s12 = s1 * c2 + c1 * s2
+    c12 = c1 * c2 - s1 * s2
+    k, dk = slider_ratio(s1, c1)
+    gamma_111, gamma_221, gamma_112 = christoffel(slider, k, dk, c12)
+    u1, u2 = potential_gradient(s1, c1, s2, c2, c12, lift, spring, gravity, force)
+    r1 = -u1 - gamma_111 * phi_dot * phi_dot - gamma_221 * theta_dot * theta_dot
+    if damping is not None:
+        r1 = r1 - damping * k * k * phi_dot
+    r2 = -u2 - gamma_112 * phi_dot * phi_dot
+    return rates_from_momenta(r1, r2, s12, metric_determinant(mass, slider, k, c12))
+
+
+@inlined
+def canonical_rates(
+    s1: float,
+    c1: float,
+    s2: float,
+    c2: float,
+    p1: float,
+    p2: float,
+    mass: float,
+    slider: float,
+    lift: float,
+    spring: float,
+    gravity: float,
+    force: float | None,
+    damping: float | None,
+) -> tuple[float, float, float, float]:
+    """(phi', theta', p1', p2') from the canonical equations, paper (14), reduced momenta.
+
+    q' = dH/dp, p' = -dH/dq + Q; at given momenta -dT/dq is +dT/dq at given rates, hence half the metric's
+    derivative.
+    """
+    s12 = s1 * c2 + c1 * s2
+    c12 = c1 * c2 - s1 * s2
+    k, dk = slider_ratio(s1, c1)
+    u1, u2 = potential_gradient(s1, c1, s2, c2, c12, lift, spring, gravity, force)
+    phi_dot, theta_dot = rates_from_momenta(p1, p2, s12, metric_determinant(mass, slider, k, c12))
+    coupling = c12 * phi_dot * theta_dot
+    p1_dot = slider * k * dk * phi_dot * phi_dot + coupling - u1
+    if damping is not None:
+        p1_dot = p1_dot - damping * k * k * phi_dot
+    return phi_dot, theta_dot, p1_dot, coupling - u2

@@ -1,0 +1,86 @@
+"""Positions, velocities, accelerations and constraints of the mechanism's points, paper (2)-(7).
+
+States ``y`` have shape (..., 4): phi, theta [rad], phi', theta' [rad/s]; results have the shape (...).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastmech.mechanism.coefficients import Parameters
+from fastmech.mechanism.reduced import slider_ratio
+
+Array = NDArray[np.float64]
+
+
+class Points(NamedTuple):
+    """A vector quantity of M1, M2 and the slider M3, each component of shape (...)."""
+
+    x1: Array
+    y1: Array
+    x2: Array
+    y2: Array
+    x3: Array
+    y3: Array
+
+
+def positions(scene: Parameters, y: ArrayLike) -> Points:
+    """Coordinates of the points [m], paper (6)."""
+    phi, theta = _components(y)[:2]
+    s1, c1 = np.sin(phi), np.cos(phi)
+    l = scene.l
+    x1, y1 = l * c1, l * s1
+    x3 = l * (c1 + np.sqrt(4.0 - s1 * s1))
+    return Points(x1, y1, x1 - l * np.sin(theta), y1 - l * np.cos(theta), x3, np.zeros_like(x3))
+
+
+def velocities(scene: Parameters, y: ArrayLike) -> Points:
+    """Velocities of the points [m/s], time derivative of paper (6); their squares are paper (7)."""
+    phi, theta, phi_dot, theta_dot = _components(y)
+    s1, c1 = np.sin(phi), np.cos(phi)
+    l = scene.l
+    k, _ = slider_ratio(s1, c1)
+    x1, y1 = -l * s1 * phi_dot, l * c1 * phi_dot
+    x2, y2 = x1 - l * np.cos(theta) * theta_dot, y1 + l * np.sin(theta) * theta_dot
+    x3 = -l * k * phi_dot
+    return Points(x1, y1, x2, y2, x3, np.zeros_like(x3))
+
+
+def accelerations(scene: Parameters, y: ArrayLike, angular: ArrayLike) -> Points:
+    """Accelerations of the points [m/s2]; ``angular`` (..., 2) holds phi'', theta'' [rad/s2]."""
+    phi, theta, phi_dot, theta_dot = _components(y)
+    phi_ddot, theta_ddot = _components(angular)
+    s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
+    l = scene.l
+    k, dk = slider_ratio(s1, c1)
+    x1 = -l * (s1 * phi_ddot + c1 * phi_dot**2)
+    y1 = l * (c1 * phi_ddot - s1 * phi_dot**2)
+    x2 = x1 - l * (c2 * theta_ddot - s2 * theta_dot**2)
+    y2 = y1 + l * (s2 * theta_ddot + c2 * theta_dot**2)
+    x3 = -l * (k * phi_ddot + dk * phi_dot**2)
+    return Points(x1, y1, x2, y2, x3, np.zeros_like(x3))
+
+
+def constraints(scene: Parameters, points: Points) -> Array:
+    """Residuals of the constraints (2)-(5), shape (4, ...): m^2, m^2, m, m^2.
+
+    The paper's (2) prints x2 where x1 belongs.
+    """
+    x1, y1, x2, y2, x3, y3 = points
+    l2 = scene.l**2
+    return np.stack(
+        [
+            x1**2 + y1**2 - l2,
+            (x2 - x1) ** 2 + (y2 - y1) ** 2 - l2,
+            y3,
+            (x3 - x1) ** 2 + (y3 - y1) ** 2 - 4.0 * l2,
+        ]
+    )
+
+
+def _components(values: ArrayLike) -> Array:
+    """The last axis in front, as float64."""
+    return np.moveaxis(np.asarray(values, dtype=np.float64), -1, 0)

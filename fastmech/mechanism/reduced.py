@@ -1,0 +1,99 @@
+"""The mechanism's physics, once: reduced metric, Christoffel symbols, potential and its derivatives.
+
+Every function takes sines and cosines of the angles (``s1, c1`` of phi, ``s2, c2`` of theta, ``s12, c12``
+of phi + theta) and reduced coefficients; all are plain arithmetic on floats or arrays, so compiled lanes
+and NumPy analysis run the same source. Quantities are those of the paper divided by m2 l^2. A term that
+is ``None`` is not there: the compiler drops its code.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fastmech.jit import inlined
+
+
+@inlined
+def slider_ratio(s1: float, c1: float) -> tuple[float, float]:
+    """k = -(dx3/dphi)/l and dk/dphi, from paper (6): k = sin phi (1 + cos phi / sqrt(4 - sin^2 phi))."""
+    inverse_root = 1.0 / np.sqrt(4.0 - s1 * s1)
+    q = c1 * inverse_root
+    k = s1 + s1 * q
+    dk = c1 + q * c1 - s1 * s1 * inverse_root * (1.0 - q * q)
+    return k, dk
+
+
+@inlined
+def metric_11(mass: float, slider: float, k: float) -> float:
+    """a11/(m2 l^2), paper (11); a12/(m2 l^2) = sin(phi + theta) and a22/(m2 l^2) = 1."""
+    return mass + 1.0 + slider * k * k
+
+
+@inlined
+def metric_determinant(mass: float, slider: float, k: float, c12: float) -> float:
+    """(a11 a22 - a12^2)/(m2 l^2)^2, written without cancellation; positive for every m1, m2 > 0."""
+    return mass + c12 * c12 + slider * k * k
+
+
+@inlined
+def christoffel(slider: float, k: float, dk: float, c12: float) -> tuple[float, float, float]:
+    """Christoffel symbols (Gamma_11,1; Gamma_22,1; Gamma_11,2) over m2 l^2, paper (12); the others vanish.
+
+    Gamma_11,1 is half of da11/dphi; the paper's print of it differs (see the paper report).
+    """
+    return slider * k * dk, c12, c12
+
+
+@inlined
+def potential_gradient(
+    s1: float,
+    c1: float,
+    s2: float,
+    c2: float,
+    c12: float,
+    lift: float,
+    spring: float,
+    gravity: float,
+    force: float | None,
+) -> tuple[float, float]:
+    """Gradient of U = Pi - F x2 over m2 l^2 with respect to (phi, theta) [1/s^2], paper (17), (20)."""
+    pull = spring * c12
+    u1 = lift * c1 - pull
+    u2 = gravity * s2 - pull
+    if force is not None:
+        u1 = u1 + force * s1
+        u2 = u2 + force * c2
+    return u1, u2
+
+
+@inlined
+def potential_hessian(
+    s1: float,
+    c1: float,
+    s2: float,
+    c2: float,
+    s12: float,
+    lift: float,
+    spring: float,
+    gravity: float,
+    force: float,
+) -> tuple[float, float, float]:
+    """(U_phi,phi, U_phi,theta, U_theta,theta) over m2 l^2 [1/s^2], paper (19)."""
+    u12 = spring * s12
+    return force * c1 - lift * s1 + u12, u12, gravity * c2 - force * s2 + u12
+
+
+@inlined
+def potential(
+    s1: float,
+    c1: float,
+    s2: float,
+    c2: float,
+    s12: float,
+    lift: float,
+    spring: float,
+    gravity: float,
+    force: float,
+) -> float:
+    """U = Pi - F x2 over m2 l^2, less the constant (c1 + c2)/m2 [1/s^2], paper (10)."""
+    return lift * s1 - gravity * c2 - spring * s12 - force * (c1 - s2)

@@ -1,0 +1,292 @@
+"""Labelled arrays: what every computation hands on to the store, the plots and the user.
+
+A `Variable` is an array with named dimensions, a unit and a description; a `Dataset` is a set of variables
+that agree on the sizes of their dimensions. A variable named like its only dimension is the coordinate of it.
+
+Conventions: booleans become int8 with the flags "false true"; statuses and kinds are int8 with the attributes
+that `flags` makes; complex numbers are two variables, `NAME_re` and `NAME_im`; strings are object arrays of
+`str`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from fastmech.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray
+
+Attribute: TypeAlias = "str | int | float | tuple[str, ...] | npt.NDArray[Any]"
+
+_INTEGERS = {f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)}
+DTYPES = frozenset({"float64", "float32"} | _INTEGERS)
+
+RESERVED_ATTRS = frozenset(
+    # what HDF5 keeps about dimension scales
+    {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "DIMENSION_LABELS"}
+    # what would make a netCDF reader change the values
+    | {"missing_value", "scale_factor", "add_offset", "coordinates", "dtype", "calendar"}
+)
+
+MAX_ATTR_BYTES = 8192
+"""Larger arrays belong in a variable: an HDF5 object keeps its attributes in a header of at most 64 KiB."""
+
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+_FALSE_TRUE: dict[str, Attribute] = {
+    "flag_values": np.array([0, 1], dtype=np.int8),
+    "flag_meanings": "false true",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Variable:
+    """An array with named dimensions.
+
+    Attributes:
+        dims: one name for each axis of `data`.
+        data: the values, anything that `numpy.asarray` takes: floats of 32 or 64 bits, integers, booleans,
+            strings.
+        units: unit of the values, "1" for a pure number.
+        long_name: what the values are, in a few words.
+        attrs: further attributes: strings, numbers, short 1-D arrays of numbers, tuples of strings.
+
+    Raises:
+        InputError: the dimensions do not match the shape, or a type or a name that result files cannot hold.
+    """
+
+    dims: tuple[str, ...]
+    data: npt.NDArray[Any]
+    units: str = "1"
+    long_name: str = ""
+    attrs: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        dims = _checked_dims(self.dims)
+        data = np.asarray(self.data)
+        if len(dims) != data.ndim:
+            raise InputError(f"variable.dims = {dims}: must name the axes of the shape {data.shape}")
+        if not isinstance(self.units, str) or not self.units.strip():
+            raise InputError(f'variable.units = {self.units!r}: must be a unit, "1" for a pure number')
+        check_text(self.units, "variable.units")
+        check_text(self.long_name, "variable.long_name")
+        attrs = checked_attrs(self.attrs, "variable.attrs", reserved={"units", "long_name"})
+        if data.dtype == np.bool_:
+            data, attrs = data.astype(np.int8), {**_FALSE_TRUE, **attrs}
+        object.__setattr__(self, "dims", dims)
+        object.__setattr__(self, "data", _checked_data(data))
+        object.__setattr__(self, "attrs", attrs)
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """Length of each dimension."""
+        return dict(zip(self.dims, self.data.shape, strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class Dataset:
+    """Variables that share dimensions, with attributes of the whole.
+
+    Raises:
+        InputError: two variables disagree on the length of a dimension, a variable is named like a dimension
+            without being its coordinate, or a name or attribute that result files cannot hold.
+    """
+
+    variables: Mapping[str, Variable]
+    attrs: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        variables = dict(self.variables)
+        for name, variable in variables.items():
+            check_name(name, "dataset.variables")
+            if not isinstance(variable, Variable):
+                raise InputError(f"dataset.variables.{name}: must be a Variable, not {type(variable)}")
+        sizes = _shared_sizes(variables)
+        for name in sizes.keys() & variables.keys():
+            if variables[name].dims != (name,):
+                raise InputError(
+                    f"dataset.variables.{name}: named like a dimension, so its dims must be ('{name}',),"
+                    f" not {variables[name].dims}"
+                )
+        object.__setattr__(self, "variables", variables)
+        object.__setattr__(self, "attrs", checked_attrs(self.attrs, "dataset.attrs"))
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """Length of each dimension."""
+        return _shared_sizes(self.variables)
+
+    def __getitem__(self, name: str) -> Variable:
+        if name not in self.variables:
+            raise InputError(
+                f"variable {name!r}: is not in this dataset; it has {', '.join(self.variables) or 'none'}"
+            )
+        return self.variables[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.variables
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.variables)
+
+    def __len__(self) -> int:
+        return len(self.variables)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The same as an `xarray.Dataset` (no copy of the data).
+
+        Raises:
+            InputError: xarray is not installed.
+        """
+        try:
+            import xarray
+        except ImportError:
+            raise InputError(
+                "to_xarray: needs xarray; install it with: pip install 'fastmech[xarray]'"
+            ) from None
+        arrays = {
+            name: (v.dims, v.data, {"units": v.units, "long_name": v.long_name, **v.attrs})
+            for name, v in self.variables.items()
+        }
+        coordinates = self.variables.keys() & self.sizes.keys()
+        return xarray.Dataset(
+            {name: array for name, array in arrays.items() if name not in coordinates},
+            {name: array for name, array in arrays.items() if name in coordinates},
+            dict(self.attrs),
+        )
+
+
+def flags(members: type[IntEnum]) -> dict[str, Any]:
+    """The attributes that explain int8 codes by the CF conventions.
+
+    Args:
+        members: the codes; their values must fit into int8.
+
+    Returns:
+        `flag_values` (int8, one for each member) and `flag_meanings` (the members' names in lower case, in
+        the same order, separated by blanks).
+
+    Raises:
+        InputError: no members, or a value beyond int8.
+    """
+    values = [int(member) for member in members]
+    if not values or min(values) < -128 or max(values) > 127:
+        raise InputError(
+            f"flags of {members.__name__} = {values}: must be one or more values from -128 to 127"
+        )
+    meanings = " ".join(member.name.lower() for member in members)
+    return {"flag_values": np.array(values, dtype=np.int8), "flag_meanings": meanings}
+
+
+def check_name(name: object, where: str) -> None:
+    """Refuse what is not a plain name: a letter or underscore, then letters, digits and underscores."""
+    if not isinstance(name, str) or not _NAME.fullmatch(name):
+        raise InputError(
+            f"{where}: the name {name!r} must be ASCII letters, digits and underscores, no digit first"
+        )
+
+
+def check_text(text: object, where: str) -> None:
+    """Refuse what HDF5 cannot hold as UTF-8 text without loss."""
+    if not isinstance(text, str):
+        raise InputError(f"{where} = {text!r}: must be text")
+    if "\0" in text or not _is_utf8(text):
+        raise InputError(f"{where} = {text!r}: must be UTF-8 text without null characters")
+
+
+def checked_attrs(
+    attrs: Mapping[str, Any], where: str, reserved: set[str] | None = None
+) -> dict[str, Attribute]:
+    """Attributes in the form in which result files give them back.
+
+    Booleans become 0 or 1, NumPy scalars Python numbers, sequences of strings tuples and of numbers arrays.
+
+    Raises:
+        InputError: a name or value that result files cannot hold.
+    """
+    checked = {}
+    for name, value in attrs.items():
+        check_name(name, where)
+        if name in RESERVED_ATTRS | (reserved or set()) or name.startswith("_"):
+            raise InputError(f"{where}.{name}: the name is reserved")
+        checked[name] = _checked_attr(value, f"{where}.{name}")
+    return checked
+
+
+def _checked_attr(value: Any, where: str) -> Attribute:
+    if isinstance(value, str):
+        check_text(value, where)
+        return str(value)
+    array = np.asarray(value)
+    if array.dtype.kind in "UTO" and array.ndim == 1 and all(isinstance(item, str) for item in value):
+        for item in value:
+            check_text(item, where)
+        return tuple(str(item) for item in value)
+    if array.dtype == np.bool_:
+        array = array.astype(np.int8)
+    if array.dtype.name not in DTYPES or array.ndim > 1:
+        kind = f"{type(value).__name__} of {array.dtype.name}"
+        raise InputError(
+            f"{where}: must be text, a number or a 1-D sequence of either, not {kind}, {array.ndim}-D"
+        )
+    if array.ndim == 0:
+        number: int | float = array.item()
+        return number
+    if array.nbytes > MAX_ATTR_BYTES:
+        raise InputError(
+            f"{where}: has {array.nbytes} bytes, at most {MAX_ATTR_BYTES} fit; make it a variable"
+        )
+    return array
+
+
+def _checked_dims(dims: object) -> tuple[str, ...]:
+    if not isinstance(dims, (tuple, list)):
+        raise InputError(f"variable.dims = {dims!r}: must be a tuple of names")
+    for name in dims:
+        check_name(name, "variable.dims")
+    if len(set(dims)) != len(dims):
+        raise InputError(f"variable.dims = {tuple(dims)}: must not name a dimension twice")
+    return tuple(dims)
+
+
+def _checked_data(data: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    if data.dtype.kind in "UTO":
+        data = data.astype(object)
+        for text in data.flat:
+            check_text(text, "variable.data")
+        return data
+    if data.dtype.kind == "c":
+        raise InputError(
+            f"variable.data of {data.dtype}: store complex numbers as two variables, NAME_re and NAME_im"
+        )
+    if data.dtype.name not in DTYPES:
+        raise InputError(
+            f"variable.data of {data.dtype}: must be floats of 32 or 64 bits, integers, booleans or strings"
+        )
+    return data
+
+
+def _shared_sizes(variables: Mapping[str, Variable]) -> dict[str, int]:
+    sizes: dict[str, int] = {}
+    for name, variable in variables.items():
+        for dim, size in variable.sizes.items():
+            if sizes.setdefault(dim, size) != size:
+                raise InputError(
+                    f"dataset.variables.{name}: has {size} points along {dim}, the others have {sizes[dim]}"
+                )
+    return sizes
+
+
+def _is_utf8(text: str) -> bool:
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True

@@ -1,0 +1,110 @@
+"""A scene: the mechanism's parameters, validated once. Every user error about a scene arises here."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from fastmech.errors import InputError
+
+
+def _python_number(value: Any) -> Any:
+    """NumPy scalars as the Python numbers that strict validation accepts; all else unchanged."""
+    return value.item() if isinstance(value, np.number) else value
+
+
+Number = Annotated[float, BeforeValidator(_python_number)]
+Positive = Annotated[Number, Field(gt=0)]
+NonNegative = Annotated[Number, Field(ge=0)]
+
+
+def _field(default: float, unit: str, description: str) -> Any:
+    return Field(default=default, description=description, json_schema_extra={"unit": unit})
+
+
+class Scene(BaseModel):
+    """Parameters of the mechanism in SI units; the defaults are the paper's Table 1 as printed.
+
+    Frozen; a wrong name, type or value raises :class:`fastmech.errors.InputError` with one line that names
+    the field, the value and what is allowed. The standard gravity 9.80665 m/s^2 is what the paper computed
+    with. Masses m1 and m2 must be positive: without either the metric is singular.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    m1: Positive = _field(10.0, "kg", "mass of material point M1")
+    m2: Positive = _field(12.0, "kg", "mass of material point M2")
+    m3: NonNegative = _field(8.0, "kg", "mass of slider M3")
+    l: Positive = _field(1.25, "m", "length of the rods OM1 and M1M2; M1M3 is twice as long")
+    c1: NonNegative = _field(162.5, "N/m", "stiffness of the spring from M2 to O")
+    c2: NonNegative = _field(366.67, "N/m", "stiffness of the spring from M1 to A = (0, l)")
+    beta: NonNegative = _field(121.0, "N s/m", "coefficient of the damper on the slider")
+    g: NonNegative = _field(9.80665, "m/s2", "acceleration of gravity")
+    F0: Number = _field(100.0, "N", "force on M2 along +x at t = 0")
+    alpha: NonNegative = _field(0.7, "1/s", "decay rate of the force F0 exp(-alpha t)")
+
+    def __init__(self, **parameters: Any) -> None:
+        try:
+            super().__init__(**parameters)
+        except ValidationError as error:
+            raise InputError(explain(error, "scene", type(self))) from None
+
+    def replace(self, **changes: Any) -> Self:
+        """A scene with some parameters changed, validated again."""
+        return type(self)(**(self.model_dump() | changes))
+
+    @classmethod
+    def from_toml(cls, path: str | Path) -> Self:
+        """The scene of a TOML file: its table ``[scene]``.
+
+        Raises:
+            InputError: no such file, not TOML, no table ``[scene]``, or a wrong parameter.
+        """
+        table = read_toml(path).get("scene")
+        if not isinstance(table, Mapping):
+            raise InputError(f"{path}: has no table [scene]")
+        return cls(**table)
+
+    @classmethod
+    def units(cls) -> dict[str, str]:
+        """Unit of every parameter."""
+        return {name: field.json_schema_extra["unit"] for name, field in cls.model_fields.items()}  # type: ignore[index,call-overload]
+
+
+def read_toml(path: str | Path) -> dict[str, Any]:
+    """Content of a TOML file.
+
+    Raises:
+        InputError: the file is missing, unreadable or not TOML.
+    """
+    try:
+        with open(path, "rb") as file:
+            return tomllib.load(file)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: is not valid TOML: {error}") from None
+
+
+def nearest(name: str, valid: Mapping[str, Any] | list[str]) -> str:
+    """Hint for a name that is not valid: the nearest valid one, or all of them."""
+    close = difflib.get_close_matches(name, list(valid), n=1, cutoff=0.5)
+    return f"did you mean {close[0]!r}?" if close else f"allowed: {', '.join(valid)}"
+
+
+def explain(error: ValidationError, where: str, model: type[BaseModel]) -> str:
+    """One line for the first thing wrong: field, value, what is allowed."""
+    first = error.errors(include_url=False)[0]
+    path = ".".join([where, *(str(part) for part in first["loc"])])
+    if first["type"] == "extra_forbidden":
+        return f"{path}: unknown name; {nearest(str(first['loc'][-1]), list(model.model_fields))}"
+    if first["type"] == "missing":
+        return f"{path}: missing"
+    message = first["msg"]
+    return f"{path} = {first['input']!r}: {message[0].lower() + message[1:]}"

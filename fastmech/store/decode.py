@@ -1,0 +1,90 @@
+"""HDF5 groups back into labelled data; the counterpart of `fastmech.store.encode`.
+
+A file may come from anywhere, so nothing in it is trusted: only what the store itself writes is followed.
+That leaves out links to other files, data kept in other files, and filters that HDF5 would load as plugins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import h5py
+import numpy as np
+
+from fastmech.errors import InputError
+from fastmech.results import RESERVED_ATTRS, Variable
+from fastmech.store.schema import DIMENSION_ONLY
+
+_FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
+
+
+@contextmanager
+def named_damage(what: str) -> Iterator[None]:
+    """Turn whatever h5py raises on damaged contents into one line that names them."""
+    try:
+        yield
+    except (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InputError(f"{what}: is damaged or not written by fastmech: {reason}") from error
+
+
+def members(group: h5py.Group) -> dict[str, h5py.Group | h5py.Dataset]:
+    """The objects of a group, in the order in which they were written, links to elsewhere left out."""
+    return {name: group[name] for name in group if isinstance(group.get(name, getlink=True), h5py.HardLink)}
+
+
+def is_dimension_only(stored: h5py.Dataset) -> bool:
+    """Whether a stored array is a dimension without coordinate."""
+    mark = stored.attrs.get("NAME", b"") if stored.is_scale else b""
+    return bool(mark.startswith(DIMENSION_ONLY.encode()))
+
+
+def get_variable(stored: h5py.Dataset, where: str) -> Variable:
+    """Read a stored variable whole.
+
+    Raises:
+        InputError: its data are damaged or kept in another way than the store's own; the message begins with
+            `where`.
+    """
+    with named_damage(where):
+        _check_storage(stored)
+        text = h5py.check_string_dtype(stored.dtype) is not None
+        data = np.asarray(stored.asstr()[()], dtype=object) if text else np.asarray(stored[()])
+        attrs = get_attrs(stored)
+        return Variable(_dims(stored), data, attrs.pop("units"), attrs.pop("long_name"), attrs)
+
+
+def get_attrs(stored: h5py.Group | h5py.Dataset) -> dict[str, Any]:
+    """The attributes of a group or variable, those of HDF5 and netCDF themselves left out."""
+    return {
+        name: _python_value(stored.attrs[name])
+        for name in stored.attrs
+        if name not in RESERVED_ATTRS and not name.startswith("_")
+    }
+
+
+def _dims(stored: h5py.Dataset) -> tuple[str, ...]:
+    if stored.is_scale:
+        return (_own_name(stored),)
+    return tuple(_own_name(stored.dims[axis][0]) for axis in range(stored.ndim))
+
+
+def _python_value(value: Any) -> Any:
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, np.ndarray) and value.dtype == object:
+        return tuple(value)
+    return value
+
+
+def _own_name(stored: h5py.Dataset) -> str:
+    return str(stored.name).rpartition("/")[2]
+
+
+def _check_storage(stored: h5py.Dataset) -> None:
+    properties = stored.id.get_create_plist()
+    filters = {properties.get_filter(i)[0] for i in range(properties.get_nfilters())}
+    if stored.is_virtual or stored.external or not filters <= _FILTERS:
+        raise ValueError("its data lie elsewhere or need a plugin")

@@ -1,0 +1,88 @@
+"""Labelled data into HDF5 groups, as netCDF-4 lays them out (see `fastmech.store.schema`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import h5py
+import numpy as np
+import numpy.typing as npt
+
+from fastmech.results import Dataset, Variable
+from fastmech.store.schema import COMPACT_BYTES, DIMENSION_ONLY
+
+
+def put_dataset(group: h5py.Group, dataset: Dataset) -> None:
+    """Write a dataset into an empty group, its dimensions first, so that all variables can refer to them."""
+    scales = {dim: _put_scale(group, dim, size, dataset) for dim, size in dataset.sizes.items()}
+    for name, variable in dataset.variables.items():
+        if name in scales:
+            continue
+        stored = _put_variable(group, name, variable)
+        for axis, dim in enumerate(variable.dims):
+            stored.dims[axis].attach_scale(scales[dim])
+    put_attrs(group, dataset.attrs)
+
+
+def put_attrs(target: h5py.Group | h5py.Dataset, attrs: Mapping[str, Any]) -> None:
+    """Write attributes as `fastmech.results.checked_attrs` returns them."""
+    for name, value in attrs.items():
+        if isinstance(value, tuple):
+            target.attrs.create(name, list(value), dtype=h5py.string_dtype())
+        else:
+            target.attrs[name] = value
+
+
+def _put_scale(group: h5py.Group, dim: str, size: int, dataset: Dataset) -> h5py.Dataset:
+    if dim in dataset.variables:
+        scale = _put_variable(group, dim, dataset.variables[dim])
+        scale.make_scale(dim)
+    else:
+        # never written, so it takes no room: only its shape counts
+        scale = group.create_dataset(dim, shape=(size,), dtype=">f4")
+        scale.make_scale(f"{DIMENSION_ONLY}{size:10d}")
+    return scale
+
+
+def _put_variable(group: h5py.Group, name: str, variable: Variable) -> h5py.Dataset:
+    data = variable.data
+    if data.dtype == object:
+        stored = _create_strings(group, name, data)
+    elif data.nbytes <= COMPACT_BYTES:
+        stored = _create_compact(group, name, data.shape, data.dtype)
+    else:
+        stored = group.create_dataset(
+            name,
+            shape=data.shape,
+            dtype=data.dtype,
+            chunks=True,
+            compression="gzip",
+            compression_opts=4,
+            shuffle=True,
+            fletcher32=True,
+        )
+    if data.size:
+        stored[...] = data
+    put_attrs(stored, {"units": variable.units, "long_name": variable.long_name, **variable.attrs})
+    return stored
+
+
+def _create_strings(group: h5py.Group, name: str, data: npt.NDArray[Any]) -> h5py.Dataset:
+    dtype = h5py.string_dtype()
+    # HDF5 keeps a reference of 16 bytes for each string; compressing those gains nothing
+    if 16 * data.size <= COMPACT_BYTES:
+        return _create_compact(group, name, data.shape, dtype)
+    return group.create_dataset(name, shape=data.shape, dtype=dtype)
+
+
+def _create_compact(
+    group: h5py.Group, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]
+) -> h5py.Dataset:
+    # h5py's create_dataset drops the layout of scalars, hence the calls below it
+    properties = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    properties.set_layout(h5py.h5d.COMPACT)
+    properties.set_obj_track_times(False)
+    file_type = h5py.h5t.py_create(np.dtype(dtype), logical=True)
+    space = h5py.h5s.create_simple(shape)
+    return h5py.Dataset(h5py.h5d.create(group.id, name.encode(), file_type, space, dcpl=properties))

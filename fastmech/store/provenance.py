@@ -1,0 +1,52 @@
+"""What made a result: versions, machine and time."""
+
+from __future__ import annotations
+
+import platform
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+
+import h5py
+
+
+def provenance(threads: int) -> dict[str, str | int]:
+    """The root attributes `fastmech.store.schema.PROVENANCE` of a result made now, on this machine.
+
+    Args:
+        threads: number of threads that computed it.
+    """
+    return {
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "fastmech_version": _version("fastmech"),
+        "python_version": platform.python_version(),
+        "numba_version": _version("numba"),
+        "numpy_version": _version("numpy"),
+        "scipy_version": _version("scipy"),
+        "h5py_version": _version("h5py"),
+        "hdf5_version": h5py.version.hdf5_version,
+        "platform": platform.platform(),
+        "processor": processor_name(),
+        "threads": threads,
+    }
+
+
+def processor_name() -> str:
+    """The processor's model name where the system tells it, else its architecture."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        lines = []
+    for line in lines:
+        key, _, value = line.partition(":")
+        if key.strip() == "model name" and value.strip():
+            return value.strip()
+    return platform.processor() or platform.machine() or "unknown"
+
+
+def _version(distribution: str) -> str:
+    # asks the installed metadata: importing numba or scipy for their version takes a second
+    try:
+        return metadata.version(distribution)
+    except metadata.PackageNotFoundError:
+        return "not installed"

@@ -1,0 +1,195 @@
+"""Reading a result file for analysis offline; data are read when they are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+import h5py
+
+from fastmech.errors import InputError
+from fastmech.results import Dataset, Variable
+from fastmech.store.decode import get_attrs, get_variable, is_dimension_only, members, named_damage
+from fastmech.store.schema import FORMAT, SCHEMA_VERSION
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def open_results(path: str | Path) -> Results:
+    """Open a result file; use it in a `with` statement or close it when done.
+
+    Raises:
+        InputError: there is no such file, it is not a result file of fastmech, its schema is newer than this
+            version knows, or it is damaged.
+    """
+    return Results(path)
+
+
+class Results:
+    """An open result file.
+
+    `results["equilibria"]` is the `Section` of that name; iterating gives the names.
+
+    Attributes:
+        path: the file.
+        attrs: the root's attributes: title, request, versions, machine, time (see `fastmech.store.schema`).
+        parameters: the scene's parameters with their units.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        self._file = _open_file(self.path)
+        try:
+            _check_schema(self._file, self.path)
+            with named_damage(str(path)):
+                self.attrs = get_attrs(self._file)
+                root = members(self._file)
+                self.parameters = {n: get_variable(m) for n, m in root.items() if isinstance(m, h5py.Dataset)}
+                self._sections = {
+                    name: Section(member, f"{path}: {name}")
+                    for name, member in root.items()
+                    if isinstance(member, h5py.Group)
+                }
+        except BaseException:
+            self.close()
+            raise
+
+    @property
+    def sections(self) -> tuple[str, ...]:
+        """Names of the sections, in the order of the request."""
+        return tuple(self._sections)
+
+    @property
+    def scene(self) -> dict[str, float]:
+        """The scene's parameters in SI units; `fastmech.Scene(**results.scene)` is the scene again."""
+        return {name: float(parameter.data) for name, parameter in self.parameters.items()}
+
+    def __getitem__(self, name: str) -> Section:
+        if name not in self._sections:
+            known = ", ".join(self._sections) or "none"
+            raise InputError(f"section {name!r}: is not in {self.path}; it has {known}")
+        return self._sections[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._sections
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._sections)
+
+    def __len__(self) -> int:
+        return len(self._sections)
+
+    def close(self) -> None:
+        """Close the file; what was read stays usable."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+class Section:
+    """One section of a result file, used like a `fastmech.results.Dataset`: `section["phi"]` is a `Variable`.
+
+    Attributes:
+        attrs: the section's attributes.
+        sizes: length of each dimension.
+        variables: the variables by name, each read anew whenever it is asked for.
+    """
+
+    def __init__(self, group: h5py.Group, where: str) -> None:
+        stored = {name: member for name, member in members(group).items() if isinstance(member, h5py.Dataset)}
+        self._where = where
+        self.attrs: dict[str, Any] = get_attrs(group)
+        self.sizes = {name: int(member.size) for name, member in stored.items() if member.is_scale}
+        self.variables: Mapping[str, Variable] = _StoredVariables(
+            {name: member for name, member in stored.items() if not is_dimension_only(member)}, where
+        )
+
+    def __getitem__(self, name: str) -> Variable:
+        if name not in self.variables:
+            known = ", ".join(self.variables) or "none"
+            raise InputError(f"variable {name!r}: is not in {self._where}; it has {known}")
+        return self.variables[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.variables
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.variables)
+
+    def __len__(self) -> int:
+        return len(self.variables)
+
+    def load(self) -> Dataset:
+        """Read all variables.
+
+        Raises:
+            InputError: a variable's data are damaged; the message names it.
+        """
+        return Dataset(dict(self.variables), self.attrs)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Read all variables as an `xarray.Dataset`.
+
+        Raises:
+            InputError: xarray is not installed, or a variable's data are damaged.
+        """
+        return self.load().to_xarray()
+
+
+class _StoredVariables(Mapping[str, Variable]):
+    """The variables of a section, each read when it is asked for."""
+
+    def __init__(self, stored: Mapping[str, h5py.Dataset], where: str) -> None:
+        self._stored = stored
+        self._where = where
+
+    def __getitem__(self, name: str) -> Variable:
+        stored = self._stored[name]
+        what = f"{self._where}: variable {name!r}"
+        if not stored:
+            raise InputError(f"{what}: the file is closed; read it before")
+        with named_damage(what):
+            return get_variable(stored)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._stored
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._stored)
+
+    def __len__(self) -> int:
+        return len(self._stored)
+
+
+def _open_file(path: Path) -> h5py.File:
+    try:
+        with path.open("rb") as file:
+            empty = not file.read(1)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    if empty:
+        raise InputError(f"{path}: is empty")
+    if not h5py.is_hdf5(path):
+        raise InputError(f"{path}: is not an HDF5 file")
+    with named_damage(str(path)):
+        return h5py.File(path, "r")
+
+
+def _check_schema(file: h5py.File, path: Path) -> None:
+    with named_damage(str(path)):
+        written_by, version = file.attrs.get("format"), file.attrs.get("schema_version")
+    if not isinstance(written_by, str) or written_by != FORMAT:
+        raise InputError(f"{path}: is an HDF5 file, but not a result file of fastmech")
+    if version != SCHEMA_VERSION:
+        raise InputError(
+            f"{path}: has schema version {version}, this version of fastmech reads {SCHEMA_VERSION}; use a newer one"
+        )

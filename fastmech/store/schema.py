@@ -1,0 +1,55 @@
+"""The layout of a result file and the names it rests on.
+
+A result file is an HDF5 file that netCDF-4 readers open:
+
+- The root holds the scene's parameters: one float64 scalar for each, with `units` and `long_name`.
+- Each section of the request is a group of the root and holds one `fastmech.results.Dataset`.
+- A variable is an HDF5 dataset with the attributes `units` and `long_name` and any others of its own. Its
+  dimensions are HDF5 dimension scales of the same group: the coordinate variable of that name or, where
+  there is none, an empty dataset with netCDF's own mark (`DIMENSION_ONLY`). Strings are UTF-8 of variable
+  length.
+- The root's attributes are `format`, `schema_version`, all of `PROVENANCE`, `title` and whatever the run
+  adds, such as `request` (the TOML text), `seed`, `wall_time_s`, `method`.
+
+Every number is under a checksum: arrays are chunked, shuffled, compressed by gzip and summed by Fletcher-32;
+scalars and arrays up to `COMPACT_BYTES` lie in their object's header, which has a checksum of its own since
+HDF5 1.10. Texts (attributes and string variables) lie outside it: HDF5 has no checksum for them.
+"""
+
+from __future__ import annotations
+
+FORMAT = "fastmech results"
+"""Value of the root attribute `format`, by which a result file is known."""
+
+SCHEMA_VERSION = 1
+"""Value of the root attribute `schema_version`: raised when an older reader would misread a newer file."""
+
+OWN_ATTRS = ("format", "schema_version")
+"""Root attributes that the store writes itself."""
+
+PROVENANCE = (
+    "created",
+    "fastmech_version",
+    "python_version",
+    "numba_version",
+    "numpy_version",
+    "scipy_version",
+    "h5py_version",
+    "hdf5_version",
+    "platform",
+    "processor",
+    "threads",
+)
+"""Root attributes of `fastmech.store.provenance.provenance`."""
+
+REQUIRED_ATTRS = ("title", *PROVENANCE)
+"""Root attributes that whoever writes a file has to give."""
+
+LIBRARY_VERSIONS = ("v110", "v110")
+"""Bounds of the HDF5 file format: 1.10 has checksums for metadata; later features would shut out readers."""
+
+COMPACT_BYTES = 4096
+"""Largest array kept in its object's header."""
+
+DIMENSION_ONLY = "This is a netCDF dimension but not a netCDF variable."
+"""netCDF-4's mark of a dimension without coordinate; the size follows, right-aligned in ten columns."""

@@ -1,0 +1,128 @@
+"""What a result file holds, on one page: for `fastmech info FILE`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fastmech.results import Variable
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+    from rich.table import Table
+    from rich.text import Text
+
+    from fastmech.store.read import Results, Section
+
+_MAX_TEXTS = 4
+
+
+def summarize(results: Results) -> RenderableType:
+    """Provenance, the scene's parameters and a table of the variables of each section, in 100 columns.
+
+    Reads every variable, one at a time.
+
+    Raises:
+        InputError: a variable's data are damaged.
+    """
+    from rich.console import Group
+
+    parts: list[RenderableType] = [_attributes(results.attrs, str(results.path)), "", _parameters(results)]
+    for name in results:
+        parts += ["", _section(name, results[name])]
+    return Group(*parts)
+
+
+def describe_values(variable: Variable) -> str:
+    """The values in a few words: counts of flags, a single value, distinct texts, or the range."""
+    data = variable.data
+    if data.size == 0:
+        return "empty"
+    if "flag_values" in variable.attrs and "flag_meanings" in variable.attrs:
+        return _flag_counts(data, variable.attrs)
+    if data.dtype == object:
+        distinct = list(dict.fromkeys(data.flat))
+        shown = ", ".join(distinct[:_MAX_TEXTS])
+        return shown if len(distinct) <= _MAX_TEXTS else f"{shown}, ... ({len(distinct)} distinct)"
+    known = data[~np.isnan(data)] if data.dtype.kind == "f" else data
+    missing = data.size - known.size
+    if known.size == 0:
+        return f"{missing} nan"
+    low, high = known.min(), known.max()
+    text = f"{low:.6g}" if low == high else f"{low:.6g} .. {high:.6g}"
+    return f"{text}, {missing} nan" if missing else text
+
+
+def _flag_counts(data: npt.NDArray[Any], attrs: Any) -> str:
+    counts = []
+    unexplained = data.size
+    for value, meaning in zip(attrs["flag_values"], attrs["flag_meanings"].split(), strict=True):
+        count = int(np.count_nonzero(data == value))
+        unexplained -= count
+        if count:
+            counts.append(f"{meaning} {count}")
+    if unexplained:
+        counts.append(f"unexplained {unexplained}")
+    return ", ".join(counts)
+
+
+def _attributes(attrs: dict[str, Any], title: str) -> Table:
+    table = _table(title, show_header=False)
+    table.add_column(no_wrap=True, style="bold")
+    table.add_column(overflow="fold")
+    for name, value in attrs.items():
+        lines = value.strip().count("\n") + 1 if isinstance(value, str) else 1
+        table.add_row(_text(name), _text(f"{lines} lines of text" if lines > 1 else value))
+    return table
+
+
+def _parameters(results: Results) -> Table:
+    table = _table("scene")
+    table.add_column("parameter", no_wrap=True, style="bold")
+    table.add_column("value", justify="right", no_wrap=True)
+    table.add_column("units", no_wrap=True)
+    table.add_column("meaning", overflow="fold")
+    for name, parameter in results.parameters.items():
+        value = f"{results.scene[name]!r}"
+        table.add_row(_text(name), value, _text(parameter.units), _text(parameter.long_name))
+    return table
+
+
+def _section(name: str, section: Section) -> RenderableType:
+    from rich.console import Group
+
+    table = _table(name)
+    table.add_column("variable", style="bold", overflow="fold", min_width=8)
+    table.add_column("dimensions", overflow="fold")
+    table.add_column("units", overflow="fold")
+    table.add_column("values", overflow="fold")
+    table.add_column("meaning", overflow="fold")
+    for variable_name in section:
+        variable = section[variable_name]
+        sizes = ", ".join(f"{dim} {size}" for dim, size in variable.sizes.items())
+        cells = (variable_name, sizes, variable.units, describe_values(variable), variable.long_name)
+        table.add_row(*(_text(cell) for cell in cells))
+    return Group(table, _attributes(section.attrs, "")) if section.attrs else table
+
+
+def _table(title: str, show_header: bool = True) -> Table:
+    from rich import box
+    from rich.table import Table
+
+    return Table(
+        title=_text(title) if title else None,
+        title_justify="left",
+        title_style="bold",
+        show_header=show_header,
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+    )
+
+
+def _text(value: Any) -> Text:
+    """A value as plain text: brackets are no markup, control characters no commands to a terminal."""
+    from rich.text import Text
+
+    return Text("".join(character if character.isprintable() else "?" for character in str(value)))
