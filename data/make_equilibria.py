@@ -2,16 +2,16 @@
 
     python data/make_equilibria.py
 
-Notation of the design notes: a = (m1+m2) g l - c2 l^2, b = m2 g l, C = c1 l^2, f = F0 l; equilibria satisfy
+Notation: a = (m1+m2) g l - c2 l^2, b = m2 g l, C = c1 l^2, f = F0 l; equilibria satisfy
 
     a cos(phi) + f sin(phi) = b sin(theta) + f cos(theta) = C cos(phi + theta),
 
 so z = exp(i phi) is a root of a polynomial of degree 6.  The parameters are doubles taken as exact rational
-numbers: the polynomial is formed and freed of repeated roots without rounding, its roots are found at 130 digits,
-every root on the unit circle is taken back to all its angles theta, and each pair (phi, theta) is polished by
-Newton's method and checked.  Then three checks that know nothing of the polynomial: 4 or 6 equilibria,
-minima - saddles + maxima = 0, and Newton's method from a 40 x 40 grid in doubles, which must find the same set.
-Nothing of fastmech is used.
+numbers: the polynomial is formed and freed of repeated roots without rounding, its roots are found at 130
+digits, every root on the unit circle is taken back to all its angles theta, and each pair (phi, theta) is
+polished by Newton's method and checked.  Then three checks that know nothing of the polynomial: 4 or 6
+equilibria, minima - saddles + maxima = 0, and Newton's method from a 40 x 40 grid in doubles, which must find
+the same set.  Nothing of fastmech is used.
 Takes about 10 s.
 """
 
@@ -142,7 +142,7 @@ def unit_roots(exact: Exact) -> list[Any]:
 
 
 def angles_theta(exact: tuple[Any, ...], phi: Any) -> list[Any]:
-    """Every theta in equilibrium with ``phi``: two solve b sin + f cos = v, and C cos(phi + theta) = v picks."""
+    """Every theta in equilibrium with ``phi``: two solve b sin + f cos = v; C cos(phi + theta) picks."""
     a, b, C, f = exact
     v = a * mp.cos(phi) + f * mp.sin(phi)
     R = mp.hypot(b, f)
@@ -248,7 +248,7 @@ def check(name: str, exact: Exact, found: list[tuple[Any, Any, list[int]]]) -> N
 
 def main() -> None:
     lines = [
-        "# Equilibria under a constant force, made by make_equilibria.py; parameters are doubles, taken as exact.",
+        "# Equilibria under a constant force, made by make_equilibria.py; parameters are exact doubles.",
         "# phi, theta: rad, in (-pi, pi] but for the rounding to 30 digits.",
         "# hessian_signs: signs of the eigenvalues of the Hessian of U = Pi - F0 x2, rising.",
     ]

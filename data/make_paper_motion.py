@@ -8,8 +8,8 @@ nothing of fastmech is used.  The run is made twice, with different order, toler
 file keeps what the two agree on.  Takes about 20 s.
 
 Every parameter and the start are DOUBLES, taken as the exact binary numbers that they are (c2 is the double
-nearest to 1100/3, the start the doubles of 4*math.pi/13 and math.pi/7), so that a double-precision code solves
-the very same problem and its every digit can be compared.
+nearest to 1100/3, the start the doubles of 4*math.pi/13 and math.pi/7), so that a double-precision code
+solves the very same problem and its every digit can be compared.
 """
 
 from __future__ import annotations
@@ -49,9 +49,9 @@ def taylor(state: tuple[mpf, ...], t: mpf, order: int) -> tuple[Series, ...]:
 
     phi, theta, u, w = ([x] for x in state)
     s, c, st, ct = ([f(x)] for x in (state[0], state[1]) for f in (mp.sin, mp.cos))
-    root, inverse, ratio, k, dk, S, K, k2, uu, ww = ([] for _ in range(10))  # type: tuple[Series, ...]
-    s2, c2, ss_cc, f, det, phi2, R1, R2 = ([] for _ in range(8))  # type: tuple[Series, ...]
-    kdk, curvature = [], []  # type: Series, Series
+    root, inverse, ratio, k, dk, S, K, k2, uu, ww = ([] for _ in range(10))
+    s2, c2, sine_ratio, f, det, phi2, R1, R2 = ([] for _ in range(8))
+    kdk, curvature = [], []
     for n in range(order):
         if n:  # d sin(x)/dt = cos(x) x', and so on
             for sine, cosine, rate in ((s, c, u), (st, ct, w)):
@@ -73,8 +73,8 @@ def taylor(state: tuple[mpf, ...], t: mpf, order: int) -> tuple[Series, ...]:
         k.append(s[n] + product(s, ratio, n))
         # dk/dphi = c + (c^2 - s^2)/root + s^2 c^2 / root^3 = c + [c^2 - s^2 + (s c / root)^2] / root
         c2.append(product(c, c, n))
-        ss_cc.append(product(s, ratio, n))
-        curvature.append(c2[n] - s2[n] + product(ss_cc, ss_cc, n))
+        sine_ratio.append(product(s, ratio, n))
+        curvature.append(c2[n] - s2[n] + product(sine_ratio, sine_ratio, n))
         dk.append(c[n] + product(curvature, inverse, n))
         S.append(product(s, ct, n) + product(c, st, n))  # sin(phi + theta)
         K.append(product(c, ct, n) - product(s, st, n))  # cos(phi + theta)
@@ -140,7 +140,7 @@ def main() -> None:
     lines = [
         "# The paper's motion, made by make_paper_motion.py: Table 1 with the decaying force.",
         "# Parameters and start are doubles, taken as exact binary numbers (see the script).",
-        f"# Angles in rad, rates in rad/s, time in s; {KEPT_DIGITS} digits, two runs agree to {agreed} decimals.",
+        f"# Angles in rad, rates in rad/s, time in s; two runs agree to {agreed} decimals.",
         "",
         "[parameters]",
         *(f"{key} = {value!r}" for key, value in PARAMETERS.items()),

@@ -9,7 +9,7 @@ from importlib import import_module, metadata
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fastmech.ensembles.disturb import disturb
+    from fastmech.disturbance.ensemble import disturb
     from fastmech.ensembles.integrate import integrate
     from fastmech.equilibria.atlas import map_equilibria
     from fastmech.equilibria.find import find_equilibria
@@ -25,7 +25,7 @@ _MODULES = {
     "InputError": "fastmech.errors",
     "Scene": "fastmech.scene",
     "classify": "fastmech.stability.classify",
-    "disturb": "fastmech.ensembles.disturb",
+    "disturb": "fastmech.disturbance.ensemble",
     "find_equilibria": "fastmech.equilibria.find",
     "integrate": "fastmech.ensembles.integrate",
     "map_equilibria": "fastmech.equilibria.atlas",

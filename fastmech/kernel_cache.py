@@ -17,14 +17,24 @@ import platformdirs
 
 PACKAGE = Path(__file__).resolve().parent
 
-#: Sub-packages that hold compiled code. They import nothing from the rest of the package
-#: (``tests/test_layout.py`` keeps it so), hence their sources decide every kernel.
-COMPILED = ("mechanism", "kernels", "integrators", "ensembles", "equilibria", "stability")
+#: Modules and sub-packages that hold compiled code or decide its flags. No kernel reaches another source of
+#: the package (``tests/test_layout.py`` keeps it so), hence these decide every kernel.
+COMPILED = (
+    "jit.py",
+    "mechanism",
+    "kernels",
+    "integrators",
+    "ensembles",
+    "equilibria",
+    "stability",
+    "disturbance",
+)
 
 
 def compiled_sources() -> list[Path]:
     """All source files that a compiled kernel of the package can depend on, sorted."""
-    return sorted(file for folder in COMPILED for file in (PACKAGE / folder).rglob("*.py"))
+    places = [PACKAGE / name for name in COMPILED]
+    return sorted(file for place in places for file in ([place] if place.is_file() else place.rglob("*.py")))
 
 
 def source_hash(files: list[Path]) -> str:
@@ -39,8 +49,10 @@ def source_hash(files: list[Path]) -> str:
 def cache_directory() -> Path:
     """Directory of this version's compiled kernels.
 
-    Below ``NUMBA_CACHE_DIR`` where the user has set it, else in the user's cache folder.
+    Below ``NUMBA_CACHE_DIR`` where the user has set it, else in the user's cache folder. Kernels that check
+    their array bounds have a directory of their own, because numba does not tell the two apart.
     """
     root = os.environ.get("NUMBA_CACHE_DIR")
     base = Path(root) if root else platformdirs.user_cache_path("fastmech", appauthor=False)
-    return base / f"fastmech-{source_hash(compiled_sources())}"
+    checked = "-boundscheck" if os.environ.get("NUMBA_BOUNDSCHECK", "0") not in ("", "0") else ""
+    return base / f"fastmech-{source_hash(compiled_sources())}{checked}"

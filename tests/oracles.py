@@ -24,7 +24,7 @@ import mpmath
 
 DIGITS = 40
 
-#: Table 1 with the stiffness that the paper computed with (DESIGN section 2) and the g that fits its numbers.
+#: Table 1 with the stiffness that the paper computed with (printed: 366.67) and the g that fits its numbers.
 TABLE_1: Mapping[str, float] = {
     "m1": 10.0, "m2": 12.0, "m3": 8.0, "l": 1.25, "c1": 162.5, "c2": 1100 / 3,
     "beta": 121.0, "g": 9.80665, "F0": 100.0, "alpha": 0.7,
@@ -40,8 +40,8 @@ Numbers = Sequence[Any]
 class Reactions:
     """Rod tensions (positive: the rod pulls) and the guide's force on the slider (positive: along +y), in N.
 
-    ``residual`` [N] is the norm of what six Newton equations leave over after fitting the four reactions: it is
-    zero, to rounding, exactly when the accelerations that were used obey the constraints' dynamics.
+    ``residual`` [N] is the norm of what six Newton equations leave over after fitting the four reactions: it
+    is zero, to rounding, exactly when the accelerations that were used obey the constraints' dynamics.
     """
 
     OM1: Any
@@ -147,7 +147,7 @@ class Oracle:
             return ((zero, zero, one, zero), (zero, zero, zero, one), *below)
 
     def characteristic_polynomial(self, params: Params, q: Numbers, F: Any = 0) -> tuple[Any, ...]:
-        """det(lambda - J) at rest in ``q`` under a constant force ``F``: five numbers, powers falling from 4."""
+        """det(lambda - J) at rest in ``q`` under a constant force ``F``: five numbers, powers falling."""
         frozen = {**params, "F0": F, "alpha": 0}
         with mpmath.workdps(DIGITS):
             J = mpmath.matrix(self.jacobian(frozen, (*q, 0, 0), 0))
@@ -182,8 +182,8 @@ class Oracle:
             missing = mpmath.matrix(self._call("newton_missing", params, y, acceleration, F=F))
             directions = self._matrix("newton_directions", (6, 4), params, y)
             # The columns are unit vectors far from dependent, so the normal equations lose no digits.
-            solution = mpmath.lu_solve(directions.T * directions, directions.T * missing)
-            return Reactions(*solution, residual=mpmath.norm(missing - directions * solution))
+            fitted = mpmath.lu_solve(directions.T * directions, directions.T * missing)
+            return Reactions(*[*fitted, mpmath.norm(missing - directions * fitted)])
 
 
 def _rows(matrix: Any) -> tuple[tuple[Any, ...], ...]:
@@ -194,7 +194,7 @@ def _derive() -> dict[str, Callable[..., Any]]:
     """Derive everything from positions and forces; return one mpmath function for each quantity."""
     import sympy as sp
 
-    m1, m2, m3, l, c1, c2, beta, g = constants = sp.symbols(" ".join(_CONSTANTS))  # noqa: E741
+    m1, m2, m3, l, c1, c2, beta, g = constants = sp.symbols(" ".join(_CONSTANTS))
     F, t = sp.symbols("F t")
     q, v, a, p = (sp.Matrix(sp.symbols(names)) for names in ("phi theta", "v1 v2", "a1 a2", "p1 p2"))
     phi, theta = q
@@ -254,7 +254,7 @@ def _derive() -> dict[str, Callable[..., Any]]:
     Q_of_p = Q_other.subs(dict(zip(v, qd_of_p, strict=True)), simultaneous=True)
     canonical = [H.diff(p[0]), H.diff(p[1]), -H.diff(phi) + Q_of_p[0], -H.diff(theta) + Q_of_p[1]]
 
-    # Newton's equations m r'' = applied + directions * (OM1, M1M2, M1M3, N); a tension pulls each end inwards.
+    # Newton's equations m r'' = applied + directions * (OM1, M1M2, M1M3, N); a tension pulls both ends in.
     acceleration = dr * a + velocity.jacobian(q) * v
     newton_missing = sp.diag(*masses) * acceleration - applied
     directions = sp.zeros(6, 4)

@@ -6,7 +6,7 @@ That leaves out links to other files, data kept in other files, and filters that
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -15,7 +15,7 @@ import numpy as np
 
 from fastmech.errors import InputError
 from fastmech.results import RESERVED_ATTRS, Variable
-from fastmech.store.schema import DIMENSION_ONLY
+from fastmech.store.schema import DIM_NUMBER, DIM_NUMBERS, DIMENSION_ONLY
 
 _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
 
@@ -26,7 +26,7 @@ def named_damage(what: str) -> Iterator[None]:
     try:
         yield
     except (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        reason = " ".join(str(part) for part in error.args) or type(error).__name__
         raise InputError(f"{what}: is damaged or not written by fastmech: {reason}") from error
 
 
@@ -41,42 +41,46 @@ def is_dimension_only(stored: h5py.Dataset) -> bool:
     return bool(mark.startswith(DIMENSION_ONLY.encode()))
 
 
-def get_variable(stored: h5py.Dataset, where: str) -> Variable:
+def dimensions(stored: Iterable[h5py.Dataset]) -> dict[int, str]:
+    """The dimensions among the arrays of a group: number and name."""
+    return {int(scale.attrs[DIM_NUMBER]): _own_name(scale) for scale in stored if scale.is_scale}
+
+
+def get_variable(stored: h5py.Dataset, dims: Mapping[int, str], where: str) -> Variable:
     """Read a stored variable whole.
 
+    Args:
+        stored: the variable.
+        dims: the group's dimensions.
+        where: the variable's full name, for messages.
+
     Raises:
-        InputError: its data are damaged or kept in another way than the store's own; the message begins with
-            `where`.
+        InputError: its data are damaged or kept in another way than the store's own.
     """
     with named_damage(where):
         _check_storage(stored)
         text = h5py.check_string_dtype(stored.dtype) is not None
         data = np.asarray(stored.asstr()[()], dtype=object) if text else np.asarray(stored[()])
         attrs = get_attrs(stored)
-        return Variable(_dims(stored), data, attrs.pop("units"), attrs.pop("long_name"), attrs)
+        own_dims = tuple(dims[number] for number in stored.attrs[DIM_NUMBERS]) if stored.ndim else ()
+        return Variable(own_dims, data, attrs.pop("units"), attrs.pop("long_name"), attrs)
 
 
 def get_attrs(stored: h5py.Group | h5py.Dataset) -> dict[str, Any]:
     """The attributes of a group or variable, those of HDF5 and netCDF themselves left out."""
     return {
-        name: _python_value(stored.attrs[name])
+        name: python_value(stored.attrs[name])
         for name in stored.attrs
         if name not in RESERVED_ATTRS and not name.startswith("_")
     }
 
 
-def _dims(stored: h5py.Dataset) -> tuple[str, ...]:
-    if stored.is_scale:
-        return (_own_name(stored),)
-    return tuple(_own_name(stored.dims[axis][0]) for axis in range(stored.ndim))
-
-
-def _python_value(value: Any) -> Any:
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, np.ndarray) and value.dtype == object:
-        return tuple(value)
-    return value
+def python_value(value: Any) -> Any:
+    if isinstance(value, bytes):
+        return value.decode()
+    if isinstance(value, np.ndarray) and value.dtype.kind == "S":
+        return tuple(text.decode() for text in value)
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def _own_name(stored: h5py.Dataset) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import h5py
@@ -10,28 +10,43 @@ import numpy as np
 import numpy.typing as npt
 
 from fastmech.results import Dataset, Variable
-from fastmech.store.schema import COMPACT_BYTES, DIMENSION_ONLY
+from fastmech.store.schema import COMPACT_BYTES, DIM_NUMBER, DIM_NUMBERS, DIMENSION_ONLY
 
 
-def put_dataset(group: h5py.Group, dataset: Dataset) -> None:
-    """Write a dataset into an empty group, its dimensions first, so that all variables can refer to them."""
+def put_dataset(group: h5py.Group, dataset: Dataset, numbers: Iterator[int]) -> None:
+    """Write a dataset into an empty group, its dimensions first, so that all variables can refer to them.
+
+    Args:
+        group: where to.
+        dataset: what.
+        numbers: gives a number to each dimension, unique in the file.
+    """
+    dim_numbers = {dim: np.int32(next(numbers)) for dim in dataset.sizes}
     scales = {dim: _put_scale(group, dim, size, dataset) for dim, size in dataset.sizes.items()}
+    for dim, scale in scales.items():
+        scale.attrs[DIM_NUMBER] = dim_numbers[dim]
     for name, variable in dataset.variables.items():
         if name in scales:
-            continue
-        stored = _put_variable(group, name, variable)
-        for axis, dim in enumerate(variable.dims):
-            stored.dims[axis].attach_scale(scales[dim])
+            stored = scales[name]
+        else:
+            stored = _put_variable(group, name, variable)
+            for axis, dim in enumerate(variable.dims):
+                stored.dims[axis].attach_scale(scales[dim])
+        if variable.dims:
+            stored.attrs[DIM_NUMBERS] = np.array([dim_numbers[dim] for dim in variable.dims])
     put_attrs(group, dataset.attrs)
 
 
 def put_attrs(target: h5py.Group | h5py.Dataset, attrs: Mapping[str, Any]) -> None:
     """Write attributes as `fastmech.results.checked_attrs` returns them."""
     for name, value in attrs.items():
-        if isinstance(value, tuple):
-            target.attrs.create(name, list(value), dtype=h5py.string_dtype())
-        else:
-            target.attrs[name] = value
+        target.attrs[name] = _fixed_length(value) if isinstance(value, (str, tuple)) else value
+
+
+def _fixed_length(texts: str | tuple[str, ...]) -> npt.NDArray[np.bytes_]:
+    encoded = np.char.encode(np.array(texts), "utf-8")
+    # HDF5 has no strings of length 0; the padding is dropped on reading
+    return encoded.astype(h5py.string_dtype("utf-8", max(1, encoded.dtype.itemsize)))
 
 
 def _put_scale(group: h5py.Group, dim: str, size: int, dataset: Dataset) -> h5py.Dataset:

@@ -11,8 +11,16 @@ import h5py
 
 from fastmech.errors import InputError
 from fastmech.results import Dataset, Variable
-from fastmech.store.decode import get_attrs, get_variable, is_dimension_only, members, named_damage
-from fastmech.store.schema import FORMAT, SCHEMA_VERSION
+from fastmech.store.decode import (
+    dimensions,
+    get_attrs,
+    get_variable,
+    is_dimension_only,
+    members,
+    named_damage,
+    python_value,
+)
+from fastmech.store.schema import FORMAT, OWN_ATTRS, SCHEMA_VERSION
 
 if TYPE_CHECKING:
     import xarray
@@ -37,6 +45,7 @@ class Results:
         path: the file.
         attrs: the root's attributes: title, request, versions, machine, time (see `fastmech.store.schema`).
         parameters: the scene's parameters with their units.
+        scene: the same as plain numbers in SI units: `fastmech.Scene(**results.scene)` is the scene again.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -47,12 +56,18 @@ class Results:
             with named_damage(str(path)):
                 self.attrs = get_attrs(self._file)
                 root = members(self._file)
-                self.parameters = {n: get_variable(m) for n, m in root.items() if isinstance(m, h5py.Dataset)}
-                self._sections = {
-                    name: Section(member, f"{path}: {name}")
-                    for name, member in root.items()
-                    if isinstance(member, h5py.Group)
-                }
+            self.parameters = {
+                name: get_variable(member, {}, f"{path}: parameter {name!r}")
+                for name, member in root.items()
+                if isinstance(member, h5py.Dataset)
+            }
+            with named_damage(f"{path}: the scene's parameters"):
+                self.scene = {name: float(parameter.data) for name, parameter in self.parameters.items()}
+            self._sections = {
+                name: Section(member, f"{path}: {name}")
+                for name, member in root.items()
+                if isinstance(member, h5py.Group)
+            }
         except BaseException:
             self.close()
             raise
@@ -61,11 +76,6 @@ class Results:
     def sections(self) -> tuple[str, ...]:
         """Names of the sections, in the order of the request."""
         return tuple(self._sections)
-
-    @property
-    def scene(self) -> dict[str, float]:
-        """The scene's parameters in SI units; `fastmech.Scene(**results.scene)` is the scene again."""
-        return {name: float(parameter.data) for name, parameter in self.parameters.items()}
 
     def __getitem__(self, name: str) -> Section:
         if name not in self._sections:
@@ -105,13 +115,14 @@ class Section:
     """
 
     def __init__(self, group: h5py.Group, where: str) -> None:
-        stored = {name: member for name, member in members(group).items() if isinstance(member, h5py.Dataset)}
         self._where = where
-        self.attrs: dict[str, Any] = get_attrs(group)
-        self.sizes = {name: int(member.size) for name, member in stored.items() if member.is_scale}
-        self.variables: Mapping[str, Variable] = _StoredVariables(
-            {name: member for name, member in stored.items() if not is_dimension_only(member)}, where
-        )
+        with named_damage(where):
+            stored = {n: member for n, member in members(group).items() if isinstance(member, h5py.Dataset)}
+            variables = {name: member for name, member in stored.items() if not is_dimension_only(member)}
+            dims = dimensions(stored.values())
+            self.sizes = {dim: int(stored[dim].size) for dim in dims.values()}
+            self.attrs: dict[str, Any] = get_attrs(group)
+        self.variables: Mapping[str, Variable] = _StoredVariables(variables, dims, where)
 
     def __getitem__(self, name: str) -> Variable:
         if name not in self.variables:
@@ -148,17 +159,17 @@ class Section:
 class _StoredVariables(Mapping[str, Variable]):
     """The variables of a section, each read when it is asked for."""
 
-    def __init__(self, stored: Mapping[str, h5py.Dataset], where: str) -> None:
+    def __init__(self, stored: Mapping[str, h5py.Dataset], dims: Mapping[int, str], where: str) -> None:
         self._stored = stored
+        self._dims = dims
         self._where = where
 
     def __getitem__(self, name: str) -> Variable:
         stored = self._stored[name]
-        what = f"{self._where}: variable {name!r}"
+        where = f"{self._where}: variable {name!r}"
         if not stored:
-            raise InputError(f"{what}: the file is closed; read it before")
-        with named_damage(what):
-            return get_variable(stored)
+            raise InputError(f"{where}: the file is closed; read it before")
+        return get_variable(stored, self._dims, where)
 
     def __contains__(self, name: object) -> bool:
         return name in self._stored
@@ -186,10 +197,11 @@ def _open_file(path: Path) -> h5py.File:
 
 def _check_schema(file: h5py.File, path: Path) -> None:
     with named_damage(str(path)):
-        written_by, version = file.attrs.get("format"), file.attrs.get("schema_version")
+        written_by, version = (python_value(file.attrs.get(name)) for name in OWN_ATTRS)
     if not isinstance(written_by, str) or written_by != FORMAT:
         raise InputError(f"{path}: is an HDF5 file, but not a result file of fastmech")
-    if version != SCHEMA_VERSION:
+    if not isinstance(version, int) or version != SCHEMA_VERSION:
         raise InputError(
-            f"{path}: has schema version {version}, this version of fastmech reads {SCHEMA_VERSION}; use a newer one"
+            f"{path}: has schema version {version}, but this fastmech reads version {SCHEMA_VERSION};"
+            " open it with the fastmech that wrote it or a newer one"
         )

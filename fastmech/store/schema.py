@@ -6,14 +6,17 @@ A result file is an HDF5 file that netCDF-4 readers open:
 - Each section of the request is a group of the root and holds one `fastmech.results.Dataset`.
 - A variable is an HDF5 dataset with the attributes `units` and `long_name` and any others of its own. Its
   dimensions are HDF5 dimension scales of the same group: the coordinate variable of that name or, where
-  there is none, an empty dataset with netCDF's own mark (`DIMENSION_ONLY`). Strings are UTF-8 of variable
-  length.
+  there is none, an empty dataset with netCDF's own mark (`DIMENSION_ONLY`). They are attached as HDF5 asks,
+  and by number as netCDF-4 does (`DIM_NUMBER`, `DIM_NUMBERS`), unique in the file.
+- String variables are UTF-8 of variable length; texts in attributes are UTF-8 of fixed length.
 - The root's attributes are `format`, `schema_version`, all of `PROVENANCE`, `title` and whatever the run
   adds, such as `request` (the TOML text), `seed`, `wall_time_s`, `method`.
 
-Every number is under a checksum: arrays are chunked, shuffled, compressed by gzip and summed by Fletcher-32;
-scalars and arrays up to `COMPACT_BYTES` lie in their object's header, which has a checksum of its own since
-HDF5 1.10. Texts (attributes and string variables) lie outside it: HDF5 has no checksum for them.
+Numbers and attributes are under a checksum: arrays are chunked, shuffled, compressed by gzip and summed by
+Fletcher-32; scalars, arrays up to `COMPACT_BYTES` and attributes lie in their object's header, which has a
+checksum of its own in the file format of HDF5 1.10. What has a variable length lies in HDF5's global heap, which
+has none and on whose damage HDF5 may loop for ever: so only string variables use it, and the reader takes the
+dimensions from their numbers.
 """
 
 from __future__ import annotations
@@ -50,6 +53,12 @@ LIBRARY_VERSIONS = ("v110", "v110")
 
 COMPACT_BYTES = 4096
 """Largest array kept in its object's header."""
+
+DIM_NUMBER = "_Netcdf4Dimid"
+"""Attribute of a dimension scale: the dimension's number."""
+
+DIM_NUMBERS = "_Netcdf4Coordinates"
+"""Attribute of a variable: the numbers of its dimensions."""
 
 DIMENSION_ONLY = "This is a netCDF dimension but not a netCDF variable."
 """netCDF-4's mark of a dimension without coordinate; the size follows, right-aligned in ten columns."""

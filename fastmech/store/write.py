@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 import re
 import secrets
@@ -68,9 +69,10 @@ def write_results(
         try:
             with h5py.File(temporary, "x", libver=LIBRARY_VERSIONS, track_order=True) as file:
                 put_attrs(file, root_attrs)
-                put_dataset(file, root)
+                numbers = itertools.count()
+                put_dataset(file, root, numbers)
                 for name, dataset in sections.items():
-                    put_dataset(file.create_group(name, track_order=True), dataset)
+                    put_dataset(file.create_group(name, track_order=True), dataset, numbers)
             _flush_to_disk(temporary, os.O_RDWR)
             _publish(temporary, target, replace)
         finally:

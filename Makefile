@@ -1,0 +1,59 @@
+# The two commands of a newcomer: `make demo` and `make test`. Both install what they need into .venv.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+OUT ?= results
+
+.PHONY: help demo test lint bench clean
+
+help:
+	@echo "make demo   install, run scans/paper.toml and the paper report, say where the results are"
+	@echo "make test   install and run the tests"
+	@echo "make lint   formatter, linter and type checker"
+	@echo "make bench  speed against error, side by side with other integrators"
+	@echo "make clean  remove the virtual environment and build output (results stay)"
+
+$(BIN)/python:
+	$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "fastmech needs Python 3.11 or newer")'
+	$(PYTHON) -m venv $(VENV)
+
+# One stamp for each set of extras: what is installed is not installed again.
+$(VENV)/.demo: $(BIN)/python pyproject.toml constraints.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[xarray]'
+	@touch $@
+
+$(VENV)/.test: $(BIN)/python pyproject.toml constraints.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]'
+	@touch $@ $(VENV)/.demo
+
+$(VENV)/.lint: $(BIN)/python pyproject.toml constraints.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test,lint]'
+	@touch $@ $(VENV)/.test $(VENV)/.demo
+
+demo: $(VENV)/.demo
+	$(BIN)/fastmech run scans/paper.toml --out $(OUT)/paper.h5 --fresh
+	$(BIN)/fastmech plot $(OUT)/paper.h5 --out $(OUT)/paper
+	$(BIN)/fastmech paper --out $(OUT)/report
+	@echo
+	@echo "Results:  $(OUT)/paper.h5          (fastmech info $(OUT)/paper.h5)"
+	@echo "Pictures: $(OUT)/paper/"
+	@echo "Report:   $(OUT)/report/report.html (the paper's tables and figures, printed against computed)"
+
+# Compiled; then small tests in plain Python, where a silent trap of compiled code shows as an exception;
+# then the kernels' tests with every array index checked.
+test: $(VENV)/.test
+	$(BIN)/python -m pytest
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -m nojit
+	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest -m nojit
+
+lint: $(VENV)/.lint
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+bench: $(VENV)/.demo
+	$(BIN)/fastmech bench --out $(OUT)/bench
+
+clean:
+	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

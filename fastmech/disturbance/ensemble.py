@@ -1,0 +1,212 @@
+"""``fm.disturb``: what becomes of thousands of random disturbances of one equilibrium."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.disturbance.observe import EXCURSION_PHI, EXCURSION_THETA, LAST_OUTSIDE, observe_departure
+from fastmech.disturbance.size import Size, size_at
+from fastmech.ensembles import checks
+from fastmech.ensembles.run import Observation, Progress, run_ensemble
+from fastmech.ensembles.status import Status
+from fastmech.equilibria.find import Equilibria, Equilibrium, find_equilibria
+from fastmech.errors import InputError
+from fastmech.integrators.tableaus import find_method
+from fastmech.kernels.select import right_hand_side
+from fastmech.mechanism.coefficients import reduce
+from fastmech.scene import Scene
+
+Floats = NDArray[np.float64]
+TURN = 2.0 * np.pi
+
+
+class Outcome(IntEnum):
+    """Where a disturbed trajectory is at the end of the run."""
+
+    RETURNED = 0
+    ELSEWHERE = 1
+    AT_UNSTABLE = 2
+    UNDECIDED = 3
+    NOT_FINITE = 4
+
+    @property
+    def advice(self) -> str:
+        """What it means and what to do."""
+        return _ADVICE[self]
+
+
+_ADVICE = {
+    Outcome.RETURNED: "at rest within the ball of return, no turns made",
+    Outcome.ELSEWHERE: "at rest at another stable equilibrium, or at this one some turns further",
+    Outcome.AT_UNSTABLE: "still within the ball of an unstable equilibrium: it will leave; use a larger t_end",
+    Outcome.UNDECIDED: "still moving at t_end; use a larger t_end",
+    Outcome.NOT_FINITE: "NaN or infinity: the step is too large; use a smaller dt",
+}
+
+
+@dataclass(frozen=True)
+class DisturbedEnsemble:
+    """Random disturbances of one equilibrium and what became of them; arrays over n trajectories."""
+
+    equilibria: Equilibria  #: all equilibria of the scene
+    index: int  #: which of them was disturbed
+    size: Size  #: the norm in which radius and ball are measured
+    starts: Floats  #: states at t = 0, shape (n, 4)
+    final: Floats  #: states at t_end, shape (n, 4)
+    outcome: NDArray[np.int8]  #: :class:`Outcome`, shape (n,)
+    end_index: NDArray[np.int8]  #: equilibrium in whose ball it ended, -1: none; shape (n,)
+    turns: NDArray[np.int64]  #: full turns of phi and theta on the way there, 0 where none; shape (n, 2)
+    time_to_return: Floats  #: s, from which on it stayed in the ball of return; NaN unless returned; (n,)
+    excursion: Floats  #: largest departures of phi and theta from the equilibrium [rad], shape (n, 2)
+
+    @property
+    def share_returned(self) -> float:
+        """Share of the trajectories that returned."""
+        return float(np.mean(self.outcome == Outcome.RETURNED))
+
+
+def disturb(
+    scene: Scene,
+    equilibrium: Equilibrium,
+    n: int = 4096,
+    *,
+    radius: float = 0.5,
+    seed: int = 0,
+    t_end: float = 120.0,
+    dt: float = 0.05,
+    method: str = "dop853",
+    return_radius: float = 0.01,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> DisturbedEnsemble:
+    """Disturb an equilibrium at random and follow every disturbance.
+
+    Starts are uniform in the ball of the given ``radius`` about the equilibrium, in the norm of
+    :class:`fastmech.disturbance.size.Size`, drawn by NumPy's ``default_rng(seed)``. Rest is being within
+    ``return_radius`` of an equilibrium, in that equilibrium's norm.
+
+    Args:
+        scene: a scene with a constant force (``alpha = 0`` or ``F0 = 0``).
+        equilibrium: one of ``find_equilibria(scene)``.
+        n: number of disturbances.
+        radius: size of the largest disturbance [rad].
+        seed: seed of the starts.
+        t_end: end of the run [s].
+        dt: longest step [s].
+        method: name of the method.
+        return_radius: radius of the ball of return [rad].
+        threads: threads to use; the result does not depend on it.
+        progress: is told how many trajectories have finished since its last call.
+
+    Raises:
+        InputError: an argument is wrong, or the scene's force decays.
+    """
+    require_constant_force(scene)
+    n = checks.whole_number("n", n, least=1)
+    seed = checks.whole_number("seed", seed, least=0)
+    radius = checks.number("radius", radius, "rad", above=0.0)
+    return_radius = checks.number("return_radius", return_radius, "rad", above=0.0)
+    times = np.array([0.0, checks.number("t_end", t_end, "s", above=0.0)])
+    dt = checks.number("dt", dt, "s", above=0.0)
+    equilibria = find_equilibria(scene)
+    index = _index_of(equilibrium, equilibria)
+    center = np.array([equilibrium.phi, equilibrium.theta, 0.0, 0.0])
+    size = size_at(scene, equilibrium.phi, equilibrium.theta)
+    starts = center + size.from_ball(radius * uniform_ball(np.random.default_rng(seed), n))
+
+    departure = np.abs(starts - center)
+    states, record, status = run_ensemble(
+        right_hand_side(scene),
+        np.array(reduce(scene), dtype=np.float64),
+        starts,
+        times,
+        dt,
+        find_method(method),
+        _observation(center, size, return_radius),
+        threads=threads,
+        progress=progress,
+    )
+    final = states[-1]
+    end_index, turns = _resting_place(scene, equilibria, final, return_radius)
+    turned = (turns != 0).any(axis=1)
+    stable = np.array([e.kind == "minimum" for e in equilibria])
+    outcome = np.full(n, Outcome.UNDECIDED, dtype=np.int8)
+    outcome[(end_index >= 0) & stable[end_index]] = Outcome.ELSEWHERE
+    outcome[(end_index >= 0) & ~stable[end_index]] = Outcome.AT_UNSTABLE
+    outcome[(end_index == index) & ~turned & stable[end_index]] = Outcome.RETURNED
+    outcome[status != Status.OK] = Outcome.NOT_FINITE
+    return DisturbedEnsemble(
+        equilibria=equilibria,
+        index=index,
+        size=size,
+        starts=starts,
+        final=final,
+        outcome=outcome,
+        end_index=end_index,
+        turns=turns,
+        time_to_return=np.where(outcome == Outcome.RETURNED, record[LAST_OUTSIDE], np.nan),
+        excursion=np.maximum(departure[:, :2], record[[EXCURSION_PHI, EXCURSION_THETA]].T),
+    )
+
+
+def require_constant_force(scene: Scene) -> None:
+    """Refuse a scene whose force changes: nothing rests while it decays.
+
+    Raises:
+        InputError: the force decays.
+    """
+    if scene.F0 != 0 and scene.alpha != 0:
+        raise InputError(
+            f"scene.alpha = {scene.alpha:g}: must be 0 1/s for motion about an equilibrium (or F0 = 0 N); "
+            "use scene.replace(alpha=0.0)"
+        )
+
+
+def uniform_ball(rng: np.random.Generator, n: int) -> Floats:
+    """Points uniform in the unit ball of four dimensions, shape (n, 4)."""
+    directions = unit_directions(rng, n)
+    return directions * rng.random((n, 1)) ** 0.25
+
+
+def unit_directions(rng: np.random.Generator, n: int) -> Floats:
+    """Points uniform on the unit sphere of four dimensions, shape (n, 4)."""
+    normal = rng.standard_normal((n, 4))
+    return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
+
+
+def _index_of(equilibrium: Equilibrium, equilibria: Equilibria) -> int:
+    away = [
+        np.hypot(np.sin((equilibrium.phi - e.phi) / 2), np.sin((equilibrium.theta - e.theta) / 2))
+        for e in equilibria
+    ]
+    if not away or min(away) > 1e-9:
+        raise InputError(
+            f"equilibrium = ({equilibrium.phi:g}, {equilibrium.theta:g}) rad: is not an equilibrium of this scene"
+        )
+    return int(np.argmin(away))
+
+
+def _observation(center: Floats, size: Size, return_radius: float) -> Observation:
+    a = size.metric
+    params = [center[0], center[1], a[0, 0], a[0, 1], a[1, 1], 1.0 / size.omega**2, return_radius**2]
+    return Observation(observe_departure, np.array(params), np.zeros(3))
+
+
+def _resting_place(
+    scene: Scene, equilibria: Equilibria, final: Floats, radius: float
+) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
+    """Index of the equilibrium in whose ball each final state lies (-1: none) and the turns made."""
+    index = np.full(len(final), -1, dtype=np.int8)
+    turns = np.zeros((len(final), 2), dtype=np.int64)
+    for i, e in enumerate(equilibria):
+        departure = final - np.array([e.phi, e.theta, 0.0, 0.0])
+        made = np.round(departure[:, :2] / TURN)
+        departure[:, :2] -= TURN * made
+        inside = size_at(scene, e.phi, e.theta)(departure) <= radius
+        index[inside] = i
+        turns[inside] = made[inside].astype(np.int64)
+    return index, turns

@@ -1,0 +1,55 @@
+"""One disturbance of an equilibrium: the nonlinear motion and the linearized one side by side."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import ArrayLike, NDArray
+
+from fastmech.disturbance.ensemble import require_constant_force
+from fastmech.ensembles import checks
+from fastmech.ensembles.integrate import integrate
+from fastmech.equilibria.find import Equilibrium
+from fastmech.scene import Scene
+from fastmech.stability.linearize import jacobian
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DisturbedMotion:
+    """Disturbances xi_phi, xi_theta [rad], eta_phi, eta_theta [rad/s] over time, paper (21)."""
+
+    t: Floats  #: s, shape (times,)
+    nonlinear: Floats  #: shape (times, n, 4)
+    linearized: Floats  #: shape (times, n, 4)
+
+
+def disturbed_motion(
+    scene: Scene,
+    equilibrium: Equilibrium,
+    disturbance: ArrayLike,
+    times: ArrayLike,
+    *,
+    dt: float = 0.01,
+    method: str = "dop853",
+    threads: int | None = None,
+) -> DisturbedMotion:
+    """Motion after disturbances (n, 4) or (4,) of an equilibrium, at ``times`` [s].
+
+    The nonlinear motion is integrated with a fixed step; the linearized one is exact: the matrix
+    exponential of the Jacobian at the equilibrium.
+
+    Raises:
+        InputError: an argument is wrong, or the scene's force decays.
+    """
+    require_constant_force(scene)
+    start = checks.states("disturbance", disturbance, 4)
+    t = checks.rising_times("times", times)
+    center = np.array([equilibrium.phi, equilibrium.theta, 0.0, 0.0])
+    run = integrate(scene, center + start, dt=dt, method=method, t_eval=t, threads=threads)
+    propagators = scipy.linalg.expm(t[:, None, None] * jacobian(scene, equilibrium))
+    linearized = np.einsum("tij,nj->tni", propagators, start)
+    return DisturbedMotion(t, run.y - center, linearized)

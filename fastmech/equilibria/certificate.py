@@ -1,0 +1,107 @@
+"""The completeness proof: each equilibrium by Newton-Kantorovich, their number by the counting theorem.
+
+The statement that is proved is about the scene's parameters as the doubles that they are: the rounding
+of the reduced coefficients and of every evaluation is inside the bounds.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fastmech.equilibria.balance import EPS, Normal, Pulls, expected_count, wrap
+from fastmech.equilibria.outcome import Outcome
+from fastmech.equilibria.search import gradient, hessian
+from fastmech.jit import inlined
+
+COMPLETE = int(Outcome.COMPLETE)
+AT_FOLD = int(Outcome.AT_FOLD)
+UNPROVED = int(Outcome.UNPROVED)
+
+#: Roundings in one evaluated pull or stiffness, each at most EPS/2 of its amplitude: sine, cosine, the sum of
+#: angles, products and sums stay below eight.
+EVALUATION = 8.0 * EPS
+
+#: A residual is "at rounding level" below this many evaluation bounds: the last Newton step's own rounding.
+RESIDUAL = 16.0
+
+
+@inlined
+def pull_errors(p: Pulls) -> tuple[float, float, float]:
+    """Bounds on the error of each of the three pulls (and of its derivative), over the scale."""
+    return (
+        p.error_phi + EVALUATION * p.amplitude_phi,
+        p.error_theta + EVALUATION * p.amplitude_theta,
+        p.error_psi + EVALUATION * p.amplitude_psi,
+    )
+
+
+@inlined
+def existence_radius(p: Pulls, phi: float, theta: float) -> tuple[float, int, bool]:
+    """Proof that exactly one equilibrium lies within a radius [rad] of (phi, theta).
+
+    Newton-Kantorovich in its affine-invariant form. H = -sum_k e_k v_k v_k^T with e_k = Ak sin yk and the
+    directions v = (1, 0), (0, 1), (1, 1), so |H^-1 (H(x) - H(y))| <= w |x - y| with w = sum_k Ak |H^-1 v_k| |v_k|^2;
+    with the step h = |H^-1 grad| a root exists and is the only one near if w h <= 1/2. A stiff spring
+    enlarges Ak and shrinks H^-1 v_k alike, hence costs nothing.
+
+    Returns:
+        The radius (infinite: nothing proved), the sign of det H (0: not certain), and whether the gradient is
+        zero to rounding level, so that a missing proof is due to a singular Hessian.
+    """
+    d1, d2, d3 = pull_errors(p)
+    g1, g2 = gradient(p, phi, theta)
+    small = abs(g1) + abs(g2) <= RESIDUAL * (d1 + d2 + 2.0 * d3)
+    h11, h12, h22 = hessian(p, phi, theta)
+    k1, k2, k3 = h11 - h12, h22 - h12, h12  # -e_k
+    determinant = k1 * k2 + k1 * k3 + k2 * k3
+    doubt = (
+        (d1 + d3) * (abs(k2) + abs(k3) + d2)
+        + (d2 + d3) * (abs(k1) + abs(k3) + d3)
+        + (d1 + d2 + d3) * (abs(k1) + abs(k2) + d1)
+        + EVALUATION * (abs(k1 * k2) + abs(k1 * k3) + abs(k2 * k3))
+    )
+    least = abs(determinant) - doubt
+    if not least > 0.0:
+        return np.inf, 0, small
+    n1 = (np.hypot(k2 + k3, k3) + d2 + 2.0 * d3) / least
+    n2 = (np.hypot(k1 + k3, k3) + d1 + 2.0 * d3) / least
+    n3 = (np.hypot(k1, k2) + d1 + d2) / least
+    step = abs(g1) * n1 + abs(g2) * n2 + d1 * n1 + d2 * n2 + d3 * n3
+    w = p.amplitude_phi * n1 + p.amplitude_theta * n2 + 2.0 * p.amplitude_psi * n3
+    if not 2.0 * w * step <= 1.0:
+        return np.inf, 0, small
+    return 2.0 * step / (1.0 + np.sqrt(1.0 - 2.0 * w * step)), 1 if determinant > 0.0 else -1, small
+
+
+@inlined
+def apart(phi1: float, theta1: float, phi2: float, theta2: float) -> float:
+    """Distance on the torus [rad]."""
+    return np.hypot(wrap(phi1 - phi2), wrap(theta1 - theta2))
+
+
+@inlined
+def certify(p: Pulls, n: Normal, count: int, phi: np.ndarray, theta: np.ndarray, radius: np.ndarray) -> int:
+    """Outcome for a list of ``count`` equilibria; writes the existence radius [rad] of each into ``radius``.
+
+    COMPLETE needs all three: every entry proved, the balls disjoint (so all are different), and as many as
+    the counting theorem says, where six is enough even if rounding hides the theorem's margin. The
+    counting law minima - saddles + maxima = 0 is checked too. The list may come from anywhere: with an
+    entry missing, false or twice it does not pass.
+    """
+    proved, law, explained = 0, 0, True
+    for i in range(count):
+        radius[i], sign, small = existence_radius(p, phi[i], theta[i])
+        law += sign
+        if radius[i] < np.inf:
+            proved += 1
+        elif not small:
+            explained = False
+    for i in range(count):
+        for j in range(i):
+            if apart(phi[i], theta[i], phi[j], theta[j]) <= radius[i] + radius[j] and radius[i] + radius[j] < np.inf:
+                return UNPROVED
+    if proved == count and law == 0 and (count == 6 or count == expected_count(n)):
+        return COMPLETE
+    if proved < count and explained:
+        return AT_FOLD
+    return UNPROVED

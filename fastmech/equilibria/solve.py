@@ -1,0 +1,148 @@
+"""One compiled call from reduced coefficients to certified equilibria, for many scenes in a row."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import types
+
+from fastmech.equilibria.balance import EPS, Pulls, expected_count, normal_form, pulls, vanishing
+from fastmech.equilibria.certificate import AT_FOLD, UNPROVED, apart, certify
+from fastmech.equilibria.outcome import Outcome
+from fastmech.equilibria.search import MOST, candidates, hessian
+from fastmech.jit import MATRIX, STATUSES, VECTOR, inlined, kernel
+from fastmech.mechanism.reduced import potential
+
+DEGENERATE = int(Outcome.DEGENERATE)
+
+#: Morse index of a slot without an equilibrium, and of an equilibrium whose Hessian is singular within rounding.
+NO_EQUILIBRIUM = -1
+SINGULAR = -2
+
+#: At a cusp three equilibria merge and rounding displaces them by about EPS^(1/3) rad; twice that, and some.
+MERGE = 16.0 * EPS ** (1.0 / 3.0)
+
+INDICES = types.Array(types.int8, 2, "C")
+
+
+@inlined
+def merge_singular(count: int, phi: np.ndarray, theta: np.ndarray, radius: np.ndarray) -> int:
+    """Drop what is within ``MERGE`` of another unproved entry: the same equilibrium, displaced by rounding."""
+    kept = 0
+    for i in range(count):
+        again = False
+        for j in range(kept):
+            if np.isinf(radius[i]) and np.isinf(radius[j]) and apart(phi[i], theta[i], phi[j], theta[j]) < MERGE:
+                again = True
+        if not again:
+            phi[kept], theta[kept], radius[kept] = phi[i], theta[i], radius[i]
+            kept += 1
+    return kept
+
+
+@inlined
+def energy_at(p: Pulls, phi: float, theta: float) -> float:
+    """U over m2 l^2 and the scale, less the springs' constant (paper (10))."""
+    s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
+    return potential(s1, c1, s2, c2, s1 * c2 + c1 * s2, p.lift, p.spring, p.gravity, p.force)
+
+
+@inlined
+def morse_index(p: Pulls, phi: float, theta: float, radius: float) -> int:
+    """Number of negative eigenvalues of the Hessian: proved where the equilibrium is, else ``SINGULAR``."""
+    if np.isinf(radius):
+        return SINGULAR
+    h11, h12, h22 = hessian(p, phi, theta)
+    if h11 * h22 - h12 * h12 < 0.0:
+        return 1
+    return 0 if h11 + h22 > 0.0 else 2
+
+
+@inlined
+def sort_by_energy(count: int, energy: np.ndarray, phi: np.ndarray, theta: np.ndarray, radius: np.ndarray) -> None:
+    """Deepest first; insertion keeps the order of equal ones."""
+    for i in range(1, count):
+        for j in range(i, 0, -1):
+            if energy[j] >= energy[j - 1]:
+                break
+            energy[j], energy[j - 1] = energy[j - 1], energy[j]
+            phi[j], phi[j - 1] = phi[j - 1], phi[j]
+            theta[j], theta[j - 1] = theta[j - 1], theta[j]
+            radius[j], radius[j - 1] = radius[j - 1], radius[j]
+
+
+@kernel(types.void(MATRIX, MATRIX, MATRIX, MATRIX, MATRIX, INDICES, STATUSES, STATUSES, STATUSES, VECTOR))
+def solve(
+    coefficients: np.ndarray,
+    phi: np.ndarray,
+    theta: np.ndarray,
+    energy: np.ndarray,
+    radius: np.ndarray,
+    index: np.ndarray,
+    count: np.ndarray,
+    expected: np.ndarray,
+    outcome: np.ndarray,
+    margin: np.ndarray,
+) -> None:
+    """Equilibria of every row of ``coefficients``, deepest first, with the outcome of the proof.
+
+    Args:
+        coefficients: (n, 8) rows of ``fastmech.mechanism.coefficients.Coefficients``, the force frozen.
+        phi, theta: (n, 6) angles [rad] in (-pi, pi]; written, NaN where there is none.
+        energy: (n, 6) U over m2 l^2 less the springs' constant [1/s^2]; written.
+        radius: (n, 6) distance [rad] within which the true equilibrium is; infinite: not proved; written.
+        index: (n, 6) Morse index, ``SINGULAR`` or ``NO_EQUILIBRIUM``; written.
+        count: (n,) number found; written.
+        expected: (n,) number by the counting theorem, 0 where rounding hides it; written.
+        outcome: (n,) ``Outcome``; DEGENERATE means here "within rounding"; written.
+        margin: (n,) distance to the fold [rad], positive with six equilibria; NaN if undefined; written.
+    """
+    for row in range(coefficients.shape[0]):
+        phi[row], theta[row], energy[row], radius[row] = np.nan, np.nan, np.nan, np.nan
+        index[row] = NO_EQUILIBRIUM
+        count[row], expected[row], outcome[row], margin[row] = 0, 0, UNPROVED, np.nan
+        mass, _, lift, spring, gravity, force, _, _ = coefficients[row]
+        p = pulls(mass, lift, spring, gravity, force)
+        if not np.isfinite(lift + spring + gravity + force):
+            continue
+        if vanishing(p) >= 2:
+            outcome[row] = DEGENERATE
+            continue
+        n = normal_form(p)
+        expected[row] = expected_count(n)
+        margin[row] = n.peak - n.distance
+        found = candidates(p, n, phi[row], theta[row])
+        outcome[row] = certify(p, n, found, phi[row], theta[row], radius[row])
+        if outcome[row] == AT_FOLD:
+            found = merge_singular(found, phi[row], theta[row], radius[row])
+            phi[row, found:], theta[row, found:], radius[row, found:] = np.nan, np.nan, np.nan
+        scale = max(np.hypot(lift, force), np.hypot(gravity, force), spring)
+        for i in range(found):
+            energy[row, i] = scale * energy_at(p, phi[row, i], theta[row, i])
+        sort_by_energy(found, energy[row], phi[row], theta[row], radius[row])
+        for i in range(found):
+            index[row, i] = morse_index(p, phi[row, i], theta[row, i], radius[row, i])
+        count[row] = found
+
+
+class Solution:
+    """Arrays that ``solve`` writes, for n scenes; see there."""
+
+    def __init__(self, coefficients: np.ndarray) -> None:
+        """Solve every row of ``coefficients`` (n, 8), float64 and contiguous."""
+        n = len(coefficients)
+        self.phi, self.theta, self.energy, self.radius = np.empty((4, n, MOST))
+        self.index = np.empty((n, MOST), dtype=np.int8)
+        self.count, self.expected, self.outcome = np.empty((3, n), dtype=np.int8)
+        self.margin = np.empty(n)
+        solve(
+            coefficients,
+            self.phi,
+            self.theta,
+            self.energy,
+            self.radius,
+            self.index,
+            self.count,
+            self.expected,
+            self.outcome,
+            self.margin,
+        )

@@ -1,0 +1,138 @@
+"""Thousands of random disturbances of every equilibrium, and how far the linearized motion can be trusted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from fastmech.disturbance.ensemble import DisturbedEnsemble, Outcome, disturb
+from fastmech.disturbance.linear_range import linear_range
+from fastmech.equilibria.find import find_equilibria
+from fastmech.results import Dataset, Variable, flags
+from fastmech.scan_types.request import RunContext, Scan
+from fastmech.scene import Scene
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
+
+
+class Disturbed(Scan):
+    """Ensembles about every equilibrium, uniform in a ball of the kinetic-energy norm."""
+
+    kind: ClassVar[str] = "disturbed"
+
+    trajectories: Annotated[int, Field(ge=1, le=100_000_000)] = 4096
+    radius: Annotated[float, Field(gt=0, description="largest size of a disturbance [rad]")] = 0.5
+    return_radius: Annotated[float, Field(gt=0, description="radius of the ball of return [rad]")] = 0.01
+    seed: Annotated[int, Field(ge=0)] = 0
+    t_end: Annotated[float, Field(gt=0)] = 120.0
+    dt: Annotated[float, Field(gt=0)] = 0.05
+    method: str = "dop853"
+    linear_horizon: Annotated[float, Field(gt=0, description="horizon of the comparison [s]")] = 2.0
+    linear_tolerance: Annotated[float, Field(gt=0, description="deviation allowed, relative")] = 0.05
+    linear_directions: Annotated[int, Field(ge=1, le=1_000_000)] = 256
+
+    def run(self, scene: Scene, context: RunContext) -> Dataset:
+        """Disturb one equilibrium after the other; each has its own stream of random numbers."""
+        equilibria = find_equilibria(scene)
+        advance = context.stage("disturbed trajectories", self.trajectories * len(equilibria))
+        ensembles = [
+            disturb(
+                scene,
+                equilibrium,
+                self.trajectories,
+                radius=self.radius,
+                return_radius=self.return_radius,
+                seed=self.seed + i,
+                t_end=self.t_end,
+                dt=self.dt,
+                method=self.method,
+                threads=context.threads,
+                progress=advance,
+            )
+            for i, equilibrium in enumerate(equilibria)
+        ]
+        advance = context.stage("range of the linearized motion", len(equilibria))
+        ranges = []
+        for i, equilibrium in enumerate(equilibria):
+            ranges.append(
+                linear_range(
+                    scene,
+                    equilibrium,
+                    horizon=self.linear_horizon,
+                    tolerance=self.linear_tolerance,
+                    directions=self.linear_directions,
+                    seed=self.seed + i,
+                    threads=context.threads,
+                )
+            )
+            advance(1)
+        each, every = ("equilibrium",), ("equilibrium", "trajectory")
+        state = "phi, theta, phi', theta'"
+        variables = {
+            "phi": Variable(each, equilibria.phi, "rad", "angle phi of the disturbed equilibrium"),
+            "theta": Variable(each, equilibria.theta, "rad", "angle theta of the disturbed equilibrium"),
+            "omega": Variable(each, [e.size.omega for e in ensembles], "rad/s", "frequency in the norm"),
+            "start": Variable((*every, "component"), _stack(ensembles, "starts"), "rad, rad/s", f"start: {state}"),
+            "final": Variable((*every, "component"), _stack(ensembles, "final"), "rad, rad/s", f"end: {state}"),
+            "outcome": Variable(every, _stack(ensembles, "outcome"), "1", "where it is at the end", flags(Outcome)),
+            "end_equilibrium": Variable(
+                every, _stack(ensembles, "end_index"), "1", "equilibrium at which it rests at the end, -1: none"
+            ),
+            "turns": Variable(
+                (*every, "angle"), _stack(ensembles, "turns"), "1", "full turns of phi and theta made until then"
+            ),
+            "time_to_return": Variable(
+                every, _stack(ensembles, "time_to_return"), "s", "from then on within the ball of return"
+            ),
+            "excursion": Variable(
+                (*every, "angle"), _stack(ensembles, "excursion"), "rad", "largest departures of phi and theta"
+            ),
+            "share_returned": Variable(each, [e.share_returned for e in ensembles], "1", "share that returned"),
+            "quantile": Variable(("quantile",), np.array(QUANTILES), "1", "quantile"),
+            "time_to_return_quantile": Variable(
+                ("equilibrium", "quantile"),
+                np.array([return_quantiles(e) for e in ensembles]).reshape(-1, len(QUANTILES)),
+                "s",
+                "quantiles of the time to return over those that returned",
+            ),
+            "linear_direction": Variable(
+                ("equilibrium", "direction", "component"),
+                np.array([r.directions for r in ranges]).reshape(-1, self.linear_directions, 4),
+                "rad, rad/s",
+                "disturbance of size 1 rad",
+            ),
+            "linear_limit": Variable(
+                ("equilibrium", "direction"),
+                np.array([r.limit for r in ranges]).reshape(-1, self.linear_directions),
+                "rad",
+                "size up to which the linearized motion keeps the tolerance, NaN: beyond all tried",
+            ),
+        }
+        attrs = self.model_dump(exclude={"scene"}) | {
+            "distribution": "uniform in the ball of the given radius, kinetic-energy norm at the equilibrium"
+        }
+        return Dataset(variables, attrs)
+
+    @staticmethod
+    def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
+        """Outcomes, times to return, excursions and the linearized motion's range."""
+        from fastmech.plots.disturbed import draw_disturbed
+
+        return draw_disturbed(dataset)
+
+
+def return_quantiles(ensemble: DisturbedEnsemble) -> NDArray[np.float64]:
+    """Quantiles of the time to return [s] over the trajectories that returned; NaN where none did."""
+    times = ensemble.time_to_return[np.isfinite(ensemble.time_to_return)]
+    return np.quantile(times, QUANTILES) if times.size else np.full(len(QUANTILES), np.nan)
+
+
+def _stack(ensembles: list[DisturbedEnsemble], name: str) -> NDArray[np.generic]:
+    return np.stack([getattr(ensemble, name) for ensemble in ensembles])

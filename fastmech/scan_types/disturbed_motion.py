@@ -1,0 +1,73 @@
+"""One disturbance of every equilibrium: nonlinear and linearized motion side by side, paper (21)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from fastmech.disturbance.motion import disturbed_motion
+from fastmech.equilibria.find import find_equilibria
+from fastmech.results import Dataset, Variable
+from fastmech.scan_types.request import RunContext, Scan
+from fastmech.scene import Scene
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class DisturbedMotionScan(Scan):
+    """The same disturbance of every equilibrium; the default is the paper's: xi1 = 0.1, eta1 = 0.1."""
+
+    kind: ClassVar[str] = "disturbed_motion"
+
+    xi_phi: float = Field(default=0.1, description="disturbance of phi [rad]")
+    xi_theta: float = Field(default=0.0, description="disturbance of theta [rad]")
+    eta_phi: float = Field(default=0.1, description="disturbance of phi' [rad/s]")
+    eta_theta: float = Field(default=0.0, description="disturbance of theta' [rad/s]")
+    t_end: Annotated[float, Field(gt=0)] = 20.0
+    outputs: Annotated[int, Field(ge=2, le=10_000_000)] = 1001
+    dt: Annotated[float, Field(gt=0)] = 0.01
+    method: str = "dop853"
+
+    def run(self, scene: Scene, context: RunContext) -> Dataset:
+        """Integrate the disturbance of each equilibrium; the linearized motion is a matrix exponential."""
+        equilibria = find_equilibria(scene)
+        t = np.linspace(0.0, self.t_end, self.outputs)
+        disturbance = [self.xi_phi, self.xi_theta, self.eta_phi, self.eta_theta]
+        advance = context.stage("disturbed motion", len(equilibria))
+        motions = []
+        for equilibrium in equilibria:
+            motions.append(
+                disturbed_motion(scene, equilibrium, disturbance, t, dt=self.dt, method=self.method)
+            )
+            advance(1)
+        dims = ("equilibrium", "time", "component")
+        empty = np.zeros((0, t.size, 4))
+        variables = {
+            "time": Variable(("time",), t, "s", "time"),
+            "phi": Variable(("equilibrium",), equilibria.phi, "rad", "angle phi of the equilibrium"),
+            "theta": Variable(("equilibrium",), equilibria.theta, "rad", "angle theta of the equilibrium"),
+            "nonlinear": Variable(
+                dims,
+                np.stack([m.nonlinear[:, 0] for m in motions]) if motions else empty,
+                "rad, rad/s",
+                "disturbance of phi, theta, phi', theta', nonlinear motion",
+            ),
+            "linearized": Variable(
+                dims,
+                np.stack([m.linearized[:, 0] for m in motions]) if motions else empty,
+                "rad, rad/s",
+                "disturbance of phi, theta, phi', theta', linearized motion",
+            ),
+        }
+        return Dataset(variables, {"method": self.method, "dt": self.dt, "disturbance": np.array(disturbance)})
+
+    @staticmethod
+    def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
+        """Nonlinear and linearized disturbances of every equilibrium over time."""
+        from fastmech.plots.disturbed_motion import draw_disturbed_motion
+
+        return draw_disturbed_motion(dataset)

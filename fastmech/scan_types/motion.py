@@ -1,0 +1,127 @@
+"""One motion of the mechanism in full: both formulations, points, constraints, energies, reactions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from fastmech.ensembles.balance import energy_balance
+from fastmech.ensembles.integrate import integrate
+from fastmech.mechanism.coefficients import force
+from fastmech.mechanism.geometry import constraints, positions
+from fastmech.mechanism.hamilton import momenta
+from fastmech.mechanism.reactions import reactions
+from fastmech.results import Dataset, Variable
+from fastmech.scan_types.request import RunContext, Scan
+from fastmech.scene import Scene
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_STATE = {
+    "phi": ("rad", "angle phi"),
+    "theta": ("rad", "angle theta"),
+    "phi_dot": ("rad/s", "rate of phi"),
+    "theta_dot": ("rad/s", "rate of theta"),
+}
+_REACTIONS = {
+    "rod_om1": "axial force in rod O-M1, tension positive",
+    "rod_m1m2": "axial force in rod M1-M2, tension positive",
+    "rod_m1m3": "axial force in rod M1-M3, tension positive",
+    "slider_normal": "force of the guide on the slider, upwards positive",
+}
+_BALANCE = {
+    "kinetic_energy": "kinetic energy T",
+    "potential_energy": "potential energy Pi",
+    "work_damper": "work of the damper since t = 0",
+    "work_force": "work of the force since t = 0",
+    "energy_residual": "change of T + Pi less the work of damper and force",
+}
+
+
+class Motion(Scan):
+    """Motion from one start; the default start is the paper's (Table 1)."""
+
+    kind: ClassVar[str] = "motion"
+
+    phi: float = Field(default=4.0 * np.pi / 13.0, description="start of phi [rad]")
+    theta: float = Field(default=np.pi / 7.0, description="start of theta [rad]")
+    phi_dot: float = Field(default=0.0, description="start of phi' [rad/s]")
+    theta_dot: float = Field(default=0.0, description="start of theta' [rad/s]")
+    t_end: Annotated[float, Field(gt=0)] = 20.0
+    outputs: Annotated[int, Field(ge=2, le=10_000_000)] = 2001
+    dt: Annotated[float, Field(gt=0)] = 0.01
+    method: str = "dop853"
+
+    def run(self, scene: Scene, context: RunContext) -> Dataset:
+        """Integrate in both formulations and derive everything else from the Lagrangian one."""
+        start = [self.phi, self.theta, self.phi_dot, self.theta_dot]
+        t = np.linspace(0.0, self.t_end, self.outputs)
+        advance = context.stage("motion", 3)
+        run = integrate(scene, start, dt=self.dt, method=self.method, t_eval=t)
+        advance(1)
+        canonical = integrate(
+            scene, start, dt=self.dt, method=self.method, t_eval=t, formulation="hamilton"
+        )
+        advance(1)
+        balance = energy_balance(scene, start, t, dt=self.dt, method=self.method)
+        advance(1)
+        y = run.y[:, 0]
+        p = momenta(scene, canonical.y[:, 0])
+        points = positions(scene, y)
+        along = ("time",)
+        variables = {
+            "time": Variable(along, t, "s", "time"),
+            **{name: Variable(along, y[:, i], *about) for i, (name, about) in enumerate(_STATE.items())},
+            "p_phi": Variable(along, p[:, 0], "kg m2/s", "generalized momentum of phi, canonical equations"),
+            "p_theta": Variable(
+                along, p[:, 1], "kg m2/s", "generalized momentum of theta, canonical equations"
+            ),
+            "formulation_difference": Variable(
+                ("time", "component"),
+                canonical.y[:, 0] - y,
+                "rad or rad/s",
+                "canonical less Lagrangian phi, theta, phi', theta'",
+            ),
+            **{
+                name: Variable(along, value, "m", f"coordinate {name[0]} of M{name[1]}")
+                for name, value in points._asdict().items()
+            },
+            "constraint_residual": Variable(
+                ("constraint", "time"),
+                constraints(scene, points),
+                "m2 (third: m)",
+                "left sides of the constraints (2)-(5)",
+            ),
+            "force": Variable(along, force(scene, t), "N", "force on M2 along +x"),
+            **{
+                name: Variable(along, value, "N", _REACTIONS[name])
+                for name, value in reactions(scene, y, t)._asdict().items()
+            },
+            **{
+                name: Variable(along, value, "J", about)
+                for (name, about), value in zip(
+                    _BALANCE.items(),
+                    (
+                        balance.kinetic,
+                        balance.potential,
+                        balance.work_damper,
+                        balance.work_force,
+                        balance.residual,
+                    ),
+                    strict=True,
+                )
+            },
+        }
+        attrs = {"method": run.method, "dt": run.dt, "steps": run.steps, "status": int(run.status[0])}
+        return Dataset(variables, attrs)
+
+    @staticmethod
+    def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
+        """Angles, reactions and energies over time."""
+        from fastmech.plots.motion import draw_motion
+
+        return draw_motion(dataset)
