@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 import numba
 from numba import types
-from numba.core import config
+from numba.core import config as numba_config
 from numba.extending import register_jitable
 
 from fastmech.kernel_cache import cache_directory
@@ -46,12 +46,13 @@ def kernel(signature: Any, **options: Any) -> Callable[[F], Any]:
     """
 
     def decorate(function: F) -> Any:
-        previous = config.CACHE_DIR
-        config.CACHE_DIR = str(cache_directory())
+        settings: Any = numba_config
+        previous = settings.CACHE_DIR
+        settings.CACHE_DIR = str(cache_directory())
         try:
             return numba.njit(signature, cache=True, nogil=True, **FLAGS, **options)(function)
         finally:
-            config.CACHE_DIR = previous
+            settings.CACHE_DIR = previous
 
     return decorate
 

@@ -24,8 +24,18 @@ Positive = Annotated[Number, Field(gt=0)]
 NonNegative = Annotated[Number, Field(ge=0)]
 
 
-def _field(default: float, unit: str, description: str) -> Any:
-    return Field(default=default, description=description, json_schema_extra={"unit": unit})
+_UNITS: dict[str, str] = {
+    "m1": "kg",
+    "m2": "kg",
+    "m3": "kg",
+    "l": "m",
+    "c1": "N/m",
+    "c2": "N/m",
+    "beta": "N s/m",
+    "g": "m/s2",
+    "F0": "N",
+    "alpha": "1/s",
+}
 
 
 class Scene(BaseModel):
@@ -38,16 +48,16 @@ class Scene(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    m1: Positive = _field(10.0, "kg", "mass of material point M1")
-    m2: Positive = _field(12.0, "kg", "mass of material point M2")
-    m3: NonNegative = _field(8.0, "kg", "mass of slider M3")
-    l: Positive = _field(1.25, "m", "length of the rods OM1 and M1M2; M1M3 is twice as long")
-    c1: NonNegative = _field(162.5, "N/m", "stiffness of the spring from M2 to O")
-    c2: NonNegative = _field(366.67, "N/m", "stiffness of the spring from M1 to A = (0, l)")
-    beta: NonNegative = _field(121.0, "N s/m", "coefficient of the damper on the slider")
-    g: NonNegative = _field(9.80665, "m/s2", "acceleration of gravity")
-    F0: Number = _field(100.0, "N", "force on M2 along +x at t = 0")
-    alpha: NonNegative = _field(0.7, "1/s", "decay rate of the force F0 exp(-alpha t)")
+    m1: Positive = Field(10.0, description="mass of material point M1")
+    m2: Positive = Field(12.0, description="mass of material point M2")
+    m3: NonNegative = Field(8.0, description="mass of slider M3")
+    l: Positive = Field(1.25, description="length of the rods OM1 and M1M2; M1M3 is twice as long")
+    c1: NonNegative = Field(162.5, description="stiffness of the spring from M2 to O")
+    c2: NonNegative = Field(366.67, description="stiffness of the spring from M1 to A = (0, l)")
+    beta: NonNegative = Field(121.0, description="coefficient of the damper on the slider")
+    g: NonNegative = Field(9.80665, description="acceleration of gravity")
+    F0: Number = Field(100.0, description="force on M2 along +x at t = 0")
+    alpha: NonNegative = Field(0.7, description="decay rate of the force F0 exp(-alpha t)")
 
     def __init__(self, **parameters: Any) -> None:
         try:
@@ -71,10 +81,12 @@ class Scene(BaseModel):
             raise InputError(f"{path}: has no table [scene]")
         return cls(**table)
 
-    @classmethod
-    def units(cls) -> dict[str, str]:
-        """Unit of every parameter."""
-        return {name: field.json_schema_extra["unit"] for name, field in cls.model_fields.items()}  # type: ignore[index,call-overload]
+    def described(self) -> dict[str, tuple[float, str, str]]:
+        """Value, unit and description of every parameter."""
+        return {
+            name: (getattr(self, name), _UNITS[name], str(field.description))
+            for name, field in type(self).model_fields.items()
+        }
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:

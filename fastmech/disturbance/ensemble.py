@@ -185,7 +185,7 @@ def _index_of(equilibrium: Equilibrium, equilibria: Equilibria) -> int:
     ]
     if not away or min(away) > 1e-9:
         raise InputError(
-            f"equilibrium = ({equilibrium.phi:g}, {equilibrium.theta:g}) rad: is not an equilibrium of this scene"
+            f"equilibrium = ({equilibrium.phi:g}, {equilibrium.theta:g}) rad: is none of this scene's equilibria"
         )
     return int(np.argmin(away))
 

@@ -16,9 +16,9 @@ from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
 
-SMALLEST, LARGEST, GRID = 1e-3, np.pi, 36
+SMALLEST, LARGEST, GRID = 1e-6, np.pi, 40
 BISECTIONS = 10
-OUTPUTS = 100
+OUTPUTS = 50
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ def linear_range(
     scene: Scene,
     equilibrium: Equilibrium,
     *,
-    horizon: float = 2.0,
+    horizon: float = 1.0,
     tolerance: float = 0.05,
     directions: int = 256,
     seed: int = 0,
@@ -47,7 +47,7 @@ def linear_range(
 
     The deviation of a disturbance is max over [0, horizon] of size(nonlinear - linearized) divided by max
     over [0, horizon] of size(linearized), in the norm of :class:`fastmech.disturbance.size.Size`. Along
-    every direction (uniform on the sphere) sizes from 0.001 rad to pi rad are tried upwards, and the first
+    every direction (uniform on the sphere) sizes from 1e-6 rad to pi rad are tried upwards, and the first
     crossing of the tolerance is refined by bisection to one part in 10,000.
 
     Raises:

@@ -18,6 +18,10 @@ from fastmech.stability.linearize import jacobian
 Floats = NDArray[np.float64]
 
 
+#: Condition of the eigenvectors beyond which their errors would show beside those of the integration.
+_ILL_CONDITIONED = 1e4
+
+
 @dataclass(frozen=True)
 class DisturbedMotion:
     """Disturbances xi_phi, xi_theta [rad], eta_phi, eta_theta [rad/s] over time, paper (21)."""
@@ -50,6 +54,17 @@ def disturbed_motion(
     t = checks.rising_times("times", times)
     center = np.array([equilibrium.phi, equilibrium.theta, 0.0, 0.0])
     run = integrate(scene, center + start, dt=dt, method=method, t_eval=t, threads=threads)
-    propagators = scipy.linalg.expm(t[:, None, None] * jacobian(scene, equilibrium))
-    linearized = np.einsum("tij,nj->tni", propagators, start)
-    return DisturbedMotion(t, run.y - center, linearized)
+    return DisturbedMotion(t, run.y - center, start @ propagators(jacobian(scene, equilibrium), t).mT)
+
+
+def propagators(matrix: Floats, times: Floats) -> Floats:
+    """Matrix exponentials exp(t matrix) at the given times, shape (times, n, n).
+
+    By the eigenvectors where these are well conditioned (the error grows with their condition number), else
+    one by one.
+    """
+    values, vectors = np.linalg.eig(matrix)
+    if np.linalg.cond(vectors) > _ILL_CONDITIONED:
+        return np.asarray(scipy.linalg.expm(times[:, None, None] * matrix))
+    growth = np.exp(times[:, None] * values)
+    return np.asarray((vectors * growth[:, None, :] @ np.linalg.inv(vectors)).real)

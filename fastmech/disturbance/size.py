@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg
@@ -21,24 +22,26 @@ class Size:
     ``size(xi, eta)^2 = (xi' a xi + eta' a eta / omega^2) / (m2 l^2)`` with the metric ``a`` at the
     equilibrium, the departures ``xi`` [rad] and ``eta`` [rad/s], and ``omega`` [rad/s] the square root of
     the largest generalized eigenvalue, in magnitude, of the Hessian and the metric: the highest natural
-    frequency at a minimum. A departure of theta alone has its own angle as its size; ``size^2 omega^2 m2 l^2 / 2``
-    is the kinetic energy of the disturbance once its angles have turned to rates.
+    frequency at a minimum. A departure of theta alone has its own angle as its size;
+    ``size^2 omega^2 m2 l^2 / 2`` is the kinetic energy of the disturbance once its angles have turned to rates.
     """
 
     metric: Floats  #: a / (m2 l^2), shape (2, 2)
     omega: float  #: rad/s
 
+    @cached_property
+    def to_ball(self) -> Floats:
+        """Matrix (4, 4): ``disturbance @ to_ball`` is a point whose length is the disturbance's size."""
+        lower = np.linalg.cholesky(self.metric)
+        return scipy.linalg.block_diag(lower, lower / self.omega)
+
     def __call__(self, disturbance: Floats) -> Floats:
         """Sizes [rad] of disturbances (..., 4)."""
-        xi, eta = disturbance[..., :2], disturbance[..., 2:] / self.omega
-        square = np.einsum("...i,ij,...j", xi, self.metric, xi)
-        return np.asarray(np.sqrt(square + np.einsum("...i,ij,...j", eta, self.metric, eta)))
+        return np.asarray(np.linalg.norm(disturbance @ self.to_ball, axis=-1))
 
     def from_ball(self, points: Floats) -> Floats:
         """Disturbances (..., 4) whose sizes are the lengths of ``points`` (..., 4)."""
-        lower = np.linalg.cholesky(self.metric)
-        unscaled = np.linalg.solve(lower.T, np.stack([points[..., :2], points[..., 2:]], axis=-1))
-        return np.concatenate([unscaled[..., 0], unscaled[..., 1] * self.omega], axis=-1)
+        return np.asarray(points @ np.linalg.inv(self.to_ball))
 
 
 def size_at(scene: Scene, phi: float, theta: float) -> Size:

@@ -68,7 +68,9 @@ def integrate(
     dt = checks.number("dt", dt, "s", above=0.0)
     tableau = find_method(method)
     if formulation not in FORMULATIONS:
-        raise InputError(f"formulation = {formulation!r}: unknown; {nearest(formulation, list(FORMULATIONS))}")
+        raise InputError(
+            f"formulation = {formulation!r}: unknown; {nearest(formulation, list(FORMULATIONS))}"
+        )
     if threads is not None:
         threads = checks.whole_number("threads", threads, least=1)
     if t_eval is None:

@@ -15,12 +15,13 @@ Nothing else of the scene matters, and the three angles play equal parts.
 yk = sk arccos(rk cos y1) with a sign sk for each, and the sum condition leaves one equation for y1 on each of
 the four branches (s2, s3). With y1 = d - pi/2 and Ak(d) = arcsin(rk sin d), whose slope is at most rk:
 
-- s2 = -s3: d - s2 (A2 - A3) = D + pi/2. The slope is 1 -+ (A2' - A3') > 0, since A2' and A3' have one sign and
-  at most size one. So each of the two branches has exactly one solution.
-- s2 = s3 = +-1, after a shift of d by pi for the lower sign: q(d) := d - A2(d) - A3(d) = D -+ pi/2 (mod 2 pi).
-  q is odd, gains 2 pi a turn, and its slope 1 - A2' - A3' grows with |d| up to |d| = pi/2 and is positive beyond.
-  So if r2 + r3 <= 1 it increases and there is exactly one solution; else it increases to q(-w) = Q > 0,
-  decreases to q(w) = -Q and increases again, and there are three solutions where |D -+ pi/2 mod 2 pi| < Q.
+- s2 = -s3: d - s2 (A2 - A3) = D + pi/2. The slope is 1 -+ (A2' - A3') > 0, since A2' and A3' have one sign
+  and at most size one. So each of the two branches has exactly one solution.
+- s2 = s3 = +-1, after a shift of d by pi for the lower sign: q(d) := d - A2(d) - A3(d) = D -+ pi/2
+  (mod 2 pi). q is odd, gains 2 pi a turn, and its slope 1 - A2' - A3' grows with |d| up to |d| = pi/2 and is
+  positive beyond. So if r2 + r3 <= 1 it increases and there is exactly one solution; else it increases to
+  q(-w) = Q > 0, decreases to q(w) = -Q and increases again, and there are three solutions where
+  |D -+ pi/2 mod 2 pi| < Q.
   Q < pi/2, so only one of the two branches can have three.
 
 Hence there are **four equilibria, or six exactly if r2 + r3 > 1 and arcsin|cos D| < Q(r2, r3)**; the fold is
@@ -64,33 +65,30 @@ class Pulls(NamedTuple):
 class Normal(NamedTuple):
     """The balance with the smallest amplitude first."""
 
-    smallest: int  #: which angle has the smallest amplitude: 0 phi, 1 theta, 2 -psi; the others follow cyclically
+    smallest: int  #: angle of the smallest amplitude: 0 phi, 1 theta, 2 -psi; the others follow cyclically
     ratio2: float  #: smallest amplitude over that of the next angle
     ratio3: float
     complement2: float  #: 1 - ratio2^2, without cancellation
     complement3: float
     turn: float  #: D, in (-pi, pi]
     corner: float  #: w: where q turns; 0 if it does not
-    peak: float  #: Q = q(-w) [rad]; 0 if q does not turn
+    peak: float  #: Q = q(-w) [rad]; if q does not turn r2 + r3 - 1 <= 0, which continues Q to no fold
     distance: float  #: arcsin|cos D| [rad]: of D from the nearest odd multiple of pi/2
     error: float  #: bound on the error of peak - distance by rounding [rad]
-    never_six: bool  #: r2 + r3 < 1 beyond rounding: four equilibria whatever the distance
 
 
 @inlined
 def wrap(angle: float) -> float:
     """The angle's representative in (-pi, pi]."""
-    wrapped = angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
-    if wrapped <= -np.pi:
-        return np.pi
-    if wrapped > np.pi:
+    wrapped: float = angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
+    if wrapped <= -np.pi or wrapped > np.pi:
         return np.pi
     return wrapped
 
 
 @inlined
 def pulls(mass: float, lift: float, spring: float, gravity: float, force: float) -> Pulls:
-    """Amplitudes, phases and rounding bounds of the three sinusoids; amplitudes are NaN if any input is not finite.
+    """Amplitudes, phases and rounding bounds of the three sinusoids, for finite coefficients.
 
     The bounds count the roundings of ``fastmech.mechanism.coefficients.reduce``: lift is a difference of
     two terms that were rounded before; every other coefficient has less than two relative roundings.
@@ -133,7 +131,7 @@ def vanishing(p: Pulls) -> int:
 
 @inlined
 def lag(ratio: float, complement: float, sine: float, cosine: float) -> tuple[float, float]:
-    """arcsin(ratio sin d) and its derivative in d, accurate also near ratio = 1; the slope may be NaN at a corner."""
+    """arcsin(ratio sin d) and its slope in d, accurate also near ratio = 1; the slope is NaN at a corner."""
     root = np.sqrt(complement + (ratio * cosine) ** 2)
     return np.arctan2(ratio * sine, root), ratio * cosine / root
 
@@ -146,9 +144,9 @@ def lag_error(ratio: float, complement: float, sine: float, cosine: float, chang
     holds at the corner too.
     """
     square = complement + (ratio * cosine) ** 2 - 2.0 * change
-    steep = 2.0 * np.sqrt(change)
+    steep: float = 2.0 * np.sqrt(change)
     if square > 0.0:
-        return min(steep, change * sine / np.sqrt(square))
+        steep = min(steep, change * sine / np.sqrt(square))
     return steep
 
 
@@ -156,16 +154,16 @@ def lag_error(ratio: float, complement: float, sine: float, cosine: float, chang
 def corner_cosine_squared(complement2: float, complement3: float, ratio2: float, ratio3: float) -> float:
     """cos^2 w of the corner of q, where A2' + A3' = 1; given ratio2 + ratio3 > 1.
 
-    Clearing the roots leaves 3 x^4 + 4 S x^3 + 6 N x^2 = N^2 for x = cos^2 w, with Bk = 1/rk^2 - 1, S = B2 + B3,
-    N = B2 B3. The left side is convex and increasing, so Newton from above cannot overshoot; each term
-    alone gives a bound from above, and the least of them is close.
+    Clearing the roots leaves 3 x^4 + 4 S x^3 + 6 N x^2 = N^2 for x = cos^2 w, with Bk = 1/rk^2 - 1,
+    S = B2 + B3, N = B2 B3. The left side is convex and increasing, so Newton from above cannot overshoot;
+    each term alone gives a bound from above, and the least of them is close.
     """
     B2 = complement2 / (ratio2 * ratio2)
     B3 = complement3 / (ratio3 * ratio3)
     S, N = B2 + B3, B2 * B3
     if N == 0.0:
         return 0.0
-    x = min(1.0, np.cbrt(N * (N / (4.0 * S))), np.sqrt(N / np.sqrt(3.0)))
+    x: float = min(1.0, np.cbrt(N * (N / (4.0 * S))), np.sqrt(N / np.sqrt(3.0)))
     for _ in range(60):
         value = ((3.0 * x + 4.0 * S) * x + 6.0 * N) * x * x - N * N
         slope = ((12.0 * x + 12.0 * S) * x + 12.0 * N) * x
@@ -200,7 +198,7 @@ def normal_form(p: Pulls) -> Normal:
     change3 = (low_error + ratio3 * high_error) / high + 4.0 * EPS * ratio3
     turn = wrap(-(p.phase_phi + p.phase_theta))
 
-    corner, peak, never_six = 0.0, 0.0, False
+    corner, peak = 0.0, min(ratio2 + ratio3 - 1.0, 0.0)
     error = p.error_phi / p.amplitude_phi + p.error_theta / p.amplitude_theta + 16.0 * EPS
     if ratio2 + ratio3 > 1.0:
         x = corner_cosine_squared(complement2, complement3, ratio2, ratio3)
@@ -211,20 +209,16 @@ def normal_form(p: Pulls) -> Normal:
         error += lag_error(ratio2, complement2, sine, cosine, change2)
         error += lag_error(ratio3, complement3, sine, cosine, change3)
     else:
-        # Rounding may hide a sum just above one: Q is then at most the excess (its slope in each ratio is <= 1
-        # times the slope of arcsin, which matters only where the other ratio vanishes).
-        never_six = ratio2 + ratio3 + change2 + change3 < 1.0
+        error += change2 + change3
     distance = abs(HALF_PI - abs(turn))
-    return Normal(
-        smallest, ratio2, ratio3, complement2, complement3, turn, corner, peak, distance, error, never_six
-    )
+    return Normal(smallest, ratio2, ratio3, complement2, complement3, turn, corner, peak, distance, error)
 
 
 @inlined
 def expected_count(n: Normal) -> int:
     """Number of equilibria by the theorem above: 4 or 6; 0 where rounding hides which."""
     margin = n.peak - n.distance
-    if n.never_six or margin < -n.error:
+    if margin < -n.error:
         return 4
     if margin > n.error:
         return 6

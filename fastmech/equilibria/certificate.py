@@ -10,7 +10,7 @@ import numpy as np
 
 from fastmech.equilibria.balance import EPS, Normal, Pulls, expected_count, wrap
 from fastmech.equilibria.outcome import Outcome
-from fastmech.equilibria.search import gradient, hessian
+from fastmech.equilibria.search import FloatArray, gradient, hessian
 from fastmech.jit import inlined
 
 COMPLETE = int(Outcome.COMPLETE)
@@ -40,9 +40,10 @@ def existence_radius(p: Pulls, phi: float, theta: float) -> tuple[float, int, bo
     """Proof that exactly one equilibrium lies within a radius [rad] of (phi, theta).
 
     Newton-Kantorovich in its affine-invariant form. H = -sum_k e_k v_k v_k^T with e_k = Ak sin yk and the
-    directions v = (1, 0), (0, 1), (1, 1), so |H^-1 (H(x) - H(y))| <= w |x - y| with w = sum_k Ak |H^-1 v_k| |v_k|^2;
-    with the step h = |H^-1 grad| a root exists and is the only one near if w h <= 1/2. A stiff spring
-    enlarges Ak and shrinks H^-1 v_k alike, hence costs nothing.
+    directions v = (1, 0), (0, 1), (1, 1), so |H^-1 (H(x) - H(y))| <= w |x - y| with the constant
+    w = sum_k Ak |H^-1 v_k| |v_k|^2. If the step h = |H^-1 grad| has w h <= 1/2, a root exists within
+    2 h/(1 + sqrt(1 - 2 w h)) and is the only one near. A stiff spring enlarges Ak and shrinks H^-1 v_k alike,
+    so it costs nothing.
 
     Returns:
         The radius (infinite: nothing proved), the sign of det H (0: not certain), and whether the gradient is
@@ -76,11 +77,12 @@ def existence_radius(p: Pulls, phi: float, theta: float) -> tuple[float, int, bo
 @inlined
 def apart(phi1: float, theta1: float, phi2: float, theta2: float) -> float:
     """Distance on the torus [rad]."""
-    return np.hypot(wrap(phi1 - phi2), wrap(theta1 - theta2))
+    distance: float = np.hypot(wrap(phi1 - phi2), wrap(theta1 - theta2))
+    return distance
 
 
 @inlined
-def certify(p: Pulls, n: Normal, count: int, phi: np.ndarray, theta: np.ndarray, radius: np.ndarray) -> int:
+def certify(p: Pulls, n: Normal, count: int, phi: FloatArray, theta: FloatArray, radius: FloatArray) -> int:
     """Outcome for a list of ``count`` equilibria; writes the existence radius [rad] of each into ``radius``.
 
     COMPLETE needs all three: every entry proved, the balls disjoint (so all are different), and as many as
@@ -98,7 +100,8 @@ def certify(p: Pulls, n: Normal, count: int, phi: np.ndarray, theta: np.ndarray,
             explained = False
     for i in range(count):
         for j in range(i):
-            if apart(phi[i], theta[i], phi[j], theta[j]) <= radius[i] + radius[j] and radius[i] + radius[j] < np.inf:
+            reach = radius[i] + radius[j]
+            if reach < np.inf and apart(phi[i], theta[i], phi[j], theta[j]) <= reach:
                 return UNPROVED
     if proved == count and law == 0 and (count == 6 or count == expected_count(n)):
         return COMPLETE

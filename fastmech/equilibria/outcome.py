@@ -15,7 +15,7 @@ class Outcome(IntEnum):
     """Equilibria merge here within rounding: the merged one is listed once, as degenerate."""
 
     DEGENERATE = 2
-    """Equilibria are not isolated: whole curves of resting positions exist and none is listed."""
+    """Equilibria are not isolated (exactly, or not to be told from that within rounding); none is listed."""
 
     UNPROVED = 3
     """Nothing is proved; the certificate's sentence says why."""

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fastmech.equilibria.balance import EPS, HALF_PI, Normal, Pulls, lag, wrap
 from fastmech.jit import inlined
 from fastmech.mechanism.reduced import potential_gradient, potential_hessian
+
+FloatArray = NDArray[np.float64]
 
 #: The exact bound on the number of equilibria of a scene whose equilibria are isolated.
 MOST = 6
 
 
 @inlined
-def lap_root(n: Normal, sign2: float, sign3: float, target: float, low: float, high: float, rising: float) -> float:
+def lap_root(
+    n: Normal, sign2: float, sign3: float, target: float, low: float, high: float, rising: float
+) -> float:
     """Root of d - sign2 A2(d) - sign3 A3(d) = target on a lap [low, high] where the left side is monotone.
 
     Newton's method that halves the bracket wherever a step would leave it (a NaN slope at a corner
@@ -86,7 +91,7 @@ def polish(p: Pulls, phi: float, theta: float) -> tuple[float, float]:
 
 
 @inlined
-def candidates(p: Pulls, n: Normal, phi: np.ndarray, theta: np.ndarray) -> int:
+def candidates(p: Pulls, n: Normal, phi: FloatArray, theta: FloatArray) -> int:
     """Write every equilibrium's angles into ``phi, theta`` (six each) and return their number.
 
     Where the fold is within rounding the laps that may have merged are all searched; what they give
@@ -102,7 +107,7 @@ def candidates(p: Pulls, n: Normal, phi: np.ndarray, theta: np.ndarray) -> int:
         target = wrap(n.turn - sign * HALF_PI)
         shift = 0.0 if sign > 0.0 else np.pi
         for lap in range(-1, 2):
-            # Laps: [-pi, -w] rising, [-w, w] falling, [w, pi] rising; a single rising one where q does not turn.
+            # Laps: [-pi, -w] rising, [-w, w] falling, [w, pi] rising; one rising where q does not turn.
             low = (-np.pi, -n.corner, n.corner)[lap + 1]
             high = (-n.corner, n.corner, np.pi)[lap + 1]
             if n.corner == 0.0:

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 from numba import types
+from numpy.typing import NDArray
 
 from fastmech.equilibria.balance import EPS, Pulls, expected_count, normal_form, pulls, vanishing
 from fastmech.equilibria.certificate import AT_FOLD, UNPROVED, apart, certify
 from fastmech.equilibria.outcome import Outcome
-from fastmech.equilibria.search import MOST, candidates, hessian
+from fastmech.equilibria.search import FloatArray, candidates, hessian
 from fastmech.jit import MATRIX, STATUSES, VECTOR, inlined, kernel
 from fastmech.mechanism.reduced import potential
 
 DEGENERATE = int(Outcome.DEGENERATE)
 
-#: Morse index of a slot without an equilibrium, and of an equilibrium whose Hessian is singular within rounding.
+SmallIntegers = NDArray[np.int8]
+
+#: Morse index of an empty slot, and of an equilibrium whose Hessian is singular within rounding.
 NO_EQUILIBRIUM = -1
 SINGULAR = -2
 
@@ -25,13 +28,17 @@ INDICES = types.Array(types.int8, 2, "C")
 
 
 @inlined
-def merge_singular(count: int, phi: np.ndarray, theta: np.ndarray, radius: np.ndarray) -> int:
-    """Drop what is within ``MERGE`` of another unproved entry: the same equilibrium, displaced by rounding."""
+def merge_singular(count: int, phi: FloatArray, theta: FloatArray, radius: FloatArray) -> int:
+    """Drop what is within ``MERGE`` of another unproved entry: the same one, displaced by rounding."""
     kept = 0
     for i in range(count):
         again = False
         for j in range(kept):
-            if np.isinf(radius[i]) and np.isinf(radius[j]) and apart(phi[i], theta[i], phi[j], theta[j]) < MERGE:
+            if (
+                np.isinf(radius[i])
+                and np.isinf(radius[j])
+                and apart(phi[i], theta[i], phi[j], theta[j]) < MERGE
+            ):
                 again = True
         if not again:
             phi[kept], theta[kept], radius[kept] = phi[i], theta[i], radius[i]
@@ -43,7 +50,8 @@ def merge_singular(count: int, phi: np.ndarray, theta: np.ndarray, radius: np.nd
 def energy_at(p: Pulls, phi: float, theta: float) -> float:
     """U over m2 l^2 and the scale, less the springs' constant (paper (10))."""
     s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
-    return potential(s1, c1, s2, c2, s1 * c2 + c1 * s2, p.lift, p.spring, p.gravity, p.force)
+    energy: float = potential(s1, c1, s2, c2, s1 * c2 + c1 * s2, p.lift, p.spring, p.gravity, p.force)
+    return energy
 
 
 @inlined
@@ -58,7 +66,9 @@ def morse_index(p: Pulls, phi: float, theta: float, radius: float) -> int:
 
 
 @inlined
-def sort_by_energy(count: int, energy: np.ndarray, phi: np.ndarray, theta: np.ndarray, radius: np.ndarray) -> None:
+def sort_by_energy(
+    count: int, energy: FloatArray, phi: FloatArray, theta: FloatArray, radius: FloatArray
+) -> None:
     """Deepest first; insertion keeps the order of equal ones."""
     for i in range(1, count):
         for j in range(i, 0, -1):
@@ -72,16 +82,16 @@ def sort_by_energy(count: int, energy: np.ndarray, phi: np.ndarray, theta: np.nd
 
 @kernel(types.void(MATRIX, MATRIX, MATRIX, MATRIX, MATRIX, INDICES, STATUSES, STATUSES, STATUSES, VECTOR))
 def solve(
-    coefficients: np.ndarray,
-    phi: np.ndarray,
-    theta: np.ndarray,
-    energy: np.ndarray,
-    radius: np.ndarray,
-    index: np.ndarray,
-    count: np.ndarray,
-    expected: np.ndarray,
-    outcome: np.ndarray,
-    margin: np.ndarray,
+    coefficients: FloatArray,
+    phi: FloatArray,
+    theta: FloatArray,
+    energy: FloatArray,
+    radius: FloatArray,
+    index: SmallIntegers,
+    count: SmallIntegers,
+    expected: SmallIntegers,
+    outcome: SmallIntegers,
+    margin: FloatArray,
 ) -> None:
     """Equilibria of every row of ``coefficients``, deepest first, with the outcome of the proof.
 
@@ -93,7 +103,7 @@ def solve(
         index: (n, 6) Morse index, ``SINGULAR`` or ``NO_EQUILIBRIUM``; written.
         count: (n,) number found; written.
         expected: (n,) number by the counting theorem, 0 where rounding hides it; written.
-        outcome: (n,) ``Outcome``; DEGENERATE means here "within rounding"; written.
+        outcome: (n,) ``Outcome``; written.
         margin: (n,) distance to the fold [rad], positive with six equilibria; NaN if undefined; written.
     """
     for row in range(coefficients.shape[0]):
@@ -122,27 +132,3 @@ def solve(
         for i in range(found):
             index[row, i] = morse_index(p, phi[row, i], theta[row, i], radius[row, i])
         count[row] = found
-
-
-class Solution:
-    """Arrays that ``solve`` writes, for n scenes; see there."""
-
-    def __init__(self, coefficients: np.ndarray) -> None:
-        """Solve every row of ``coefficients`` (n, 8), float64 and contiguous."""
-        n = len(coefficients)
-        self.phi, self.theta, self.energy, self.radius = np.empty((4, n, MOST))
-        self.index = np.empty((n, MOST), dtype=np.int8)
-        self.count, self.expected, self.outcome = np.empty((3, n), dtype=np.int8)
-        self.margin = np.empty(n)
-        solve(
-            coefficients,
-            self.phi,
-            self.theta,
-            self.energy,
-            self.radius,
-            self.index,
-            self.count,
-            self.expected,
-            self.outcome,
-            self.margin,
-        )

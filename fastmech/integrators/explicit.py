@@ -87,7 +87,19 @@ def observe_nothing(t: float, Y: Floats, params: Floats, record: Floats) -> None
 
 @kernel(
     types.void(
-        RHS, OBSERVER, INTEGERS, INTEGERS, VECTOR, VECTOR, VECTOR, INTEGERS, MATRIX, VECTOR, VECTOR, MATRIX, CUBE
+        RHS,
+        OBSERVER,
+        INTEGERS,
+        INTEGERS,
+        VECTOR,
+        VECTOR,
+        VECTOR,
+        INTEGERS,
+        MATRIX,
+        VECTOR,
+        VECTOR,
+        MATRIX,
+        CUBE,
     )
 )
 def integrate_block(

@@ -7,35 +7,14 @@ the mechanism divided by m2 l^2); energies and forces in SI units are m2 l^2 tim
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from fastmech.scene import Scene
 
-class Parameters(Protocol):
-    """What the mechanism needs to know of a scene (SI units, paper's Table 1)."""
-
-    @property
-    def m1(self) -> float: ...
-    @property
-    def m2(self) -> float: ...
-    @property
-    def m3(self) -> float: ...
-    @property
-    def l(self) -> float: ...
-    @property
-    def c1(self) -> float: ...
-    @property
-    def c2(self) -> float: ...
-    @property
-    def beta(self) -> float: ...
-    @property
-    def g(self) -> float: ...
-    @property
-    def F0(self) -> float: ...
-    @property
-    def alpha(self) -> float: ...
+Parameters = Scene
 
 
 class Coefficients(NamedTuple):
@@ -51,7 +30,7 @@ class Coefficients(NamedTuple):
     decay: float  #: alpha [1/s]
 
 
-def reduce(scene: Parameters) -> Coefficients:
+def reduce(scene: Scene) -> Coefficients:
     """Reduced coefficients of ``scene`` (equations of motion over m2 l^2)."""
     m1, m2, l = scene.m1, scene.m2, scene.l
     return Coefficients(
@@ -66,6 +45,6 @@ def reduce(scene: Parameters) -> Coefficients:
     )
 
 
-def force(scene: Parameters, t: float | NDArray[np.float64]) -> NDArray[np.float64]:
+def force(scene: Scene, t: ArrayLike) -> NDArray[np.float64]:
     """Force F(t) = F0 exp(-alpha t) on M2 along +x [N] (paper, section 2)."""
     return scene.F0 * np.exp(-scene.alpha * np.asarray(t, dtype=np.float64))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from fastmech.jit import inlined
 from fastmech.mechanism.reduced import (
+    Values,
     christoffel,
     metric_11,
     metric_determinant,
@@ -18,7 +19,7 @@ from fastmech.mechanism.reduced import (
 
 
 @inlined
-def rates_from_momenta(p1: float, p2: float, s12: float, determinant: float) -> tuple[float, float]:
+def rates_from_momenta(p1: Values, p2: Values, s12: Values, determinant: Values) -> tuple[Values, Values]:
     """(phi', theta') from reduced momenta: q' = a^-1 p."""
     phi_dot = (p1 - s12 * p2) / determinant
     return phi_dot, p2 - s12 * phi_dot
@@ -26,28 +27,28 @@ def rates_from_momenta(p1: float, p2: float, s12: float, determinant: float) -> 
 
 @inlined
 def momenta_from_rates(
-    phi_dot: float, theta_dot: float, mass: float, slider: float, k: float, s12: float
-) -> tuple[float, float]:
+    phi_dot: Values, theta_dot: Values, mass: Values, slider: Values, k: Values, s12: Values
+) -> tuple[Values, Values]:
     """Reduced generalized momenta p = a q', paper, section 3."""
     return metric_11(mass, slider, k) * phi_dot + s12 * theta_dot, s12 * phi_dot + theta_dot
 
 
 @inlined
 def lagrange_accelerations(
-    s1: float,
-    c1: float,
-    s2: float,
-    c2: float,
-    phi_dot: float,
-    theta_dot: float,
-    mass: float,
-    slider: float,
-    lift: float,
-    spring: float,
-    gravity: float,
-    force: float | None,
-    damping: float | None,
-) -> tuple[float, float]:
+    s1: Values,
+    c1: Values,
+    s2: Values,
+    c2: Values,
+    phi_dot: Values,
+    theta_dot: Values,
+    mass: Values,
+    slider: Values,
+    lift: Values,
+    spring: Values,
+    gravity: Values,
+    force: Values | None,
+    damping: Values | None,
+) -> tuple[Values, Values]:
     """(phi'', theta'') [rad/s^2] from Lagrange's equations in covariant form, paper (13)."""
     s12 = s1 * c2 + c1 * s2
     c12 = c1 * c2 - s1 * s2
@@ -63,20 +64,20 @@ def lagrange_accelerations(
 
 @inlined
 def canonical_rates(
-    s1: float,
-    c1: float,
-    s2: float,
-    c2: float,
-    p1: float,
-    p2: float,
-    mass: float,
-    slider: float,
-    lift: float,
-    spring: float,
-    gravity: float,
-    force: float | None,
-    damping: float | None,
-) -> tuple[float, float, float, float]:
+    s1: Values,
+    c1: Values,
+    s2: Values,
+    c2: Values,
+    p1: Values,
+    p2: Values,
+    mass: Values,
+    slider: Values,
+    lift: Values,
+    spring: Values,
+    gravity: Values,
+    force: Values | None,
+    damping: Values | None,
+) -> tuple[Values, Values, Values, Values]:
     """(phi', theta', p1', p2') from the canonical equations, paper (14), reduced momenta.
 
     q' = dH/dp, p' = -dH/dq + Q; at given momenta -dT/dq is +dT/dq at given rates, hence half the metric's

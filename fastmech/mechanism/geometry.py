@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.mechanism.coefficients import Parameters
 from fastmech.mechanism.reduced import slider_ratio
+from fastmech.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ class Points(NamedTuple):
     y3: Array
 
 
-def positions(scene: Parameters, y: ArrayLike) -> Points:
+def positions(scene: Scene, y: ArrayLike) -> Points:
     """Coordinates of the points [m], paper (6)."""
     phi, theta = _components(y)[:2]
     s1, c1 = np.sin(phi), np.cos(phi)
@@ -37,7 +37,7 @@ def positions(scene: Parameters, y: ArrayLike) -> Points:
     return Points(x1, y1, x1 - l * np.sin(theta), y1 - l * np.cos(theta), x3, np.zeros_like(x3))
 
 
-def velocities(scene: Parameters, y: ArrayLike) -> Points:
+def velocities(scene: Scene, y: ArrayLike) -> Points:
     """Velocities of the points [m/s], time derivative of paper (6); their squares are paper (7)."""
     phi, theta, phi_dot, theta_dot = _components(y)
     s1, c1 = np.sin(phi), np.cos(phi)
@@ -49,7 +49,7 @@ def velocities(scene: Parameters, y: ArrayLike) -> Points:
     return Points(x1, y1, x2, y2, x3, np.zeros_like(x3))
 
 
-def accelerations(scene: Parameters, y: ArrayLike, angular: ArrayLike) -> Points:
+def accelerations(scene: Scene, y: ArrayLike, angular: ArrayLike) -> Points:
     """Accelerations of the points [m/s2]; ``angular`` (..., 2) holds phi'', theta'' [rad/s2]."""
     phi, theta, phi_dot, theta_dot = _components(y)
     phi_ddot, theta_ddot = _components(angular)
@@ -64,7 +64,7 @@ def accelerations(scene: Parameters, y: ArrayLike, angular: ArrayLike) -> Points
     return Points(x1, y1, x2, y2, x3, np.zeros_like(x3))
 
 
-def constraints(scene: Parameters, points: Points) -> Array:
+def constraints(scene: Scene, points: Points) -> Array:
     """Residuals of the constraints (2)-(5), shape (4, ...): m^2, m^2, m, m^2.
 
     The paper's (2) prints x2 where x1 belongs.

@@ -9,18 +9,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.mechanism import reduced
-from fastmech.mechanism.coefficients import Coefficients, Parameters, force, reduce
+from fastmech.mechanism.coefficients import Coefficients, force, reduce
 from fastmech.mechanism.equations import lagrange_accelerations
+from fastmech.scene import Scene
 
 Array = NDArray[np.float64]
 
 
-def unit(scene: Parameters) -> float:
+def unit(scene: Scene) -> float:
     """m2 l^2 [kg m2]: what reduced quantities are multiplied by."""
     return scene.m2 * scene.l**2
 
 
-def metric(scene: Parameters, q: ArrayLike) -> Array:
+def metric(scene: Scene, q: ArrayLike) -> Array:
     """Metric tensor a_(alpha beta) [kg m2], paper (11); shape (..., 2, 2)."""
     phi, theta = _split(q, 2)
     coefficients = reduce(scene)
@@ -30,7 +31,7 @@ def metric(scene: Parameters, q: ArrayLike) -> Array:
     return unit(scene) * _symmetric(a11, s12, np.ones_like(s12))
 
 
-def christoffel(scene: Parameters, q: ArrayLike) -> Array:
+def christoffel(scene: Scene, q: ArrayLike) -> Array:
     """Christoffel symbols of the first kind Gamma[..., gamma, alpha, beta] [kg m2], paper (12).
 
     ``Gamma[..., 0, 1, 1]`` is the paper's Gamma_22,1: the index behind the comma comes first.
@@ -43,22 +44,24 @@ def christoffel(scene: Parameters, q: ArrayLike) -> Array:
     return unit(scene) * gamma
 
 
-def kinetic_energy(scene: Parameters, y: ArrayLike) -> Array:
+def kinetic_energy(scene: Scene, y: ArrayLike) -> Array:
     """Kinetic energy T [J], paper (8), (9)."""
     rates = np.asarray(y, dtype=np.float64)[..., 2:]
     a = metric(scene, np.asarray(y, dtype=np.float64)[..., :2])
     return np.asarray(0.5 * np.einsum("...i,...ij,...j", rates, a, rates))
 
 
-def potential_energy(scene: Parameters, q: ArrayLike, constant_force: float = 0.0) -> Array:
+def potential_energy(scene: Scene, q: ArrayLike, constant_force: float = 0.0) -> Array:
     """Potential energy Pi [J], paper (10), or U = Pi - F x2 where a constant force F [N] is given."""
     trig, coefficients, f = _trigonometry(scene, q, constant_force)
     s1, c1, s2, c2, s12, _ = trig
-    u = reduced.potential(s1, c1, s2, c2, s12, coefficients.lift, coefficients.spring, coefficients.gravity, f)
+    u = reduced.potential(
+        s1, c1, s2, c2, s12, coefficients.lift, coefficients.spring, coefficients.gravity, f
+    )
     return np.asarray(unit(scene) * u + (scene.c1 + scene.c2) * scene.l**2)
 
 
-def potential_gradient(scene: Parameters, q: ArrayLike, constant_force: float = 0.0) -> Array:
+def potential_gradient(scene: Scene, q: ArrayLike, constant_force: float = 0.0) -> Array:
     """Gradient of Pi, or of U = Pi - F x2, with respect to (phi, theta) [J]; shape (..., 2)."""
     trig, coefficients, f = _trigonometry(scene, q, constant_force)
     s1, c1, s2, c2, _, c12 = trig
@@ -68,7 +71,7 @@ def potential_gradient(scene: Parameters, q: ArrayLike, constant_force: float = 
     return unit(scene) * np.stack(u, axis=-1)
 
 
-def potential_hessian(scene: Parameters, q: ArrayLike, constant_force: float = 0.0) -> Array:
+def potential_hessian(scene: Scene, q: ArrayLike, constant_force: float = 0.0) -> Array:
     """Hessian c_(alpha beta) of Pi, or of U = Pi - F x2 [J], paper (19); shape (..., 2, 2)."""
     trig, coefficients, f = _trigonometry(scene, q, constant_force)
     s1, c1, s2, c2, s12, _ = trig
@@ -78,7 +81,7 @@ def potential_hessian(scene: Parameters, q: ArrayLike, constant_force: float = 0
     return unit(scene) * _symmetric(*u)
 
 
-def generalized_forces(scene: Parameters, y: ArrayLike, t: ArrayLike) -> Array:
+def generalized_forces(scene: Scene, y: ArrayLike, t: ArrayLike) -> Array:
     """Generalized forces Q_alpha [N m] of weight, springs, damper and force; shape (..., 2).
 
     The damper acts through the slider alone: -beta (dx3/dphi)^2 phi' on phi; the force through M2: F dx2/dq.
@@ -92,7 +95,7 @@ def generalized_forces(scene: Parameters, y: ArrayLike, t: ArrayLike) -> Array:
     return np.stack(np.broadcast_arrays(q1, q2), axis=-1) - potential_gradient(scene, np.asarray(y)[..., :2])
 
 
-def angular_accelerations(scene: Parameters, y: ArrayLike, t: ArrayLike) -> Array:
+def angular_accelerations(scene: Scene, y: ArrayLike, t: ArrayLike) -> Array:
     """phi'', theta'' [rad/s2] from paper (13); shape (..., 2). The arithmetic that compiled lanes run."""
     phi, theta, phi_dot, theta_dot = _split(y, 4)
     c = reduce(scene)
@@ -113,7 +116,9 @@ def _symmetric(a11: Array, a12: Array, a22: Array) -> Array:
     return np.stack([np.stack([a11, a12], axis=-1), np.stack([a12, a22], axis=-1)], axis=-2)
 
 
-def _trigonometry(scene: Parameters, q: ArrayLike, constant_force: float) -> tuple[tuple[Array, ...], Coefficients, float]:
+def _trigonometry(
+    scene: Scene, q: ArrayLike, constant_force: float
+) -> tuple[tuple[Array, ...], Coefficients, float]:
     phi, theta = _split(q, 2)
     total = phi + theta
     trig = (np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta), np.sin(total), np.cos(total))

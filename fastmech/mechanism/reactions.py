@@ -11,9 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.mechanism.coefficients import Parameters, force
+from fastmech.mechanism.coefficients import force
 from fastmech.mechanism.geometry import accelerations, positions, velocities
 from fastmech.mechanism.lagrange import angular_accelerations
+from fastmech.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -27,7 +28,7 @@ class Reactions(NamedTuple):
     slider_normal: Array  #: force of the guide on the slider, upwards positive
 
 
-def reactions(scene: Parameters, y: ArrayLike, t: ArrayLike) -> Reactions:
+def reactions(scene: Scene, y: ArrayLike, t: ArrayLike) -> Reactions:
     """Rod forces and the slider's normal reaction at states ``y`` (..., 4) and times ``t`` [s]."""
     r, v = positions(scene, y), velocities(scene, y)
     a = accelerations(scene, y, angular_accelerations(scene, y, t))
@@ -40,7 +41,9 @@ def reactions(scene: Parameters, y: ArrayLike, t: ArrayLike) -> Reactions:
     rod_m1m3 = (scene.m3 * a.x3 + scene.beta * v.x3) * 2.0 * l / (r.x1 - r.x3)
     slider_normal = scene.m3 * g - rod_m1m3 * r.y1 / (2.0 * l)
     # M1: what weight, spring and the two other rods leave to rod OM1.
-    need_x = scene.m1 * a.x1 + scene.c2 * r.x1 - rod_m1m2 * (r.x2 - r.x1) / l - rod_m1m3 * (r.x3 - r.x1) / (2 * l)
+    need_x = (
+        scene.m1 * a.x1 + scene.c2 * r.x1 - rod_m1m2 * (r.x2 - r.x1) / l - rod_m1m3 * (r.x3 - r.x1) / (2 * l)
+    )
     need_y = scene.m1 * (a.y1 + g) - scene.c2 * (l - r.y1)
     need_y = need_y - rod_m1m2 * (r.y2 - r.y1) / l - rod_m1m3 * (r.y3 - r.y1) / (2 * l)
     rod_om1 = -(need_x * r.x1 + need_y * r.y1) / l

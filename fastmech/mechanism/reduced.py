@@ -8,13 +8,18 @@ is ``None`` is not there: the compiler drops its code.
 
 from __future__ import annotations
 
+from typing import Any, TypeAlias
+
 import numpy as np
 
 from fastmech.jit import inlined
 
+#: A float in compiled lanes, an array in analysis.
+Values: TypeAlias = Any
+
 
 @inlined
-def slider_ratio(s1: float, c1: float) -> tuple[float, float]:
+def slider_ratio(s1: Values, c1: Values) -> tuple[Values, Values]:
     """k = -(dx3/dphi)/l and dk/dphi, from paper (6): k = sin phi (1 + cos phi / sqrt(4 - sin^2 phi))."""
     inverse_root = 1.0 / np.sqrt(4.0 - s1 * s1)
     q = c1 * inverse_root
@@ -24,19 +29,19 @@ def slider_ratio(s1: float, c1: float) -> tuple[float, float]:
 
 
 @inlined
-def metric_11(mass: float, slider: float, k: float) -> float:
+def metric_11(mass: Values, slider: Values, k: Values) -> Values:
     """a11/(m2 l^2), paper (11); a12/(m2 l^2) = sin(phi + theta) and a22/(m2 l^2) = 1."""
     return mass + 1.0 + slider * k * k
 
 
 @inlined
-def metric_determinant(mass: float, slider: float, k: float, c12: float) -> float:
+def metric_determinant(mass: Values, slider: Values, k: Values, c12: Values) -> Values:
     """(a11 a22 - a12^2)/(m2 l^2)^2, written without cancellation; positive for every m1, m2 > 0."""
     return mass + c12 * c12 + slider * k * k
 
 
 @inlined
-def christoffel(slider: float, k: float, dk: float, c12: float) -> tuple[float, float, float]:
+def christoffel(slider: Values, k: Values, dk: Values, c12: Values) -> tuple[Values, Values, Values]:
     """Christoffel symbols (Gamma_11,1; Gamma_22,1; Gamma_11,2) over m2 l^2, paper (12); the others vanish.
 
     Gamma_11,1 is half of da11/dphi; the paper's print of it differs (see the paper report).
@@ -46,16 +51,16 @@ def christoffel(slider: float, k: float, dk: float, c12: float) -> tuple[float, 
 
 @inlined
 def potential_gradient(
-    s1: float,
-    c1: float,
-    s2: float,
-    c2: float,
-    c12: float,
-    lift: float,
-    spring: float,
-    gravity: float,
-    force: float | None,
-) -> tuple[float, float]:
+    s1: Values,
+    c1: Values,
+    s2: Values,
+    c2: Values,
+    c12: Values,
+    lift: Values,
+    spring: Values,
+    gravity: Values,
+    force: Values | None,
+) -> tuple[Values, Values]:
     """Gradient of U = Pi - F x2 over m2 l^2 with respect to (phi, theta) [1/s^2], paper (17), (20)."""
     pull = spring * c12
     u1 = lift * c1 - pull
@@ -68,16 +73,16 @@ def potential_gradient(
 
 @inlined
 def potential_hessian(
-    s1: float,
-    c1: float,
-    s2: float,
-    c2: float,
-    s12: float,
-    lift: float,
-    spring: float,
-    gravity: float,
-    force: float,
-) -> tuple[float, float, float]:
+    s1: Values,
+    c1: Values,
+    s2: Values,
+    c2: Values,
+    s12: Values,
+    lift: Values,
+    spring: Values,
+    gravity: Values,
+    force: Values,
+) -> tuple[Values, Values, Values]:
     """(U_phi,phi, U_phi,theta, U_theta,theta) over m2 l^2 [1/s^2], paper (19)."""
     u12 = spring * s12
     return force * c1 - lift * s1 + u12, u12, gravity * c2 - force * s2 + u12
@@ -85,15 +90,15 @@ def potential_hessian(
 
 @inlined
 def potential(
-    s1: float,
-    c1: float,
-    s2: float,
-    c2: float,
-    s12: float,
-    lift: float,
-    spring: float,
-    gravity: float,
-    force: float,
-) -> float:
+    s1: Values,
+    c1: Values,
+    s2: Values,
+    c2: Values,
+    s12: Values,
+    lift: Values,
+    spring: Values,
+    gravity: Values,
+    force: Values,
+) -> Values:
     """U = Pi - F x2 over m2 l^2, less the constant (c1 + c2)/m2 [1/s^2], paper (10)."""
     return lift * s1 - gravity * c2 - spring * s12 - force * (c1 - s2)

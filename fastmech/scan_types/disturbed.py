@@ -34,7 +34,7 @@ class Disturbed(Scan):
     t_end: Annotated[float, Field(gt=0)] = 120.0
     dt: Annotated[float, Field(gt=0)] = 0.05
     method: str = "dop853"
-    linear_horizon: Annotated[float, Field(gt=0, description="horizon of the comparison [s]")] = 2.0
+    linear_horizon: Annotated[float, Field(gt=0, description="horizon of the comparison [s]")] = 1.0
     linear_tolerance: Annotated[float, Field(gt=0, description="deviation allowed, relative")] = 0.05
     linear_directions: Annotated[int, Field(ge=1, le=1_000_000)] = 256
 
@@ -78,23 +78,42 @@ class Disturbed(Scan):
         variables = {
             "phi": Variable(each, equilibria.phi, "rad", "angle phi of the disturbed equilibrium"),
             "theta": Variable(each, equilibria.theta, "rad", "angle theta of the disturbed equilibrium"),
-            "omega": Variable(each, [e.size.omega for e in ensembles], "rad/s", "frequency in the norm"),
-            "start": Variable((*every, "component"), _stack(ensembles, "starts"), "rad, rad/s", f"start: {state}"),
-            "final": Variable((*every, "component"), _stack(ensembles, "final"), "rad, rad/s", f"end: {state}"),
-            "outcome": Variable(every, _stack(ensembles, "outcome"), "1", "where it is at the end", flags(Outcome)),
+            "omega": Variable(
+                each, np.array([e.size.omega for e in ensembles]), "rad/s", "frequency in the norm"
+            ),
+            "start": Variable(
+                (*every, "component"), _stack(ensembles, "starts"), "rad, rad/s", f"start: {state}"
+            ),
+            "final": Variable(
+                (*every, "component"), _stack(ensembles, "final"), "rad, rad/s", f"end: {state}"
+            ),
+            "outcome": Variable(
+                every, _stack(ensembles, "outcome"), "1", "where it is at the end", flags(Outcome)
+            ),
             "end_equilibrium": Variable(
-                every, _stack(ensembles, "end_index"), "1", "equilibrium at which it rests at the end, -1: none"
+                every,
+                _stack(ensembles, "end_index"),
+                "1",
+                "equilibrium at which it rests at the end, -1: none",
             ),
             "turns": Variable(
-                (*every, "angle"), _stack(ensembles, "turns"), "1", "full turns of phi and theta made until then"
+                (*every, "angle"),
+                _stack(ensembles, "turns"),
+                "1",
+                "full turns of phi and theta made until then",
             ),
             "time_to_return": Variable(
                 every, _stack(ensembles, "time_to_return"), "s", "from then on within the ball of return"
             ),
             "excursion": Variable(
-                (*every, "angle"), _stack(ensembles, "excursion"), "rad", "largest departures of phi and theta"
+                (*every, "angle"),
+                _stack(ensembles, "excursion"),
+                "rad",
+                "largest departures of phi and theta",
             ),
-            "share_returned": Variable(each, [e.share_returned for e in ensembles], "1", "share that returned"),
+            "share_returned": Variable(
+                each, np.array([e.share_returned for e in ensembles]), "1", "share that returned"
+            ),
             "quantile": Variable(("quantile",), np.array(QUANTILES), "1", "quantile"),
             "time_to_return_quantile": Variable(
                 ("equilibrium", "quantile"),

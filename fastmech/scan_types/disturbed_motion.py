@@ -63,7 +63,9 @@ class DisturbedMotionScan(Scan):
                 "disturbance of phi, theta, phi', theta', linearized motion",
             ),
         }
-        return Dataset(variables, {"method": self.method, "dt": self.dt, "disturbance": np.array(disturbance)})
+        return Dataset(
+            variables, {"method": self.method, "dt": self.dt, "disturbance": np.array(disturbance)}
+        )
 
     @staticmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
@@ -50,11 +50,9 @@ class EquilibriumMap(Scan):
         grid = tuple(axes)
         roots = (*grid, "root")
         modes = (*roots, "mode")
-        about: dict[str, Any] = {
-            name: str(field.description) for name, field in Scene.model_fields.items() if name in axes
-        }
+        described = scene.described()
         variables = {
-            **{name: Variable((name,), axes[name], Scene.units()[name], about[name]) for name in axes},
+            **{name: Variable((name,), values, *described[name][1:]) for name, values in axes.items()},
             "count": Variable(grid, found.count, "1", "number of equilibria"),
             "count_stable": Variable(grid, found.count_stable, "1", "number of stable equilibria (minima)"),
             "outcome": Variable(grid, found.outcome, "1", "what is proved of the count", flags(Outcome)),
@@ -64,7 +62,9 @@ class EquilibriumMap(Scan):
             "morse_index": Variable(
                 roots, found.morse_index, "1", "negative eigenvalues of the Hessian, -1: no equilibrium"
             ),
-            "eigenvalue_re": Variable(modes, found.eigenvalues.real, "1/s", "eigenvalues of the motion, real part"),
+            "eigenvalue_re": Variable(
+                modes, found.eigenvalues.real, "1/s", "eigenvalues of the motion, real part"
+            ),
             "eigenvalue_im": Variable(
                 modes, found.eigenvalues.imag, "rad/s", "eigenvalues of the motion, imaginary part"
             ),

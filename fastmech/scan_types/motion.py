@@ -63,9 +63,7 @@ class Motion(Scan):
         advance = context.stage("motion", 3)
         run = integrate(scene, start, dt=self.dt, method=self.method, t_eval=t)
         advance(1)
-        canonical = integrate(
-            scene, start, dt=self.dt, method=self.method, t_eval=t, formulation="hamilton"
-        )
+        canonical = integrate(scene, start, dt=self.dt, method=self.method, t_eval=t, formulation="hamilton")
         advance(1)
         balance = energy_balance(scene, start, t, dt=self.dt, method=self.method)
         advance(1)

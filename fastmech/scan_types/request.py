@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from fastmech.errors import InputError
 from fastmech.ensembles.run import Progress
+from fastmech.errors import InputError
 from fastmech.results import Dataset, check_name
 from fastmech.scene import Scene, explain, nearest, read_toml
 
@@ -82,7 +82,9 @@ def read_request(path: str | Path, kinds: Mapping[str, type[Scan]]) -> Request:
     scene = Scene(**_table(table.get("scene", {}), "scene"))
     scans = _table(table.get("scan", {}), "scan")
     if not scans:
-        raise InputError(f"{path}: asks for no scan; write a table [scan.NAME] with kind = one of {list(kinds)}")
+        raise InputError(
+            f"{path}: asks for no scan; write a table [scan.NAME] with kind = one of {list(kinds)}"
+        )
     request = Request(
         title=title,
         scene=scene,

@@ -69,13 +69,13 @@ def get_variable(stored: h5py.Dataset, dims: Mapping[int, str], where: str) -> V
 def get_attrs(stored: h5py.Group | h5py.Dataset) -> dict[str, Any]:
     """The attributes of a group or variable, those of HDF5 and netCDF themselves left out."""
     return {
-        name: python_value(stored.attrs[name])
+        name: _python_value(stored.attrs[name])
         for name in stored.attrs
         if name not in RESERVED_ATTRS and not name.startswith("_")
     }
 
 
-def python_value(value: Any) -> Any:
+def _python_value(value: Any) -> Any:
     if isinstance(value, bytes):
         return value.decode()
     if isinstance(value, np.ndarray) and value.dtype.kind == "S":

@@ -40,13 +40,13 @@ def put_dataset(group: h5py.Group, dataset: Dataset, numbers: Iterator[int]) -> 
 def put_attrs(target: h5py.Group | h5py.Dataset, attrs: Mapping[str, Any]) -> None:
     """Write attributes as `fastmech.results.checked_attrs` returns them."""
     for name, value in attrs.items():
-        target.attrs[name] = _fixed_length(value) if isinstance(value, (str, tuple)) else value
+        target.attrs[name] = _fixed_length(value, 1) if isinstance(value, (str, tuple)) else value
 
 
-def _fixed_length(texts: str | tuple[str, ...]) -> npt.NDArray[np.bytes_]:
-    encoded = np.char.encode(np.array(texts), "utf-8")
-    # HDF5 has no strings of length 0; the padding is dropped on reading
-    return encoded.astype(h5py.string_dtype("utf-8", max(1, encoded.dtype.itemsize)))
+def _fixed_length(texts: npt.ArrayLike, least: int) -> npt.NDArray[np.bytes_]:
+    """UTF-8, padded with null bytes, which reading drops, to the longest text or to `least` bytes."""
+    encoded = np.char.encode(np.asarray(texts, dtype=str), "utf-8")
+    return encoded.astype(h5py.string_dtype("utf-8", max(least, encoded.dtype.itemsize)))
 
 
 def _put_scale(group: h5py.Group, dim: str, size: int, dataset: Dataset) -> h5py.Dataset:
@@ -61,10 +61,10 @@ def _put_scale(group: h5py.Group, dim: str, size: int, dataset: Dataset) -> h5py
 
 
 def _put_variable(group: h5py.Group, name: str, variable: Variable) -> h5py.Dataset:
-    data = variable.data
-    if data.dtype == object:
-        stored = _create_strings(group, name, data)
-    elif data.nbytes <= COMPACT_BYTES:
+    text = variable.data.dtype == object
+    # of two bytes at least: netCDF readers take strings of one byte for the characters of longer ones
+    data = _fixed_length(variable.data, 2) if text else variable.data
+    if data.nbytes <= COMPACT_BYTES:
         stored = _create_compact(group, name, data.shape, data.dtype)
     else:
         stored = group.create_dataset(
@@ -79,16 +79,10 @@ def _put_variable(group: h5py.Group, name: str, variable: Variable) -> h5py.Data
         )
     if data.size:
         stored[...] = data
+    if text:
+        put_attrs(stored, {"_Encoding": "utf-8"})
     put_attrs(stored, {"units": variable.units, "long_name": variable.long_name, **variable.attrs})
     return stored
-
-
-def _create_strings(group: h5py.Group, name: str, data: npt.NDArray[Any]) -> h5py.Dataset:
-    dtype = h5py.string_dtype()
-    # HDF5 keeps a reference of 16 bytes for each string; compressing those gains nothing
-    if 16 * data.size <= COMPACT_BYTES:
-        return _create_compact(group, name, data.shape, dtype)
-    return group.create_dataset(name, shape=data.shape, dtype=dtype)
 
 
 def _create_compact(

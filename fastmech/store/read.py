@@ -18,9 +18,8 @@ from fastmech.store.decode import (
     is_dimension_only,
     members,
     named_damage,
-    python_value,
 )
-from fastmech.store.schema import FORMAT, OWN_ATTRS, SCHEMA_VERSION
+from fastmech.store.schema import FORMAT, SCHEMA_VERSION
 
 if TYPE_CHECKING:
     import xarray
@@ -52,9 +51,10 @@ class Results:
         self.path = Path(path)
         self._file = _open_file(self.path)
         try:
-            _check_schema(self._file, self.path)
             with named_damage(str(path)):
                 self.attrs = get_attrs(self._file)
+            _check_schema(self.attrs, path)
+            with named_damage(str(path)):
                 root = members(self._file)
             self.parameters = {
                 name: get_variable(member, {}, f"{path}: parameter {name!r}")
@@ -195,13 +195,11 @@ def _open_file(path: Path) -> h5py.File:
         return h5py.File(path, "r")
 
 
-def _check_schema(file: h5py.File, path: Path) -> None:
-    with named_damage(str(path)):
-        written_by, version = (python_value(file.attrs.get(name)) for name in OWN_ATTRS)
-    if not isinstance(written_by, str) or written_by != FORMAT:
+def _check_schema(attrs: Mapping[str, Any], path: str | Path) -> None:
+    if attrs.get("format") != FORMAT:
         raise InputError(f"{path}: is an HDF5 file, but not a result file of fastmech")
-    if not isinstance(version, int) or version != SCHEMA_VERSION:
+    if attrs.get("schema_version") != SCHEMA_VERSION:
         raise InputError(
-            f"{path}: has schema version {version}, but this fastmech reads version {SCHEMA_VERSION};"
-            " open it with the fastmech that wrote it or a newer one"
+            f"{path}: has schema version {attrs.get('schema_version')}, but this fastmech reads version"
+            f" {SCHEMA_VERSION}; open it with the fastmech that wrote it or a newer one"
         )

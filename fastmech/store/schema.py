@@ -8,15 +8,16 @@ A result file is an HDF5 file that netCDF-4 readers open:
   dimensions are HDF5 dimension scales of the same group: the coordinate variable of that name or, where
   there is none, an empty dataset with netCDF's own mark (`DIMENSION_ONLY`). They are attached as HDF5 asks,
   and by number as netCDF-4 does (`DIM_NUMBER`, `DIM_NUMBERS`), unique in the file.
-- String variables are UTF-8 of variable length; texts in attributes are UTF-8 of fixed length.
+- Texts, in attributes and in variables, are UTF-8 of fixed length; string variables say so to xarray by the
+  attribute `_Encoding`.
 - The root's attributes are `format`, `schema_version`, all of `PROVENANCE`, `title` and whatever the run
   adds, such as `request` (the TOML text), `seed`, `wall_time_s`, `method`.
 
-Numbers and attributes are under a checksum: arrays are chunked, shuffled, compressed by gzip and summed by
+All values and attributes are under a checksum: arrays are chunked, shuffled, compressed by gzip and summed by
 Fletcher-32; scalars, arrays up to `COMPACT_BYTES` and attributes lie in their object's header, which has a
-checksum of its own in the file format of HDF5 1.10. What has a variable length lies in HDF5's global heap, which
-has none and on whose damage HDF5 may loop for ever: so only string variables use it, and the reader takes the
-dimensions from their numbers.
+checksum of its own in the file format of HDF5 1.10. HDF5 keeps whatever has a variable length in a global
+heap, which has no checksum and on whose damage HDF5 can loop for ever. So no text is of variable length, and
+the reader takes dimensions by their numbers, not by HDF5's lists of references.
 """
 
 from __future__ import annotations

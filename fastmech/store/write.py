@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import itertools
 import os
-import re
 import secrets
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -46,8 +46,8 @@ def write_results(
 ) -> None:
     """Write a result file (see `fastmech.store.schema`); missing parent folders are made.
 
-    The file is written aside, flushed to the disk and then takes its final name at once: under that name
-    there is always a complete file, or the older one, or none.
+    The file is composed in memory, written aside, flushed to the disk and then takes its final name at once:
+    under that name there is always a complete file, or the older one, or none.
 
     Args:
         path: the result file to be.
@@ -61,22 +61,33 @@ def write_results(
         InputError: the folder is unwritable, the disk is full, the path is a folder, the file exists and
             `replace` is False, or the content does not fit the schema.
     """
-    root = _checked_root(scene_parameters, sections)
-    root_attrs = _checked_root_attrs(attrs)
+    image = _image(_checked_root(scene_parameters, sections), sections, _checked_root_attrs(attrs))
     with _readable_reasons(path):
         target = _target(path, replace)
         temporary = _aside(target)
         try:
-            with h5py.File(temporary, "x", libver=LIBRARY_VERSIONS, track_order=True) as file:
-                put_attrs(file, root_attrs)
-                numbers = itertools.count()
-                put_dataset(file, root, numbers)
-                for name, dataset in sections.items():
-                    put_dataset(file.create_group(name, track_order=True), dataset, numbers)
-            _flush_to_disk(temporary, os.O_RDWR)
+            with temporary.open("xb") as file:
+                file.write(image)
+                file.flush()
+                os.fsync(file.fileno())
             _publish(temporary, target, replace)
         finally:
             temporary.unlink(missing_ok=True)
+
+
+def _image(root: Dataset, sections: Mapping[str, Dataset], attrs: Mapping[str, Any]) -> memoryview:
+    """The file's bytes.
+
+    Built in memory, because HDF5 may crash the process when the disk is full; a plain write tells it.
+    """
+    buffer = io.BytesIO()
+    with h5py.File(buffer, "w", libver=LIBRARY_VERSIONS, track_order=True) as file:
+        put_attrs(file, attrs)
+        numbers = itertools.count()
+        put_dataset(file, root, numbers)
+        for name, dataset in sections.items():
+            put_dataset(file.create_group(name, track_order=True), dataset, numbers)
+    return buffer.getbuffer()
 
 
 def _checked_root(scene_parameters: Mapping[str, Variable], sections: Mapping[str, Dataset]) -> Dataset:
@@ -129,17 +140,17 @@ def _publish(temporary: Path, target: Path, replace: bool) -> None:
             if target.exists():
                 raise _already_exists(target) from None
             os.replace(temporary, target)
-    # some systems cannot flush a folder; the file itself is safe by now
+    _flush_folder(target.parent)
+
+
+def _flush_folder(folder: Path) -> None:
+    # some systems cannot do it; the file itself is safe by now
     with contextlib.suppress(OSError):
-        _flush_to_disk(target.parent, os.O_RDONLY)
-
-
-def _flush_to_disk(path: Path, access: int) -> None:
-    descriptor = os.open(path, access)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
 
 
 def _already_exists(path: str | Path) -> InputError:
@@ -151,16 +162,5 @@ def _readable_reasons(path: str | Path) -> Iterator[None]:
     """Turn the failures of a file system into one line with the path and the system's reason."""
     try:
         yield
-    except (OSError, RuntimeError) as error:
-        reason = _system_reason(error)
-        if reason is None:
-            raise
-        raise InputError(f"{path}: cannot be written: {reason}") from error
-
-
-def _system_reason(error: OSError | RuntimeError) -> str | None:
-    if isinstance(error, OSError) and error.strerror:
-        return error.strerror
-    # HDF5 hands the system's error on inside of its own message, as an OSError or a RuntimeError
-    found = re.search(r"errno = (\d+)", str(error))
-    return os.strerror(int(found[1])) if found else None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error

@@ -1,0 +1,1 @@
+"""Speed against error, side by side with what a user would do otherwise."""

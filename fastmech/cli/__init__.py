@@ -1,0 +1,67 @@
+"""The command ``fastmech``: one module a command, loaded when it is asked for.
+
+To add a command, write a module ``NAME.py`` here with a click command ``command`` and name it in ``COMMANDS``.
+Its imports at module level must stay as light as click: numerical libraries are imported inside of the command,
+so that ``fastmech --help`` answers at once.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+import click
+
+from fastmech import __version__
+from fastmech.cli.failure import Failure, one_line
+
+COMMANDS = ("run", "info", "plot", "equilibria", "paper", "bench")
+
+
+class _Commands(click.Group):
+    """Loads commands when they are needed and tells every user error in one line."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = import_module(f"{__name__}.{cmd_name}").command
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        name = args[0]
+        if name not in COMMANDS and not name.startswith("-"):
+            raise Failure(f"{name!r}: unknown command; {_hint(name)}")
+        return super().resolve_command(ctx, args)
+
+    def make_context(
+        self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: object
+    ) -> click.Context:
+        with one_line():
+            return super().make_context(info_name, args, parent, **extra)
+
+    def invoke(self, ctx: click.Context) -> object:
+        with one_line():
+            return super().invoke(ctx)
+
+
+def _hint(name: str) -> str:
+    from difflib import get_close_matches
+
+    close = get_close_matches(name, COMMANDS, n=1, cutoff=0.5)
+    return f"did you mean {close[0]!r}?" if close else f"commands: {', '.join(COMMANDS)}"
+
+
+@click.group(cls=_Commands, invoke_without_command=True)
+@click.version_option(__version__, message="fastmech %(version)s")
+@click.pass_context
+def main(ctx: click.Context) -> None:
+    """Where a mechanism can rest, whether it stays there, and what shock it survives.
+
+    Start with: fastmech run scans/paper.toml
+    """
+    if ctx.invoked_subcommand is None:
+        click.echo(ctx.get_help())

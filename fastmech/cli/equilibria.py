@@ -1,0 +1,110 @@
+"""``fastmech equilibria``: every resting position of a scene and its stability, as a table."""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from fastmech.equilibria.find import Equilibria
+    from fastmech.scene import Scene
+    from fastmech.stability.classify import Classification
+
+
+class _SceneCommand(click.Command):
+    """A command with an option for every parameter of a scene."""
+
+    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
+        """The command's own parameters after the scene's, which are looked up only now: pydantic is slow to load."""
+        from fastmech.scene import Scene
+
+        options = [
+            click.Option([f"--{name}", name], type=float, metavar="X", help=f"{about} [{unit}; Table 1: {value:g}]")
+            for name, (value, unit, about) in Scene().described().items()
+        ]
+        return [*options, *super().get_params(ctx)]
+
+
+@click.command(name="equilibria", cls=_SceneCommand)
+@click.argument("scene_file", metavar="[SCENE.toml]", required=False, type=click.Path(path_type=Path))
+@click.option(
+    "--at",
+    metavar="T",
+    type=float,
+    default=math.inf,
+    help="Time at which the force is frozen [s; default: after all decay].",
+)
+def command(scene_file: Path | None, at: float, **parameters: float | None) -> None:
+    """List every equilibrium of a scene and its stability.
+
+    A sentence says whether the list is proved to be complete. The scene is the one of SCENE.toml (its table [scene]), else Table 1; options change it.
+    """
+    from rich.console import Console
+
+    from fastmech.cli.progress import ProgressBars
+    from fastmech.scene import Scene
+
+    scene = Scene.from_toml(scene_file) if scene_file else Scene()
+    scene = scene.replace(**{name: value for name, value in parameters.items() if value is not None})
+    with ProgressBars() as bars, bars.preparing():
+        from fastmech.equilibria.find import find_equilibria
+        from fastmech.stability.classify import classify
+    found = find_equilibria(scene, at)
+    results = [classify(scene, equilibrium) for equilibrium in found]
+    console = Console(width=None if sys.stdout.isatty() else 110, highlight=False)
+    console.print(f"force F = {found.force:g} N on M2{_time(scene, at)}")
+    if found:
+        console.print(_table(found, results))
+    for number, result in enumerate(results, start=1):
+        console.print(f"{number}: {result.explanation}.")
+    sentence = found.certificate.sentence
+    console.print(f"{sentence[0].upper()}{sentence[1:]}.")
+
+
+def _time(scene: Scene, at: float) -> str:
+    if scene.alpha == 0.0 or scene.F0 == 0.0:
+        return ", constant"
+    frozen = "decayed" if math.isinf(at) else f"frozen at t = {at:g} s"
+    return f", {frozen} (F0 = {scene.F0:g} N, alpha = {scene.alpha:g} 1/s)"
+
+
+def _table(found: Equilibria, results: list[Classification]) -> Table:
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_lines=True)
+    table.add_column("")
+    for title in ("phi\nrad\ndeg", "theta\nrad\ndeg", "energy\nJ"):
+        table.add_column(title, justify="right", no_wrap=True)
+    table.add_column("kind", no_wrap=True)
+    table.add_column("eigenvalues\n1/s", justify="right", no_wrap=True)
+    table.add_column("Sylvester\nHurwitz\neigenvalues", no_wrap=True)
+    table.add_column("joint verdict", style="bold", no_wrap=True)
+    for number, (equilibrium, result) in enumerate(zip(found, results, strict=True), start=1):
+        table.add_row(
+            str(number),
+            f"{equilibrium.phi:z.6f}\n{math.degrees(equilibrium.phi):z.3f}",
+            f"{equilibrium.theta:z.6f}\n{math.degrees(equilibrium.theta):z.3f}",
+            f"{equilibrium.energy:z.4f}",
+            equilibrium.kind,
+            "\n".join(
+                _complex(value, error)
+                for value, error in zip(result.eigenvalues, result.eigenvalue_errors, strict=True)
+                if value.imag >= 0.0
+            ),
+            "\n".join(f.verdict for f in (result.sylvester, result.hurwitz, result.spectrum)),
+            result.verdict,
+        )
+    return table
+
+
+def _complex(value: complex, error: float) -> str:
+    """An eigenvalue, a conjugate pair once; a real part that rounding hides is shown as 0."""
+    real = f"{value.real:+.5g}" if abs(value.real) > error else "0"
+    return f"{real} ± {value.imag:.5g}i" if value.imag else real

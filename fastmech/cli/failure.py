@@ -1,0 +1,39 @@
+"""How the command line fails: one line on standard error, an exit code, no traceback."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import IO, Any
+
+import click
+
+from fastmech.errors import InputError
+
+BAD_INPUT, INTERRUPTED = 2, 130
+
+
+class Failure(click.ClickException):
+    """Ends the command with ``fastmech: message`` on standard error."""
+
+    def __init__(self, message: str, exit_code: int = BAD_INPUT) -> None:
+        super().__init__(" ".join(message.split("\n")))
+        self.exit_code = exit_code
+
+    def show(self, file: IO[Any] | None = None) -> None:
+        """Write the line."""
+        click.echo(f"fastmech: {self.message}", file=file, err=True)
+
+
+@contextmanager
+def one_line() -> Iterator[None]:
+    """Turn what a user causes (a wrong command line, wrong input, an interruption) into a `Failure`."""
+    try:
+        yield
+    except click.UsageError as error:
+        see = f" See: {error.ctx.command_path} --help" if error.ctx else ""
+        raise Failure(f"{error.format_message()}{see}") from None
+    except InputError as error:
+        raise Failure(str(error)) from None
+    except KeyboardInterrupt:
+        raise Failure("interrupted", INTERRUPTED) from None

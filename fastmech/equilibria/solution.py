@@ -1,0 +1,57 @@
+"""The arrays that the compiled solver fills, and the sentence that says what its proof came to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.equilibria.outcome import Outcome
+from fastmech.equilibria.search import MOST, FloatArray
+from fastmech.equilibria.solve import solve
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """What ``solve`` writes for n scenes; shapes (n,) and (n, 6), meanings there."""
+
+    phi: FloatArray
+    theta: FloatArray
+    energy: FloatArray
+    radius: FloatArray
+    index: NDArray[np.int8]
+    count: NDArray[np.int8]
+    expected: NDArray[np.int8]
+    outcome: NDArray[np.int8]
+    margin: FloatArray
+
+
+def solve_rows(coefficients: FloatArray) -> Solution:
+    """Equilibria of n scenes from their (n, 8) reduced coefficients, contiguous, the force frozen."""
+    n = len(coefficients)
+    result = Solution(
+        phi=np.empty((n, MOST)),
+        theta=np.empty((n, MOST)),
+        energy=np.empty((n, MOST)),
+        radius=np.empty((n, MOST)),
+        index=np.empty((n, MOST), dtype=np.int8),
+        count=np.empty(n, dtype=np.int8),
+        expected=np.empty(n, dtype=np.int8),
+        outcome=np.empty(n, dtype=np.int8),
+        margin=np.empty(n),
+    )
+    solve(coefficients, *vars(result).values())
+    return result
+
+
+def explain(outcome: Outcome, count: int, expected: int, margin: float) -> str:
+    """One sentence for a certificate; a degenerate scene's is made from its parameters instead."""
+    if outcome is Outcome.COMPLETE:
+        change = "two of them merge" if margin > 0.0 else "two more appear"
+        return f"all {count} are proved to exist and to be all; {abs(margin):.3g} rad from where {change}"
+    if outcome is Outcome.AT_FOLD:
+        return f"equilibria merge here within rounding: {count} listed, the merged one as degenerate"
+    if np.isnan(margin):
+        return "not proved: the reduced coefficients are not finite"
+    return f"not proved: {count} equilibria listed, {expected or '4 to 6'} must exist"

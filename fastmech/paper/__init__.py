@@ -1,0 +1,1 @@
+"""The source paper as the package's first scene: every printed number, table and figure, computed again."""

@@ -1,0 +1,1 @@
+"""Pictures: one look, and the parts that several of them share."""

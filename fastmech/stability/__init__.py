@@ -1,0 +1,1 @@
+"""Stability of an equilibrium: linearization, three criteria and their joint verdict."""

@@ -1,0 +1,76 @@
+"""Undamped modes, and how far the slider's damper reaches them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fastmech.stability.linearize import FloatArray, SmallMotion, polynomial
+
+#: Names of the three measures that must be away from zero for the damper to reach both modes.
+SIN_PHI = "sin phi"
+SIN_PSI = "sin(phi+theta)"
+UNLOADED = "U_theta,theta - C"
+
+#: What it means when one of them vanishes.
+MEANING = {
+    SIN_PHI: "the slider is at dead centre (sin phi = 0), so small motions do not move the damper",
+    SIN_PSI: "sin(phi+theta) = 0, so M2 swings without pulling at M1",
+    UNLOADED: "U_theta,theta = C, so the rod M1M2 is unloaded and M2 swings without pulling at M1",
+}
+
+
+def squared_frequencies(s: SmallMotion) -> FloatArray:
+    """Squares of the undamped natural frequencies (2,) [1/s^2], rising; negative ones grow instead.
+
+    They are the roots of det(K - w^2 M), found from the Hessian in the Cholesky coordinates of M.
+    """
+    # With M = L L^T, L = [[r, s12], [0, 1]] (upper), r = sqrt(det M): L^-1 K L^-T is symmetric.
+    r = np.sqrt(s.determinant)
+    h12 = (s.k12 - s.s12 * s.k22) / r
+    h11 = (s.k11 - 2.0 * s.s12 * s.k12 + s.s12 * s.s12 * s.k22) / s.determinant
+    squares: FloatArray = np.linalg.eigvalsh(np.array([[h11, h12], [h12, s.k22]]))
+    return squares
+
+
+def reach(s: SmallMotion, spring: float) -> dict[str, float]:
+    """Three measures in [0, 1] of how well the damper reaches the modes; a mode is missed where one is zero.
+
+    A mode that the damper misses has phi at rest: either k = 0 (sin phi = 0), or (0, 1) is an eigenvector of
+    (K, M), K12 = sin(phi+theta) K22, which by K12 = C sin(phi+theta) means one of the other two.
+    """
+    total = abs(s.k22) + spring
+    return {
+        # k = sin phi (1 + cos phi / sqrt(4 - sin^2 phi)) <= 4/3 and zero only with sin phi.
+        SIN_PHI: 0.75 * abs(s.k),
+        SIN_PSI: abs(s.s12),
+        UNLOADED: abs(s.k22 - spring) / total if total > 0.0 else 0.0,
+    }
+
+
+def slowest_decay(s: SmallMotion, spring: float, squares: FloatArray) -> float:
+    """Decay rate [1/s] of the mode that the damper reaches least, for a minimum of U; zero if it is missed.
+
+    The characteristic polynomial is (x^2 + w1^2)(x^2 + w2^2) + p3 x (x^2 + K22) with w1^2 <= K22 <= w2^2.
+    For a root near i w, to first order in the gap K22 - w^2 and to every order in p3,
+
+        rate = p3 gap (W^2 - w^2) / (2 ((W^2 - w^2)^2 + p3^2 w^2)),    W the other frequency.
+
+    The smaller gap follows from the product of both, (K12 - sin(phi+theta) K22)^2 / det M, without
+    cancellation, so that the rate has correct digits where eigenvalues have none.
+    """
+    low, high = squares
+    p3 = polynomial(s)[0]
+    split = high - low
+    if not split > 0.0:
+        return 0.0
+    product = (s.s12 * (spring - s.k22)) ** 2 / s.determinant
+    below, above = s.k22 - low, high - s.k22
+    if below < above:
+        below = product / above
+    else:
+        above = product / below
+    rates = [
+        p3 * gap * split / (2.0 * (split * split + p3 * p3 * square))
+        for gap, square in ((below, low), (above, high))
+    ]
+    return float(min(rates))

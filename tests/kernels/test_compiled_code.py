@@ -1,0 +1,117 @@
+"""What the compiler made of the kernels: packed instructions, no library calls, no terms that a scene lacks.
+
+Read from LLVM's optimized code and from the machine code, not from timings.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from typing import Any
+
+import llvmlite.binding as llvm
+import numba
+import pytest
+from kernels.blocks_of_lanes import COMBINATIONS, MODULES, kernel
+from numba import float64, int64
+
+from fastmech.integrators.explicit import add_stages, start_stage
+from fastmech.jit import FLAGS, INTEGERS, MATRIX, VECTOR
+from fastmech.kernels.work import lagrange_work
+
+pytestmark = pytest.mark.skipif(
+    not llvm.get_host_cpu_features().get("fma", False), reason="no packed fused instructions on this processor"
+)
+
+KERNELS = {f"{formulation}-{terms}": kernel(formulation, terms) for formulation, terms in COMBINATIONS}
+SHIPPED = {**KERNELS, "work": lagrange_work}
+
+PACKED = re.compile(r"\bv(?:f?n?m(?:add|sub)\d*|mul)\w*pd\s.*%[yz]mm")
+VECTOR_ARITHMETIC = re.compile(r"= f(?:add|sub|mul|div) .*<[48] x double>")
+PACKED_FLOOR = re.compile(r"= .*call .*@llvm\.floor\.v[48]f64")
+PACKED_ROOT = re.compile(r"= .*call .*@llvm\.sqrt\.v[48]f64")
+LIBRARY = re.compile(r"@(?:llvm\.)?(?:sin|cos|sincos|tan|exp|pow)\b")
+COEFFICIENT = re.compile(r"%arg\.p\.4, i64 (\d+)")
+
+
+@cache
+def compiled_anew(shipped: Any) -> Any:
+    """The kernel compiled in this process: numba shows no code of what it loaded from the disk cache."""
+    (signature,) = shipped.signatures
+    return numba.njit(signature, nogil=True, **FLAGS)(shipped.py_func)
+
+
+def intermediate(shipped: Any) -> str:
+    return "".join(compiled_anew(shipped).inspect_llvm().values())
+
+
+def machine_code(shipped: Any) -> str:
+    return "".join(compiled_anew(shipped).inspect_asm().values())
+
+
+def basic_blocks(code: str) -> list[str]:
+    """Pieces of LLVM's or the assembler's text between labels and between functions."""
+    return re.split(r"^(?:[\w.$\"<>-]+:.*|})$", code, flags=re.MULTILINE)
+
+
+def main_loop(shipped: Any) -> str:
+    """The vector loop over lanes: of the blocks in LLVM's code that take packed square roots, those that floor."""
+    blocks = basic_blocks(intermediate(shipped))
+    return "\n".join(b for b in blocks if all(re.search(call, b) for call in (PACKED_FLOOR, PACKED_ROOT)))
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_lanes_are_packed_without_library_calls(name: str) -> None:
+    loop = main_loop(SHIPPED[name])
+    assert len(VECTOR_ARITHMETIC.findall(loop)) >= 40
+    assert not LIBRARY.search(loop)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_machine_code_of_the_loop(name: str) -> None:
+    """The same in machine code: one stretch between labels that rounds packed numbers (the reduction)."""
+    blocks = basic_blocks(machine_code(SHIPPED[name]))
+    loops = [b for b in blocks if re.search(r"\bv(?:round|rndscale)pd\s.*%[yz]mm", b)]
+    loops = [b for b in loops if re.search(r"\bvsqrtpd\s.*%[yz]mm", b)]
+    assert loops
+    for loop in loops:
+        assert len(PACKED.findall(loop)) >= 40
+        assert not re.search(r"\bcall", loop)
+
+
+@pytest.mark.parametrize("stage_sum", [add_stages, start_stage])
+def test_stage_sums_are_packed(stage_sum: Any) -> None:
+    """Ten products a lane: passes of one, two, three and four terms."""
+    n_arrays = stage_sum.__code__.co_argcount - 6
+    arguments = (*[VECTOR] * n_arrays, MATRIX, float64, INTEGERS, VECTOR, int64, int64)
+    compiled = numba.njit(arguments, nogil=True, **FLAGS)(stage_sum)
+    assert len(PACKED.findall("".join(compiled.inspect_asm().values()))) >= 10
+
+
+@pytest.mark.parametrize(("formulation", "terms"), COMBINATIONS)
+def test_kernel_reads_the_coefficients_of_its_terms_only(formulation: str, terms: str) -> None:
+    """``p[5]`` is the force, ``p[6]`` the damper, ``p[7]`` the decay; eight bytes each."""
+    offsets = {int(offset) // 8 for offset in COEFFICIENT.findall(intermediate(kernel(formulation, terms)))}
+    forced = "constant" in terms or "decaying" in terms
+    assert (5 in offsets) == forced
+    assert (6 in offsets) == ("damped" in terms)
+    assert (7 in offsets) == ("decaying" in terms)
+
+
+@pytest.mark.parametrize(("formulation", "terms"), COMBINATIONS)
+def test_only_a_decaying_force_calls_the_exponential(formulation: str, terms: str) -> None:
+    calls = re.findall(r"@(?:llvm\.)?exp(?:\.f64)?\(", intermediate(kernel(formulation, terms)))
+    assert bool(calls) == ("decaying" in terms)
+
+
+@pytest.mark.parametrize("formulation", MODULES)
+def test_every_term_costs_arithmetic_and_its_absence_none(formulation: str) -> None:
+    """Packed operations for each vector of lanes; two kernels may be unrolled differently, hence the quotient."""
+    cost = {}
+    for terms in ("free", "damped", "constant", "damped_constant", "decaying", "damped_decaying"):
+        loop = main_loop(kernel(formulation, terms))
+        cost[terms] = len(VECTOR_ARITHMETIC.findall(loop)) / len(PACKED_ROOT.findall(loop))
+    assert cost["free"] < cost["damped"] < cost["damped_constant"]
+    assert cost["free"] < cost["constant"] < cost["damped_constant"]
+    assert cost["decaying"] == cost["constant"]
+    assert cost["damped_decaying"] == cost["damped_constant"]

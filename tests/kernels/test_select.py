@@ -1,0 +1,42 @@
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from kernels.blocks_of_lanes import COMBINATIONS, TERMS, kernel
+
+from fastmech.kernels.select import right_hand_side, terms
+from fastmech.scene import Scene
+
+pytestmark = pytest.mark.nojit
+
+
+@pytest.mark.parametrize(("formulation", "combination"), COMBINATIONS)
+def test_a_scene_is_given_the_kernel_of_its_terms(formulation: str, combination: str) -> None:
+    scene = Scene().replace(**TERMS[combination])
+    assert terms(scene) == combination
+    assert right_hand_side(scene, formulation) is kernel(formulation, combination)
+
+
+@pytest.mark.parametrize(
+    ("change", "combination"),
+    [
+        ({"F0": -1e-300}, "damped_decaying"),
+        ({"F0": 0.0, "alpha": 0.0}, "damped"),
+        ({"beta": 5e-324, "F0": 0.0}, "damped"),
+        ({"beta": 0.0, "F0": -0.0}, "free"),
+        ({"alpha": 5e-324}, "damped_decaying"),
+    ],
+)
+def test_edges(change: dict[str, Any], combination: str) -> None:
+    assert terms(Scene().replace(**change)) == combination
+
+
+def test_default_formulation_is_lagrange() -> None:
+    assert right_hand_side(Scene()) is kernel("lagrange", "damped_decaying")
+
+
+def test_every_kernel_is_another_one() -> None:
+    assert len({id(kernel(*combination)) for combination in COMBINATIONS}) == len(COMBINATIONS) == 12
+    assert np.unique([kernel(*combination).__name__ for combination in COMBINATIONS]).size == 12
