@@ -56,6 +56,9 @@ def run_request(
     """
     context = context or RunContext()
     request = read_request(path, scan_kinds())
+    for name in request.scans:
+        if name in type(request.scene).model_fields:
+            raise InputError(f"scan.{name}: is the name of a parameter of the scene; choose another")
     target = Path(out) if out is not None else default_output(path)
     check_writable(target, replace=fresh)
     started = time.perf_counter()
@@ -121,9 +124,7 @@ def _run_scan(request: Request, name: str, context: RunContext) -> Dataset:
         raise InputError(f"scan.{name}: {error}") from None
     seconds = time.perf_counter() - started
     changes = {f"{CHANGE}{key}": float(value) for key, value in scan.scene.items()}
-    return Dataset(
-        dataset.variables, {"kind": scan.kind, **changes, **dataset.attrs, "wall_time_s": seconds}
-    )
+    return Dataset(dataset.variables, {"kind": scan.kind, **changes, **dataset.attrs, "wall_time_s": seconds})
 
 
 def _parameters(scene: Scene) -> dict[str, Variable]:

@@ -1,8 +1,8 @@
 """The command ``fastmech``: one module a command, loaded when it is asked for.
 
-To add a command, write a module ``NAME.py`` here with a click command ``command`` and name it in ``COMMANDS``.
-Its imports at module level must stay as light as click: numerical libraries are imported inside of the command,
-so that ``fastmech --help`` answers at once.
+To add a command, write a module ``NAME.py`` here with a click command ``command`` and name it in
+``COMMANDS``. Its imports at module level must stay as light as click: numerical libraries are imported inside
+of the command, so that ``fastmech --help`` answers at once.
 """
 
 from __future__ import annotations

@@ -21,11 +21,13 @@ class _SceneCommand(click.Command):
     """A command with an option for every parameter of a scene."""
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
-        """The command's own parameters after the scene's, which are looked up only now: pydantic is slow to load."""
+        """The scene's parameters, looked up only now because pydantic is slow to load, then the command's."""
         from fastmech.scene import Scene
 
         options = [
-            click.Option([f"--{name}", name], type=float, metavar="X", help=f"{about} [{unit}; Table 1: {value:g}]")
+            click.Option(
+                [f"--{name}", name], type=float, metavar="X", help=f"{about} [{unit}; Table 1: {value:g}]"
+            )
             for name, (value, unit, about) in Scene().described().items()
         ]
         return [*options, *super().get_params(ctx)]
@@ -43,7 +45,8 @@ class _SceneCommand(click.Command):
 def command(scene_file: Path | None, at: float, **parameters: float | None) -> None:
     """List every equilibrium of a scene and its stability.
 
-    A sentence says whether the list is proved to be complete. The scene is the one of SCENE.toml (its table [scene]), else Table 1; options change it.
+    A sentence says whether the list is proved to be complete. The scene is that of SCENE.toml (its
+    table [scene]), else the paper's Table 1; the options change it.
     """
     from rich.console import Console
 

@@ -10,19 +10,24 @@ import click
 
 from fastmech.errors import InputError
 
-BAD_INPUT, INTERRUPTED = 2, 130
-
 
 class Failure(click.ClickException):
     """Ends the command with ``fastmech: message`` on standard error."""
 
-    def __init__(self, message: str, exit_code: int = BAD_INPUT) -> None:
-        super().__init__(" ".join(message.split("\n")))
-        self.exit_code = exit_code
+    exit_code = 2
+
+    def __init__(self, message: str) -> None:
+        super().__init__(" ".join(message.splitlines()))
 
     def show(self, file: IO[Any] | None = None) -> None:
         """Write the line."""
         click.echo(f"fastmech: {self.message}", file=file, err=True)
+
+
+class Interrupted(Failure):
+    """The user has stopped the command."""
+
+    exit_code = 130
 
 
 @contextmanager
@@ -36,4 +41,4 @@ def one_line() -> Iterator[None]:
     except InputError as error:
         raise Failure(str(error)) from None
     except KeyboardInterrupt:
-        raise Failure("interrupted", INTERRUPTED) from None
+        raise Interrupted("interrupted") from None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from datetime import timedelta
 from typing import Self
 
 from rich.console import Console
@@ -15,9 +16,8 @@ from rich.progress import (
     Task,
     TaskProgressColumn,
     TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
 )
+from rich.table import Column
 from rich.text import Text
 
 from fastmech.kernel_cache import cache_directory
@@ -29,22 +29,34 @@ class _Rate(ProgressColumn):
     def render(self, task: Task) -> Text:
         """The rate, or nothing where there is none yet."""
         speed = task.finished_speed or task.speed
-        return Text(f"{speed:,.3g}/s" if speed else "", style="progress.data.speed")
+        if not speed:
+            return Text()
+        return Text(f"{speed:,.0f}/s" if speed >= 10 else f"{speed:.2g}/s", style="progress.data.speed")
+
+
+class _Time(ProgressColumn):
+    """Time left, and in the end the time taken."""
+
+    def render(self, task: Task) -> Text:
+        """The time with its meaning."""
+        if task.finished_time is not None:
+            return Text(f"took {task.finished_time:.1f} s")
+        left = task.time_remaining
+        return Text("" if left is None else f"{timedelta(seconds=int(left))} left")
 
 
 class ProgressBars:
-    """Bars with percentage, rate and time left while it is entered; none unless standard error is a terminal."""
+    """Bars with percentage, rate and time left, where standard error is a terminal; nothing elsewhere."""
 
     def __init__(self, quiet: bool = False) -> None:
         self._progress = Progress(
-            TextColumn("{task.description}", markup=False),
-            BarColumn(bar_width=28),
+            TextColumn(
+                "{task.description}", markup=False, table_column=Column(overflow="ellipsis", no_wrap=True)
+            ),
+            BarColumn(bar_width=16),
             TaskProgressColumn(),
-            _Rate(),
-            TextColumn("elapsed"),
-            TimeElapsedColumn(),
-            TextColumn("left"),
-            TimeRemainingColumn(),
+            _Rate(Column(justify="right", min_width=10, no_wrap=True)),
+            _Time(Column(min_width=12, no_wrap=True)),
             console=Console(stderr=True),
             disable=quiet or not sys.stderr.isatty(),
         )

@@ -10,7 +10,10 @@ import click
 @click.command(name="run")
 @click.argument("request_file", metavar="SCAN.toml", type=click.Path(path_type=Path))
 @click.option(
-    "--out", metavar="FILE.h5", type=click.Path(path_type=Path), help="Result file [default: results/SCAN.h5]."
+    "--out",
+    metavar="FILE.h5",
+    type=click.Path(path_type=Path),
+    help="Result file [default: results/SCAN.h5].",
 )
 @click.option("--fresh", is_flag=True, help="Replace the result file if it exists.")
 @click.option("--threads", metavar="N", type=click.IntRange(min=1), help="Threads to use [default: all].")

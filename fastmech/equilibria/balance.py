@@ -74,7 +74,7 @@ class Normal(NamedTuple):
     corner: float  #: w: where q turns; 0 if it does not
     peak: float  #: Q = q(-w) [rad]; if q does not turn r2 + r3 - 1 <= 0, which continues Q to no fold
     distance: float  #: arcsin|cos D| [rad]: of D from the nearest odd multiple of pi/2
-    error: float  #: bound on the error of peak - distance by rounding [rad]
+    error: float  #: bound on the error of peak - distance (of peak where that is below zero anyway) [rad]
 
 
 @inlined
@@ -199,7 +199,9 @@ def normal_form(p: Pulls) -> Normal:
     turn = wrap(-(p.phase_phi + p.phase_theta))
 
     corner, peak = 0.0, min(ratio2 + ratio3 - 1.0, 0.0)
-    error = p.error_phi / p.amplitude_phi + p.error_theta / p.amplitude_theta + 16.0 * EPS
+    error = change2 + change3
+    if peak >= -error:
+        error += p.error_phi / p.amplitude_phi + p.error_theta / p.amplitude_theta + 16.0 * EPS
     if ratio2 + ratio3 > 1.0:
         x = corner_cosine_squared(complement2, complement3, ratio2, ratio3)
         cosine, sine = np.sqrt(x), np.sqrt(1.0 - x)
@@ -208,8 +210,6 @@ def normal_form(p: Pulls) -> Normal:
         # Q is a maximum over d, so the error of the corner itself does not count.
         error += lag_error(ratio2, complement2, sine, cosine, change2)
         error += lag_error(ratio3, complement3, sine, cosine, change3)
-    else:
-        error += change2 + change3
     distance = abs(HALF_PI - abs(turn))
     return Normal(smallest, ratio2, ratio3, complement2, complement3, turn, corner, peak, distance, error)
 

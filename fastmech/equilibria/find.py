@@ -10,6 +10,7 @@ from typing import overload
 
 import numpy as np
 
+from fastmech.equilibria.evidence import Evidence, gather
 from fastmech.equilibria.outcome import Outcome
 from fastmech.equilibria.search import FloatArray
 from fastmech.equilibria.solution import explain, solve_rows
@@ -48,6 +49,7 @@ class Certificate:
     count: int  #: equilibria listed
     expected: int | None  #: equilibria that exist by the counting theorem; None where rounding hides it
     fold_margin: float  #: signed distance to the fold [rad], positive with six equilibria; NaN if degenerate
+    evidence: Evidence  #: two searches that share nothing with the proof
     sentence: str
 
     @property
@@ -117,6 +119,11 @@ def find_equilibria(scene: Scene, at: float = math.inf) -> Equilibria:
     frozen = frozen_force(scene, at)
     coefficients = reduce(scene)._replace(force=frozen / (scene.m2 * scene.l))
     solution = solve_rows(np.array([coefficients]))
+    evidence = gather(
+        coefficients, solution.phi[0, : solution.count[0]], solution.theta[0, : solution.count[0]]
+    )
+    if solution.outcome[0] == Outcome.COMPLETE and evidence.contradicts:
+        solution.outcome[0] = Outcome.UNPROVED
     outcome, count = Outcome(int(solution.outcome[0])), int(solution.count[0])
     expected, margin = int(solution.expected[0]), float(solution.margin[0])
     items = tuple(
@@ -131,12 +138,13 @@ def find_equilibria(scene: Scene, at: float = math.inf) -> Equilibria:
         )
         for i in range(count)
     )
-    sentence = (
-        degenerate_sentence(scene, frozen)
-        if outcome is Outcome.DEGENERATE
-        else explain(outcome, count, expected, margin)
+    if outcome is Outcome.DEGENERATE:
+        sentence = degenerate_sentence(scene, frozen)
+    else:
+        sentence = f"{explain(outcome, count, expected, margin)}; {evidence.sentence}"
+    return Equilibria(
+        items, frozen, Certificate(outcome, count, expected or None, margin, evidence, sentence)
     )
-    return Equilibria(items, frozen, Certificate(outcome, count, expected or None, margin, sentence))
 
 
 def frozen_force(scene: Scene, at: float) -> float:

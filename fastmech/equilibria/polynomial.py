@@ -1,7 +1,8 @@
 """The polynomial of degree 6 among whose roots on the unit circle lie exp(i phi) of all equilibria.
 
-With z = exp(i phi) the conditions of rest a cos phi + f sin phi = b sin theta + f cos theta = C cos(phi + theta)
-become, theta eliminated (f is the force's coefficient, a, b, C those of lift, gravity and spring),
+With z = exp(i phi) the conditions of rest
+a cos phi + f sin phi = b sin theta + f cos theta = C cos(phi + theta) become, theta eliminated (f is the
+force's coefficient, a, b, C those of lift, gravity and spring),
 
     C^2 z [(f + ib) z^2 - (f - ib)]^2 + [(a - if) z^2 + (a + if)]^2 [(f - ib) - C z] [(f + ib) z - C] = 0.
 
@@ -13,12 +14,13 @@ counted blindly: each is taken back to the equilibria.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
-#: How far a double root may lie from its place [in |z|]: the square root of rounding, with room for conditioning.
+#: How far a double root may lie from its place in |z|: the square root of rounding, and some.
 NEAR = 1e-5
 
 
@@ -36,14 +38,13 @@ class UnitRoots:
         return self.unexplained == 0 and self.unmatched == 0
 
 
-def rest_polynomial(lift: float, spring: float, gravity: float, force: float) -> Polynomial:
+def rest_polynomial(lift: float, spring: float, gravity: float, force: float) -> Any:
     """The polynomial in z = exp(i phi), coefficients over their largest."""
     a, C, b, f = lift, spring, gravity, force
-    z = Polynomial([0.0, 1.0])
-    eliminated = C**2 * z * ((f + 1j * b) * z**2 - (f - 1j * b)) ** 2
-    eliminated = eliminated + ((a - 1j * f) * z**2 + (a + 1j * f)) ** 2 * ((f - 1j * b) - C * z) * (
-        (f + 1j * b) * z - C
-    )
+    z: Any = Polynomial([0.0, 1.0])
+    lever = (f + 1j * b) * z**2 - (f - 1j * b)
+    pull = (a - 1j * f) * z**2 + (a + 1j * f)
+    eliminated = C**2 * z * lever**2 + pull**2 * ((f - 1j * b) - C * z) * ((f + 1j * b) * z - C)
     largest = np.max(np.abs(eliminated.coef))
     return eliminated / largest if largest > 0 else eliminated
 

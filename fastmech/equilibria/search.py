@@ -14,6 +14,9 @@ FloatArray = NDArray[np.float64]
 #: The exact bound on the number of equilibria of a scene whose equilibria are isolated.
 MOST = 6
 
+#: Laps of all branches: two with one, two with three; all have a solution only within rounding of a fold.
+LAPS = 8
+
 
 @inlined
 def lap_root(
@@ -92,7 +95,7 @@ def polish(p: Pulls, phi: float, theta: float) -> tuple[float, float]:
 
 @inlined
 def candidates(p: Pulls, n: Normal, phi: FloatArray, theta: FloatArray) -> int:
-    """Write every equilibrium's angles into ``phi, theta`` (six each) and return their number.
+    """Write every equilibrium's angles into ``phi, theta`` (``LAPS`` slots each) and return their number.
 
     Where the fold is within rounding the laps that may have merged are all searched; what they give
     then agrees up to the square root of rounding, and is for the caller to merge.

@@ -51,7 +51,8 @@ def explain(outcome: Outcome, count: int, expected: int, margin: float) -> str:
         change = "two of them merge" if margin > 0.0 else "two more appear"
         return f"all {count} are proved to exist and to be all; {abs(margin):.3g} rad from where {change}"
     if outcome is Outcome.AT_FOLD:
-        return f"equilibria merge here within rounding: {count} listed, the merged one as degenerate"
+        there = f"{expected} exist" if expected else "how many exist is hidden"
+        return f"at a fold within rounding: {there}, {count} are told apart, the merging ones as degenerate"
     if np.isnan(margin):
         return "not proved: the reduced coefficients are not finite"
-    return f"not proved: {count} equilibria listed, {expected or '4 to 6'} must exist"
+    return f"not proved: {count} equilibria listed, {expected or 'four to six'} must exist"

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fastmech.equilibria.balance import EPS, Pulls, expected_count, normal_form, pulls, vanishing
 from fastmech.equilibria.certificate import AT_FOLD, UNPROVED, apart, certify
 from fastmech.equilibria.outcome import Outcome
-from fastmech.equilibria.search import FloatArray, candidates, hessian
+from fastmech.equilibria.search import LAPS, MOST, FloatArray, candidates, hessian
 from fastmech.jit import MATRIX, STATUSES, VECTOR, inlined, kernel
 from fastmech.mechanism.reduced import potential
 
@@ -21,7 +21,7 @@ SmallIntegers = NDArray[np.int8]
 NO_EQUILIBRIUM = -1
 SINGULAR = -2
 
-#: At a cusp three equilibria merge and rounding displaces them by about EPS^(1/3) rad; twice that, and some.
+#: At a cusp three equilibria merge; rounding displaces them by about EPS^(1/3) rad times a condition number.
 MERGE = 16.0 * EPS ** (1.0 / 3.0)
 
 INDICES = types.Array(types.int8, 2, "C")
@@ -106,6 +106,7 @@ def solve(
         outcome: (n,) ``Outcome``; written.
         margin: (n,) distance to the fold [rad], positive with six equilibria; NaN if undefined; written.
     """
+    at_phi, at_theta, at_radius = np.empty(LAPS), np.empty(LAPS), np.empty(LAPS)
     for row in range(coefficients.shape[0]):
         phi[row], theta[row], energy[row], radius[row] = np.nan, np.nan, np.nan, np.nan
         index[row] = NO_EQUILIBRIUM
@@ -120,11 +121,12 @@ def solve(
         n = normal_form(p)
         expected[row] = expected_count(n)
         margin[row] = n.peak - n.distance
-        found = candidates(p, n, phi[row], theta[row])
-        outcome[row] = certify(p, n, found, phi[row], theta[row], radius[row])
+        found = candidates(p, n, at_phi, at_theta)
+        outcome[row] = certify(p, n, found, at_phi, at_theta, at_radius)
         if outcome[row] == AT_FOLD:
-            found = merge_singular(found, phi[row], theta[row], radius[row])
-            phi[row, found:], theta[row, found:], radius[row, found:] = np.nan, np.nan, np.nan
+            found = min(MOST, merge_singular(found, at_phi, at_theta, at_radius))
+        phi[row, :found], theta[row, :found] = at_phi[:found], at_theta[:found]
+        radius[row, :found] = at_radius[:found]
         scale = max(np.hypot(lift, force), np.hypot(gravity, force), spring)
         for i in range(found):
             energy[row, i] = scale * energy_at(p, phi[row, i], theta[row, i])

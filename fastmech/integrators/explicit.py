@@ -126,19 +126,18 @@ def integrate_block(
     """
     stages = nodes.shape[0]
     dim, lanes = Y.shape
-    K = np.empty((stages, dim * lanes))
-    z = np.empty(dim * lanes)
-    Z = z.reshape(dim, lanes)
-    y = Y.reshape(dim * lanes)
+    # Each array once as rows for the right-hand side and once flat for the stage sums.
+    K, Z = np.empty((stages, dim, lanes)), np.empty((dim, lanes))
+    k_flat, z, y = K.reshape(stages, dim * lanes), Z.reshape(dim * lanes), Y.reshape(dim * lanes)
     for j in range(steps.shape[0]):
         h = (times[j + 1] - times[j]) / max(steps[j], 1)
         for step in range(steps[j]):
             t = times[j] + step * h
-            rhs(t, Y, K[0].reshape(dim, lanes), params)
+            rhs(t, Y, K[0], params)
             for s in range(1, stages):
-                k = start_stage(z, y, K, h, stage, weight, start[s], start[s + 1])
-                add_stages(z, K, h, stage, weight, k, start[s + 1])
-                rhs(t + nodes[s] * h, Z, K[s].reshape(dim, lanes), params)
-            add_stages(y, K, h, stage, weight, start[stages], start[stages + 1])
+                k = start_stage(z, y, k_flat, h, stage, weight, start[s], start[s + 1])
+                add_stages(z, k_flat, h, stage, weight, k, start[s + 1])
+                rhs(t + nodes[s] * h, Z, K[s], params)
+            add_stages(y, k_flat, h, stage, weight, start[stages], start[stages + 1])
             observe(times[j] + (step + 1) * h, Y, observer_params, record)
         out[j] = Y

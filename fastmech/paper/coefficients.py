@@ -6,7 +6,7 @@ the functions are the right ones nothing is left over, and the numbers are exact
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,9 @@ from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
 Terms = list[dict[str, str]]
+
+#: The term of the denominator of (16) whose coefficient is free.
+FREE = "cos(4*phi)"
 
 
 class Fit(NamedTuple):
@@ -33,8 +36,10 @@ def sample_angles(count: int = 400) -> Floats:
 
 def term_values(terms: Terms, q: Floats) -> Floats:
     """The factors of ``terms`` at the angles ``q`` (n, 2), shape (n, terms)."""
-    values = [evaluate(term["factor"], phi=q[:, 0], theta=q[:, 1]) for term in terms]
-    return np.stack(np.broadcast_arrays(*values, q[:, 0])[:-1], axis=-1).astype(np.float64)
+    values = np.empty((len(q), len(terms)))
+    for i, term in enumerate(terms):
+        values[:, i] = evaluate(term["factor"], phi=q[:, 0], theta=q[:, 1])
+    return values
 
 
 def printed_sum(terms: Terms, q: Floats) -> Floats:
@@ -67,42 +72,35 @@ class Hamiltonian(NamedTuple):
 
 
 def hamiltonian_16(scene: Scene, equation: Printed) -> Hamiltonian:
-    """Exact coefficients of (16) in the shape that it has once the inner bracket is closed after the last term.
+    """Exact coefficients of (16) once the inner bracket of its denominator is closed after the last term.
 
-    Numerators and denominator are determined up to a common factor; the paper's is a denominator of
-    ``-(4 - sin^2 phi) det(a)/(m2 l^4)``, of which ``cos 4 phi`` has the coefficient 1 as printed (without that
-    choice it would not be unique, as cos 4 phi is a polynomial in sin^2 phi).
+    Numerators and denominator are determined up to a common factor; the paper's makes the denominator
+    ``-(4 - sin^2 phi) det(a)/(m2 l^4)``. As cos 4 phi is a polynomial in sin^2 phi, its coefficient is free: it is
+    taken as printed, and then all others are unique.
     """
     q = sample_angles()
     a = metric(scene, q)
     scale = -(4.0 - np.sin(q[:, 0]) ** 2) / (scene.m2 * scene.l**4)
-    denominator = scale * np.linalg.det(a)
     shape = equation["denominator"]
     outside: Terms = shape["outside"]
-    # An empty list cannot be fitted beside the others, hence the zero columns.
-    inside: Terms = [*shape["inside"], *shape["after"]]
+    taken = np.array([term["factor"] == FREE for term in outside])
+    values = np.array([float(term["value"]) if term["factor"] == FREE else 0.0 for term in outside])
+    functions = term_values(outside, q)
+    rest = scale * np.linalg.det(a) - functions @ values
     square = np.sin(q[:, 0, None]) ** 2
-    chosen = [term["factor"] == "cos(4*phi)" for term in outside]
-    known = term_values(outside, q)[:, chosen] @ np.array(
-        [float(term["value"]) for term in outside if term["factor"] == "cos(4*phi)"]
-    )
-    free = term_values([term for term in outside if term["factor"] != "cos(4*phi)"], q)
-    corrected = _fit(np.hstack([free, square * term_values(inside, q)]), denominator - known)
-    as_printed = [free, square * term_values(shape["inside"], q)]
-    if shape["after"]:
-        as_printed.append(term_values(shape["after"], q))
-    count = free.shape[1]
-    outside_values = np.ones(len(outside))
-    outside_values[~np.array(chosen)] = corrected.coefficients[:count]
-    outside_values[np.array(chosen)] = [float(t["value"]) for t, c in zip(outside, chosen, strict=True) if c]
+    first = [functions[:, ~taken], square * term_values(shape["inside"], q)]
+    after = term_values(shape["after"], q)
+    corrected = _fit(np.hstack([*first, square * after]), rest)
+    count = int(np.sum(~taken))
+    values[~taken] = corrected.coefficients[:count]
     return Hamiltonian(
         potential=fit(equation["potential"], q, potential_energy(scene, q)),
         p_phi_2=fit(equation["p_phi_2"], q, scale * a[:, 1, 1] / 2.0),
         p_theta_2=fit(equation["p_theta_2"], q, scale * a[:, 0, 0] / 2.0),
         p_phi_p_theta=fit(equation["p_phi_p_theta"], q, -scale * a[:, 0, 1]),
-        outside=outside_values,
+        outside=values,
         inside=corrected.coefficients[count:],
-        residual_as_printed=_fit(np.hstack(as_printed), denominator - known).residual,
+        residual_as_printed=_fit(np.hstack([*first, after]), rest).residual,
         residual_corrected=corrected.residual,
     )
 
@@ -112,10 +110,9 @@ def printed_kinetic(equation: Printed, q: Floats, p: Floats, *, corrected: bool)
 
     ``corrected`` closes the inner bracket of the denominator after the last term.
     """
-    shape: dict[str, Any] = equation["denominator"]
+    shape = equation["denominator"]
     square = np.sin(q[:, 0]) ** 2
-    after = printed_sum(shape["after"], q) if shape["after"] else np.zeros(len(q))
-    inside = printed_sum(shape["inside"], q)
+    inside, after = printed_sum(shape["inside"], q), printed_sum(shape["after"], q)
     inner = square * (inside + after) if corrected else square * inside + after
     numerator = (
         p[:, 0] ** 2 * printed_sum(equation["p_phi_2"], q)

@@ -6,13 +6,14 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from enum import StrEnum
 
-from fastmech.paper.printed import agrees, agrees_legibly
+from fastmech.paper.printed import agrees, agrees_legibly, evaluate
 
 
 class Verdict(StrEnum):
     """What a comparison of a printed number came to."""
 
     AGREES = "agrees to the printed digit"
+    SAME = "says the same"
     LEGIBLE = "agrees to the legible digits"
     ROUNDING = "rounding of the print"
     MISPRINT = "misprint"
@@ -21,7 +22,7 @@ class Verdict(StrEnum):
     @property
     def good(self) -> bool:
         """Whether print and computation say the same."""
-        return self in (Verdict.AGREES, Verdict.LEGIBLE, Verdict.ROUNDING)
+        return self not in (Verdict.MISPRINT, Verdict.DIFFERS)
 
 
 @dataclass(frozen=True)
@@ -54,8 +55,6 @@ def number(printed: str) -> float:
     """Value of a print: a decimal number, or a fraction of pi such as ``4 pi / 13``."""
     if "pi" not in printed:
         return float(printed)
-    from fastmech.paper.printed import evaluate
-
     return float(evaluate(printed.replace(" pi", "*pi")))
 
 
@@ -73,22 +72,21 @@ class Judge:
         unit: str,
         printed: str,
         computed: float | str,
-        explanation: str = "",
+        *explanations: str,
     ) -> Row:
-        """A row with its verdict. ``explanation`` is the key of the misprint that would explain a difference."""
-        verdict = self._verdict(printed, computed, explanation)
-        see = explanation if verdict == Verdict.MISPRINT else ""
+        """A row with its verdict; ``explanations`` are the keys of misprints that would explain a difference."""
+        verdict, see = compare(printed, computed), ""
+        if verdict == Verdict.DIFFERS:
+            see = next((key for key in explanations if key in self.misprints), "")
+            verdict = Verdict.MISPRINT if see else verdict
         return Row(section, place, symbol, unit, printed, computed, verdict, see)
 
-    def _verdict(self, printed: str, computed: float | str, explanation: str) -> Verdict:
-        if isinstance(computed, str):
-            same = printed == computed
-        elif "*" in printed:
-            same = agrees_legibly(printed, computed)
-        elif "pi" in printed:
-            same = number(printed) == computed
-        else:
-            same = agrees(printed, computed)
-        if same:
-            return Verdict.LEGIBLE if "*" in printed else Verdict.AGREES
-        return Verdict.MISPRINT if explanation in self.misprints else Verdict.DIFFERS
+
+def compare(printed: str, computed: float | str) -> Verdict:
+    """Verdict of a print by itself."""
+    if isinstance(computed, str):
+        return Verdict.SAME if printed == computed else Verdict.DIFFERS
+    if "*" in printed:
+        return Verdict.LEGIBLE if agrees_legibly(printed, computed) else Verdict.DIFFERS
+    same = number(printed) == computed if "pi" in printed else agrees(printed, computed)
+    return Verdict.AGREES if same else Verdict.DIFFERS

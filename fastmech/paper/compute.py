@@ -11,7 +11,7 @@ from fastmech.disturbance.motion import DisturbedMotion, disturbed_motion
 from fastmech.disturbance.size import size_at
 from fastmech.ensembles.balance import EnergyBalance, energy_balance
 from fastmech.ensembles.integrate import integrate
-from fastmech.equilibria.find import Equilibrium, find_equilibria
+from fastmech.equilibria.find import Certificate, Equilibria, Equilibrium, find_equilibria
 from fastmech.mechanism.hamilton import momenta
 from fastmech.paper.printed import CASES, Printed
 from fastmech.paper.scene import DISTURBANCE, PAPER_SCENE, START, STATIC_SCENE
@@ -51,12 +51,11 @@ class Computed:
     """The paper, computed."""
 
     count: int  #: number of equilibria under the constant force
+    certificate: Certificate  #: of their completeness
     cases: tuple[Case, ...]
     motion: EnergyBalance  #: Lagrange's equations from Table 1's start
     momenta: Floats  #: p_phi, p_theta [kg m2/s] from the canonical equations, shape (times, 2)
-    formulations_differ: (
-        Floats  #: largest differences of the states of both formulations [rad, rad, rad/s, rad/s]
-    )
+    formulations_differ: Floats  #: largest differences between the formulations [rad, rad/s], (4,)
 
 
 def compute(printed: Printed, *, threads: int | None = None) -> Computed:
@@ -66,11 +65,12 @@ def compute(printed: Printed, *, threads: int | None = None) -> Computed:
     canonical = integrate(
         PAPER_SCENE, START, dt=STEP, method=METHOD, t_eval=t, formulation="hamilton", threads=threads
     ).y[:, 0]
-    equilibria = list(find_equilibria(STATIC_SCENE))
+    equilibria = find_equilibria(STATIC_SCENE)
     return Computed(
         count=len(equilibria),
+        certificate=equilibria.certificate,
         cases=tuple(
-            _case(number, _nearest(equilibria, printed["table_2"][name]), threads)
+            _case(number, nearest(equilibria, printed["table_2"][name]), threads)
             for number, name in enumerate(CASES, start=1)
         ),
         motion=motion,
@@ -79,8 +79,8 @@ def compute(printed: Printed, *, threads: int | None = None) -> Computed:
     )
 
 
-def _nearest(equilibria: list[Equilibrium], angles: Printed) -> Equilibrium:
-    """The computed equilibrium nearest to a printed one on the torus."""
+def nearest(equilibria: Equilibria, angles: Printed) -> Equilibrium:
+    """The computed equilibrium nearest to printed angles on the torus."""
     phi, theta = float(angles["phi"]), float(angles["theta"])
     return min(equilibria, key=lambda e: np.hypot(np.sin((e.phi - phi) / 2), np.sin((e.theta - theta) / 2)))
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fastmech.paper.coefficients import Floats, hamiltonian_16, printed_kinetic
+from fastmech.paper.coefficients import Floats, Terms, hamiltonian_16, printed_kinetic
 from fastmech.paper.compute import Case, Computed
 from fastmech.paper.formulas import formula_evidence
 from fastmech.paper.printed import CASES, Printed, agrees_legibly, half_unit
@@ -68,7 +68,7 @@ def candidates(printed: Printed, computed: Computed) -> list[Misprint]:
         _bracket_16(printed, computed),
         _coefficient_16(printed),
         _copied_hessian(printed, computed.cases),
-        _elements_case_4(printed, computed.cases[3]),
+        *_elements_case_4(printed, computed.cases[3]),
         _sign_of_polynomials(printed),
         _copied_polynomial(printed, computed.cases),
     ]
@@ -85,7 +85,7 @@ def _bracket_16(printed: Printed, computed: Computed) -> Misprint:
         return float(np.max(np.abs(difference)) / np.max(kinetic))
 
     fitted = Evidence(
-        "what a denominator of this shape cannot represent, with its best coefficients, over its largest value",
+        "remainder of the denominator that no coefficients in this shape remove, over its largest value",
         "1",
         exact.residual_as_printed,
         exact.residual_corrected,
@@ -93,7 +93,7 @@ def _bracket_16(printed: Printed, computed: Computed) -> Misprint:
     )
     # The coefficients have two or three digits: 0.03 stands for 0.0267.
     along = Evidence(
-        "largest error of the kinetic energy along the motion, with the printed coefficients, over its largest value",
+        "largest error of the kinetic energy along the motion, over its largest value",
         "1",
         kinetic_error(False),
         kinetic_error(True),
@@ -111,53 +111,46 @@ def _bracket_16(printed: Printed, computed: Computed) -> Misprint:
 
 def _denominator(equation: Printed, corrected: bool) -> str:
     shape = equation["denominator"]
-
-    def total(terms: list[dict[str, str]]) -> str:
-        return " + ".join(f"{t['value']}*{t['factor']}".removesuffix("*1") for t in terms).replace(
-            "+ -", "- "
-        )
-
     inside, after = list(shape["inside"]), list(shape["after"])
     if corrected:
-        return f"{total(shape['outside'])} + sin(phi)**2*({total(inside + after)})"
-    tail = f" + {total(after)}".replace("+ -", "- ") if after else ""
-    return f"{total(shape['outside'])} + sin(phi)**2*({total(inside)}){tail}"
+        inside, after = inside + after, []
+    text = f"{_sum(shape['outside'])} + sin(phi)**2*({_sum(inside)})"
+    return _signs(f"{text} + {_sum(after)}") if after else _signs(text)
+
+
+def _sum(terms: Terms) -> str:
+    return " + ".join(f"{term['value']}*{term['factor']}".removesuffix("*1") for term in terms)
+
+
+def _signs(text: str) -> str:
+    return text.replace("+ -", "- ").replace("+ 1*", "+ ")
 
 
 def _coefficient_16(printed: Printed) -> Misprint:
     equation = printed["equation_16"]
     index = next(i for i, term in enumerate(equation["potential"]) if term["factor"] == "sin(phi)")
-    value = equation["potential"][index]["value"]
     other = next(term["value"] for term in printed["equation_20"]["phi"] if term["factor"] == "cos(phi)")
-    exact = float(hamiltonian_16(PAPER_SCENE, equation).potential.coefficients[index])
-    return _digits(
-        "equation_16_coefficient", "Equation (16), sin(phi)", f"(20) has {other}", [value], [exact], "J"
+    return _wrong_digits(
+        "equation_16_coefficient",
+        "Equation (16), sin(phi)",
+        f"no rounding of the same number that (20) prints as {other}",
+        equation["potential"][index]["value"],
+        float(hamiltonian_16(PAPER_SCENE, equation).potential.coefficients[index]),
     )
 
 
-def _digits(
-    key: str,
-    place: str,
-    error: str,
-    values: list[str],
-    exact: list[float],
-    unit: str,
-    extra: tuple[Evidence, ...] = (),
-) -> Misprint:
-    """Numbers that miss the computed ones by more than half a unit in their last place."""
-    decimals = [len(value.partition(".")[2]) for value in values]
-    right = [f"{number:.{places}f}" for number, places in zip(exact, decimals, strict=True)]
-    evidence = tuple(
-        Evidence(
-            f"difference from the computed {number:.{places + 3}f}",
-            unit,
-            abs(float(value) - number),
-            abs(float(corrected) - number),
-            half_unit(value) * (1.0 + 1e-9),
-        )
-        for value, corrected, number, places in zip(values, right, exact, decimals, strict=True)
+def _wrong_digits(key: str, place: str, error: str, value: str, exact: float) -> Misprint:
+    """A number [J] that misses the computed one by more than half a unit in its last place."""
+    places = len(value.partition(".")[2])
+    right = f"{exact:.{places}f}"
+    evidence = Evidence(
+        f"difference from the computed {exact:.{places + 3}f}",
+        "J",
+        abs(float(value) - exact),
+        abs(float(right) - exact),
+        half_unit(value) * (1.0 + 1e-9),
     )
-    return Misprint(key, place, error, ", ".join(values), ", ".join(right), evidence + extra)
+    return Misprint(key, place, error, value, right, (evidence,))
 
 
 def _hessian_distance(printed: Printed, name: str, case: Case) -> float:
@@ -189,24 +182,25 @@ def _matrix(rows: list[list[str]]) -> str:
     return "[" + ", ".join("[" + ", ".join(row) + "]" for row in rows) + "]"
 
 
-def _elements_case_4(printed: Printed, case: Case) -> Misprint:
+def _elements_case_4(printed: Printed, case: Case) -> list[Misprint]:
     entries = printed["table_3"]["case_4"]["hessian"]
     hessian = case.equilibrium.hessian
-    return _digits(
-        "table_3_case_4",
-        "Table 3, Case 4, upper right and lower right",
-        f"the two equal elements differ (the lower left one reads {entries[1][0]}), and the last one is rounded wrongly",
-        [entries[0][1], entries[1][1]],
-        [float(hessian[0, 1]), float(hessian[1, 1])],
-        "J",
-    )
+    upper = f"the matrix is symmetric, and the equal element is printed as {entries[1][0]}"
+    lower = "the last digits are wrong"
+    return [
+        _wrong_digits(
+            "table_3_case_4_c12", "Table 3, Case 4, c12", upper, entries[0][1], float(hessian[0, 1])
+        ),
+        _wrong_digits(
+            "table_3_case_4_c22", "Table 3, Case 4, c22", lower, entries[1][1], float(hessian[1, 1])
+        ),
+    ]
 
 
 def _sign_of_polynomials(printed: Printed) -> Misprint:
     leading = [float(printed["table_4"][name]["coefficients"][4]) for name in CASES]
     evidence = Evidence(
-        "difference of the leading coefficient from that of det(lambda - J), which is 1; as printed and with the sign "
-        "reversed",
+        "difference of the leading coefficient from 1, that of det(lambda - J)",
         "1",
         max(abs(value - 1.0) for value in leading),
         max(abs(-value - 1.0) for value in leading),
@@ -240,7 +234,7 @@ def _copied_polynomial(printed: Printed, cases: tuple[Case, ...]) -> Misprint:
     return Misprint(
         key="table_4_case_1",
         place="Table 4, Case 1",
-        error="the polynomial is a copy of Case 3; the remark that both cases have the same graphs follows from it",
+        error="a copy of Case 3, from which follows the remark that both cases have the same graphs",
         printed=", ".join(patterns),
         corrected=", ".join(f"{value:.6g}" for value in right),
         evidence=(evidence,),

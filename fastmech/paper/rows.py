@@ -95,8 +95,8 @@ def _equation_16(judge: Judge, printed: Printed) -> Iterator[Row]:
     for place, unit, terms, values in parts:
         for term, value in zip(terms, values, strict=True):
             symbol = "constant" if term["factor"] == "1" else term["factor"]
-            explanation = "equation_16_coefficient" if symbol == "sin(phi)" else ""
-            yield judge.row("Equation (16)", place, symbol, unit, term["value"], float(value), explanation)
+            keys = ("equation_16_coefficient",) if symbol == "sin(phi)" else ()
+            yield judge.row("Equation (16)", place, symbol, unit, term["value"], float(value), *keys)
 
 
 def _equation_20(judge: Judge, printed: Printed) -> Iterator[Row]:
@@ -119,11 +119,10 @@ def _table_3(judge: Judge, printed: Printed, cases: tuple[Case, ...]) -> Iterato
         entry, place = printed["table_3"][name], f"Case {case.number}"
         for i in range(2):
             for j in range(2):
-                value = float(case.equilibrium.hessian[i, j])
-                symbol = f"c{i + 1}{j + 1}"
-                yield judge.row(
-                    "Table 3", place, symbol, "J", entry["hessian"][i][j], value, f"table_3_{name}"
-                )
+                symbol, value = f"c{i + 1}{j + 1}", float(case.equilibrium.hessian[i, j])
+                # A whole matrix may be wrong, or one element.
+                keys = (f"table_3_{name}", f"table_3_{name}_{symbol}")
+                yield judge.row("Table 3", place, symbol, "J", entry["hessian"][i][j], value, *keys)
         yield judge.row("Table 3", place, "stability", "", entry["verdict"], case.verdict)
 
 

@@ -10,7 +10,7 @@ PAPER_SCENE = Scene(c2=1100.0 / 3.0)
 """Table 1 with the stiffness c2 = 1100/3 N/m, of which the table prints the rounding 366.67 N/m.
 
 The paper computed with the unrounded value: with it all eight angles of Table 2 and the coefficients of (16)
-and (20) come out to the printed digit; with 366.67 N/m six of the eight angles miss their last digit.
+and (20) come out to the printed digit; with 366.67 N/m five of the eight angles miss their last digit.
 """
 
 STATIC_SCENE = PAPER_SCENE.replace(alpha=0.0)

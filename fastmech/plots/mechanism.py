@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 Points = NDArray[np.float64]
 
 ROD, SPRING, DAMPER, FORCE = PALETTE["black"], PALETTE["green"], PALETTE["purple"], PALETTE["vermillion"]
-MASS, GROUND = PALETTE["blue"], "#8c8c8c"
+MASS, GROUND, INK = PALETTE["blue"], "#8c8c8c", "#404040"
 
 #: Sizes over the rod's length l.
 LARGEST_MASS, ARROW, COIL, HOUSING, TURNS = 0.15, 0.75, 0.055, 0.09, 9
@@ -37,7 +37,7 @@ def draw_mechanism(axes: Axes, scene: Parameters, phi: float, theta: float, forc
     wall = 3.62 * l
 
     axes.set_aspect("equal")
-    axes.set(xlim=(-2.15 * l, wall + 0.15 * l), ylim=(-2.2 * l, 2.2 * l), xlabel="x [m]", ylabel="y [m]")
+    axes.set(xlim=(-2.3 * l, wall + 0.1 * l), ylim=(-2.3 * l, 2.3 * l), xlabel="x [m]", ylabel="y [m]")
     _ground(axes, l, wall)
     for start, end in ((m2, origin), (m1, a)):
         axes.plot(*_zigzag(start, end, COIL * l), color=SPRING, lw=1.1, zorder=2)
@@ -56,22 +56,34 @@ def draw_mechanism(axes: Axes, scene: Parameters, phi: float, theta: float, forc
             "shrinkB": 0,
         }
         axes.annotate("", xy=tip, xytext=m2, arrowprops=arrow, zorder=6)
-        axes.text(*(tip + [0.06 * l, 0.0]), f"F = {force:g} N", color=FORCE, va="center", zorder=7, **_HALO)
+    ahead = m2 + np.array([np.sign(force), 0.0])
+    _label(axes, "$M_1$", m1, (origin, m2, m3, a), 0.29 * l, MASS)
+    _label(axes, "$M_2$", m2, (m1, origin, ahead), 0.29 * l, MASS)
+    _label(axes, "$M_3$", m3, (m1, m3 + np.array([1.0, 0.0])), 0.29 * l, MASS)
+    _label(axes, "O", origin, (m1, m2), 0.22 * l, INK)
+    _label(axes, "A", a, (m1,), 0.22 * l, INK)
 
 
-_HALO = {
-    "fontsize": 9,
-    "bbox": {"boxstyle": "round,pad=0.12", "facecolor": "white", "edgecolor": "none", "alpha": 0.8},
-}
+def _label(
+    axes: Axes, text: str, place: Points, others: tuple[Points, ...], distance: float, colour: str
+) -> None:
+    """Name a point on the side where nothing is tied to it."""
+    ties = np.array([other - place for other in others])
+    lengths = np.hypot(*ties.T)
+    ties = ties[lengths > 1e-9] / lengths[lengths > 1e-9, None]
+    # The free direction is the one farthest from every tie.
+    angles = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
+    directions = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    away = directions[np.argmin(np.max(directions @ ties.T, axis=1))]
+    x, y = place + distance * away
+    axes.text(x, y, text, ha="center", va="center", color=colour, fontsize=10, zorder=7)
 
 
 def _ground(axes: Axes, l: float, wall: float) -> None:
     """Guide, wall and the fixed points O and A."""
     axes.axhline(0.0, color=GROUND, lw=0.9, ls=(0, (6, 3)), zorder=1)
     axes.plot([wall, wall], [-0.3 * l, 0.3 * l], color=GROUND, lw=3.0, zorder=1)
-    for name, y, below in (("O", 0.0, True), ("A", l, False)):
-        axes.plot(0.0, y, marker="^" if below else "v", ms=8, color=GROUND, zorder=4)
-        axes.text(-0.1 * l, y + 0.1 * l, name, ha="right", va="bottom", color="#404040", zorder=7, **_HALO)
+    axes.plot([0.0, 0.0], [0.0, l], ls="none", marker="s", ms=7, color=GROUND, zorder=4)
 
 
 def _masses(axes: Axes, scene: Parameters, m1: Points, m2: Points, m3: Points) -> None:
@@ -87,16 +99,6 @@ def _masses(axes: Axes, scene: Parameters, m1: Points, m2: Points, m3: Points) -
             axes.add_patch(Rectangle(tuple(center - side / 2), side, side, color=MASS, zorder=5))
         else:
             axes.add_patch(Circle(tuple(center), radius, color=MASS, zorder=5))
-        up = -1.0 if name == "M2" else 1.0
-        axes.text(
-            *(center + [0.0, up * 1.25 * LARGEST_MASS * l]),
-            f"$M_{name[1]}$",
-            ha="center",
-            va="bottom" if up > 0 else "top",
-            color=MASS,
-            zorder=7,
-            **_HALO,
-        )
 
 
 def _zigzag(start: Points, end: Points, width: float) -> tuple[Points, Points]:
@@ -119,3 +121,18 @@ def _damper(axes: Axes, slider: Points, wall: float, half: float) -> None:
     axes.plot([piston, piston], [-0.8 * half, 0.8 * half], color=DAMPER, lw=2.6, zorder=2)
     axes.plot([front, back, back, front], [half, half, -half, -half], color=DAMPER, lw=1.6, zorder=2)
     axes.plot([back, wall], [0.0, 0.0], color=DAMPER, lw=1.6, zorder=2)
+
+
+def legend_handles(force: float) -> list[Any]:
+    """What the drawing's colours mean, for a legend; ``force`` [N]."""
+    from matplotlib.lines import Line2D
+
+    return [
+        Line2D([], [], color=ROD, lw=2.6, label="rod"),
+        Line2D([], [], color=MASS, marker="o", ms=9, ls="none", label="mass"),
+        Line2D([], [], color=SPRING, lw=1.4, label="spring"),
+        Line2D([], [], color=DAMPER, lw=1.8, label="damper"),
+        Line2D([], [], color=FORCE, marker=">", lw=2.4, label=f"force on $M_2$, {force:g} N"),
+        Line2D([], [], color=GROUND, marker="s", ls="none", label="fixed points O and A"),
+        Line2D([], [], color=GROUND, lw=1.2, ls="--", label="guide of the slider"),
+    ]

@@ -1,4 +1,4 @@
-"""How every picture of the package looks: fonts, colours, saving. No global state of matplotlib is touched."""
+"""How every picture of the package looks: fonts, colours, saving; matplotlib's global state is left alone."""
 
 from __future__ import annotations
 

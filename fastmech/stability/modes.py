@@ -50,20 +50,24 @@ def reach(s: SmallMotion, spring: float) -> dict[str, float]:
 def slowest_decay(s: SmallMotion, spring: float, squares: FloatArray) -> float:
     """Decay rate [1/s] of the mode that the damper reaches least, for a minimum of U; zero if it is missed.
 
-    The characteristic polynomial is (x^2 + w1^2)(x^2 + w2^2) + p3 x (x^2 + K22) with w1^2 <= K22 <= w2^2.
-    For a root near i w, to first order in the gap K22 - w^2 and to every order in p3,
+    For where eigenvalues have no digits left: weak, missing or enormous damping. The characteristic
+    polynomial is (x^2 + w1^2)(x^2 + w2^2) + p3 x (x^2 + K22) with w1^2 <= K22 <= w2^2. Roots near i w, to
+    first order in p3 or in the gap |K22 - w^2|, with W the other frequency:
 
-        rate = p3 gap (W^2 - w^2) / (2 ((W^2 - w^2)^2 + p3^2 w^2)),    W the other frequency.
+        rate = p3 gap (W^2 - w^2) / (2 ((W^2 - w^2)^2 + p3^2 w^2)).
 
-    The smaller gap follows from the product of both, (K12 - sin(phi+theta) K22)^2 / det M, without
-    cancellation, so that the rate has correct digits where eigenvalues have none.
+    For large p3 the same with the product of both gaps and K22 for w^2, and a real root at -p0/(p3 K22). The
+    product is (K12 - sin(phi+theta) K22)^2 / det M, which gives the smaller gap without cancellation.
     """
     low, high = squares
-    p3 = polynomial(s)[0]
+    p3, _, p1, p0 = polynomial(s)
     split = high - low
-    if not split > 0.0:
+    if not split > 0.0 or p3 == 0.0:
         return 0.0
     product = (s.s12 * (spring - s.k22)) ** 2 / s.determinant
+    if p3 * p3 > high:
+        swinging = p3 * product / (2.0 * (split * split + p3 * p3 * s.k22))
+        return float(min(swinging, p0 / p1))
     below, above = s.k22 - low, high - s.k22
     if below < above:
         below = product / above

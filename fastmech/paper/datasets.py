@@ -1,0 +1,176 @@
+"""Tables and figures as labelled data: the groups of ``paper.h5``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fastmech.mechanism.geometry import constraints, positions
+from fastmech.mechanism.lagrange import potential_energy, potential_gradient
+from fastmech.paper.compare import Row, Verdict
+from fastmech.paper.compute import Case, Computed
+from fastmech.paper.scene import PAPER_SCENE, STATIC_SCENE
+from fastmech.results import Dataset, Variable
+
+TABLES = ("Table 1", "Table 2", "Table 3", "Table 4")
+#: Cases that each figure of disturbed motion shows.
+DISTURBED = {"figure_7": (1, 3), "figure_8": (1, 3), "figure_9": (2,), "figure_10": (4,), "figure_11": (4,)}
+GRID = 181
+
+_DISTURBANCES = {
+    "xi_1": ("rad", "disturbance of phi"),
+    "xi_2": ("rad", "disturbance of theta"),
+    "eta_1": ("rad/s", "disturbance of phi'"),
+    "eta_2": ("rad/s", "disturbance of theta'"),
+}
+
+
+def all_datasets(computed: Computed, rows: Sequence[Row]) -> dict[str, Dataset]:
+    """One dataset for every table and figure, and the rows of all printed numbers."""
+    tables = {
+        name.lower().replace(" ", "_"): rows_dataset([row for row in rows if row.section == name])
+        for name in TABLES
+    }
+    motion = computed.motion
+    points = positions(PAPER_SCENE, motion.y)
+    figures = {
+        "figure_2": _over_time(computed, {"phi": ("rad", motion.y[:, 0]), "theta": ("rad", motion.y[:, 1])}),
+        "figure_3": _over_time(computed, {name: ("m", value) for name, value in points._asdict().items()}),
+        "figure_4": _over_time(
+            computed,
+            {
+                f"f_{i}": ("m" if i == 3 else "m2", residual)
+                for i, residual in enumerate(constraints(PAPER_SCENE, points), start=1)
+            },
+        ),
+        "figure_5": _over_time(
+            computed,
+            {"p_phi": ("kg m2/s", computed.momenta[:, 0]), "p_theta": ("kg m2/s", computed.momenta[:, 1])},
+        ),
+        "figure_6": _equilibria(computed.cases),
+    }
+    disturbed = {
+        name: _disturbed([computed.cases[number - 1] for number in numbers])
+        for name, numbers in DISTURBED.items()
+    }
+    balance = _over_time(
+        computed,
+        {
+            "kinetic_energy": ("J", motion.kinetic),
+            "potential_energy": ("J", motion.potential),
+            "work_damper": ("J", motion.work_damper),
+            "work_force": ("J", motion.work_force),
+            "energy_residual": ("J", motion.residual),
+        },
+    )
+    return {
+        **tables,
+        **figures,
+        **disturbed,
+        "energy_balance": balance,
+        "printed_numbers": rows_dataset(rows),
+    }
+
+
+_LONG_NAMES = {
+    "phi": "angle phi",
+    "theta": "angle theta",
+    "p_phi": "generalized momentum of phi, canonical equations",
+    "p_theta": "generalized momentum of theta, canonical equations",
+    "kinetic_energy": "kinetic energy T",
+    "potential_energy": "potential energy Pi",
+    "work_damper": "work of the damper since t = 0",
+    "work_force": "work of the force since t = 0",
+    "energy_residual": "change of T + Pi less both works",
+    **{f"f_{i}": f"residual of constraint ({i + 1})" for i in range(1, 5)},
+    **{f"{axis}{i}": f"coordinate {axis} of M{i}" for axis in "xy" for i in (1, 2, 3)},
+}
+
+
+def _over_time(computed: Computed, values: dict[str, tuple[str, np.ndarray]]) -> Dataset:
+    along = ("time",)
+    return Dataset(
+        {
+            "time": Variable(along, computed.motion.t, "s", "time"),
+            **{name: Variable(along, v, unit, _LONG_NAMES[name]) for name, (unit, v) in values.items()},
+        }
+    )
+
+
+def _equilibria(cases: Sequence[Case]) -> Dataset:
+    angles = np.linspace(-np.pi, np.pi, GRID)
+    grid = np.stack(np.meshgrid(angles, angles, indexing="ij"), axis=-1)
+    force = STATIC_SCENE.F0
+    gradient = potential_gradient(STATIC_SCENE, grid, force)
+    rest = np.array([(case.equilibrium.phi, case.equilibrium.theta, 0.0, 0.0) for case in cases])
+    plane, along = ("phi", "theta"), ("case",)
+    return Dataset(
+        {
+            "phi": Variable(("phi",), angles, "rad", "angle phi"),
+            "theta": Variable(("theta",), angles, "rad", "angle theta"),
+            "potential": Variable(plane, potential_energy(STATIC_SCENE, grid, force), "J", "U = Pi - F x2"),
+            "condition_phi": Variable(plane, gradient[..., 0], "J", "dU/dphi, first of (20)"),
+            "condition_theta": Variable(plane, gradient[..., 1], "J", "dU/dtheta, second of (20)"),
+            "case": Variable(along, [case.number for case in cases], "1", "case of Table 2"),
+            "phi_st": Variable(along, rest[:, 0], "rad", "angle phi at rest"),
+            "theta_st": Variable(along, rest[:, 1], "rad", "angle theta at rest"),
+            "energy": Variable(along, [case.equilibrium.energy for case in cases], "J", "U at rest"),
+            "kind": Variable(along, [case.equilibrium.kind for case in cases], "1", "kind of equilibrium"),
+            **{
+                name: Variable(along, value, "m", f"{_LONG_NAMES[name]} at rest")
+                for name, value in positions(STATIC_SCENE, rest)._asdict().items()
+            },
+        }
+    )
+
+
+def _disturbed(cases: Sequence[Case]) -> Dataset:
+    along = ("case", "time")
+    variables = {
+        "case": Variable(("case",), [case.number for case in cases], "1", "case of Table 2"),
+        "time": Variable(("time",), cases[0].disturbed.t, "s", "time"),
+    }
+    for which in ("nonlinear", "linearized"):
+        for i, (name, (unit, long_name)) in enumerate(_DISTURBANCES.items()):
+            data = np.stack([getattr(case.disturbed, which)[:, 0, i] for case in cases])
+            variables[f"{name}_{which}"] = Variable(along, data, unit, f"{long_name}, {which} equations")
+        norm = np.stack([getattr(case, f"norm_{which}") for case in cases])
+        variables[f"norm_{which}"] = Variable(
+            along, norm, "rad", f"size of the disturbance, {which} equations"
+        )
+    roots = np.stack([case.classification.eigenvalues for case in cases])
+    for part, data in (("re", roots.real), ("im", roots.imag)):
+        variables[f"root_{part}"] = Variable(
+            ("case", "root"), data, "1/s", f"root of the characteristic polynomial, {part}"
+        )
+    return Dataset(variables)
+
+
+def rows_dataset(rows: Sequence[Row]) -> Dataset:
+    """Rows of printed against computed values."""
+    along = ("row",)
+    texts = {
+        "section": ("where it is printed", [row.section for row in rows]),
+        "place": ("case or part", [row.place for row in rows]),
+        "symbol": ("symbol", [row.symbol for row in rows]),
+        "unit": ("unit of the values", [row.unit for row in rows]),
+        "printed": ("as printed, * for lost characters", [row.printed for row in rows]),
+        "computed_text": ("the computed word, for words", [_word(row) for row in rows]),
+        "verdict": ("what the comparison came to", [str(row.verdict) for row in rows]),
+        "see": ("key of the misprint that explains it", [row.see for row in rows]),
+    }
+    numbers = [row.computed if not isinstance(row.computed, str) else np.nan for row in rows]
+    differences = [np.nan if row.difference is None else row.difference for row in rows]
+    return Dataset(
+        {
+            **{name: Variable(along, data, "1", about) for name, (about, data) in texts.items()},
+            "computed": Variable(along, numbers, "see unit", "computed value, NaN for words"),
+            "difference": Variable(along, differences, "see unit", "computed less printed"),
+        },
+        {"disagreeing": sum(row.verdict == Verdict.DIFFERS for row in rows)},
+    )
+
+
+def _word(row: Row) -> str:
+    return row.computed if isinstance(row.computed, str) else ""

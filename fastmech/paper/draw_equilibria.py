@@ -1,0 +1,128 @@
+"""Figure 6: where the mechanism rests, on the potential's map and as drawings of the mechanism itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fastmech.paper.compute import Case
+from fastmech.paper.scene import STATIC_SCENE
+from fastmech.plots.mechanism import draw_mechanism, legend_handles
+from fastmech.plots.style import PALETTE, new_figure, style
+from fastmech.results import Dataset
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: Marker and name of each kind of equilibrium.
+KINDS = {
+    "minimum": ("o", "minimum, stable"),
+    "saddle": ("X", "saddle, unstable"),
+    "maximum": ("^", "maximum, unstable"),
+}
+PHI_CURVE, THETA_CURVE = "black", PALETTE["vermillion"]
+
+
+def draw_potential(data: Dataset) -> Figure:
+    """Figure 6 (a): contours of U = Pi - F x2, both curves of (20) and their intersections."""
+    from matplotlib import patheffects
+    from matplotlib.lines import Line2D
+    from matplotlib.ticker import MaxNLocator
+
+    with style():
+        figure = new_figure(7.4, 7.2)
+        axes = figure.subplots()
+        phi, theta = data["phi"].data, data["theta"].data
+        filled = axes.contourf(phi, theta, data["potential"].data.T, levels=24)
+        figure.colorbar(filled, ax=axes, label="U = Π − F x₂ [J]", shrink=0.9, ticks=MaxNLocator(8))
+        halo = [patheffects.withStroke(linewidth=4.5, foreground="white")]
+        curves = (("condition_phi", PHI_CURVE, "-"), ("condition_theta", THETA_CURVE, "--"))
+        for name, colour, dashes in curves:
+            axes.contour(
+                phi,
+                theta,
+                data[name].data.T,
+                levels=[0.0],
+                colors=[colour],
+                linestyles=dashes,
+                linewidths=2.2,
+            ).set_path_effects(halo)
+        handles = [
+            Line2D([], [], color=PHI_CURVE, lw=2.2, label=r"$\partial U/\partial\varphi = 0$, first of (20)"),
+            Line2D(
+                [],
+                [],
+                color=THETA_CURVE,
+                ls="--",
+                lw=2.2,
+                label=r"$\partial U/\partial\theta = 0$, second of (20)",
+            ),
+        ]
+        handles += _mark_equilibria(axes, data)
+        _angle_axes(axes)
+        axes.set_title("Fig. 6 (a)  Static equilibria: where both curves cross (F = 100 N)")
+        figure.legend(handles=handles, loc="outside lower center", ncols=2)
+    return figure
+
+
+def _mark_equilibria(axes: Axes, data: Dataset) -> list[Any]:
+    from matplotlib.lines import Line2D
+
+    box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
+    look: dict[str, Any] = {"mfc": "white", "mec": "black", "ms": 11, "ls": "none"}
+    places = zip(
+        data["case"].data, data["phi_st"].data, data["theta_st"].data, data["kind"].data, strict=True
+    )
+    for number, phi, theta, kind in places:
+        axes.plot(phi, theta, KINDS[kind][0], zorder=5, **look)
+        offset = (0, 14) if theta < 0.7 * np.pi else (0, -22)
+        axes.annotate(
+            f"Case {number}",
+            (phi, theta),
+            offset,
+            textcoords="offset points",
+            ha="center",
+            zorder=6,
+            bbox=box,
+        )
+    present = [kind for kind in KINDS if kind in set(data["kind"].data)]
+    return [Line2D([], [], marker=KINDS[kind][0], label=KINDS[kind][1], **look) for kind in present]
+
+
+def _angle_axes(axes: Axes) -> None:
+    ticks = np.array([-1.0, -0.5, 0.0, 0.5, 1.0]) * np.pi
+    names = ["−π", "−π/2", "0", "π/2", "π"]
+    axes.set_xticks(ticks, names)
+    axes.set_yticks(ticks, names)
+    axes.set(xlabel=r"$\varphi$ [rad]", ylabel=r"$\theta$ [rad]", aspect="equal")
+    axes.grid(False)
+
+
+def draw_positions(cases: Sequence[Case]) -> Figure:
+    """Figure 6 (b): the mechanism at each equilibrium, to scale."""
+    with style():
+        figure = new_figure(9.6, 9.2)
+        grid = figure.subplots(2, 2, sharex=True, sharey=True)
+        for axes, case in zip(grid.flat, cases, strict=True):
+            e = case.equilibrium
+            draw_mechanism(axes, STATIC_SCENE, e.phi, e.theta, STATIC_SCENE.F0)
+            colour = PALETTE["blue"] if case.verdict == "stable" else PALETTE["vermillion"]
+            axes.set_title(
+                f"Case {case.number}: {case.verdict} ({e.kind})\n"
+                rf"$\varphi$ = {degrees(e.phi)}, $\theta$ = {degrees(e.theta)}",
+                color=colour,
+            )
+            axes.label_outer()
+        figure.suptitle(
+            "Fig. 6 (b)  The mechanism at its static equilibria, to scale; areas of the masses in proportion"
+        )
+        figure.legend(handles=legend_handles(STATIC_SCENE.F0), loc="outside lower center", ncols=4)
+    return figure
+
+
+def degrees(angle: float) -> str:
+    """An angle [rad] in degrees, with a true minus."""
+    return f"{np.degrees(angle):.1f}°".replace("-", "−")

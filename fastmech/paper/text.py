@@ -1,0 +1,191 @@
+"""The report's Markdown, made from rows, misprints and checks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from fastmech.paper.checks import Check, Guess
+from fastmech.paper.compare import Row, Verdict
+from fastmech.paper.compute import METHOD, STEP, Computed
+from fastmech.paper.figures import Picture
+from fastmech.paper.misprints import Misprint
+from fastmech.paper.wording import HEADINGS, cells
+
+TITLE = "The source paper, computed again"
+
+_NOTES = {
+    "Table 1": "Given values, as this report's scene has them. The paper prints no g; see *Parameters used*.",
+    "Equation (16)": "The exact coefficients of the Hamiltonian in the paper's shape, with the inner bracket of "
+    "the denominator closed after the last term.",
+    "Table 4": "Computed coefficients are given the sign of the print. A `*` stands for characters that are lost "
+    "in the text at hand; a row agrees if some rounding of the computed number fits what is left.",
+}
+
+
+def report_text(
+    computed: Computed,
+    rows: Sequence[Row],
+    misprints: Sequence[Misprint],
+    checks: Sequence[Check],
+    guesses: Sequence[Guess],
+    figures: Sequence[Picture],
+) -> str:
+    """The whole report."""
+    confirmed = [item for item in misprints if item.confirmed]
+    right = [item for item in misprints if not item.confirmed]
+    places = {item.key: item.place for item in misprints}
+    lines = [
+        f"# {TITLE}",
+        "",
+        *_summary(computed, rows, confirmed, checks),
+        "",
+        "## Printed against computed",
+        "",
+        *_rows(rows, places),
+        "## Misprints",
+        "",
+        "A place counts as misprinted only if each measure of the print exceeds the tolerance and the same "
+        "measure of the correction does not. Formulas are in Python's syntax and are what was evaluated.",
+        "",
+        *(line for item in confirmed for line in _misprint(item)),
+    ]
+    if right:
+        lines += [
+            "## Suspected, but printed rightly",
+            "",
+            *(f"- {item.place}: {item.error}" for item in right),
+            "",
+        ]
+    lines += [
+        "## Parameters used",
+        "",
+        *_guesses(guesses),
+        "## Checks of the computation",
+        "",
+        *_checks(checks),
+    ]
+    lines += ["## Equilibria", "", *_equilibria(computed)]
+    lines += ["## Figures", "", "Spans are not printed in the paper; those here show decay or escape.", ""]
+    for picture in figures:
+        lines += [
+            f"### {picture.heading}",
+            "",
+            f"![{picture.heading}]({picture.name}.png)",
+            "",
+            picture.caption,
+            "",
+        ]
+    return "\n".join(lines)
+
+
+def _summary(
+    computed: Computed, rows: Sequence[Row], confirmed: Sequence[Misprint], checks: Sequence[Check]
+) -> Iterator[str]:
+    numbers = [row for row in rows if row.is_number]
+    words = [row for row in rows if not row.is_number]
+
+    def count(verdict: Verdict) -> int:
+        return sum(row.verdict == verdict for row in numbers)
+
+    yield (
+        f"Of **{len(numbers)} printed numbers**, {count(Verdict.AGREES)} agree to the printed digit, "
+        f"{count(Verdict.LEGIBLE)} in every legible digit, {count(Verdict.ROUNDING)} is a rounding of the value "
+        f"that was used, **{count(Verdict.MISPRINT)} are misprints** and **{count(Verdict.DIFFERS)} differ "
+        f"unexplained**. {sum(row.verdict.good for row in words)} of {len(words)} printed verdicts say the same as "
+        "the computation."
+    )
+    yield ""
+    yield f"{len(confirmed)} misprints are proved, formulas included:"
+    yield ""
+    yield from (f"- [{item.place}](#{_anchor(item)}): {item.error}" for item in confirmed)
+    yield ""
+    kept = sum(check.passed for check in checks)
+    yield (
+        f"{kept} of {len(checks)} checks of the computation itself are passed; on the equilibria: "
+        f"{computed.certificate.sentence}. Motions: {METHOD}, step {STEP:g} s."
+    )
+
+
+def _anchor(item: Misprint) -> str:
+    return item.key.replace("_", "-")
+
+
+def _table(
+    headings: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[int] = ()
+) -> Iterator[str]:
+    yield "| " + " | ".join(headings) + " |"
+    yield "|" + "|".join("---:" if i in right else "---" for i in range(len(headings))) + "|"
+    yield from ("| " + " | ".join(row) + " |" for row in rows)
+    yield ""
+
+
+def _rows(rows: Sequence[Row], places: dict[str, str]) -> Iterator[str]:
+    for section in dict.fromkeys(row.section for row in rows):
+        yield f"### {section}, printed numbers"
+        yield ""
+        if section in _NOTES:
+            yield _NOTES[section]
+            yield ""
+        yield from _table(HEADINGS, [_row(row, places) for row in rows if row.section == section], (3, 4, 5))
+
+
+def _row(row: Row, places: dict[str, str]) -> list[str]:
+    texts = list(cells(row))
+    for i in (1, 3):
+        # Markdown would read the stars as emphasis.
+        texts[i] = f"`{texts[i]}`" if "*" in texts[i] else texts[i]
+    if row.verdict == Verdict.MISPRINT:
+        texts[-1] = f"**misprint**: see [{places[row.see]}](#{row.see.replace('_', '-')})"
+    if row.verdict == Verdict.DIFFERS:
+        texts[-1] = "**differs**"
+    return texts
+
+
+def _misprint(item: Misprint) -> Iterator[str]:
+    # Plain Markdown has no anchors of its own.
+    yield f'<a id="{_anchor(item)}"></a>'
+    yield ""
+    yield f"### {item.place}: {item.error}"
+    yield ""
+    yield f"- printed: `{item.printed}`"
+    yield f"- corrected: `{item.corrected}`"
+    yield ""
+    rows = [
+        [e.measure, e.unit, f"{e.printed:.3g}", f"{e.corrected:.2g}", f"{e.tolerance:.1g}"]
+        for e in item.evidence
+    ]
+    yield from _table(("Measure", "Unit", "As printed", "Corrected", "Tolerance"), rows, (2, 3, 4))
+
+
+def _guesses(guesses: Sequence[Guess]) -> Iterator[str]:
+    yield "Angles of Table 2 that come out to the printed digit with each choice of c2 and g:"
+    yield ""
+    rows = [[guess.c2, guess.g, f"{guess.agreeing} of {guess.total}"] for guess in guesses]
+    yield from _table(("c2 [N/m]", "g [m/s²]", "Agreeing angles"), rows, (0, 1, 2))
+
+
+def _checks(checks: Sequence[Check]) -> Iterator[str]:
+    rows = [
+        [c.name, f"{c.value:.2g}", f"{c.limit:.1g}", c.unit, "passed" if c.passed else "**failed**"]
+        for c in checks
+    ]
+    yield from _table(("Check", "Value", "Limit", "Unit", "Result"), rows, (1, 2))
+
+
+def _equilibria(computed: Computed) -> Iterator[str]:
+    rows = []
+    for case in computed.cases:
+        e, c = case.equilibrium, case.classification
+        roots = ", ".join(_complex(root) for root in c.eigenvalues if root.imag >= 0.0)
+        rows.append(
+            [f"Case {case.number}", f"{e.phi:.10f}", f"{e.theta:.10f}", f"{e.energy:.4f}", e.kind, roots]
+        )
+    headings = ("Case", "φ [rad]", "θ [rad]", "U [J]", "Kind", "Roots [1/s]")
+    yield from _table(headings, rows, (1, 2, 3))
+    for case in computed.cases:
+        yield f"- Case {case.number}, {case.classification.verdict}: {case.classification.explanation}."
+    yield ""
+
+
+def _complex(root: complex) -> str:
+    return f"{root.real:.4f}" + (f" ± {root.imag:.4f}i" if root.imag else "")

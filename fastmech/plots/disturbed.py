@@ -1,0 +1,194 @@
+"""What became of random disturbances: outcomes, times to return, excursions, range of the linearization."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.plots.labels import equilibrium_names, flag_codes
+from fastmech.plots.style import LINES, legend_below, new_figure, style
+from fastmech.results import Dataset
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Floats = NDArray[np.float64]
+
+LEFT_OVER = {
+    "at_unstable": ("still at an unstable one", "#8c8c8c"),
+    "undecided": ("still moving", "#d0d0d0"),
+    "not_finite": ("not finite", "#000000"),
+}
+BOX = (0.05, 0.25, 0.5, 0.75, 0.95)
+SHOWN_QUANTILES = (0.5, 0.95, 0.99)
+
+#: Points of a cumulative distribution and of a strip: more cannot be told apart.
+POINTS = 1001
+
+
+def draw_disturbed(dataset: Dataset) -> dict[str, Figure]:
+    """Pictures of a dataset of the scan type ``disturbed``; none where there is no equilibrium."""
+    if not dataset.sizes["equilibrium"]:
+        return {}
+    with style():
+        return {
+            "outcomes": _outcomes(dataset),
+            "time_to_return": _time_to_return(dataset),
+            "excursions": _excursions(dataset),
+            "linear_range": _linear_range(dataset),
+        }
+
+
+def _outcomes(dataset: Dataset) -> Figure:
+    figure, axes = _rows_of_equilibria(dataset, 0.7)
+    names = equilibrium_names(dataset)
+    for row in range(len(names)):
+        left = 0.0
+        for share, label, look in _segments(dataset, row):
+            known = label in axes.get_legend_handles_labels()[1]
+            look = {"height": 0.62, "edgecolor": "white", **look}
+            axes.barh(row, share, left=left, label=None if known else label, **look)
+            if share >= 6.0:
+                dark = look["color"] in (LINES[0], LINES[1], LINES[2], "#000000")
+                box = {"facecolor": look["color"], "edgecolor": "none", "pad": 1.5}
+                axes.text(
+                    left + share / 2,
+                    row,
+                    f"{share:.3g} %",
+                    ha="center",
+                    va="center",
+                    color="white" if dark else "black",
+                    bbox=box,
+                )
+            left += share
+    axes.set(xlim=(0.0, 100.0), xlabel="share of the disturbed trajectories [%]")
+    axes.grid(visible=False)
+    axes.set_title("Where disturbances of each equilibrium end")
+    labelled = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+    order = sorted(labelled, key=lambda label: (not label.startswith("rest"), label))
+    figure.legend([labelled[label] for label in order], order, loc="outside lower center", ncols=3)
+    return figure
+
+
+def _segments(dataset: Dataset, row: int) -> list[tuple[float, str, dict[str, Any]]]:
+    """Share [%], label and look of each part of an equilibrium's bar."""
+    codes = flag_codes(dataset["outcome"])
+    outcome, end = dataset["outcome"].data[row], dataset["end_equilibrium"].data[row]
+    elsewhere = outcome == codes["elsewhere"]
+    parts = [(outcome == codes["returned"], f"rest at {row + 1}", {"color": LINES[row]})]
+    for other in range(dataset.sizes["equilibrium"]):
+        if other == row:
+            label, look = "rest at the same, full turns further", {"color": LINES[row], "hatch": "//"}
+        else:
+            label, look = f"rest at {other + 1}", {"color": LINES[other]}
+        parts.append((elsewhere & (end == other), label, look))
+    parts += [(outcome == codes[name], label, {"color": grey}) for name, (label, grey) in LEFT_OVER.items()]
+    return [(100.0 * float(np.mean(where)), label, look) for where, label, look in parts if where.any()]
+
+
+def _time_to_return(dataset: Dataset) -> Figure:
+    figure = new_figure(7.2, 4.8)
+    axes = figure.subplots()
+    marked = [int(np.argmin(np.abs(dataset["quantile"].data - q))) for q in SHOWN_QUANTILES]
+    level = dataset["quantile"].data[marked]
+    share = np.linspace(0.0, 1.0, POINTS)
+    for row, name in enumerate(equilibrium_names(dataset)):
+        times = dataset["time_to_return"].data[row]
+        times = times[np.isfinite(times)]
+        if not times.size:
+            continue
+        at = dataset["time_to_return_quantile"].data[row, marked]
+        texts = ", ".join(f"{100 * q:g} %: {time:.3g} s" for q, time in zip(level, at, strict=True))
+        returned = float(dataset["share_returned"].data[row])
+        label = f"{name}, {100.0 * returned:.3g} % return\n({texts})"
+        axes.plot(np.quantile(times, share), 100.0 * share, color=LINES[row], label=label)
+        axes.plot(at, 100.0 * level, "o", color=LINES[row], mec="white", ms=7)
+    axes.set(xlabel="time to return t [s]", ylabel="share of those that return [%]", ylim=(0.0, 103.0))
+    axes.set_xlim(left=0.0)
+    if axes.lines:
+        legend_below(figure, axes, 1)
+    else:
+        axes.text(0.5, 0.5, "no trajectory returned", transform=axes.transAxes, ha="center")
+    axes.set_title("Time after which a disturbed trajectory stays near its equilibrium")
+    return figure
+
+
+def _excursions(dataset: Dataset) -> Figure:
+    figure, axes = _rows_of_equilibria(dataset, 0.85)
+    excursion = dataset["excursion"].data
+    for column, (symbol, shift) in enumerate((("φ", -0.18), ("θ", 0.18))):
+        for row in range(len(excursion)):
+            values = excursion[row, :, column]
+            values = values[np.isfinite(values)]
+            if values.size:
+                _box(axes, row + shift, np.quantile(values, BOX), LINES[column])
+                axes.plot(values.max(), row + shift, "|", color=LINES[column], ms=9, mew=2)
+        axes.plot([], [], "s", color=LINES[column], label=f"largest |{symbol} - {symbol} of the equilibrium|")
+    axes.plot([], [], "|", color="black", mew=2, ms=9, label="largest of all")
+    axes.set(xscale="log", xlabel="excursion [rad]")
+    axes.set_title("How far trajectories go (box: 25-75 %, line: 5-95 %)")
+    legend_below(figure, axes, 3)
+    return figure
+
+
+def _linear_range(dataset: Dataset) -> Figure:
+    figure, axes = _rows_of_equilibria(dataset, 0.85)
+    limit = dataset["linear_limit"].data
+    tolerance, horizon = dataset.attrs["linear_tolerance"], dataset.attrs["linear_horizon"]
+    positive = limit[limit > 0.0]
+    low, high = (positive.min(), positive.max()) if positive.size else (1e-3, np.pi)
+    for row, values in enumerate(limit):
+        # NaN stands for more than the largest size tried, 0 for less than the smallest.
+        ordered = np.where(np.isnan(values), np.inf, values)
+        beyond, never = 100.0 * np.mean(np.isinf(ordered)), 100.0 * np.mean(ordered == 0.0)
+        texts = [f"{beyond:.3g} % beyond all tried"] * bool(beyond) + [
+            f"{never:.3g} % below all tried"
+        ] * bool(never)
+        axes.annotate(
+            "\n".join(texts), (1.01, row), xycoords=("axes fraction", "data"), va="center", fontsize=9
+        )
+        if 100.0 in (beyond, never):
+            continue
+        shown = np.clip(ordered[:: -(-ordered.size // POINTS)], 0.9 * low, 1.1 * high)
+        jitter = np.random.default_rng(row).uniform(0.22, 0.42, shown.size)
+        axes.plot(shown, row + jitter, ".", color=LINES[5], ms=3)
+        # The lower value at each quantile, because no mean can be taken with infinity.
+        quantiles = np.quantile(ordered, BOX, method="lower")
+        _box(axes, row, np.clip(quantiles, 0.9 * low, 1.1 * high), LINES[0])
+    axes.set(xscale="log", xlabel="size of the disturbance [rad]")
+    axes.set_title(
+        f"Size up to which the linearized motion is within {100.0 * tolerance:g} % for {horizon:g} s\n"
+        "(dots: directions, box: 25-75 %, line: 5-95 %)"
+    )
+    return figure
+
+
+def _rows_of_equilibria(dataset: Dataset, height: float) -> tuple[Figure, Axes]:
+    """A figure with a row for each equilibrium, the first on top."""
+    names = equilibrium_names(dataset)
+    figure = new_figure(8.4, height * len(names) + 1.9)
+    axes = figure.subplots()
+    axes.set_yticks(range(len(names)), [name.replace(", θ", ",\nθ") for name in names])
+    axes.set_ylim(len(names) - 0.4, -0.6)
+    axes.grid(visible=False, axis="y")
+    return figure, axes
+
+
+def _box(axes: Axes, place: float, quantiles: Floats, color: str) -> None:
+    names = ("whislo", "q1", "med", "q3", "whishi")
+    axes.bxp(
+        [dict(zip(names, quantiles, strict=True), fliers=[])],
+        positions=[place],
+        widths=0.28,
+        orientation="horizontal",
+        manage_ticks=False,
+        showfliers=False,
+        patch_artist=True,
+        boxprops={"facecolor": color, "alpha": 0.55, "edgecolor": color},
+        medianprops={"color": "black", "linewidth": 2.0},
+        whiskerprops={"color": color},
+        capprops={"color": color},
+    )

@@ -1,0 +1,118 @@
+"""Equilibria on the potential's map, drawn to scale, and their eigenvalues in the complex plane."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fastmech.mechanism.lagrange import potential_energy
+from fastmech.plots.labels import PI_TICKS, equilibrium_names, flag_codes
+from fastmech.plots.mechanism import draw_mechanism
+from fastmech.plots.style import LINES, legend_below, new_figure, style
+from fastmech.results import Dataset
+from fastmech.scene import Scene
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MARKERS = {"minimum": "o", "saddle": "D", "maximum": "^", "degenerate": "X"}
+SHAPES = ["o", "s", "^", "D", "v", "P"]
+GRID = 241
+
+
+def draw_equilibria(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
+    """Pictures of a dataset of the scan type ``equilibria`` of the scene with these parameters."""
+    with style():
+        figures = {"potential": _potential(dataset, Scene(**scene))}
+        if dataset.sizes["equilibrium"]:
+            figures["eigenvalues"] = _eigenvalues(dataset)
+            figures["positions"] = _positions(dataset, Scene(**scene))
+    return figures
+
+
+def _potential(dataset: Dataset, scene: Scene) -> Figure:
+    figure = new_figure(7.4, 6.4)
+    axes = figure.subplots()
+    angle = np.linspace(-np.pi, np.pi, GRID)
+    q = np.stack(np.meshgrid(angle, angle), axis=-1)
+    energy = potential_energy(scene, q, float(dataset.attrs["force"]))
+    filled = axes.contourf(angle, angle, energy, levels=24)
+    axes.contour(angle, angle, energy, levels=24, colors="white", linewidths=0.4, alpha=0.6)
+    figure.colorbar(filled, ax=axes, label="potential energy Π - F x2 [J]")
+    codes = flag_codes(dataset["kind"])
+    for kind, marker in MARKERS.items():
+        of_kind = dataset["kind"].data == codes[kind]
+        if of_kind.any():
+            place = dataset["phi"].data[of_kind], dataset["theta"].data[of_kind]
+            axes.plot(*place, marker, color="white", mec="black", mew=1.4, ms=10, clip_on=False, label=kind)
+    _number(axes, dataset)
+    axes.set_xticks(*PI_TICKS)
+    axes.set_yticks(*PI_TICKS)
+    axes.set(xlabel="angle φ [rad]", ylabel="angle θ [rad]")
+    axes.set_title(f"Equilibria and potential, force F = {dataset.attrs['force']:g} N")
+    axes.grid(visible=False)
+    if dataset.sizes["equilibrium"]:
+        legend_below(figure, axes, 4)
+    return figure
+
+
+def _number(axes: Axes, dataset: Dataset) -> None:
+    """Numbers beside the equilibria, towards the middle so that none leaves the picture."""
+    places = zip(dataset["phi"].data, dataset["theta"].data, strict=True)
+    for number, (phi, theta) in enumerate(places, start=1):
+        offset = (-13.0 if phi > 0 else 13.0, -13.0 if theta > 0 else 13.0)
+        box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
+        axes.annotate(
+            str(number),
+            (phi, theta),
+            offset,
+            textcoords="offset points",
+            ha="center",
+            va="center",
+            bbox=box,
+        )
+
+
+def _eigenvalues(dataset: Dataset) -> Figure:
+    figure = new_figure(7.2, 5.4)
+    axes = figure.subplots()
+    for i, name in enumerate(equilibrium_names(dataset)):
+        axes.plot(
+            dataset["eigenvalue_re"].data[i],
+            dataset["eigenvalue_im"].data[i],
+            SHAPES[i],
+            color=LINES[i],
+            mec="white",
+            ms=9,
+            label=name,
+        )
+    left, right = axes.get_xlim()
+    axes.set_xlim(min(left, -0.1 * right), max(right, -0.1 * left))
+    axes.axvline(0.0, color="black", lw=1.0, zorder=1.0)
+    axes.axvspan(0.0, axes.get_xlim()[1], color="black", alpha=0.07, lw=0)
+    axes.text(0.99, 0.98, "growing", transform=axes.transAxes, ha="right", va="top", color="#404040")
+    axes.text(0.01, 0.98, "decaying", transform=axes.transAxes, ha="left", va="top", color="#404040")
+    axes.set(xlabel="real part [1/s]", ylabel="imaginary part [rad/s]")
+    axes.set_title("Eigenvalues of the linearized motion")
+    axes.margins(y=0.12)
+    legend_below(figure, axes, 2)
+    return figure
+
+
+def _positions(dataset: Dataset, scene: Scene) -> Figure:
+    names = equilibrium_names(dataset)
+    kinds = {code: kind for kind, code in flag_codes(dataset["kind"]).items()}
+    rows = -(-len(names) // 2)
+    figure = new_figure(9.6, 3.9 * rows)
+    panels = figure.subplots(rows, 2, squeeze=False)
+    for axes in panels.flat[len(names) :]:
+        axes.remove()
+    for i, name in enumerate(names):
+        axes = panels.flat[i]
+        phi, theta = float(dataset["phi"].data[i]), float(dataset["theta"].data[i])
+        draw_mechanism(axes, scene, phi, theta, float(dataset.attrs["force"]))
+        axes.set_title(f"{name} ({kinds[int(dataset['kind'].data[i])]})", fontsize=10)
+    return figure

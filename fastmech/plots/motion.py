@@ -1,0 +1,149 @@
+"""One motion in full: angles, points, reactions, energies and what the checks leave over."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.plots.style import new_figure, style
+from fastmech.results import Dataset
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Floats = NDArray[np.float64]
+
+TIME = "time t [s]"
+
+_REACTIONS = {
+    "rod_om1": "Rod OM1, tension positive",
+    "rod_m1m2": "Rod M1M2, tension positive",
+    "rod_m1m3": "Rod M1M3, tension positive",
+    "slider_normal": "Guide on the slider, upwards positive",
+}
+
+
+def draw_motion(dataset: Dataset) -> dict[str, Figure]:
+    """Pictures of a dataset of the scan type ``motion``."""
+    with style():
+        return {
+            "angles": _angles(dataset),
+            "coordinates": _coordinates(dataset),
+            "reactions": _reactions(dataset),
+            "energies": _energies(dataset),
+            "residuals": _residuals(dataset),
+        }
+
+
+def _angles(dataset: Dataset) -> Figure:
+    t = dataset["time"].data
+    figure, (angles, rates) = _rows(2)
+    for axes, suffix in ((angles, ""), (rates, "_dot")):
+        prime = "'" if suffix else ""
+        axes.plot(t, dataset[f"phi{suffix}"].data, label=f"φ{prime}")
+        axes.plot(t, dataset[f"theta{suffix}"].data, "--", label=f"θ{prime}")
+        _legend(axes)
+    angles.set(ylabel="angle [rad]", title="Angles and their rates")
+    rates.set(ylabel="rate [rad/s]")
+    return figure
+
+
+def _coordinates(dataset: Dataset) -> Figure:
+    t = dataset["time"].data
+    figure = new_figure(7.2, 7.4)
+    over_time, paths = figure.subplots(2, 1, height_ratios=[1.0, 1.3])
+    for name, line in (("x1", "-"), ("y1", "--"), ("x2", "-"), ("y2", "--"), ("x3", "-")):
+        over_time.plot(t, dataset[name].data, line, label=name)
+    over_time.set(xlabel=TIME, ylabel="coordinate [m]", title="Coordinates of the points")
+    _legend(over_time)
+    for point in ("1", "2"):
+        x, y = dataset[f"x{point}"].data, dataset[f"y{point}"].data
+        (line,) = paths.plot(x, y, lw=1.2, label=f"path of M{point}")
+        paths.plot(x[0], y[0], "o", color=line.get_color(), mfc="white", label=f"start of M{point}")
+        paths.plot(x[-1], y[-1], "o", color=line.get_color(), label=f"end of M{point}")
+    paths.set(xlabel="x [m]", ylabel="y [m]", title="Paths in the plane")
+    paths.set_aspect("equal", adjustable="datalim")
+    _legend(paths)
+    return figure
+
+
+def _reactions(dataset: Dataset) -> Figure:
+    t = dataset["time"].data
+    figure, panels = _rows(len(_REACTIONS), 1.9)
+    for axes, (name, title) in zip(panels, _REACTIONS.items(), strict=True):
+        values = dataset[name].data
+        axes.plot(t, values)
+        axes.set(ylabel="force [N]")
+        axes.set_title(title, loc="left")
+        if np.isfinite(values).any():
+            _mark_extremes(axes, t, values)
+    return figure
+
+
+def _mark_extremes(axes: Axes, t: Floats, values: Floats) -> None:
+    texts = []
+    for name, i, marker in (
+        ("max", np.nanargmax(values), "^"),
+        ("min", np.nanargmin(values), "v"),
+    ):
+        axes.plot(t[i], values[i], marker, color="black", ms=6)
+        texts.append(f"{'▲' if name == 'max' else '▼'} {name} {values[i]:.4g} N at {t[i]:.3g} s")
+    axes.set_title("    ".join(texts), loc="right", fontsize=9)
+    axes.margins(y=0.12)
+
+
+def _energies(dataset: Dataset) -> Figure:
+    t = dataset["time"].data
+    kinetic, potential = dataset["kinetic_energy"].data, dataset["potential_energy"].data
+    figure, (energies, works) = _rows(2)
+    energies.plot(t, kinetic, label="kinetic T")
+    energies.plot(t, potential, "--", label="potential Π")
+    energies.plot(t, kinetic + potential, "-.", label="T + Π")
+    energies.set(ylabel="energy [J]", title="Energies, and works since t = 0")
+    works.plot(t, dataset["work_force"].data, label="force")
+    works.plot(t, dataset["work_damper"].data, "--", label="damper")
+    works.set(ylabel="work [J]")
+    for axes in (energies, works):
+        _legend(axes)
+    return figure
+
+
+def _residuals(dataset: Dataset) -> Figure:
+    t = dataset["time"].data
+    figure, (formulations, constraints, energy) = _rows(3)
+    difference = dataset["formulation_difference"].data
+    for i, name in enumerate(("φ [rad]", "θ [rad]", "φ' [rad/s]", "θ' [rad/s]")):
+        _log_plot(formulations, t, difference[:, i], name)
+    formulations.set(ylabel="difference [rad], [rad/s]", title="Canonical equations less Lagrange's")
+    for number, residual in enumerate(dataset["constraint_residual"].data, start=1):
+        _log_plot(constraints, t, residual, f"{number} [{'m' if number == 3 else 'm²'}]")
+    constraints.set(ylabel="residual [m²], [m]", title="Constraints, paper (2)-(5)")
+    _log_plot(energy, t, dataset["energy_residual"].data, "[J]")
+    energy.set(ylabel="residual [J]", title="Change of T + Π less the works of damper and force")
+    for axes in (formulations, constraints):
+        _legend(axes)
+    return figure
+
+
+def _log_plot(axes: Axes, t: Floats, values: Floats, label: str) -> None:
+    """Magnitudes on a logarithmic axis; exact zeros have no place there and are left out."""
+    size = np.abs(values)
+    size = np.where(size > 0.0, size, np.nan)
+    axes.semilogy(t, size, ".", ms=2.0, label=label if np.isfinite(size).any() else f"{label}: all 0")
+
+
+def _legend(axes: Axes) -> None:
+    axes.legend(
+        loc="center left", bbox_to_anchor=(1.0, 0.5), markerscale=2.0 if axes.get_yscale() == "log" else 1.0
+    )
+
+
+def _rows(count: int, height: float = 2.4) -> tuple[Figure, list[Axes]]:
+    """A figure with panels over one axis of time."""
+    figure = new_figure(7.2, count * height + 0.4)
+    panels = list(figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0])
+    panels[-1].set_xlabel(TIME)
+    return figure, panels

@@ -1,0 +1,53 @@
+"""``fastmech equilibria``: the paper's Table 2 on the screen, and wrong scenes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from cli.refusal import assert_refused
+
+PAPER = ["--c2", "366.6666666666667", "--alpha", "0"]
+
+# Table 2 of the paper, rad.
+TABLE_2 = [(1.4506, -0.2326), (0.6881, -2.9148), (-1.3558, -2.5298), (-2.4469, 1.5226)]
+
+
+def test_paper_scene(invoke):
+    result = invoke("equilibria", *PAPER)
+    assert result.exit_code == 0
+    assert result.stderr == ""
+    numbers = [word for word in result.stdout.split() if word.lstrip("-")[:1].isdigit()]
+    shown = {f"{float(word):.4f}" for word in numbers if word.count(".") == 1 and word[-1].isdigit()}
+    for phi, theta in TABLE_2:
+        assert {f"{phi:.4f}", f"{theta:.4f}"} <= shown
+    assert result.stdout.count("minimum") == 1 + result.stdout.count("U has a minimum")
+    for fragment in ("force F = 100 N", "asymptotically stable", "unstable", "saddle", "maximum", "All 4 "):
+        assert fragment in result.stdout
+
+
+def test_decaying_force_is_frozen_at_a_time(invoke):
+    assert "force F = 0 N" in invoke("equilibria").stdout
+    assert "force F = 100 N" in invoke("equilibria", "--at", "0").stdout
+    # 100 N exp(-0.7) = 49.6585 N
+    assert "force F = 49.6585 N" in invoke("equilibria", "--at", "1").stdout
+
+
+def test_scene_of_a_file_with_changes(invoke):
+    Path("scene.toml").write_text("[scene]\nF0 = 20.0\nalpha = 0.0\n", encoding="utf-8")
+    assert "force F = 20 N" in invoke("equilibria", "scene.toml").stdout
+    assert "force F = -30 N" in invoke("equilibria", "scene.toml", "--F0", "-30").stdout
+
+
+def test_no_isolated_equilibria(invoke):
+    result = invoke("equilibria", "--c1", "0", "--F0", "0", "--g", "0")
+    assert result.exit_code == 0
+    assert "not isolated" in result.stdout
+
+
+def test_bad_scene_is_one_line(invoke):
+    assert_refused(invoke("equilibria", "--m1", "0"), "scene.m1 = 0.0")
+    assert_refused(invoke("equilibria", "--m1", "nan"), "scene.m1 = nan")
+    assert_refused(invoke("equilibria", "--at", "-1"), "at = -1.0")
+    assert_refused(invoke("equilibria", "none.toml"), "none.toml")
+    Path("empty.toml").write_text("", encoding="utf-8")
+    assert_refused(invoke("equilibria", "empty.toml"), "[scene]")

@@ -1,0 +1,33 @@
+"""Progress bars: on a terminal only."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+from fastmech.cli.progress import ProgressBars
+
+
+def use(bars: ProgressBars) -> None:
+    with bars:
+        advance = bars.stage("map: points", 2000)
+        advance(500)
+        advance(1500)
+
+
+def test_bars_on_a_terminal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    use(ProgressBars())
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert "map: points" in shown.err
+    assert "100%" in shown.err
+    assert "took" in shown.err
+
+
+@pytest.mark.parametrize(("terminal", "quiet"), [(False, False), (False, True), (True, True)])
+def test_silence(terminal, quiet, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal)
+    use(ProgressBars(quiet))
+    assert capsys.readouterr() == ("", "")

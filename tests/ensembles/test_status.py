@@ -1,0 +1,38 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fastmech.ensembles.integrate import integrate
+from fastmech.ensembles.status import Status
+from fastmech.scene import Scene
+
+SCENE = Scene()
+START = [0.9, 0.4, 0.0, 0.0]
+
+
+def test_starts_that_are_not_finite_and_steps_that_explode() -> None:
+    starts = np.array([START, [np.nan, 0, 0, 0], START, [0, 0, 1e200, 0]])
+    run = integrate(SCENE, starts, 1.0, dt=0.1)
+    assert run.status.tolist() == [Status.OK, Status.NOT_FINITE, Status.OK, Status.NOT_FINITE]
+    assert run.status.dtype == np.int8
+    np.testing.assert_array_equal(run.y[:, 0], run.y[:, 2])
+
+
+@pytest.mark.parametrize("formulation", ["lagrange", "hamilton"])
+def test_a_step_too_large_for_the_scene(formulation: str) -> None:
+    """A stiff spring, 1000 rad/s, with steps of 0.1 s: the motion explodes, and is said to."""
+    run = integrate(SCENE.replace(c1=1.2e7), START, 50.0, dt=0.1, method="euler", formulation=formulation)
+    assert run.status.tolist() == [Status.NOT_FINITE]
+
+
+def test_every_output_counts() -> None:
+    """The start itself is not finite, and is an output."""
+    run = integrate(SCENE, [0.0, 0.0, np.inf, 0.0], t_eval=[0.0])
+    assert run.status.tolist() == [Status.NOT_FINITE]
+
+
+@pytest.mark.nojit
+def test_every_status_has_its_own_advice() -> None:
+    assert all(status.advice for status in Status)
+    assert len({status.advice for status in Status}) == len(Status)

@@ -1,0 +1,119 @@
+"""Maps of equilibria over grids."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fastmech.equilibria.atlas import EquilibriumMap, map_equilibria
+from fastmech.equilibria.find import find_equilibria
+from fastmech.equilibria.outcome import Outcome
+from fastmech.errors import InputError
+from fastmech.scene import Scene
+from fastmech.stability.classify import classify
+
+PAPER = Scene(c2=1100 / 3, alpha=0.0)
+AXES = {
+    "F0": np.linspace(-100.0, 100.0, 5),
+    "c1": np.linspace(0.0, 500.0, 6),
+    "c2": np.array([0.0, 172.0, 400.0]),
+}
+
+
+@pytest.fixture(scope="module")
+def atlas() -> EquilibriumMap:
+    return map_equilibria(PAPER, AXES, threads=1)
+
+
+def test_shapes_and_types(atlas: EquilibriumMap) -> None:
+    grid = (5, 6, 3)
+    assert (
+        atlas.count.shape
+        == atlas.count_stable.shape
+        == atlas.outcome.shape
+        == atlas.fold_margin.shape
+        == grid
+    )
+    assert atlas.phi.shape == atlas.theta.shape == atlas.energy.shape == atlas.morse_index.shape == (*grid, 6)
+    assert atlas.eigenvalues.shape == (*grid, 6, 4)
+    assert {a.dtype.name for a in (atlas.count, atlas.count_stable, atlas.outcome, atlas.morse_index)} == {
+        "int8"
+    }
+    assert list(atlas.axes) == list(AXES)
+
+
+def test_every_point_is_what_find_equilibria_finds(atlas: EquilibriumMap) -> None:
+    for i, j, k in np.ndindex(5, 6, 3):
+        scene = PAPER.replace(F0=AXES["F0"][i], c1=AXES["c1"][j], c2=AXES["c2"][k])
+        found = find_equilibria(scene)
+        n = len(found)
+        assert atlas.count[i, j, k] == n
+        assert atlas.outcome[i, j, k] == found.certificate.outcome
+        assert atlas.count_stable[i, j, k] == found.kind.count("minimum")
+        np.testing.assert_array_equal(atlas.phi[i, j, k, :n], found.phi)
+        np.testing.assert_array_equal(atlas.theta[i, j, k, :n], found.theta)
+        np.testing.assert_allclose(atlas.energy[i, j, k, :n], found.energy, rtol=1e-14)
+        np.testing.assert_array_equal(atlas.morse_index[i, j, k, :n], found.morse_index)
+        assert np.isnan(atlas.phi[i, j, k, n:]).all()
+        assert np.isnan(atlas.eigenvalues[i, j, k, n:]).all()
+        assert (atlas.morse_index[i, j, k, n:] == -1).all()
+
+
+def test_eigenvalues_are_those_of_classify(atlas: EquilibriumMap) -> None:
+    scene = PAPER.replace(F0=50.0, c1=300.0, c2=400.0)
+    for n, equilibrium in enumerate(find_equilibria(scene)):
+        expected = classify(scene, equilibrium).eigenvalues
+        np.testing.assert_allclose(atlas.eigenvalues[3, 3, 2, n], expected, rtol=1e-10)
+
+
+@pytest.mark.parametrize("threads", [2, 3])
+def test_same_bits_for_any_number_of_threads(threads: int) -> None:
+    axes = {"F0": np.linspace(-300.0, 300.0, 60), "c2": np.linspace(0.0, 500.0, 30)}
+    one, many = map_equilibria(PAPER, axes, threads=1), map_equilibria(PAPER, axes, threads=threads)
+    for name in vars(one):
+        if name != "axes":
+            assert getattr(one, name).tobytes() == getattr(many, name).tobytes(), name
+
+
+def test_progress_adds_up_to_the_grid() -> None:
+    finished: list[int] = []
+    map_equilibria(PAPER, {"c1": np.linspace(0.0, 500.0, 2000)}, progress=finished.append)
+    assert sum(finished) == 2000
+    assert len(finished) > 1
+
+
+def test_decaying_force_rests_without_it() -> None:
+    atlas = map_equilibria(PAPER, {"alpha": [0.0, 0.7]})
+    assert list(atlas.count) == [4, 6]
+
+
+def test_degenerate_point_is_marked() -> None:
+    scene = PAPER.replace(F0=0.0, c2=22 * 9.80665 / 1.25)
+    atlas = map_equilibria(scene, {"c1": [0.0, 10.0]})
+    assert list(atlas.outcome) == [Outcome.DEGENERATE, Outcome.COMPLETE]
+    assert list(atlas.count) == [0, 4]
+    assert np.isnan(atlas.eigenvalues[0]).all()
+
+
+@pytest.mark.parametrize(
+    ("axes", "message"),
+    [
+        ({}, r"^axes: 0 given"),
+        ({name: [1.0] for name in ("m1", "m2", "m3", "l")}, r"^axes: 4 given"),
+        ({"cc1": [1.0]}, r"^axes\.cc1: unknown parameter; did you mean 'c1'\?"),
+        ({"c1": []}, r"^axes\.c1: shape \(0,\)"),
+        ({"c1": [[1.0]]}, r"^axes\.c1: shape \(1, 1\)"),
+        ({"c1": ["stiff"]}, r"^axes\.c1: must be a sequence of numbers"),
+        ({"c1": [1.0, -2.0]}, r"^axes\.c1: scene\.c1 = -2\.0: "),
+        ({"F0": [np.nan]}, r"^axes\.F0: scene\.F0 = nan: "),
+    ],
+)
+def test_wrong_axes_are_refused(axes: dict[str, list[float]], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        map_equilibria(PAPER, axes)
+
+
+@pytest.mark.parametrize("threads", [0, -1, 1.5, True])
+def test_wrong_thread_count_is_refused(threads: int) -> None:
+    with pytest.raises(InputError, match=r"^threads = "):
+        map_equilibria(PAPER, {"c1": [1.0]}, threads=threads)

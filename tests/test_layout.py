@@ -1,0 +1,182 @@
+"""The package's shape: data flows one way, compiled code keeps to its places, files stay small and described."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from fastmech.kernel_cache import COMPILED, PACKAGE, compiled_sources
+
+pytestmark = pytest.mark.nojit
+
+#: Each layer may import itself and the ones before it.
+LAYERS = (
+    "errors",
+    "kernel_cache",
+    "jit",
+    "scene",
+    "mechanism",
+    "kernels",
+    "integrators",
+    "ensembles",
+    "stability",
+    "equilibria",
+    "disturbance",
+    "results",
+    "store",
+    "plots",
+    "scan_types",
+    "runner",
+    "paper",
+    "bench",
+    "cli",
+    "__main__",
+)
+
+LONGEST = 300
+MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path != PACKAGE / "__init__.py")
+
+EVERY_MODULE = pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
+
+
+def layer(path: Path) -> str:
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+@cache
+def tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def imported(code: ast.Module) -> Iterator[str]:
+    """Layers of fastmech that a module imports, wherever in it; the package itself is ``""``."""
+    for node in ast.walk(code):
+        names: list[str] = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "relative import"
+            module = node.module or ""
+            names = [f"{module}.{alias.name}" for alias in node.names] if module == "fastmech" else [module]
+        for name in names:
+            if name.split(".")[0] == "fastmech":
+                yield name.split(".")[1] if "." in name else ""
+
+
+def decorators(code: ast.Module) -> set[str]:
+    """Names of everything that decorates a function, called or not."""
+    found = set()
+    for node in ast.walk(code):
+        if isinstance(node, ast.FunctionDef):
+            for decorator in node.decorator_list:
+                target = decorator.func if isinstance(decorator, ast.Call) else decorator
+                found.add(target.attr if isinstance(target, ast.Attribute) else getattr(target, "id", ""))
+    return found
+
+
+def is_compiled(path: Path) -> bool:
+    return path.relative_to(PACKAGE).parts[0] in COMPILED
+
+
+def test_every_layer_is_known() -> None:
+    assert {layer(path) for path in MODULES} <= set(LAYERS)
+
+
+@EVERY_MODULE
+def test_imports_point_one_way(path: Path) -> None:
+    mine = LAYERS.index(layer(path))
+    for other in imported(tree(path)):
+        if other in ("", "__version__"):  # the package's own names: only where a user's command starts
+            assert layer(path) in ("cli", "paper", "store", "bench"), path
+        else:
+            assert LAYERS.index(other) <= mine, f"{path} imports {other}"
+
+
+def test_the_test_sees_imports_inside_functions_and_conditions() -> None:
+    code = ast.parse("def f():\n    from fastmech.store.read import x\nif a:\n    import fastmech.plots\n")
+    assert sorted(imported(code)) == ["plots", "store"]
+
+
+def test_no_cycles_inside_a_layer() -> None:
+    """Modules of the same layer import each other in one direction too."""
+    edges: dict[str, set[str]] = {}
+    for path in MODULES:
+        name = ".".join(("fastmech", *path.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(".__init__")
+        edges[name] = {
+            node.module
+            for node in tree(path).body
+            if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("fastmech")
+        }
+    done: set[str] = set()
+
+    def visit(name: str, above: tuple[str, ...]) -> None:
+        assert name not in above, f"cycle: {' -> '.join((*above, name))}"
+        if name not in done:
+            for other in edges.get(name, ()):
+                visit(other, (*above, name))
+            done.add(name)
+
+    for name in edges:
+        visit(name, ())
+
+
+@EVERY_MODULE
+def test_compiled_places_import_compiled_places_only(path: Path) -> None:
+    """Else an edit elsewhere could change a kernel and leave its cached machine code in use."""
+    if is_compiled(path):
+        allowed = {name.removesuffix(".py") for name in COMPILED} | {"scene", "errors", "kernel_cache"}
+        assert set(imported(tree(path))) <= allowed
+
+
+@EVERY_MODULE
+def test_cached_kernels_lie_in_compiled_places(path: Path) -> None:
+    """What is decorated by ``kernel`` or ``inlined`` is kept on disk or reaches what is."""
+    if decorators(tree(path)) & {"kernel", "inlined"}:
+        assert is_compiled(path)
+
+
+def test_compiled_places_exist_and_hold_kernels() -> None:
+    for name in COMPILED:
+        assert (PACKAGE / name).exists()
+    sources = compiled_sources()
+    assert sources == sorted(path for path in MODULES if is_compiled(path))
+    assert PACKAGE / "jit.py" in sources
+    assert sum(bool(decorators(tree(path)) & {"kernel", "inlined"}) for path in sources) >= 10
+
+
+@EVERY_MODULE
+def test_only_one_module_decides_what_is_cached(path: Path) -> None:
+    """``cache=True`` appears in jit.py alone, where the cache directory is set."""
+    calls = [node for node in ast.walk(tree(path)) if isinstance(node, ast.Call)]
+    cached = [call for call in calls for keyword in call.keywords if keyword.arg == "cache"]
+    assert not cached or path == PACKAGE / "jit.py"
+
+
+@EVERY_MODULE
+def test_files_are_small(path: Path) -> None:
+    assert len(path.read_text(encoding="utf-8").splitlines()) < LONGEST
+
+
+@EVERY_MODULE
+def test_modules_and_public_functions_are_described(path: Path) -> None:
+    code = tree(path)
+    assert ast.get_docstring(code), "module"
+    for node in code.body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
+            assert ast.get_docstring(node), node.name
+            methods = node.body if isinstance(node, ast.ClassDef) else []
+            for method in methods:
+                if isinstance(method, ast.FunctionDef) and not method.name.startswith("_"):
+                    overload = any(getattr(d, "id", "") == "overload" for d in method.decorator_list)
+                    assert overload or ast.get_docstring(method), f"{node.name}.{method.name}"
+
+
+@EVERY_MODULE
+def test_annotations_are_postponed(path: Path) -> None:
+    code = tree(path)
+    if len(code.body) > 1:  # more than a docstring
+        assert any(isinstance(node, ast.ImportFrom) and node.module == "__future__" for node in code.body)

@@ -1,0 +1,43 @@
+from __future__ import annotations
+
+import inspect
+import subprocess
+import sys
+
+import pytest
+
+import fastmech as fm
+
+pytestmark = pytest.mark.nojit
+
+
+@pytest.mark.parametrize("name", fm.__all__)
+def test_every_public_name_exists_and_is_described(name: str) -> None:
+    value = getattr(fm, name)
+    assert inspect.getdoc(value)
+    assert getattr(fm, name) is value
+    assert value.__name__ == name
+    assert name in dir(fm)
+
+
+def test_public_names_of_the_design() -> None:
+    promised = {"Scene", "InputError", "find_equilibria", "classify", "integrate", "disturb", "open_results"}
+    assert promised <= set(fm.__all__)
+    assert fm.__all__ == sorted(fm.__all__)
+
+
+def test_an_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="module 'fastmech' has no attribute 'integrat'"):
+        fm.integrat  # noqa: B018
+
+
+def test_version() -> None:
+    assert fm.__version__.split(".")[0].isdigit()
+
+
+def test_import_is_cheap() -> None:
+    """Nothing numerical is loaded before it is used."""
+    heavy = ["numba", "numpy", "scipy", "h5py", "pydantic", "matplotlib"]
+    script = f"import sys, fastmech; print([m for m in {heavy} if m in sys.modules])"
+    result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "[]"

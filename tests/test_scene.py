@@ -1,0 +1,204 @@
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from fastmech.errors import InputError
+from fastmech.scene import Scene, nearest, read_toml
+
+pytestmark = pytest.mark.nojit
+
+#: Table 1 of the paper as printed; g is the standard gravity (ISO 80000-3).
+TABLE_1 = {
+    "m1": 10.0,
+    "m2": 12.0,
+    "m3": 8.0,
+    "l": 1.25,
+    "c1": 162.5,
+    "c2": 366.67,
+    "beta": 121.0,
+    "g": 9.80665,
+    "F0": 100.0,
+    "alpha": 0.7,
+}
+POSITIVE = ("m1", "m2", "l")
+NOT_NEGATIVE = ("m3", "c1", "c2", "beta", "g", "alpha")
+
+
+def refused(message: str, **parameters: Any) -> None:
+    with pytest.raises(InputError) as error:
+        Scene(**parameters)
+    assert str(error.value) == message
+    assert "\n" not in message
+
+
+def test_defaults_are_table_1() -> None:
+    assert Scene().model_dump() == TABLE_1
+
+
+def test_units() -> None:
+    assert Scene.units() == {
+        "m1": "kg",
+        "m2": "kg",
+        "m3": "kg",
+        "l": "m",
+        "c1": "N/m",
+        "c2": "N/m",
+        "beta": "N s/m",
+        "g": "m/s2",
+        "F0": "N",
+        "alpha": "1/s",
+    }
+
+
+@pytest.mark.parametrize("name", POSITIVE)
+@pytest.mark.parametrize("value", [0.0, -3.0, -5e-324])
+def test_what_must_be_positive(name: str, value: float) -> None:
+    refused(f"scene.{name} = {value!r}: input should be greater than 0", **{name: value})
+    assert getattr(Scene(**{name: 5e-324}), name) == 5e-324
+
+
+@pytest.mark.parametrize("name", NOT_NEGATIVE)
+def test_what_must_not_be_negative(name: str) -> None:
+    refused(f"scene.{name} = -1.0: input should be greater than or equal to 0", **{name: -1.0})
+    assert getattr(Scene(**{name: 0.0}), name) == 0.0
+
+
+def test_the_force_may_have_either_sign() -> None:
+    assert [Scene(F0=F0).F0 for F0 in (-100.0, 0.0, 100.0)] == [-100.0, 0.0, 100.0]
+
+
+@pytest.mark.parametrize("name", TABLE_1)
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, np.float64("nan"), np.float32("inf")])
+def test_numbers_must_be_finite(name: str, value: float) -> None:
+    refused(f"scene.{name} = {float(value)!r}: input should be a finite number", **{name: value})
+
+
+@pytest.mark.parametrize("name", TABLE_1)
+@pytest.mark.parametrize(
+    "value", [True, False, "10", "ten", None, [1.0], (1.0,), {"kg": 1}, 1j, np.bool_(True), np.array([1.0, 2.0])]
+)
+def test_numbers_must_be_numbers(name: str, value: Any) -> None:
+    with pytest.raises(InputError, match=rf"^scene\.{name} = .*: input should be a valid number$") as error:
+        Scene(**{name: value})
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("value", [7, np.float64(7.0), np.float32(7.0), np.int64(7), np.uint8(7)])
+def test_numbers_of_any_kind_become_floats(value: Any) -> None:
+    scene = Scene(m1=value)
+    assert type(scene.m1) is float
+    assert scene.m1 == 7.0
+    assert scene == Scene(m1=7.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [("betta", "beta"), ("aplha", "alpha"), ("M1", "m1"), ("f0", "F0"), ("m4", "m")],
+)
+def test_unknown_name_hints_at_the_nearest(name: str, hint: str) -> None:
+    with pytest.raises(InputError, match=rf"^scene\.{name}: unknown name; did you mean '{hint}\w?'\?$"):
+        Scene(**{name: 1.0})
+
+
+def test_unknown_name_without_a_near_one_lists_all() -> None:
+    refused(f"scene.stiffness: unknown name; allowed: {', '.join(TABLE_1)}", stiffness=1.0)
+    assert nearest("zzz", ["a", "b"]) == "allowed: a, b"
+
+
+def test_the_first_of_several_mistakes_is_named() -> None:
+    refused("scene.m1 = -1.0: input should be greater than 0", m2="x", m1=-1.0)
+
+
+def test_frozen() -> None:
+    scene = Scene()
+    with pytest.raises(ValidationError, match="frozen"):
+        scene.m1 = 2.0  # type: ignore[misc]
+    assert scene.m1 == 10.0
+
+
+def test_replace_validates_and_leaves_the_original() -> None:
+    scene = Scene(F0=50.0)
+    changed = scene.replace(m1=1, alpha=0.0)
+    assert changed.model_dump() == TABLE_1 | {"F0": 50.0, "m1": 1.0, "alpha": 0.0}
+    assert scene.model_dump() == TABLE_1 | {"F0": 50.0}
+    assert scene.replace() == scene
+    for change, message in (
+        ({"m1": -3.0}, "scene.m1 = -3.0: input should be greater than 0"),
+        ({"alpa": 0.0}, "scene.alpa: unknown name; did you mean 'alpha'?"),
+    ):
+        with pytest.raises(InputError, match=f"^{re.escape(message)}$"):
+            scene.replace(**change)
+
+
+def test_equal_scenes_are_equal_and_hash_alike() -> None:
+    scenes = {Scene(), Scene(m1=10), Scene(m1=np.float64(10.0)), Scene(m1=11.0)}
+    assert len(scenes) == 2
+    assert Scene() != Scene(alpha=0.0)
+    assert hash(Scene()) == hash(Scene().replace(g=9.80665))
+
+
+def toml(folder: Path, text: str) -> Path:
+    path = folder / "scan.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_from_toml(tmp_path: Path) -> None:
+    path = toml(tmp_path, 'title = "x"\n[scene]\nm1 = 3\nF0 = -20.5\n[run]\nn = 1\n')
+    for given_path in (path, str(path)):
+        assert Scene.from_toml(given_path) == Scene(m1=3.0, F0=-20.5)
+    assert Scene.from_toml(toml(tmp_path, "[scene]\n")) == Scene()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[other]\nm1 = 1\n", "{path}: has no table [scene]"),
+        ("scene = 3\n", "{path}: has no table [scene]"),
+        ("[scene]\nm1 = 0\n", "scene.m1 = 0: input should be greater than 0"),
+        ("[scene]\nm1 = true\n", "scene.m1 = True: input should be a valid number"),
+        ("[scene]\nm1 = nan\n", "scene.m1 = nan: input should be a finite number"),
+        ('[scene]\nm1 = "10 kg"\n', "scene.m1 = '10 kg': input should be a valid number"),
+        ("[scene]\nmass = 1\n", "scene.mass: unknown name; "),
+        ("[scene\n", "{path}: is not valid TOML: "),
+        ("[scene]\nm1 = 1\nm1 = 2\n", "{path}: is not valid TOML: "),
+    ],
+)
+def test_wrong_files_are_refused_in_one_line(tmp_path: Path, text: str, message: str) -> None:
+    path = toml(tmp_path, text)
+    with pytest.raises(InputError, match=f"^{re.escape(message.format(path=path))}") as error:
+        Scene.from_toml(path)
+    assert "\n" not in str(error.value)
+
+
+def test_files_that_cannot_be_read(tmp_path: Path) -> None:
+    missing = tmp_path / "missing.toml"
+    with pytest.raises(InputError, match=f"^{re.escape(str(missing))}: cannot be read: No such file"):
+        Scene.from_toml(missing)
+    with pytest.raises(InputError, match=r": cannot be read: Is a directory$"):
+        read_toml(tmp_path)
+    binary = tmp_path / "binary.toml"
+    binary.write_bytes(b"\xff\xfe[scene]")
+    with pytest.raises(InputError, match=r"binary\.toml: is not valid TOML: "):
+        read_toml(binary)
+
+
+@given(
+    st.fixed_dictionaries(
+        {name: st.floats(1e-3, 1e6) for name in POSITIVE}
+        | {name: st.floats(0.0, 1e6) for name in NOT_NEGATIVE}
+        | {"F0": st.floats(-1e6, 1e6)}
+    )
+)
+def test_every_valid_scene_keeps_its_numbers(parameters: dict[str, float]) -> None:
+    scene = Scene(**parameters)
+    assert scene.model_dump() == {name: parameters[name] for name in TABLE_1}
+    assert Scene(**scene.model_dump()) == scene
