@@ -28,6 +28,7 @@ COMPILED = (
     "equilibria",
     "stability",
     "disturbance",
+    "atlas",
 )
 
 

@@ -1,4 +1,4 @@
-"""The package's shape: data flows one way, compiled code keeps to its places, files stay small and described."""
+"""The package's shape: data flows one way, compiled code keeps to its places, files stay small."""
 
 from __future__ import annotations
 
@@ -105,7 +105,9 @@ def test_no_cycles_inside_a_layer() -> None:
     """Modules of the same layer import each other in one direction too."""
     edges: dict[str, set[str]] = {}
     for path in MODULES:
-        name = ".".join(("fastmech", *path.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(".__init__")
+        name = ".".join(("fastmech", *path.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(
+            ".__init__"
+        )
         edges[name] = {
             node.module
             for node in tree(path).body

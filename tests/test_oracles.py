@@ -32,6 +32,11 @@ def read(name: str) -> dict[str, Any]:
     return tomllib.loads((DATA / name).read_text(encoding="utf-8"))
 
 
+def printed_numbers() -> dict[str, Any]:
+    path = DATA.parent / "fastmech" / "paper" / "printed.toml"
+    return tomllib.loads(path.read_text(encoding="utf-8"))
+
+
 def draw(seed: int) -> tuple[dict[str, float], tuple[float, ...], float]:
     """Random parameters over decades, a random state and a random time."""
     random = np.random.default_rng(seed)
@@ -165,7 +170,7 @@ def test_reactions_of_the_hanging_mechanism() -> None:
 @cache
 def equilibrium(case: str) -> tuple[Any, ...]:
     """The equilibrium of Table 2, by Newton's method on the oracle's gradient; c2 is the double of 1100/3."""
-    printed = read("paper_printed.toml")["table_2"][case]
+    printed = printed_numbers()["table_2"][case]
     start = (float(printed["phi"]), float(printed["theta"]))
     with mpmath.workdps(DIGITS):
         return tuple(mpmath.findroot(lambda *q: oracle().gradient(TABLE_1, q, F=100), start, tol=1e-50))
@@ -179,7 +184,7 @@ def rounds_to(value: Any, printed: str) -> bool:
 
 @pytest.mark.parametrize("case", ["case_1", "case_2", "case_3", "case_4"])
 def test_table_2(case: str) -> None:
-    printed = read("paper_printed.toml")["table_2"][case]
+    printed = printed_numbers()["table_2"][case]
     phi, theta = equilibrium(case)
     assert rounds_to(phi, printed["phi"])
     assert rounds_to(theta, printed["theta"])
@@ -188,7 +193,7 @@ def test_table_2(case: str) -> None:
 @pytest.mark.parametrize("case", ["case_2", "case_3", "case_4"])
 def test_table_3(case: str) -> None:
     """To the printed digit, but for the two misprinted elements of case 4."""
-    printed = read("paper_printed.toml")["table_3"][case]["hessian"]
+    printed = printed_numbers()["table_3"][case]["hessian"]
     H = oracle().hessian(TABLE_1, equilibrium(case), F=100)
     wrong = {(i, j) for i in range(2) for j in range(2) if not rounds_to(H[i][j], printed[i][j])}
     assert wrong == ({(0, 1), (1, 1)} if case == "case_4" else set())
@@ -197,7 +202,7 @@ def test_table_3(case: str) -> None:
 @pytest.mark.parametrize("case", ["case_2", "case_3", "case_4"])
 def test_table_4(case: str) -> None:
     """The computed coefficients, rounded as read, fit the legible digits."""
-    printed = read("paper_printed.toml")["table_4"][case]
+    printed = printed_numbers()["table_4"][case]
     coefficients = oracle().characteristic_polynomial(TABLE_1, equilibrium(case), F=100)
     readings, patterns = printed["read_as"], printed["coefficients"]
     for value, reading, pattern in zip(reversed(coefficients), readings, patterns, strict=True):
@@ -207,7 +212,7 @@ def test_table_4(case: str) -> None:
 
 def test_case_1_is_a_copy_of_case_3() -> None:
     """Tables 3 and 4 repeat case 3; the true values were computed independently of this oracle."""
-    printed = read("paper_printed.toml")
+    printed = printed_numbers()
     for table in ("table_3", "table_4"):
         first, third = printed[table]["case_1"], printed[table]["case_3"]
         assert {key: first[key] for key in third} == third
@@ -231,7 +236,7 @@ def total(terms: list[dict[str, str]], phi: float, theta: float) -> tuple[float,
 
 def misfit_of_equation_16(q: tuple[float, float], p: tuple[float, float], closed_at_end: bool) -> float:
     """|H printed - H| in units of what the rounding of the printed coefficients explains."""
-    printed = read("paper_printed.toml")["equation_16"]
+    printed = printed_numbers()["equation_16"]
     weights = {"p_phi_2": p[0] ** 2, "p_theta_2": p[1] ** 2, "p_phi_p_theta": p[0] * p[1]}
     parts = {key: total(printed[key], *q) for key in ("potential", *weights)}
     numerator = sum(weights[key] * parts[key][0] for key in weights)
@@ -261,7 +266,7 @@ def test_equation_20(seed: int) -> None:
     _, (phi, theta, *_), _ = draw(seed)
     slopes = oracle().gradient(TABLE_1, (phi, theta), F=100)
     for name, slope in zip(("phi", "theta"), slopes, strict=True):
-        value, error = total(read("paper_printed.toml")["equation_20"][name], phi, theta)
+        value, error = total(printed_numbers()["equation_20"][name], phi, theta)
         assert abs(value - float(slope)) <= error
 
 

@@ -32,19 +32,21 @@ POSITIVE = ("m1", "m2", "l")
 NOT_NEGATIVE = ("m3", "c1", "c2", "beta", "g", "alpha")
 
 
-def refused(message: str, **parameters: Any) -> None:
-    with pytest.raises(InputError) as error:
+def refused(start: str, allowed: str, **parameters: Any) -> None:
+    """One line: field and value, then what is allowed."""
+    with pytest.raises(InputError, match=f"^{re.escape(start)}: .*{re.escape(allowed)}") as error:
         Scene(**parameters)
-    assert str(error.value) == message
-    assert "\n" not in message
+    assert "\n" not in str(error.value)
 
 
 def test_defaults_are_table_1() -> None:
     assert Scene().model_dump() == TABLE_1
 
 
-def test_units() -> None:
-    assert Scene.units() == {
+def test_every_parameter_has_a_unit_and_a_description() -> None:
+    described = Scene(m1=3.0).described()
+    assert {name: value for name, (value, _, _) in described.items()} == TABLE_1 | {"m1": 3.0}
+    assert {name: unit for name, (_, unit, _) in described.items()} == {
         "m1": "kg",
         "m2": "kg",
         "m3": "kg",
@@ -56,18 +58,19 @@ def test_units() -> None:
         "F0": "N",
         "alpha": "1/s",
     }
+    assert all(text for _, _, text in described.values())
 
 
 @pytest.mark.parametrize("name", POSITIVE)
 @pytest.mark.parametrize("value", [0.0, -3.0, -5e-324])
 def test_what_must_be_positive(name: str, value: float) -> None:
-    refused(f"scene.{name} = {value!r}: input should be greater than 0", **{name: value})
+    refused(f"scene.{name} = {value!r}", "greater than 0", **{name: value})
     assert getattr(Scene(**{name: 5e-324}), name) == 5e-324
 
 
 @pytest.mark.parametrize("name", NOT_NEGATIVE)
 def test_what_must_not_be_negative(name: str) -> None:
-    refused(f"scene.{name} = -1.0: input should be greater than or equal to 0", **{name: -1.0})
+    refused(f"scene.{name} = -1.0", "greater than or equal to 0", **{name: -1.0})
     assert getattr(Scene(**{name: 0.0}), name) == 0.0
 
 
@@ -78,17 +81,17 @@ def test_the_force_may_have_either_sign() -> None:
 @pytest.mark.parametrize("name", TABLE_1)
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, np.float64("nan"), np.float32("inf")])
 def test_numbers_must_be_finite(name: str, value: float) -> None:
-    refused(f"scene.{name} = {float(value)!r}: input should be a finite number", **{name: value})
+    refused(f"scene.{name} = {float(value)!r}", "finite number", **{name: value})
 
 
 @pytest.mark.parametrize("name", TABLE_1)
 @pytest.mark.parametrize(
-    "value", [True, False, "10", "ten", None, [1.0], (1.0,), {"kg": 1}, 1j, np.bool_(True), np.array([1.0, 2.0])]
+    "value",
+    [True, False, "10", "ten", None, [1.0], (1.0,), {"kg": 1}, 1j, np.bool_(True), np.array([1.0, 2.0])],
 )
 def test_numbers_must_be_numbers(name: str, value: Any) -> None:
-    with pytest.raises(InputError, match=rf"^scene\.{name} = .*: input should be a valid number$") as error:
-        Scene(**{name: value})
-    assert "\n" not in str(error.value)
+    shown = value.item() if isinstance(value, np.bool_) else value
+    refused(f"scene.{name} = {shown!r}", "number", **{name: value})
 
 
 @pytest.mark.parametrize("value", [7, np.float64(7.0), np.float32(7.0), np.int64(7), np.uint8(7)])
@@ -109,12 +112,12 @@ def test_unknown_name_hints_at_the_nearest(name: str, hint: str) -> None:
 
 
 def test_unknown_name_without_a_near_one_lists_all() -> None:
-    refused(f"scene.stiffness: unknown name; allowed: {', '.join(TABLE_1)}", stiffness=1.0)
+    refused("scene.stiffness", f"unknown name; allowed: {', '.join(TABLE_1)}", stiffness=1.0)
     assert nearest("zzz", ["a", "b"]) == "allowed: a, b"
 
 
 def test_the_first_of_several_mistakes_is_named() -> None:
-    refused("scene.m1 = -1.0: input should be greater than 0", m2="x", m1=-1.0)
+    refused("scene.m1 = -1.0", "greater than 0", m2="x", m1=-1.0)
 
 
 def test_frozen() -> None:
@@ -131,10 +134,10 @@ def test_replace_validates_and_leaves_the_original() -> None:
     assert scene.model_dump() == TABLE_1 | {"F0": 50.0}
     assert scene.replace() == scene
     for change, message in (
-        ({"m1": -3.0}, "scene.m1 = -3.0: input should be greater than 0"),
+        ({"m1": -3.0}, "scene.m1 = -3.0: "),
         ({"alpa": 0.0}, "scene.alpa: unknown name; did you mean 'alpha'?"),
     ):
-        with pytest.raises(InputError, match=f"^{re.escape(message)}$"):
+        with pytest.raises(InputError, match=f"^{re.escape(message)}"):
             scene.replace(**change)
 
 
@@ -163,10 +166,10 @@ def test_from_toml(tmp_path: Path) -> None:
     [
         ("[other]\nm1 = 1\n", "{path}: has no table [scene]"),
         ("scene = 3\n", "{path}: has no table [scene]"),
-        ("[scene]\nm1 = 0\n", "scene.m1 = 0: input should be greater than 0"),
-        ("[scene]\nm1 = true\n", "scene.m1 = True: input should be a valid number"),
-        ("[scene]\nm1 = nan\n", "scene.m1 = nan: input should be a finite number"),
-        ('[scene]\nm1 = "10 kg"\n', "scene.m1 = '10 kg': input should be a valid number"),
+        ("[scene]\nm1 = 0\n", "scene.m1 = 0: "),
+        ("[scene]\nm1 = true\n", "scene.m1 = True: "),
+        ("[scene]\nm1 = nan\n", "scene.m1 = nan: "),
+        ('[scene]\nm1 = "10 kg"\n', "scene.m1 = '10 kg': "),
         ("[scene]\nmass = 1\n", "scene.mass: unknown name; "),
         ("[scene\n", "{path}: is not valid TOML: "),
         ("[scene]\nm1 = 1\nm1 = 2\n", "{path}: is not valid TOML: "),

@@ -43,7 +43,7 @@ class Entrant:
     threaded: bool = False
 
 
-@njit(nogil=True, **FLAGS)
+@njit(nogil=True, **FLAGS)  # type: ignore[untyped-decorator]
 def one_at_a_time(starts: Floats, p: Floats, h: float, steps: int) -> Floats:
     """RK4 as most users write it in numba: one trajectory after the other."""
     final = np.empty_like(starts)

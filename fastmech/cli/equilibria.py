@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +16,10 @@ if TYPE_CHECKING:
     from fastmech.equilibria.find import Equilibria
     from fastmech.scene import Scene
     from fastmech.stability.classify import Classification
+
+
+#: Columns that the table needs: in a narrower terminal lines break, but no digit is lost.
+LEAST_WIDTH = 84
 
 
 class _SceneCommand(click.Command):
@@ -60,7 +65,8 @@ def command(scene_file: Path | None, at: float, **parameters: float | None) -> N
         from fastmech.stability.classify import classify
     found = find_equilibria(scene, at)
     results = [classify(scene, equilibrium) for equilibrium in found]
-    console = Console(width=None if sys.stdout.isatty() else 110, highlight=False)
+    terminal = shutil.get_terminal_size().columns if sys.stdout.isatty() else 100
+    console = Console(width=max(terminal, LEAST_WIDTH), highlight=False)
     console.print(f"force F = {found.force:g} N on M2{_time(scene, at)}")
     if found:
         console.print(_table(found, results))
@@ -81,33 +87,37 @@ def _table(found: Equilibria, results: list[Classification]) -> Table:
     from rich import box
     from rich.table import Table
 
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_lines=True)
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 1, 0))
     table.add_column("")
     for title in ("phi\nrad\ndeg", "theta\nrad\ndeg", "energy\nJ"):
         table.add_column(title, justify="right", no_wrap=True)
     table.add_column("kind", no_wrap=True)
     table.add_column("eigenvalues\n1/s", justify="right", no_wrap=True)
     table.add_column("Sylvester\nHurwitz\neigenvalues", no_wrap=True)
-    table.add_column("joint verdict", style="bold", no_wrap=True)
+    table.add_column("joint verdict", style="bold")
     for number, (equilibrium, result) in enumerate(zip(found, results, strict=True), start=1):
         table.add_row(
             str(number),
-            f"{equilibrium.phi:z.6f}\n{math.degrees(equilibrium.phi):z.3f}",
-            f"{equilibrium.theta:z.6f}\n{math.degrees(equilibrium.theta):z.3f}",
-            f"{equilibrium.energy:z.4f}",
+            f"{equilibrium.phi:z.5f}\n{math.degrees(equilibrium.phi):z.3f}",
+            f"{equilibrium.theta:z.5f}\n{math.degrees(equilibrium.theta):z.3f}",
+            f"{equilibrium.energy:z.3f}",
             equilibrium.kind,
             "\n".join(
                 _complex(value, error)
                 for value, error in zip(result.eigenvalues, result.eigenvalue_errors, strict=True)
                 if value.imag >= 0.0
             ),
-            "\n".join(f.verdict for f in (result.sylvester, result.hurwitz, result.spectrum)),
+            "\n".join(_short(f.verdict) for f in (result.sylvester, result.hurwitz, result.spectrum)),
             result.verdict,
         )
     return table
 
 
+def _short(verdict: str) -> str:
+    return "asymptotic" if verdict == "asymptotically stable" else verdict
+
+
 def _complex(value: complex, error: float) -> str:
     """An eigenvalue, a conjugate pair once; a real part that rounding hides is shown as 0."""
-    real = f"{value.real:+.5g}" if abs(value.real) > error else "0"
-    return f"{real} ± {value.imag:.5g}i" if value.imag else real
+    real = f"{value.real:+.4g}" if abs(value.real) > error else "0"
+    return f"{real} ± {value.imag:.4g}i" if value.imag else real

@@ -77,6 +77,15 @@ class ProgressBars:
 
         return advance
 
+    def counter(self, name: str) -> Callable[[int, int], None]:
+        """Announce a piece of work; the result is told how many items are finished, and of how many."""
+        task = self._progress.add_task(name, total=None)
+
+        def tell(done: int, total: int) -> None:
+            self._progress.update(task, completed=done, total=total)
+
+        return tell
+
     @contextmanager
     def preparing(self) -> Iterator[None]:
         """Show that kernels are compiled, while they are imported for the first time."""

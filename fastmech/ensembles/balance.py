@@ -80,7 +80,7 @@ def energy_balance(
 
 
 def lowest_potential(scene: Scene) -> float:
-    """Least potential energy Pi on a grid of one degree over both angles [J]: a scale, not a minimum to digits."""
+    """Least potential energy Pi on a grid of one degree over both angles [J]: exact enough for a scale."""
     angles = np.linspace(-np.pi, np.pi, 361)
     grid = np.stack(np.meshgrid(angles, angles), axis=-1)
     return float(np.min(potential_energy(scene, grid)))

@@ -27,8 +27,11 @@ class Solution:
     margin: FloatArray
 
 
-def solve_rows(coefficients: FloatArray) -> Solution:
-    """Equilibria of n scenes from their (n, 8) reduced coefficients, contiguous, the force frozen."""
+def solve_rows(coefficients: FloatArray, inherit: bool = False) -> Solution:
+    """Equilibria of n scenes from their (n, 8) reduced coefficients, contiguous, the force frozen.
+
+    ``inherit`` starts each scene from the one before it, which pays where neighbours are alike.
+    """
     n = len(coefficients)
     result = Solution(
         phi=np.empty((n, MOST)),
@@ -41,7 +44,7 @@ def solve_rows(coefficients: FloatArray) -> Solution:
         outcome=np.empty(n, dtype=np.int8),
         margin=np.empty(n),
     )
-    solve(coefficients, *vars(result).values())
+    solve(coefficients, inherit, *vars(result).values())
     return result
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import types
+from numba import boolean, types
 from numpy.typing import NDArray
 
 from fastmech.equilibria.balance import EPS, Pulls, expected_count, normal_form, pulls, vanishing
-from fastmech.equilibria.certificate import AT_FOLD, UNPROVED, apart, certify
+from fastmech.equilibria.certificate import AT_FOLD, COMPLETE, UNPROVED, apart, certify
 from fastmech.equilibria.outcome import Outcome
-from fastmech.equilibria.search import LAPS, MOST, FloatArray, candidates, hessian
+from fastmech.equilibria.search import LAPS, MOST, FloatArray, candidates, hessian, polish
 from fastmech.jit import MATRIX, STATUSES, VECTOR, inlined, kernel
 from fastmech.mechanism.reduced import potential
 
@@ -80,9 +80,14 @@ def sort_by_energy(
             radius[j], radius[j - 1] = radius[j - 1], radius[j]
 
 
-@kernel(types.void(MATRIX, MATRIX, MATRIX, MATRIX, MATRIX, INDICES, STATUSES, STATUSES, STATUSES, VECTOR))
+@kernel(
+    types.void(
+        MATRIX, boolean, MATRIX, MATRIX, MATRIX, MATRIX, INDICES, STATUSES, STATUSES, STATUSES, VECTOR
+    )
+)
 def solve(
     coefficients: FloatArray,
+    inherit: bool,
     phi: FloatArray,
     theta: FloatArray,
     energy: FloatArray,
@@ -97,6 +102,8 @@ def solve(
 
     Args:
         coefficients: (n, 8) rows of ``fastmech.mechanism.coefficients.Coefficients``, the force frozen.
+        inherit: whether a row first tries Newton's method from the row before; what that gives counts only
+            if its completeness is proved, else the row is searched afresh.
         phi, theta: (n, 6) angles [rad] in (-pi, pi]; written, NaN where there is none.
         energy: (n, 6) U over m2 l^2 less the springs' constant [1/s^2]; written.
         radius: (n, 6) distance [rad] within which the true equilibrium is; infinite: not proved; written.
@@ -121,8 +128,15 @@ def solve(
         n = normal_form(p)
         expected[row] = expected_count(n)
         margin[row] = n.peak - n.distance
-        found = candidates(p, n, at_phi, at_theta)
-        outcome[row] = certify(p, n, found, at_phi, at_theta, at_radius)
+        found = 0
+        if inherit and row > 0 and outcome[row - 1] == COMPLETE and count[row - 1] == expected[row]:
+            found = int(count[row - 1])
+            for i in range(found):
+                at_phi[i], at_theta[i] = polish(p, phi[row - 1, i], theta[row - 1, i])
+            outcome[row] = certify(p, n, found, at_phi, at_theta, at_radius)
+        if found == 0 or outcome[row] != COMPLETE:
+            found = candidates(p, n, at_phi, at_theta)
+            outcome[row] = certify(p, n, found, at_phi, at_theta, at_radius)
         if outcome[row] == AT_FOLD:
             found = min(MOST, merge_singular(found, at_phi, at_theta, at_radius))
         phi[row, :found], theta[row, :found] = at_phi[:found], at_theta[:found]

@@ -135,9 +135,9 @@ def integrate_block(
             t = times[j] + step * h
             rhs(t, Y, K[0], params)
             for s in range(1, stages):
-                k = start_stage(z, y, k_flat, h, stage, weight, start[s], start[s + 1])
-                add_stages(z, k_flat, h, stage, weight, k, start[s + 1])
+                k = start_stage(z, y, k_flat, h, stage, weight, int(start[s]), int(start[s + 1]))
+                add_stages(z, k_flat, h, stage, weight, k, int(start[s + 1]))
                 rhs(t + nodes[s] * h, Z, K[s], params)
-            add_stages(y, k_flat, h, stage, weight, start[stages], start[stages + 1])
+            add_stages(y, k_flat, h, stage, weight, int(start[stages]), int(start[stages + 1]))
             observe(times[j] + (step + 1) * h, Y, observer_params, record)
         out[j] = Y

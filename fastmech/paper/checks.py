@@ -53,7 +53,7 @@ def all_checks(computed: Computed) -> list[Check]:
         ),
         Check("constraint (4): largest residual along the motion", float(residual[2].max()), "m", 1e-13),
         Check(
-            "energy balance: change of T + Π less the work of damper and force, over the largest T + Π − min Π",
+            "energy balance: change of T + Π less the works of damper and force, over max(T + Π) − min Π",
             motion.relative_residual,
             "1",
             1e-10,

@@ -44,7 +44,7 @@ def term_values(terms: Terms, q: Floats) -> Floats:
 
 def printed_sum(terms: Terms, q: Floats) -> Floats:
     """Sum of ``terms`` with their printed values."""
-    return term_values(terms, q) @ np.array([float(term["value"]) for term in terms])
+    return np.asarray(term_values(terms, q) @ np.array([float(term["value"]) for term in terms]))
 
 
 def fit(terms: Terms, q: Floats, values: Floats) -> Fit:
@@ -53,7 +53,7 @@ def fit(terms: Terms, q: Floats, values: Floats) -> Fit:
 
 
 def _fit(basis: Floats, values: Floats) -> Fit:
-    coefficients = np.linalg.lstsq(basis, values, rcond=None)[0]
+    coefficients = np.asarray(np.linalg.lstsq(basis, values, rcond=None)[0], dtype=np.float64)
     remainder = np.max(np.abs(basis @ coefficients - values))
     return Fit(coefficients, float(remainder / np.max(np.abs(values))))
 
@@ -75,8 +75,8 @@ def hamiltonian_16(scene: Scene, equation: Printed) -> Hamiltonian:
     """Exact coefficients of (16) once the inner bracket of its denominator is closed after the last term.
 
     Numerators and denominator are determined up to a common factor; the paper's makes the denominator
-    ``-(4 - sin^2 phi) det(a)/(m2 l^4)``. As cos 4 phi is a polynomial in sin^2 phi, its coefficient is free: it is
-    taken as printed, and then all others are unique.
+    ``-(4 - sin^2 phi) det(a)/(m2 l^4)``. As cos 4 phi is a polynomial in sin^2 phi, its coefficient is free:
+    it is taken as printed, and then all others are unique.
     """
     q = sample_angles()
     a = metric(scene, q)

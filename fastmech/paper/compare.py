@@ -74,7 +74,7 @@ class Judge:
         computed: float | str,
         *explanations: str,
     ) -> Row:
-        """A row with its verdict; ``explanations`` are the keys of misprints that would explain a difference."""
+        """A row with its verdict; ``explanations``: keys of misprints that would explain a difference."""
         verdict, see = compare(printed, computed), ""
         if verdict == Verdict.DIFFERS:
             see = next((key for key in explanations if key in self.misprints), "")

@@ -112,11 +112,15 @@ def _equilibria(cases: Sequence[Case]) -> Dataset:
             "potential": Variable(plane, potential_energy(STATIC_SCENE, grid, force), "J", "U = Pi - F x2"),
             "condition_phi": Variable(plane, gradient[..., 0], "J", "dU/dphi, first of (20)"),
             "condition_theta": Variable(plane, gradient[..., 1], "J", "dU/dtheta, second of (20)"),
-            "case": Variable(along, [case.number for case in cases], "1", "case of Table 2"),
+            "case": Variable(along, np.array([case.number for case in cases]), "1", "case of Table 2"),
             "phi_st": Variable(along, rest[:, 0], "rad", "angle phi at rest"),
             "theta_st": Variable(along, rest[:, 1], "rad", "angle theta at rest"),
-            "energy": Variable(along, [case.equilibrium.energy for case in cases], "J", "U at rest"),
-            "kind": Variable(along, [case.equilibrium.kind for case in cases], "1", "kind of equilibrium"),
+            "energy": Variable(
+                along, np.array([case.equilibrium.energy for case in cases]), "J", "U at rest"
+            ),
+            "kind": Variable(
+                along, np.array([case.equilibrium.kind for case in cases]), "1", "kind of equilibrium"
+            ),
             **{
                 name: Variable(along, value, "m", f"{_LONG_NAMES[name]} at rest")
                 for name, value in positions(STATIC_SCENE, rest)._asdict().items()
@@ -128,7 +132,7 @@ def _equilibria(cases: Sequence[Case]) -> Dataset:
 def _disturbed(cases: Sequence[Case]) -> Dataset:
     along = ("case", "time")
     variables = {
-        "case": Variable(("case",), [case.number for case in cases], "1", "case of Table 2"),
+        "case": Variable(("case",), np.array([case.number for case in cases]), "1", "case of Table 2"),
         "time": Variable(("time",), cases[0].disturbed.t, "s", "time"),
     }
     for which in ("nonlinear", "linearized"):
@@ -164,9 +168,9 @@ def rows_dataset(rows: Sequence[Row]) -> Dataset:
     differences = [np.nan if row.difference is None else row.difference for row in rows]
     return Dataset(
         {
-            **{name: Variable(along, data, "1", about) for name, (about, data) in texts.items()},
-            "computed": Variable(along, numbers, "see unit", "computed value, NaN for words"),
-            "difference": Variable(along, differences, "see unit", "computed less printed"),
+            **{name: Variable(along, np.array(data), "1", about) for name, (about, data) in texts.items()},
+            "computed": Variable(along, np.array(numbers), "see unit", "computed value, NaN for words"),
+            "difference": Variable(along, np.array(differences), "see unit", "computed less printed"),
         },
         {"disagreeing": sum(row.verdict == Verdict.DIFFERS for row in rows)},
     )

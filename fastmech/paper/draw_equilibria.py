@@ -38,7 +38,9 @@ def draw_potential(data: Dataset) -> Figure:
         phi, theta = data["phi"].data, data["theta"].data
         filled = axes.contourf(phi, theta, data["potential"].data.T, levels=24)
         figure.colorbar(filled, ax=axes, label="U = Π − F x₂ [J]", shrink=0.9, ticks=MaxNLocator(8))
-        halo = [patheffects.withStroke(linewidth=4.5, foreground="white")]
+        halo: list[patheffects.AbstractPathEffect] = [
+            patheffects.withStroke(linewidth=4.5, foreground="white")
+        ]
         curves = (("condition_phi", PHI_CURVE, "-"), ("condition_theta", THETA_CURVE, "--"))
         for name, colour, dashes in curves:
             axes.contour(

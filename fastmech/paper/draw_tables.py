@@ -21,6 +21,8 @@ HEADING, PLAIN, MISPRINT, WRONG = "#e6e6e6", "#ffffff", "#fbe3cf", "#f4b6a6"
 
 def draw_table(title: str, rows: Sequence[Row]) -> Figure:
     """One table of the paper, a line for each number; misprints are shaded."""
+    from matplotlib.transforms import Bbox
+
     with style():
         figure = new_figure(9.4, 0.75 + ROW_HEIGHT * (len(rows) + 1))
         axes = figure.subplots()
@@ -33,7 +35,7 @@ def draw_table(title: str, rows: Sequence[Row]) -> Figure:
             colLabels=HEADINGS,
             colColours=[HEADING] * len(WIDTHS),
             colWidths=WIDTHS,
-            bbox=(0.0, 0.0, 1.0, 1.0),
+            bbox=Bbox.unit(),
             cellLoc="left",
             colLoc="left",
         )

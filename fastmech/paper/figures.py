@@ -102,7 +102,7 @@ def figure_pictures(computed: Computed, data: Mapping[str, Dataset]) -> list[Pic
         Picture(
             "figure_6a",
             "Figure 6 (a)",
-            "Potential energy under the constant force, the two curves of (20), and the equilibria where they cross.",
+            "Potential under the constant force, both curves of (20), and the equilibria at their crossings.",
             lambda: draw_potential(data["figure_6"]),
         ),
         Picture(

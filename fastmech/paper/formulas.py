@@ -159,7 +159,7 @@ def _canonical(formula: Formula, motion: EnergyBalance) -> list[Measured]:
 
 
 def _momentum_rates(y: Floats, t: Floats) -> Floats:
-    """d/dt (a q') along a motion (n, 4) from Lagrange's accelerations, with the symbols (12) for da/dq [N m]."""
+    """d/dt (a q') along a motion (n, 4) from Lagrange's accelerations; the symbols (12) give da/dq [N m]."""
     gamma = christoffel(PAPER_SCENE, y[:, :2])
     change = gamma + gamma.swapaxes(1, 2)
     inertia = np.einsum("nij,nj->ni", metric(PAPER_SCENE, y[:, :2]), angular_accelerations(PAPER_SCENE, y, t))

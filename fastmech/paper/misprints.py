@@ -39,7 +39,7 @@ class Misprint:
 
     key: str
     place: str
-    error: str
+    error: str  #: in words, Markdown
     printed: str
     corrected: str
     evidence: tuple[Evidence, ...]
@@ -102,7 +102,7 @@ def _bracket_16(printed: Printed, computed: Computed) -> Misprint:
     return Misprint(
         key="equation_16_bracket",
         place="Equation (16), denominator",
-        error="the bracket that sin(phi)**2 multiplies is closed too early",
+        error="the bracket that `sin(phi)**2` multiplies is closed too early",
         printed=_denominator(equation, False),
         corrected=_denominator(equation, True),
         evidence=(fitted, along),

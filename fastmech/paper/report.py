@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from fastmech.ensembles.run import thread_count
 from fastmech.errors import InputError
 from fastmech.paper.checks import Check, all_checks, parameters_used
@@ -55,8 +57,9 @@ class PaperReport:
 def write_paper(out: Path, *, threads: int | None = None, progress: Progress | None = None) -> PaperReport:
     """Compute the paper's tables and figures and set them against what it prints.
 
-    Writes into the folder ``out`` (made if missing, files of an earlier report replaced): ``report.html`` (which
-    needs no other file), ``report.md``, a PNG for every table and figure, and their data in ``paper.h5``.
+    Writes into the folder ``out`` (made if missing, files of an earlier report replaced): ``report.html``
+    (which needs no other file), ``report.md``, a PNG for every table and figure, and their data in
+    ``paper.h5``.
 
     Args:
         out: folder of the report.
@@ -98,7 +101,7 @@ def write_paper(out: Path, *, threads: int | None = None, progress: Progress | N
     write_results(
         out / DATA,
         scene_parameters={
-            name: Variable((), value, unit, about)
+            name: Variable((), np.array(value), unit, about)
             for name, (value, unit, about) in PAPER_SCENE.described().items()
         },
         sections=datasets,

@@ -15,10 +15,10 @@ TITLE = "The source paper, computed again"
 
 _NOTES = {
     "Table 1": "Given values, as this report's scene has them. The paper prints no g; see *Parameters used*.",
-    "Equation (16)": "The exact coefficients of the Hamiltonian in the paper's shape, with the inner bracket of "
-    "the denominator closed after the last term.",
-    "Table 4": "Computed coefficients are given the sign of the print. A `*` stands for characters that are lost "
-    "in the text at hand; a row agrees if some rounding of the computed number fits what is left.",
+    "Equation (16)": "The exact coefficients of the Hamiltonian in the paper's shape, with the inner bracket "
+    "of the denominator closed after the last term.",
+    "Table 4": "Computed coefficients are given the sign of the print. A `*` stands for characters that are "
+    "lost in the text at hand; a row agrees if some rounding of the computed number fits what is left.",
 }
 
 
@@ -87,12 +87,13 @@ def _summary(
     def count(verdict: Verdict) -> int:
         return sum(row.verdict == verdict for row in numbers)
 
+    same = sum(row.verdict.good for row in words)
     yield (
         f"Of **{len(numbers)} printed numbers**, {count(Verdict.AGREES)} agree to the printed digit, "
-        f"{count(Verdict.LEGIBLE)} in every legible digit, {count(Verdict.ROUNDING)} is a rounding of the value "
-        f"that was used, **{count(Verdict.MISPRINT)} are misprints** and **{count(Verdict.DIFFERS)} differ "
-        f"unexplained**. {sum(row.verdict.good for row in words)} of {len(words)} printed verdicts say the same as "
-        "the computation."
+        f"{count(Verdict.LEGIBLE)} in every legible digit, {count(Verdict.ROUNDING)} is a rounding of the "
+        f"value that was used, **{count(Verdict.MISPRINT)} are misprints** and "
+        f"**{count(Verdict.DIFFERS)} differ unexplained**. "
+        f"{same} of {len(words)} printed verdicts say the same as the computation."
     )
     yield ""
     yield f"{len(confirmed)} misprints are proved, formulas included:"
@@ -131,7 +132,7 @@ def _rows(rows: Sequence[Row], places: dict[str, str]) -> Iterator[str]:
 
 def _row(row: Row, places: dict[str, str]) -> list[str]:
     texts = list(cells(row))
-    for i in (1, 3):
+    for i in (0, 1, 3):
         # Markdown would read the stars as emphasis.
         texts[i] = f"`{texts[i]}`" if "*" in texts[i] else texts[i]
     if row.verdict == Verdict.MISPRINT:

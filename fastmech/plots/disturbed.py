@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.plots.labels import equilibrium_names, flag_codes
+from fastmech.plots.labels import equilibrium_names, flag_codes, logarithmic
 from fastmech.plots.style import LINES, legend_below, new_figure, style
 from fastmech.results import Dataset
 
@@ -129,6 +129,7 @@ def _excursions(dataset: Dataset) -> Figure:
         axes.plot([], [], "s", color=LINES[column], label=f"largest |{symbol} - {symbol} of the equilibrium|")
     axes.plot([], [], "|", color="black", mew=2, ms=9, label="largest of all")
     axes.set(xscale="log", xlabel="excursion [rad]")
+    logarithmic(axes.xaxis)
     axes.set_title("How far trajectories go (box: 25-75 %, line: 5-95 %)")
     legend_below(figure, axes, 3)
     return figure
@@ -159,6 +160,7 @@ def _linear_range(dataset: Dataset) -> Figure:
         quantiles = np.quantile(ordered, BOX, method="lower")
         _box(axes, row, np.clip(quantiles, 0.9 * low, 1.1 * high), LINES[0])
     axes.set(xscale="log", xlabel="size of the disturbance [rad]")
+    logarithmic(axes.xaxis)
     axes.set_title(
         f"Size up to which the linearized motion is within {100.0 * tolerance:g} % for {horizon:g} s\n"
         "(dots: directions, box: 25-75 %, line: 5-95 %)"

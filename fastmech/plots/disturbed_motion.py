@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.plots.labels import equilibrium_names
+from fastmech.plots.labels import equilibrium_names, logarithmic
 from fastmech.plots.style import LINES, legend_below, new_figure, style
 from fastmech.results import Dataset
 
@@ -64,6 +64,7 @@ def _norm(dataset: Dataset) -> Figure:
         known = nonlinear[i][nonlinear[i] > 0.0]
         if known.size:
             axes.set_ylim(known.min() / 3.0, 10.0 * known.max())
+        logarithmic(axes.yaxis)
         axes.set_title(name, loc="left", fontsize=10)
         axes.set_ylabel("|ξ| [rad]")
         if i >= len(nonlinear) - 2:

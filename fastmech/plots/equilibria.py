@@ -106,7 +106,8 @@ def _positions(dataset: Dataset, scene: Scene) -> Figure:
     names = equilibrium_names(dataset)
     kinds = {code: kind for kind, code in flag_codes(dataset["kind"]).items()}
     rows = -(-len(names) // 2)
-    figure = new_figure(9.6, 3.9 * rows)
+    figure = new_figure(9.6, 3.9 * rows + 0.3)
+    figure.suptitle(f"Positions of rest, force F = {dataset.attrs['force']:g} N on M2")
     panels = figure.subplots(rows, 2, squeeze=False)
     for axes in panels.flat[len(names) :]:
         axes.remove()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.plots.labels import flag_codes
+from fastmech.plots.labels import flag_codes, logarithmic
 from fastmech.plots.style import FIELD, LINES, PALETTE, legend_below, new_figure, style
 from fastmech.results import Dataset
 
@@ -31,8 +31,11 @@ COUNT_COLORS = {
     6: PALETTE["yellow"],
 }
 
-#: Relative difference of energies that rounding may cause.
-TIE = 1e-10
+#: Relative difference of energies, and of eigenvalues, that rounding may cause.
+ROUNDING = 1e-10
+
+#: Half of the smallest range of a colour bar of angles [rad]: rounding shall not look like structure.
+LEAST_SPAN = 1e-3
 
 #: Marks of points whose count is not an ordinary proved one.
 UNSETTLED = {"at_fold": "|", "degenerate": "x", "unproved": "+"}
@@ -86,17 +89,18 @@ class _View:
     def stable(self, rank: int, values: NDArray[np.generic]) -> Floats:
         """Of values over the equilibria, that of the stable one of this rank (0: deepest), NaN if none."""
         energy = np.where(self.data("morse_index") == 0, self.data("energy"), np.inf)
-        # Mirror images are equally deep but for rounding: their order is the angle's, so that maps are smooth.
+        # Mirror images are equally deep but for rounding: the angle orders them, so that maps are smooth.
         deepest = energy.min(axis=-1, keepdims=True)
-        tied = energy <= deepest + TIE * np.abs(deepest)
+        tied = energy <= deepest + ROUNDING * np.abs(deepest)
         order = np.lexsort((self.data("phi"), np.where(tied, deepest, energy)), axis=-1)
         chosen = (np.argsort(order, axis=-1) == rank) & np.isfinite(energy)
         return np.where(chosen.any(axis=-1), np.where(chosen, values, 0.0).sum(axis=-1), np.nan)
 
     def decay_rate(self) -> Floats:
-        """Decay rate of the slowest mode [1/s] of every equilibrium; NaN where it is not positive."""
-        rate = -np.max(self.data("eigenvalue_re"), axis=-1)
-        return np.where(rate > 0.0, rate, np.nan)
+        """Decay rate of the slowest mode [1/s] of every equilibrium, NaN if no more than rounding."""
+        real, imaginary = self.data("eigenvalue_re"), self.data("eigenvalue_im")
+        rate = -np.max(real, axis=-1)
+        return np.where(rate > ROUNDING * np.max(np.hypot(real, imaginary), axis=-1), rate, np.nan)
 
 
 def draw_equilibrium_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
@@ -105,7 +109,12 @@ def draw_equilibrium_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[s
     with style():
         if len(view.axes) == 1:
             return {"branches": _branches(view)}
-        return {"count": _counts(view), "angles": _angles(view), "decay": _decay(view)}
+        figures = {"count": _counts(view)}
+        if view.data("count_stable").any():
+            figures["angles"] = _angles(view)
+        if np.isfinite(view.stable(0, view.decay_rate())).any():
+            figures["decay"] = _decay(view)
+        return figures
 
 
 def _view(dataset: Dataset, scene: Mapping[str, float]) -> _View:
@@ -165,7 +174,7 @@ def _mark_own(axes: Axes, view: _View) -> list[Artist]:
 
 
 def _angles(view: _View) -> Figure:
-    ranks = range(max(1, int(view.data("count_stable").max())))
+    ranks = range(int(view.data("count_stable").max()))
     figure = new_figure(1.6 + 4.6 * len(ranks), 7.6)
     panels = figure.subplots(2, len(ranks), squeeze=False, sharex=True, sharey=True)
     for row, (name, symbol) in enumerate((("phi", "φ"), ("theta", "θ"))):
@@ -187,23 +196,23 @@ _ORDER = ("deepest", "second", "third")
 def _angle_look(fields: list[Floats]) -> dict[str, object]:
     """Colours of an angle: cyclic where its values go round."""
     known = np.concatenate([field[np.isfinite(field)] for field in fields])
-    if known.size and np.ptp(known) > 1.5 * np.pi:
+    if np.ptp(known) > 1.5 * np.pi:
         return {"cmap": "twilight", "vmin": -np.pi, "vmax": np.pi}
-    low, high = (known.min(), known.max()) if known.size else (-np.pi, np.pi)
-    return {"cmap": FIELD, "vmin": low, "vmax": high}
+    middle, half = 0.5 * (known.min() + known.max()), max(0.5 * np.ptp(known), LEAST_SPAN)
+    return {"cmap": FIELD, "vmin": middle - half, "vmax": middle + half}
 
 
 def _decay(view: _View) -> Figure:
     from matplotlib.colors import LogNorm
 
-    ranks = range(max(1, int(view.data("count_stable").max())))
+    ranks = range(int(view.data("count_stable").max()))
     figure = new_figure(1.6 + 4.6 * len(ranks), 4.6)
     panels = figure.subplots(1, len(ranks), squeeze=False, sharey=True)[0]
     rate = view.decay_rate()
     fields = [view.stable(rank, rate) for rank in ranks]
     known = np.concatenate([field[np.isfinite(field)] for field in fields])
     # Rates near zero are only so many decades below the others: the colours are for the others.
-    norm = LogNorm(max(known.min(), known.max() * 1e-4), known.max()) if known.size else None
+    norm = LogNorm(max(known.min(), known.max() * 1e-4), known.max())
     for rank, field in enumerate(fields):
         axes = panels[rank]
         mesh = axes.pcolormesh(*map(view.axis, view.axes), field.T, shading="nearest", norm=norm, cmap=FIELD)
@@ -229,6 +238,7 @@ def _branches(view: _View) -> Figure:
         axes.set(ylabel=f"angle {symbol} [rad]", ylim=(-3.4, 3.4))
         _mark_own(axes, view)
     panels[2].semilogy(x[stable], view.decay_rate()[stable], "o", color=LINES[0], ms=3.5)
+    logarithmic(panels[2].yaxis)
     panels[2].set(ylabel="slowest decay\nof the stable [1/s]", xlabel=view.label(name))
     _mark_own(panels[2], view)
     panels[0].set_title(f"Equilibria over {name}{view.note}")

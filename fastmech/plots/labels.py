@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from fastmech.results import Dataset, Variable
+
+if TYPE_CHECKING:
+    from matplotlib.axis import Axis
 
 #: Places and labels of the ticks of an angle's axis over one turn.
 PI_TICKS = ([-np.pi, -np.pi / 2, 0.0, np.pi / 2, np.pi], ["-π", "-π/2", "0", "π/2", "π"])
@@ -23,3 +28,14 @@ def flag_codes(variable: Variable) -> dict[str, int]:
     """Meaning and code of a variable of flags."""
     meanings = str(variable.attrs["flag_meanings"]).split()
     return dict(zip(meanings, (int(value) for value in variable.attrs["flag_values"]), strict=True))
+
+
+def logarithmic(axis: Axis) -> None:
+    """Ticks of a logarithmic axis whose labels keep apart, over a part of a decade or over many."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    low, high = axis.get_view_interval()
+    if high < 30.0 * low:
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())

@@ -55,7 +55,7 @@ def draw_mechanism(axes: Axes, scene: Parameters, phi: float, theta: float, forc
             "shrinkA": 0,
             "shrinkB": 0,
         }
-        axes.annotate("", xy=tip, xytext=m2, arrowprops=arrow, zorder=6)
+        axes.annotate("", xy=tuple(tip), xytext=tuple(m2), arrowprops=arrow, zorder=6)
     ahead = m2 + np.array([np.sign(force), 0.0])
     _label(axes, "$M_1$", m1, (origin, m2, m3, a), 0.29 * l, MASS)
     _label(axes, "$M_2$", m2, (m1, origin, ahead), 0.29 * l, MASS)
@@ -70,7 +70,9 @@ def _label(
     """Name a point on the side where nothing is tied to it."""
     ties = np.array([other - place for other in others])
     lengths = np.hypot(*ties.T)
-    ties = ties[lengths > 1e-9] / lengths[lengths > 1e-9, None]
+    tied = lengths > 1e-9
+    # A point that coincides with all it is tied to gets its name above.
+    ties = ties[tied] / lengths[tied, None] if tied.any() else np.array([[0.0, -1.0]])
     # The free direction is the one farthest from every tie.
     angles = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
     directions = np.stack([np.cos(angles), np.sin(angles)], axis=-1)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.plots.labels import logarithmic
 from fastmech.plots.style import new_figure, style
 from fastmech.results import Dataset
 
@@ -123,6 +124,8 @@ def _residuals(dataset: Dataset) -> Figure:
     constraints.set(ylabel="residual [m²], [m]", title="Constraints, paper (2)-(5)")
     _log_plot(energy, t, dataset["energy_residual"].data, "[J]")
     energy.set(ylabel="residual [J]", title="Change of T + Π less the works of damper and force")
+    for axes in (formulations, constraints, energy):
+        logarithmic(axes.yaxis)
     for axes in (formulations, constraints):
         _legend(axes)
     return figure

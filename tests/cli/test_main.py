@@ -38,7 +38,9 @@ def test_version(invoke):
     assert result.stdout == f"fastmech {metadata.version('fastmech')}\n"
 
 
-@pytest.mark.parametrize(("name", "nearest"), [("rum", "run"), ("equilibrium", "equilibria"), ("plots", "plot")])
+@pytest.mark.parametrize(
+    ("name", "nearest"), [("rum", "run"), ("equilibrium", "equilibria"), ("plots", "plot")]
+)
 def test_unknown_command_suggests_the_nearest(invoke, name, nearest):
     assert_refused(invoke(name), f"{name!r}", f"did you mean {nearest!r}?")
 

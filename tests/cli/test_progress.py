@@ -11,6 +11,9 @@ from fastmech.cli.progress import ProgressBars
 
 def use(bars: ProgressBars) -> None:
     with bars:
+        tell = bars.counter("pictures")
+        tell(1, 3)
+        tell(3, 3)
         advance = bars.stage("map: points", 2000)
         advance(500)
         advance(1500)
@@ -21,6 +24,7 @@ def test_bars_on_a_terminal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capt
     use(ProgressBars())
     shown = capsys.readouterr()
     assert shown.out == ""
+    assert "pictures" in shown.err
     assert "map: points" in shown.err
     assert "100%" in shown.err
     assert "took" in shown.err

@@ -49,7 +49,7 @@ def test_out_names_the_file(invoke, tiny):
 BAD = {
     "unknown key of a scan": (MOTION + "t_ned = 1.0", ["scan.a.t_ned", "'t_end'"]),
     "unknown key of the scene": ("[scene]\nbetta = 1.0\n" + MOTION, ["scene.betta", "'beta'"]),
-    "unknown key of a scan's scene": (MOTION + "scene = { F1 = 1.0 }", ["scan.a.scene.F1", "'F0'"]),
+    "unknown key of a scan's scene": (MOTION + "scene = { betta = 1.0 }", ["scan.a.scene.betta", "'beta'"]),
     "unknown table": ("[scenes]\n" + MOTION, ["scenes", "'scene'"]),
     "wrong type": (MOTION + 'dt = "small"', ["scan.a.dt", "'small'"]),
     "wrong type in the scene": ("[scene]\nm1 = true\n" + MOTION, ["scene.m1 = True"]),

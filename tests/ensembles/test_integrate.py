@@ -96,7 +96,12 @@ def test_progress_counts_every_trajectory_once() -> None:
 
 def test_y0_of_any_kind_of_numbers() -> None:
     right = integrate(SCENE, [1.0, 2.0, 0.0, -1.0], 0.1).y
-    for y0 in ((1, 2, 0, -1), [[1, 2, 0, -1]], np.array([1, 2, 0, -1]), np.array([1, 2, 0, -1], dtype=np.float32)):
+    for y0 in (
+        (1, 2, 0, -1),
+        [[1, 2, 0, -1]],
+        np.array([1, 2, 0, -1]),
+        np.array([1, 2, 0, -1], dtype=np.float32),
+    ):
         np.testing.assert_array_equal(integrate(SCENE, y0, 0.1).y, right)
     columns = np.asfortranarray(np.array([[1.0, 2.0, 0.0, -1.0]] * 3))
     np.testing.assert_array_equal(integrate(SCENE, columns, 0.1).y[:, 1:2], right)
@@ -151,7 +156,7 @@ def test_wrong_arguments_are_refused_in_one_line(arguments: dict[str, Any], mess
 
 def test_a_wrong_t_end_beside_t_eval_is_refused() -> None:
     for t_end in (np.nan, "1", -1.0, 0.0):
-        with pytest.raises(InputError, match="^t_end"):
+        with pytest.raises(InputError, match=r"^t_end"):
             integrate(SCENE, START, t_end, t_eval=[0.0])  # type: ignore[arg-type]
 
 

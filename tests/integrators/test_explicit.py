@@ -47,7 +47,13 @@ def observe_times(t: float, Y: Floats, params: Floats, record: Floats) -> None:
 
 
 def drive(
-    rhs: Any, method: str, Y: Floats, times: Floats, steps: list[int], params: Floats, observe: Any = observe_nothing
+    rhs: Any,
+    method: str,
+    Y: Floats,
+    times: Floats,
+    steps: list[int],
+    params: Floats,
+    observe: Any = observe_nothing,
 ) -> tuple[Floats, Floats, Floats]:
     """Outputs, the block's last state and the record."""
     tableau = METHODS[method]
@@ -78,7 +84,9 @@ def by_the_book(method: str, A: Floats, y: Floats, h: float, steps: int) -> Floa
     for _ in range(steps):
         stages: list[Floats] = []
         for row in tableau.a:
-            stages.append(A @ (y + h * sum((w * k for w, k in zip(row, stages, strict=True)), np.zeros_like(y))))
+            stages.append(
+                A @ (y + h * sum((w * k for w, k in zip(row, stages, strict=True)), np.zeros_like(y)))
+            )
         y = y + h * sum(w * k for w, k in zip(tableau.b, stages, strict=True))
     return y
 

@@ -148,11 +148,18 @@ def test_coefficients_equal_the_closed_forms(name: str) -> None:
 
 
 def test_coefficients_of_tsit5() -> None:
-    """Tsitouras (2011): c2, c3, c4 and b2 as chosen there, nodes and order exact to 1e-14, and sum_i b_i a_ij =
-    b_j (1 - c_j), the simplifying assumption that the method is built on. A coefficient off by 1e-13 breaks one.
+    """Tsitouras (2011): c2 to c6 and b2 as chosen there, the row sums, the order, and the assumption on which
+    the method is built, sum_i b_i a_ij = b_j (1 - c_j), all to 1e-14. A coefficient off by 1e-13 breaks one.
     """
     t = METHODS["tsit5"]
-    assert (t.c[1], t.c[2], t.c[3], t.c[4], t.c[5], t.b[1]) == (0.161, 0.327, 0.9, 0.9800255409045097, 1.0, 0.01)
+    assert (t.c[1], t.c[2], t.c[3], t.c[4], t.c[5], t.b[1]) == (
+        0.161,
+        0.327,
+        0.9,
+        0.9800255409045097,
+        1.0,
+        0.01,
+    )
     b, c = np.array(t.b), np.array(t.c)
     assert np.abs(t.matrix.sum(axis=1) - c).max() <= 2e-15
     assert np.abs(b @ t.matrix - b * (1 - c)).max() <= 5e-15

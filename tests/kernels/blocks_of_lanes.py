@@ -1,4 +1,4 @@
-"""What the tests of block kernels share: the kernels by name, blocks of lanes, the physics they must equal."""
+"""What the tests of block kernels share: kernels by name, blocks of lanes, what they must equal."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def kernel(formulation: str, terms: str) -> Any:
 
 
 def evaluate(rhs: Any, scene: Scene, Y: Floats, t: float = 0.0) -> Floats:
-    """Derivatives of the lanes of ``Y`` (dim, lanes); the result starts as NaN, so nothing is left unwritten."""
+    """Derivatives of the lanes of ``Y`` (dim, lanes); it starts as NaN: nothing stays unwritten."""
     dY = np.full(Y.shape, np.nan)
     with np.errstate(all="ignore"):  # plain Python warns where compiled code is silent
         rhs(t, np.ascontiguousarray(Y), dY, np.array(reduce(scene), dtype=np.float64))

@@ -20,7 +20,8 @@ from fastmech.jit import FLAGS, INTEGERS, MATRIX, VECTOR
 from fastmech.kernels.work import lagrange_work
 
 pytestmark = pytest.mark.skipif(
-    not llvm.get_host_cpu_features().get("fma", False), reason="no packed fused instructions on this processor"
+    not llvm.get_host_cpu_features().get("fma", False),
+    reason="no packed fused instructions on this processor",
 )
 
 KERNELS = {f"{formulation}-{terms}": kernel(formulation, terms) for formulation, terms in COMBINATIONS}
@@ -55,7 +56,7 @@ def basic_blocks(code: str) -> list[str]:
 
 
 def main_loop(shipped: Any) -> str:
-    """The vector loop over lanes: of the blocks in LLVM's code that take packed square roots, those that floor."""
+    """The vector loop over lanes: the blocks of LLVM's code that take packed square roots and floors."""
     blocks = basic_blocks(intermediate(shipped))
     return "\n".join(b for b in blocks if all(re.search(call, b) for call in (PACKED_FLOOR, PACKED_ROOT)))
 
@@ -106,7 +107,7 @@ def test_only_a_decaying_force_calls_the_exponential(formulation: str, terms: st
 
 @pytest.mark.parametrize("formulation", MODULES)
 def test_every_term_costs_arithmetic_and_its_absence_none(formulation: str) -> None:
-    """Packed operations for each vector of lanes; two kernels may be unrolled differently, hence the quotient."""
+    """Packed operations for each vector of lanes; kernels may be unrolled differently, hence the quotient."""
     cost = {}
     for terms in ("free", "damped", "constant", "damped_constant", "decaying", "damped_decaying"):
         loop = main_loop(kernel(formulation, terms))

@@ -76,7 +76,7 @@ def test_absolute_error_at_100_000_points() -> None:
 
 @pytest.mark.nojit
 def test_multiples_of_half_pi_up_to_10_000() -> None:
-    """Where one function vanishes its value is 1e-16 or less, and the error relative to that is still bounded."""
+    """Where one function all but vanishes, the error relative to its value is still bounded."""
     absolute, relative = errors(multiples(1e4))
     assert absolute <= 2.3e-16
     assert relative <= 5e-16

@@ -20,7 +20,7 @@ TOLERANCE = 1e-12  # of the natural scale, see draws.py
 
 
 def _oracle_accelerations(d: Draw) -> Any:
-    """Accelerations of the points: central difference of the oracle's velocities along the motion, 25 digits."""
+    """Of the points: central difference of the oracle's velocities along the motion, 25 digits."""
     from mpmath import mpf, workdps
 
     with workdps(40):
@@ -172,7 +172,9 @@ def test_quantity(name: str) -> None:
 
 
 def test_draws_lack_every_combination_of_optional_terms() -> None:
-    lacking = {tuple(getattr(d.scene, key) == 0 for key in ("m3", "beta", "F0", "alpha")) for d in draws.draws()}
+    lacking = {
+        tuple(getattr(d.scene, key) == 0 for key in ("m3", "beta", "F0", "alpha")) for d in draws.draws()
+    }
     assert len(lacking) == 16
     assert any(d.scene.F0 < 0 for d in draws.draws())
     assert any(d.scene.F0 > 0 for d in draws.draws())

@@ -25,5 +25,7 @@ def test_reduced_coefficients_against_exact_fractions() -> None:
 
 def test_force_decays_exponentially() -> None:
     scene = Scene(F0=-80.0, alpha=np.log(2.0))
-    np.testing.assert_allclose(force(scene, [0.0, 1.0, 2.0, 10.0]), [-80.0, -40.0, -20.0, -80 / 1024], rtol=1e-15)
+    np.testing.assert_allclose(
+        force(scene, [0.0, 1.0, 2.0, 10.0]), [-80.0, -40.0, -20.0, -80 / 1024], rtol=1e-15
+    )
     np.testing.assert_array_equal(force(scene.replace(alpha=0.0), [0.0, 7.0]), [-80.0, -80.0])

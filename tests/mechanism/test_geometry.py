@@ -40,7 +40,9 @@ def test_velocities_satisfy_the_differentiated_constraints() -> None:
         (3, "x3", 1.0, 2 * np.sqrt(3.0) + 1.0),
     ],
 )
-def test_a_point_out_of_place_leaves_a_residual(index: int, point: str, change: float, residual: float) -> None:
+def test_a_point_out_of_place_leaves_a_residual(
+    index: int, point: str, change: float, residual: float
+) -> None:
     """l = 1, phi = pi/2, theta = 0: M1 = (0, 1), M2 = (0, 0), M3 = (sqrt 3, 0)."""
     scene = Scene(l=1.0)
     r = geometry.positions(scene, [np.pi / 2, 0.0, 0.0, 0.0])

@@ -1,0 +1,51 @@
+"""``fastmech paper`` and ``fastmech bench`` hand over to the package and tell where the result is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+
+@dataclass(frozen=True)
+class Report:
+    as_expected: bool
+    paths: tuple[Path, ...] = (Path("there/report.html"), Path("there/report.md"))
+    n_rows: int = 99
+    misprints: tuple[str, ...] = ("one", "two")
+
+
+@pytest.mark.parametrize(("as_expected", "code"), [(True, 0), (False, 1)])
+def test_paper(invoke, monkeypatch, as_expected, code):
+    asked = []
+
+    def write_paper(out, *, progress):
+        asked.append(out)
+        progress(1, 2)
+        return Report(as_expected)
+
+    monkeypatch.setattr("fastmech.paper.report.write_paper", write_paper)
+    result = invoke("paper", "--out", "there")
+    assert asked == [Path("there")]
+    assert result.exit_code == code
+    assert "Report: there/report.html" in result.stdout
+    assert "99 printed values compared, 2 misprints proved" in result.stdout
+    assert len(result.stderr.splitlines()) == (0 if as_expected else 1)
+
+
+@pytest.mark.parametrize("quick", [True, False])
+def test_bench(invoke, monkeypatch, quick):
+    asked = []
+
+    def run_bench(out, *, quick, stage):
+        asked.append((out, quick))
+        stage("entrants", 2)(1)
+        return [out / "bench.md", out / "bench.png"]
+
+    monkeypatch.setattr("fastmech.bench.report.run_bench", run_bench)
+    result = invoke("bench", *(["--quick"] if quick else []))
+    assert result.exit_code == 0
+    assert asked == [(Path("results/bench"), quick)]
+    assert result.stdout.splitlines() == ["results/bench/bench.md", "results/bench/bench.png"]
+    assert result.stderr == ""

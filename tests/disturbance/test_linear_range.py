@@ -1,0 +1,77 @@
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.linalg
+from disturbance.known import center, equilibria, known, oracle_jacobian, oracle_size, scipy_motion
+
+from fastmech.disturbance.linear_range import linear_range
+from fastmech.errors import InputError
+
+SCENE = known("table_1")[0]
+
+
+def deviation(e: Any, ray: Any, size: float, horizon: float) -> float:
+    """By SciPy: the ratio of maxima over 201 times."""
+    times = np.linspace(0.0, horizon, 201)
+    nonlinear = scipy_motion(SCENE, center(e) + size * ray, horizon, 1e-10).sol(times).T - center(e)
+    J = oracle_jacobian(SCENE, e)
+    linear = np.array([scipy.linalg.expm(t * J) @ (size * ray) for t in times])
+    return float(oracle_size(SCENE, e, nonlinear - linear).max() / oracle_size(SCENE, e, linear).max())
+
+
+@pytest.mark.parametrize("morse_index", [0, 1])
+def test_limits_against_scipy(morse_index: int) -> None:
+    """The deviation is the tolerance at the limit, to half a percent, and less at smaller sizes."""
+    e = equilibria("table_1", morse_index)[0]
+    found = linear_range(SCENE, e, directions=4, seed=3, horizon=1.5, tolerance=0.08)
+    assert (found.horizon, found.tolerance) == (1.5, 0.08)
+    np.testing.assert_allclose(oracle_size(SCENE, e, found.directions), 1.0, rtol=1e-12)
+    for ray, limit in zip(found.directions, found.limit, strict=True):
+        assert deviation(e, ray, limit, 1.5) == pytest.approx(0.08, rel=5e-3)
+        assert all(deviation(e, ray, limit * share, 1.5) < 0.08 for share in (0.98, 0.7, 0.2))
+
+
+def test_limit_grows_with_the_tolerance_and_ends_are_told_apart() -> None:
+    (e,) = equilibria("table_1", 0)
+    strict, loose = (linear_range(SCENE, e, directions=5, tolerance=x) for x in (0.02, 0.1))
+    assert np.all(strict.limit < loose.limit)
+    np.testing.assert_array_equal(linear_range(SCENE, e, directions=5, tolerance=1e-9).limit, 0.0)
+    assert np.all(np.isnan(linear_range(SCENE, e, directions=5, tolerance=1e6).limit))
+
+
+def test_the_seed_decides_and_threads_do_not() -> None:
+    (e,) = equilibria("table_1", 0)
+    first, again, other = (
+        linear_range(SCENE, e, directions=20, seed=seed, threads=threads)
+        for seed, threads in ((1, 1), (1, 2), (2, 1))
+    )
+    np.testing.assert_array_equal(first.directions, again.directions)
+    np.testing.assert_array_equal(first.limit, again.limit)
+    assert not np.any(first.directions == other.directions)
+
+
+@pytest.mark.nojit
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"horizon": 0.0}, "horizon = 0.0: must be a finite number of s greater than 0"),
+        ({"tolerance": -1.0}, "tolerance = -1.0: must be a finite number greater than 0"),
+        ({"directions": 0}, "directions = 0: must be an integer not less than 1"),
+        ({"seed": -1}, "seed = -1: must be an integer not less than 0"),
+    ],
+)
+def test_wrong_arguments_are_refused(arguments: dict[str, Any], message: str) -> None:
+    (e,) = equilibria("table_1", 0)
+    with pytest.raises(InputError, match=f"^{re.escape(message)}"):
+        linear_range(SCENE, e, **arguments)
+
+
+@pytest.mark.nojit
+def test_a_decaying_force_is_refused() -> None:
+    (e,) = equilibria("table_1", 0)
+    with pytest.raises(InputError, match=r"^scene\.alpha = 0\.7: must be 0 1/s"):
+        linear_range(SCENE.replace(alpha=0.7), e)

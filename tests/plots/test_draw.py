@@ -1,0 +1,203 @@
+"""Pictures of every kind of scan: units, no overlaps, the right marks; on real results and on edge cases."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib._pylab_helpers import Gcf
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from plots.legibility import assert_legible, settings
+
+from fastmech.plots.labels import flag_codes
+from fastmech.results import Dataset
+from fastmech.scan_types import scan_kinds
+from fastmech.scan_types.request import RunContext
+from fastmech.scene import Scene
+
+CONSTANT = Scene(alpha=0.0)
+# Two minima, three saddles and a maximum (the counting law's other case has one minimum).
+BISTABLE = Scene(alpha=0.0, F0=85.3, c1=294.9, c2=92.85)
+# Without gravity, force and the spring c1 every theta is at rest: no isolated equilibrium.
+DEGENERATE = Scene(g=0.0, F0=0.0, c1=0.0)
+SMALL = {"trajectories": 24, "t_end": 40.0, "dt": 0.02, "linear_directions": 16}
+
+
+def axis(start: float, stop: float, num: int) -> dict[str, Any]:
+    return {"start": start, "stop": stop, "num": num}
+
+
+def run(kind: str, scene: Scene, **fields: Any) -> Dataset:
+    return scan_kinds()[kind](**fields).run(scene, RunContext(threads=1))
+
+
+def draw(kind: str, scene: Scene, **fields: Any) -> dict[str, Figure]:
+    return scan_kinds()[kind].draw(run(kind, scene, **fields), scene.model_dump())
+
+
+def panel(figure: Figure, title: str) -> Axes:
+    (found,) = [axes for axes in figure.axes if title in axes.get_title()]
+    return found
+
+
+def handles(axes: Axes) -> list[str]:
+    return [text.get_text() for text in axes.get_legend().get_texts()]
+
+
+CASES: dict[str, tuple[str, Scene, dict[str, Any], set[str]]] = {
+    "motion": (
+        "motion",
+        Scene(),
+        {"outputs": 101},
+        {"angles", "coordinates", "reactions", "energies", "residuals"},
+    ),
+    "motion at rest": (
+        "motion",
+        Scene(F0=0.0),
+        {"phi": np.pi / 2, "theta": 0.0, "t_end": 1.0, "outputs": 5},
+        {"angles", "coordinates", "reactions", "energies", "residuals"},
+    ),
+    "equilibria": ("equilibria", CONSTANT, {}, {"potential", "eigenvalues", "positions"}),
+    "six equilibria": ("equilibria", BISTABLE, {}, {"potential", "eigenvalues", "positions"}),
+    "no isolated equilibrium": ("equilibria", DEGENERATE, {}, {"potential"}),
+    "disturbed motion": ("disturbed_motion", CONSTANT, {"outputs": 101}, {"angles", "norm"}),
+    "six disturbed motions": ("disturbed_motion", BISTABLE, {"outputs": 101}, {"angles", "norm"}),
+    "no disturbed motion": ("disturbed_motion", DEGENERATE, {"outputs": 3}, set()),
+    "disturbed": (
+        "disturbed",
+        CONSTANT,
+        SMALL,
+        {"outcomes", "time_to_return", "excursions", "linear_range"},
+    ),
+    "disturbed, six equilibria": (
+        "disturbed",
+        BISTABLE,
+        SMALL | {"radius": 1.0},
+        {"outcomes", "time_to_return", "excursions", "linear_range"},
+    ),
+    "disturbed too briefly": (
+        "disturbed",
+        CONSTANT,
+        SMALL | {"t_end": 0.5, "trajectories": 1},
+        {"outcomes", "time_to_return", "excursions", "linear_range"},
+    ),
+    "map": (
+        "equilibrium_map",
+        CONSTANT,
+        {"axes": {"F0": axis(-400.0, 400.0, 9), "c1": axis(0.0, 400.0, 7)}},
+        {"count", "angles", "decay"},
+    ),
+    "map with bistable points": (
+        "equilibrium_map",
+        CONSTANT,
+        {"axes": {"c2": axis(0.0, 300.0, 9), "F0": axis(0.0, 200.0, 5)}},
+        {"count", "angles", "decay"},
+    ),
+    "map with degenerate points": (
+        "equilibrium_map",
+        DEGENERATE,
+        {"axes": {"c1": axis(0.0, 100.0, 3), "c2": axis(0.0, 100.0, 3)}},
+        {"count", "angles"},
+    ),
+    "map of nothing": (
+        "equilibrium_map",
+        DEGENERATE,
+        {"axes": {"m1": axis(1.0, 2.0, 2), "m2": axis(1.0, 2.0, 2)}},
+        {"count"},
+    ),
+    "map over three": (
+        "equilibrium_map",
+        CONSTANT,
+        {"axes": {"c2": axis(0.0, 400.0, 4), "c1": axis(50.0, 200.0, 3), "F0": axis(-100.0, 100.0, 3)}},
+        {"count", "angles", "decay"},
+    ),
+    "line": ("equilibrium_map", CONSTANT, {"axes": {"c2": axis(0.0, 800.0, 41)}}, {"branches"}),
+    "line, second axis of one point": (
+        "equilibrium_map",
+        CONSTANT,
+        {"axes": {"c1": axis(162.5, 162.5, 1), "c2": axis(0.0, 800.0, 5)}},
+        {"branches"},
+    ),
+    "point": ("equilibrium_map", CONSTANT, {"axes": {"c2": axis(100.0, 100.0, 1)}}, {"branches"}),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_pictures_are_legible(case: str):
+    kind, scene, fields, names = CASES[case]
+    before = settings()
+    figures = draw(kind, scene, **fields)
+    assert set(figures) == names
+    for figure in figures.values():
+        assert_legible(figure)
+    assert settings() == before
+    assert not Gcf.figs, "pyplot keeps a figure"
+
+
+def test_extremes_are_named():
+    dataset = run("motion", Scene(), outputs=201)
+    figure = scan_kinds()["motion"].draw(dataset, {})["reactions"]
+    tension = dataset["rod_m1m2"].data
+    (axes,) = [axes for axes in figure.axes if axes.get_title(loc="left").startswith("Rod M1M2")]
+    assert f"max {max(tension):.4g} N" in axes.get_title(loc="right")
+    assert f"min {min(tension):.4g} N" in axes.get_title(loc="right")
+
+
+def test_every_equilibrium_is_marked():
+    dataset = run("equilibria", BISTABLE)
+    axes = scan_kinds()["equilibria"].draw(dataset, BISTABLE.model_dump())["potential"].axes[0]
+    marked = {line.get_label(): len(line.get_xdata()) for line in axes.lines}
+    codes = flag_codes(dataset["kind"])
+    assert marked == {kind: int(np.sum(dataset["kind"].data == codes[kind])) for kind in marked}
+    assert marked == {"minimum": 2, "saddle": 3, "maximum": 1}
+    assert {text.get_text() for text in axes.texts} == set("123456")
+
+
+def test_shares_of_the_bars_sum_up():
+    figure = draw("disturbed", BISTABLE, **SMALL | {"radius": 1.0})["outcomes"]
+    widths: dict[float, float] = {}
+    for bar in figure.axes[0].patches:
+        row = round(bar.get_y() + bar.get_height() / 2)
+        widths[row] = widths.get(row, 0.0) + bar.get_width()
+    assert widths == pytest.approx(dict.fromkeys(range(6), 100.0))
+
+
+def test_counts_have_their_legend_and_the_scene_its_star():
+    figure = draw("equilibrium_map", CONSTANT, axes={"F0": axis(-100.0, 100.0, 3), "c2": axis(0.0, 400.0, 5)})
+    counts = panel(figure["count"], "Number of equilibria")
+    assert [text.split()[0] for text in handles(counts)] == ["4", "6", "the"]
+    (star,) = [line for line in counts.lines if line.get_marker() == "*"]
+    assert (star.get_xdata()[0], star.get_ydata()[0]) == (100.0, 366.67)
+
+
+def test_no_star_for_a_scene_outside_the_map():
+    figure = draw("equilibrium_map", CONSTANT, axes={"F0": axis(-9.0, 9.0, 2), "c2": axis(0.0, 400.0, 2)})
+    assert not panel(figure["count"], "Number of equilibria").lines
+
+
+def test_unsettled_points_are_marked():
+    figure = draw("equilibrium_map", DEGENERATE, axes={"c1": axis(0.0, 9.0, 2), "c2": axis(1.0, 9.0, 3)})
+    axes = panel(figure["count"], "Number of equilibria")
+    assert "degenerate (3)" in handles(axes)
+    (crosses,) = [line for line in axes.lines if line.get_marker() == "x"]
+    assert list(crosses.get_xdata()) == [0.0] * 3
+
+
+def test_mirror_images_keep_their_order():
+    """Without a force both minima are equally deep but for rounding: a map shows one side of them."""
+    grid = {"c1": axis(100.0, 200.0, 11), "c2": axis(40.0, 60.0, 5)}
+    figure = draw("equilibrium_map", Scene(alpha=0.0, F0=0.0), axes=grid)["angles"]
+    first = panel(figure, "φ of the deepest").collections[0].get_array()
+    second = panel(figure, "φ of the second").collections[0].get_array()
+    assert (np.ma.compressed(first) <= np.ma.compressed(second)).all()
+
+
+def test_stable_dots_are_solid_and_unstable_hollow():
+    dataset = run("equilibrium_map", CONSTANT, axes={"c2": axis(0.0, 800.0, 5)})
+    axes = scan_kinds()["equilibrium_map"].draw(dataset, CONSTANT.model_dump())["branches"].axes[0]
+    dots = {line.get_label(): line for line in axes.lines}
+    assert dots["unstable"].get_markerfacecolor() == "none"
+    assert dots["stable"].get_markerfacecolor() != "none"
+    assert len(dots["stable"].get_xdata()) == int(dataset["count_stable"].data.sum())
