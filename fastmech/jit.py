@@ -28,8 +28,9 @@ CUBE = types.Array(types.float64, 3, "C")
 INTEGERS = types.Array(types.int64, 1, "C")
 STATUSES = types.Array(types.int8, 1, "C")
 
-#: ``rhs(t, Y, dY, params)``: derivatives of a block of lanes. ``Y`` and ``dY`` have shape (dim, lanes).
-RHS_SIGNATURE = types.void(types.float64, MATRIX, MATRIX, VECTOR)
+#: ``rhs(t, Y, dY, params)``: derivatives of a block of lanes. ``Y`` and ``dY`` have shape (dim, lanes),
+#: ``params`` (count, 1) where all lanes share them or (count, lanes) where each has its own.
+RHS_SIGNATURE = types.void(types.float64, MATRIX, MATRIX, MATRIX)
 RHS = types.FunctionType(RHS_SIGNATURE)
 
 #: ``observe(t, Y, params, record)``: looks at a block after every step; ``record`` is (rows, lanes).
@@ -62,5 +63,5 @@ def inlined(function: F) -> F:
 
     The same source therefore serves compiled lanes and NumPy arrays.
     """
-    jitable: F = register_jitable(**FLAGS)(function)
+    jitable: F = register_jitable(forceinline=True, **FLAGS)(function)
     return jitable

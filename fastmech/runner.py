@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fastmech.ensembles.run import Progress, thread_count
+from fastmech.ensembles.run import Progress
+from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError
 from fastmech.plots.style import save
 from fastmech.results import Dataset, Variable

@@ -13,7 +13,8 @@ from fastmech.bench.entrants import entrants, jitted_rhs
 from fastmech.bench.measure import Row, measure
 from fastmech.bench.picture import draw_bench
 from fastmech.bench.problem import PROBLEMS, reference
-from fastmech.ensembles.run import Progress, thread_count
+from fastmech.ensembles.run import Progress
+from fastmech.ensembles.threads import thread_count
 from fastmech.results import Dataset, Variable
 from fastmech.scene import Scene
 from fastmech.store.provenance import provenance

@@ -119,7 +119,7 @@ def disturb(
     starts = center + size.from_ball(radius * uniform_ball(np.random.default_rng(seed), n))
 
     departure = np.abs(starts - center)
-    states, record, status = run_ensemble(
+    run = run_ensemble(
         right_hand_side(scene),
         np.array(reduce(scene), dtype=np.float64),
         starts,
@@ -130,7 +130,7 @@ def disturb(
         threads=threads,
         progress=progress,
     )
-    final = states[-1]
+    final = run.states[-1]
     end_index, turns = _resting_place(scene, equilibria, final, return_radius)
     turned = (turns != 0).any(axis=1)
     stable = np.array([e.kind == "minimum" for e in equilibria])
@@ -138,7 +138,7 @@ def disturb(
     outcome[(end_index >= 0) & stable[end_index]] = Outcome.ELSEWHERE
     outcome[(end_index >= 0) & ~stable[end_index]] = Outcome.AT_UNSTABLE
     outcome[(end_index == index) & ~turned & stable[end_index]] = Outcome.RETURNED
-    outcome[status != Status.OK] = Outcome.NOT_FINITE
+    outcome[run.status != Status.OK] = Outcome.NOT_FINITE
     return DisturbedEnsemble(
         equilibria=equilibria,
         index=index,
@@ -148,8 +148,8 @@ def disturb(
         outcome=outcome,
         end_index=end_index,
         turns=turns,
-        time_to_return=np.where(outcome == Outcome.RETURNED, record[LAST_OUTSIDE], np.nan),
-        excursion=np.maximum(departure[:, :2], record[[EXCURSION_PHI, EXCURSION_THETA]].T),
+        time_to_return=np.where(outcome == Outcome.RETURNED, run.records[LAST_OUTSIDE], np.nan),
+        excursion=np.maximum(departure[:, :2], run.records[[EXCURSION_PHI, EXCURSION_THETA]].T),
     )
 
 

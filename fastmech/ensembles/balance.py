@@ -60,9 +60,9 @@ def energy_balance(
     with_works = np.concatenate([start, np.zeros((1, 2))], axis=1)
     params = np.array(reduce(scene), dtype=np.float64)
     dt = checks.number("dt", dt, "s", above=0.0)
-    states, _, _ = run_ensemble(lagrange_work, params, with_works, times, dt, find_method(method), threads=1)
-    y = states[:, 0, :4]
-    works = unit(scene) * states[:, 0, 4:]
+    run = run_ensemble(lagrange_work, params, with_works, times, dt, find_method(method), threads=1)
+    y = run.states[:, 0, :4]
+    works = unit(scene) * run.states[:, 0, 4:]
     kinetic, potential = kinetic_energy(scene, y), potential_energy(scene, y[:, :2])
     at_start = float(kinetic_energy(scene, start[0]) + potential_energy(scene, start[0, :2]))
     energy = kinetic + potential

@@ -88,9 +88,10 @@ def integrate(
         starts = np.concatenate([starts[:, :2], momenta(scene, starts) / unit(scene)], axis=1)
     params = np.array(reduce(scene), dtype=np.float64)
     rhs = right_hand_side(scene, formulation)
-    y, _, status = run_ensemble(rhs, params, starts, times, dt, tableau, threads=threads, progress=progress)
+    ensemble = run_ensemble(rhs, params, starts, times, dt, tableau, threads=threads, progress=progress)
+    y = ensemble.states
     if canonical:
         y[..., 2:] = rates(scene, y[..., :2], y[..., 2:] * unit(scene))
     steps = output_steps(times, dt)
     longest = float(np.max(np.diff(times) / np.maximum(steps, 1)))
-    return Trajectories(outputs, y, status, int(steps.sum()), longest, method, formulation)
+    return Trajectories(outputs, y, ensemble.status, int(steps.sum()), longest, method, formulation)

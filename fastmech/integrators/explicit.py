@@ -96,7 +96,7 @@ def observe_nothing(t: float, Y: Floats, params: Floats, record: Floats) -> None
         VECTOR,
         INTEGERS,
         MATRIX,
-        VECTOR,
+        MATRIX,
         VECTOR,
         MATRIX,
         CUBE,
@@ -121,7 +121,7 @@ def integrate_block(
 
     ``times`` holds the start and then every output time, ``steps[j]`` the number of steps from ``times[j]``
     to ``times[j + 1]``. ``Y`` (dim, lanes) is the start and is advanced in place; ``out`` (outputs, dim,
-    lanes) receives the states; ``record`` is what ``observe`` keeps, called after every step. A step's time
+    lanes) receives the states; ``params`` (count, lanes) are the lanes' parameters; ``record`` is what ``observe`` keeps, called after every step. A step's time
     is computed from its index, so rounding does not accumulate.
     """
     stages = nodes.shape[0]

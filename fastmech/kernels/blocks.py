@@ -1,8 +1,9 @@
 """The lane loop of the equations of motion: branch-free, over contiguous rows of a small block.
 
 ``lagrange_block`` and ``canonical_block`` are what every block right-hand side of the mechanism calls with
-the terms it has. Lanes whose angles exceed the range of the fast trigonometry are done again, one by one,
-with the library's functions: a lane's result never depends on its neighbours.
+the terms it has. Every lane has its own parameters, rows of ``mechanism.coefficients.Coefficients``: loading
+them costs nothing beside the arithmetic. Lanes whose angles exceed the range of the fast trigonometry are
+done again, one by one, with the library's functions: a lane's result never depends on its neighbours.
 """
 
 from __future__ import annotations
@@ -18,59 +19,106 @@ from fastmech.mechanism.equations import canonical_rates, lagrange_accelerations
 
 Block = NDArray[np.float64]
 
+#: Rows of the parameters that belong to terms which a scene may lack.
+FORCE, DAMPING, DECAY = 5, 6, 7
+
 
 @inlined
-def lagrange_block(Y: Block, dY: Block, p: Block, force: float | None, damping: float | None) -> None:
-    """Derivatives of lanes ``Y`` = (phi, theta, phi', theta') into ``dY``; both (4, lanes).
+def is_beyond(Y: Block, i: int) -> bool:
+    """Whether a lane's angles exceed the range of the fast trigonometry; false for NaN."""
+    return (abs(Y[0, i]) > REDUCTION_LIMIT) | (abs(Y[1, i]) > REDUCTION_LIMIT)
 
-    ``p`` are the reduced coefficients, ``force`` the reduced force now; ``None`` leaves a term out.
+
+@inlined
+def lane_damping(p: Block, i: int, damping: int | None) -> float | None:
+    """A lane's damping, ``None`` in a kernel without damper."""
+    if damping is None:
+        return None
+    return float(p[damping, i])
+
+
+@inlined
+def lane_force(p: Block, i: int, force: int | None, decay: int | None, decayed: Block) -> float | None:
+    """A lane's reduced force now, ``None`` in a kernel without force; ``decayed`` holds exp(-alpha t)."""
+    if force is None:
+        return None
+    if decay is None:
+        return float(p[force, i])
+    return float(p[force, i] * decayed[0, i])
+
+
+@inlined
+def write_decay(t: float, p: Block, decay: int | None, decayed: Block) -> None:
+    """Write exp(-alpha t) of every lane into the first row of ``decayed``: one call where all agree."""
+    if decay is not None:
+        differs = 0
+        for i in range(p.shape[1]):
+            differs |= p[decay, i] != p[decay, 0]
+        if differs:
+            for i in range(p.shape[1]):
+                decayed[0, i] = math.exp(-p[decay, i] * t)
+        else:
+            decayed[0] = math.exp(-p[decay, 0] * t)
+
+
+@inlined
+def lagrange_block(
+    t: float, Y: Block, dY: Block, p: Block, force: int | None, damping: int | None, decay: int | None
+) -> None:
+    """Derivatives of lanes ``Y`` = (phi, theta, phi', theta') into ``dY``; both (4, lanes), ``p`` (8, lanes).
+
+    ``force``, ``damping`` and ``decay`` are the rows of these parameters; ``None`` leaves the term out of the
+    compiled code. The first row of ``dY`` serves as scratch for the force's decay.
     """
-    mass, slider, lift, spring, gravity = p[0], p[1], p[2], p[3], p[4]
+    write_decay(t, p, decay, dY)
     beyond = 0
     for i in range(Y.shape[1]):
-        phi, theta, phi_dot, theta_dot = Y[0, i], Y[1, i], Y[2, i], Y[3, i]
-        s1, c1 = sincos(phi)
-        s2, c2 = sincos(theta)
+        s1, c1 = sincos(Y[0, i])
+        s2, c2 = sincos(Y[1, i])
+        phi_dot, theta_dot = Y[2, i], Y[3, i]
+        push, damp = lane_force(p, i, force, decay, dY), lane_damping(p, i, damping)
+        beyond |= is_beyond(Y, i)
         dY[0, i] = phi_dot
         dY[1, i] = theta_dot
         dY[2, i], dY[3, i] = lagrange_accelerations(
-            s1, c1, s2, c2, phi_dot, theta_dot, mass, slider, lift, spring, gravity, force, damping
+            s1, c1, s2, c2, phi_dot, theta_dot, p[0, i], p[1, i], p[2, i], p[3, i], p[4, i], push, damp
         )
-        beyond |= (abs(phi) > REDUCTION_LIMIT) | (abs(theta) > REDUCTION_LIMIT)
     if beyond:
         for i in range(Y.shape[1]):
-            phi, theta = Y[0, i], Y[1, i]
-            if abs(phi) > REDUCTION_LIMIT or abs(theta) > REDUCTION_LIMIT:
-                s1, c1, s2, c2 = math.sin(phi), math.cos(phi), math.sin(theta), math.cos(theta)
+            if is_beyond(Y, i):
+                s1, c1, s2, c2 = math.sin(Y[0, i]), math.cos(Y[0, i]), math.sin(Y[1, i]), math.cos(Y[1, i])
+                write_decay(t, p[:, i : i + 1], decay, dY[:, i : i + 1])
+                push, damp = lane_force(p, i, force, decay, dY), lane_damping(p, i, damping)
+                dY[0, i] = Y[2, i]
                 dY[2, i], dY[3, i] = lagrange_accelerations(
-                    s1, c1, s2, c2, Y[2, i], Y[3, i], mass, slider, lift, spring, gravity, force, damping
+                    s1, c1, s2, c2, Y[2, i], Y[3, i], p[0, i], p[1, i], p[2, i], p[3, i], p[4, i], push, damp
                 )
 
 
 @inlined
-def canonical_block(Y: Block, dY: Block, p: Block, force: float | None, damping: float | None) -> None:
-    """Derivatives of lanes ``Y`` = (phi, theta, p_phi, p_theta), momenta over m2 l^2, into ``dY``."""
-    mass, slider, lift, spring, gravity = p[0], p[1], p[2], p[3], p[4]
+def canonical_block(
+    t: float, Y: Block, dY: Block, p: Block, force: int | None, damping: int | None, decay: int | None
+) -> None:
+    """Derivatives of lanes ``Y`` = (phi, theta, p_phi, p_theta), momenta over m2 l^2, into ``dY``.
+
+    Arguments as those of ``lagrange_block``.
+    """
+    write_decay(t, p, decay, dY)
     beyond = 0
     for i in range(Y.shape[1]):
-        phi, theta = Y[0, i], Y[1, i]
-        s1, c1 = sincos(phi)
-        s2, c2 = sincos(theta)
+        s1, c1 = sincos(Y[0, i])
+        s2, c2 = sincos(Y[1, i])
+        push, damp = lane_force(p, i, force, decay, dY), lane_damping(p, i, damping)
+        beyond |= is_beyond(Y, i)
         dY[0, i], dY[1, i], dY[2, i], dY[3, i] = canonical_rates(
-            s1, c1, s2, c2, Y[2, i], Y[3, i], mass, slider, lift, spring, gravity, force, damping
+            s1, c1, s2, c2, Y[2, i], Y[3, i], p[0, i], p[1, i], p[2, i], p[3, i], p[4, i], push, damp
         )
-        beyond |= (abs(phi) > REDUCTION_LIMIT) | (abs(theta) > REDUCTION_LIMIT)
     if beyond:
         for i in range(Y.shape[1]):
-            phi, theta = Y[0, i], Y[1, i]
-            if abs(phi) > REDUCTION_LIMIT or abs(theta) > REDUCTION_LIMIT:
-                s1, c1, s2, c2 = math.sin(phi), math.cos(phi), math.sin(theta), math.cos(theta)
+            if is_beyond(Y, i):
+                s1, c1, s2, c2 = math.sin(Y[0, i]), math.cos(Y[0, i]), math.sin(Y[1, i]), math.cos(Y[1, i])
+                write_decay(t, p[:, i : i + 1], decay, dY[:, i : i + 1])
+                push, damp = lane_force(p, i, force, decay, dY), lane_damping(p, i, damping)
                 dY[0, i], dY[1, i], dY[2, i], dY[3, i] = canonical_rates(
-                    s1, c1, s2, c2, Y[2, i], Y[3, i], mass, slider, lift, spring, gravity, force, damping
+                    s1, c1, s2, c2, Y[2, i], Y[3, i], p[0, i], p[1, i], p[2, i], p[3, i], p[4, i], push, damp
                 )
-
-
-@inlined
-def decayed(p: Block, t: float) -> float:
-    """Reduced force at time ``t``: once for a whole block."""
-    return float(p[5] * math.exp(-p[7] * t))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fastmech.jit import RHS_SIGNATURE, kernel
-from fastmech.kernels.blocks import Block, decayed, lagrange_block
+from fastmech.kernels.blocks import DAMPING, DECAY, FORCE, Block, lagrange_block, write_decay
 from fastmech.kernels.sincos import sincos
 from fastmech.mechanism.reduced import slider_ratio
 
@@ -11,11 +11,12 @@ from fastmech.mechanism.reduced import slider_ratio
 @kernel(RHS_SIGNATURE)
 def lagrange_work(t: float, Y: Block, dY: Block, p: Block) -> None:
     """State (phi, theta, phi', theta', W_damper, W_force), works over m2 l^2; damper and decaying force."""
-    force = decayed(p, t)
-    lagrange_block(Y, dY, p, force, p[6])
+    lagrange_block(t, Y, dY, p, FORCE, DAMPING, DECAY)
+    write_decay(t, p, DECAY, dY[4:])
     for i in range(Y.shape[1]):
         s1, c1 = sincos(Y[0, i])
         _, c2 = sincos(Y[1, i])
         k, _ = slider_ratio(s1, c1)
-        dY[4, i] = -p[6] * (k * Y[2, i]) * (k * Y[2, i])
+        force = p[FORCE, i] * dY[4, i]
+        dY[4, i] = -p[DAMPING, i] * (k * Y[2, i]) * (k * Y[2, i])
         dY[5, i] = -force * (s1 * Y[2, i] + c2 * Y[3, i])

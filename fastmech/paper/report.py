@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fastmech.ensembles.run import thread_count
+from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError
 from fastmech.paper.checks import Check, all_checks, parameters_used
 from fastmech.paper.compare import Row

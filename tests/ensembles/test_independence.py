@@ -9,7 +9,8 @@ import pytest
 from ensembles.starts import Floats, random_starts
 
 from fastmech.ensembles.integrate import integrate
-from fastmech.ensembles.run import run_ensemble, thread_count
+from fastmech.ensembles.run import run_ensemble
+from fastmech.ensembles.threads import thread_count
 from fastmech.integrators.tableaus import METHODS
 from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import reduce
@@ -24,9 +25,7 @@ FORMULATIONS = pytest.mark.parametrize("formulation", ["lagrange", "hamilton"])
 def states(block_lanes: int, threads: int, method: str = "rk4", starts: Floats = STARTS) -> Floats:
     params, times = np.array(reduce(SCENE)), np.array([0.0, 0.3, 0.5])
     rhs, tableau = right_hand_side(SCENE), METHODS[method]
-    return run_ensemble(rhs, params, starts, times, 0.05, tableau, threads=threads, block_lanes=block_lanes)[
-        0
-    ]
+    return run_ensemble(rhs, params, starts, times, 0.05, tableau, threads=threads, block_lanes=block_lanes).states
 
 
 @pytest.mark.parametrize("method", ["rk4", "dop853"])

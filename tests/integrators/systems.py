@@ -31,8 +31,8 @@ def forced_linear(t: float, Y: Floats, dY: Floats, p: Floats) -> None:
     v0, v1 = 2.0 * math.cos(2.0 * t), -0.5 * u1
     for i in range(Y.shape[1]):
         x0, x1 = Y[0, i] - u0, Y[1, i] - u1
-        dY[0, i] = p[0] * x0 + p[1] * x1 + v0
-        dY[1, i] = -p[1] * x0 + p[2] * x1 + v1
+        dY[0, i] = p[0, i] * x0 + p[1, i] * x1 + v0
+        dY[1, i] = -p[1, i] * x0 + p[2, i] * x1 + v1
 
 
 @dataclass(frozen=True)
@@ -55,11 +55,9 @@ class Linear:
         return np.array([np.sin(2 * t), np.exp(-t / 2)])
 
     def run(self, times: Floats, dt: float, method: str, **options: Any) -> Floats:
-        states, _, status = run_ensemble(
-            forced_linear, self.params, self.starts, times, dt, METHODS[method], **options
-        )
-        assert not status.any()
-        return states
+        run = run_ensemble(forced_linear, self.params, self.starts, times, dt, METHODS[method], **options)
+        assert not run.status.any()
+        return run.states
 
 
 LINEAR = Linear(np.array([-0.3, 5.0, -0.5]), 0.5, np.random.default_rng(3).uniform(-2, 2, (11, 2)))

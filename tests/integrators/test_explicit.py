@@ -20,20 +20,19 @@ EVERY_METHOD = pytest.mark.parametrize("method", METHODS)
 @kernel(RHS_SIGNATURE)
 def polynomial(t: float, Y: Floats, dY: Floats, p: Floats) -> None:
     """y' = p0 + p1 t + p2 t^2 + ...: a method of order k is exact up to t^(k-1)."""
-    rate = 0.0
-    for power in range(p.size):
-        rate += p[power] * t**power
     for i in range(Y.shape[1]):
-        dY[0, i] = rate
+        dY[0, i] = 0.0
+        for power in range(p.shape[0]):
+            dY[0, i] += p[power, i] * t**power
 
 
 @kernel(RHS_SIGNATURE)
 def rotation(t: float, Y: Floats, dY: Floats, p: Floats) -> None:
     """A linear system of three states, y' = p x y."""
     for i in range(Y.shape[1]):
-        dY[0, i] = p[1] * Y[2, i] - p[2] * Y[1, i]
-        dY[1, i] = p[2] * Y[0, i] - p[0] * Y[2, i]
-        dY[2, i] = p[0] * Y[1, i] - p[1] * Y[0, i]
+        dY[0, i] = p[1, i] * Y[2, i] - p[2, i] * Y[1, i]
+        dY[1, i] = p[2, i] * Y[0, i] - p[0, i] * Y[2, i]
+        dY[2, i] = p[0, i] * Y[1, i] - p[1, i] * Y[0, i]
 
 
 @kernel(OBSERVER_SIGNATURE)
@@ -70,7 +69,7 @@ def drive(
         times,
         np.array(steps, dtype=np.int64),
         Y,
-        params,
+        np.repeat(params[:, None], Y.shape[1], axis=1),
         np.array([2.0]),
         record,
         out,

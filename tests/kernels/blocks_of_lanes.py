@@ -39,7 +39,8 @@ def evaluate(rhs: Any, scene: Scene, Y: Floats, t: float = 0.0) -> Floats:
     """Derivatives of the lanes of ``Y`` (dim, lanes); it starts as NaN: nothing stays unwritten."""
     dY = np.full(Y.shape, np.nan)
     with np.errstate(all="ignore"):  # plain Python warns where compiled code is silent
-        rhs(t, np.ascontiguousarray(Y), dY, np.array(reduce(scene), dtype=np.float64))
+        params = np.repeat(np.array(reduce(scene))[:, None], Y.shape[1], axis=1)
+        rhs(t, np.ascontiguousarray(Y), dY, params)
     return dY
 
 

@@ -11,13 +11,17 @@ from typing import Any
 
 import llvmlite.binding as llvm
 import numba
+import numpy as np
 import pytest
-from kernels.blocks_of_lanes import COMBINATIONS, MODULES, kernel
+from kernels.blocks_of_lanes import COMBINATIONS, MODULES, kernel, lanes
 from numba import float64, int64
 
 from fastmech.integrators.explicit import add_stages, start_stage
 from fastmech.jit import FLAGS, INTEGERS, MATRIX, VECTOR
+from fastmech.kernels.blocks import DAMPING, DECAY, FORCE
 from fastmech.kernels.work import lagrange_work
+from fastmech.mechanism.coefficients import reduce
+from fastmech.scene import Scene
 
 pytestmark = pytest.mark.skipif(
     not llvm.get_host_cpu_features().get("fma", False),
@@ -32,7 +36,6 @@ VECTOR_ARITHMETIC = re.compile(r"= f(?:add|sub|mul|div) .*<[48] x double>")
 PACKED_FLOOR = re.compile(r"= .*call .*@llvm\.floor\.v[48]f64")
 PACKED_ROOT = re.compile(r"= .*call .*@llvm\.sqrt\.v[48]f64")
 LIBRARY = re.compile(r"@(?:llvm\.)?(?:sin|cos|sincos|tan|exp|pow)\b")
-COEFFICIENT = re.compile(r"%arg\.p\.4, i64 (\d+)")
 
 
 @cache
@@ -91,12 +94,16 @@ def test_stage_sums_are_packed(stage_sum: Any) -> None:
 
 @pytest.mark.parametrize(("formulation", "terms"), COMBINATIONS)
 def test_kernel_reads_the_coefficients_of_its_terms_only(formulation: str, terms: str) -> None:
-    """``p[5]`` is the force, ``p[6]`` the damper, ``p[7]`` the decay; eight bytes each."""
-    offsets = {int(offset) // 8 for offset in COEFFICIENT.findall(intermediate(kernel(formulation, terms)))}
+    """A coefficient that is NaN poisons the kernel that reads it, and no other."""
+    Y = lanes(9)
     forced = "constant" in terms or "decaying" in terms
-    assert (5 in offsets) == forced
-    assert (6 in offsets) == ("damped" in terms)
-    assert (7 in offsets) == ("decaying" in terms)
+    reads = {FORCE: forced, DAMPING: "damped" in terms, DECAY: "decaying" in terms}
+    for row, expected in reads.items():
+        params = np.repeat(np.array(reduce(Scene()))[:, None], Y.shape[1], axis=1)
+        params[row] = np.nan
+        dY = np.empty_like(Y)
+        kernel(formulation, terms)(0.0, Y, dY, params)
+        assert np.isnan(dY).any() == expected
 
 
 @pytest.mark.parametrize(("formulation", "terms"), COMBINATIONS)
@@ -114,5 +121,6 @@ def test_every_term_costs_arithmetic_and_its_absence_none(formulation: str) -> N
         cost[terms] = len(VECTOR_ARITHMETIC.findall(loop)) / len(PACKED_ROOT.findall(loop))
     assert cost["free"] < cost["damped"] < cost["damped_constant"]
     assert cost["free"] < cost["constant"] < cost["damped_constant"]
-    assert cost["decaying"] == cost["constant"]
-    assert cost["damped_decaying"] == cost["damped_constant"]
+    # The decay is one factor for each lane; its exponential is outside the loop.
+    assert cost["constant"] < cost["decaying"] <= cost["constant"] + 2
+    assert cost["damped_constant"] < cost["damped_decaying"] <= cost["damped_constant"] + 2
