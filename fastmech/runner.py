@@ -57,9 +57,6 @@ def run_request(
     """
     context = context or RunContext()
     request = read_request(path, scan_kinds())
-    for name in request.scans:
-        if name in type(request.scene).model_fields:
-            raise InputError(f"scan.{name}: is the name of a parameter of the scene; choose another")
     target = Path(out) if out is not None else default_output(path)
     check_writable(target, replace=fresh)
     started = time.perf_counter()

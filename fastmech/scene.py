@@ -16,7 +16,7 @@ from fastmech.errors import InputError
 
 def _python_number(value: Any) -> Any:
     """NumPy scalars as the Python numbers that strict validation accepts; all else unchanged."""
-    return value.item() if isinstance(value, np.number) else value
+    return value.item() if isinstance(value, np.generic) else value
 
 
 Number = Annotated[float, BeforeValidator(_python_number)]

@@ -52,7 +52,7 @@ sys.path.insert(0, sys.argv[1])
 import users_module
 Y = np.array([[0.7], [0.3], [1.0], [2.0]])
 dY = np.zeros((4, 1))
-rhs(0.0, Y, dY, np.array([0.8, 0.6, -9.0, 13.0, 8.0, 0.0, 0.0, 0.0]))
+rhs(0.0, Y, dY, np.array([[0.8], [0.6], [-9.0], [13.0], [8.0], [0.0], [0.0], [0.0]]))
 print(json.dumps({
     "package": fastmech.__file__, "answer": dY[:, 0].tolist(), "directory": str(cache_directory()),
     "path": rhs.stats.cache_path, "hits": sum(rhs.stats.cache_hits.values()),

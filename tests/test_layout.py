@@ -25,6 +25,7 @@ LAYERS = (
     "ensembles",
     "stability",
     "equilibria",
+    "atlas",
     "disturbance",
     "results",
     "store",

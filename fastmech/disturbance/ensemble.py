@@ -42,7 +42,7 @@ class Outcome(IntEnum):
 _ADVICE = {
     Outcome.RETURNED: "at rest within the ball of return, no turns made",
     Outcome.ELSEWHERE: "at rest at another stable equilibrium, or at this one some turns further",
-    Outcome.AT_UNSTABLE: "still within the ball of an unstable equilibrium: it will leave; use a larger t_end",
+    Outcome.AT_UNSTABLE: "still in the ball of an unstable equilibrium: it will leave; use a larger t_end",
     Outcome.UNDECIDED: "still moving at t_end; use a larger t_end",
     Outcome.NOT_FINITE: "NaN or infinity: the step is too large; use a smaller dt",
 }
@@ -60,7 +60,7 @@ class DisturbedEnsemble:
     outcome: NDArray[np.int8]  #: :class:`Outcome`, shape (n,)
     end_index: NDArray[np.int8]  #: equilibrium in whose ball it ended, -1: none; shape (n,)
     turns: NDArray[np.int64]  #: full turns of phi and theta on the way there, 0 where none; shape (n, 2)
-    time_to_return: Floats  #: s, from which on it stayed in the ball of return; NaN unless returned; (n,)
+    time_to_return: Floats  #: s, last step outside the ball of return; NaN unless returned; (n,)
     excursion: Floats  #: largest departures of phi and theta from the equilibrium [rad], shape (n, 2)
 
     @property
@@ -105,14 +105,13 @@ def disturb(
     Raises:
         InputError: an argument is wrong, or the scene's force decays.
     """
-    require_constant_force(scene)
+    equilibria = equilibria_to_disturb(scene)
     n = checks.whole_number("n", n, least=1)
     seed = checks.whole_number("seed", seed, least=0)
     radius = checks.number("radius", radius, "rad", above=0.0)
     return_radius = checks.number("return_radius", return_radius, "rad", above=0.0)
     times = np.array([0.0, checks.number("t_end", t_end, "s", above=0.0)])
     dt = checks.number("dt", dt, "s", above=0.0)
-    equilibria = find_equilibria(scene)
     index = _index_of(equilibrium, equilibria)
     center = np.array([equilibrium.phi, equilibrium.theta, 0.0, 0.0])
     size = size_at(scene, equilibrium.phi, equilibrium.theta)
@@ -166,6 +165,19 @@ def require_constant_force(scene: Scene) -> None:
         )
 
 
+def equilibria_to_disturb(scene: Scene) -> Equilibria:
+    """The equilibria of a scene in which disturbed motion makes sense.
+
+    Raises:
+        InputError: the force decays, or no equilibrium is isolated.
+    """
+    require_constant_force(scene)
+    equilibria = find_equilibria(scene)
+    if not equilibria:
+        raise InputError(f"scene: has no equilibrium to disturb: {equilibria.certificate.sentence}")
+    return equilibria
+
+
 def uniform_ball(rng: np.random.Generator, n: int) -> Floats:
     """Points uniform in the unit ball of four dimensions, shape (n, 4)."""
     directions = unit_directions(rng, n)
@@ -185,7 +197,8 @@ def _index_of(equilibrium: Equilibrium, equilibria: Equilibria) -> int:
     ]
     if not away or min(away) > 1e-9:
         raise InputError(
-            f"equilibrium = ({equilibrium.phi:g}, {equilibrium.theta:g}) rad: is none of this scene's equilibria"
+            f"equilibrium = ({equilibrium.phi:g}, {equilibrium.theta:g}) rad: "
+            "must be one of this scene's equilibria"
         )
     return int(np.argmin(away))
 

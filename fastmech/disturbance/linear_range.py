@@ -17,7 +17,7 @@ from fastmech.scene import Scene
 Floats = NDArray[np.float64]
 
 SMALLEST, LARGEST, GRID = 1e-6, np.pi, 40
-BISECTIONS = 10
+BISECTIONS = 12
 OUTPUTS = 50
 
 

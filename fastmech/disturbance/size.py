@@ -23,7 +23,8 @@ class Size:
     equilibrium, the departures ``xi`` [rad] and ``eta`` [rad/s], and ``omega`` [rad/s] the square root of
     the largest generalized eigenvalue, in magnitude, of the Hessian and the metric: the highest natural
     frequency at a minimum. A departure of theta alone has its own angle as its size;
-    ``size^2 omega^2 m2 l^2 / 2`` is the kinetic energy of the disturbance once its angles have turned to rates.
+    ``size^2 omega^2 m2 l^2 / 2`` is the kinetic energy of the disturbance once its angles have turned to
+    rates.
     """
 
     metric: Floats  #: a / (m2 l^2), shape (2, 2)
@@ -37,7 +38,8 @@ class Size:
 
     def __call__(self, disturbance: Floats) -> Floats:
         """Sizes [rad] of disturbances (..., 4)."""
-        return np.asarray(np.linalg.norm(disturbance @ self.to_ball, axis=-1))
+        with np.errstate(invalid="ignore", over="ignore"):  # what is not finite has no finite size
+            return np.asarray(np.linalg.norm(disturbance @ self.to_ball, axis=-1))
 
     def from_ball(self, points: Floats) -> Floats:
         """Disturbances (..., 4) whose sizes are the lengths of ``points`` (..., 4)."""

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import run_ensemble
+from fastmech.errors import InputError
 from fastmech.integrators.tableaus import find_method
 from fastmech.kernels.work import lagrange_work
 from fastmech.mechanism.coefficients import reduce
@@ -54,7 +55,9 @@ def energy_balance(
     Raises:
         InputError: an argument is wrong.
     """
-    start = checks.states("y0", y0, 4)[:1]
+    start = checks.states("y0", y0, 4)
+    if len(start) != 1:
+        raise InputError(f"y0: holds {len(start)} states, must be one")
     outputs = checks.rising_times("t_eval", t_eval)
     times = np.concatenate([[0.0], outputs])
     with_works = np.concatenate([start, np.zeros((1, 2))], axis=1)

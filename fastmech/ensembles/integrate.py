@@ -71,12 +71,12 @@ def integrate(
         raise InputError(
             f"formulation = {formulation!r}: unknown; {nearest(formulation, list(FORMULATIONS))}"
         )
-    if threads is not None:
-        threads = checks.whole_number("threads", threads, least=1)
+    if t_end is not None:
+        t_end = checks.number("t_end", t_end, "s", above=0.0)
     if t_eval is None:
         if t_end is None:
             raise InputError("t_end: missing; give the end of the run in s, or output times t_eval")
-        outputs = np.array([checks.number("t_end", t_end, "s", above=0.0)])
+        outputs = np.array([t_end])
     else:
         outputs = checks.rising_times("t_eval", t_eval)
         if t_end is not None and outputs[-1] > t_end:
@@ -85,13 +85,15 @@ def integrate(
     times = np.concatenate([[0.0], outputs])
     canonical = formulation == "hamilton"
     if canonical:
-        starts = np.concatenate([starts[:, :2], momenta(scene, starts) / unit(scene)], axis=1)
+        with np.errstate(invalid="ignore", over="ignore"):  # starts that are not finite have a status
+            starts = np.concatenate([starts[:, :2], momenta(scene, starts) / unit(scene)], axis=1)
     params = np.array(reduce(scene), dtype=np.float64)
     rhs = right_hand_side(scene, formulation)
     ensemble = run_ensemble(rhs, params, starts, times, dt, tableau, threads=threads, progress=progress)
     y = ensemble.states
     if canonical:
-        y[..., 2:] = rates(scene, y[..., :2], y[..., 2:] * unit(scene))
+        with np.errstate(invalid="ignore", over="ignore"):
+            y[..., 2:] = rates(scene, y[..., :2], y[..., 2:] * unit(scene))
     steps = output_steps(times, dt)
     longest = float(np.max(np.diff(times) / np.maximum(steps, 1)))
     return Trajectories(outputs, y, ensemble.status, int(steps.sum()), longest, method, formulation)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -171,8 +172,8 @@ def _run_with_stops(
 
 
 def segments(times: Floats, dt: float) -> Iterator[list[Floats]]:
-    """For every output interval the pairs of times that divide it into at most ``SEGMENT_STEPS`` steps each."""
+    """For every output interval the pairs of times that cut it into at most ``SEGMENT_STEPS`` steps each."""
     for start, stop, steps in zip(times[:-1], times[1:], output_steps(times, dt), strict=True):
         cuts = np.append(np.arange(0, steps, SEGMENT_STEPS), steps)
         at = start + (stop - start) * cuts / max(steps, 1)
-        yield [np.ascontiguousarray(pair) for pair in zip(at[:-1], at[1:], strict=True)]
+        yield [np.ascontiguousarray(pair) for pair in pairwise(at)]

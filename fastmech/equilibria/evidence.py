@@ -51,16 +51,19 @@ class Evidence:
 def gather(coefficients: Coefficients, phi: Floats, theta: Floats) -> Evidence:
     """Search beside the proof; ``phi``, ``theta`` [rad] are the listed equilibria."""
     c = coefficients
-    found = grid_search(c.lift, c.spring, c.gravity, c.force)
+    p = pulls(c.mass, c.lift, c.spring, c.gravity, c.force)
+    over_largest = np.array([p.lift, p.spring, p.gravity, p.force])
+    if not np.isfinite(over_largest).all():
+        return Evidence(reached=0, unlisted=0, polynomial=UnitRoots(np.zeros(0), 0, 0))
+    found = grid_search(*over_largest)
     apart = np.hypot(
         2.0 * np.sin(0.5 * (found[:, :1] - phi[None, :])), 2.0 * np.sin(0.5 * (found[:, 1:] - theta[None, :]))
     )
     near = apart < NEAR
-    p = pulls(c.mass, c.lift, c.spring, c.gravity, c.force)
     # Beside a fold Newton's method may stop in a dip that is no root: only proved roots count.
     proved = [math.isfinite(existence_radius(p, *root)[0]) for root in found[~near.any(axis=1)]]
     return Evidence(
         reached=int(near.any(axis=0).sum()),
         unlisted=sum(proved),
-        polynomial=unit_roots(c.lift, c.spring, c.gravity, c.force, phi),
+        polynomial=unit_roots(*over_largest, phi),
     )

@@ -57,9 +57,9 @@ def unit_roots(
     roots = polynomial.roots() if polynomial.degree() > 0 else np.zeros(0)
     angles = np.angle(roots[np.abs(np.abs(roots) - 1.0) < NEAR])
     apart = np.abs(np.exp(1j * angles)[:, None] - np.exp(1j * phi)[None, :])
-    spurious = np.abs(spring**2 - gravity**2 - force**2) <= NEAR * spring**2
-    trap = np.angle(force - 1j * gravity) if spurious and spring > 0 else np.nan
-    explained = (apart < 10 * NEAR).any(axis=1) | (
-        np.abs(np.exp(1j * angles) - np.exp(1j * trap)) < 10 * NEAR
-    )
-    return UnitRoots(angles, int((~explained).sum()), int((~(apart < 10 * NEAR).any(axis=0)).sum()))
+    matched = apart < 10 * NEAR
+    explained = matched.any(axis=1)
+    if spring > 0 and abs(spring**2 - gravity**2 - force**2) <= NEAR * spring**2:
+        trap = (force - 1j * gravity) / spring
+        explained |= np.abs(np.exp(1j * angles) - trap) < 10 * NEAR
+    return UnitRoots(angles, int((~explained).sum()), int((~matched.any(axis=0)).sum()))

@@ -81,9 +81,7 @@ def sort_by_energy(
 
 
 @kernel(
-    types.void(
-        MATRIX, boolean, MATRIX, MATRIX, MATRIX, MATRIX, INDICES, STATUSES, STATUSES, STATUSES, VECTOR
-    )
+    types.void(MATRIX, boolean, MATRIX, MATRIX, MATRIX, MATRIX, INDICES, STATUSES, STATUSES, STATUSES, VECTOR)
 )
 def solve(
     coefficients: FloatArray,

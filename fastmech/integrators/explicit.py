@@ -121,8 +121,9 @@ def integrate_block(
 
     ``times`` holds the start and then every output time, ``steps[j]`` the number of steps from ``times[j]``
     to ``times[j + 1]``. ``Y`` (dim, lanes) is the start and is advanced in place; ``out`` (outputs, dim,
-    lanes) receives the states; ``params`` (count, lanes) are the lanes' parameters; ``record`` is what ``observe`` keeps, called after every step. A step's time
-    is computed from its index, so rounding does not accumulate.
+    lanes) receives the states; ``params`` (count, lanes) are the lanes' parameters; ``record`` is what
+    ``observe`` keeps, called after every step. A step's time is computed from its index, so rounding does
+    not accumulate.
     """
     stages = nodes.shape[0]
     dim, lanes = Y.shape

@@ -208,8 +208,8 @@ DOP853 = Tableau(
         0.8571428571428571,
         1.0,
     ],
-    source="Dormand, Prince; coefficients of DOP853 in Hairer, Norsett, Wanner, Solving ODEs I, section II.5: "
-    "the twelve-stage formula of order 8",
+    source="Dormand, Prince; coefficients of DOP853 in Hairer, Norsett, Wanner, Solving ODEs I, "
+    "section II.5: the twelve-stage formula of order 8",
 )
 
 #: Every method by its name.

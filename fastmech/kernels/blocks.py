@@ -86,7 +86,7 @@ def lagrange_block(
     if beyond:
         for i in range(Y.shape[1]):
             if is_beyond(Y, i):
-                s1, c1, s2, c2 = math.sin(Y[0, i]), math.cos(Y[0, i]), math.sin(Y[1, i]), math.cos(Y[1, i])
+                s1, c1, s2, c2 = np.sin(Y[0, i]), np.cos(Y[0, i]), np.sin(Y[1, i]), np.cos(Y[1, i])
                 write_decay(t, p[:, i : i + 1], decay, dY[:, i : i + 1])
                 push, damp = lane_force(p, i, force, decay, dY), lane_damping(p, i, damping)
                 dY[0, i] = Y[2, i]
@@ -116,7 +116,7 @@ def canonical_block(
     if beyond:
         for i in range(Y.shape[1]):
             if is_beyond(Y, i):
-                s1, c1, s2, c2 = math.sin(Y[0, i]), math.cos(Y[0, i]), math.sin(Y[1, i]), math.cos(Y[1, i])
+                s1, c1, s2, c2 = np.sin(Y[0, i]), np.cos(Y[0, i]), np.sin(Y[1, i]), np.cos(Y[1, i])
                 write_decay(t, p[:, i : i + 1], decay, dY[:, i : i + 1])
                 push, damp = lane_force(p, i, force, decay, dY), lane_damping(p, i, damping)
                 dY[0, i], dY[1, i], dY[2, i], dY[3, i] = canonical_rates(

@@ -1,6 +1,6 @@
 """Block right-hand sides of the canonical equations (14), one for every combination of terms.
 
-State (phi, theta, p_phi, p_theta) with momenta over m2 l^2; ``p`` are the lanes' reduced coefficients (8, lanes).
+State (phi, theta, p_phi, p_theta), momenta over m2 l^2; ``p`` are the lanes' reduced coefficients (8, lanes).
 """
 
 from __future__ import annotations

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from fastmech.disturbance.ensemble import DisturbedEnsemble, Outcome, disturb
+from fastmech.disturbance.ensemble import DisturbedEnsemble, Outcome, disturb, equilibria_to_disturb
 from fastmech.disturbance.linear_range import linear_range
-from fastmech.equilibria.find import find_equilibria
 from fastmech.results import Dataset, Variable, flags
-from fastmech.scan_types.request import RunContext, Scan
+from fastmech.scan_types.request import MethodName, RunContext, Scan
 from fastmech.scene import Scene
 
 if TYPE_CHECKING:
@@ -33,14 +32,18 @@ class Disturbed(Scan):
     seed: Annotated[int, Field(ge=0)] = 0
     t_end: Annotated[float, Field(gt=0)] = 120.0
     dt: Annotated[float, Field(gt=0)] = 0.05
-    method: str = "dop853"
+    method: MethodName = "dop853"
     linear_horizon: Annotated[float, Field(gt=0, description="horizon of the comparison [s]")] = 1.0
     linear_tolerance: Annotated[float, Field(gt=0, description="deviation allowed, relative")] = 0.05
     linear_directions: Annotated[int, Field(ge=1, le=1_000_000)] = 256
 
+    def check(self, scene: Scene) -> None:
+        """There must be something to disturb, and a constant force."""
+        equilibria_to_disturb(scene)
+
     def run(self, scene: Scene, context: RunContext) -> Dataset:
         """Disturb one equilibrium after the other; each has its own stream of random numbers."""
-        equilibria = find_equilibria(scene)
+        equilibria = equilibria_to_disturb(scene)
         advance = context.stage("disturbed trajectories", self.trajectories * len(equilibria))
         ensembles = [
             disturb(

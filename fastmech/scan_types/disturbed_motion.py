@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
+from fastmech.disturbance.ensemble import equilibria_to_disturb
 from fastmech.disturbance.motion import disturbed_motion
-from fastmech.equilibria.find import find_equilibria
 from fastmech.results import Dataset, Variable
-from fastmech.scan_types.request import RunContext, Scan
+from fastmech.scan_types.request import MethodName, RunContext, Scan
 from fastmech.scene import Scene
 
 if TYPE_CHECKING:
@@ -30,11 +30,15 @@ class DisturbedMotionScan(Scan):
     t_end: Annotated[float, Field(gt=0)] = 20.0
     outputs: Annotated[int, Field(ge=2, le=10_000_000)] = 1001
     dt: Annotated[float, Field(gt=0)] = 0.01
-    method: str = "dop853"
+    method: MethodName = "dop853"
+
+    def check(self, scene: Scene) -> None:
+        """There must be something to disturb, and a constant force."""
+        equilibria_to_disturb(scene)
 
     def run(self, scene: Scene, context: RunContext) -> Dataset:
         """Integrate the disturbance of each equilibrium; the linearized motion is a matrix exponential."""
-        equilibria = find_equilibria(scene)
+        equilibria = equilibria_to_disturb(scene)
         t = np.linspace(0.0, self.t_end, self.outputs)
         disturbance = [self.xi_phi, self.xi_theta, self.eta_phi, self.eta_theta]
         advance = context.stage("disturbed motion", len(equilibria))
@@ -45,20 +49,19 @@ class DisturbedMotionScan(Scan):
             )
             advance(1)
         dims = ("equilibrium", "time", "component")
-        empty = np.zeros((0, t.size, 4))
         variables = {
             "time": Variable(("time",), t, "s", "time"),
             "phi": Variable(("equilibrium",), equilibria.phi, "rad", "angle phi of the equilibrium"),
             "theta": Variable(("equilibrium",), equilibria.theta, "rad", "angle theta of the equilibrium"),
             "nonlinear": Variable(
                 dims,
-                np.stack([m.nonlinear[:, 0] for m in motions]) if motions else empty,
+                np.stack([m.nonlinear[:, 0] for m in motions]),
                 "rad, rad/s",
                 "disturbance of phi, theta, phi', theta', nonlinear motion",
             ),
             "linearized": Variable(
                 dims,
-                np.stack([m.linearized[:, 0] for m in motions]) if motions else empty,
+                np.stack([m.linearized[:, 0] for m in motions]),
                 "rad, rad/s",
                 "disturbance of phi, theta, phi', theta', linearized motion",
             ),

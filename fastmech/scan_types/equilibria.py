@@ -86,7 +86,9 @@ class EquilibriaScan(Scan):
                 "1/s^(k(k+1)/2), k = 1 to 4",
                 "Hurwitz determinants",
             ),
-            "eigenvalue_re": Variable(("equilibrium", "mode"), eigenvalues.real, "1/s", "eigenvalue, real part"),
+            "eigenvalue_re": Variable(
+                ("equilibrium", "mode"), eigenvalues.real, "1/s", "eigenvalue, real part"
+            ),
             "eigenvalue_im": Variable(
                 ("equilibrium", "mode"), eigenvalues.imag, "rad/s", "eigenvalue, imaginary part"
             ),
@@ -97,7 +99,10 @@ class EquilibriaScan(Scan):
                 "undamped natural frequency, NaN for a direction that grows",
             ),
             "decay_time": Variable(
-                each, column([f.decay_time for f in found]), "s", "slowest linear mode falls to 1/e; NaN: unstable"
+                each,
+                column([f.decay_time for f in found]),
+                "s",
+                "slowest linear mode falls to 1/e; NaN: unstable",
             ),
             "verdict_sylvester": verdicts([f.sylvester.verdict for f in found], "Lagrange-Dirichlet"),
             "verdict_hurwitz": verdicts([f.hurwitz.verdict for f in found], "Hurwitz"),

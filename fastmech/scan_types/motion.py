@@ -15,7 +15,7 @@ from fastmech.mechanism.geometry import constraints, positions
 from fastmech.mechanism.hamilton import momenta
 from fastmech.mechanism.reactions import reactions
 from fastmech.results import Dataset, Variable
-from fastmech.scan_types.request import RunContext, Scan
+from fastmech.scan_types.request import MethodName, RunContext, Scan
 from fastmech.scene import Scene
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ class Motion(Scan):
     t_end: Annotated[float, Field(gt=0)] = 20.0
     outputs: Annotated[int, Field(ge=2, le=10_000_000)] = 2001
     dt: Annotated[float, Field(gt=0)] = 0.01
-    method: str = "dop853"
+    method: MethodName = "dop853"
 
     def run(self, scene: Scene, context: RunContext) -> Dataset:
         """Integrate in both formulations and derive everything else from the Lagrangian one."""

@@ -6,12 +6,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from fastmech.ensembles.run import Progress
 from fastmech.errors import InputError
+from fastmech.integrators.tableaus import find_method
 from fastmech.results import Dataset, check_name
 from fastmech.scene import Scene, explain, nearest, read_toml
 
@@ -28,6 +29,15 @@ class RunContext:
     """``stage(name, total)`` announces a piece of work; its result is told what has been finished since."""
 
 
+def _known_method(name: str) -> str:
+    find_method(name)
+    return name
+
+
+#: A field that names an integration method.
+MethodName = Annotated[str, AfterValidator(_known_method)]
+
+
 class Scan(BaseModel, ABC):
     """A kind of scan: its request (the fields), how it runs and how its result is drawn.
 
@@ -40,6 +50,13 @@ class Scan(BaseModel, ABC):
     kind: ClassVar[str]
 
     scene: dict[str, Any] = Field(default={}, description="parameters that differ from the file's scene")
+
+    def check(self, scene: Scene) -> None:
+        """Refuse a scene that this scan cannot work with, before any scan of the file runs.
+
+        Raises:
+            InputError: the scene is none for this scan.
+        """
 
     @abstractmethod
     def run(self, scene: Scene, context: RunContext) -> Dataset:
@@ -91,9 +108,9 @@ def read_request(path: str | Path, kinds: Mapping[str, type[Scan]]) -> Request:
         scans={name: _scan(name, entry, kinds) for name, entry in scans.items()},
         text=Path(path).read_text(encoding="utf-8"),
     )
-    for name in request.scans:
+    for name, scan in request.scans.items():
         try:
-            request.scene_of(name)
+            scan.check(request.scene_of(name))
         except InputError as error:
             raise InputError(f"scan.{name}.{error}") from None
     return request
@@ -108,6 +125,8 @@ def _table(value: Any, where: str) -> dict[str, Any]:
 def _scan(name: str, value: Any, kinds: Mapping[str, type[Scan]]) -> Scan:
     where = f"scan.{name}"
     check_name(name, where)
+    if name in Scene.model_fields:
+        raise InputError(f"{where}: is the name of a parameter of the scene; choose another")
     entry = dict(_table(value, where))
     kind = entry.pop("kind", None)
     if kind is None:

@@ -27,9 +27,9 @@ START = [0.9, 0.4, 0.0, 0.0]
     ("arguments", "steps", "longest"),
     [
         ({"t_end": 1.0, "dt": 0.25}, 4, 0.25),
-        ({"t_end": 1.0, "dt": 0.1}, 10, 0.1),  # 1/0.1 is not 10 in doubles' arithmetic, but for rounding
-        ({"t_end": 0.3, "dt": 0.1}, 3, 0.1),  # 0.3/0.1 is a bit less than 3
-        ({"t_end": 0.7, "dt": 0.1}, 7, 0.1),
+        ({"t_end": 1.0, "dt": 0.1}, 10, 0.1),
+        ({"t_end": 0.14, "dt": 0.02}, 7, 0.02),  # the quotient is a bit more than 7 in doubles
+        ({"t_end": 0.3, "dt": 0.1}, 3, 0.1),  # the quotient is a bit less than 3
         ({"t_end": 1.0, "dt": 0.3}, 4, 0.25),
         ({"t_end": 1.0, "dt": 5.0}, 1, 1.0),
         ({"t_end": 1.0, "dt": 1.0 - 1e-9}, 2, 0.5),

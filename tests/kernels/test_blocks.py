@@ -30,8 +30,8 @@ CLOSE = {"rtol": 2e-14, "atol": 5e-13}
 @pytest.mark.parametrize("scene", [Scene(), UNALIKE], ids=["table_1", "unalike"])
 @pytest.mark.parametrize("n", [1, 7, 8, 33])
 def test_kernel_equals_the_mechanism(formulation: str, terms: str, scene: Scene, n: int) -> None:
-    """Lane counts with and without a remainder of whole vectors. Coefficients of terms that the kernel lacks are
-    there, and must not matter.
+    """Lane counts with and without a remainder of whole vectors. All coefficients are given: those of terms
+    that the kernel lacks must not matter.
     """
     Y, t = lanes(n, seed=n), 0.6
     actual = evaluate(kernel(formulation, terms), scene, Y, t)

@@ -64,7 +64,6 @@ CASES: dict[str, tuple[str, Scene, dict[str, Any], set[str]]] = {
     "no isolated equilibrium": ("equilibria", DEGENERATE, {}, {"potential"}),
     "disturbed motion": ("disturbed_motion", CONSTANT, {"outputs": 101}, {"angles", "norm"}),
     "six disturbed motions": ("disturbed_motion", BISTABLE, {"outputs": 101}, {"angles", "norm"}),
-    "no disturbed motion": ("disturbed_motion", DEGENERATE, {"outputs": 3}, set()),
     "disturbed": (
         "disturbed",
         CONSTANT,
