@@ -9,40 +9,62 @@ from importlib import import_module, metadata
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fastmech.disturbance.ensemble import disturb
+    from fastmech.disturbance.ensemble import Outcome, disturb
+    from fastmech.disturbance.linear_range import linear_range
+    from fastmech.disturbance.motion import disturbed_motion
     from fastmech.ensembles.integrate import integrate
+    from fastmech.ensembles.status import Status
+    from fastmech.ensembles.system import System
     from fastmech.equilibria.atlas import map_equilibria
     from fastmech.equilibria.find import find_equilibria
     from fastmech.errors import InputError
+    from fastmech.kernels.sincos import cos, sin
     from fastmech.mechanism.reactions import reactions
     from fastmech.scene import Scene
     from fastmech.stability.classify import classify
     from fastmech.store.read import open_results
 
-__version__ = metadata.version("fastmech")
+try:
+    __version__ = metadata.version("fastmech")
+except metadata.PackageNotFoundError:  # run from its sources, not installed
+    __version__ = "unknown"
 
 _MODULES = {
     "InputError": "fastmech.errors",
+    "Outcome": "fastmech.disturbance.ensemble",
     "Scene": "fastmech.scene",
+    "Status": "fastmech.ensembles.status",
+    "System": "fastmech.ensembles.system",
     "classify": "fastmech.stability.classify",
+    "cos": "fastmech.kernels.sincos",
     "disturb": "fastmech.disturbance.ensemble",
+    "disturbed_motion": "fastmech.disturbance.motion",
     "find_equilibria": "fastmech.equilibria.find",
     "integrate": "fastmech.ensembles.integrate",
+    "linear_range": "fastmech.disturbance.linear_range",
     "map_equilibria": "fastmech.equilibria.atlas",
     "open_results": "fastmech.store.read",
     "reactions": "fastmech.mechanism.reactions",
+    "sin": "fastmech.kernels.sincos",
 }
 
 __all__ = [
     "InputError",
+    "Outcome",
     "Scene",
+    "Status",
+    "System",
     "classify",
+    "cos",
     "disturb",
+    "disturbed_motion",
     "find_equilibria",
     "integrate",
+    "linear_range",
     "map_equilibria",
     "open_results",
     "reactions",
+    "sin",
 ]
 
 

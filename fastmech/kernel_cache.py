@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import tempfile
 from functools import cache
 from pathlib import Path
 
@@ -51,9 +52,16 @@ def cache_directory() -> Path:
     """Directory of this version's compiled kernels.
 
     Below ``NUMBA_CACHE_DIR`` where the user has set it, else in the user's cache folder. Kernels that check
-    their array bounds have a directory of their own, because numba does not tell the two apart.
+    their array bounds have a directory of their own. Where the folder cannot be written, a temporary one
+    serves this process: numba's own fallback beside the sources is not named by their hash.
     """
     root = os.environ.get("NUMBA_CACHE_DIR")
     base = Path(root) if root else platformdirs.user_cache_path("fastmech", appauthor=False)
     checked = "-boundscheck" if os.environ.get("NUMBA_BOUNDSCHECK", "0") not in ("", "0") else ""
-    return base / f"fastmech-{source_hash(compiled_sources())}{checked}"
+    directory = base / f"fastmech-{source_hash(compiled_sources())}{checked}"
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=directory):
+            return directory
+    except OSError:
+        return Path(tempfile.mkdtemp(prefix="fastmech-"))

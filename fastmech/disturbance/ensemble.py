@@ -119,8 +119,8 @@ def disturb(
 
     departure = np.abs(starts - center)
     run = run_ensemble(
-        right_hand_side(scene),
-        np.array(reduce(scene), dtype=np.float64),
+        right_hand_side(reduce(scene)),
+        reduce(scene),
         starts,
         times,
         dt,

@@ -6,21 +6,24 @@ number of threads and any block size.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import threading
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from fastmech.ensembles.spans import Span, spans
 from fastmech.ensembles.status import Status
+from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
 from fastmech.ensembles.threads import thread_count
 from fastmech.integrators.explicit import integrate_block, observe_nothing
 from fastmech.integrators.tableau import Tableau
 
 Floats = NDArray[np.float64]
+Progress = Callable[[int], None]
 
 #: Lanes a block: large enough that calls cost little, small enough that all stages stay in the caches.
 BLOCK_LANES = 256
@@ -28,10 +31,9 @@ BLOCK_LANES = 256
 #: Blocks that one task holds where trajectories may stop: those still running move up into full blocks.
 CHUNK_BLOCKS = 16
 
-#: Steps after which stopped trajectories make room.
-SEGMENT_STEPS = 64
-
-Progress = Callable[[int], None]
+#: Steps a call: between calls an interrupt is heard, and where trajectories may stop they make room.
+CALL_STEPS = 4096
+CALL_STEPS_WITH_STOPS = 64
 
 
 @dataclass(frozen=True)
@@ -60,17 +62,11 @@ class Ensemble:
     status: NDArray[np.int8]
 
 
-def output_steps(times: Floats, dt: float) -> NDArray[np.int64]:
-    """Steps between output times: the fewest equal ones that are no longer than ``dt``."""
-    # A quotient that is an integer but for rounding must not cost a step more.
-    return np.ceil(np.diff(times) / dt * (1.0 - 1e-12)).astype(np.int64)
-
-
 def run_ensemble(
     rhs: Any,
-    params: Floats,
-    starts: Floats,
-    times: Floats,
+    params: ArrayLike,
+    starts: ArrayLike,
+    times: ArrayLike,
     dt: float,
     tableau: Tableau,
     observation: Observation = NOTHING,
@@ -79,65 +75,53 @@ def run_ensemble(
     block_lanes: int = BLOCK_LANES,
     progress: Progress | None = None,
 ) -> Ensemble:
-    """Integrate ``starts`` (n, dim) from ``times[0]`` through ``times[1:]``.
+    """Integrate ``starts`` (n, dim) from ``times[0]`` through ``times[1:]`` [s].
 
     ``params`` are the parameters of all trajectories (count,) or of each (n, count). A trajectory that has
     stopped keeps the state in which it did. ``progress`` is told the number of trajectories finished since
     its last call.
-    """
-    n, dim = starts.shape
-    own = np.broadcast_to(params, (n, params.shape[-1]))
-    ensemble = Ensemble(
-        states=np.empty((times.size - 1, n, dim)),
-        records=np.empty((observation.record.size, n)),
-        status=np.empty(n, dtype=np.int8),
-    )
-    packed, nodes = tableau.packed, np.asarray(tableau.c, dtype=np.float64)
 
-    def advance(span: Floats, lanes: _Lanes) -> Floats:
-        """Take lanes through the times ``span``; their states at ``span[1:]``, shape (outputs, dim, m)."""
-        steps, m = output_steps(span, dt), lanes.Y.shape[1]
-        out = np.empty((span.size - 1, dim, m))
-        for first in range(0, m, block_lanes):
-            part = slice(first, first + block_lanes)
-            Y, p, record = (np.ascontiguousarray(a[:, part]) for a in (lanes.Y, lanes.params, lanes.record))
-            block_out = np.empty((span.size - 1, *Y.shape))
-            integrate_block(
-                rhs,
-                observation.observe,
-                packed.start,
-                packed.stage,
-                packed.weight,
-                nodes,
-                span,
-                steps,
-                Y,
-                p,
-                observation.params,
-                record,
-                block_out,
-            )
-            lanes.Y[:, part], lanes.record[:, part], out[:, :, part] = Y, record, block_out
-        return out
+    Raises:
+        InputError: the step, the times or the number of threads are wrong.
+    """
+    begin = np.asarray(starts, dtype=np.float64)
+    clock = np.asarray(times, dtype=np.float64)
+    own = np.asarray(params, dtype=np.float64)
+    own = np.broadcast_to(own, (len(begin), own.shape[-1]))
+    workers = thread_count(threads)
+    # Small ensembles are shared among the threads too, in whole vectors.
+    width = max(1, min(block_lanes, -(-len(begin) // (8 * workers)) * 8))
+    chunk = width * CHUNK_BLOCKS if observation.stops else width
+    way = list(spans(clock, dt, CALL_STEPS_WITH_STOPS if observation.stops else CALL_STEPS))
+    ensemble = Ensemble(
+        states=np.empty((clock.size - 1, *begin.shape)),
+        records=np.empty((observation.record.size, len(begin))),
+        status=np.empty(len(begin), dtype=np.int8),
+    )
+    interrupted = threading.Event()
 
     def run_chunk(first: int) -> int:
-        members = np.arange(first, min(first + chunk, n))
+        members = np.arange(first, min(first + chunk, len(begin)))
         record = np.repeat(observation.record[:, None], members.size, axis=1)
-        lanes = _Lanes(members, starts[members].T.copy(), own[members].T.copy(), record)
-        if observation.stops:
-            _run_with_stops(advance, lanes, times, dt, ensemble)
-        else:
-            ensemble.states[:, members] = advance(times, lanes).transpose(0, 2, 1)
-            ensemble.records[:, members] = lanes.record
+        lanes = _Lanes(members, begin[members].T.copy(), own[members].T.copy(), record)
+        for span in way:
+            if interrupted.is_set() or not lanes.members.size:
+                break
+            reached = _advance(rhs, observation, tableau, lanes, span, width)
+            _store(ensemble, lanes, span, reached, observation.stops)
         finite = np.isfinite(ensemble.states[:, members]).all(axis=(0, 2))
         ensemble.status[members] = np.where(finite, Status.OK, Status.NOT_FINITE)
         return members.size
 
-    chunk = block_lanes * CHUNK_BLOCKS if observation.stops else block_lanes
-    with ThreadPoolExecutor(thread_count(threads)) as pool:
-        for finished in pool.map(run_chunk, range(0, n, chunk)):
-            if progress is not None:
-                progress(finished)
+    with ThreadPoolExecutor(workers) as pool:
+        try:
+            for finished in pool.map(run_chunk, range(0, len(begin), chunk)):
+                if progress is not None:
+                    progress(finished)
+        except BaseException:  # Ctrl-C too: blocks in hand end with their call, the others never begin
+            interrupted.set()
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
     return ensemble
 
 
@@ -155,25 +139,51 @@ class _Lanes:
         self.params, self.record = self.params[:, which], self.record[:, which]
 
 
-def _run_with_stops(
-    advance: Callable[[Floats, _Lanes], Floats], lanes: _Lanes, times: Floats, dt: float, ensemble: Ensemble
-) -> None:
-    """Segment by segment; whoever has stopped or is not finite any more leaves after each."""
-    for output, until in enumerate(segments(times, dt)):
-        for span in until:
-            if lanes.members.size:
-                advance(span, lanes)
-                stopped = lanes.record[0] != 0.0
-                lanes.Y[:, stopped] = lanes.record[2:, stopped]
-                gone = stopped | ~np.isfinite(lanes.Y).all(axis=0)
-                ensemble.records[:, lanes.members] = lanes.record
-                ensemble.states[output:, lanes.members] = lanes.Y.T
-                lanes.keep(~gone)
+def _advance(
+    rhs: Any, observation: Observation, tableau: Tableau, lanes: _Lanes, span: Span, width: int
+) -> Floats:
+    """Take lanes through a span, block by block; their states at its times, shape (pieces, dim, lanes)."""
+    packed, nodes = tableau.packed, np.asarray(tableau.c, dtype=np.float64)
+    reached = np.empty((span.steps.size, *lanes.Y.shape))
+    for first in range(0, lanes.members.size, width):
+        part = slice(first, first + width)
+        Y, params, record = (a[:, part].copy() for a in (lanes.Y, lanes.params, lanes.record))
+        out = np.empty((span.steps.size, *Y.shape))
+        integrate_block(
+            rhs,
+            observation.observe,
+            packed.start,
+            packed.stage,
+            packed.weight,
+            nodes,
+            span.times,
+            span.steps,
+            Y,
+            params,
+            observation.params,
+            record,
+            out,
+        )
+        lanes.Y[:, part], lanes.record[:, part], reached[:, :, part] = Y, record, out
+    return reached
 
 
-def segments(times: Floats, dt: float) -> Iterator[list[Floats]]:
-    """For every output interval the pairs of times that cut it into at most ``SEGMENT_STEPS`` steps each."""
-    for start, stop, steps in zip(times[:-1], times[1:], output_steps(times, dt), strict=True):
-        cuts = np.append(np.arange(0, steps, SEGMENT_STEPS), steps)
-        at = start + (stop - start) * cuts / max(steps, 1)
-        yield [np.ascontiguousarray(pair) for pair in pairwise(at)]
+def _store(ensemble: Ensemble, lanes: _Lanes, span: Span, reached: Floats, stops: bool) -> None:
+    """Store what a span has brought; who has stopped or is not finite any more leaves, if ``stops``."""
+    ensemble.records[:, lanes.members] = lanes.record
+    for piece, output in enumerate(span.outputs):
+        if output >= 0:
+            if stops:
+                before = _stopped(lanes) & (lanes.record[STOP_TIME] <= span.times[piece + 1])
+                reached[piece][:, before] = lanes.record[STOP_STATE:, before]
+            ensemble.states[output, lanes.members] = reached[piece].T
+    if stops:
+        stopped = _stopped(lanes)
+        lanes.Y[:, stopped] = lanes.record[STOP_STATE:, stopped]
+        gone = stopped | ~np.isfinite(lanes.Y).all(axis=0)
+        ensemble.states[span.passed :, lanes.members[gone]] = lanes.Y[:, gone].T
+        lanes.keep(~gone)
+
+
+def _stopped(lanes: _Lanes) -> NDArray[np.bool_]:
+    return np.asarray(lanes.record[STOP_CODE] != 0.0)

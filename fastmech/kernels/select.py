@@ -1,23 +1,31 @@
-"""Which kernel a scene is given: only the terms that it has."""
+"""Which kernel an ensemble is given: only the terms that its scenes have."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from fastmech.kernels import canonical, lagrange
-from fastmech.scene import Scene
+from fastmech.mechanism.coefficients import Coefficients
 
 FORMULATIONS = {"lagrange": lagrange, "hamilton": canonical}
 
 
-def terms(scene: Scene) -> str:
-    """Name of the combination of terms of ``scene``: free, damped, constant, damped_constant, ..."""
-    force = "" if scene.F0 == 0 else "constant" if scene.alpha == 0 else "decaying"
-    damper = "damped" if scene.beta > 0 else ""
+def terms(coefficients: Coefficients) -> str:
+    """Name of the combination of terms: free, damped, constant, damped_constant, ...
+
+    Coefficients may be arrays over trajectories: a term is there if any trajectory has it.
+    """
+    if not np.any(coefficients.force):
+        force = ""
+    else:
+        force = "decaying" if np.any(coefficients.decay) else "constant"
+    damper = "damped" if np.any(coefficients.damping) else ""
     return "_".join(term for term in (damper, force) if term) or "free"
 
 
-def right_hand_side(scene: Scene, formulation: str = "lagrange") -> Any:
-    """Block right-hand side of ``scene`` in a formulation, ``"lagrange"`` or ``"hamilton"``."""
+def right_hand_side(coefficients: Coefficients, formulation: str = "lagrange") -> Any:
+    """Block right-hand side of a formulation, ``"lagrange"`` or ``"hamilton"``, with these terms."""
     module = FORMULATIONS[formulation]
-    return getattr(module, f"{module.__name__.rpartition('.')[2]}_{terms(scene)}")
+    return getattr(module, f"{module.__name__.rpartition('.')[2]}_{terms(coefficients)}")

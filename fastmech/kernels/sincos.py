@@ -45,3 +45,15 @@ def sincos(x: float) -> tuple[float, float]:
     sine = sign * (c if odd > 0.5 else s)
     cosine = sign * (-s if odd > 0.5 else c)
     return sine, cosine
+
+
+@inlined
+def sin(x: float) -> float:
+    """Sine of ``x`` [rad] for right-hand sides: packed instructions; NaN beyond ``REDUCTION_LIMIT``."""
+    return sincos(x)[0] if abs(x) <= REDUCTION_LIMIT else np.nan
+
+
+@inlined
+def cos(x: float) -> float:
+    """Cosine of ``x`` [rad] for right-hand sides: packed instructions; NaN beyond ``REDUCTION_LIMIT``."""
+    return sincos(x)[1] if abs(x) <= REDUCTION_LIMIT else np.nan

@@ -24,7 +24,7 @@ FORMULATIONS = pytest.mark.parametrize("formulation", ["lagrange", "hamilton"])
 
 def states(block_lanes: int, threads: int, method: str = "rk4", starts: Floats = STARTS) -> Floats:
     params, times = np.array(reduce(SCENE)), np.array([0.0, 0.3, 0.5])
-    rhs, tableau = right_hand_side(SCENE), METHODS[method]
+    rhs, tableau = right_hand_side(reduce(SCENE)), METHODS[method]
     return run_ensemble(
         rhs, params, starts, times, 0.05, tableau, threads=threads, block_lanes=block_lanes
     ).states

@@ -7,6 +7,7 @@ import pytest
 from kernels.blocks_of_lanes import COMBINATIONS, TERMS, kernel
 
 from fastmech.kernels.select import right_hand_side, terms
+from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 
 pytestmark = pytest.mark.nojit
@@ -15,8 +16,8 @@ pytestmark = pytest.mark.nojit
 @pytest.mark.parametrize(("formulation", "combination"), COMBINATIONS)
 def test_a_scene_is_given_the_kernel_of_its_terms(formulation: str, combination: str) -> None:
     scene = Scene().replace(**TERMS[combination])
-    assert terms(scene) == combination
-    assert right_hand_side(scene, formulation) is kernel(formulation, combination)
+    assert terms(reduce(scene)) == combination
+    assert right_hand_side(reduce(scene), formulation) is kernel(formulation, combination)
 
 
 @pytest.mark.parametrize(
@@ -30,11 +31,11 @@ def test_a_scene_is_given_the_kernel_of_its_terms(formulation: str, combination:
     ],
 )
 def test_edges(change: dict[str, Any], combination: str) -> None:
-    assert terms(Scene().replace(**change)) == combination
+    assert terms(reduce(Scene().replace(**change))) == combination
 
 
 def test_default_formulation_is_lagrange() -> None:
-    assert right_hand_side(Scene()) is kernel("lagrange", "damped_decaying")
+    assert right_hand_side(reduce(Scene())) is kernel("lagrange", "damped_decaying")
 
 
 def test_every_kernel_is_another_one() -> None:

@@ -1,0 +1,116 @@
+"""What an ensemble integrates: a scene in one of two formulations, or a system of the user's own.
+
+Either is a block right-hand side, the parameters of every trajectory, and how public states turn into the
+integrated ones and back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastmech.ensembles.run import NOTHING, Observation
+from fastmech.ensembles.system import System
+from fastmech.errors import InputError
+from fastmech.kernels.select import right_hand_side
+from fastmech.mechanism.coefficients import Coefficients, reduce
+from fastmech.mechanism.equations import momenta_from_rates, rates_from_momenta
+from fastmech.mechanism.reduced import metric_determinant, slider_ratio
+from fastmech.scene import Scene, nearest
+
+Floats = NDArray[np.float64]
+
+
+def _unchanged(y: Floats) -> Floats:
+    return y
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A right-hand side with the parameters of n trajectories."""
+
+    rhs: Any
+    params: Floats  #: shape (count,) or (n, count)
+    observation: Observation = NOTHING
+    inward: Callable[[Floats], Floats] = _unchanged  #: public states (..., n, dim) to integrated ones
+    outward: Callable[[Floats], Floats] = _unchanged  #: and back
+
+
+def scene_problem(scene: Scene, n: int, parameters: Mapping[str, ArrayLike], formulation: str) -> Problem:
+    """A scene whose ``parameters`` differ between the n trajectories.
+
+    Raises:
+        InputError: an unknown parameter, or values that no scene may have.
+    """
+    own = own_values(parameters, scene.model_dump(), n)
+    for name, values in own.items():
+        for extreme in (values.min(), values.max()) if n else ():
+            scene.replace(**{name: extreme})
+    values: Any = SimpleNamespace(**(scene.model_dump() | own))
+    coefficients = reduce(values)
+    columns = [np.broadcast_to(column, n if own else ()) for column in coefficients]
+    params = np.stack(columns, axis=-1).astype(np.float64)
+    rhs = right_hand_side(coefficients, formulation)
+    if formulation == "lagrange":
+        return Problem(rhs, params)
+    return Problem(
+        rhs, params, NOTHING, lambda y: with_momenta(coefficients, y), lambda y: with_rates(coefficients, y)
+    )
+
+
+def system_problem(system: System, n: int, parameters: Mapping[str, ArrayLike]) -> Problem:
+    """A system whose ``parameters`` differ between the n trajectories.
+
+    Raises:
+        InputError: an unknown parameter or wrong values.
+    """
+    own = own_values(parameters, system.parameters, n)
+    columns = [np.broadcast_to(own.get(k, v), n if own else ()) for k, v in system.parameters.items()]
+    params = np.stack(columns, axis=-1).astype(np.float64) if columns else np.zeros(0)
+    return Problem(system.kernel, params, system.observation)
+
+
+def own_values(parameters: Mapping[str, ArrayLike], known: Mapping[str, float], n: int) -> dict[str, Floats]:
+    """Values of each trajectory (n,) by parameter.
+
+    Raises:
+        InputError: an unknown name, not n values, or values that are not finite.
+    """
+    own = {}
+    for name, values in parameters.items():
+        if name not in known:
+            raise InputError(f"parameters.{name}: unknown name; {nearest(name, list(known))}")
+        try:
+            array = np.array(values, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError(f"parameters.{name}: must be numbers") from None
+        if array.shape != (n,):
+            raise InputError(f"parameters.{name}: has shape {array.shape}, must be ({n},), one value a start")
+        if not np.isfinite(array).all():
+            raise InputError(f"parameters.{name}: must be finite")
+        own[name] = array
+    return own
+
+
+def with_momenta(c: Coefficients, y: Floats) -> Floats:
+    """(phi, theta, p_phi, p_theta) with momenta over m2 l^2 from angles and rates."""
+    phi, theta, phi_dot, theta_dot = np.moveaxis(y, -1, 0)
+    with np.errstate(invalid="ignore", over="ignore"):  # states that are not finite have a status
+        k, _ = slider_ratio(np.sin(phi), np.cos(phi))
+        p = momenta_from_rates(phi_dot, theta_dot, c.mass, c.slider, k, np.sin(phi + theta))
+    return np.stack([phi, theta, *p], axis=-1)
+
+
+def with_rates(c: Coefficients, y: Floats) -> Floats:
+    """Angles and rates from (phi, theta, p_phi, p_theta) with momenta over m2 l^2."""
+    phi, theta, p1, p2 = np.moveaxis(y, -1, 0)
+    with np.errstate(invalid="ignore", over="ignore"):
+        k, _ = slider_ratio(np.sin(phi), np.cos(phi))
+        determinant = metric_determinant(c.mass, c.slider, k, np.cos(phi + theta))
+        rates = rates_from_momenta(p1, p2, np.sin(phi + theta), determinant)
+    return np.stack([phi, theta, *rates], axis=-1)

@@ -1,0 +1,135 @@
+"""Driver of Adams methods with a fixed step over one block of lanes.
+
+The derivatives of the last steps are kept as rows of a ring, so nothing is shifted: which row holds which age
+is an index array. A Runge-Kutta method takes the first steps. Right-hand side, observer, times, steps and
+outputs are those of :func:`fastmech.integrators.explicit.integrate_block`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import types
+
+from fastmech.integrators.explicit import BlockRHS, Floats, Integers, Observer, add_stages, start_stage
+from fastmech.jit import CUBE, INTEGERS, MATRIX, OBSERVER, RHS, VECTOR, inlined, kernel
+
+#: Step lengths that differ by less, relatively, are the same: outputs at k h differ by rounding only.
+SAME_STEP = 1e-12
+
+
+@inlined
+def predict_and_correct(
+    z: Floats, w: Floats, y: Floats, F: Floats, h: float, row: Integers, p: Floats, c: Floats
+) -> None:
+    """z = y + h sum_a p[a] F[row[a]] and w = h sum_a c[a] F[row[a]] in common passes over the history.
+
+    Each pass takes three or four rows, of which any number from six on is a sum.
+    """
+    n, rows = z.shape[0], p.shape[0]
+    for i in range(n):
+        z[i] = y[i]
+        w[i] = 0.0
+    a = 0
+    while a < rows:
+        p0, p1, p2 = h * p[a], h * p[a + 1], h * p[a + 2]
+        c0, c1, c2 = h * c[a], h * c[a + 1], h * c[a + 2]
+        F0, F1, F2 = F[row[a]], F[row[a + 1]], F[row[a + 2]]
+        if (rows - a) % 4:
+            for i in range(n):
+                z[i] += p0 * F0[i] + p1 * F1[i] + p2 * F2[i]
+                w[i] += c0 * F0[i] + c1 * F1[i] + c2 * F2[i]
+            a += 3
+        else:
+            p3, c3, F3 = h * p[a + 3], h * c[a + 3], F[row[a + 3]]
+            for i in range(n):
+                z[i] += p0 * F0[i] + p1 * F1[i] + p2 * F2[i] + p3 * F3[i]
+                w[i] += c0 * F0[i] + c1 * F1[i] + c2 * F2[i] + c3 * F3[i]
+            a += 4
+
+
+@inlined
+def add_correction(y: Floats, w: Floats, d: Floats, weight: float) -> None:
+    """y += w + weight d: one rounding of the state a step."""
+    for i in range(y.shape[0]):
+        y[i] += w[i] + weight * d[i]
+
+
+@kernel(
+    types.void(
+        RHS,
+        OBSERVER,
+        INTEGERS,
+        INTEGERS,
+        VECTOR,
+        VECTOR,
+        VECTOR,
+        VECTOR,
+        VECTOR,
+        INTEGERS,
+        MATRIX,
+        MATRIX,
+        VECTOR,
+        MATRIX,
+        CUBE,
+    )
+)
+def integrate_multistep_block(
+    rhs: BlockRHS,
+    observe: Observer,
+    start: Integers,
+    stage: Integers,
+    weight: Floats,
+    nodes: Floats,
+    predictor: Floats,
+    corrector: Floats,
+    times: Floats,
+    steps: Integers,
+    Y: Floats,
+    params: Floats,
+    observer_params: Floats,
+    record: Floats,
+    out: Floats,
+) -> None:
+    """Take a block through all output times.
+
+    ``predictor`` weighs the derivatives at t_n, t_(n-1), ...; ``corrector`` that at the predicted t_(n+1),
+    then the same ones, and is empty for an explicit method. ``start``, ``stage``, ``weight`` and ``nodes``
+    are the packed tableau of the starter. The method starts anew wherever the step's length changes.
+    """
+    stages, rows = nodes.shape[0], predictor.shape[0]
+    dim, lanes = Y.shape
+    n = dim * lanes
+    F, K, Z = np.empty((rows, dim, lanes)), np.empty((stages, dim, lanes)), np.empty((dim, lanes))
+    f, k_flat, z, y, w = F.reshape(rows, n), K.reshape(stages, n), Z.reshape(n), Y.reshape(n), np.empty(n)
+    row = np.empty(rows, dtype=np.int64)  # row[a] holds the derivative of a steps ago
+    known, newest, last = 0, 0, 0.0
+    for j in range(steps.shape[0]):
+        if steps[j] == 0:
+            out[j] = Y
+            continue
+        h = (times[j + 1] - times[j]) / steps[j]
+        if abs(h - last) > SAME_STEP * h:
+            known, last = 0, h
+        for step in range(steps[j]):
+            t = times[j] + step * h
+            newest = (newest + 1) % rows
+            known = min(known + 1, rows)
+            rhs(t, Y, F[newest], params)
+            if known < rows:
+                k_flat[0] = f[newest]
+                for s in range(1, stages):
+                    k = start_stage(z, y, k_flat, h, stage, weight, int(start[s]), int(start[s + 1]))
+                    add_stages(z, k_flat, h, stage, weight, k, int(start[s + 1]))
+                    rhs(t + nodes[s] * h, Z, K[s], params)
+                add_stages(y, k_flat, h, stage, weight, int(start[stages]), int(start[stages + 1]))
+            else:
+                for a in range(rows):
+                    row[a] = (newest - a) % rows
+                if corrector.shape[0]:
+                    predict_and_correct(z, w, y, f, h, row, predictor, corrector[1:])
+                    rhs(t + h, Z, K[0], params)
+                    add_correction(y, w, k_flat[0], h * corrector[0])
+                else:
+                    add_stages(y, f, h, row, predictor, 0, rows)
+            observe(times[j] + (step + 1) * h, Y, observer_params, record)
+        out[j] = Y
