@@ -9,9 +9,10 @@ from importlib import import_module, metadata
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fastmech.disturbance.ensemble import Outcome, disturb
+    from fastmech.disturbance.ensemble import disturb
     from fastmech.disturbance.linear_range import linear_range
     from fastmech.disturbance.motion import disturbed_motion
+    from fastmech.disturbance.outcome import Outcome
     from fastmech.ensembles.integrate import integrate
     from fastmech.ensembles.status import Status
     from fastmech.ensembles.system import System
@@ -31,7 +32,7 @@ except metadata.PackageNotFoundError:  # run from its sources, not installed
 
 _MODULES = {
     "InputError": "fastmech.errors",
-    "Outcome": "fastmech.disturbance.ensemble",
+    "Outcome": "fastmech.disturbance.outcome",
     "Scene": "fastmech.scene",
     "Status": "fastmech.ensembles.status",
     "System": "fastmech.ensembles.system",

@@ -40,5 +40,7 @@ def one_line() -> Iterator[None]:
         raise Failure(f"{error.format_message()}{see}") from None
     except InputError as error:
         raise Failure(str(error)) from None
+    except MemoryError as error:
+        raise Failure(f"more memory is needed than there is: {error}") from None
     except KeyboardInterrupt:
         raise Interrupted("interrupted") from None

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.disturbance.observe import EXCURSION_PHI, EXCURSION_THETA, LAST_OUTSIDE, observe_departure
+from fastmech.disturbance.outcome import Outcome, resting_place
 from fastmech.disturbance.size import Size, size_at
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Observation, Progress, run_ensemble
+from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.status import Status
 from fastmech.equilibria.find import Equilibria, Equilibrium, find_equilibria
 from fastmech.errors import InputError
@@ -21,31 +22,6 @@ from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
-TURN = 2.0 * np.pi
-
-
-class Outcome(IntEnum):
-    """Where a disturbed trajectory is at the end of the run."""
-
-    RETURNED = 0
-    ELSEWHERE = 1
-    AT_UNSTABLE = 2
-    UNDECIDED = 3
-    NOT_FINITE = 4
-
-    @property
-    def advice(self) -> str:
-        """What it means and what to do."""
-        return _ADVICE[self]
-
-
-_ADVICE = {
-    Outcome.RETURNED: "at rest within the ball of return, no turns made",
-    Outcome.ELSEWHERE: "at rest at another stable equilibrium, or at this one some turns further",
-    Outcome.AT_UNSTABLE: "still in the ball of an unstable equilibrium: it will leave; use a larger t_end",
-    Outcome.UNDECIDED: "still moving at t_end; use a larger t_end",
-    Outcome.NOT_FINITE: "NaN or infinity: the step is too large; use a smaller dt",
-}
 
 
 @dataclass(frozen=True)
@@ -60,7 +36,7 @@ class DisturbedEnsemble:
     outcome: NDArray[np.int8]  #: :class:`Outcome`, shape (n,)
     end_index: NDArray[np.int8]  #: equilibrium in whose ball it ended, -1: none; shape (n,)
     turns: NDArray[np.int64]  #: full turns of phi and theta on the way there, 0 where none; shape (n, 2)
-    time_to_return: Floats  #: s, last step outside the ball of return; NaN unless returned; (n,)
+    time_to_return: Floats  #: s, first step from which on it was in the ball; NaN unless returned; (n,)
     excursion: Floats  #: largest departures of phi and theta from the equilibrium [rad], shape (n, 2)
 
     @property
@@ -86,8 +62,9 @@ def disturb(
     """Disturb an equilibrium at random and follow every disturbance.
 
     Starts are uniform in the ball of the given ``radius`` about the equilibrium, in the norm of
-    :class:`fastmech.disturbance.size.Size`, drawn by NumPy's ``default_rng(seed)``. Rest is being within
-    ``return_radius`` of an equilibrium, in that equilibrium's norm.
+    :class:`fastmech.disturbance.size.Size`, drawn by NumPy's ``default_rng([seed, index])``. Rest is being
+    within ``return_radius`` of a minimum, in its norm, without the energy to leave; see
+    :func:`fastmech.disturbance.outcome.resting_place`.
 
     Args:
         scene: a scene with a constant force (``alpha = 0`` or ``F0 = 0``).
@@ -112,10 +89,12 @@ def disturb(
     return_radius = checks.number("return_radius", return_radius, "rad", above=0.0)
     times = np.array([0.0, checks.number("t_end", t_end, "s", above=0.0)])
     dt = checks.number("dt", dt, "s", above=0.0)
-    index = _index_of(equilibrium, equilibria)
+    index = equilibria.index_of(equilibrium)
     center = np.array([equilibrium.phi, equilibrium.theta, 0.0, 0.0])
     size = size_at(scene, equilibrium.phi, equilibrium.theta)
-    starts = center + size.from_ball(radius * uniform_ball(np.random.default_rng(seed), n))
+    # A stream for each equilibrium, shared with no other seed.
+    rng = np.random.default_rng([seed, index])
+    starts = center + size.from_ball(radius * uniform_ball(rng, n))
 
     departure = np.abs(starts - center)
     run = run_ensemble(
@@ -130,7 +109,7 @@ def disturb(
         progress=progress,
     )
     final = run.states[-1]
-    end_index, turns = _resting_place(scene, equilibria, final, return_radius)
+    end_index, turns = resting_place(scene, equilibria, final, return_radius)
     turned = (turns != 0).any(axis=1)
     stable = np.array([e.kind == "minimum" for e in equilibria])
     outcome = np.full(n, Outcome.UNDECIDED, dtype=np.int8)
@@ -138,6 +117,9 @@ def disturb(
     outcome[(end_index >= 0) & ~stable[end_index]] = Outcome.AT_UNSTABLE
     outcome[(end_index == index) & ~turned & stable[end_index]] = Outcome.RETURNED
     outcome[run.status != Status.OK] = Outcome.NOT_FINITE
+    last_outside, step = run.records[LAST_OUTSIDE], times[-1] / output_steps(times, dt)[0]
+    left = (size(starts - center) > return_radius) | (last_outside > 0.0)
+    inside_since = np.where(left, last_outside + step, 0.0)
     return DisturbedEnsemble(
         equilibria=equilibria,
         index=index,
@@ -147,7 +129,7 @@ def disturb(
         outcome=outcome,
         end_index=end_index,
         turns=turns,
-        time_to_return=np.where(outcome == Outcome.RETURNED, run.records[LAST_OUTSIDE], np.nan),
+        time_to_return=np.where(outcome == Outcome.RETURNED, inside_since, np.nan),
         excursion=np.maximum(departure[:, :2], run.records[[EXCURSION_PHI, EXCURSION_THETA]].T),
     )
 
@@ -161,7 +143,7 @@ def require_constant_force(scene: Scene) -> None:
     if scene.F0 != 0 and scene.alpha != 0:
         raise InputError(
             f"scene.alpha = {scene.alpha:g}: must be 0 1/s for motion about an equilibrium (or F0 = 0 N); "
-            "use scene.replace(alpha=0.0)"
+            "use scene.replace(alpha=0.0) and find its equilibria anew"
         )
 
 
@@ -190,36 +172,7 @@ def unit_directions(rng: np.random.Generator, n: int) -> Floats:
     return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
 
 
-def _index_of(equilibrium: Equilibrium, equilibria: Equilibria) -> int:
-    away = [
-        np.hypot(np.sin((equilibrium.phi - e.phi) / 2), np.sin((equilibrium.theta - e.theta) / 2))
-        for e in equilibria
-    ]
-    if not away or min(away) > 1e-9:
-        raise InputError(
-            f"equilibrium = ({equilibrium.phi:g}, {equilibrium.theta:g}) rad: "
-            "must be one of this scene's equilibria"
-        )
-    return int(np.argmin(away))
-
-
 def _observation(center: Floats, size: Size, return_radius: float) -> Observation:
     a = size.metric
     params = [center[0], center[1], a[0, 0], a[0, 1], a[1, 1], 1.0 / size.omega**2, return_radius**2]
     return Observation(observe_departure, np.array(params), np.zeros(3))
-
-
-def _resting_place(
-    scene: Scene, equilibria: Equilibria, final: Floats, radius: float
-) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
-    """Index of the equilibrium in whose ball each final state lies (-1: none) and the turns made."""
-    index = np.full(len(final), -1, dtype=np.int8)
-    turns = np.zeros((len(final), 2), dtype=np.int64)
-    for i, e in enumerate(equilibria):
-        departure = final - np.array([e.phi, e.theta, 0.0, 0.0])
-        made = np.round(departure[:, :2] / TURN)
-        departure[:, :2] -= TURN * made
-        inside = size_at(scene, e.phi, e.theta)(departure) <= radius
-        index[inside] = i
-        turns[inside] = made[inside].astype(np.int64)
-    return index, turns

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.disturbance.ensemble import unit_directions
+from fastmech.disturbance.ensemble import equilibria_to_disturb, unit_directions
 from fastmech.disturbance.motion import disturbed_motion
 from fastmech.disturbance.size import Size, size_at
 from fastmech.ensembles import checks
@@ -26,7 +26,7 @@ class LinearRange:
     """Largest sizes at which the linearized motion is within the tolerance, direction by direction."""
 
     directions: Floats  #: disturbances of size 1 rad, shape (directions, 4)
-    limit: Floats  #: rad, shape (directions,); 0: not even the smallest size tried, NaN: every one
+    limit: Floats  #: rad, shape (directions,); 0: not even the smallest size tried, inf: every one
     size: Size  #: the norm
     horizon: float  #: s
     tolerance: float
@@ -45,20 +45,22 @@ def linear_range(
 ) -> LinearRange:
     """Size of disturbance up to which the linearized motion stays within ``tolerance`` of the nonlinear one.
 
-    The deviation of a disturbance is max over [0, horizon] of size(nonlinear - linearized) divided by max
-    over [0, horizon] of size(linearized), in the norm of :class:`fastmech.disturbance.size.Size`. Along
-    every direction (uniform on the sphere) sizes from 1e-6 rad to pi rad are tried upwards, and the first
-    crossing of the tolerance is refined by bisection to one part in 10,000.
+    The deviation of a disturbance is the maximum of size(nonlinear - linearized) divided by that of
+    size(linearized), both over 51 evenly spaced times of [0, horizon], in the norm of
+    :class:`fastmech.disturbance.size.Size`. Along every direction (uniform on the sphere) sizes from 1e-6 rad
+    to pi rad are tried upwards, and the first crossing of the tolerance is refined by bisection to one part
+    in 10,000.
 
     Raises:
-        InputError: an argument is wrong, or the scene's force decays.
+        InputError: an argument is wrong, the scene's force decays, or the equilibrium is not the scene's.
     """
     horizon = checks.number("horizon", horizon, "s", above=0.0)
     tolerance = checks.number("tolerance", tolerance, "", above=0.0)
     count = checks.whole_number("directions", directions, least=1)
     seed = checks.whole_number("seed", seed, least=0)
     size = size_at(scene, equilibrium.phi, equilibrium.theta)
-    rays = size.from_ball(unit_directions(np.random.default_rng(seed), count))
+    index = equilibria_to_disturb(scene).index_of(equilibrium)
+    rays = size.from_ball(unit_directions(np.random.default_rng([seed, index, 1]), count))
     times = np.linspace(0.0, horizon, OUTPUTS + 1)
 
     def deviation(sizes: Floats) -> Floats:
@@ -66,15 +68,17 @@ def linear_range(
         starts = (sizes[..., None] * rays[:, None, :]).reshape(-1, 4)
         motion = disturbed_motion(scene, equilibrium, starts, times, dt=dt, threads=threads)
         apart = size(motion.nonlinear - motion.linearized).max(axis=0)
-        return np.asarray((apart / size(motion.linearized).max(axis=0)).reshape(sizes.shape))
+        with np.errstate(invalid="ignore"):
+            return np.asarray((apart / size(motion.linearized).max(axis=0)).reshape(sizes.shape))
 
     grid = np.geomspace(SMALLEST, LARGEST, GRID)
-    exceeded = deviation(np.broadcast_to(grid, (count, GRID))) > tolerance
+    # What is not finite deviates: the comparison is written so that NaN counts as exceeding.
+    exceeded = ~(deviation(np.broadcast_to(grid, (count, GRID))) <= tolerance)
     first = np.argmax(exceeded, axis=1)
     low, high = grid[np.maximum(first - 1, 0)], grid[first]
     for _ in range(BISECTIONS):
         middle = np.sqrt(low * high)
-        above = deviation(middle[:, None])[:, 0] > tolerance
+        above = ~(deviation(middle[:, None])[:, 0] <= tolerance)
         low, high = np.where(above, low, middle), np.where(above, middle, high)
-    limit = np.where(exceeded.any(axis=1), low, np.nan)
+    limit = np.where(exceeded.any(axis=1), low, np.inf)
     return LinearRange(rays, np.where(exceeded[:, 0], 0.0, limit), size, horizon, tolerance)

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.disturbance.ensemble import require_constant_force
+from fastmech.disturbance.ensemble import equilibria_to_disturb
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
 from fastmech.equilibria.find import Equilibrium
@@ -47,9 +47,9 @@ def disturbed_motion(
     exponential of the Jacobian at the equilibrium.
 
     Raises:
-        InputError: an argument is wrong, or the scene's force decays.
+        InputError: an argument is wrong, the scene's force decays, or the equilibrium is not the scene's.
     """
-    require_constant_force(scene)
+    equilibria_to_disturb(scene).index_of(equilibrium)
     start = checks.states("disturbance", disturbance, 4)
     t = checks.rising_times("times", times)
     center = np.array([equilibrium.phi, equilibrium.theta, 0.0, 0.0])

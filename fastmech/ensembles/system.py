@@ -21,7 +21,7 @@ from fastmech.errors import InputError
 from fastmech.jit import inlined
 from fastmech.kernel_cache import cache_directory
 
-_TEMPLATE = '''"""Made by fastmech: block kernels of {name!r}; ``rhs`` and ``stop`` are the user's functions."""
+_TEMPLATE = '''"""Made by fastmech: block kernels of {name!r}, whose functions are ``rhs`` and ``stop``."""
 
 from fastmech.ensembles.stopping import note_stop
 from fastmech.jit import OBSERVER_SIGNATURE, RHS_SIGNATURE, kernel

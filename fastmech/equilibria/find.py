@@ -76,6 +76,23 @@ class Equilibria(Sequence[Equilibrium]):
     def __getitem__(self, index: int | slice) -> Equilibrium | Sequence[Equilibrium]:
         return self.items[index]
 
+    def index_of(self, equilibrium: Equilibrium) -> int:
+        """Which of these an equilibrium is.
+
+        Raises:
+            InputError: it is none of them, for example one of another scene.
+        """
+        for i, item in enumerate(self.items):
+            away = np.hypot(
+                np.sin((equilibrium.phi - item.phi) / 2), np.sin((equilibrium.theta - item.theta) / 2)
+            )
+            if away <= 1e-9:
+                return i
+        raise InputError(
+            f"equilibrium = ({equilibrium.phi:g}, {equilibrium.theta:g}) rad: "
+            "must be one of this scene's equilibria"
+        )
+
     @property
     def phi(self) -> FloatArray:
         """Angles phi (n,) [rad]."""

@@ -30,8 +30,12 @@ class Method(Protocol):
     def source(self) -> str:
         """Where its formula comes from."""
 
+    @property
+    def start_steps(self) -> int:
+        """Steps after each call, or change of the step's length, that a starter takes; 0 for most methods."""
+
     def evaluations(self, steps: int) -> int:
-        """Right-hand sides that so many steps of equal length take, the method's start included."""
+        """Right-hand sides that so many steps of equal length take, the starter's included."""
 
     def run(
         self,
@@ -68,6 +72,11 @@ class RungeKutta:
     def source(self) -> str:
         """Where its coefficients come from."""
         return self.tableau.source
+
+    @property
+    def start_steps(self) -> int:
+        """None: every step stands alone."""
+        return 0
 
     def evaluations(self, steps: int) -> int:
         """Right-hand sides that so many steps take."""
@@ -135,9 +144,14 @@ class Adams:
         """Weights of the derivatives at t_(n+1), t_n, ...: implicit formula; empty without a corrector."""
         return np.array([float(w) for w in moulton(self.order)] if self.corrects else [], dtype=np.float64)
 
+    @property
+    def start_steps(self) -> int:
+        """Steps that the history is short of."""
+        return self.predictor.size - 1
+
     def evaluations(self, steps: int) -> int:
         """Right-hand sides that so many steps of equal length take, the starter's included."""
-        start = min(steps, self.predictor.size - 1)
+        start = min(steps, self.start_steps)
         return start * self.starter.stages + (steps - start) * (2 if self.corrects else 1)
 
     def run(

@@ -13,8 +13,8 @@ from numba import types
 from fastmech.integrators.explicit import BlockRHS, Floats, Integers, Observer, add_stages, start_stage
 from fastmech.jit import CUBE, INTEGERS, MATRIX, OBSERVER, RHS, VECTOR, inlined, kernel
 
-#: Step lengths that differ by less, relatively, are the same: outputs at k h differ by rounding only.
-SAME_STEP = 1e-12
+#: Step lengths that differ by less than this share of the time are the same: outputs were rounded.
+ROUNDED_TIME = 4 * 2.0**-52
 
 
 @inlined
@@ -108,7 +108,7 @@ def integrate_multistep_block(
             out[j] = Y
             continue
         h = (times[j + 1] - times[j]) / steps[j]
-        if abs(h - last) > SAME_STEP * h:
+        if abs(h - last) > ROUNDED_TIME * max(abs(times[j]), abs(times[j + 1])):
             known, last = 0, h
         for step in range(steps[j]):
             t = times[j] + step * h

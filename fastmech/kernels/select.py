@@ -17,12 +17,12 @@ def terms(coefficients: Coefficients) -> str:
 
     Coefficients may be arrays over trajectories: a term is there if any trajectory has it.
     """
-    if not np.any(coefficients.force):
-        force = ""
-    else:
-        force = "decaying" if np.any(coefficients.decay) else "constant"
-    damper = "damped" if np.any(coefficients.damping) else ""
-    return "_".join(term for term in (damper, force) if term) or "free"
+    present = []
+    if np.any(coefficients.damping):
+        present.append("damped")
+    if np.any(coefficients.force):
+        present.append("decaying" if np.any(coefficients.decay) else "constant")
+    return "_".join(present) or "free"
 
 
 def right_hand_side(coefficients: Coefficients, formulation: str = "lagrange") -> Any:

@@ -42,9 +42,9 @@ def all_checks(computed: Computed) -> list[Check]:
             f"Lagrange's and Hamilton's equations: largest difference of the angles {run}",
             float(angles.max()),
             "rad",
-            1e-9,
+            1e-10,
         ),
-        Check("the same, rates", float(rates.max()), "rad/s", 1e-9),
+        Check("the same, rates", float(rates.max()), "rad/s", 1e-10),
         Check(
             "constraints (2), (3), (5): largest residual along the motion",
             float(residual[[0, 1, 3]].max()),

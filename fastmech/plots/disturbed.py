@@ -143,7 +143,7 @@ def _linear_range(dataset: Dataset) -> Figure:
     low, high = (positive.min(), positive.max()) if positive.size else (1e-3, np.pi)
     for row, values in enumerate(limit):
         # NaN stands for more than the largest size tried, 0 for less than the smallest.
-        ordered = np.where(np.isnan(values), np.inf, values)
+        ordered = values
         beyond, never = 100.0 * np.mean(np.isinf(ordered)), 100.0 * np.mean(ordered == 0.0)
         texts = [f"{beyond:.3g} % beyond all tried"] * bool(beyond) + [
             f"{never:.3g} % below all tried"

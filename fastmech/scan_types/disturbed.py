@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from fastmech.disturbance.ensemble import DisturbedEnsemble, Outcome, disturb, equilibria_to_disturb
+from fastmech.disturbance.ensemble import DisturbedEnsemble, disturb, equilibria_to_disturb
 from fastmech.disturbance.linear_range import linear_range
+from fastmech.disturbance.outcome import Outcome
 from fastmech.results import Dataset, Variable, flags
 from fastmech.scan_types.request import MethodName, RunContext, Scan
 from fastmech.scene import Scene
@@ -52,18 +53,18 @@ class Disturbed(Scan):
                 self.trajectories,
                 radius=self.radius,
                 return_radius=self.return_radius,
-                seed=self.seed + i,
+                seed=self.seed,
                 t_end=self.t_end,
                 dt=self.dt,
                 method=self.method,
                 threads=context.threads,
                 progress=advance,
             )
-            for i, equilibrium in enumerate(equilibria)
+            for equilibrium in equilibria
         ]
         advance = context.stage("range of the linearized motion", len(equilibria))
         ranges = []
-        for i, equilibrium in enumerate(equilibria):
+        for equilibrium in equilibria:
             ranges.append(
                 linear_range(
                     scene,
@@ -71,7 +72,7 @@ class Disturbed(Scan):
                     horizon=self.linear_horizon,
                     tolerance=self.linear_tolerance,
                     directions=self.linear_directions,
-                    seed=self.seed + i,
+                    seed=self.seed,
                     threads=context.threads,
                 )
             )
@@ -106,7 +107,10 @@ class Disturbed(Scan):
                 "full turns of phi and theta made until then",
             ),
             "time_to_return": Variable(
-                every, _stack(ensembles, "time_to_return"), "s", "from then on within the ball of return"
+                every,
+                _stack(ensembles, "time_to_return"),
+                "s",
+                "first step from which on it was in the ball of return",
             ),
             "excursion": Variable(
                 (*every, "angle"),
@@ -134,7 +138,7 @@ class Disturbed(Scan):
                 ("equilibrium", "direction"),
                 np.array([r.limit for r in ranges]).reshape(-1, self.linear_directions),
                 "rad",
-                "size up to which the linearized motion keeps the tolerance, NaN: beyond all tried",
+                "size up to which the linearized motion keeps the tolerance, inf: beyond all tried, 0: below",
             ),
         }
         attrs = self.model_dump(exclude={"scene"}) | {

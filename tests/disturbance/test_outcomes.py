@@ -92,7 +92,7 @@ def test_a_step_too_large_is_not_finite() -> None:
 
 
 def test_time_to_return_and_excursions_against_dense_solutions() -> None:
-    """The last step outside the ball, and the largest departures over all steps and the start."""
+    """The first step inside for good, and the largest departures over all steps and the start."""
     (stable,) = equilibria("table_1", 0)
     dt, t_end = 0.05, 120.0
     run = disturb(SCENE, stable, 40, radius=0.6, seed=8, t_end=t_end, dt=dt)
@@ -101,8 +101,36 @@ def test_time_to_return_and_excursions_against_dense_solutions() -> None:
         assert run.outcome[lane] == Outcome.RETURNED
         departures = scipy_motion(SCENE, run.starts[lane], t_end, 1e-10).sol(times).T - center(stable)
         outside = np.flatnonzero(oracle_size(SCENE, stable, departures) > 0.01)
-        assert run.time_to_return[lane] == pytest.approx(times[outside[-1]], abs=1e-9)
+        assert run.time_to_return[lane] == pytest.approx(times[outside[-1] + 1], abs=1e-9)
         np.testing.assert_allclose(run.excursion[lane], np.abs(departures[:, :2]).max(axis=0), rtol=1e-6)
+
+
+def test_a_run_that_ends_inside_by_chance_has_not_returned() -> None:
+    """At t_end some are in the ball and will leave it again: only what cannot leave has returned."""
+    (stable,) = equilibria("table_1", 0)
+    early = disturb(SCENE, stable, 2000, radius=0.5, t_end=25.0)
+    late = disturb(SCENE, stable, 2000, radius=0.5, t_end=60.0)
+    returned = early.outcome == Outcome.RETURNED
+    assert 0 < returned.sum() < 2000
+    np.testing.assert_array_equal(early.time_to_return[returned], late.time_to_return[returned])
+
+
+def test_balls_that_would_meet_are_refused() -> None:
+    (stable,) = equilibria("table_1", 0)
+    with pytest.raises(InputError, match=r"^return_radius = 5 rad: must not exceed"):
+        disturb(SCENE, stable, 1, return_radius=5.0)
+
+
+def test_equilibria_and_seeds_have_streams_of_their_own() -> None:
+    (first,), second = equilibria("table_1", 0), equilibria("table_1", 1)[0]
+    ball = [
+        run.size.to_ball.T @ (run.starts - center(e)).T
+        for e, seed in ((first, 7), (second, 7), (first, 8), (second, 6))
+        for run in [disturb(SCENE, e, 5, seed=seed, t_end=0.1)]
+    ]
+    for i in range(len(ball)):
+        for j in range(i):
+            assert not np.isclose(ball[i], ball[j]).any()
 
 
 def test_a_disturbance_inside_the_ball_returns_at_once_or_after_it_left() -> None:
@@ -142,10 +170,10 @@ def test_wrong_arguments_are_refused(arguments: dict[str, Any], message: str) ->
 @pytest.mark.nojit
 def test_a_decaying_force_and_a_foreign_equilibrium_are_refused() -> None:
     (stable,) = equilibria("table_1", 0)
-    with pytest.raises(InputError, match=r"^scene\.alpha = 0\.7: must be 0 1/s .*replace\(alpha=0\.0\)$"):
+    with pytest.raises(InputError, match=r"^scene\.alpha = 0\.7: must be 0 1/s .*replace\(alpha=0\.0\) and find"):
         disturb(SCENE.replace(alpha=0.7), stable, 1)
     with pytest.raises(
-        InputError, match=r"^equilibrium = \(1\.45058, -0\.232575\) rad: is none of this scene's equilibria"
+        InputError, match=r"^equilibrium = \(1\.45058, -0\.232575\) rad: must be one of this scene's equilibria"
     ):
         disturb(Scene(F0=-100.0, alpha=0.0), stable, 1)
 
