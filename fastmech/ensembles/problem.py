@@ -50,7 +50,7 @@ def scene_problem(scene: Scene, n: int, parameters: Mapping[str, ArrayLike], for
     own = own_values(parameters, scene.model_dump(), n)
     for name, values in own.items():
         for extreme in (values.min(), values.max()) if n else ():
-            scene.replace(**{name: extreme})
+            scene.replace(**{name: float(extreme)})
     values: Any = SimpleNamespace(**(scene.model_dump() | own))
     coefficients = reduce(values)
     columns = [np.broadcast_to(column, n if own else ()) for column in coefficients]

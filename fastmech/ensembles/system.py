@@ -98,13 +98,14 @@ class System:
         directory under a name made from everything that the user's functions depend on.
         """
         source = self._source()
-        functions = [self.rhs] if self.stop is None else [self.rhs, self.stop]
+        functions: list[Any] = [self.rhs] if self.stop is None else [self.rhs, self.stop]
         prints = [source, *(_fingerprint(function, set()) for function in functions)]
         digest = hashlib.sha256("\0".join(prints).encode()).hexdigest()[:16]
         path = cache_directory() / "systems" / f"system_{digest}.py"
         _write_once(path, source)
         module = types.ModuleType(f"fastmech_{path.stem}")
-        vars(module).update(__file__=str(path), rhs=inlined(self.rhs), stop=self.stop and inlined(self.stop))
+        compilable = [inlined(_copy(function, module.__name__)) for function in functions]
+        vars(module).update(zip(("rhs", "stop"), compilable, strict=False), __file__=str(path))
         sys.modules[module.__name__] = module  # where numba looks when it loads a kernel from the disk
         try:
             exec(compile(source, path, "exec"), vars(module))
@@ -136,6 +137,18 @@ def _check_arity(field: str, function: Any, arguments: int) -> None:
     taken = len(inspect.signature(function).parameters)
     if taken != arguments:
         raise InputError(f"{field}: takes {taken} arguments, must take {arguments}: t, states, parameters")
+
+
+def _copy(function: types.FunctionType, module: str) -> types.FunctionType:
+    """A function object of its own, said to be of ``module``.
+
+    Numba compiles one object once, whatever becomes of its globals; and a kernel from the disk wants to
+    import the module of every function in it, which for the user's may be a notebook.
+    """
+    code, known = function.__code__, function.__globals__
+    copy = types.FunctionType(code, known, function.__name__, function.__defaults__, function.__closure__)
+    copy.__module__ = module
+    return copy
 
 
 def _fingerprint(value: Any, seen: set[int]) -> str:

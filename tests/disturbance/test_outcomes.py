@@ -170,10 +170,13 @@ def test_wrong_arguments_are_refused(arguments: dict[str, Any], message: str) ->
 @pytest.mark.nojit
 def test_a_decaying_force_and_a_foreign_equilibrium_are_refused() -> None:
     (stable,) = equilibria("table_1", 0)
-    with pytest.raises(InputError, match=r"^scene\.alpha = 0\.7: must be 0 1/s .*replace\(alpha=0\.0\) and find"):
+    with pytest.raises(
+        InputError, match=r"^scene\.alpha = 0\.7: must be 0 1/s .*replace\(alpha=0\.0\) and find"
+    ):
         disturb(SCENE.replace(alpha=0.7), stable, 1)
     with pytest.raises(
-        InputError, match=r"^equilibrium = \(1\.45058, -0\.232575\) rad: must be one of this scene's equilibria"
+        InputError,
+        match=r"^equilibrium = \(1\.45058, -0\.232575\) rad: must be one of this scene's equilibria",
     ):
         disturb(Scene(F0=-100.0, alpha=0.0), stable, 1)
 

@@ -1,0 +1,186 @@
+"""Systems of one's own: the same engine, checked against SciPy, closed forms and published fractions."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import fastmech as fm
+from fastmech.ensembles.system import System
+
+SCANS = Path(__file__).parents[2] / "scans" / "systems"
+FREQUENCY = 2.0
+
+
+def oscillator(t: float, x: float, v: float, omega: float) -> tuple[float, float]:
+    return v, -omega * omega * x
+
+
+def falling(t: float, x: float, rate: float) -> tuple[float]:
+    return (-rate,)
+
+
+def below_zero(t: float, x: float) -> float:
+    return 7.0 if x < 0.0 else 0.0
+
+
+def scaled(t: float, x: float) -> tuple[float]:
+    return (FREQUENCY * x,)
+
+
+def shipped(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, SCANS / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_every_trajectory_may_have_its_own_parameters() -> None:
+    omega = np.linspace(0.5, 3.0, 300)
+    system = System(oscillator, ["x", "v"], {"omega": 1.0})
+    run = fm.integrate(
+        system, np.tile([1.0, 0.0], (300, 1)), 2.0, 0.01, "dop853", parameters={"omega": omega}
+    )
+    np.testing.assert_allclose(run.y[0, :, 0], np.cos(2.0 * omega), atol=1e-12)
+    np.testing.assert_allclose(run.y[0, :, 1], -omega * np.sin(2.0 * omega), atol=1e-12)
+
+
+def test_a_scene_s_own_parameters_are_as_so_many_scenes() -> None:
+    starts = np.random.default_rng(0).uniform(-2, 2, (5, 4))
+    own = {
+        "F0": np.array([0.0, 50.0, -20.0, 10.0, 5.0]),
+        "c1": np.linspace(0, 300, 5),
+        "m2": np.linspace(1, 5, 5),
+    }
+    for formulation in ("lagrange", "hamilton"):
+        together = fm.integrate(fm.Scene(), starts, 1.0, parameters=own, formulation=formulation).y[0]
+        for i, start in enumerate(starts):
+            scene = fm.Scene().replace(**{name: float(values[i]) for name, values in own.items()})
+            alone = fm.integrate(scene, start, 1.0, formulation=formulation).y[0, 0]
+            np.testing.assert_allclose(together[i], alone, rtol=0, atol=1e-14)
+
+
+def test_own_decay_rates_are_each_trajectory_s() -> None:
+    starts, alpha = np.tile([0.5, 0.1, 0.0, 0.0], (9, 1)), np.linspace(0.0, 4.0, 9)
+    run = fm.integrate(fm.Scene(), starts, 1.0, parameters={"alpha": alpha}).y[0]
+    for i in (0, 4, 8):
+        alone = fm.integrate(fm.Scene(alpha=float(alpha[i])), starts[0], 1.0).y[0, 0]
+        np.testing.assert_allclose(run[i], alone, rtol=0, atol=1e-14)
+
+
+def test_a_stopped_trajectory_keeps_its_state_time_and_code() -> None:
+    """x = x0 - t falls below zero at the first step after x0."""
+    x0 = np.concatenate([np.random.default_rng(1).uniform(0.1, 30.0, 5000), [1000.0]])
+    system = System(falling, ["x"], {"rate": 1.0}, stop=below_zero)
+    times = np.array([5.0, 20.0, 40.0])
+    run = fm.integrate(system, x0[:, None], t_eval=times, dt=0.125, method="euler", threads=1)
+    assert run.stop_code is not None
+    assert run.stop_time is not None
+    stopped = np.floor(x0[:-1] / 0.125) * 0.125 + 0.125
+    np.testing.assert_array_equal(run.stop_code, [*np.full(5000, 7), 0])
+    np.testing.assert_allclose(run.stop_time[:-1], stopped, atol=1e-9)
+    assert math.isnan(run.stop_time[-1])
+    for k, t in enumerate(times):
+        np.testing.assert_allclose(run.y[k, :-1, 0], x0[:-1] - np.minimum(stopped, t), atol=1e-9)
+    again = fm.integrate(system, x0[:, None], t_eval=times, dt=0.125, method="euler", threads=2)
+    np.testing.assert_array_equal(again.y, run.y)
+
+
+def test_a_trajectory_that_is_not_finite_is_taken_out_and_told() -> None:
+    system = System(falling, ["x"], {"rate": 1.0}, stop=below_zero)
+    run = fm.integrate(system, [[np.nan], [1.0]], 3.0, 0.1, "euler")
+    assert run.status.tolist() == [fm.Status.NOT_FINITE, fm.Status.OK]
+    assert run.stop_code is not None
+    assert run.stop_code.tolist() == [0, 7]
+
+
+def test_a_changed_constant_is_another_system(monkeypatch: pytest.MonkeyPatch) -> None:
+    first = fm.integrate(System(scaled, ["x"], {}), [[1.0]], 1.0, 0.01).y[0, 0, 0]
+    monkeypatch.setitem(scaled.__globals__, "FREQUENCY", 3.0)
+    second = fm.integrate(System(scaled, ["x"], {}), [[1.0]], 1.0, 0.01).y[0, 0, 0]
+    np.testing.assert_allclose([first, second], np.exp([2.0, 3.0]), rtol=1e-6)
+
+
+def test_a_second_process_loads_the_kernels_from_the_disk(tmp_path: Path) -> None:
+    script = f"import sys; sys.path.insert(0, {str(SCANS)!r}); import lorenz\n"
+    script += (
+        "s = lorenz.system.kernel.stats; print(sum(s.cache_hits.values()), sum(s.cache_misses.values()))"
+    )
+    told = [
+        subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
+        for _ in range(2)
+    ]
+    assert told[1].split() == ["1", "0"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((oscillator, ["x"], {"omega": 1.0}), "rhs: takes 4 arguments, must take 3"),
+        ((oscillator, ["x", "x"], {"omega": 1.0}), "state = ['x', 'x']: must be different Python names"),
+        ((oscillator, ["x", "2v"], {"omega": 1.0}), "state = ['x', '2v']: must be different Python names"),
+        ((oscillator, ["x", "v"], {"omega": 1.0}, below_zero), "stop: takes 2 arguments, must take 3"),
+        (("x", ["x", "v"], {"omega": 1.0}), "rhs = 'x': must be a plain Python function"),
+    ],
+)
+def test_wrong_systems_are_refused(arguments: Any, message: str) -> None:
+    with pytest.raises(fm.InputError) as refusal:
+        System(*arguments)
+    assert str(refusal.value).startswith(message)
+
+
+@pytest.mark.parametrize(
+    ("own", "message"),
+    [
+        ({"omge": [1.0]}, "parameters.omge: unknown name; did you mean 'omega'?"),
+        ({"omega": 1.0}, "parameters.omega: has shape (), must be (1,), one value a start"),
+        ({"omega": [np.nan]}, "parameters.omega: must be finite"),
+        ({"omega": ["x"]}, "parameters.omega: must be numbers"),
+    ],
+)
+def test_wrong_parameters_are_refused(own: dict[str, Any], message: str) -> None:
+    with pytest.raises(fm.InputError) as refusal:
+        fm.integrate(System(oscillator, ["x", "v"], {"omega": 1.0}), [[1.0, 0.0]], 1.0, parameters=own)
+    assert str(refusal.value) == message
+
+
+def test_parameters_that_no_scene_may_have_are_refused() -> None:
+    with pytest.raises(fm.InputError, match=r"^scene\.m1 = 0\.0: "):
+        fm.integrate(fm.Scene(), np.zeros((2, 4)), 1.0, parameters={"m1": [1.0, 0.0]})
+
+
+@pytest.mark.parametrize("name", ["pendulum", "duffing", "lorenz"])
+def test_shipped_systems_move_as_scipy_says(name: str) -> None:
+    system = shipped(name).system
+    start = np.array([0.3, -0.4, 0.0][: len(system.state)])
+    p = list(system.parameters.values())
+
+    def rhs(t: float, y: Any) -> Any:
+        return system.rhs(t, *y, *p)
+
+    right = solve_ivp(rhs, (0.0, 5.0), start, method="DOP853", rtol=1e-12, atol=1e-12).y[:, -1]
+    np.testing.assert_allclose(fm.integrate(system, start, 5.0, 0.02, "dop853").y[0, 0], right, atol=1e-10)
+
+
+def test_published_shares_of_the_pendulum_and_the_lorenz_system() -> None:
+    """Within three standard errors of the published fraction, both samples' errors counted."""
+    pendulum, lorenz = shipped("pendulum"), shipped("lorenz")
+    rng = np.random.default_rng(5)
+    middle = np.arcsin(0.5)
+    starts = rng.uniform([middle - np.pi, -10.0], [middle + np.pi, 10.0], (2000, 2))
+    rest = np.abs(fm.integrate(pendulum.system, starts, 300.0, 0.1).y[0, :, 1]) < 1e-3
+    assert abs(rest.mean() - pendulum.PUBLISHED) < 3 * np.sqrt(0.152 * 0.848 * (1 / 2000 + 1 / 10_000))
+    starts = rng.uniform([-10.0, -20.0, 0.0], [10.0, 20.0, 0.0], (2000, 3))
+    escaped = fm.integrate(lorenz.system, starts, 300.0, 0.02).stop_code == 1
+    assert abs(escaped.mean() - 0.820) < 3 * np.sqrt(0.820 * 0.180 * (1 / 2000 + 1 / 4000))
