@@ -25,14 +25,15 @@ class Row:
     threads: int
     trajectories: int
     rate: float  #: trajectories per second, median of warm calls
-    max_error: float  #: largest error of any component of any final state [rad, rad/s]
-    median_error: float  #: median over trajectories of the largest error of a component
+    compared: int  #: trajectories whose error is known, the same ones for every entrant
+    max_error: float  #: largest error of any component of any of these final states [rad, rad/s]
+    median_error: float  #: median over them of the largest error of a component
     first_call: float  #: s, on a few trajectories: compiling or loading included
 
 
 def measure(problem: Problem, entrant: Entrant, reference: NDArray[np.float64], threads: int) -> Row:
     """Time an entrant on its share of the problem's starts."""
-    n = max(8, round(len(problem.starts) * entrant.share))
+    n = max(len(reference), round(len(problem.starts) * entrant.share))
     starts = problem.starts[:n]
     began = time.perf_counter()
     entrant.run(problem, starts[:8], threads)
@@ -42,8 +43,7 @@ def measure(problem: Problem, entrant: Entrant, reference: NDArray[np.float64], 
         began = time.perf_counter()
         final = entrant.run(problem, starts, threads)
         seconds.append(time.perf_counter() - began)
-    m = min(n, len(reference))
-    errors = np.abs(final[:m] - reference[:m]).max(axis=1)
+    errors = np.abs(final[: len(reference)] - reference).max(axis=1)
     return Row(
         problem.name,
         entrant.family,
@@ -51,6 +51,7 @@ def measure(problem: Problem, entrant: Entrant, reference: NDArray[np.float64], 
         threads,
         n,
         n / statistics.median(seconds),
+        len(reference),
         float(errors.max()),
         float(np.median(errors)),
         first_call,

@@ -48,12 +48,12 @@ def scene_problem(scene: Scene, n: int, parameters: Mapping[str, ArrayLike], for
         InputError: an unknown parameter, or values that no scene may have.
     """
     own = own_values(parameters, scene.model_dump(), n)
-    for name, values in own.items():
-        for extreme in (values.min(), values.max()) if n else ():
+    for name, column in own.items():
+        for extreme in (column.min(), column.max()) if n else ():
             scene.replace(**{name: float(extreme)})
-    values: Any = SimpleNamespace(**(scene.model_dump() | own))
-    coefficients = reduce(values)
-    columns = [np.broadcast_to(column, n if own else ()) for column in coefficients]
+    scenes: Any = SimpleNamespace(**(scene.model_dump() | own))
+    coefficients = reduce(scenes)
+    columns = [np.broadcast_to(value, n if own else ()) for value in coefficients]
     params = np.stack(columns, axis=-1).astype(np.float64)
     rhs = right_hand_side(coefficients, formulation)
     if formulation == "lagrange":

@@ -3,9 +3,10 @@
 Measured on the mechanism (largest error of final states, right-hand sides a trajectory): the Adams methods
 need the fewest right-hand sides at every accuracy, because each step costs one or two. ``ab6`` leads down to
 errors of 1e-6, ``ab8`` to 1e-8, ``abm12`` below; of the Runge-Kutta methods ``tsit5`` leads down to 1e-4,
-``dop853`` to 1e-8 and ``hairer10`` below. Choose a Runge-Kutta method where outputs are close together or
-unevenly spaced (an Adams method starts anew whenever its step changes), where trajectories are short, or
-where the step is large for the system: the Adams methods' stability intervals are short and end abruptly,
+``verner6`` and ``dop853`` to 1e-7, ``hairer10`` below. Choose a Runge-Kutta method where outputs are close
+together or unevenly spaced (an Adams method starts anew whenever its step changes), where trajectories are
+short, or where the step is large for the system: the Adams methods' stability intervals are short and end
+abruptly,
 
     ========  ====  ======  =====  =====  ======  ======
     method    ab5   ab6     ab8    abm8   abm10   abm12
@@ -28,7 +29,8 @@ _CORRECTED = (
     "Moulton, New Methods in Exterior Ballistics, 1926, with Adams-Bashforth of one order less as predictor"
 )
 
-_ADAMS = (
+_ALL: tuple[Method, ...] = (
+    *map(RungeKutta, TABLEAUS.values()),
     Adams("ab5", 5, False, TABLEAUS["tsit5"], _EXPLICIT),
     Adams("ab6", 6, False, TABLEAUS["tsit5"], _EXPLICIT),
     Adams("ab8", 8, False, TABLEAUS["verner7"], _EXPLICIT),
@@ -38,9 +40,7 @@ _ADAMS = (
 )
 
 #: Every method by its name.
-METHODS: dict[str, Method] = {
-    method.name: method for method in (*map(RungeKutta, TABLEAUS.values()), *_ADAMS)
-}
+METHODS: dict[str, Method] = {method.name: method for method in _ALL}
 
 
 def find_method(name: str) -> Method:

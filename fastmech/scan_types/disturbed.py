@@ -13,7 +13,7 @@ from fastmech.disturbance.ensemble import DisturbedEnsemble, disturb, equilibria
 from fastmech.disturbance.linear_range import linear_range
 from fastmech.disturbance.outcome import Outcome
 from fastmech.results import Dataset, Variable, flags
-from fastmech.scan_types.request import MethodName, RunContext, Scan
+from fastmech.scan_types.request import MethodName, RunContext, Scan, not_finite
 from fastmech.scene import Scene
 
 if TYPE_CHECKING:
@@ -144,6 +144,7 @@ class Disturbed(Scan):
         attrs = self.model_dump(exclude={"scene"}) | {
             "distribution": "uniform in the ball of the given radius, kinetic-energy norm at the equilibrium"
         }
+        attrs |= not_finite(variables["outcome"].data == Outcome.NOT_FINITE)
         return Dataset(variables, attrs)
 
     @staticmethod

@@ -66,9 +66,9 @@ class DisturbedMotionScan(Scan):
                 "disturbance of phi, theta, phi', theta', linearized motion",
             ),
         }
-        return Dataset(
-            variables, {"method": self.method, "dt": self.dt, "disturbance": np.array(disturbance)}
-        )
+        failed = [not np.isfinite(motion.nonlinear).all() for motion in motions]
+        attrs = {"method": self.method, "dt": self.dt, "disturbance": np.array(disturbance)}
+        return Dataset(variables, attrs | not_finite(np.array(failed)))
 
     @staticmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:

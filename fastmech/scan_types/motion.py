@@ -10,12 +10,13 @@ from pydantic import Field
 
 from fastmech.ensembles.balance import energy_balance
 from fastmech.ensembles.integrate import integrate
+from fastmech.ensembles.status import Status
 from fastmech.mechanism.coefficients import force
 from fastmech.mechanism.geometry import constraints, positions
 from fastmech.mechanism.hamilton import momenta
 from fastmech.mechanism.reactions import reactions
 from fastmech.results import Dataset, Variable
-from fastmech.scan_types.request import MethodName, RunContext, Scan
+from fastmech.scan_types.request import MethodName, RunContext, Scan, not_finite
 from fastmech.scene import Scene
 
 if TYPE_CHECKING:
@@ -114,7 +115,8 @@ class Motion(Scan):
                 )
             },
         }
-        attrs = {"method": run.method, "dt": run.dt, "steps": run.steps, "status": int(run.status[0])}
+        attrs = {"method": run.method, "dt": run.dt, "steps": run.steps}
+        attrs |= not_finite(run.status != Status.OK)
         return Dataset(variables, attrs)
 
     @staticmethod

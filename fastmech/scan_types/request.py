@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from fastmech.ensembles.run import Progress
@@ -66,6 +68,11 @@ class Scan(BaseModel, ABC):
     @abstractmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
         """Pictures of a result, by name. ``scene`` are the scene's parameters with this scan's changes."""
+
+
+def not_finite(failed: NDArray[np.bool_]) -> dict[str, int]:
+    """The attribute of a section that tells how many of its trajectories are not finite."""
+    return {"not_finite": int(np.count_nonzero(failed))}
 
 
 @dataclass(frozen=True)

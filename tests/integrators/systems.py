@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.run import run_ensemble
-from fastmech.integrators.tableaus import METHODS
+from fastmech.integrators.methods import METHODS
 from fastmech.jit import RHS_SIGNATURE, kernel
 from fastmech.scene import Scene
 
@@ -33,6 +33,13 @@ def forced_linear(t: float, Y: Floats, dY: Floats, p: Floats) -> None:
         x0, x1 = Y[0, i] - u0, Y[1, i] - u1
         dY[0, i] = p[0, i] * x0 + p[1, i] * x1 + v0
         dY[1, i] = -p[1, i] * x0 + p[2, i] * x1 + v1
+
+
+@kernel(RHS_SIGNATURE)
+def driven(t: float, Y: Floats, dY: Floats, p: Floats) -> None:
+    """y' = p0 (y - sin(p1 t)) + p1 cos(p1 t)."""
+    for i in range(Y.shape[1]):
+        dY[0, i] = p[0, i] * (Y[0, i] - math.sin(p[1, i] * t)) + p[1, i] * math.cos(p[1, i] * t)
 
 
 @dataclass(frozen=True)
@@ -85,3 +92,12 @@ def mechanism_error(method: str, steps: int) -> float:
     run = integrate(scene, start, dt=1.0 / steps, method=method, t_eval=times[:3])
     assert run.steps == 5 * steps
     return float(np.abs(run.y[:, 0] - states[:3]).max())
+
+
+def driven_error(method: str, steps: int) -> float:
+    """Error after two seconds of a slow system that a fast force drives: large errors at stable steps."""
+    rate, frequency, start, t = -0.5, 100.0, 0.5, 2.0
+    times, params = np.array([0.0, t]), np.array([rate, frequency])
+    run = run_ensemble(driven, params, np.array([[start]]), times, t / steps, METHODS[method])
+    exact = math.sin(frequency * t) + start * math.exp(rate * t)
+    return abs(float(run.states[-1, 0, 0]) - exact)
