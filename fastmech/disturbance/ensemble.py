@@ -16,7 +16,7 @@ from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.status import Status
 from fastmech.equilibria.find import Equilibria, Equilibrium, find_equilibria
 from fastmech.errors import InputError
-from fastmech.integrators.tableaus import find_method
+from fastmech.integrators.methods import find_method
 from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene

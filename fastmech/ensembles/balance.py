@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import run_ensemble
 from fastmech.errors import InputError
-from fastmech.integrators.tableaus import find_method
+from fastmech.integrators.methods import find_method
 from fastmech.kernels.work import lagrange_work
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import kinetic_energy, potential_energy, potential_gradient, unit
@@ -51,7 +51,7 @@ def energy_balance(
         y0: start, shape (4,): phi, theta [rad], phi', theta' [rad/s].
         t_eval: output times [s], rising, not negative.
         dt: longest step [s].
-        method: a name from :data:`fastmech.integrators.tableaus.METHODS`.
+        method: a name from :data:`fastmech.integrators.methods.METHODS`.
 
     Raises:
         InputError: an argument is wrong.

@@ -15,7 +15,7 @@ from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.stopping import STOP_CODE, STOP_TIME
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError
-from fastmech.integrators.tableaus import find_method
+from fastmech.integrators.methods import find_method
 from fastmech.kernels.select import FORMULATIONS
 from fastmech.scene import Scene, nearest
 
@@ -57,7 +57,7 @@ def integrate(
             Angles are not wrapped.
         t_end: end of the run [s]; the last of ``t_eval`` by default.
         dt: longest step [s]. Each interval between outputs is divided into equal steps not longer than it.
-        method: a name from :data:`fastmech.integrators.tableaus.METHODS`.
+        method: a name from :data:`fastmech.integrators.methods.METHODS`.
         t_eval: output times [s], rising, not negative; only ``t_end`` by default.
         parameters: values of parameters, by name, that differ between trajectories, each of shape (n,).
         formulation: of a scene: "lagrange" integrates angles and rates (paper (13)), "hamilton" angles and
@@ -74,7 +74,7 @@ def integrate(
         InputError: an argument is wrong.
     """
     dt = checks.number("dt", dt, "s", above=0.0)
-    tableau = find_method(method)
+    formula = find_method(method)
     outputs = _output_times(t_end, t_eval)
     starts, problem = _problem(scene, y0, parameters or {}, formulation)
     times = np.concatenate([[0.0], outputs])
@@ -84,7 +84,7 @@ def integrate(
         problem.inward(starts),
         times,
         dt,
-        tableau,
+        formula,
         problem.observation,
         threads=threads,
         progress=progress,

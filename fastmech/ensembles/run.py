@@ -19,8 +19,8 @@ from fastmech.ensembles.spans import Span, spans
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
 from fastmech.ensembles.threads import thread_count
-from fastmech.integrators.explicit import integrate_block, observe_nothing
-from fastmech.integrators.tableau import Tableau
+from fastmech.integrators.explicit import observe_nothing
+from fastmech.integrators.method import Method
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int], None]
@@ -68,7 +68,7 @@ def run_ensemble(
     starts: ArrayLike,
     times: ArrayLike,
     dt: float,
-    tableau: Tableau,
+    method: Method,
     observation: Observation = NOTHING,
     *,
     threads: int | None = None,
@@ -92,7 +92,8 @@ def run_ensemble(
     # Small ensembles are shared among the threads too, in whole vectors.
     width = max(1, min(block_lanes, -(-len(begin) // (8 * workers)) * 8))
     chunk = width * CHUNK_BLOCKS if observation.stops else width
-    way = list(spans(clock, dt, CALL_STEPS_WITH_STOPS if observation.stops else CALL_STEPS))
+    most = CALL_STEPS_WITH_STOPS * (1 + method.start_steps) if observation.stops else CALL_STEPS
+    way = list(spans(clock, dt, most))
     ensemble = Ensemble(
         states=np.empty((clock.size - 1, *begin.shape)),
         records=np.empty((observation.record.size, len(begin))),
@@ -107,7 +108,7 @@ def run_ensemble(
         for span in way:
             if interrupted.is_set() or not lanes.members.size:
                 break
-            reached = _advance(rhs, observation, tableau, lanes, span, width)
+            reached = _advance(rhs, observation, method, lanes, span, width)
             _store(ensemble, lanes, span, reached, observation.stops)
         finite = np.isfinite(ensemble.states[:, members]).all(axis=(0, 2))
         ensemble.status[members] = np.where(finite, Status.OK, Status.NOT_FINITE)
@@ -140,22 +141,17 @@ class _Lanes:
 
 
 def _advance(
-    rhs: Any, observation: Observation, tableau: Tableau, lanes: _Lanes, span: Span, width: int
+    rhs: Any, observation: Observation, method: Method, lanes: _Lanes, span: Span, width: int
 ) -> Floats:
     """Take lanes through a span, block by block; their states at its times, shape (pieces, dim, lanes)."""
-    packed, nodes = tableau.packed, np.asarray(tableau.c, dtype=np.float64)
     reached = np.empty((span.steps.size, *lanes.Y.shape))
     for first in range(0, lanes.members.size, width):
         part = slice(first, first + width)
         Y, params, record = (a[:, part].copy() for a in (lanes.Y, lanes.params, lanes.record))
         out = np.empty((span.steps.size, *Y.shape))
-        integrate_block(
+        method.run(
             rhs,
             observation.observe,
-            packed.start,
-            packed.stage,
-            packed.weight,
-            nodes,
             span.times,
             span.steps,
             Y,

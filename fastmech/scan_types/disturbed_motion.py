@@ -11,7 +11,7 @@ from pydantic import Field
 from fastmech.disturbance.ensemble import equilibria_to_disturb
 from fastmech.disturbance.motion import disturbed_motion
 from fastmech.results import Dataset, Variable
-from fastmech.scan_types.request import MethodName, RunContext, Scan
+from fastmech.scan_types.request import MethodName, RunContext, Scan, not_finite
 from fastmech.scene import Scene
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 
 from fastmech.ensembles.run import Progress
 from fastmech.errors import InputError
-from fastmech.integrators.tableaus import find_method
+from fastmech.integrators.methods import find_method
 from fastmech.results import Dataset, check_name
 from fastmech.scene import Scene, explain, nearest, read_toml
 

@@ -11,7 +11,7 @@ from ensembles.starts import Floats, random_starts
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.run import run_ensemble
 from fastmech.ensembles.threads import thread_count
-from fastmech.integrators.tableaus import METHODS
+from fastmech.integrators.methods import METHODS
 from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
@@ -30,7 +30,7 @@ def states(block_lanes: int, threads: int, method: str = "rk4", starts: Floats =
     ).states
 
 
-@pytest.mark.parametrize("method", ["rk4", "dop853"])
+@pytest.mark.parametrize("method", ["rk4", "dop853", "ab6", "abm12"])
 @pytest.mark.parametrize("block_lanes", [1, 7, 64, 256, 1000, 5000])
 def test_block_size_does_not_matter(method: str, block_lanes: int) -> None:
     np.testing.assert_array_equal(states(block_lanes, 1, method), states(256, 1, method))

@@ -13,7 +13,7 @@ from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.run import run_ensemble
 from fastmech.ensembles.spans import output_steps
 from fastmech.errors import InputError
-from fastmech.integrators.tableaus import METHODS
+from fastmech.integrators.methods import METHODS
 from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene

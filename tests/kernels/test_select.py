@@ -25,9 +25,9 @@ def test_a_scene_is_given_the_kernel_of_its_terms(formulation: str, combination:
     [
         ({"F0": -1e-300}, "damped_decaying"),
         ({"F0": 0.0, "alpha": 0.0}, "damped"),
-        ({"beta": 5e-324, "F0": 0.0}, "damped"),
+        ({"beta": 1e-300, "F0": 0.0}, "damped"),
         ({"beta": 0.0, "F0": -0.0}, "free"),
-        ({"alpha": 5e-324}, "damped_decaying"),
+        ({"alpha": 1e-300}, "damped_decaying"),
     ],
 )
 def test_edges(change: dict[str, Any], combination: str) -> None:

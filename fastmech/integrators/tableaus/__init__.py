@@ -17,10 +17,3 @@ TABLEAUS: dict[str, Tableau] = {
     for value in vars(module).values()
     if isinstance(value, Tableau)
 }
-
-METHODS = TABLEAUS
-
-
-def find_method(name: str) -> Tableau:
-    """The tableau of this name; superseded by :func:`fastmech.integrators.methods.find_method`."""
-    return TABLEAUS[name]
