@@ -1,1 +1,1 @@
-"""Equilibria over parameters: certified maps, sheets, folds, wells, and loads at which a position snaps."""
+"""Equilibria over parameters: certified maps, sheets, folds, wells, and the load at which a position snaps."""
