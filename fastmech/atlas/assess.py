@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 from fastmech.atlas.quartic import factor, quadratic, sort_roots
 from fastmech.atlas.verdicts import (
     ASYMPTOTIC,
+    CRITICAL,
     ROUNDING,
     STABLE,
+    UNSTABLE,
     coefficient_errors,
     hurwitz_code,
     spectrum_code,
@@ -41,9 +43,7 @@ def squares(s: SmallMotion) -> tuple[float, float]:
 
 
 @inlined
-def decay_rate(
-    s: SmallMotion, spring: float, low: float, high: float, p3: float, p1: float, p0: float
-) -> float:
+def decay_rate(s: SmallMotion, spring: float, low: float, high: float, p3: float, p1: float, p0: float) -> float:
     """Rate [1/s] of the mode that the damper reaches least; see ``modes.slowest_decay``."""
     split = high - low
     if not split > 0.0 or p3 == 0.0:
@@ -146,3 +146,5 @@ def assess(
                     joint = ASYMPTOTIC
             verdict[row, i, 0], verdict[row, i, 1] = by_minors, hurwitz_code(p, errors)
             verdict[row, i, 2], verdict[row, i, 3] = by_spectrum, joint
+
+
