@@ -9,9 +9,12 @@ from pathlib import Path
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from fastmech.errors import InputError
+
+#: Bounds within which ratios and products of parameters stay in double precision.
+SMALLEST, LARGEST = 1e-30, 1e30
 
 
 def _python_number(value: Any) -> Any:
@@ -19,10 +22,22 @@ def _python_number(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-Number = Annotated[float, BeforeValidator(_python_number)]
-Positive = Annotated[Number, Field(gt=0)]
-NonNegative = Annotated[Number, Field(ge=0)]
+def _not_huge(value: float) -> float:
+    if abs(value) > LARGEST:
+        raise ValueError(f"must not exceed {LARGEST:g} in magnitude")
+    return value
 
+
+def _not_tiny(value: float) -> float:
+    if value < SMALLEST:
+        raise ValueError(f"must not be less than {SMALLEST:g}")
+    return value
+
+
+_Float = Annotated[float, BeforeValidator(_python_number)]
+Number = Annotated[_Float, AfterValidator(_not_huge)]
+Positive = Annotated[Number, Field(gt=0), AfterValidator(_not_tiny)]
+NonNegative = Annotated[Number, Field(ge=0)]
 
 _UNITS: dict[str, str] = {
     "m1": "kg",
@@ -118,5 +133,5 @@ def explain(error: ValidationError, where: str, model: type[BaseModel]) -> str:
         return f"{path}: unknown name; {nearest(str(first['loc'][-1]), list(model.model_fields))}"
     if first["type"] == "missing":
         return f"{path}: missing"
-    message = first["msg"]
+    message = first["msg"].removeprefix("Value error, ")
     return f"{path} = {first['input']!r}: {message[0].lower() + message[1:]}"

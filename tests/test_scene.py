@@ -65,7 +65,9 @@ def test_every_parameter_has_a_unit_and_a_description() -> None:
 @pytest.mark.parametrize("value", [0.0, -3.0, -5e-324])
 def test_what_must_be_positive(name: str, value: float) -> None:
     refused(f"scene.{name} = {value!r}", "greater than 0", **{name: value})
-    assert getattr(Scene(**{name: 5e-324}), name) == 5e-324
+    assert getattr(Scene(**{name: 1e-30}), name) == 1e-30
+    with pytest.raises(InputError, match=rf"^scene\.{name} = 9e-31: must not be less than 1e-30$"):
+        Scene(**{name: 9e-31})
 
 
 @pytest.mark.parametrize("name", NOT_NEGATIVE)

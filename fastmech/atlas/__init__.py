@@ -1,1 +1,1 @@
-"""Equilibria over parameters: certified maps, sheets, folds, wells, and the load at which a position snaps."""
+"""Equilibria over parameters: certified maps, sheets, folds, wells, and the load at which one snaps."""

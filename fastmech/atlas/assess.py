@@ -9,10 +9,8 @@ from numpy.typing import NDArray
 from fastmech.atlas.quartic import factor, quadratic, sort_roots
 from fastmech.atlas.verdicts import (
     ASYMPTOTIC,
-    CRITICAL,
     ROUNDING,
     STABLE,
-    UNSTABLE,
     coefficient_errors,
     hurwitz_code,
     spectrum_code,
@@ -43,7 +41,9 @@ def squares(s: SmallMotion) -> tuple[float, float]:
 
 
 @inlined
-def decay_rate(s: SmallMotion, spring: float, low: float, high: float, p3: float, p1: float, p0: float) -> float:
+def decay_rate(
+    s: SmallMotion, spring: float, low: float, high: float, p3: float, p1: float, p0: float
+) -> float:
     """Rate [1/s] of the mode that the damper reaches least; see ``modes.slowest_decay``."""
     split = high - low
     if not split > 0.0 or p3 == 0.0:
@@ -106,7 +106,7 @@ def assess(
     decay: Floats,
     verdict: Codes,
 ) -> None:
-    """Stability of the first ``count`` equilibria of every row; the other slots are left alone.
+    """Stability of the first ``count`` equilibria of every row; the other slots get NaN and -1.
 
     Args:
         coefficients: (n, 8) rows of ``fastmech.mechanism.coefficients.Coefficients``, the force frozen.
@@ -122,6 +122,9 @@ def assess(
     for row in range(coefficients.shape[0]):
         mass, slider, lift, spring, gravity, force, damping, _ = coefficients[row]
         loads = abs(lift) + (mass + 2.0) * gravity + 2.0 * spring + 2.0 * abs(force)
+        for i in range(count[row], phi.shape[1]):
+            hessian[row, i], eigenvalues[row, i], verdict[row, i] = np.nan, complex(np.nan, np.nan), -1
+            frequency[row, i], decay[row, i] = np.nan, np.nan
         for i in range(count[row]):
             s = small_motion(phi[row, i], theta[row, i], mass, slider, lift, spring, gravity, force, damping)
             hessian[row, i, 0], hessian[row, i, 1], hessian[row, i, 2] = s.k11, s.k12, s.k22
@@ -146,5 +149,3 @@ def assess(
                     joint = ASYMPTOTIC
             verdict[row, i, 0], verdict[row, i, 1] = by_minors, hurwitz_code(p, errors)
             verdict[row, i, 2], verdict[row, i, 3] = by_spectrum, joint
-
-

@@ -102,11 +102,16 @@ def spectrum_code(
     """
     settled = True
     for root in roots:
-        r = abs(root)
+        if root.imag < 0.0:
+            continue  # its conjugate says the same
+        r = np.sqrt(root.real * root.real + root.imag * root.imag)
         h = e[3] + r * (e[2] + r * (e[1] + r * e[0]))
         h += ROUNDING * (abs(p[3]) + r * (abs(p[2]) + r * (abs(p[1]) + r * (abs(p[0]) + r))))
-        slope = abs(p[2] + root * (2.0 * p[1] + root * (3.0 * p[0] + root * 4.0)))
-        error = min(4.0 * h / slope, h**0.25) if slope > 0.0 else h**0.25
+        derivative = p[2] + root * (2.0 * p[1] + root * (3.0 * p[0] + root * 4.0))
+        slope = np.sqrt(derivative.real * derivative.real + derivative.imag * derivative.imag)
+        error = np.sqrt(np.sqrt(h))
+        if slope > 0.0:
+            error = min(error, 4.0 * h / slope)
         if root.real > error:
             return UNSTABLE
         if root.real >= -error:

@@ -35,17 +35,14 @@ def command(request_file: Path, out: Path | None, fresh: bool, threads: int | No
 
 
 def _report(target: Path) -> None:
-    from fastmech.ensembles.status import Status
     from fastmech.store.read import open_results
 
     with open_results(target) as results:
         for name in results:
             click.echo(f"{results[name].attrs['wall_time_s']:9.2f} s  {name}")
-            if results[name].attrs.get("not_finite", 0):
-                click.echo(
-                    f"{name}: {results[name].attrs['not_finite']} trajectories: {Status.NOT_FINITE.advice}",
-                    err=True,
-                )
+            failed = results[name].attrs.get("failed", 0)
+            if failed:
+                click.echo(f"{name}: {failed} trajectories failed; use a smaller dt", err=True)
         click.echo(f"{results.attrs['wall_time_s']:9.2f} s  in all")
     click.echo(f"Results: {target}")
     click.echo(f"Next:    fastmech info {target}")

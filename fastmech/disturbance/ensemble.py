@@ -11,6 +11,7 @@ from fastmech.disturbance.observe import EXCURSION_PHI, EXCURSION_THETA, LAST_OU
 from fastmech.disturbance.outcome import Outcome, resting_place
 from fastmech.disturbance.size import Size, size_at
 from fastmech.ensembles import checks
+from fastmech.ensembles.plausible import judge
 from fastmech.ensembles.run import Observation, Progress, run_ensemble
 from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.status import Status
@@ -31,6 +32,7 @@ class DisturbedEnsemble:
     equilibria: Equilibria  #: all equilibria of the scene
     index: int  #: which of them was disturbed
     size: Size  #: the norm in which radius and ball are measured
+    t_end: float  #: s
     starts: Floats  #: states at t = 0, shape (n, 4)
     final: Floats  #: states at t_end, shape (n, 4)
     outcome: NDArray[np.int8]  #: :class:`Outcome`, shape (n,)
@@ -116,7 +118,9 @@ def disturb(
     outcome[(end_index >= 0) & stable[end_index]] = Outcome.ELSEWHERE
     outcome[(end_index >= 0) & ~stable[end_index]] = Outcome.AT_UNSTABLE
     outcome[(end_index == index) & ~turned & stable[end_index]] = Outcome.RETURNED
-    outcome[run.status != Status.OK] = Outcome.NOT_FINITE
+    status = judge(run.status, starts, final, reduce(scene))
+    outcome[status == Status.STEP_TOO_LARGE] = Outcome.STEP_TOO_LARGE
+    outcome[status == Status.NOT_FINITE] = Outcome.NOT_FINITE
     last_outside, step = run.records[LAST_OUTSIDE], times[-1] / output_steps(times, dt)[0]
     left = (size(starts - center) > return_radius) | (last_outside > 0.0)
     inside_since = np.where(left, last_outside + step, 0.0)
@@ -124,6 +128,7 @@ def disturb(
         equilibria=equilibria,
         index=index,
         size=size,
+        t_end=float(times[-1]),
         starts=starts,
         final=final,
         outcome=outcome,

@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 SMALLEST, LARGEST, GRID = 1e-6, np.pi, 40
 BISECTIONS = 12
-OUTPUTS = 50
+OUTPUTS = 200
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ def linear_range(
     """Size of disturbance up to which the linearized motion stays within ``tolerance`` of the nonlinear one.
 
     The deviation of a disturbance is the maximum of size(nonlinear - linearized) divided by that of
-    size(linearized), both over 51 evenly spaced times of [0, horizon], in the norm of
+    size(nonlinear), both over 201 evenly spaced times of [0, horizon], in the norm of
     :class:`fastmech.disturbance.size.Size`. Along every direction (uniform on the sphere) sizes from 1e-6 rad
     to pi rad are tried upwards, and the first crossing of the tolerance is refined by bisection to one part
     in 10,000.
@@ -69,7 +69,7 @@ def linear_range(
         motion = disturbed_motion(scene, equilibrium, starts, times, dt=dt, threads=threads)
         apart = size(motion.nonlinear - motion.linearized).max(axis=0)
         with np.errstate(invalid="ignore"):
-            return np.asarray((apart / size(motion.linearized).max(axis=0)).reshape(sizes.shape))
+            return np.asarray((apart / size(motion.nonlinear).max(axis=0)).reshape(sizes.shape))
 
     grid = np.geomspace(SMALLEST, LARGEST, GRID)
     # What is not finite deviates: the comparison is written so that NaN counts as exceeding.

@@ -26,6 +26,7 @@ class Outcome(IntEnum):
     AT_UNSTABLE = 2
     UNDECIDED = 3
     NOT_FINITE = 4
+    STEP_TOO_LARGE = 5
 
     @property
     def advice(self) -> str:
@@ -38,7 +39,8 @@ _ADVICE = {
     Outcome.ELSEWHERE: "the same at another stable equilibrium, or at this one some turns further",
     Outcome.AT_UNSTABLE: "still in the ball of an unstable equilibrium: it will leave; use a larger t_end",
     Outcome.UNDECIDED: "still moving at t_end; use a larger t_end",
-    Outcome.NOT_FINITE: "NaN or infinity: the step is too large; use a smaller dt",
+    Outcome.NOT_FINITE: "became NaN or infinite on the way; use a smaller dt",
+    Outcome.STEP_TOO_LARGE: "has energy at the end that the motion cannot have; use a smaller dt",
 }
 
 

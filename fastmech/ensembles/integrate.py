@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.ensembles import checks
+from fastmech.ensembles.plausible import judge
 from fastmech.ensembles.problem import Problem, scene_problem, system_problem
 from fastmech.ensembles.run import Progress, run_ensemble
 from fastmech.ensembles.spans import output_steps
@@ -66,9 +67,10 @@ def integrate(
         progress: is told how many trajectories have finished since its last call.
 
     Returns:
-        states at the output times and the status of every trajectory. A start that is not finite gives a
-        trajectory that is not finite and leaves the others as they are. One that a system's stopping
-        condition ends keeps the state in which it stopped.
+        states at the output times and the status of every trajectory: a start that is not finite, a motion
+        that became so, and a scene's motion that ends with an energy it cannot have (the step is too large)
+        are told apart and leave the others as they are. There is no error estimate: halve ``dt`` and
+        compare. A trajectory that a system's stopping condition ends keeps the state in which it stopped.
 
     Raises:
         InputError: an argument is wrong.
@@ -92,11 +94,12 @@ def integrate(
     steps = output_steps(times, dt)
     longest = float(np.max(np.diff(times) / np.maximum(steps, 1)))
     y, total = problem.outward(ensemble.states), int(steps.sum())
+    status = judge(ensemble.status, starts, y[-1], problem.coefficients)
     if not problem.observation.stops:
-        return Trajectories(outputs, y, ensemble.status, total, longest, method)
+        return Trajectories(outputs, y, status, total, longest, method)
     code = ensemble.records[STOP_CODE]
     time = np.where(code != 0.0, ensemble.records[STOP_TIME], np.nan)
-    return Trajectories(outputs, y, ensemble.status, total, longest, method, code.astype(np.int64), time)
+    return Trajectories(outputs, y, status, total, longest, method, code.astype(np.int64), time)
 
 
 def _output_times(t_end: float | None, t_eval: ArrayLike | None) -> NDArray[np.float64]:

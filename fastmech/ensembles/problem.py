@@ -39,6 +39,7 @@ class Problem:
     observation: Observation = NOTHING
     inward: Callable[[Floats], Floats] = _unchanged  #: public states (..., n, dim) to integrated ones
     outward: Callable[[Floats], Floats] = _unchanged  #: and back
+    coefficients: Coefficients | None = None  #: of a scene: numbers, or one a trajectory
 
 
 def scene_problem(scene: Scene, n: int, parameters: Mapping[str, ArrayLike], formulation: str) -> Problem:
@@ -57,9 +58,13 @@ def scene_problem(scene: Scene, n: int, parameters: Mapping[str, ArrayLike], for
     params = np.stack(columns, axis=-1).astype(np.float64)
     rhs = right_hand_side(coefficients, formulation)
     if formulation == "lagrange":
-        return Problem(rhs, params)
+        return Problem(rhs, params, coefficients=coefficients)
     return Problem(
-        rhs, params, NOTHING, lambda y: with_momenta(coefficients, y), lambda y: with_rates(coefficients, y)
+        rhs,
+        params,
+        inward=lambda y: with_momenta(coefficients, y),
+        outward=lambda y: with_rates(coefficients, y),
+        coefficients=coefficients,
     )
 
 

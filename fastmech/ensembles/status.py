@@ -10,6 +10,8 @@ class Status(IntEnum):
 
     OK = 0
     NOT_FINITE = 1
+    STEP_TOO_LARGE = 2
+    START_NOT_FINITE = 3
 
     @property
     def advice(self) -> str:
@@ -18,6 +20,8 @@ class Status(IntEnum):
 
 
 _ADVICE = {
-    Status.OK: "reached the end of the run",
-    Status.NOT_FINITE: "NaN or infinity: a start that is not finite, or a step too large; use a smaller dt",
+    Status.OK: "reached the end of the run, or its stopping condition",
+    Status.NOT_FINITE: "became NaN or infinite on the way; use a smaller dt",
+    Status.STEP_TOO_LARGE: "has energy at the end that the motion cannot have; use a smaller dt",
+    Status.START_NOT_FINITE: "the start is NaN or infinite",
 }

@@ -52,8 +52,6 @@ def gather(coefficients: Coefficients, phi: Floats, theta: Floats) -> Evidence:
     """Search beside the proof; ``phi``, ``theta`` [rad] are the listed equilibria."""
     c = coefficients
     p = pulls(c.mass, c.lift, c.spring, c.gravity, c.force)
-    if not np.isfinite([p.lift, p.spring, p.gravity, p.force]).all():
-        return Evidence(reached=0, unlisted=0, polynomial=UnitRoots(np.zeros(0), 0, 0))
     found = grid_search(p.lift, p.spring, p.gravity, p.force)
     apart = np.hypot(
         2.0 * np.sin(0.5 * (found[:, :1] - phi[None, :])), 2.0 * np.sin(0.5 * (found[:, 1:] - theta[None, :]))

@@ -14,6 +14,9 @@ FloatArray = NDArray[np.float64]
 #: The exact bound on the number of equilibria of a scene whose equilibria are isolated.
 MOST = 6
 
+#: Length of a Newton step [rad] after which the next one, of second order in it, is lost in rounding.
+SHORT = 1e-10
+
 #: Laps of all branches: two with one, two with three; all have a solution only within rounding of a fold.
 LAPS = 8
 
@@ -76,20 +79,29 @@ def hessian(p: Pulls, phi: float, theta: float) -> tuple[float, float, float]:
 
 @inlined
 def polish(p: Pulls, phi: float, theta: float) -> tuple[float, float]:
-    """Newton steps on the gradient as long as each makes it smaller; angles come back in (-pi, pi]."""
+    """Newton steps on the gradient as long as each makes it smaller; angles come back in (-pi, pi].
+
+    A step shorter than ``SHORT`` is the last one: the next would be below rounding.
+    """
     phi, theta = wrap(phi), wrap(theta)
-    g1, g2 = gradient(p, phi, theta)
+    s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
+    g1, g2 = potential_gradient(s1, c1, s2, c2, c1 * c2 - s1 * s2, p.lift, p.spring, p.gravity, p.force)
     merit = abs(g1) + abs(g2)
     for _ in range(8):
-        h11, h12, h22 = hessian(p, phi, theta)
+        h11, h12, h22 = potential_hessian(
+            s1, c1, s2, c2, s1 * c2 + c1 * s2, p.lift, p.spring, p.gravity, p.force
+        )
         determinant = h11 * h22 - h12 * h12
-        new_phi = wrap(phi - (h22 * g1 - h12 * g2) / determinant)
-        new_theta = wrap(theta - (h11 * g2 - h12 * g1) / determinant)
-        g1, g2 = gradient(p, new_phi, new_theta)
+        step1, step2 = -(h22 * g1 - h12 * g2) / determinant, -(h11 * g2 - h12 * g1) / determinant
+        new_phi, new_theta = wrap(phi + step1), wrap(theta + step2)
+        s1, c1, s2, c2 = np.sin(new_phi), np.cos(new_phi), np.sin(new_theta), np.cos(new_theta)
+        g1, g2 = potential_gradient(s1, c1, s2, c2, c1 * c2 - s1 * s2, p.lift, p.spring, p.gravity, p.force)
         if not abs(g1) + abs(g2) < merit:
             break
         merit = abs(g1) + abs(g2)
         phi, theta = new_phi, new_theta
+        if abs(step1) + abs(step2) < SHORT:
+            break
     return phi, theta
 
 

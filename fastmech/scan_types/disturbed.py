@@ -12,12 +12,16 @@ from pydantic import Field
 from fastmech.disturbance.ensemble import DisturbedEnsemble, disturb, equilibria_to_disturb
 from fastmech.disturbance.linear_range import linear_range
 from fastmech.disturbance.outcome import Outcome
+from fastmech.ensembles.integrate import integrate
 from fastmech.results import Dataset, Variable, flags
-from fastmech.scan_types.request import MethodName, RunContext, Scan, not_finite
+from fastmech.scan_types.request import MethodName, RunContext, Scan, failures
 from fastmech.scene import Scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+#: Trajectories of each ensemble that are integrated again with half the step.
+SAMPLE = 256
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
 
@@ -77,6 +81,7 @@ class Disturbed(Scan):
                 )
             )
             advance(1)
+        errors = np.array([sampled_errors(scene, e, 0.5 * self.dt, self.method) for e in ensembles])
         each, every = ("equilibrium",), ("equilibrium", "trajectory")
         state = "phi, theta, phi', theta'"
         variables = {
@@ -110,16 +115,22 @@ class Disturbed(Scan):
                 every,
                 _stack(ensembles, "time_to_return"),
                 "s",
-                "first step from which on it was in the ball of return",
+                "end of the first step from which on every step ended in the ball of return",
             ),
             "excursion": Variable(
                 (*every, "angle"),
                 _stack(ensembles, "excursion"),
                 "rad",
-                "largest departures of phi and theta",
+                "largest departures of phi and theta at the ends of steps",
             ),
             "share_returned": Variable(
                 each, np.array([e.share_returned for e in ensembles]), "1", "share that returned"
+            ),
+            "error_estimate": Variable(
+                ("equilibrium", "sample"),
+                errors,
+                "rad or rad/s",
+                "difference of a final state from the same run with half the step, first trajectories",
             ),
             "quantile": Variable(("quantile",), np.array(QUANTILES), "1", "quantile"),
             "time_to_return_quantile": Variable(
@@ -144,7 +155,7 @@ class Disturbed(Scan):
         attrs = self.model_dump(exclude={"scene"}) | {
             "distribution": "uniform in the ball of the given radius, kinetic-energy norm at the equilibrium"
         }
-        attrs |= not_finite(variables["outcome"].data == Outcome.NOT_FINITE)
+        attrs |= failures(variables["outcome"].data >= Outcome.NOT_FINITE)
         return Dataset(variables, attrs)
 
     @staticmethod
@@ -153,6 +164,13 @@ class Disturbed(Scan):
         from fastmech.plots.disturbed import draw_disturbed
 
         return draw_disturbed(dataset)
+
+
+def sampled_errors(scene: Scene, e: DisturbedEnsemble, dt: float, method: str) -> NDArray[np.float64]:
+    """Differences of the first final states from those of the step ``dt`` [s], shape (sample,)."""
+    final = e.final[:SAMPLE]
+    finer = integrate(scene, e.starts[: len(final)], e.t_end, dt, method).y[-1]
+    return np.asarray(np.abs(finer - final).max(axis=1))
 
 
 def return_quantiles(ensemble: DisturbedEnsemble) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ from pydantic import Field
 from fastmech.disturbance.ensemble import equilibria_to_disturb
 from fastmech.disturbance.motion import disturbed_motion
 from fastmech.results import Dataset, Variable
-from fastmech.scan_types.request import MethodName, RunContext, Scan, not_finite
+from fastmech.scan_types.request import HALVING, MethodName, RunContext, Scan, failures
 from fastmech.scene import Scene
 
 if TYPE_CHECKING:
@@ -42,11 +42,14 @@ class DisturbedMotionScan(Scan):
         t = np.linspace(0.0, self.t_end, self.outputs)
         disturbance = [self.xi_phi, self.xi_theta, self.eta_phi, self.eta_theta]
         advance = context.stage("disturbed motion", len(equilibria))
-        motions = []
+        motions, differences = [], []
         for equilibrium in equilibria:
-            motions.append(
-                disturbed_motion(scene, equilibrium, disturbance, t, dt=self.dt, method=self.method)
+            motion, halved = (
+                disturbed_motion(scene, equilibrium, disturbance, t, dt=dt, method=self.method)
+                for dt in (self.dt, 0.5 * self.dt)
             )
+            motions.append(motion)
+            differences.append(np.max(np.abs(halved.nonlinear - motion.nonlinear)))
             advance(1)
         dims = ("equilibrium", "time", "component")
         variables = {
@@ -67,8 +70,11 @@ class DisturbedMotionScan(Scan):
             ),
         }
         failed = [not np.isfinite(motion.nonlinear).all() for motion in motions]
-        attrs = {"method": self.method, "dt": self.dt, "disturbance": np.array(disturbance)}
-        return Dataset(variables, attrs | not_finite(np.array(failed)))
+        attrs = self.model_dump(exclude={"scene"}) | {
+            "error_estimate": float(np.max(differences)),
+            "error_estimate_is": HALVING,
+        }
+        return Dataset(variables, attrs | failures(np.array(failed)))
 
     @staticmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:

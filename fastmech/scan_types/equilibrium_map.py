@@ -1,21 +1,33 @@
-"""Equilibria over one to three parameters: how many, how many stable, where, and how fast they settle."""
+"""Equilibria over one to three parameters: how many, how many stable, where, how deep, how fast they settle.
+
+Layout: six slots along ``root`` at every point, the deepest equilibrium first; slots beyond ``count`` hold
+NaN in numbers and -1 in codes. ``sheet`` says which slots of different points are one equilibrium, continued.
+A map over two parameters also holds its fold curves, cusps and vanishing-damping curves, point after point;
+a map over one its folds.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-from fastmech.equilibria.atlas import map_equilibria
-from fastmech.equilibria.outcome import Outcome
-from fastmech.results import Dataset, Variable, flags
+from fastmech.atlas.map import Slab, map_equilibria, solve_in_slabs
+from fastmech.atlas.sheets import SheetBuilder
+from fastmech.results import Dataset, Variable
+from fastmech.scan_types.map_curves import curve_variables
+from fastmech.scan_types.map_layout import point_variables, sheet_variables
 from fastmech.scan_types.request import RunContext, Scan
 from fastmech.scene import Scene, nearest
+from fastmech.store.stream import Piece, Stream
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+#: Points above which a map is written as it is computed instead of being held in memory.
+IN_MEMORY = 1_500_000
 
 
 class Axis(BaseModel):
@@ -35,45 +47,90 @@ def _known_parameters(axes: dict[str, Axis]) -> dict[str, Axis]:
     return axes
 
 
+def _known_variables(names: list[str]) -> list[str]:
+    known = list(point_variables(("x",), Slab.empty(1)))
+    for name in names:
+        if name not in known:
+            raise ValueError(f"unknown variable {name!r}; {nearest(name, known)}")
+    return names
+
+
 class EquilibriumMap(Scan):
     """Every equilibrium at every point of a grid of parameters, with the proof that none is missing."""
 
     kind: ClassVar[str] = "equilibrium_map"
 
     axes: Annotated[dict[str, Axis], Field(min_length=1, max_length=3), AfterValidator(_known_parameters)]
+    variables: Annotated[list[str], AfterValidator(_known_variables)] | None = Field(
+        None, description="what to keep of every point (all by default); large maps are smaller with less"
+    )
 
-    def run(self, scene: Scene, context: RunContext) -> Dataset:
+    def run(self, scene: Scene, context: RunContext) -> Dataset | Stream:
         """Search the grid; the force is the one at rest (F0 where alpha = 0)."""
         axes = {name: np.linspace(axis.start, axis.stop, axis.num) for name, axis in self.axes.items()}
-        advance = context.stage("equilibrium map", int(np.prod([values.size for values in axes.values()])))
-        found = map_equilibria(scene, axes, threads=context.threads, progress=advance)
-        grid = tuple(axes)
-        roots = (*grid, "root")
-        modes = (*roots, "mode")
-        described = scene.described()
-        variables = {
-            **{name: Variable((name,), values, *described[name][1:]) for name, values in axes.items()},
-            "count": Variable(grid, found.count, "1", "number of equilibria"),
-            "count_stable": Variable(grid, found.count_stable, "1", "number of stable equilibria (minima)"),
-            "outcome": Variable(grid, found.outcome, "1", "what is proved of the count", flags(Outcome)),
-            "phi": Variable(roots, found.phi, "rad", "angle phi"),
-            "theta": Variable(roots, found.theta, "rad", "angle theta"),
-            "energy": Variable(roots, found.energy, "J", "potential energy Pi - F x2"),
-            "morse_index": Variable(
-                roots, found.morse_index, "1", "negative eigenvalues of the Hessian, -1: no equilibrium"
-            ),
-            "eigenvalue_re": Variable(
-                modes, found.eigenvalues.real, "1/s", "eigenvalues of the motion, real part"
-            ),
-            "eigenvalue_im": Variable(
-                modes, found.eigenvalues.imag, "rad/s", "eigenvalues of the motion, imaginary part"
-            ),
+        total = int(np.prod([values.size for values in axes.values()]))
+        fixed = {
+            name: Variable((name,), values, *scene.described()[name][1:]) for name, values in axes.items()
         }
-        return Dataset(variables, {"axes": grid})
+        fixed |= curve_variables(scene, axes, context.threads)
+        attrs = {
+            "axes": tuple(axes),
+            "layout": "six slots along root, the deepest first; beyond count NaN, codes -1",
+        }
+        if total > IN_MEMORY:
+            return self._stream(scene, axes, total, context, Dataset(fixed, attrs))
+        advance = context.stage("equilibrium map", total)
+        found = map_equilibria(scene, axes, wells=self._wells, threads=context.threads, progress=advance)
+        variables = self._kept(point_variables(tuple(axes), found))
+        variables |= sheet_variables(tuple(axes), found.sheet, found.sheet_morse_index)
+        return Dataset({**fixed, **variables}, attrs)
+
+    @property
+    def _wells(self) -> bool:
+        return self.variables is None or bool({"depth", "escape_speed"} & set(self.variables))
+
+    def _kept(self, variables: dict[str, Variable]) -> dict[str, Variable]:
+        if self.variables is None:
+            return variables
+        return {name: variable for name, variable in variables.items() if name in self.variables}
+
+    def _stream(
+        self, scene: Scene, axes: dict[str, np.ndarray], total: int, context: RunContext, fixed: Dataset
+    ) -> Stream:
+        grid = tuple(len(values) for values in axes.values())
+        names = tuple(axes)
+
+        def shaped(slab: Slab, planes: int) -> dict[str, Variable]:
+            arrays = {name: a.reshape(planes, *grid[1:], *a.shape[1:]) for name, a in vars(slab).items()}
+            return self._kept(point_variables(names, Slab(**arrays)))
+
+        def pieces() -> Iterator[Piece]:
+            advance = context.stage("equilibrium map", total)
+            builder = SheetBuilder(grid)
+
+            def place(rows: slice) -> Slab:
+                return Slab.empty(rows.stop - rows.start)
+
+            for planes, slab in solve_in_slabs(
+                scene, axes, builder, place, self._wells, context.threads, advance
+            ):
+                variables = shaped(slab, planes.stop - planes.start)
+                yield planes, {name: variable.data for name, variable in variables.items()}
+            labelled, sheet_index = builder.finish()
+            start = 0
+            for sheet in labelled:
+                piece = sheet.reshape(-1, *grid[1:], sheet.shape[-1])
+                yield slice(start, start + len(piece)), {"sheet": piece}
+                start += len(piece)
+            yield Dataset(sheet_variables(names, None, sheet_index))
+
+        one = shaped(Slab.empty(int(np.prod(grid[1:]))), 1)
+        one |= sheet_variables(names, np.zeros((1, *grid[1:], 6), dtype=np.int32), None)
+        return Stream(fixed, one, names[0], pieces)
 
     @staticmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
-        """Counts, positions and slowest decay of the stable equilibria over the parameters."""
+        """Counts, positions, barriers and slowest decay over the parameters, with the curves on top."""
         from fastmech.plots.equilibrium_map import draw_equilibrium_map
 
         return draw_equilibrium_map(dataset, scene)

@@ -16,7 +16,7 @@ from fastmech.mechanism.geometry import constraints, positions
 from fastmech.mechanism.hamilton import momenta
 from fastmech.mechanism.reactions import reactions
 from fastmech.results import Dataset, Variable
-from fastmech.scan_types.request import MethodName, RunContext, Scan, not_finite
+from fastmech.scan_types.request import HALVING, MethodName, RunContext, Scan, failures
 from fastmech.scene import Scene
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ class Motion(Scan):
         """Integrate in both formulations and derive everything else from the Lagrangian one."""
         start = [self.phi, self.theta, self.phi_dot, self.theta_dot]
         t = np.linspace(0.0, self.t_end, self.outputs)
-        advance = context.stage("motion", 3)
+        advance = context.stage("motion", 4)
         run = integrate(scene, start, dt=self.dt, method=self.method, t_eval=t)
         advance(1)
         canonical = integrate(scene, start, dt=self.dt, method=self.method, t_eval=t, formulation="hamilton")
@@ -115,8 +115,14 @@ class Motion(Scan):
                 )
             },
         }
-        attrs = {"method": run.method, "dt": run.dt, "steps": run.steps}
-        attrs |= not_finite(run.status != Status.OK)
+        halved = integrate(scene, start, dt=0.5 * self.dt, method=self.method, t_eval=t)
+        attrs = self.model_dump(exclude={"scene"}) | {
+            "steps": run.steps,
+            "error_estimate": float(np.max(np.abs(halved.y[:, 0] - y))),
+            "error_estimate_is": HALVING,
+        }
+        advance(1)
+        attrs |= failures(run.status != Status.OK)
         return Dataset(variables, attrs)
 
     @staticmethod

@@ -70,9 +70,13 @@ class Scan(BaseModel, ABC):
         """Pictures of a result, by name. ``scene`` are the scene's parameters with this scan's changes."""
 
 
-def not_finite(failed: NDArray[np.bool_]) -> dict[str, int]:
-    """The attribute of a section that tells how many of its trajectories are not finite."""
-    return {"not_finite": int(np.count_nonzero(failed))}
+#: What ``error_estimate`` of a section is.
+HALVING = "largest difference of a state [rad or rad/s] from the same run with half the step"
+
+
+def failures(failed: NDArray[np.bool_]) -> dict[str, int]:
+    """The attribute of a section that tells how many of its trajectories have failed."""
+    return {"failed": int(np.count_nonzero(failed))}
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,13 @@ from fastmech.stability.linearize import FloatArray, Rest, jacobian, linearized
 from fastmech.stability.modes import MEANING, reach, slowest_decay, squared_frequencies
 
 
+_PROVED = {
+    0: Finding("stable", "U has a minimum: its minors are near zero, their signs proved with the equilibrium"),
+    1: Finding("unstable", "U has a saddle: its minors are near zero, their signs proved with the equilibrium"),
+    2: Finding("unstable", "U has a maximum: its minors are near zero, their signs proved with the equilibrium"),
+}
+
+
 @dataclass(frozen=True, eq=False)
 class Classification:
     """Everything that decides an equilibrium's stability; SI units."""
@@ -69,6 +76,9 @@ def classify(scene: Scene, equilibrium: Rest) -> Classification:
     rate = float(np.sqrt(np.max(np.abs(squares)))) or 1.0
     values, errors = eigenvalues(jacobian(scene, equilibrium), rate, stiffness_error)
     by_minors, by_hurwitz, by_spectrum = sylvester(minor), hurwitz(p, d), spectrum(values, errors)
+    if by_minors.verdict == "critical":
+        # The equilibrium's own proof knows the determinant's sign more closely than the minors' bound.
+        by_minors = _PROVED.get(equilibrium.morse_index, by_minors)
 
     decay, measures, unreached = np.nan, reach(s, c.spring), None
     if by_minors.verdict == "stable":

@@ -20,7 +20,7 @@ def deviation(e: Any, ray: Any, size: float, horizon: float) -> float:
     nonlinear = scipy_motion(SCENE, center(e) + size * ray, horizon, 1e-10).sol(times).T - center(e)
     J = oracle_jacobian(SCENE, e)
     linear = np.array([scipy.linalg.expm(t * J) @ (size * ray) for t in times])
-    return float(oracle_size(SCENE, e, nonlinear - linear).max() / oracle_size(SCENE, e, linear).max())
+    return float(oracle_size(SCENE, e, nonlinear - linear).max() / oracle_size(SCENE, e, nonlinear).max())
 
 
 @pytest.mark.parametrize("morse_index", [0, 1])

@@ -100,7 +100,7 @@ def test_a_stopped_trajectory_keeps_its_state_time_and_code() -> None:
 def test_a_trajectory_that_is_not_finite_is_taken_out_and_told() -> None:
     system = System(falling, ["x"], {"rate": 1.0}, stop=below_zero)
     run = fm.integrate(system, [[np.nan], [1.0]], 3.0, 0.1, "euler")
-    assert run.status.tolist() == [fm.Status.NOT_FINITE, fm.Status.OK]
+    assert run.status.tolist() == [fm.Status.START_NOT_FINITE, fm.Status.OK]
     assert run.stop_code is not None
     assert run.stop_code.tolist() == [0, 7]
 

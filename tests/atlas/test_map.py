@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fastmech.equilibria.atlas import EquilibriumMap, map_equilibria
+from fastmech.atlas.map import EquilibriumMap, map_equilibria
 from fastmech.equilibria.find import find_equilibria
 from fastmech.equilibria.outcome import Outcome
 from fastmech.errors import InputError
@@ -50,9 +50,17 @@ def test_every_point_is_what_find_equilibria_finds(atlas: EquilibriumMap) -> Non
         assert atlas.count[i, j, k] == n
         assert atlas.outcome[i, j, k] == found.certificate.outcome
         assert atlas.count_stable[i, j, k] == found.kind.count("minimum")
-        np.testing.assert_array_equal(atlas.phi[i, j, k, :n], found.phi)
-        np.testing.assert_array_equal(atlas.theta[i, j, k, :n], found.theta)
-        np.testing.assert_allclose(atlas.energy[i, j, k, :n], found.energy, rtol=1e-14)
+        # A map starts from neighbours, so the last bits may differ; two proved balls must meet.
+        for slot, e in enumerate(found):
+            apart = np.hypot(
+                np.angle(np.exp(1j * (atlas.phi[i, j, k, slot] - e.phi))),
+                np.angle(np.exp(1j * (atlas.theta[i, j, k, slot] - e.theta))),
+            )
+            assert apart <= atlas.radius[i, j, k, slot] + e.radius + 1e-15
+            h = atlas.hessian[i, j, k, slot]
+            size = np.abs(e.hessian).max()
+            np.testing.assert_allclose([[h[0], h[1]], [h[1], h[2]]], e.hessian, atol=1e-11 * size)
+        np.testing.assert_allclose(atlas.energy[i, j, k, :n], found.energy, rtol=1e-13, atol=1e-10)
         np.testing.assert_array_equal(atlas.morse_index[i, j, k, :n], found.morse_index)
         assert np.isnan(atlas.phi[i, j, k, n:]).all()
         assert np.isnan(atlas.eigenvalues[i, j, k, n:]).all()
@@ -66,6 +74,44 @@ def test_eigenvalues_are_those_of_classify(atlas: EquilibriumMap) -> None:
         np.testing.assert_allclose(atlas.eigenvalues[3, 3, 2, n], expected, rtol=1e-10)
 
 
+CODES = {"asymptotically stable": 0, "stable": 1, "unstable": 2, "critical": 3}
+
+
+@pytest.mark.parametrize("beta", [0.0, 1e-3, 121.0, 1e6])
+def test_verdicts_rates_and_frequencies_are_those_of_classify(beta: float) -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(12):
+        scene = Scene(
+            m1=10 ** rng.uniform(-1, 2), m2=10 ** rng.uniform(-1, 2), l=rng.uniform(0.2, 4.0), alpha=0.0,
+            c1=10 ** rng.uniform(0, 4), c2=10 ** rng.uniform(0, 4), F0=rng.uniform(-1e3, 1e3), beta=beta,
+        )  # fmt: skip
+        found = find_equilibria(scene)
+        one = map_equilibria(scene, {"F0": [scene.F0]})
+        for slot, e in enumerate(found):
+            c = classify(scene, e)
+            by_three = [c.sylvester.verdict, c.hurwitz.verdict, c.spectrum.verdict, c.verdict]
+            mine = list(one.verdict[0, slot])
+            # The eigenvalues' own bounds differ; each may call critical what the other still resolves.
+            assert mine[0] == CODES[by_three[0]]
+            assert mine[1] == CODES[by_three[1]]
+            assert mine[2] == CODES[by_three[2]] or 3 in (mine[2], CODES[by_three[2]])
+            assert mine[3] == CODES[by_three[3]]
+            np.testing.assert_allclose(one.frequency[0, slot], c.natural_frequencies[0], rtol=1e-8)
+            if e.morse_index == 0:
+                assert one.decay_time[0, slot] == pytest.approx(c.decay_time, rel=1e-4)
+            else:
+                assert np.isnan(one.decay_time[0, slot])
+
+
+def test_verdicts_near_a_missed_mode() -> None:
+    """The Hurwitz test is silent, the joint verdict is not (the design's table of vanishing damping)."""
+    scene = Scene(F0=166.722372, c2=17.35486052, alpha=0.0)
+    one = map_equilibria(scene, {"c1": [162.5]})
+    slot = int(np.nanargmin(np.hypot(one.phi[0], one.theta[0] - 0.3)))
+    assert list(one.verdict[0, slot]) == [1, 3, 3, 0]
+    assert one.decay_time[0, slot] > 1e8
+
+
 @pytest.mark.parametrize("threads", [2, 3])
 def test_same_bits_for_any_number_of_threads(threads: int) -> None:
     axes = {"F0": np.linspace(-300.0, 300.0, 60), "c2": np.linspace(0.0, 500.0, 30)}
@@ -77,8 +123,8 @@ def test_same_bits_for_any_number_of_threads(threads: int) -> None:
 
 def test_progress_adds_up_to_the_grid() -> None:
     finished: list[int] = []
-    map_equilibria(PAPER, {"c1": np.linspace(0.0, 500.0, 2000)}, progress=finished.append)
-    assert sum(finished) == 2000
+    map_equilibria(PAPER, {"c1": np.linspace(0.0, 500.0, 70_000)}, progress=finished.append)
+    assert sum(finished) == 70_000
     assert len(finished) > 1
 
 

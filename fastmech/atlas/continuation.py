@@ -1,0 +1,150 @@
+"""Pseudo-arclength continuation of a curve F(z) = 0, F: R^(n+1) -> R^n, with Newton's method.
+
+Keller's method (1977): a step along the tangent, then Newton's method on F together with the plane through
+the predicted point that is normal to the tangent; so turning points in any coordinate are passed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+#: F and its Jacobian at a point.
+System = Callable[[Floats], tuple[Floats, Floats]]
+
+#: Longest and shortest step along a curve, in radians and in parts of the parameters' ranges.
+LONGEST, SHORTEST = 0.02, 1e-8
+
+#: Cosine of the largest turn of the tangent in one step.
+TURN = 0.985
+
+#: Newton's method ends when a step is this short.
+SETTLED = 1e-14
+
+MOST_STEPS = 20_000
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Points along a solution curve, in order."""
+
+    points: Floats  #: (points, n + 1)
+    tangents: Floats  #: (points, n + 1), of unit length, all pointing onwards
+    closed: bool  #: the last point is the first one again
+
+
+def newton(system: System, z: Floats, reach: float, normal: Floats | None = None) -> Floats | None:
+    """Solution near z: the nearest one, or the one in the plane through z with this normal.
+
+    A system of as many equations as unknowns is solved as it is.
+
+    Returns:
+        None if Newton's method leaves the distance ``reach`` or does not settle.
+    """
+    start = z
+    for _ in range(12):
+        value, jacobian = system(z)
+        try:
+            if normal is not None:
+                rows = np.vstack([jacobian, normal])
+                step = np.linalg.solve(rows, -np.append(value, normal @ (z - start)))
+            elif jacobian.shape[0] == jacobian.shape[1]:
+                step = np.linalg.solve(jacobian, -value)
+            else:
+                step = -np.linalg.pinv(jacobian) @ value
+        except np.linalg.LinAlgError:
+            return None
+        z = z + step
+        size = float(np.linalg.norm(step))
+        if not np.linalg.norm(z - start) < reach:
+            return None
+        if size < SETTLED * (1.0 + float(np.linalg.norm(z))) * 4.0:
+            return z
+    return z if size < 1e-11 else None
+
+
+def tangent_at(system: System, z: Floats) -> Floats:
+    """Unit tangent of the curve, of either direction."""
+    tangent: Floats = np.linalg.svd(system(z)[1])[2][-1]
+    return tangent
+
+
+def trace(
+    system: System,
+    start: Floats,
+    inside: Callable[[Floats], bool],
+    finish: Callable[[Floats, Floats], Floats],
+    apart: Callable[[Floats, Floats], Floats],
+    longest: float = LONGEST,
+) -> Curve:
+    """The curve through ``start``, in both directions until it leaves ``inside`` or closes.
+
+    Args:
+        system: the curve's equations.
+        start: a point on the curve.
+        inside: where it is wanted.
+        finish: given the last point inside and the first one outside, the curve's end between them.
+        apart: difference of two points, angles counted the short way.
+        longest: longest step.
+    """
+    tangent = tangent_at(system, start)
+    points, tangents, closed = _march(system, start, tangent, inside, finish, apart, longest)
+    if not closed:
+        back, back_tangents, _ = _march(system, start, -tangent, inside, finish, apart, longest)
+        points = back[:0:-1] + points
+        tangents = [-t for t in back_tangents[:0:-1]] + tangents
+    return Curve(np.array(points), np.array(tangents), closed)
+
+
+def _march(
+    system: System,
+    start: Floats,
+    tangent: Floats,
+    inside: Callable[[Floats], bool],
+    finish: Callable[[Floats, Floats], Floats],
+    apart: Callable[[Floats, Floats], Floats],
+    longest: float,
+) -> tuple[list[Floats], list[Floats], bool]:
+    points, tangents = [start], [tangent]
+    step = 0.25 * longest
+    while step >= SHORTEST and len(points) < MOST_STEPS:
+        z, t = points[-1], tangents[-1]
+        there = newton(system, z + step * t, 0.5 * step, t)
+        ahead = None if there is None else tangent_at(system, there)
+        if there is None or ahead is None or abs(ahead @ t) < TURN:
+            step *= 0.5
+            continue
+        ahead = ahead * np.sign(ahead @ t)
+        if len(points) > 4:
+            gap = apart(start, z)
+            along = float(gap @ t)
+            if 0.0 < along <= 1.2 * step and np.linalg.norm(gap - along * t) < 0.3 * step:
+                return [*points, z + gap], [*tangents, tangents[0]], True
+        if not inside(there):
+            end = finish(z, there)
+            if np.linalg.norm(end - z) > 0.0:
+                points.append(end)
+                tangents.append(ahead)
+            break
+        points.append(there)
+        tangents.append(ahead)
+        step = min(longest, 1.5 * step)
+    return points, tangents, False
+
+
+def distance(curve: Floats, point: Floats, apart: Callable[[Floats, Floats], Floats]) -> tuple[float, int]:
+    """Distance of a point from a polyline (points, n), and the number of the nearest segment."""
+    here = apart(np.broadcast_to(point, curve.shape), curve)
+    if len(curve) == 1:
+        return float(np.linalg.norm(here[0])), 0
+    along = np.diff(curve, axis=0)
+    squared = np.einsum("ij,ij->i", along, along)
+    share = np.clip(np.einsum("ij,ij->i", here[:-1], along) / np.maximum(squared, 1e-300), 0.0, 1.0)
+    gaps = np.linalg.norm(here[:-1] - share[:, None] * along, axis=1)
+    nearest = int(np.argmin(gaps))
+    return float(gaps[nearest]), nearest

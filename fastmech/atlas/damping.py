@@ -1,0 +1,146 @@
+"""Curves on which damping stops reaching a mode at a stable equilibrium: settling takes forever there.
+
+The slider's damper misses a mode where sin phi = 0, where sin(phi + theta) = 0 and where U_theta,theta = C
+(see ``fastmech.stability.modes.reach``): the Hurwitz test is silent and the decay is algebraic.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastmech.atlas.continuation import LONGEST, System, distance, newton, trace
+from fastmech.atlas.folds import EXPLAINED, apart, checked_plane, finish_on_edge, inside, plane_of
+from fastmech.atlas.map import EquilibriumMap, map_equilibria
+from fastmech.atlas.systems import Plane, dead_centre, point_at, straight, unloaded
+from fastmech.scene import Scene
+from fastmech.stability.modes import SIN_PHI, SIN_PSI, UNLOADED
+
+Floats = NDArray[np.float64]
+
+SYSTEMS: dict[str, Callable[[Plane], System]] = {
+    SIN_PHI: dead_centre,
+    SIN_PSI: straight,
+    UNLOADED: unloaded,
+}
+
+#: A curve ends this near to where its equilibrium stops being stable [rad and parts of the ranges].
+END = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class UnreachedCurve:
+    """A curve on which the damper misses a mode of a stable equilibrium; arrays over its points, in order."""
+
+    vanishes: str  #: ``sin phi``, ``sin(phi+theta)`` or ``U_theta,theta - C``
+    x: Floats  #: values of the first parameter
+    y: Floats  #: values of the second one
+    phi: Floats  #: [rad]
+    theta: Floats  #: [rad]
+    residual: float  #: largest scaled residual on the curve
+
+
+def trace_unreached(
+    scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike], *, threads: int | None = None
+) -> tuple[UnreachedCurve, ...]:
+    """Vanishing-damping curves of ``scene`` in the plane of two parameters.
+
+    The values are the grid of the map that seeds them: a curve passes wherever one of the three quantities
+    changes sign between neighbours of one stable sheet. Nothing is found without a damper (beta = 0).
+
+    Raises:
+        InputError: as ``trace_folds``.
+    """
+    axes = checked_plane(scene, x, y)
+    plane = plane_of(scene, axes)
+    if scene.beta == 0.0 and "beta" not in axes:
+        return ()
+    atlas = map_equilibria(scene, axes, threads=threads)
+    curves = []
+    for name, make in SYSTEMS.items():
+        equations = make(plane)
+        lines: list[Floats] = []
+        for seed in seeds(plane, atlas, name):
+            if any(distance(line, seed, apart)[0] < LONGEST for line in lines):
+                continue
+            start = newton(equations, seed, reach=0.2)
+            if start is None or not stable(plane, start) or not inside(start):
+                continue
+            if any(distance(line, start, apart)[0] < EXPLAINED for line in lines):
+                continue
+            line = trace(
+                equations, start, lambda z: inside(z) and stable(plane, z), finish(plane, equations), apart
+            )
+            lines.append(line.points)
+        curves += [curve_of(plane, name, equations, line) for line in lines if len(line) > 1]
+    return tuple(curves)
+
+
+def stable(plane: Plane, z: Floats) -> bool:
+    """Whether U has a minimum."""
+    p = point_at(plane, z[:, None])
+    return bool(p.determinant[0] > 0.0 and p.hessian[0][0] > 0.0)
+
+
+def finish(plane: Plane, equations: System) -> Callable[[Floats, Floats], Floats]:
+    """How a curve ends: on the rectangle's side, or just before the minimum is lost at a fold."""
+    on_edge = finish_on_edge(equations)
+
+    def end(last: Floats, beyond: Floats) -> Floats:
+        if stable(plane, beyond):
+            return on_edge(last, beyond)
+        kept, lost = last, beyond
+        while np.linalg.norm(lost - kept) > END:
+            middle = newton(equations, 0.5 * (kept + lost), LONGEST)
+            if middle is None or np.linalg.norm(middle - kept) > 0.9 * np.linalg.norm(lost - kept):
+                break
+            kept, lost = (middle, lost) if stable(plane, middle) and inside(middle) else (kept, middle)
+        return kept
+
+    return end
+
+
+def seeds(plane: Plane, atlas: EquilibriumMap, name: str) -> Floats:
+    """Points (n, 4) near which the quantity vanishes, by linear interpolation between neighbours."""
+    first, second = (np.asarray(values) for values in atlas.axes.values())
+    u, v = np.meshgrid(
+        plane.parts(np.stack([first, np.full_like(first, plane.low[1])], axis=-1))[:, 0],
+        plane.parts(np.stack([np.full_like(second, plane.low[0]), second], axis=-1))[:, 1],
+        indexing="ij",
+    )
+    found = []
+    for sheet in np.flatnonzero(atlas.sheet_morse_index == 0):
+        there = atlas.sheet == sheet
+
+        def on_sheet(values: Floats, there: NDArray[np.bool_] = there) -> Floats:
+            return np.where(there.any(axis=-1), np.where(there, values, 0.0).sum(axis=-1), np.nan)
+
+        phi, theta = on_sheet(atlas.phi), on_sheet(atlas.theta)
+        z = np.stack([phi, theta, u, v], axis=-1)
+        p = point_at(plane, np.where(np.isnan(z), 0.0, z).reshape(-1, 4).T)
+        size = {
+            SIN_PHI: np.sin(phi),
+            SIN_PSI: np.sin(phi + theta),
+            UNLOADED: np.where(np.isnan(phi), np.nan, (p.hessian[2] - p.spring).reshape(phi.shape)),
+        }[name]
+        for one, two in (
+            ((slice(None, -1), slice(None)), (slice(1, None), slice(None))),
+            ((slice(None), slice(None, -1)), (slice(None), slice(1, None))),
+        ):
+            change = size[one] * size[two] <= 0.0
+            start, gap = z[one][change], apart(z[two][change], z[one][change])
+            a, b = size[one][change], size[two][change]
+            found.append(start + (a / np.where(a == b, 1.0, a - b))[:, None] * gap)
+    return np.concatenate(found) if found else np.empty((0, 4))
+
+
+def curve_of(plane: Plane, name: str, equations: System, points: Floats) -> UnreachedCurve:
+    """A traced curve in the parameters' units."""
+    residual = max(float(np.max(np.abs(equations(z)[0]))) for z in points)
+    values = plane.values(points[:, 2:].T)
+    x, y = (np.asarray(values[key]) for key in plane.names)
+    phi, theta = (np.mod(points[:, k] + np.pi, 2.0 * np.pi) - np.pi for k in (0, 1))
+    return UnreachedCurve(name, x, y, phi, theta, residual)

@@ -1,0 +1,111 @@
+"""Equilibria over one parameter: stable solid, unstable dashed, folds marked."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.plots.labels import PI_TICKS, logarithmic
+from fastmech.plots.map_view import View
+from fastmech.plots.style import PALETTE, legend_below, new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Floats = NDArray[np.float64]
+
+#: How sheets look, by their Morse index.
+LOOKS = {
+    0: (PALETTE["blue"], "-", 2.2, "stable"),
+    1: (PALETTE["vermillion"], "--", 1.3, "unstable: saddle"),
+    2: (PALETTE["purple"], ":", 1.6, "unstable: maximum"),
+}
+
+
+def draw_bifurcation(view: View) -> Figure:
+    """phi, theta and the slowest decay time of the stable ones over one parameter."""
+    (name,) = view.axes
+    third = view.has("decay_time")
+    figure = new_figure(7.6, 8.4 if third else 6.2)
+    panels = figure.subplots(3 if third else 2, 1, sharex=True)
+    folds = _folds(view, name)
+    for axes, variable, symbol in zip(panels, ("phi", "theta"), ("φ", "θ"), strict=False):
+        labelled: set[int] = set()
+        for index, x, y in _sheets(view, name, variable, folds):
+            color, dash, width, label = LOOKS[index]
+            axes.plot(
+                x, y, color=color, ls=dash, lw=width, marker="." if np.isfinite(y).sum() < 2 else "",
+                label="" if index in labelled else label,
+            )  # fmt: skip
+            labelled.add(index)
+        if folds:
+            places = folds[f"fold_{variable}"]
+            axes.plot(folds["at"], places, "o", color="white", mec="black", ms=6, ls="none", label="fold")
+            for value in folds["at"]:
+                axes.axvline(value, color="black", lw=0.6, ls=":", zorder=0)
+        axes.set(ylabel=f"angle {symbol} [rad]", ylim=(-3.4, 3.4))
+        axes.set_yticks(*PI_TICKS)
+        _own(axes, view)
+    if third:
+        stable = view.data("morse_index") == 0
+        x = np.broadcast_to(view.axis(name)[:, None], stable.shape)
+        time = np.where(np.isfinite(view.data("decay_time")), view.data("decay_time"), np.nan)
+        panels[2].semilogy(x[stable], time[stable], ".", color=PALETTE["blue"], ms=3.0)
+        if np.isfinite(time[stable]).any():
+            logarithmic(panels[2].yaxis)
+        panels[2].set_ylabel("slowest decay time\nof the stable [s]")
+        _own(panels[2], view)
+    panels[-1].set_xlabel(view.label(name))
+    panels[0].set_title(f"Equilibria over {name}{view.note}")
+    legend_below(figure, panels[0], 5)
+    return figure
+
+
+def _own(axes: Axes, view: View) -> None:
+    point = view.own()
+    if point is not None:
+        axes.axvline(point[0], color="black", lw=1.0, ls="-.", label="the scene")
+
+
+def _folds(view: View, name: str) -> dict[str, Floats]:
+    if len(view.dataset.attrs["axes"]) != 1 or not view.has(f"fold_{name}"):
+        return {}
+    return {"at": view.axis(f"fold_{name}")} | {key: view.axis(key) for key in ("fold_phi", "fold_theta")}
+
+
+def _sheets(
+    view: View, name: str, variable: str, folds: dict[str, Floats]
+) -> list[tuple[int, Floats, Floats]]:
+    """Morse index, parameter and angle of every sheet, led to the folds that it ends at, broken at +-pi."""
+    sheet, values, x = view.data("sheet"), view.data(variable), view.axis(name)
+    curves = []
+    for number, index in enumerate(view.dataset["sheet_morse_index"].data):
+        there = sheet == number
+        line = np.where(there.any(axis=-1), np.where(there, values, 0.0).sum(axis=-1), np.nan)
+        curves.append((int(index), x.copy(), np.asarray(line, dtype=np.float64)))
+    for at, angle in zip(folds.get("at", ()), folds.get(f"fold_{variable}", ()), strict=True):
+        _lead_to_fold(curves, float(at), float(angle))
+    return [(index, *_cut(xs, ys)) for index, xs, ys in curves if np.isfinite(ys).any()]
+
+
+def _lead_to_fold(curves: list[tuple[int, Floats, Floats]], at: float, angle: float) -> None:
+    """Extend the two sheets that merge at a fold up to it."""
+    ends = []
+    for number, (_, x, y) in enumerate(curves):
+        k = int(np.searchsorted(x, at))
+        if not 0 < k < x.size or np.isfinite(y[k - 1]) == np.isfinite(y[k]):
+            continue
+        value = y[k - 1] if np.isfinite(y[k - 1]) else y[k]
+        ends.append((abs(np.remainder(value - angle + np.pi, 2 * np.pi) - np.pi), number, k))
+    for _, number, k in sorted(ends)[:2]:
+        index, x, y = curves[number]
+        curves[number] = (index, np.insert(x, k, at), np.insert(y, k, angle))
+
+
+def _cut(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """A line that is broken where the angle goes round."""
+    jumps = np.flatnonzero(np.abs(np.diff(y)) > np.pi) + 1
+    return np.insert(x, jumps, x[jumps] if jumps.size else []), np.insert(y, jumps, np.nan)

@@ -1,0 +1,142 @@
+"""The curves of an equilibrium map as variables: folds, cusps and vanishing damping, point after point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.atlas.damping import trace_unreached
+from fastmech.atlas.fold_points import find_folds
+from fastmech.atlas.folds import trace_folds
+from fastmech.results import Variable, flags
+from fastmech.scene import Scene
+from fastmech.stability.modes import SIN_PHI, SIN_PSI, UNLOADED
+
+Floats = NDArray[np.float64]
+
+#: Values of an axis that seed the vanishing-damping curves; folds are seeded by every edge of the map.
+SEED_VALUES = 151
+
+
+class Merging(IntEnum):
+    """What merges with a saddle on a fold."""
+
+    MINIMUM = 0
+    MAXIMUM = 1
+
+
+class Vanishing(IntEnum):
+    """What vanishes where the damper misses a mode."""
+
+    SIN_PHI = 0
+    SIN_PHI_THETA = 1
+    UNLOADED_ROD = 2
+
+
+_VANISHING = {
+    SIN_PHI: Vanishing.SIN_PHI,
+    SIN_PSI: Vanishing.SIN_PHI_THETA,
+    UNLOADED: Vanishing.UNLOADED_ROD,
+}
+
+
+def curve_variables(scene: Scene, axes: dict[str, Floats], threads: int | None) -> dict[str, Variable]:
+    """Folds over one parameter, curves over two; nothing over three or where values do not rise."""
+    if "alpha" in axes or not all(
+        values.size > 1 and (np.diff(values) > 0.0).all() for values in axes.values()
+    ):
+        return {}
+    if len(axes) == 1:
+        return _fold_points(scene, axes)
+    if len(axes) == 2:
+        x, y = axes.items()
+        return _fold_curves(scene, x, y) | _unreached_curves(scene, x, y, threads)
+    return {}
+
+
+def _fold_points(scene: Scene, axes: dict[str, Floats]) -> dict[str, Variable]:
+    ((name, values),) = axes.items()
+    unit = scene.described()[name][1]
+    found = find_folds(scene, name, values)
+    each = ("fold",)
+    return {
+        f"fold_{name}": _numbers(each, [f.value for f in found], unit, f"{name} at the fold"),
+        "fold_phi": _numbers(each, [f.phi for f in found], "rad", "phi where two equilibria merge"),
+        "fold_theta": _numbers(each, [f.theta for f in found], "rad", "theta where two equilibria merge"),
+        "fold_merges": _codes(
+            each, [Merging[f.merges.upper()] for f in found], "merges with a saddle", Merging
+        ),
+    }
+
+
+def _fold_curves(scene: Scene, x: tuple[str, Floats], y: tuple[str, Floats]) -> dict[str, Variable]:
+    found = trace_folds(scene, x, y)
+    curves = found.curves
+    units = [scene.described()[name][1] for name, _ in (x, y)]
+    each, cusp = ("fold_point",), ("cusp",)
+    variables = {
+        f"fold_{x[0]}": _joined(each, [c.x for c in curves], units[0], f"{x[0]} along the fold curves"),
+        f"fold_{y[0]}": _joined(each, [c.y for c in curves], units[1], f"{y[0]} along the fold curves"),
+        "fold_phi": _joined(each, [c.phi for c in curves], "rad", "phi where two equilibria merge"),
+        "fold_theta": _joined(each, [c.theta for c in curves], "rad", "theta where two equilibria merge"),
+        "fold_curve": _numbering(each, [c.x.size for c in curves], "number of the fold curve"),
+        "fold_merges": _codes(
+            each,
+            [m for c in curves for m in [Merging[c.merges.upper()]] * c.x.size],
+            "merges with a saddle",
+            Merging,
+        ),
+        f"cusp_{x[0]}": _numbers(cusp, [c.x for c in found.cusps], units[0], f"{x[0]} at the cusp"),
+        f"cusp_{y[0]}": _numbers(cusp, [c.y for c in found.cusps], units[1], f"{y[0]} at the cusp"),
+        "cusp_phi": _numbers(cusp, [c.phi for c in found.cusps], "rad", "phi where three equilibria merge"),
+        "cusp_theta": _numbers(cusp, [c.theta for c in found.cusps], "rad", "theta where three merge"),
+    }
+    about = "edges of the map between whose ends the count changes, and those that no fold curve crosses"
+    counts = np.array([found.crossings, found.unexplained])
+    variables["fold_crossings"] = Variable(("total_and_unexplained",), counts, "1", about)
+    return variables
+
+
+def _unreached_curves(
+    scene: Scene, x: tuple[str, Floats], y: tuple[str, Floats], threads: int | None
+) -> dict[str, Variable]:
+    thin = [
+        (name, np.linspace(values[0], values[-1], min(values.size, SEED_VALUES))) for name, values in (x, y)
+    ]
+    curves = trace_unreached(scene, *thin, threads=threads)
+    units = [scene.described()[name][1] for name, _ in (x, y)]
+    each = ("unreached_point",)
+    what = "where the damper misses a mode"
+    return {
+        f"unreached_{x[0]}": _joined(each, [c.x for c in curves], units[0], f"{x[0]} {what}"),
+        f"unreached_{y[0]}": _joined(each, [c.y for c in curves], units[1], f"{y[0]} {what}"),
+        "unreached_phi": _joined(each, [c.phi for c in curves], "rad", f"phi {what}"),
+        "unreached_theta": _joined(each, [c.theta for c in curves], "rad", f"theta {what}"),
+        "unreached_curve": _numbering(each, [c.x.size for c in curves], "number of the curve"),
+        "unreached_vanishes": _codes(
+            each,
+            [v for c in curves for v in [_VANISHING[c.vanishes]] * c.x.size],
+            "what vanishes there",
+            Vanishing,
+        ),
+    }
+
+
+def _numbers(dims: tuple[str, ...], values: Sequence[float], unit: str, about: str) -> Variable:
+    return Variable(dims, np.array(values, dtype=np.float64), unit, about)
+
+
+def _joined(dims: tuple[str, ...], pieces: Sequence[Floats], unit: str, about: str) -> Variable:
+    return Variable(dims, np.concatenate([np.zeros(0), *pieces]), unit, about)
+
+
+def _numbering(dims: tuple[str, ...], sizes: Sequence[int], about: str) -> Variable:
+    return Variable(dims, np.repeat(np.arange(len(sizes), dtype=np.int32), sizes), "1", about)
+
+
+def _codes(dims: tuple[str, ...], codes: Sequence[Any], about: str, members: type[IntEnum]) -> Variable:
+    return Variable(dims, np.array(codes, dtype=np.int8), "1", about, flags(members))

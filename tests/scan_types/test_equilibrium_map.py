@@ -1,0 +1,116 @@
+"""The map as a scan: its layout, its curves, and the same result in memory and streamed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fastmech.errors import InputError
+from fastmech.results import Dataset
+from fastmech.scan_types import scan_kinds
+from fastmech.scan_types.equilibrium_map import EquilibriumMap
+from fastmech.scan_types.request import RunContext, read_request
+from fastmech.scan_types.snap import SnapScan
+from fastmech.scene import Scene
+from fastmech.store.provenance import provenance
+from fastmech.store.read import open_results
+from fastmech.store.stream import Stream, write_stream
+from fastmech.store.write import write_results
+
+SCENE = Scene(c1=294.9, c2=92.85, F0=85.3, alpha=0.0)
+AXES = {
+    "F0": {"start": -300.0, "stop": 300.0, "num": 31},
+    "c2": {"start": 0.0, "stop": 300.0, "num": 23},
+}
+
+
+def mapped() -> Dataset:
+    result = EquilibriumMap(axes=AXES).run(SCENE, RunContext())
+    assert isinstance(result, Dataset)
+    return result
+
+
+def test_padding_is_as_documented() -> None:
+    dataset = mapped()
+    empty = np.arange(6) >= dataset["count"].data[..., None]
+    for name in ("phi", "theta", "radius", "energy", "frequency", "decay_time", "depth", "escape_speed"):
+        assert dataset[name].dims == ("F0", "c2", "root")
+        assert np.isnan(dataset[name].data[empty]).all(), name
+    for name in ("hessian", "eigenvalue_re", "eigenvalue_im"):
+        assert np.isnan(dataset[name].data[empty]).all(), name
+    codes = ("morse_index", "sheet", "verdict", "verdict_sylvester", "verdict_hurwitz", "verdict_eigenvalues")
+    for name in codes:
+        assert (dataset[name].data[empty] == -1).all(), name
+        assert (dataset[name].data[~empty] >= 0).all(), name
+    assert "NaN" in dataset.attrs["layout"]
+
+
+def test_curves_come_with_the_map() -> None:
+    dataset = mapped()
+    assert dataset["fold_crossings"].data[0] > 10
+    assert dataset["fold_crossings"].data[1] == 0
+    assert dataset["cusp_F0"].data.size >= 4
+    assert set(np.unique(dataset["unreached_vanishes"].data)) >= {0, 2}
+    line = EquilibriumMap(axes={"F0": {"start": -800.0, "stop": 800.0, "num": 99}}).run(SCENE, RunContext())
+    assert line["fold_F0"].data == pytest.approx([-671.1627073982018, 671.1627073982018], abs=1e-9)
+
+
+def test_xarray_opens_a_map_with_names_and_units(tmp_path: Path) -> None:
+    xarray = pytest.importorskip("xarray")
+    path = tmp_path / "map.h5"
+    attrs = {**provenance(1), "title": "map"}
+    write_results(path, scene_parameters={}, sections={"map": mapped()}, attrs=attrs)
+    with xarray.open_dataset(path, group="map", engine="h5netcdf") as opened:
+        assert opened["F0"].attrs["units"] == "N"
+        assert opened["c2"].attrs["units"] == "N/m"
+        assert opened["phi"].sel(F0=300.0, c2=0.0).dims == ("root",)
+        assert all("units" in variable.attrs for variable in opened.variables.values())
+        # One identity across the map: pick a sheet and there is one value at a point.
+        one = opened["phi"].where(opened["sheet"] == 0)
+        assert int(one.notnull().sum("root").max()) == 1
+
+
+def test_streamed_and_in_memory_agree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = mapped()
+    monkeypatch.setattr("fastmech.scan_types.equilibrium_map.IN_MEMORY", 100)
+    monkeypatch.setattr("fastmech.atlas.map.SLAB", 100)
+    result = EquilibriumMap(axes=AXES).run(SCENE, RunContext())
+    assert isinstance(result, Stream)
+    path = tmp_path / "map.h5"
+    attrs = {**provenance(1), "title": "map"}
+    write_stream(path, scene_parameters={}, sections={"map": result}, attrs=lambda: attrs)
+    with open_results(path) as results:
+        streamed = results["map"].load()
+    assert set(streamed) == set(whole)
+    for name in whole:
+        one, two = whole[name], streamed[name]
+        assert (one.dims, one.units, one.long_name) == (two.dims, two.units, two.long_name), name
+        if one.data.dtype.kind == "f":
+            # Pieces start afresh, so angles may differ in their last bits, and a rate of nothing entirely.
+            settled = np.isfinite(one.data) & (np.abs(one.data) < 1e6)
+            np.testing.assert_allclose(two.data[settled], one.data[settled], rtol=1e-6, atol=1e-6)
+        else:
+            np.testing.assert_array_equal(two.data, one.data)
+
+
+def test_chosen_variables_only() -> None:
+    result = EquilibriumMap(axes=AXES, variables=["count", "phi"]).run(SCENE, RunContext())
+    assert {"count", "phi", "sheet"} <= set(result)
+    assert "depth" not in result
+    with pytest.raises(ValueError, match="unknown variable 'phii'; did you mean 'phi'"):
+        EquilibriumMap(axes=AXES, variables=["phii"])
+
+
+def test_requests_of_the_atlas_are_valid() -> None:
+    for path in sorted((Path(__file__).parents[2] / "scans").glob("atlas_*.toml")):
+        assert read_request(path, scan_kinds()).scans
+
+
+def test_snap_scan() -> None:
+    dataset = SnapScan().run(SCENE, RunContext())
+    assert dataset.sizes["equilibrium"] == 2
+    assert np.nanmin(dataset["snap_below"].data) == pytest.approx(-671.1627073982018, abs=1e-9)
+    with pytest.raises(InputError, match="searched"):
+        SnapScan(searched=[0.0, 1.0]).run(SCENE, RunContext())
