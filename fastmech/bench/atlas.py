@@ -30,6 +30,9 @@ SCENE = Scene(c1=294.9, c2=92.85, F0=85.3, alpha=0.0)
 F0_RANGE, C1_RANGE = (-400.0, 400.0), (0.0, 400.0)
 
 STARTS = 64
+
+#: Distance in F0 [N] of the scenes beside folds.
+NEAR_FOLD = 0.01
 REPEATS = 3
 
 
@@ -66,15 +69,16 @@ def run_atlas(
     stage: Callable[[str, int], Progress] = lambda name, total: lambda done: None,
 ) -> list[Path]:
     """Measure and write ``atlas.md`` into the folder ``out``; ``quick`` is for trying the command."""
-    side, sample = (200, 20) if quick else (1000, 100)
+    side, sample = (200, 100) if quick else (1000, 2000)
     rows = []
     advance = stage("maps", 2)
     for threads in sorted({1, thread_count(None)}):
         rows.append(certified(side, threads))
         advance(1)
-    advance = stage("multistart", sample)
+    advance = stage("multistart", 3 * sample)
     rows.append(multistart("in the map's region", region_scenes(sample), advance))
-    rows.append(multistart("random scenes", random_scenes(sample), lambda done: None))
+    rows.append(multistart("random scenes", random_scenes(sample), advance))
+    rows.append(multistart(f"within {NEAR_FOLD:g} N of a fold", fold_scenes(sample), advance))
     advance = stage("fold curves", 2)
     folds = [traced()]
     advance(1)
@@ -144,6 +148,18 @@ def random_scenes(n: int) -> list[Scene]:
             alpha=0.0,
         )
         for _ in range(n)
+    ]
+
+
+def fold_scenes(n: int) -> list[Scene]:
+    """Points of the map's region just beside its fold curves, on either side."""
+    rng = np.random.default_rng(4)
+    curves = trace_folds(SCENE, *grid(201).items()).curves
+    x, y = (np.concatenate([getattr(curve, name) for curve in curves]) for name in ("x", "y"))
+    chosen = rng.integers(x.size, size=n)
+    sides = rng.choice([-NEAR_FOLD, NEAR_FOLD], n)
+    return [
+        SCENE.replace(F0=float(x[k] + side), c1=float(y[k])) for k, side in zip(chosen, sides, strict=True)
     ]
 
 

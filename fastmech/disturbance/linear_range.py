@@ -16,8 +16,8 @@ from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
 
-SMALLEST, LARGEST, GRID = 1e-6, np.pi, 40
-BISECTIONS = 12
+SMALLEST, LARGEST, GRID = 1e-6, np.pi, 24
+BISECTIONS = 13
 OUTPUTS = 200
 
 

@@ -26,9 +26,15 @@ from fastmech.stability.modes import MEANING, reach, slowest_decay, squared_freq
 
 
 _PROVED = {
-    0: Finding("stable", "U has a minimum: its minors are near zero, their signs proved with the equilibrium"),
-    1: Finding("unstable", "U has a saddle: its minors are near zero, their signs proved with the equilibrium"),
-    2: Finding("unstable", "U has a maximum: its minors are near zero, their signs proved with the equilibrium"),
+    0: Finding(
+        "stable", "U has a minimum: its minors are near zero, their signs proved with the equilibrium"
+    ),
+    1: Finding(
+        "unstable", "U has a saddle: its minors are near zero, their signs proved with the equilibrium"
+    ),
+    2: Finding(
+        "unstable", "U has a maximum: its minors are near zero, their signs proved with the equilibrium"
+    ),
 }
 
 
