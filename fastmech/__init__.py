@@ -9,6 +9,10 @@ from importlib import import_module, metadata
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from fastmech.atlas.fold_points import find_folds
+    from fastmech.atlas.folds import trace_folds
+    from fastmech.atlas.map import map_equilibria
+    from fastmech.atlas.snap import find_snap
     from fastmech.disturbance.ensemble import disturb
     from fastmech.disturbance.linear_range import linear_range
     from fastmech.disturbance.motion import disturbed_motion
@@ -16,7 +20,6 @@ if TYPE_CHECKING:
     from fastmech.ensembles.integrate import integrate
     from fastmech.ensembles.status import Status
     from fastmech.ensembles.system import System
-    from fastmech.equilibria.atlas import map_equilibria
     from fastmech.equilibria.find import find_equilibria
     from fastmech.errors import InputError
     from fastmech.kernels.sincos import cos, sin
@@ -41,12 +44,15 @@ _MODULES = {
     "disturb": "fastmech.disturbance.ensemble",
     "disturbed_motion": "fastmech.disturbance.motion",
     "find_equilibria": "fastmech.equilibria.find",
+    "find_folds": "fastmech.atlas.fold_points",
+    "find_snap": "fastmech.atlas.snap",
     "integrate": "fastmech.ensembles.integrate",
     "linear_range": "fastmech.disturbance.linear_range",
-    "map_equilibria": "fastmech.equilibria.atlas",
+    "map_equilibria": "fastmech.atlas.map",
     "open_results": "fastmech.store.read",
     "reactions": "fastmech.mechanism.reactions",
     "sin": "fastmech.kernels.sincos",
+    "trace_folds": "fastmech.atlas.folds",
 }
 
 __all__ = [
@@ -60,12 +66,15 @@ __all__ = [
     "disturb",
     "disturbed_motion",
     "find_equilibria",
+    "find_folds",
+    "find_snap",
     "integrate",
     "linear_range",
     "map_equilibria",
     "open_results",
     "reactions",
     "sin",
+    "trace_folds",
 ]
 
 

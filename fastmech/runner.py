@@ -19,6 +19,7 @@ from fastmech.scan_types.request import Request, RunContext, read_request
 from fastmech.scene import Scene
 from fastmech.store.provenance import provenance
 from fastmech.store.read import Results, open_results
+from fastmech.store.stream import Stream, write_stream
 from fastmech.store.write import check_writable, write_results
 
 #: Prefix of the attributes of a section that hold its changes of the scene.
@@ -61,16 +62,22 @@ def run_request(
     check_writable(target, replace=fresh)
     started = time.perf_counter()
     sections = {name: _run_scan(request, name, context) for name in request.scans}
-    attrs = {
-        **provenance(thread_count(context.threads)),
-        "title": request.title,
-        "request_file": Path(path).name,
-        "request": request.text,
-        "wall_time_s": time.perf_counter() - started,
-    }
-    write_results(
-        target, scene_parameters=_parameters(request.scene), sections=sections, attrs=attrs, replace=fresh
-    )
+    parameters = _parameters(request.scene)
+
+    def attrs() -> dict[str, str | int | float]:
+        return {
+            **provenance(thread_count(context.threads)),
+            "title": request.title,
+            "request_file": Path(path).name,
+            "request": request.text,
+            "wall_time_s": time.perf_counter() - started,
+        }
+
+    whole = {name: section for name, section in sections.items() if isinstance(section, Dataset)}
+    if len(whole) < len(sections):
+        write_stream(target, scene_parameters=parameters, sections=sections, attrs=attrs, replace=fresh)
+    else:
+        write_results(target, scene_parameters=parameters, sections=whole, attrs=attrs(), replace=fresh)
     return target
 
 
@@ -110,7 +117,7 @@ def draw_results(path: str | Path, out: str | Path | None = None) -> Iterator[Pa
                 yield picture
 
 
-def _run_scan(request: Request, name: str, context: RunContext) -> Dataset:
+def _run_scan(request: Request, name: str, context: RunContext) -> Dataset | Stream:
     def stage(what: str, total: int) -> Progress:
         return context.stage(f"{name}: {what}", total)
 
@@ -122,6 +129,9 @@ def _run_scan(request: Request, name: str, context: RunContext) -> Dataset:
         raise InputError(f"scan.{name}: {error}") from None
     seconds = time.perf_counter() - started
     changes = {f"{CHANGE}{key}": float(value) for key, value in scan.scene.items()}
+    if isinstance(dataset, Stream):
+        fixed = Dataset(dataset.fixed.variables, {"kind": scan.kind, **changes, **dataset.fixed.attrs})
+        return replace(dataset, fixed=fixed)
     return Dataset(dataset.variables, {"kind": scan.kind, **changes, **dataset.attrs, "wall_time_s": seconds})
 
 

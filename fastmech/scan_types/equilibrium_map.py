@@ -16,6 +16,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from fastmech.atlas.map import Slab, map_equilibria, solve_in_slabs
 from fastmech.atlas.sheets import SheetBuilder
+from fastmech.errors import InputError
 from fastmech.results import Dataset, Variable
 from fastmech.scan_types.map_curves import curve_variables
 from fastmech.scan_types.map_layout import point_variables, sheet_variables
@@ -64,6 +65,16 @@ class EquilibriumMap(Scan):
     variables: Annotated[list[str], AfterValidator(_known_variables)] | None = Field(
         None, description="what to keep of every point (all by default); large maps are smaller with less"
     )
+
+    def check(self, scene: Scene) -> None:
+        """Every value of every axis must be one the scene accepts, and every axis must matter."""
+        if "F0" in self.axes and scene.alpha > 0:
+            raise InputError(
+                f"alpha = {scene.alpha:g}: must be 0 1/s for a map over F0, or no force is left at rest"
+            )
+        for name, axis in self.axes.items():
+            for value in (axis.start, axis.stop):
+                scene.replace(**{name: value})
 
     def run(self, scene: Scene, context: RunContext) -> Dataset | Stream:
         """Search the grid; the force is the one at rest (F0 where alpha = 0)."""

@@ -17,6 +17,7 @@ from fastmech.errors import InputError
 from fastmech.integrators.methods import find_method
 from fastmech.results import Dataset, check_name
 from fastmech.scene import Scene, explain, nearest, read_toml
+from fastmech.store.stream import Stream
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -61,8 +62,8 @@ class Scan(BaseModel, ABC):
         """
 
     @abstractmethod
-    def run(self, scene: Scene, context: RunContext) -> Dataset:
-        """Compute the result. ``scene`` has this scan's changes already."""
+    def run(self, scene: Scene, context: RunContext) -> Dataset | Stream:
+        """Compute the result, or say how it is computed while it is written. ``scene`` has the changes."""
 
     @staticmethod
     @abstractmethod

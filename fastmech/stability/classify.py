@@ -24,7 +24,6 @@ from fastmech.stability.criteria import (
 from fastmech.stability.linearize import FloatArray, Rest, jacobian, linearized
 from fastmech.stability.modes import MEANING, reach, slowest_decay, squared_frequencies
 
-
 _PROVED = {
     0: Finding(
         "stable", "U has a minimum: its minors are near zero, their signs proved with the equilibrium"

@@ -35,6 +35,11 @@ class Rest(Protocol):
         ...
 
     @property
+    def morse_index(self) -> int:
+        """Negative eigenvalues of the Hessian, if proved."""
+        ...
+
+    @property
     def radius(self) -> float:
         """How far the true equilibrium may be [rad]; inf if unknown."""
         ...

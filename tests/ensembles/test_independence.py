@@ -10,8 +10,8 @@ from ensembles.starts import Floats, random_starts
 
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.run import run_ensemble
-from fastmech.ensembles.threads import thread_count
 from fastmech.ensembles.status import Status
+from fastmech.ensembles.threads import thread_count
 from fastmech.integrators.methods import METHODS
 from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import reduce

@@ -156,7 +156,7 @@ def test_wrong_time_is_refused(at: float) -> None:
 
 @pytest.mark.parametrize("change", [{"c1": 1e30, "m2": 1e-30}, {"l": 1e-30, "F0": -1e30}, {"m1": 1e30}])
 def test_the_most_extreme_scenes_are_answered(change: dict[str, float]) -> None:
-    """At the bounds of what a scene may hold nothing leaves double precision, though rounding hides the rest."""
+    """At the bounds of what a scene may hold nothing leaves double precision."""
     certificate = find_equilibria(PAPER.replace(**change)).certificate
     assert certificate.outcome in (Outcome.COMPLETE, Outcome.AT_FOLD)
     assert certificate.expected == 4

@@ -86,19 +86,19 @@ CASES: dict[str, tuple[str, Scene, dict[str, Any], set[str]]] = {
         "equilibrium_map",
         CONSTANT,
         {"axes": {"F0": axis(-400.0, 400.0, 9), "c1": axis(0.0, 400.0, 7)}},
-        {"count", "angles", "decay"},
+        {"count", "angles", "barrier", "decay"},
     ),
     "map with bistable points": (
         "equilibrium_map",
         CONSTANT,
         {"axes": {"c2": axis(0.0, 300.0, 9), "F0": axis(0.0, 200.0, 5)}},
-        {"count", "angles", "decay"},
+        {"count", "angles", "barrier", "decay"},
     ),
     "map with degenerate points": (
         "equilibrium_map",
         DEGENERATE,
         {"axes": {"c1": axis(0.0, 100.0, 3), "c2": axis(0.0, 100.0, 3)}},
-        {"count", "angles"},
+        {"count", "angles", "barrier"},
     ),
     "map of nothing": (
         "equilibrium_map",
@@ -110,7 +110,7 @@ CASES: dict[str, tuple[str, Scene, dict[str, Any], set[str]]] = {
         "equilibrium_map",
         CONSTANT,
         {"axes": {"c2": axis(0.0, 400.0, 4), "c1": axis(50.0, 200.0, 3), "F0": axis(-100.0, 100.0, 3)}},
-        {"count", "angles", "decay"},
+        {"count", "angles", "barrier", "decay"},
     ),
     "line": ("equilibrium_map", CONSTANT, {"axes": {"c2": axis(0.0, 800.0, 41)}}, {"branches"}),
     "line, second axis of one point": (
@@ -173,7 +173,8 @@ def test_counts_have_their_legend_and_the_scene_its_star():
 
 def test_no_star_for_a_scene_outside_the_map():
     figure = draw("equilibrium_map", CONSTANT, axes={"F0": axis(-9.0, 9.0, 2), "c2": axis(0.0, 400.0, 2)})
-    assert not panel(figure["count"], "Number of equilibria").lines
+    lines = panel(figure["count"], "Number of equilibria").lines
+    assert not [line for line in lines if line.get_marker() == "*"]
 
 
 def test_unsettled_points_are_marked():
@@ -193,10 +194,10 @@ def test_mirror_images_keep_their_order():
     assert (np.ma.compressed(first) <= np.ma.compressed(second)).all()
 
 
-def test_stable_dots_are_solid_and_unstable_hollow():
-    dataset = run("equilibrium_map", CONSTANT, axes={"c2": axis(0.0, 800.0, 5)})
+def test_stable_branches_are_solid_and_unstable_dashed():
+    dataset = run("equilibrium_map", CONSTANT, axes={"F0": axis(-3.0, 3.0, 41)})
     axes = scan_kinds()["equilibrium_map"].draw(dataset, CONSTANT.model_dump())["branches"].axes[0]
-    dots = {line.get_label(): line for line in axes.lines}
-    assert dots["unstable"].get_markerfacecolor() == "none"
-    assert dots["stable"].get_markerfacecolor() != "none"
-    assert len(dots["stable"].get_xdata()) == int(dataset["count_stable"].data.sum())
+    looks = {line.get_label(): line for line in axes.lines}
+    assert looks["stable"].get_linestyle() == "-"
+    assert looks["unstable: saddle"].get_linestyle() == "--"
+    assert len(looks["fold"].get_xdata()) == 2

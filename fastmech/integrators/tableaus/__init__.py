@@ -7,8 +7,10 @@ the module is imported (shapes, row sums, order conditions), appears under its n
 
 from __future__ import annotations
 
+import fastmech.integrators.tableaus.order_1_to_5 as order_1_to_5
+import fastmech.integrators.tableaus.order_6_to_8 as order_6_to_8
+import fastmech.integrators.tableaus.order_10 as order_10
 from fastmech.integrators.tableau import Tableau
-from fastmech.integrators.tableaus import order_1_to_5, order_6_to_8, order_10
 
 #: Every tableau by its name.
 TABLEAUS: dict[str, Tableau] = {

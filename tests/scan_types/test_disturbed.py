@@ -1,0 +1,268 @@
+"""The section of disturbed ensembles: every trajectory by own Runge-Kutta steps, norms by the oracle.
+
+Ensembles run with the classical method and a fixed step, so all that happens at the ends of steps can be had
+again without the package; SciPy tells how far that is from the truth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.linalg
+import scipy.stats
+from scan_types.values import (
+    Floats,
+    Norm,
+    check_labels,
+    decoded,
+    deepest_first,
+    motion_rates,
+    oracle_jacobian,
+    rk4,
+    scipy_motion,
+    stored,
+)
+
+from fastmech.results import Dataset
+from fastmech.scan_types.disturbed import Disturbed
+from fastmech.scene import Scene
+
+UNITS = {
+    "phi": "rad", "theta": "rad", "omega": "rad/s", "start": "rad, rad/s", "final": "rad, rad/s",
+    "outcome": "1", "end_equilibrium": "1", "turns": "1", "time_to_return": "s", "excursion": "rad",
+    "share_returned": "1", "error_estimate": "rad or rad/s", "quantile": "1",
+    "time_to_return_quantile": "s", "linear_direction": "rad, rad/s", "linear_limit": "rad",
+}  # fmt: skip
+
+QUANTILES = [0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0]
+
+#: Strong damping of a light slider: within 6 s most, not all, come to rest, many some turns away. The other
+#: run is so short and its ball so wide that much is still at saddles and maxima, and two minima are reached.
+SETTLING = Disturbed(
+    trajectories=300, radius=1.6, return_radius=0.1, seed=5, t_end=6.0, dt=0.02, method="rk4",
+    linear_horizon=0.7, linear_tolerance=0.04, linear_directions=2,
+)  # fmt: skip
+BRIEF = Disturbed(
+    trajectories=200, radius=0.3, return_radius=0.2, seed=11, t_end=0.3, dt=0.07, method="rk4",
+    linear_horizon=1.0, linear_tolerance=0.05, linear_directions=1,
+)  # fmt: skip
+
+
+@dataclass
+class Run:
+    """A stored section and the same ensembles by own steps."""
+
+    scan: Disturbed
+    scene: Scene
+    angles: Floats
+    section: Dataset
+
+    def __post_init__(self) -> None:
+        self.params = self.scene.model_dump()
+        self.norms = [Norm(self.params, q) for q in self.angles]
+        self.centers = np.concatenate([self.angles, np.zeros_like(self.angles)], axis=1)
+        self.starts = self.section["start"].data
+        self.count = int(np.ceil(self.scan.t_end / self.scan.dt))
+        self.step = self.scan.t_end / self.count
+
+    @cached_property
+    def states(self) -> Floats:
+        """States at the start and the ends of steps, shape (steps + 1, equilibrium, trajectory, 4)."""
+        return rk4(motion_rates(self.params), self.starts, self.scan.t_end, self.count)
+
+    @cached_property
+    def places(self) -> list[list[tuple[int, int, int]]]:
+        """Equilibrium and turns at which every trajectory rests; (-1, 0, 0) for none."""
+        return [[self.place(y) for y in ensemble] for ensemble in self.section["final"].data]
+
+    def place(self, y: Floats) -> tuple[int, int, int]:
+        for i, norm in enumerate(self.norms):
+            turns = np.rint((y[:2] - norm.q) / (2.0 * np.pi))
+            if norm(y - self.centers[i] - [*(2.0 * np.pi * turns), 0.0, 0.0]) > self.scan.return_radius:
+                continue
+            lowest = norm.squares[0]
+            enough = 0.5 * lowest * norm.inertia * self.scan.return_radius**2
+            if lowest < 0.0 or norm.excess(y) <= enough:
+                return i, int(turns[0]), int(turns[1])
+        return -1, 0, 0
+
+    def outcome(self, index: int, place: tuple[int, int, int]) -> str:
+        end, *turns = place
+        if end < 0:
+            return "undecided"
+        if self.norms[end].squares[0] < 0.0:
+            return "at_unstable"
+        return "returned" if end == index and turns == [0, 0] else "elsewhere"
+
+
+def settling_scene() -> tuple[Scene, Floats]:
+    # Neither the slider's mass nor the damper moves an equilibrium.
+    scene, angles = deepest_first("table_1")
+    return scene.replace(beta=30.0, m3=0.5), angles
+
+
+MAKE: dict[str, Callable[[], tuple[Disturbed, Scene, Floats]]] = {
+    "settling": lambda: (SETTLING, *settling_scene()),
+    "brief": lambda: (BRIEF, *deepest_first("bistable")),
+}
+
+
+@pytest.fixture(scope="module", params=list(MAKE))
+def run(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Run:
+    scan, scene, angles = MAKE[request.param]()
+    return Run(scan, scene, angles, stored(scan, scene, tmp_path_factory.mktemp("disturbed")))
+
+
+def test_labels(run: Run) -> None:
+    section = run.section
+    check_labels(section, UNITS)
+    assert section["outcome"].dims == section["time_to_return"].dims == ("equilibrium", "trajectory")
+    assert section["start"].dims == section["final"].dims == ("equilibrium", "trajectory", "component")
+    assert section["excursion"].dims == section["turns"].dims == ("equilibrium", "trajectory", "angle")
+    assert section["time_to_return_quantile"].dims == ("equilibrium", "quantile")
+    assert section["linear_direction"].dims == ("equilibrium", "direction", "component")
+    assert section["linear_limit"].dims == ("equilibrium", "direction")
+    assert section["error_estimate"].dims == ("equilibrium", "sample")
+
+
+def test_equilibria_and_norm(run: Run) -> None:
+    found = np.stack([run.section["phi"].data, run.section["theta"].data], axis=-1)
+    np.testing.assert_allclose(found, run.angles, rtol=0, atol=1e-12)
+    omegas = [norm.omega for norm in run.norms]
+    np.testing.assert_allclose(run.section["omega"].data, omegas, rtol=1e-10)
+
+
+def test_starts_are_uniform_in_the_ball(run: Run) -> None:
+    shares = []
+    for norm, center, starts in zip(run.norms, run.centers, run.starts, strict=True):
+        away = starts - center
+        sizes = norm(away) / run.scan.radius
+        assert sizes.max() <= 1.0 + 1e-12
+        shares.append(sizes**4)
+        # In the eyes of the norm all directions are alike: covariance 1/(d + 2) = 1/6 of the unit matrix.
+        root = np.linalg.cholesky(norm.metric / norm.inertia)
+        points = away @ scipy.linalg.block_diag(root, root / norm.omega) / run.scan.radius
+        np.testing.assert_allclose(np.cov(points.T), np.eye(4) / 6.0, atol=0.06)
+        np.testing.assert_allclose(points.mean(axis=0), np.zeros(4), atol=0.13)
+    assert scipy.stats.kstest(np.concatenate(shares), "uniform").pvalue > 0.01
+    # Each equilibrium has its own stream.
+    assert np.unique(np.round(np.concatenate(shares), 12)).size == run.starts[..., 0].size
+
+
+def test_finals_and_excursions_are_runge_kutta_s(run: Run) -> None:
+    np.testing.assert_allclose(run.section["final"].data, run.states[-1], rtol=0, atol=1e-6)
+    departures = np.abs(run.states - run.centers[:, None])[..., :2].max(axis=0)
+    np.testing.assert_allclose(run.section["excursion"].data, departures, rtol=0, atol=1e-6)
+
+
+def test_error_estimate(run: Run) -> None:
+    finals = run.section["final"].data
+    # Half the longest step asked for: where that does not divide the run, more than half of the step taken.
+    count = int(np.ceil(run.scan.t_end / (0.5 * run.scan.dt)))
+    finer = rk4(motion_rates(run.params), run.starts[:, :256], run.scan.t_end, count)[-1]
+    errors = np.abs(finer - finals[:, :256]).max(axis=-1)
+    found = run.section["error_estimate"].data
+    assert found.shape == (len(run.angles), min(256, run.scan.trajectories))
+    np.testing.assert_allclose(found, errors, rtol=1e-3, atol=1e-6)
+    # The truth is not much further away than half the step tells.
+    truth = scipy_motion(run.params, run.starts[:, :4], np.array([run.scan.t_end]))[-1]
+    assert (np.abs(truth - finals[:, :4]).max(axis=-1) <= 1.5 * found[:, :4] + 1e-9).all()
+
+
+def test_outcomes(run: Run) -> None:
+    np.testing.assert_array_equal(
+        run.section["end_equilibrium"].data, [[p[0] for p in e] for e in run.places]
+    )
+    np.testing.assert_array_equal(run.section["turns"].data, [[p[1:] for p in e] for e in run.places])
+    expected = [[run.outcome(i, p) for p in e] for i, e in enumerate(run.places)]
+    assert decoded(run.section["outcome"]) == expected
+    assert run.section["outcome"].attrs["flag_meanings"].split()[-2:] == ["not_finite", "step_too_large"]
+    assert run.section.attrs["failed"] == 0
+
+
+def test_the_runs_have_every_outcome_that_is_no_failure(run: Run) -> None:
+    seen = set(np.ravel(np.array(decoded(run.section["outcome"]))))
+    if run.scan is SETTLING:
+        assert seen == {"returned", "elsewhere", "undecided"}
+        turns = run.section["turns"].data.reshape(-1, 2)
+        assert {-1, 0} <= set(turns[:, 0].tolist())
+        assert {-1, 0, 1} <= set(turns[:, 1].tolist())
+    else:
+        assert {"returned", "at_unstable", "undecided"} <= seen
+        assert set(np.unique(run.section["end_equilibrium"].data)) >= set(range(-1, 5))
+
+
+def test_time_to_return(run: Run) -> None:
+    returned = np.array(decoded(run.section["outcome"])) == "returned"
+    for i, (norm, center) in enumerate(zip(run.norms, run.centers, strict=True)):
+        inside = norm(run.states[:, i] - center) <= run.scan.return_radius
+        times = np.full(run.scan.trajectories, np.nan)
+        for k in np.flatnonzero(returned[i]):
+            first = 0
+            for step in range(run.count + 1):
+                first = first if inside[step, k] else step + 1
+            times[k] = first * run.step
+        np.testing.assert_allclose(run.section["time_to_return"].data[i], times, rtol=0, atol=1e-10)
+
+
+def test_statistics(run: Run) -> None:
+    np.testing.assert_array_equal(run.section["quantile"].data, QUANTILES)
+    outcomes, times = decoded(run.section["outcome"]), run.section["time_to_return"].data
+    for i, row in enumerate(outcomes):
+        assert run.section["share_returned"].data[i] == pytest.approx(row.count("returned") / len(row))
+        settled = sorted(t for t, where in zip(times[i].tolist(), row, strict=True) if where == "returned")
+        quantiles = []
+        for q in QUANTILES:
+            if not settled:
+                quantiles.append(np.nan)
+                continue
+            place = q * (len(settled) - 1)
+            low = int(place)
+            high = min(low + 1, len(settled) - 1)
+            quantiles.append(settled[low] + (place - low) * (settled[high] - settled[low]))
+        np.testing.assert_allclose(run.section["time_to_return_quantile"].data[i], quantiles, rtol=1e-12)
+    assert 0.0 < run.section["share_returned"].data[0] < 1.0
+    assert np.isnan(run.section["time_to_return_quantile"].data[-1]).all()
+
+
+def test_linear_directions_and_limits(run: Run) -> None:
+    tolerance = run.scan.linear_tolerance
+    times = np.linspace(0.0, run.scan.linear_horizon, 201)
+    directions, limits = run.section["linear_direction"].data, run.section["linear_limit"].data
+    assert limits.shape == (len(run.angles), run.scan.linear_directions)
+    assert np.isfinite(limits).all()
+    assert (limits > 1e-6).all()
+    for norm, center, rays, ends in zip(run.norms, run.centers, directions, limits, strict=True):
+        np.testing.assert_allclose(norm(rays), 1.0, rtol=1e-12)
+        # Not beyond the tolerance on the way there; at the limit the tolerance is passed.
+        relative = np.array([0.05, 0.3, 0.6, 0.9, 0.997, 1.003])
+        starts = relative[:, None, None] * ends[:, None] * rays
+        nonlinear = scipy_motion(run.params, center + starts, times) - center
+        jacobian = oracle_jacobian(run.params, norm.q)
+        growth = scipy.linalg.expm(times[:, None, None] * jacobian)
+        linear = np.einsum("tij,...j->t...i", growth, starts)
+        deviation = norm(nonlinear - linear).max(axis=0) / norm(nonlinear).max(axis=0)
+        assert (deviation[:-1] <= tolerance).all()
+        assert (deviation[-1] > tolerance).all()
+    assert not np.allclose(directions[:, 0, 0] / directions[0, 0, 0], 1.0)
+
+
+def test_attributes(run: Run) -> None:
+    request = run.scan.model_dump(exclude={"scene"})
+    assert {name: run.section.attrs[name] for name in request} == request
+    assert "uniform in the ball" in run.section.attrs["distribution"]
+
+
+def test_failures_are_counted(tmp_path: Path) -> None:
+    scan = Disturbed(trajectories=20, t_end=60.0, dt=1.0, method="rk4", linear_directions=1)
+    section = stored(scan, settling_scene()[0], tmp_path)
+    outcomes = np.ravel(np.array(decoded(section["outcome"]))).tolist()
+    failed = outcomes.count("not_finite") + outcomes.count("step_too_large")
+    assert section.attrs["failed"] == failed > 0
+    finite = np.isfinite(section["final"].data).all(axis=-1)
+    assert ((np.array(decoded(section["outcome"])) == "not_finite") == ~finite).all()

@@ -1,0 +1,177 @@
+"""What tests of stored sections share: re-reading, own equations of motion, the norm by the oracle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from disturbance.known import known
+from numpy.typing import NDArray
+from oracles import oracle
+from scipy.integrate import solve_ivp
+
+from fastmech.results import Dataset, Variable
+from fastmech.scan_types.request import RunContext, Scan
+from fastmech.scene import Scene
+from fastmech.store.provenance import provenance
+from fastmech.store.read import open_results
+from fastmech.store.write import write_results
+
+Floats = NDArray[np.float64]
+Params = Mapping[str, float]
+Rates = Callable[[float, Floats], Floats]
+
+
+def stored(scan: Scan, scene: Scene, folder: Path) -> Dataset:
+    """The result of a scan after a way through a file."""
+    dataset = scan.run(scene, RunContext(threads=2))
+    assert isinstance(dataset, Dataset)
+    path = folder / "result.h5"
+    attrs = {**provenance(2), "title": "values"}
+    write_results(path, scene_parameters={}, sections={"section": dataset}, attrs=attrs, replace=True)
+    with open_results(path) as results:
+        return results["section"].load()
+
+
+def check_labels(section: Dataset, units: Mapping[str, str]) -> None:
+    """Exactly these variables, each with its unit and a description of its own."""
+    assert {name: section[name].units for name in section} == units
+    names = [section[name].long_name for name in section]
+    assert all(name.strip() for name in names)
+    assert len(set(names)) == len(names)
+
+
+def decoded(variable: Variable) -> list[Any]:
+    """The meanings of a variable's codes."""
+    assert variable.data.dtype == np.int8
+    values, meanings = variable.attrs["flag_values"].tolist(), variable.attrs["flag_meanings"].split()
+    table = dict(zip(values, meanings, strict=True))
+    return np.vectorize(table.__getitem__, otypes=[object])(variable.data).tolist()
+
+
+def deepest_first(name: str) -> tuple[Scene, Floats]:
+    """A scene of data/equilibria.toml and its equilibria (n, 2) [rad], the least potential energy first."""
+    scene, angles, _ = known(name)
+    energies = [float(oracle().potential(scene.model_dump(), q, scene.F0)) for q in angles]
+    assert np.diff(np.sort(energies)).min() > 1e-6
+    return scene, angles[np.argsort(energies)]
+
+
+def array(numbers: Any) -> Floats:
+    return np.array(numbers, dtype=np.float64)
+
+
+def along(function: Callable[..., Any], params: Params, *columns: Any) -> Floats:
+    """A function of the oracle at every instant, shape (times, ...)."""
+    return array([function(params, *row) for row in zip(*columns, strict=True)])
+
+
+def slider_slopes(params: Params, phi: Floats) -> tuple[Floats, Floats]:
+    """First and second derivative of x3 = l (cos phi + sqrt(4 - sin^2 phi)) [m]."""
+    s, c = np.sin(phi), np.cos(phi)
+    root = np.sqrt(4.0 - s * s)
+    return (
+        -params["l"] * (s + s * c / root),
+        -params["l"] * (c + (c * c - s * s) / root + (s * c) ** 2 / root**3),
+    )
+
+
+def motion_rates(params: Params) -> Rates:
+    """Rates of states (..., 4): Newton's equations of x1, y1, x2, y2, x3, projected on the free motions."""
+    m1, m2, m3, l, g = (params[name] for name in ("m1", "m2", "m3", "l", "g"))
+
+    def rates(t: float, y: Floats) -> Floats:
+        phi, theta, u, w = np.moveaxis(y, -1, 0)
+        s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
+        k, dk = slider_slopes(params, phi)
+        zero = np.zeros_like(phi)
+        by_phi = np.stack([-l * s1, l * c1, -l * s1, l * c1, k])
+        by_theta = np.stack([zero, zero, -l * c2, l * s2, zero])
+        bending = np.stack([-l * c1, -l * s1, -l * c1, -l * s1, dk]) * u * u
+        bending += np.stack([zero, zero, l * s2, l * c2, zero]) * w * w
+        x2, y2 = l * (c1 - s2), l * (s1 - c2)
+        force = params["F0"] * np.exp(-params["alpha"] * t)
+        applied = np.stack(
+            [
+                -params["c2"] * l * c1,
+                params["c2"] * l * (1.0 - s1) - m1 * g,
+                force - params["c1"] * x2,
+                -params["c1"] * y2 - m2 * g,
+                -params["beta"] * k * u,
+            ]
+        )
+        mass = array([m1, m1, m2, m2, m3]).reshape(5, *[1] * phi.ndim)
+        drive = applied - mass * bending
+        a11, a12, a22 = ((mass * v * z).sum(axis=0) for v, z in _pairs(by_phi, by_theta))
+        q1, q2 = (by_phi * drive).sum(axis=0), (by_theta * drive).sum(axis=0)
+        determinant = a11 * a22 - a12 * a12
+        return np.stack([u, w, (a22 * q1 - a12 * q2) / determinant, (a11 * q2 - a12 * q1) / determinant], -1)
+
+    return rates
+
+
+def _pairs(one: Floats, two: Floats) -> tuple[tuple[Floats, Floats], ...]:
+    return (one, one), (one, two), (two, two)
+
+
+def rk4(rates: Rates, y: Floats, t_end: float, steps: int) -> Floats:
+    """Classical Runge-Kutta with equal steps from t = 0: the start and every step's end, (steps + 1, ...)."""
+    h, states = t_end / steps, [y]
+    for i in range(steps):
+        t = i * h
+        k1 = rates(t, y)
+        k2 = rates(t + h / 2, y + h / 2 * k1)
+        k3 = rates(t + h / 2, y + h / 2 * k2)
+        k4 = rates(t + h, y + h * k3)
+        y = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        states.append(y)
+    return array(states)
+
+
+def scipy_motion(params: Params, starts: Floats, times: Floats) -> Floats:
+    """Motions from starts (..., 4) by SciPy at tolerances near rounding, shape (times, ..., 4)."""
+    rates = motion_rates(params)
+    solution = solve_ivp(
+        lambda t, y: rates(t, y.reshape(starts.shape)).ravel(),
+        (0.0, times[-1]),
+        starts.ravel(),
+        method="DOP853",
+        rtol=1e-12,
+        atol=1e-12,
+        t_eval=times,
+    )
+    assert solution.success
+    return solution.y.T.reshape(-1, *starts.shape)
+
+
+def oracle_jacobian(params: Params, q: Floats) -> Floats:
+    """Matrix (4, 4) of the linearized motion about an equilibrium under a constant force."""
+    return array(oracle().jacobian({**params, "alpha": 0.0}, (*q, 0.0, 0.0), 0.0))
+
+
+class Norm:
+    """The kinetic-energy norm at an equilibrium under a constant force, and the energy above it."""
+
+    def __init__(self, params: Params, q: Floats) -> None:
+        self.params, self.q = params, q
+        self.metric = array(oracle().metric(params, q))
+        self.hessian = array(oracle().hessian(params, q, params["F0"]))
+        self.squares = np.sort(np.linalg.eigvals(np.linalg.inv(self.metric) @ self.hessian).real)
+        self.omega = float(np.sqrt(np.abs(self.squares).max()))
+        self.inertia = params["m2"] * params["l"] ** 2
+
+    def __call__(self, away: Floats) -> Floats:
+        """Sizes [rad] of disturbances (..., 4)."""
+        xi, eta = away[..., :2], away[..., 2:] / self.omega
+        square = np.einsum("...i,ij,...j", xi, self.metric, xi) + np.einsum(
+            "...i,ij,...j", eta, self.metric, eta
+        )
+        return np.asarray(np.sqrt(square / self.inertia))
+
+    def excess(self, y: Floats) -> float:
+        """Energy of a state (4,) above the equilibrium's [J]."""
+        F, o = self.params["F0"], oracle()
+        here = o.kinetic_energy(self.params, y) + o.potential(self.params, y[:2], F)
+        return float(here - o.potential(self.params, self.q, F))
