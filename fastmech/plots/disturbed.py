@@ -21,6 +21,7 @@ LEFT_OVER = {
     "at_unstable": ("still at an unstable one", "#8c8c8c"),
     "undecided": ("still moving", "#d0d0d0"),
     "not_finite": ("not finite", "#000000"),
+    "step_too_large": ("step too large", "#5a5a5a"),
 }
 BOX = (0.05, 0.25, 0.5, 0.75, 0.95)
 SHOWN_QUANTILES = (0.5, 0.95, 0.99)
@@ -79,12 +80,12 @@ def _segments(dataset: Dataset, row: int) -> list[tuple[float, str, dict[str, An
     outcome, end = dataset["outcome"].data[row], dataset["end_equilibrium"].data[row]
     elsewhere = outcome == codes["elsewhere"]
     parts = [(outcome == codes["returned"], f"rest at {row + 1}", {"color": LINES[row]})]
+    turned = (dataset["turns"].data[row] != 0).any(axis=1)
     for other in range(dataset.sizes["equilibrium"]):
-        if other == row:
-            label, look = "rest at the same, full turns further", {"color": LINES[row], "hatch": "//"}
-        else:
-            label, look = f"rest at {other + 1}", {"color": LINES[other]}
-        parts.append((elsewhere & (end == other), label, look))
+        there = elsewhere & (end == other)
+        further = {"color": LINES[other], "hatch": "//"}
+        parts.append((there & ~turned, f"rest at {other + 1}", {"color": LINES[other]}))
+        parts.append((there & turned, f"rest at {other + 1}, full turns further", further))
     parts += [(outcome == codes[name], label, {"color": grey}) for name, (label, grey) in LEFT_OVER.items()]
     return [(100.0 * float(np.mean(where)), label, look) for where, label, look in parts if where.any()]
 
