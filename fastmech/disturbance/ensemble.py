@@ -33,6 +33,7 @@ class DisturbedEnsemble:
     index: int  #: which of them was disturbed
     size: Size  #: the norm in which radius and ball are measured
     t_end: float  #: s
+    dt: float  #: step taken [s]
     starts: Floats  #: states at t = 0, shape (n, 4)
     final: Floats  #: states at t_end, shape (n, 4)
     outcome: NDArray[np.int8]  #: :class:`Outcome`, shape (n,)
@@ -129,6 +130,7 @@ def disturb(
         index=index,
         size=size,
         t_end=float(times[-1]),
+        dt=float(step),
         starts=starts,
         final=final,
         outcome=outcome,

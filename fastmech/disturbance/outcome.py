@@ -70,7 +70,8 @@ def resting_place(
             )
         departure = final - np.array([e.phi, e.theta, 0.0, 0.0])
         made = np.round(departure[:, :2] / TURN)
-        departure[:, :2] -= TURN * made
+        with np.errstate(invalid="ignore"):  # infinite states are nowhere at rest
+            departure[:, :2] -= TURN * made
         inside = size(departure) <= radius
         if e.kind == "minimum":
             inside &= excess_energy(scene, e, final) <= confining_energy(scene, e, radius)

@@ -81,7 +81,7 @@ class Disturbed(Scan):
                 )
             )
             advance(1)
-        errors = np.array([sampled_errors(scene, e, 0.5 * self.dt, self.method) for e in ensembles])
+        errors = np.array([sampled_errors(scene, e, 0.5 * e.dt, self.method) for e in ensembles])
         each, every = ("equilibrium",), ("equilibrium", "trajectory")
         state = "phi, theta, phi', theta'"
         variables = {

@@ -10,6 +10,7 @@ from pydantic import Field
 
 from fastmech.disturbance.ensemble import equilibria_to_disturb
 from fastmech.disturbance.motion import disturbed_motion
+from fastmech.ensembles.spans import output_steps
 from fastmech.results import Dataset, Variable
 from fastmech.scan_types.request import HALVING, MethodName, RunContext, Scan, failures
 from fastmech.scene import Scene
@@ -42,11 +43,13 @@ class DisturbedMotionScan(Scan):
         t = np.linspace(0.0, self.t_end, self.outputs)
         disturbance = [self.xi_phi, self.xi_theta, self.eta_phi, self.eta_theta]
         advance = context.stage("disturbed motion", len(equilibria))
+        # The step taken: what divides the intervals between outputs.
+        step = t[1] / output_steps(t[:2], self.dt)[0]
         motions, differences = [], []
         for equilibrium in equilibria:
             motion, halved = (
                 disturbed_motion(scene, equilibrium, disturbance, t, dt=dt, method=self.method)
-                for dt in (self.dt, 0.5 * self.dt)
+                for dt in (step, 0.5 * step)
             )
             motions.append(motion)
             differences.append(np.max(np.abs(halved.nonlinear - motion.nonlinear)))

@@ -115,7 +115,7 @@ class Motion(Scan):
                 )
             },
         }
-        halved = integrate(scene, start, dt=0.5 * self.dt, method=self.method, t_eval=t)
+        halved = integrate(scene, start, dt=0.5 * run.dt, method=self.method, t_eval=t)
         attrs = self.model_dump(exclude={"scene"}) | {
             "steps": run.steps,
             "error_estimate": float(np.max(np.abs(halved.y[:, 0] - y))),

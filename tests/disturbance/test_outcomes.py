@@ -184,3 +184,11 @@ def test_a_decaying_force_and_a_foreign_equilibrium_are_refused() -> None:
 @pytest.mark.nojit
 def test_every_outcome_has_its_own_advice() -> None:
     assert len({outcome.advice for outcome in Outcome}) == len(Outcome)
+
+
+def test_failed_trajectories_make_no_noise() -> None:
+    """A step far too large: some end infinite, and nothing but their outcome says so."""
+    scene = SCENE.replace(m3=0.5, beta=30.0)
+    (stable,) = [e for e in find_equilibria(scene) if e.kind == "minimum"]
+    run = disturb(scene, stable, 100, radius=1.0, t_end=3.0, dt=0.5, method="rk4")
+    assert {Outcome.NOT_FINITE, Outcome.STEP_TOO_LARGE} & set(run.outcome.tolist())

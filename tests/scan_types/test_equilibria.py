@@ -111,6 +111,9 @@ def test_hessian_minors_and_kind(case: Case) -> None:
     assert case.section["morse_index"].data.tolist() == case.negative.tolist()
     kinds = [("minimum", "saddle", "maximum")[n] for n in case.negative]
     assert decoded(case.section["kind"]) == kinds
+    attrs = case.section["kind"].attrs
+    codes = ([0, 1, 2, 3], "minimum saddle maximum degenerate")
+    assert (attrs["flag_values"].tolist(), attrs["flag_meanings"]) == codes
     for kind, sentence in zip(kinds, case.section["explanation"].data, strict=True):
         assert kind in sentence
 
@@ -144,6 +147,10 @@ def test_frequencies_and_decay(case: Case) -> None:
 
 
 def test_verdicts(case: Case) -> None:
+    for name in VERDICTS:
+        attrs = case.section[name].attrs
+        codes = ([0, 1, 2, 3], "asymptotically_stable stable unstable critical")
+        assert (attrs["flag_values"].tolist(), attrs["flag_meanings"]) == codes
     definite = case.negative == 0
     stable = np.array([min(hurwitz_determinants(p)) > 0.0 for p in case.polynomials])
     falling = np.array(case.roots()).real.max(axis=1) < 0.0

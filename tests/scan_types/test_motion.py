@@ -34,7 +34,7 @@ OTHER = {
 OTHER_START = (2.1, -0.7, 1.3, -2.4)
 
 #: Outputs every 0.25 s, which 0.06 s does not divide: five steps between outputs, with half of it nine.
-T_END, OUTPUTS, DT, STEPS, HALF_STEPS = 2.0, 9, 0.06, 40, 72
+T_END, OUTPUTS, DT, STEPS, HALF_STEPS = 2.0, 9, 0.06, 40, 80
 
 UNITS = {
     "time": "s", "phi": "rad", "theta": "rad", "phi_dot": "rad/s", "theta_dot": "rad/s",
