@@ -8,8 +8,10 @@ kernel can reach: a changed source means another directory, hence a fresh compil
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import os
+import shutil
 import tempfile
 from functools import cache
 from pathlib import Path
@@ -64,4 +66,6 @@ def cache_directory() -> Path:
         with tempfile.TemporaryFile(dir=directory):
             return directory
     except OSError:
-        return Path(tempfile.mkdtemp(prefix="fastmech-"))
+        temporary = tempfile.mkdtemp(prefix="fastmech-")
+        atexit.register(shutil.rmtree, temporary, ignore_errors=True)
+        return Path(temporary)

@@ -24,6 +24,10 @@ def check_axes(scene: Scene, axes: Mapping[str, ArrayLike], most: int = 3) -> di
     """
     if not 1 <= len(axes) <= most:
         raise InputError(f"axes: {len(axes)} given; one to {_WORDS[most]} parameters are allowed")
+    if "F0" in axes and scene.alpha > 0.0 and "alpha" not in axes:
+        raise InputError(
+            f"scene.alpha = {scene.alpha:g}: must be 0 1/s where F0 is an axis, or no force is left at rest"
+        )
     return {name: check_axis(scene, name, values) for name, values in axes.items()}
 
 

@@ -24,6 +24,9 @@ from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
 
+#: Trajectories of the largest ensemble: its results take about 150 bytes each in memory.
+MOST_TRAJECTORIES = 100_000_000
+
 
 @dataclass(frozen=True)
 class DisturbedEnsemble:
@@ -86,7 +89,7 @@ def disturb(
         InputError: an argument is wrong, or the scene's force decays.
     """
     equilibria = equilibria_to_disturb(scene)
-    n = checks.whole_number("n", n, least=1)
+    n = checks.whole_number("n", n, least=1, most=MOST_TRAJECTORIES)
     seed = checks.whole_number("seed", seed, least=0)
     radius = checks.number("radius", radius, "rad", above=0.0)
     return_radius = checks.number("return_radius", return_radius, "rad", above=0.0)

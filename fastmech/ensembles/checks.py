@@ -29,14 +29,16 @@ def number(name: str, value: Any, unit: str, *, above: float = -math.inf, least:
     return float(value)
 
 
-def whole_number(name: str, value: Any, *, least: int) -> int:
-    """An integer not less than ``least``.
+def whole_number(name: str, value: Any, *, least: int, most: int | None = None) -> int:
+    """An integer not less than ``least`` and not greater than ``most``.
 
     Raises:
         InputError: it is something else.
     """
     if not isinstance(value, Integral) or isinstance(value, bool) or value < least:
         raise InputError(f"{name} = {value!r}: must be an integer not less than {least}")
+    if most is not None and int(value) > most:
+        raise InputError(f"{name} = {value!r}: must be an integer not greater than {most}")
     return int(value)
 
 

@@ -36,18 +36,20 @@ def breaks_energy_bounds(c: Coefficients, start: Floats, final: Floats) -> NDArr
 
     Under a constant force T + U never grows, and without damper it is conserved; under the decaying force
     T + Pi grows by at most F0 (2 l - sgn(F0) x2(0)), the work done if M2 went to the far end of its reach
-    at full force. ``c`` are reduced coefficients, numbers or one a trajectory.
+    at full force, and without damper falls by at most F0 (2 l + sgn(F0) x2(0)). ``c`` are reduced
+    coefficients, numbers or one a trajectory.
     """
     constant = (np.asarray(c.decay) == 0.0) | (np.asarray(c.force) == 0.0)
     force = np.where(constant, c.force, 0.0)
     with np.errstate(invalid="ignore", over="ignore"):  # what is not finite has a status of its own
         reach = 2.0 - np.sign(c.force) * (np.cos(start[:, 0]) - np.sin(start[:, 1]))
         allowance = np.where(constant, 0.0, np.abs(c.force) * reach)
+        back = np.where(constant, 0.0, np.abs(c.force) * (4.0 - reach))
         before, scale = energy(c, start, force)
         after, _ = energy(c, final, force)
         gained = after - before - allowance > SLACK * scale
-        conservative = constant & (np.asarray(c.damping) == 0.0)
-        lost = conservative & (before - after > SLACK * scale)
+        undamped = np.asarray(c.damping) == 0.0
+        lost = undamped & (before - after - back > SLACK * scale)
     return np.asarray(gained | lost)
 
 

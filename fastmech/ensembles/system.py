@@ -16,6 +16,7 @@ from typing import Any
 import numba
 import numpy as np
 
+from fastmech.ensembles.fingerprint import fingerprint
 from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.errors import InputError
 from fastmech.jit import inlined
@@ -57,12 +58,12 @@ class System:
             ``a if condition else b`` instead of branches: then the loop over trajectories becomes packed
             instructions.
         state: names of the states.
-        parameters: the parameters' values by name, in the order in which ``rhs`` takes them.
+        parameters: the parameters' values by name; ``rhs`` takes arguments of these names after the states.
         stop: ``stop(t, *state)`` gives 0 while the trajectory runs on, any other number as the code of why it
             stops; it is looked at after every step. A trajectory that has stopped costs nothing any more.
 
     Raises:
-        InputError: names or the number of arguments are wrong, or a function cannot be compiled.
+        InputError: names do not match the functions' arguments, or a function cannot be compiled.
     """
 
     rhs: Callable[..., tuple[float, ...]]
@@ -73,9 +74,9 @@ class System:
     def __post_init__(self) -> None:
         _check_names("state", list(self.state), least=1)
         _check_names("parameters", list(self.parameters), least=0)
-        _check_arity("rhs", self.rhs, 1 + len(self.state) + len(self.parameters))
+        _check_arguments("rhs", self.rhs, list(self.state), list(self.parameters))
         if self.stop is not None:
-            _check_arity("stop", self.stop, 1 + len(self.state))
+            _check_arguments("stop", self.stop, list(self.state), [])
 
     @property
     def kernel(self) -> Any:
@@ -99,7 +100,7 @@ class System:
         """
         source = self._source()
         functions: list[Any] = [self.rhs] if self.stop is None else [self.rhs, self.stop]
-        prints = [source, *(_fingerprint(function, set()) for function in functions)]
+        prints = [source, *(fingerprint(function) for function in functions)]
         digest = hashlib.sha256("\0".join(prints).encode()).hexdigest()[:16]
         path = cache_directory() / "systems" / f"system_{digest}.py"
         _write_once(path, source)
@@ -111,12 +112,16 @@ class System:
             exec(compile(source, path, "exec"), vars(module))
         except numba.core.errors.NumbaError as error:
             reason = " ".join(str(error).split())
-            raise InputError(f"rhs or stop: cannot be compiled: {reason[:300]}") from None
+            raise InputError(
+                "rhs or stop: cannot be compiled (arithmetic, numpy and math only; functions that it "
+                f"calls need numba.njit): {reason[:200]}"
+            ) from None
         return module
 
     def _source(self) -> str:
         states = [f"Y[{d}, i]" for d in range(len(self.state))]
-        given = [f"p[{k}, i]" for k in range(len(self.parameters))]
+        order = list(inspect.signature(self.rhs).parameters)[1 + len(self.state) :]
+        given = [f"p[{list(self.parameters).index(name)}, i]" for name in order]
         stores = [f"        dY[{d}, i] = derivatives[{d}]" for d in range(len(self.state))]
         text = _TEMPLATE.format(
             name=getattr(self.rhs, "__name__", "rhs"),
@@ -131,12 +136,14 @@ def _check_names(field: str, names: list[str], least: int) -> None:
         raise InputError(f"{field} = {names}: must be different Python names, at least {least}")
 
 
-def _check_arity(field: str, function: Any, arguments: int) -> None:
+def _check_arguments(field: str, function: Any, state: list[str], parameters: list[str]) -> None:
+    """Arguments are matched by name: a value never lands in the wrong place silently."""
     if not isinstance(function, types.FunctionType):
         raise InputError(f"{field} = {function!r}: must be a plain Python function")
-    taken = len(inspect.signature(function).parameters)
-    if taken != arguments:
-        raise InputError(f"{field}: takes {taken} arguments, must take {arguments}: t, states, parameters")
+    taken = list(inspect.signature(function).parameters)
+    if taken[1 : 1 + len(state)] != state or sorted(taken[1 + len(state) :]) != sorted(parameters):
+        wanted = ", ".join(["t", *state, *parameters])
+        raise InputError(f"{field}: takes ({', '.join(taken)}), must take ({wanted})")
 
 
 def _copy(function: types.FunctionType, module: str) -> types.FunctionType:
@@ -149,24 +156,6 @@ def _copy(function: types.FunctionType, module: str) -> types.FunctionType:
     copy = types.FunctionType(code, known, function.__name__, function.__defaults__, function.__closure__)
     copy.__module__ = module
     return copy
-
-
-def _fingerprint(value: Any, seen: set[int]) -> str:
-    """Text that changes with whatever compiled code made of a function could depend on."""
-    if not isinstance(value, types.FunctionType):
-        return getattr(value, "__name__", repr(value)) if callable(value) else repr(value)
-    if id(value) in seen:
-        return value.__qualname__
-    seen.add(id(value))
-    code = value.__code__
-    inner = [constant.co_code.hex() for constant in code.co_consts if isinstance(constant, types.CodeType)]
-    constants = [repr(constant) for constant in code.co_consts if not isinstance(constant, types.CodeType)]
-    names = {name: value.__globals__[name] for name in code.co_names if name in value.__globals__}
-    cells = [cell.cell_contents for cell in value.__closure__ or ()]
-    used = [f"{name}={_fingerprint(used, seen)}" for name, used in names.items()]
-    closed = [_fingerprint(cell, seen) for cell in cells]
-    parts = [code.co_code.hex(), *inner, *constants, *code.co_names, *used, *closed]
-    return "|".join(parts)
 
 
 def _write_once(path: Path, source: str) -> None:

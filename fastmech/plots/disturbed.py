@@ -128,7 +128,7 @@ def _excursions(dataset: Dataset) -> Figure:
                 _box(axes, row + shift, np.quantile(values, BOX), LINES[column])
                 axes.plot(values.max(), row + shift, "|", color=LINES[column], ms=9, mew=2)
         axes.plot([], [], "s", color=LINES[column], label=f"largest |{symbol} - {symbol} of the equilibrium|")
-    axes.plot([], [], "|", color="black", mew=2, ms=9, label="largest of all")
+    axes.plot([], [], "|", color="black", mew=2, ms=9, label="median")
     axes.set(xscale="log", xlabel="excursion [rad]")
     logarithmic(axes.xaxis)
     axes.set_title("How far trajectories go (box: 25-75 %, line: 5-95 %)")

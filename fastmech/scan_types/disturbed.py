@@ -14,7 +14,7 @@ from fastmech.disturbance.linear_range import linear_range
 from fastmech.disturbance.outcome import Outcome
 from fastmech.ensembles.integrate import integrate
 from fastmech.results import Dataset, Variable, flags
-from fastmech.scan_types.request import MethodName, RunContext, Scan, failures
+from fastmech.scan_types.request import HALVING, MethodName, RunContext, Scan, failures
 from fastmech.scene import Scene
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ class Disturbed(Scan):
             "share_returned": Variable(
                 each, np.array([e.share_returned for e in ensembles]), "1", "share that returned"
             ),
-            "error_estimate": Variable(
+            "halving_difference": Variable(
                 ("equilibrium", "sample"),
                 errors,
                 "rad or rad/s",
@@ -154,6 +154,11 @@ class Disturbed(Scan):
         }
         attrs = self.model_dump(exclude={"scene"}) | {
             "distribution": "uniform in the ball of the given radius, kinetic-energy norm at the equilibrium"
+        }
+        attrs |= {
+            "error_estimate": float(errors.max()),
+            "error_estimate_median": float(np.median(errors)),
+            "error_estimate_is": f"{HALVING}; final states of the first {errors.shape[1]} of each",
         }
         attrs |= failures(variables["outcome"].data >= Outcome.NOT_FINITE)
         return Dataset(variables, attrs)

@@ -8,6 +8,7 @@ a map over one its folds.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
@@ -29,6 +30,9 @@ if TYPE_CHECKING:
 
 #: Points above which a map is written as it is computed instead of being held in memory.
 IN_MEMORY = 1_500_000
+
+#: Points of the largest map: its sheets take 24 bytes a point in memory, its file about 100.
+MOST_POINTS = 50_000_000
 
 
 class Axis(BaseModel):
@@ -72,6 +76,9 @@ class EquilibriumMap(Scan):
             raise InputError(
                 f"alpha = {scene.alpha:g}: must be 0 1/s for a map over F0, or no force is left at rest"
             )
+        total = math.prod(axis.num for axis in self.axes.values())
+        if total > MOST_POINTS:
+            raise InputError(f"axes: ask for {total:.3g} points, at most {MOST_POINTS:.0e} are allowed")
         for name, axis in self.axes.items():
             for value in (axis.start, axis.stop):
                 scene.replace(**{name: value})

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.errors import InputError
 from fastmech.mechanism.coefficients import Coefficients
+from fastmech.mechanism.lagrange import potential_gradient, unit
 from fastmech.scene import Scene
 from fastmech.stability.criteria import (
     ROUNDING,
@@ -23,6 +25,9 @@ from fastmech.stability.criteria import (
 )
 from fastmech.stability.linearize import FloatArray, Rest, jacobian, linearized
 from fastmech.stability.modes import MEANING, reach, slowest_decay, squared_frequencies
+
+#: Share of the loads that may be left unbalanced: far above rounding, far below any other scene's loads.
+NOT_AT_REST = 1e-7
 
 _PROVED = {
     0: Finding(
@@ -69,9 +74,17 @@ def classify(scene: Scene, equilibrium: Rest) -> Classification:
     negative direction is unstable, damped or not (Kelvin-Tait-Chetaev); a minimum is stable without damping
     and asymptotically stable with it, also where the linear damping misses a mode: no motion near a
     minimum keeps the slider at rest, so by LaSalle's principle all come to rest, only slowly.
+
+    Raises:
+        InputError: the scene is not at rest there, for example because the equilibrium is another scene's.
     """
     c, s = linearized(scene, equilibrium)
     loads = abs(c.lift) + (c.mass + 2.0) * c.gravity + 2.0 * c.spring + 2.0 * abs(c.force)
+    gradient = potential_gradient(scene, (equilibrium.phi, equilibrium.theta), equilibrium.force)
+    if not np.max(np.abs(gradient)) <= NOT_AT_REST * loads * unit(scene):
+        raise InputError(
+            f"equilibrium = ({equilibrium.phi:g}, {equilibrium.theta:g}) rad: this scene does not rest there"
+        )
     # Third derivatives of U are at most 2 loads, so an angle's error changes the Hessian by no more.
     stiffness_error = loads * (ROUNDING + 2.0 * min(equilibrium.radius, 1.0))
     minor = minors(s, stiffness_error)

@@ -163,3 +163,8 @@ def test_wrong_axes_are_refused(axes: dict[str, list[float]], message: str) -> N
 def test_wrong_thread_count_is_refused(threads: int) -> None:
     with pytest.raises(InputError, match=r"^threads = "):
         map_equilibria(PAPER, {"c1": [1.0]}, threads=threads)
+
+
+def test_a_force_that_decays_is_no_axis() -> None:
+    with pytest.raises(InputError, match=r"^scene\.alpha = 0\.7: must be 0 1/s where F0 is an axis"):
+        map_equilibria(Scene(), {"F0": [1.0, 2.0]})

@@ -33,9 +33,12 @@ def test_every_output_counts() -> None:
 
 
 @pytest.mark.parametrize("formulation", ["lagrange", "hamilton"])
-def test_a_motion_that_stays_finite_with_an_impossible_energy(formulation: str) -> None:
-    """Without damper and force the energy is conserved: RK4 with steps of 0.5 s brings it to rest."""
-    conservative = SCENE.replace(beta=0.0, F0=0.0)
+@pytest.mark.parametrize("force", [{"F0": 0.0}, {"alpha": 0.0}, {"F0": 10.0, "alpha": 5.0}])
+def test_a_motion_that_stays_finite_with_an_impossible_energy(
+    formulation: str, force: dict[str, float]
+) -> None:
+    """Without damper energy does not get lost: RK4 with steps of 0.5 s brings the motion to rest."""
+    conservative = SCENE.replace(beta=0.0, **force)
     fine, coarse = (
         integrate(conservative, [1.0, 0.3, 0.0, 0.0], 20.0, dt=dt, formulation=formulation)
         for dt in (0.01, 0.5)

@@ -112,6 +112,40 @@ def test_a_changed_constant_is_another_system(monkeypatch: pytest.MonkeyPatch) -
     np.testing.assert_allclose([first, second], np.exp([2.0, 3.0]), rtol=1e-6)
 
 
+def test_parameters_go_by_name() -> None:
+    def pull(t: float, x: float, a: float, b: float) -> tuple[float]:
+        return (a - b * x,)
+
+    given, swapped = ({"a": 1.0, "b": 2.0}, {"b": 2.0, "a": 1.0})
+    runs = [fm.integrate(System(pull, ["x"], p), [[0.0]], 1.0).y for p in (given, swapped)]
+    np.testing.assert_allclose(runs[0][0, 0, 0], 0.5 * (1.0 - np.exp(-2.0)), rtol=1e-8)
+    np.testing.assert_array_equal(*runs)
+
+
+CONSTANT_IN = {
+    "a global number": "K = {k}\ndef rhs(t, x):\n    return (K * x,)\n",
+    "a compiled helper": (
+        "import numba\n@numba.njit\ndef h(x):\n    return {k} * x\n\ndef rhs(t, x):\n    return (h(x),)\n"
+    ),
+    "a nested function": "def rhs(t, x):\n    def h(x):\n        return {k} * x\n    return (h(x),)\n",
+    "a module": "import own\ndef rhs(t, x):\n    return (own.K * x,)\n",
+    "an array": "import numpy as np\nA = np.full(5000, {k})\ndef rhs(t, x):\n    return (A[2500] * x,)\n",
+}
+
+
+@pytest.mark.parametrize("code", CONSTANT_IN.values(), ids=CONSTANT_IN)
+def test_a_second_process_never_gets_an_old_answer(code: str, tmp_path: Path) -> None:
+    """Wherever a constant hides: y = exp(K) after it has been edited from 2 to 3."""
+    script = "import sys; sys.path.insert(0, sys.argv[1]); import fastmech as fm, users\n"
+    script += "print(fm.integrate(fm.System(users.rhs, ['x'], {}), [[1.0]], 1.0, 0.01).y[0, 0, 0])"
+    for k in (2.0, 3.0):
+        (tmp_path / "users.py").write_text(code.format(k=k))
+        (tmp_path / "own.py").write_text(f"K = {k}\n")
+        command = [sys.executable, "-B", "-c", script, str(tmp_path)]
+        told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        assert float(told) == pytest.approx(np.exp(k), rel=1e-6)
+
+
 def test_a_second_process_loads_the_kernels_from_the_disk(tmp_path: Path) -> None:
     script = f"import sys; sys.path.insert(0, {str(SCANS)!r}); import lorenz\n"
     script += (
@@ -127,10 +161,12 @@ def test_a_second_process_loads_the_kernels_from_the_disk(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((oscillator, ["x"], {"omega": 1.0}), "rhs: takes 4 arguments, must take 3"),
+        ((oscillator, ["x"], {"omega": 1.0}), "rhs: takes (t, x, v, omega), must take (t, x, omega)"),
         ((oscillator, ["x", "x"], {"omega": 1.0}), "state = ['x', 'x']: must be different Python names"),
         ((oscillator, ["x", "2v"], {"omega": 1.0}), "state = ['x', '2v']: must be different Python names"),
-        ((oscillator, ["x", "v"], {"omega": 1.0}, below_zero), "stop: takes 2 arguments, must take 3"),
+        ((oscillator, ["x", "v"], {"omega": 1.0}, below_zero), "stop: takes (t, x), must take (t, x, v)"),
+        ((oscillator, ["v", "x"], {"omega": 1.0}), "rhs: takes (t, x, v, omega), must take (t, v, x, omega)"),
+        ((oscillator, ["x", "v"], {"k": 1.0}), "rhs: takes (t, x, v, omega), must take (t, x, v, k)"),
         (("x", ["x", "v"], {"omega": 1.0}), "rhs = 'x': must be a plain Python function"),
     ],
 )

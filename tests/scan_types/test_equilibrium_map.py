@@ -114,3 +114,10 @@ def test_snap_scan() -> None:
     assert np.nanmin(dataset["snap_below"].data) == pytest.approx(-671.1627073982018, abs=1e-9)
     with pytest.raises(InputError, match="searched"):
         SnapScan(searched=[0.0, 1.0]).run(SCENE, RunContext())
+
+
+def test_a_map_too_large_for_any_machine_is_refused_at_once() -> None:
+    axis = {"start": 0.0, "stop": 1.0, "num": 100_000}
+    scan = EquilibriumMap(axes={"F0": axis, "c1": axis})
+    with pytest.raises(InputError, match=r"^axes: ask for 1e\+10 points, at most 5e\+07 are allowed$"):
+        scan.check(Scene(alpha=0.0))

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from oracles import oracle
 
 from fastmech.equilibria.find import Equilibrium, find_equilibria
+from fastmech.errors import InputError
 from fastmech.scene import Scene
 from fastmech.stability.classify import Classification, classify
 from fastmech.stability.modes import SIN_PHI, SIN_PSI, UNLOADED
@@ -201,3 +202,9 @@ def test_criteria_never_contradict_each_other(scene: Scene) -> None:
         c = classify(scene, e)
         verdicts = {c.sylvester.verdict, c.hurwitz.verdict, c.spectrum.verdict, c.verdict}
         assert not ("unstable" in verdicts and verdicts & {"stable", "asymptotically stable"})
+
+
+def test_an_equilibrium_of_another_scene_is_refused() -> None:
+    foreign = find_equilibria(Scene(c1=200.0, alpha=0.0))[0]
+    with pytest.raises(InputError, match=r"rad: this scene does not rest there$"):
+        classify(Scene(alpha=0.0), foreign)
