@@ -20,7 +20,7 @@ def test_every_public_name_exists_and_is_described(name: str) -> None:
     assert name in dir(fm)
 
 
-def test_public_names_of_the_design() -> None:
+def test_public_names() -> None:
     promised = {"Scene", "InputError", "find_equilibria", "classify", "integrate", "disturb", "open_results"}
     assert promised <= set(fm.__all__)
     assert fm.__all__ == sorted(fm.__all__)
