@@ -69,7 +69,7 @@ def point_variables(grid: tuple[str, ...], found: Slab) -> dict[str, Variable]:
             roots,
             found.escape_speed,
             "m/s",
-            "speed of M2 whose own kinetic energy is the depth: no slower blow on M2 leaves the well",
+            "speed at which M2 alone has the depth as kinetic energy; a blow that moves M1 too needs less",
         ),
     }
 
@@ -81,7 +81,10 @@ def sheet_variables(
     variables = {}
     if sheet is not None:
         variables["sheet"] = Variable(
-            (*grid, "root"), sheet, "1", "equal numbers are one equilibrium, continued; -1: none"
+            (*grid, "root"),
+            sheet,
+            "1",
+            "equal numbers are one equilibrium, continued, but cut along some folds round a cusp; -1: none",
         )
     if morse_index is not None:
         variables["sheet_morse_index"] = Variable(
