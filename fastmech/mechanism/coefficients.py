@@ -14,8 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastmech.scene import Scene
 
-Parameters = Scene
-
 
 class Coefficients(NamedTuple):
     """Reduced coefficients of a scene; ``np.array(coefficients)`` is what kernels are given."""

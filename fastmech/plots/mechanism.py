@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.mechanism.coefficients import Parameters
 from fastmech.mechanism.geometry import positions
 from fastmech.plots.style import PALETTE
+from fastmech.scene import Scene
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,7 +23,7 @@ MASS, GROUND, INK = PALETTE["blue"], "#8c8c8c", "#404040"
 LARGEST_MASS, ARROW, COIL, HOUSING, TURNS = 0.15, 0.75, 0.055, 0.09, 9
 
 
-def draw_mechanism(axes: Axes, scene: Parameters, phi: float, theta: float, force: float) -> None:
+def draw_mechanism(axes: Axes, scene: Scene, phi: float, theta: float, force: float) -> None:
     """Draw the mechanism at rest in (phi, theta) [rad], with ``force`` [N] on M2 along +x.
 
     Lengths are to scale; masses have areas in proportion to them; the arrow has one length for every force.
@@ -88,7 +88,7 @@ def _ground(axes: Axes, l: float, wall: float) -> None:
     axes.plot([0.0, 0.0], [0.0, l], ls="none", marker="s", ms=7, color=GROUND, zorder=4)
 
 
-def _masses(axes: Axes, scene: Parameters, m1: Points, m2: Points, m3: Points) -> None:
+def _masses(axes: Axes, scene: Scene, m1: Points, m2: Points, m3: Points) -> None:
     from matplotlib.patches import Circle, Rectangle
 
     l = scene.l

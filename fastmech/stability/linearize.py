@@ -8,17 +8,14 @@ from __future__ import annotations
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
-from fastmech.jit import MATRIX, STATUSES, inlined, kernel
+from fastmech.jit import inlined
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.mechanism.reduced import metric_11, metric_determinant, potential_hessian, slider_ratio
 from fastmech.scene import Scene
 
 FloatArray = NDArray[np.float64]
-
-MATRICES = types.Array(types.float64, 4, "C")
 
 
 class Rest(Protocol):
@@ -113,25 +110,6 @@ def fill_state_matrix(s: SmallMotion, out: FloatArray) -> None:
     out[3, 0] = (s.s12 * s.k11 - s.m11 * s.k12) / d
     out[3, 1] = (s.s12 * s.k12 - s.m11 * s.k22) / d
     out[3, 2] = s.s12 * s.b11 / d
-
-
-@kernel(types.void(MATRIX, MATRIX, MATRIX, STATUSES, MATRICES))
-def state_matrices(
-    coefficients: FloatArray, phi: FloatArray, theta: FloatArray, count: NDArray[np.int8], out: FloatArray
-) -> None:
-    """State matrices of the first ``count`` equilibria of n scenes.
-
-    Args:
-        coefficients: (n, 8) rows of ``fastmech.mechanism.coefficients.Coefficients``.
-        phi, theta: (n, slots) angles [rad].
-        count: (n,) how many slots are filled.
-        out: (n, slots, 4, 4), written for filled slots.
-    """
-    for row in range(coefficients.shape[0]):
-        mass, slider, lift, spring, gravity, force, damping, _ = coefficients[row]
-        for i in range(count[row]):
-            s = small_motion(phi[row, i], theta[row, i], mass, slider, lift, spring, gravity, force, damping)
-            fill_state_matrix(s, out[row, i])
 
 
 def linearized(scene: Scene, equilibrium: Rest) -> tuple[Coefficients, SmallMotion]:
