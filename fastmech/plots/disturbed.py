@@ -131,7 +131,7 @@ def _excursions(dataset: Dataset) -> Figure:
     axes.plot([], [], "|", color="black", mew=2, ms=9, label="median")
     axes.set(xscale="log", xlabel="excursion [rad]")
     logarithmic(axes.xaxis)
-    axes.set_title("How far trajectories go (box: 25-75 %, line: 5-95 %)")
+    axes.set_title("How far trajectories go (box: 25-75 %, line: 5-95 %, coloured tick: the farthest)")
     legend_below(figure, axes, 3)
     return figure
 
