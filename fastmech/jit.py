@@ -25,6 +25,7 @@ FLAGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 VECTOR = types.Array(types.float64, 1, "C")
 MATRIX = types.Array(types.float64, 2, "C")
 CUBE = types.Array(types.float64, 3, "C")
+BLOCKS_OF_OUTPUTS = types.Array(types.float64, 4, "C")
 INTEGERS = types.Array(types.int64, 1, "C")
 STATUSES = types.Array(types.int8, 1, "C")
 

@@ -7,7 +7,7 @@ number of threads and any block size.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -15,10 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.ensembles.lanes import VECTOR_LANES, Lanes
 from fastmech.ensembles.spans import Span, spans
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
 from fastmech.ensembles.threads import thread_count
+from fastmech.integrators.batch import Batch
 from fastmech.integrators.explicit import observe_nothing
 from fastmech.integrators.method import Method
 
@@ -28,11 +30,15 @@ Progress = Callable[[int], None]
 #: Lanes a block: large enough that calls cost little, small enough that all stages stay in the caches.
 BLOCK_LANES = 256
 
-#: Blocks that one task holds where trajectories may stop: those still running move up into full blocks.
-CHUNK_BLOCKS = 16
+#: Blocks that a task holds at most: one call runs them all, and where trajectories may stop, those still
+#: running move up into full blocks.
+TASK_BLOCKS = 16
+
+#: Numbers that the output of one call holds at most.
+CALL_OUTPUT = 2**22
 
 #: Steps a call: between calls an interrupt is heard, and where trajectories may stop they make room.
-CALL_STEPS = 4096
+CALL_STEPS = 2048
 CALL_STEPS_WITH_STOPS = 64
 
 
@@ -67,7 +73,7 @@ def run_ensemble(
     params: ArrayLike,
     starts: ArrayLike,
     times: ArrayLike,
-    dt: float,
+    dt: float | Floats,
     method: Method,
     observation: Observation = NOTHING,
     *,
@@ -77,9 +83,9 @@ def run_ensemble(
 ) -> Ensemble:
     """Integrate ``starts`` (n, dim) from ``times[0]`` through ``times[1:]`` [s].
 
-    ``params`` are the parameters of all trajectories (count,) or of each (n, count). A trajectory that has
-    stopped keeps the state in which it did. ``progress`` is told the number of trajectories finished since
-    its last call.
+    ``params`` are the parameters of all trajectories (count,) or of each (n, count); ``dt`` is the longest
+    step of all trajectories or of each (n,). A trajectory that has stopped keeps the state in which it did.
+    ``progress`` is told the number of trajectories finished since its last call.
 
     Raises:
         InputError: the step, the times or the number of threads are wrong.
@@ -89,11 +95,7 @@ def run_ensemble(
     own = np.asarray(params, dtype=np.float64)
     own = np.broadcast_to(own, (len(begin), own.shape[-1]))
     workers = thread_count(threads)
-    # Small ensembles are shared among the threads too, in whole vectors.
-    width = max(1, min(block_lanes, -(-len(begin) // (8 * workers)) * 8))
-    chunk = width * CHUNK_BLOCKS if observation.stops else width
     most = CALL_STEPS_WITH_STOPS * (1 + method.start_steps) if observation.stops else CALL_STEPS
-    way = list(spans(clock, dt, most))
     ensemble = Ensemble(
         states=np.empty((clock.size - 1, *begin.shape)),
         records=np.empty((observation.record.size, len(begin))),
@@ -101,85 +103,76 @@ def run_ensemble(
     )
     interrupted = threading.Event()
 
-    def run_chunk(first: int) -> int:
-        members = np.arange(first, min(first + chunk, len(begin)))
-        record = np.repeat(observation.record[:, None], members.size, axis=1)
-        lanes = _Lanes(members, begin[members].T.copy(), own[members].T.copy(), record)
-        for span in way:
+    def run_task(task: _Task) -> int:
+        members = task.members
+        lanes = Lanes(members, begin[members], own[members], observation.record, block_lanes)
+        for span in task.way:
             if interrupted.is_set() or not lanes.members.size:
                 break
-            reached = _advance(rhs, observation, method, lanes, span, width)
-            _store(ensemble, lanes, span, reached, observation.stops)
+            batch = lanes.batch(span, observation.params)
+            method.run(rhs, observation.observe, batch)
+            _store(ensemble, lanes, span, batch, observation.stops)
         finite = np.isfinite(ensemble.states[:, members]).all(axis=(0, 2))
         ensemble.status[members] = np.where(finite, Status.OK, Status.NOT_FINITE)
         return members.size
 
-    with ThreadPoolExecutor(workers) as pool:
-        try:
-            for finished in pool.map(run_chunk, range(0, len(begin), chunk)):
-                if progress is not None:
-                    progress(finished)
-        except BaseException:  # Ctrl-C too: blocks in hand end with their call, the others never begin
-            interrupted.set()
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    width = min(block_lanes, max(VECTOR_LANES, CALL_OUTPUT // (begin.shape[1] * clock.size)))
+    tasks = list(_tasks(np.broadcast_to(dt, len(begin)), clock, most, workers, width * TASK_BLOCKS))
+    for finished in _in_threads(run_task, tasks, min(workers, len(tasks)), interrupted):
+        if progress is not None:
+            progress(finished)
     return ensemble
 
 
-@dataclass
-class _Lanes:
-    """The trajectories of one task that still run: who they are, states, parameters and records."""
+@dataclass(frozen=True)
+class _Task:
+    """Trajectories of one step's length, and how they pass the output times."""
 
     members: NDArray[np.int64]
-    Y: Floats
-    params: Floats
-    record: Floats
-
-    def keep(self, which: NDArray[np.bool_]) -> None:
-        self.members, self.Y = self.members[which], self.Y[:, which]
-        self.params, self.record = self.params[:, which], self.record[:, which]
+    way: list[Span]
 
 
-def _advance(
-    rhs: Any, observation: Observation, method: Method, lanes: _Lanes, span: Span, width: int
-) -> Floats:
-    """Take lanes through a span, block by block; their states at its times, shape (pieces, dim, lanes)."""
-    reached = np.empty((span.steps.size, *lanes.Y.shape))
-    for first in range(0, lanes.members.size, width):
-        part = slice(first, first + width)
-        Y, params, record = (a[:, part].copy() for a in (lanes.Y, lanes.params, lanes.record))
-        out = np.empty((span.steps.size, *Y.shape))
-        method.run(
-            rhs,
-            observation.observe,
-            span.times,
-            span.steps,
-            Y,
-            params,
-            observation.params,
-            record,
-            out,
-        )
-        lanes.Y[:, part], lanes.record[:, part], reached[:, :, part] = Y, record, out
-    return reached
+def _tasks(dt: Floats, times: Floats, most: int, workers: int, lanes: int) -> Iterator[_Task]:
+    """Trajectories sorted by their step, shared evenly among the workers in tasks of at most ``lanes``."""
+    for step in np.unique(dt):
+        members = np.flatnonzero(dt == step)
+        way = list(spans(times, float(step), most))
+        number = -(-members.size // (lanes * workers)) * workers
+        size = -(-members.size // (number * VECTOR_LANES)) * VECTOR_LANES
+        for first in range(0, members.size, size):
+            yield _Task(members[first : first + size], way)
 
 
-def _store(ensemble: Ensemble, lanes: _Lanes, span: Span, reached: Floats, stops: bool) -> None:
+def _in_threads(
+    work: Callable[[_Task], int], tasks: list[_Task], workers: int, interrupted: threading.Event
+) -> Iterator[int]:
+    """What ``work`` gives for each task; one worker is this thread itself, which costs nothing to start."""
+    if workers <= 1:
+        yield from map(work, tasks)
+        return
+    with ThreadPoolExecutor(workers) as pool:
+        try:
+            yield from pool.map(work, tasks)
+        except BaseException:  # Ctrl-C too: calls in hand end, the other tasks never begin
+            interrupted.set()
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _store(ensemble: Ensemble, lanes: Lanes, span: Span, batch: Batch, stops: bool) -> None:
     """Store what a span has brought; who has stopped or is not finite any more leaves, if ``stops``."""
-    ensemble.records[:, lanes.members] = lanes.record
+    record = lanes.rows(batch.record)
+    ensemble.records[:, lanes.members] = record.T
     for piece, output in enumerate(span.outputs):
         if output >= 0:
+            reached = lanes.rows(batch.out[:, piece])
             if stops:
-                before = _stopped(lanes) & (lanes.record[STOP_TIME] <= span.times[piece + 1])
-                reached[piece][:, before] = lanes.record[STOP_STATE:, before]
-            ensemble.states[output, lanes.members] = reached[piece].T
+                before = (record[:, STOP_CODE] != 0.0) & (record[:, STOP_TIME] <= span.times[piece + 1])
+                reached = np.where(before[:, None], record[:, STOP_STATE:], reached)
+            ensemble.states[output, lanes.members] = reached
     if stops:
-        stopped = _stopped(lanes)
-        lanes.Y[:, stopped] = lanes.record[STOP_STATE:, stopped]
-        gone = stopped | ~np.isfinite(lanes.Y).all(axis=0)
-        ensemble.states[span.passed :, lanes.members[gone]] = lanes.Y[:, gone].T
+        now, stopped = lanes.rows(batch.Y), record[:, STOP_CODE] != 0.0
+        now = np.where(stopped[:, None], record[:, STOP_STATE:], now)
+        gone = stopped | ~np.isfinite(now).all(axis=1)
+        ensemble.states[span.passed :, lanes.members[gone]] = now[gone]
         lanes.keep(~gone)
-
-
-def _stopped(lanes: _Lanes) -> NDArray[np.bool_]:
-    return np.asarray(lanes.record[STOP_CODE] != 0.0)

@@ -1,4 +1,4 @@
-"""Driver of explicit Runge-Kutta methods with a fixed step over one block of lanes.
+"""Driver of explicit Runge-Kutta methods with a fixed step over blocks of lanes.
 
 The driver knows neither the mechanism nor the method: a block right-hand side and an observer come as
 first-class functions (one indirect call a stage and block), the tableau as arrays. Stage sums run over the
@@ -13,7 +13,17 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fastmech.jit import CUBE, INTEGERS, MATRIX, OBSERVER, OBSERVER_SIGNATURE, RHS, VECTOR, inlined, kernel
+from fastmech.jit import (
+    BLOCKS_OF_OUTPUTS,
+    CUBE,
+    INTEGERS,
+    OBSERVER,
+    OBSERVER_SIGNATURE,
+    RHS,
+    VECTOR,
+    inlined,
+    kernel,
+)
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -85,24 +95,8 @@ def observe_nothing(t: float, Y: Floats, params: Floats, record: Floats) -> None
     """The observer of runs that keep nothing but states."""
 
 
-@kernel(
-    types.void(
-        RHS,
-        OBSERVER,
-        INTEGERS,
-        INTEGERS,
-        VECTOR,
-        VECTOR,
-        VECTOR,
-        INTEGERS,
-        MATRIX,
-        MATRIX,
-        VECTOR,
-        MATRIX,
-        CUBE,
-    )
-)
-def integrate_block(
+@inlined
+def advance_block(
     rhs: BlockRHS,
     observe: Observer,
     start: Integers,
@@ -111,19 +105,15 @@ def integrate_block(
     nodes: Floats,
     times: Floats,
     steps: Integers,
-    Y: Floats,
     params: Floats,
     observer_params: Floats,
+    Y: Floats,
     record: Floats,
     out: Floats,
 ) -> None:
-    """Take a block through all output times.
+    """Take a block through all times; arguments as those of ``integrate_blocks``, without the blocks' axis.
 
-    ``times`` holds the start and then every output time, ``steps[j]`` the number of steps from ``times[j]``
-    to ``times[j + 1]``. ``Y`` (dim, lanes) is the start and is advanced in place; ``out`` (outputs, dim,
-    lanes) receives the states; ``params`` (count, lanes) are the lanes' parameters; ``record`` is what
-    ``observe`` keeps, called after every step. A step's time is computed from its index, so rounding does
-    not accumulate.
+    A step's time is computed from its index, so rounding does not accumulate.
     """
     stages = nodes.shape[0]
     dim, lanes = Y.shape
@@ -142,3 +132,58 @@ def integrate_block(
             add_stages(y, k_flat, h, stage, weight, int(start[stages]), int(start[stages + 1]))
             observe(times[j] + (step + 1) * h, Y, observer_params, record)
         out[j] = Y
+
+
+@kernel(
+    types.void(
+        RHS,
+        OBSERVER,
+        INTEGERS,
+        INTEGERS,
+        VECTOR,
+        VECTOR,
+        VECTOR,
+        INTEGERS,
+        CUBE,
+        VECTOR,
+        CUBE,
+        CUBE,
+        BLOCKS_OF_OUTPUTS,
+    )
+)
+def integrate_blocks(
+    rhs: BlockRHS,
+    observe: Observer,
+    start: Integers,
+    stage: Integers,
+    weight: Floats,
+    nodes: Floats,
+    times: Floats,
+    steps: Integers,
+    params: Floats,
+    observer_params: Floats,
+    Y: Floats,
+    record: Floats,
+    out: Floats,
+) -> None:
+    """Take blocks of lanes through all times, one block after the other.
+
+    ``start``, ``stage``, ``weight`` and ``nodes`` are a packed tableau; the rest are the fields of
+    :class:`fastmech.integrators.batch.Batch`. ``observe`` is called after every step.
+    """
+    for b in range(Y.shape[0]):
+        advance_block(
+            rhs,
+            observe,
+            start,
+            stage,
+            weight,
+            nodes,
+            times,
+            steps,
+            params[b],
+            observer_params,
+            Y[b],
+            record[b],
+            out[b],
+        )

@@ -9,8 +9,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.integrators.explicit import Floats, Integers, integrate_block
-from fastmech.integrators.multistep import integrate_multistep_block
+from fastmech.integrators.batch import Batch
+from fastmech.integrators.explicit import integrate_blocks
+from fastmech.integrators.multistep import integrate_multistep_blocks
 from fastmech.integrators.multistep_weights import bashforth, moulton
 from fastmech.integrators.tableau import Tableau
 
@@ -37,19 +38,8 @@ class Method(Protocol):
     def evaluations(self, steps: int) -> int:
         """Right-hand sides that so many steps of equal length take, the starter's included."""
 
-    def run(
-        self,
-        rhs: Any,
-        observe: Any,
-        times: Floats,
-        steps: Integers,
-        Y: Floats,
-        params: Floats,
-        observer_params: Floats,
-        record: Floats,
-        out: Floats,
-    ) -> None:
-        """Take a block of lanes through all output times; see ``explicit.integrate_block``."""
+    def run(self, rhs: Any, observe: Any, batch: Batch) -> None:
+        """Take a batch through its times."""
 
 
 @dataclass(frozen=True)
@@ -82,34 +72,23 @@ class RungeKutta:
         """Right-hand sides that so many steps take."""
         return steps * self.tableau.stages
 
-    def run(
-        self,
-        rhs: Any,
-        observe: Any,
-        times: Floats,
-        steps: Integers,
-        Y: Floats,
-        params: Floats,
-        observer_params: Floats,
-        record: Floats,
-        out: Floats,
-    ) -> None:
-        """Take a block of lanes through all output times; see ``explicit.integrate_block``."""
+    def run(self, rhs: Any, observe: Any, batch: Batch) -> None:
+        """Take a batch through its times."""
         packed = self.tableau.packed
-        integrate_block(
+        integrate_blocks(
             rhs,
             observe,
             packed.start,
             packed.stage,
             packed.weight,
             packed.nodes,
-            times,
-            steps,
-            Y,
-            params,
-            observer_params,
-            record,
-            out,
+            batch.times,
+            batch.steps,
+            batch.params,
+            batch.observer_params,
+            batch.Y,
+            batch.record,
+            batch.out,
         )
 
 
@@ -154,21 +133,10 @@ class Adams:
         start = min(steps, self.start_steps)
         return start * self.starter.stages + (steps - start) * (2 if self.corrects else 1)
 
-    def run(
-        self,
-        rhs: Any,
-        observe: Any,
-        times: Floats,
-        steps: Integers,
-        Y: Floats,
-        params: Floats,
-        observer_params: Floats,
-        record: Floats,
-        out: Floats,
-    ) -> None:
-        """Take a block of lanes through all output times; see ``multistep.integrate_multistep_block``."""
+    def run(self, rhs: Any, observe: Any, batch: Batch) -> None:
+        """Take a batch through its times."""
         packed = self.starter.packed
-        integrate_multistep_block(
+        integrate_multistep_blocks(
             rhs,
             observe,
             packed.start,
@@ -177,11 +145,11 @@ class Adams:
             packed.nodes,
             self.predictor,
             self.corrector,
-            times,
-            steps,
-            Y,
-            params,
-            observer_params,
-            record,
-            out,
+            batch.times,
+            batch.steps,
+            batch.params,
+            batch.observer_params,
+            batch.Y,
+            batch.record,
+            batch.out,
         )

@@ -1,8 +1,8 @@
-"""Driver of Adams methods with a fixed step over one block of lanes.
+"""Driver of Adams methods with a fixed step over blocks of lanes.
 
 The derivatives of the last steps are kept as rows of a ring, so nothing is shifted: which row holds which age
 is an index array. A Runge-Kutta method takes the first steps. Right-hand side, observer, times, steps and
-outputs are those of :func:`fastmech.integrators.explicit.integrate_block`.
+outputs are those of :func:`fastmech.integrators.explicit.integrate_blocks`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 from numba import types
 
 from fastmech.integrators.explicit import BlockRHS, Floats, Integers, Observer, add_stages, start_stage
-from fastmech.jit import CUBE, INTEGERS, MATRIX, OBSERVER, RHS, VECTOR, inlined, kernel
+from fastmech.jit import BLOCKS_OF_OUTPUTS, CUBE, INTEGERS, OBSERVER, RHS, VECTOR, inlined, kernel
 
 #: Step lengths that differ by less than this share of the time are the same: outputs were rounded.
 ROUNDED_TIME = 4 * 2.0**-52
@@ -54,26 +54,8 @@ def add_correction(y: Floats, w: Floats, d: Floats, weight: float) -> None:
         y[i] += w[i] + weight * d[i]
 
 
-@kernel(
-    types.void(
-        RHS,
-        OBSERVER,
-        INTEGERS,
-        INTEGERS,
-        VECTOR,
-        VECTOR,
-        VECTOR,
-        VECTOR,
-        VECTOR,
-        INTEGERS,
-        MATRIX,
-        MATRIX,
-        VECTOR,
-        MATRIX,
-        CUBE,
-    )
-)
-def integrate_multistep_block(
+@inlined
+def advance_multistep_block(
     rhs: BlockRHS,
     observe: Observer,
     start: Integers,
@@ -84,18 +66,13 @@ def integrate_multistep_block(
     corrector: Floats,
     times: Floats,
     steps: Integers,
-    Y: Floats,
     params: Floats,
     observer_params: Floats,
+    Y: Floats,
     record: Floats,
     out: Floats,
 ) -> None:
-    """Take a block through all output times.
-
-    ``predictor`` weighs the derivatives at t_n, t_(n-1), ...; ``corrector`` that at the predicted t_(n+1),
-    then the same ones, and is empty for an explicit method. ``start``, ``stage``, ``weight`` and ``nodes``
-    are the packed tableau of the starter. The method starts anew wherever the step's length changes.
-    """
+    """Take a block through all times; arguments as those of ``integrate_multistep_blocks``."""
     stages, rows = nodes.shape[0], predictor.shape[0]
     dim, lanes = Y.shape
     n = dim * lanes
@@ -133,3 +110,66 @@ def integrate_multistep_block(
                     add_stages(y, f, h, row, predictor, 0, rows)
             observe(times[j] + (step + 1) * h, Y, observer_params, record)
         out[j] = Y
+
+
+@kernel(
+    types.void(
+        RHS,
+        OBSERVER,
+        INTEGERS,
+        INTEGERS,
+        VECTOR,
+        VECTOR,
+        VECTOR,
+        VECTOR,
+        VECTOR,
+        INTEGERS,
+        CUBE,
+        VECTOR,
+        CUBE,
+        CUBE,
+        BLOCKS_OF_OUTPUTS,
+    )
+)
+def integrate_multistep_blocks(
+    rhs: BlockRHS,
+    observe: Observer,
+    start: Integers,
+    stage: Integers,
+    weight: Floats,
+    nodes: Floats,
+    predictor: Floats,
+    corrector: Floats,
+    times: Floats,
+    steps: Integers,
+    params: Floats,
+    observer_params: Floats,
+    Y: Floats,
+    record: Floats,
+    out: Floats,
+) -> None:
+    """Take blocks of lanes through all times, one block after the other.
+
+    ``predictor`` weighs the derivatives at t_n, t_(n-1), ...; ``corrector`` that at the predicted t_(n+1),
+    then the same ones, and is empty for an explicit method. ``start``, ``stage``, ``weight`` and ``nodes``
+    are the packed tableau of the starter; the rest are the fields of
+    :class:`fastmech.integrators.batch.Batch`. The method starts anew wherever the step's length changes.
+    """
+    for b in range(Y.shape[0]):
+        advance_multistep_block(
+            rhs,
+            observe,
+            start,
+            stage,
+            weight,
+            nodes,
+            predictor,
+            corrector,
+            times,
+            steps,
+            params[b],
+            observer_params,
+            Y[b],
+            record[b],
+            out[b],
+        )

@@ -91,8 +91,9 @@ def test_progress_counts_every_trajectory_once() -> None:
     told.clear()
     params, times = np.array(reduce(SCENE)), np.array([0.0, 0.02])
     rhs, rk4 = right_hand_side(reduce(SCENE)), METHODS["rk4"]
-    run_ensemble(rhs, params, random_starts(7), times, 0.01, rk4, block_lanes=3, progress=told.append)
-    assert told == [3, 3, 1]
+    run_ensemble(rhs, params, random_starts(200), times, 0.01, rk4, block_lanes=3, progress=told.append)
+    assert sum(told) == 200
+    assert len(told) > 1
 
 
 def test_y0_of_any_kind_of_numbers() -> None:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from integrators.systems import Floats
 
+from fastmech.integrators.batch import Batch
 from fastmech.integrators.explicit import observe_nothing
 from fastmech.integrators.methods import METHODS
 from fastmech.jit import OBSERVER_SIGNATURE, RHS_SIGNATURE, kernel
@@ -62,18 +63,15 @@ def drive(
     observe: Any = observe_nothing,
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Outputs, the block's last state, the record and the parameters as the right-hand side left them."""
-    Y, record = Y.copy(), np.zeros((4, Y.shape[1]))
-    out = np.empty((len(steps), *Y.shape))
-    lanes_params = np.repeat(params[:, None], Y.shape[1], axis=1)
-    METHODS[method].run(
-        rhs,
-        observe,
-        times,
-        np.array(steps, dtype=np.int64),
-        Y,
-        lanes_params,
-        np.array([2.0]),
-        record,
-        out,
+    lanes = Y.shape[1]
+    batch = Batch(
+        times=times,
+        steps=np.array(steps, dtype=np.int64),
+        params=np.repeat(params[None, :, None], lanes, axis=2),
+        observer_params=np.array([2.0]),
+        Y=Y[None].copy(),
+        record=np.zeros((1, 4, lanes)),
+        out=np.empty((1, len(steps), *Y.shape)),
     )
-    return out, Y, record, lanes_params
+    METHODS[method].run(rhs, observe, batch)
+    return batch.out[0], batch.Y[0], batch.record[0], batch.params[0]

@@ -1,0 +1,62 @@
+"""The trajectories of one task in blocks of equal width, and how those that have ended make room."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.ensembles.spans import Span
+from fastmech.integrators.batch import Batch
+
+Floats = NDArray[np.float64]
+
+#: Widths of blocks are multiples of this: whole vectors of any processor, in either precision.
+VECTOR_LANES = 16
+
+#: Share of the lanes that must have ended before the others move up: moving costs a copy of all.
+WORTH_MOVING = 0.125
+
+
+class Lanes:
+    """Trajectories that still run, as blocks (blocks, rows, lanes) of states, parameters and records.
+
+    The last block is filled up with copies of the last trajectory, so every lane runs in whole vectors.
+    """
+
+    def __init__(
+        self, members: NDArray[np.int64], states: Floats, params: Floats, record: Floats, block_lanes: int
+    ) -> None:
+        """From states (n, dim) and parameters (n, count) of the members, and the empty record (rows,)."""
+        self.block_lanes = block_lanes
+        self.members = members
+        self._arrange(states, params, np.repeat(record[None, :], members.size, axis=0))
+
+    def _arrange(self, states: Floats, params: Floats, record: NDArray[np.float64]) -> None:
+        n = len(states)
+        blocks = max(1, -(-n // self.block_lanes))
+        width = -(-n // (blocks * VECTOR_LANES)) * VECTOR_LANES
+        lanes = np.minimum(np.arange(blocks * width), n - 1)
+        self.Y, self.params, self.record = (
+            np.ascontiguousarray(a[lanes].reshape(blocks, width, a.shape[1]).transpose(0, 2, 1))
+            for a in (states, params, record)
+        )
+
+    def batch(self, span: Span, observer_params: NDArray[np.float64]) -> Batch:
+        """What a method is given to take the lanes through a span."""
+        blocks, dim, width = self.Y.shape
+        out = np.empty((blocks, span.steps.size, dim, width), dtype=self.Y.dtype)
+        return Batch(span.times, span.steps, self.params, observer_params, self.Y, self.record, out)
+
+    def rows(self, blocked: Floats) -> Floats:
+        """Values (members, rows) of an array (blocks, rows, lanes)."""
+        blocks, rows, width = blocked.shape
+        return blocked.transpose(0, 2, 1).reshape(blocks * width, rows)[: self.members.size]
+
+    def keep(self, which: NDArray[np.bool_]) -> None:
+        """Let the others leave, if enough of them have ended to be worth the move."""
+        if which.all() or (which.any() and np.count_nonzero(~which) < WORTH_MOVING * which.size):
+            return
+        states, params, record = (self.rows(a)[which] for a in (self.Y, self.params, self.record))
+        self.members = self.members[which]
+        if self.members.size:
+            self._arrange(states, params, record)
