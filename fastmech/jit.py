@@ -9,12 +9,14 @@ by them.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import wraps
 from typing import Any, TypeVar
 
 import numba
+import numpy as np
 from numba import types
 from numba.core import config as numba_config
-from numba.extending import register_jitable
+from numba.extending import overload, register_jitable
 
 from fastmech.kernel_cache import cache_directory
 
@@ -25,18 +27,50 @@ FLAGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 VECTOR = types.Array(types.float64, 1, "C")
 MATRIX = types.Array(types.float64, 2, "C")
 CUBE = types.Array(types.float64, 3, "C")
-BLOCKS_OF_OUTPUTS = types.Array(types.float64, 4, "C")
 INTEGERS = types.Array(types.int64, 1, "C")
 STATUSES = types.Array(types.int8, 1, "C")
 
-#: ``rhs(t, Y, dY, params)``: derivatives of a block of lanes. ``Y`` and ``dY`` have shape (dim, lanes),
-#: ``params`` (count, 1) where all lanes share them or (count, lanes) where each has its own.
-RHS_SIGNATURE = types.void(types.float64, MATRIX, MATRIX, MATRIX)
-RHS = types.FunctionType(RHS_SIGNATURE)
 
-#: ``observe(t, Y, params, record)``: looks at a block after every step; ``record`` is (rows, lanes).
-OBSERVER_SIGNATURE = types.void(types.float64, MATRIX, VECTOR, MATRIX)
-OBSERVER = types.FunctionType(OBSERVER_SIGNATURE)
+def lanes(precision: Any, dimensions: int) -> Any:
+    """Type of an array of lanes: states, derivatives, parameters or outputs of a block, or of blocks."""
+    return types.Array(precision, dimensions, "C")
+
+
+def rhs_signature(precision: Any) -> Any:
+    """``rhs(t, Y, dY, params)``: derivatives of a block of lanes, in either precision.
+
+    ``Y`` and ``dY`` have shape (dim, lanes), ``params`` (count, lanes).
+    """
+    block = lanes(precision, 2)
+    return types.void(types.float64, block, block, block)
+
+
+def observer_signature(precision: Any) -> Any:
+    """``observe(t, Y, params, record)``: looks at a block after every step; ``record`` is (rows, lanes)."""
+    return types.void(types.float64, lanes(precision, 2), VECTOR, MATRIX)
+
+
+RHS_SIGNATURE = rhs_signature(types.float64)
+OBSERVER_SIGNATURE = observer_signature(types.float64)
+
+
+def driver_signature(precision: Any, *method: Any) -> Any:
+    """``drive(rhs, observe, *method, times, steps, params, observer_params, Y, record, out)``.
+
+    The last seven are the fields of :class:`fastmech.integrators.batch.Batch`.
+    """
+    return types.void(
+        types.FunctionType(rhs_signature(precision)),
+        types.FunctionType(observer_signature(precision)),
+        *method,
+        VECTOR,
+        INTEGERS,
+        lanes(precision, 3),
+        VECTOR,
+        lanes(precision, 3),
+        CUBE,
+        lanes(precision, 4),
+    )
 
 
 def kernel(signature: Any, **options: Any) -> Callable[[F], Any]:
@@ -66,3 +100,41 @@ def inlined(function: F) -> F:
     """
     jitable: F = register_jitable(forceinline=True, **FLAGS)(function)
     return jitable
+
+
+def single(shipped: Any, signature: Any) -> Any:
+    """The same source as a kernel's, compiled for lanes of float32."""
+    return kernel(signature)(getattr(shipped, "py_func", shipped))
+
+
+def by_precision(double: F, single: F) -> F:
+    """A function of one number that kernels compile as ``single`` for float32 and as ``double`` otherwise.
+
+    In Python it is ``double``.
+    """
+
+    @wraps(double)
+    def function(x: Any) -> Any:
+        return double(x)
+
+    def choose(x: Any) -> Any:
+        return single if x == types.float32 else double
+
+    overload(function, jit_options={"forceinline": True, **FLAGS}, strict=False)(choose)
+    return function  # type: ignore[return-value]
+
+
+def rounded_to(x: Any, value: Any) -> Any:
+    """``value`` in the precision of ``x``, a number or an array: what keeps float32 lanes in float32.
+
+    Without it a literal or a step's length would turn a lane's arithmetic into float64. In Python it is
+    ``value``.
+    """
+    return value
+
+
+@overload(rounded_to, jit_options={"forceinline": True, **FLAGS}, strict=False)
+def _rounded_to(x: Any, value: Any) -> Any:
+    if getattr(x, "dtype", x) == types.float32:
+        return lambda x, value: np.float32(value)
+    return lambda x, value: value

@@ -10,6 +10,7 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from fastmech.ensembles.threads import thread_count
 from fastmech.integrators.batch import Batch
 from fastmech.integrators.explicit import observe_nothing
 from fastmech.integrators.method import Method
+from fastmech.kernels.single import in_single
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int], None]
@@ -79,13 +81,15 @@ def run_ensemble(
     *,
     threads: int | None = None,
     block_lanes: int = BLOCK_LANES,
+    precision: type[np.floating[Any]] = np.float64,
     progress: Progress | None = None,
 ) -> Ensemble:
     """Integrate ``starts`` (n, dim) from ``times[0]`` through ``times[1:]`` [s].
 
     ``params`` are the parameters of all trajectories (count,) or of each (n, count); ``dt`` is the longest
     step of all trajectories or of each (n,). A trajectory that has stopped keeps the state in which it did.
-    ``progress`` is told the number of trajectories finished since its last call.
+    ``progress`` is told the number of trajectories finished since its last call. In float32 nothing can be
+    observed.
 
     Raises:
         InputError: the step, the times or the number of threads are wrong.
@@ -102,6 +106,10 @@ def run_ensemble(
         status=np.empty(len(begin), dtype=np.int8),
     )
     interrupted = threading.Event()
+    observe = observation.observe
+    if precision is np.float32:
+        rhs, observe = in_single(rhs), import_module("fastmech.integrators.single").observe_nothing
+        begin, own = begin.astype(precision), own.astype(precision)
 
     def run_task(task: _Task) -> int:
         members = task.members
@@ -110,7 +118,7 @@ def run_ensemble(
             if interrupted.is_set() or not lanes.members.size:
                 break
             batch = lanes.batch(span, observation.params)
-            method.run(rhs, observation.observe, batch)
+            method.run(rhs, observe, batch)
             _store(ensemble, lanes, span, batch, observation.stops)
         finite = np.isfinite(ensemble.states[:, members]).all(axis=(0, 2))
         ensemble.status[members] = np.where(finite, Status.OK, Status.NOT_FINITE)

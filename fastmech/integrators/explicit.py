@@ -14,15 +14,13 @@ from numba import types
 from numpy.typing import NDArray
 
 from fastmech.jit import (
-    BLOCKS_OF_OUTPUTS,
-    CUBE,
     INTEGERS,
-    OBSERVER,
     OBSERVER_SIGNATURE,
-    RHS,
     VECTOR,
+    driver_signature,
     inlined,
     kernel,
+    rounded_to,
 )
 
 Floats = NDArray[np.float64]
@@ -37,23 +35,24 @@ def add_stages(z: Floats, K: Floats, h: float, stage: Integers, weight: Floats, 
     n = z.shape[0]
     while k < stop:
         terms = min(4, stop - k)
-        w0 = h * weight[k]
+        w0 = rounded_to(z, h * weight[k])
         K0 = K[stage[k]]
         if terms == 1:
             for i in range(n):
                 z[i] += w0 * K0[i]
         elif terms == 2:
-            w1 = h * weight[k + 1]
+            w1 = rounded_to(z, h * weight[k + 1])
             K1 = K[stage[k + 1]]
             for i in range(n):
                 z[i] += w0 * K0[i] + w1 * K1[i]
         elif terms == 3:
-            w1, w2 = h * weight[k + 1], h * weight[k + 2]
+            w1, w2 = rounded_to(z, h * weight[k + 1]), rounded_to(z, h * weight[k + 2])
             K1, K2 = K[stage[k + 1]], K[stage[k + 2]]
             for i in range(n):
                 z[i] += w0 * K0[i] + w1 * K1[i] + w2 * K2[i]
         else:
-            w1, w2, w3 = h * weight[k + 1], h * weight[k + 2], h * weight[k + 3]
+            w1, w2 = rounded_to(z, h * weight[k + 1]), rounded_to(z, h * weight[k + 2])
+            w3 = rounded_to(z, h * weight[k + 3])
             K1, K2, K3 = K[stage[k + 1]], K[stage[k + 2]], K[stage[k + 3]]
             for i in range(n):
                 z[i] += w0 * K0[i] + w1 * K1[i] + w2 * K2[i] + w3 * K3[i]
@@ -67,23 +66,24 @@ def start_stage(
     """z = y + h * (the first at most four terms); returns the index of the first term left out."""
     n = z.shape[0]
     terms = min(4, stop - k)
-    w0 = h * weight[k]
+    w0 = rounded_to(z, h * weight[k])
     K0 = K[stage[k]]
     if terms == 1:
         for i in range(n):
             z[i] = y[i] + w0 * K0[i]
     elif terms == 2:
-        w1 = h * weight[k + 1]
+        w1 = rounded_to(z, h * weight[k + 1])
         K1 = K[stage[k + 1]]
         for i in range(n):
             z[i] = y[i] + (w0 * K0[i] + w1 * K1[i])
     elif terms == 3:
-        w1, w2 = h * weight[k + 1], h * weight[k + 2]
+        w1, w2 = rounded_to(z, h * weight[k + 1]), rounded_to(z, h * weight[k + 2])
         K1, K2 = K[stage[k + 1]], K[stage[k + 2]]
         for i in range(n):
             z[i] = y[i] + (w0 * K0[i] + w1 * K1[i] + w2 * K2[i])
     else:
-        w1, w2, w3 = h * weight[k + 1], h * weight[k + 2], h * weight[k + 3]
+        w1, w2 = rounded_to(z, h * weight[k + 1]), rounded_to(z, h * weight[k + 2])
+        w3 = rounded_to(z, h * weight[k + 3])
         K1, K2, K3 = K[stage[k + 1]], K[stage[k + 2]], K[stage[k + 3]]
         for i in range(n):
             z[i] = y[i] + (w0 * K0[i] + w1 * K1[i] + w2 * K2[i] + w3 * K3[i])
@@ -118,7 +118,7 @@ def advance_block(
     stages = nodes.shape[0]
     dim, lanes = Y.shape
     # Each array once as rows for the right-hand side and once flat for the stage sums.
-    K, Z = np.empty((stages, dim, lanes)), np.empty((dim, lanes))
+    K, Z = np.empty((stages, dim, lanes), dtype=Y.dtype), np.empty((dim, lanes), dtype=Y.dtype)
     k_flat, z, y = K.reshape(stages, dim * lanes), Z.reshape(dim * lanes), Y.reshape(dim * lanes)
     for j in range(steps.shape[0]):
         h = (times[j + 1] - times[j]) / max(steps[j], 1)
@@ -134,23 +134,11 @@ def advance_block(
         out[j] = Y
 
 
-@kernel(
-    types.void(
-        RHS,
-        OBSERVER,
-        INTEGERS,
-        INTEGERS,
-        VECTOR,
-        VECTOR,
-        VECTOR,
-        INTEGERS,
-        CUBE,
-        VECTOR,
-        CUBE,
-        CUBE,
-        BLOCKS_OF_OUTPUTS,
-    )
-)
+#: Types of a packed tableau: start, stage, weight, nodes.
+TABLEAU = (INTEGERS, INTEGERS, VECTOR, VECTOR)
+
+
+@kernel(driver_signature(types.float64, *TABLEAU))
 def integrate_blocks(
     rhs: BlockRHS,
     observe: Observer,

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from importlib import import_module
+from types import ModuleType
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.integrators.batch import Batch
-from fastmech.integrators.explicit import integrate_blocks
-from fastmech.integrators.multistep import integrate_multistep_blocks
+from fastmech.integrators import explicit, multistep
 from fastmech.integrators.multistep_weights import bashforth, moulton
 from fastmech.integrators.tableau import Tableau
 
@@ -40,6 +41,13 @@ class Method(Protocol):
 
     def run(self, rhs: Any, observe: Any, batch: Batch) -> None:
         """Take a batch through its times."""
+
+
+def _driver(module: ModuleType, name: str, batch: Batch) -> Any:
+    """The driver for the batch's precision; that for float32 is compiled or loaded on first use."""
+    if batch.Y.dtype == np.float32:
+        module = import_module("fastmech.integrators.single")
+    return getattr(module, name)
 
 
 @dataclass(frozen=True)
@@ -75,7 +83,7 @@ class RungeKutta:
     def run(self, rhs: Any, observe: Any, batch: Batch) -> None:
         """Take a batch through its times."""
         packed = self.tableau.packed
-        integrate_blocks(
+        _driver(explicit, "integrate_blocks", batch)(
             rhs,
             observe,
             packed.start,
@@ -136,7 +144,7 @@ class Adams:
     def run(self, rhs: Any, observe: Any, batch: Batch) -> None:
         """Take a batch through its times."""
         packed = self.starter.packed
-        integrate_multistep_blocks(
+        _driver(multistep, "integrate_multistep_blocks", batch)(
             rhs,
             observe,
             packed.start,

@@ -33,6 +33,7 @@ _ALL: tuple[Method, ...] = (
     *map(RungeKutta, TABLEAUS.values()),
     Adams("ab5", 5, False, TABLEAUS["tsit5"], _EXPLICIT),
     Adams("ab6", 6, False, TABLEAUS["tsit5"], _EXPLICIT),
+    Adams("ab7", 7, False, TABLEAUS["verner6"], _EXPLICIT),
     Adams("ab8", 8, False, TABLEAUS["verner7"], _EXPLICIT),
     Adams("abm8", 8, True, TABLEAUS["dop853"], _CORRECTED),
     Adams("abm10", 10, True, TABLEAUS["dop853"], _CORRECTED),

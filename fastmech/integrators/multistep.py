@@ -10,8 +10,16 @@ from __future__ import annotations
 import numpy as np
 from numba import types
 
-from fastmech.integrators.explicit import BlockRHS, Floats, Integers, Observer, add_stages, start_stage
-from fastmech.jit import BLOCKS_OF_OUTPUTS, CUBE, INTEGERS, OBSERVER, RHS, VECTOR, inlined, kernel
+from fastmech.integrators.explicit import (
+    TABLEAU,
+    BlockRHS,
+    Floats,
+    Integers,
+    Observer,
+    add_stages,
+    start_stage,
+)
+from fastmech.jit import VECTOR, driver_signature, inlined, kernel, rounded_to
 
 #: Step lengths that differ by less than this share of the time are the same: outputs were rounded.
 ROUNDED_TIME = 4 * 2.0**-52
@@ -28,11 +36,12 @@ def predict_and_correct(
     n, rows = z.shape[0], p.shape[0]
     for i in range(n):
         z[i] = y[i]
-        w[i] = 0.0
+        w[i] = 0
     a = 0
     while a < rows:
-        p0, p1, p2 = h * p[a], h * p[a + 1], h * p[a + 2]
-        c0, c1, c2 = h * c[a], h * c[a + 1], h * c[a + 2]
+        p0, c0 = rounded_to(z, h * p[a]), rounded_to(z, h * c[a])
+        p1, c1 = rounded_to(z, h * p[a + 1]), rounded_to(z, h * c[a + 1])
+        p2, c2 = rounded_to(z, h * p[a + 2]), rounded_to(z, h * c[a + 2])
         F0, F1, F2 = F[row[a]], F[row[a + 1]], F[row[a + 2]]
         if (rows - a) % 4:
             for i in range(n):
@@ -40,7 +49,8 @@ def predict_and_correct(
                 w[i] += c0 * F0[i] + c1 * F1[i] + c2 * F2[i]
             a += 3
         else:
-            p3, c3, F3 = h * p[a + 3], h * c[a + 3], F[row[a + 3]]
+            p3, c3 = rounded_to(z, h * p[a + 3]), rounded_to(z, h * c[a + 3])
+            F3 = F[row[a + 3]]
             for i in range(n):
                 z[i] += p0 * F0[i] + p1 * F1[i] + p2 * F2[i] + p3 * F3[i]
                 w[i] += c0 * F0[i] + c1 * F1[i] + c2 * F2[i] + c3 * F3[i]
@@ -50,8 +60,9 @@ def predict_and_correct(
 @inlined
 def add_correction(y: Floats, w: Floats, d: Floats, weight: float) -> None:
     """y += w + weight d: one rounding of the state a step."""
+    own = rounded_to(y, weight)
     for i in range(y.shape[0]):
-        y[i] += w[i] + weight * d[i]
+        y[i] += w[i] + own * d[i]
 
 
 @inlined
@@ -76,8 +87,9 @@ def advance_multistep_block(
     stages, rows = nodes.shape[0], predictor.shape[0]
     dim, lanes = Y.shape
     n = dim * lanes
-    F, K, Z = np.empty((rows, dim, lanes)), np.empty((stages, dim, lanes)), np.empty((dim, lanes))
-    f, k_flat, z, y, w = F.reshape(rows, n), K.reshape(stages, n), Z.reshape(n), Y.reshape(n), np.empty(n)
+    F, K = np.empty((rows, dim, lanes), dtype=Y.dtype), np.empty((stages, dim, lanes), dtype=Y.dtype)
+    Z, w = np.empty((dim, lanes), dtype=Y.dtype), np.empty(n, dtype=Y.dtype)
+    f, k_flat, z, y = F.reshape(rows, n), K.reshape(stages, n), Z.reshape(n), Y.reshape(n)
     row = np.empty(rows, dtype=np.int64)  # row[a] holds the derivative of a steps ago
     known, newest, last = 0, 0, 0.0
     for j in range(steps.shape[0]):
@@ -112,25 +124,11 @@ def advance_multistep_block(
         out[j] = Y
 
 
-@kernel(
-    types.void(
-        RHS,
-        OBSERVER,
-        INTEGERS,
-        INTEGERS,
-        VECTOR,
-        VECTOR,
-        VECTOR,
-        VECTOR,
-        VECTOR,
-        INTEGERS,
-        CUBE,
-        VECTOR,
-        CUBE,
-        CUBE,
-        BLOCKS_OF_OUTPUTS,
-    )
-)
+#: Types of the starter's packed tableau, of the predictor and of the corrector.
+ADAMS = (*TABLEAU, VECTOR, VECTOR)
+
+
+@kernel(driver_signature(types.float64, *ADAMS))
 def integrate_multistep_blocks(
     rhs: BlockRHS,
     observe: Observer,

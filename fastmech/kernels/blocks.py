@@ -9,12 +9,13 @@ done again, one by one, with the library's functions: a lane's result never depe
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.jit import inlined
-from fastmech.kernels.sincos import REDUCTION_LIMIT, sincos
+from fastmech.kernels.sincos import reduction_limit, sincos
 from fastmech.mechanism.equations import canonical_rates, lagrange_accelerations
 
 Block = NDArray[np.float64]
@@ -26,25 +27,26 @@ FORCE, DAMPING, DECAY = 5, 6, 7
 @inlined
 def is_beyond(Y: Block, i: int) -> bool:
     """Whether a lane's angles exceed the range of the fast trigonometry; false for NaN."""
-    return (abs(Y[0, i]) > REDUCTION_LIMIT) | (abs(Y[1, i]) > REDUCTION_LIMIT)
+    limit = reduction_limit(Y[0, i])
+    return (abs(Y[0, i]) > limit) | (abs(Y[1, i]) > limit)
 
 
 @inlined
-def lane_damping(p: Block, i: int, damping: int | None) -> float | None:
+def lane_damping(p: Block, i: int, damping: int | None) -> Any:
     """A lane's damping, ``None`` in a kernel without damper."""
     if damping is None:
         return None
-    return float(p[damping, i])
+    return p[damping, i]
 
 
 @inlined
-def lane_force(p: Block, i: int, force: int | None, decay: int | None, decayed: Block) -> float | None:
+def lane_force(p: Block, i: int, force: int | None, decay: int | None, decayed: Block) -> Any:
     """A lane's reduced force now, ``None`` in a kernel without force; ``decayed`` holds exp(-alpha t)."""
     if force is None:
         return None
     if decay is None:
-        return float(p[force, i])
-    return float(p[force, i] * decayed[0, i])
+        return p[force, i]
+    return p[force, i] * decayed[0, i]
 
 
 @inlined

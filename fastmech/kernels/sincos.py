@@ -4,17 +4,21 @@ Numba from PyPI has no vector mathematics library: every ``math.sin`` in a loop 
 argument is reduced by multiples of pi/2 in three parts (Cody and Waite, *Software Manual for the Elementary
 Functions*, 1980, chapter 8), two polynomials give sine and cosine on [-pi/4, pi/4], and the quadrant is
 applied by selection. The polynomials' coefficients and the parts of pi/2 are those of the FreeBSD
-mathematics library (``k_sin.c``, ``k_cos.c``, ``e_rem_pio2.c``; Sun Microsystems 1993).
+mathematics library (``k_sin.c``, ``k_cos.c``, ``e_rem_pio2.c``; Sun Microsystems 1993); for float32 those of
+the Cephes library (``sinf.c``; Moshier 1992).
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from fastmech.jit import inlined
+from fastmech.jit import by_precision, inlined, rounded_to
 
 #: Largest angle [rad] for which the reduction is used: multiples up to 2**20 keep its first products exact.
 REDUCTION_LIMIT = 1.0e6
+
+#: The same for float32: multiples up to 2**13.
+REDUCTION_LIMIT_SINGLE = 1.0e4
 
 _TWO_OVER_PI = 0.6366197723675814
 _HALF_PI_1 = 1.57079632673412561417e00  # first 33 bits of pi/2
@@ -26,9 +30,15 @@ _S4, _S5, _S6 = 2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969
 _C1, _C2, _C3 = 4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05
 _C4, _C5, _C6 = -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11
 
+_HALF_PI_1_SINGLE = 1.5703125  # first 8 bits of pi/2
+_HALF_PI_2_SINGLE = 4.837512969970703125e-04  # next 11 bits
+_HALF_PI_3_SINGLE = 7.54978995489188216e-08  # the rest, rounded
+_S1_SINGLE, _S2_SINGLE, _S3_SINGLE = -1.6666654611e-1, 8.3321608736e-3, -1.9515295891e-4
+_C1_SINGLE, _C2_SINGLE, _C3_SINGLE = 4.166664568298827e-2, -1.388731625493765e-3, 2.443315711809948e-5
+
 
 @inlined
-def sincos(x: float) -> tuple[float, float]:
+def sincos_double(x: float) -> tuple[float, float]:
     """Sine and cosine of ``x`` [rad], ``abs(x) <= REDUCTION_LIMIT``; NaN gives NaN.
 
     Beyond the limit the result is inaccurate: block kernels compute such lanes again with the library's
@@ -48,12 +58,50 @@ def sincos(x: float) -> tuple[float, float]:
 
 
 @inlined
+def sincos_single(x: float) -> tuple[float, float]:
+    """Sine and cosine of a float32 ``x`` [rad], ``abs(x) <= REDUCTION_LIMIT_SINGLE``; NaN gives NaN."""
+    n = np.floor(x * rounded_to(x, _TWO_OVER_PI) + rounded_to(x, 0.5))
+    r = x - n * rounded_to(x, _HALF_PI_1_SINGLE)
+    r = (r - n * rounded_to(x, _HALF_PI_2_SINGLE)) - n * rounded_to(x, _HALF_PI_3_SINGLE)
+    one, two, half_of = rounded_to(x, 1.0), rounded_to(x, 2.0), rounded_to(x, 0.5)
+    half = np.floor(half_of * n)
+    odd = n - two * half
+    sign = one - two * (half - two * np.floor(half_of * half))
+    z = r * r
+    s1, s2, s3 = rounded_to(x, _S1_SINGLE), rounded_to(x, _S2_SINGLE), rounded_to(x, _S3_SINGLE)
+    c1, c2, c3 = rounded_to(x, _C1_SINGLE), rounded_to(x, _C2_SINGLE), rounded_to(x, _C3_SINGLE)
+    s = r + r * z * (s1 + z * (s2 + z * s3))
+    c = one - half_of * z + z * z * (c1 + z * (c2 + z * c3))
+    sine = sign * (c if odd > half_of else s)
+    cosine = sign * (-s if odd > half_of else c)
+    return sine, cosine
+
+
+sincos = by_precision(sincos_double, sincos_single)
+
+
+@inlined
+def limit_double(x: float) -> float:
+    """Largest angle [rad] for which the reduction is used."""
+    return REDUCTION_LIMIT
+
+
+@inlined
+def limit_single(x: float) -> float:
+    """Largest angle [rad] for which the reduction of float32 is used."""
+    return rounded_to(x, REDUCTION_LIMIT_SINGLE)
+
+
+reduction_limit = by_precision(limit_double, limit_single)
+
+
+@inlined
 def sin(x: float) -> float:
     """Sine of ``x`` [rad] for right-hand sides: packed instructions; NaN beyond ``REDUCTION_LIMIT``."""
-    return sincos(x)[0] if abs(x) <= REDUCTION_LIMIT else np.nan
+    return sincos(x)[0] if abs(x) <= reduction_limit(x) else np.nan
 
 
 @inlined
 def cos(x: float) -> float:
     """Cosine of ``x`` [rad] for right-hand sides: packed instructions; NaN beyond ``REDUCTION_LIMIT``."""
-    return sincos(x)[1] if abs(x) <= REDUCTION_LIMIT else np.nan
+    return sincos(x)[1] if abs(x) <= reduction_limit(x) else np.nan

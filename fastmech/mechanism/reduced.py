@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from fastmech.jit import inlined
+from fastmech.jit import inlined, rounded_to
 
 #: A float in compiled lanes, an array in analysis.
 Values: TypeAlias = Any
@@ -21,17 +21,18 @@ Values: TypeAlias = Any
 @inlined
 def slider_ratio(s1: Values, c1: Values) -> tuple[Values, Values]:
     """k = -(dx3/dphi)/l and dk/dphi, from paper (6): k = sin phi (1 + cos phi / sqrt(4 - sin^2 phi))."""
-    inverse_root = 1.0 / np.sqrt(4.0 - s1 * s1)
+    one, four = rounded_to(s1, 1.0), rounded_to(s1, 4.0)
+    inverse_root = one / np.sqrt(four - s1 * s1)
     q = c1 * inverse_root
     k = s1 + s1 * q
-    dk = c1 + q * c1 - s1 * s1 * inverse_root * (1.0 - q * q)
+    dk = c1 + q * c1 - s1 * s1 * inverse_root * (one - q * q)
     return k, dk
 
 
 @inlined
 def metric_11(mass: Values, slider: Values, k: Values) -> Values:
     """a11/(m2 l^2), paper (11); a12/(m2 l^2) = sin(phi + theta) and a22/(m2 l^2) = 1."""
-    return mass + 1.0 + slider * k * k
+    return mass + rounded_to(mass, 1.0) + slider * k * k
 
 
 @inlined

@@ -1,0 +1,14 @@
+"""The drivers for lanes of float32: the same source, compiled when a run first asks for them."""
+
+from __future__ import annotations
+
+from numba import types
+
+from fastmech.integrators import explicit, multistep
+from fastmech.jit import driver_signature, observer_signature, single
+
+observe_nothing = single(explicit.observe_nothing, observer_signature(types.float32))
+integrate_blocks = single(explicit.integrate_blocks, driver_signature(types.float32, *explicit.TABLEAU))
+integrate_multistep_blocks = single(
+    multistep.integrate_multistep_blocks, driver_signature(types.float32, *multistep.ADAMS)
+)
