@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from numbers import Integral, Real
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,29 @@ def states(name: str, values: ArrayLike, columns: int) -> NDArray[np.float64]:
     if array.ndim != 2 or array.shape[1] != columns:
         raise InputError(f"{name}: has shape {np.shape(values)}, must be (n, {columns})")
     return array
+
+
+def memory(numbers: int, copies: int) -> None:
+    """Refuse results of so many numbers, held ``copies`` times on the way, before anything is allocated.
+
+    Raises:
+        InputError: the machine has not as much free memory.
+    """
+    needed, free = 8 * numbers * copies, free_memory()
+    if needed > free:
+        raise InputError(
+            f"y0, t_eval: the states would take {needed / 2**30:.3g} GiB on the way, {free / 2**30:.3g} GiB "
+            "are free; ask for fewer trajectories or output times"
+        )
+
+
+def free_memory() -> float:
+    """Bytes of memory that this machine could still give, infinite where it does not tell."""
+    try:
+        text = Path("/proc/meminfo").read_text(encoding="ascii")
+        return 1024.0 * float(text.split("MemAvailable:")[1].split()[0])
+    except (OSError, IndexError, ValueError):
+        return math.inf
 
 
 def rising_times(name: str, values: ArrayLike) -> NDArray[np.float64]:

@@ -9,16 +9,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.ensembles import checks
-from fastmech.ensembles.plausible import judge
 from fastmech.ensembles.problem import Problem, scene_problem, system_problem
-from fastmech.ensembles.run import Progress, run_ensemble
-from fastmech.ensembles.spans import output_steps
+from fastmech.ensembles.run import Progress
+from fastmech.ensembles.solve import Precision, Settings, Solution, solve
 from fastmech.ensembles.stopping import STOP_CODE, STOP_TIME
 from fastmech.ensembles.system import System
+from fastmech.ensembles.tolerance import solve_to_tolerance
 from fastmech.errors import InputError
 from fastmech.integrators.methods import find_method
 from fastmech.kernels.select import FORMULATIONS
 from fastmech.scene import Scene, nearest
+
+
+#: Longest step [s] where neither a step nor a tolerance is given.
+DEFAULT_DT = 0.01
 
 
 @dataclass(frozen=True)
@@ -30,76 +34,140 @@ class Trajectories:
         np.float64
     ]  #: states, shape (times, n, dim); a scene's: phi, theta [rad], phi', theta' [rad/s]
     status: NDArray[np.int8]  #: :class:`fastmech.ensembles.status.Status` of each trajectory, shape (n,)
-    steps: int  #: steps of a trajectory that runs to the end
+    steps: int  #: most steps of a trajectory that runs to the end
     dt: float  #: longest step taken [s]
     method: str  #: name of the method
+    own_steps: NDArray[np.int64]  #: steps of each trajectory that runs to the end, shape (n,)
+    own_dt: NDArray[np.float64]  #: longest step of each [s], shape (pieces, n); one piece, or one for each fit
+    precision: str = "float64"  #: of the lanes
     stop_code: NDArray[np.int64] | None = None  #: why each stopped, 0: it did not; only where it could; (n,)
     stop_time: NDArray[np.float64] | None = None  #: when [s], NaN: it did not; (n,)
+    error: NDArray[np.float64] | None = None  #: estimate for each trajectory (n,), of runs to a tolerance
+    error_estimate: float | None = None  #: estimate of the quantile asked for, of runs to a tolerance
 
 
 def integrate(
     scene: Scene | System,
     y0: ArrayLike,
     t_end: float | None = None,
-    dt: float = 0.01,
-    method: str = "rk4",
+    dt: float | None = None,
+    method: str | None = None,
     *,
+    tol: float | None = None,
+    quantile: float = 1.0,
+    fit: bool | ArrayLike = False,
     t_eval: ArrayLike | None = None,
     parameters: Mapping[str, ArrayLike] | None = None,
     formulation: str = "lagrange",
+    dtype: str = "float64",
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Trajectories:
-    """Integrate an ensemble with a fixed step.
+    """Integrate an ensemble with fixed steps.
 
     Args:
         scene: the mechanism, or a system of your own.
         y0: starts, shape (n, dim) or (dim,) at t = 0; a scene's: phi, theta [rad], phi', theta' [rad/s].
             Angles are not wrapped.
         t_end: end of the run [s]; the last of ``t_eval`` by default.
-        dt: longest step [s]. Each interval between outputs is divided into equal steps not longer than it.
-        method: a name from :data:`fastmech.integrators.methods.METHODS`.
+        dt: longest step [s], 0.01 by default. Each interval between outputs is divided into equal steps not
+            longer than it.
+        method: a name from :data:`fastmech.integrators.methods.METHODS`; "rk4" by default, or the tolerance's
+            choice.
+        tol: in place of ``dt``: the error to be kept, absolute, in the state's units, of the worst component
+            at the worst output time. Method, step and precision are chosen by a calibration on a sample.
+        quantile: whose error ``tol`` is: 1.0 the largest of all trajectories, for which every one runs twice
+            and bad ones again; less: that quantile of the trajectories, estimated from a sample.
+        fit: whether each trajectory's step is fitted to its energy: ``dt`` then belongs to slow motions, and
+            the faster a trajectory can become, the shorter its own step, see
+            :mod:`fastmech.ensembles.fitting`. True: once, so that a trajectory's step is the same all along;
+            times [s]: at each of them, which pays where a damper slows fast motion down. Scenes only.
         t_eval: output times [s], rising, not negative; only ``t_end`` by default.
         parameters: values of parameters, by name, that differ between trajectories, each of shape (n,).
         formulation: of a scene: "lagrange" integrates angles and rates (paper (13)), "hamilton" angles and
             generalized momenta (paper (14)); both take and give angles and rates.
+        dtype: precision of the lanes, "float64" or "float32": about twice as fast, for errors down to 1e-4.
         threads: threads to use, all processors by default. The result does not depend on it.
         progress: is told how many trajectories have finished since its last call.
 
     Returns:
         states at the output times and the status of every trajectory: a start that is not finite, a motion
         that became so, and a scene's motion that ends with an energy it cannot have (the step is too large)
-        are told apart and leave the others as they are. There is no error estimate: halve ``dt`` and
-        compare. A trajectory that a system's stopping condition ends keeps the state in which it stopped.
+        are told apart and leave the others as they are. With ``tol`` also an estimate of the error; with
+        ``dt`` there is none. A trajectory that a system's stopping condition ends keeps the state in which
+        it stopped.
 
     Raises:
-        InputError: an argument is wrong.
+        InputError: an argument is wrong, or the states would not fit into memory.
     """
-    dt = checks.number("dt", dt, "s", above=0.0)
-    formula = find_method(method)
     outputs = _output_times(t_end, t_eval)
     starts, problem = _problem(scene, y0, parameters or {}, formulation)
-    times = np.concatenate([[0.0], outputs])
-    ensemble = run_ensemble(
-        problem.rhs,
-        problem.params,
-        problem.inward(starts),
-        times,
-        dt,
-        formula,
-        problem.observation,
-        threads=threads,
-        progress=progress,
+    checks.memory(outputs.size * starts.size, 2 if tol is None else 4)
+    if tol is not None:
+        if dt is not None or fit is not False or dtype != "float64":
+            raise InputError("tol: chooses the step and the precision itself; give no dt, fit or dtype with it")
+        tol = checks.number("tol", tol, "", above=0.0)
+        quantile = checks.number("quantile", quantile, "", above=0.0)
+        if quantile > 1.0:
+            raise InputError(f"quantile = {quantile:g}: must not be greater than 1")
+        if method is not None:
+            find_method(method)
+        found = solve_to_tolerance(problem, starts, outputs, tol, quantile, method, threads, progress)
+        return _trajectories(problem, outputs, found.solution, found.settings, found.error, found.estimate)
+    settings = Settings(
+        find_method(method or "rk4"),
+        checks.number("dt", DEFAULT_DT if dt is None else dt, "s", above=0.0),
+        _fit_times(fit, scene),
+        _precision(dtype, problem),
     )
-    steps = output_steps(times, dt)
-    longest = float(np.max(np.diff(times) / np.maximum(steps, 1)))
-    y, total = problem.outward(ensemble.states), int(steps.sum())
-    status = judge(ensemble.status, starts, y[-1], problem.coefficients)
-    if not problem.observation.stops:
-        return Trajectories(outputs, y, status, total, longest, method)
-    code = ensemble.records[STOP_CODE]
-    time = np.where(code != 0.0, ensemble.records[STOP_TIME], np.nan)
-    return Trajectories(outputs, y, status, total, longest, method, code.astype(np.int64), time)
+    solution = solve(problem, starts, outputs, settings, threads, progress)
+    return _trajectories(problem, outputs, solution, settings)
+
+
+def _trajectories(
+    problem: Problem,
+    outputs: NDArray[np.float64],
+    solution: Solution,
+    settings: Settings,
+    error: NDArray[np.float64] | None = None,
+    estimate: float | None = None,
+) -> Trajectories:
+    code = time = None
+    if problem.observation.stops:
+        code = solution.records[STOP_CODE].astype(np.int64)
+        time = np.where(code != 0, solution.records[STOP_TIME], np.nan)
+    return Trajectories(
+        t=outputs,
+        y=solution.y,
+        status=solution.status,
+        steps=int(solution.steps.max(initial=0)),
+        dt=float(solution.dt.max(initial=0.0)),
+        method=settings.method.name,
+        own_steps=solution.steps,
+        own_dt=solution.dt,
+        precision=np.dtype(settings.precision).name,
+        stop_code=code,
+        stop_time=time,
+        error=error,
+        error_estimate=estimate,
+    )
+
+
+def _fit_times(fit: bool | ArrayLike, scene: Scene | System) -> tuple[float, ...]:
+    if fit is False:
+        return ()
+    if isinstance(scene, System):
+        raise InputError("fit: only for a scene, whose energy bounds its speed")
+    return (0.0,) if fit is True else tuple(checks.rising_times("fit", fit).tolist())  # type: ignore[arg-type]
+
+
+def _precision(dtype: str, problem: Problem) -> Precision:
+    known: dict[str, Precision] = {"float64": np.float64, "float32": np.float32}
+    if dtype not in known:
+        raise InputError(f"dtype = {dtype!r}: must be one of {', '.join(known)}")
+    if dtype == "float32" and problem.observation.stops:
+        raise InputError("dtype = 'float32': not with a stopping condition")
+    return known[dtype]
 
 
 def _output_times(t_end: float | None, t_eval: ArrayLike | None) -> NDArray[np.float64]:

@@ -6,8 +6,8 @@ integrated ones and back.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -26,10 +26,6 @@ from fastmech.scene import Scene, nearest
 Floats = NDArray[np.float64]
 
 
-def _unchanged(y: Floats) -> Floats:
-    return y
-
-
 @dataclass(frozen=True)
 class Problem:
     """A right-hand side with the parameters of n trajectories."""
@@ -37,9 +33,23 @@ class Problem:
     rhs: Any
     params: Floats  #: shape (count,) or (n, count)
     observation: Observation = NOTHING
-    inward: Callable[[Floats], Floats] = _unchanged  #: public states (..., n, dim) to integrated ones
-    outward: Callable[[Floats], Floats] = _unchanged  #: and back
     coefficients: Coefficients | None = None  #: of a scene: numbers, or one a trajectory
+    canonical: bool = False  #: momenta are integrated in place of rates
+
+    def inward(self, y: Floats) -> Floats:
+        """Integrated states from public ones (..., n, dim)."""
+        return with_momenta(self.coefficients, y) if self.canonical and self.coefficients else y
+
+    def outward(self, y: Floats) -> Floats:
+        """Public states from integrated ones (..., n, dim)."""
+        return with_rates(self.coefficients, y) if self.canonical and self.coefficients else y
+
+    def part(self, members: NDArray[np.int64]) -> Problem:
+        """The same for some of the trajectories."""
+        if self.params.ndim == 1:
+            return self
+        own = self.coefficients and Coefficients(*(np.asarray(c)[members] for c in self.coefficients))
+        return replace(self, params=self.params[members], coefficients=own)
 
 
 def scene_problem(scene: Scene, n: int, parameters: Mapping[str, ArrayLike], formulation: str) -> Problem:
@@ -54,18 +64,11 @@ def scene_problem(scene: Scene, n: int, parameters: Mapping[str, ArrayLike], for
             scene.replace(**{name: float(extreme)})
     scenes: Any = SimpleNamespace(**(scene.model_dump() | own))
     coefficients = reduce(scenes)
-    columns = [np.broadcast_to(value, n if own else ()) for value in coefficients]
-    params = np.stack(columns, axis=-1).astype(np.float64)
+    if own:
+        coefficients = Coefficients(*(np.broadcast_to(value, n) for value in coefficients))
+    params = np.stack([np.asarray(c, dtype=np.float64) for c in coefficients], axis=-1)
     rhs = right_hand_side(coefficients, formulation)
-    if formulation == "lagrange":
-        return Problem(rhs, params, coefficients=coefficients)
-    return Problem(
-        rhs,
-        params,
-        inward=lambda y: with_momenta(coefficients, y),
-        outward=lambda y: with_rates(coefficients, y),
-        coefficients=coefficients,
-    )
+    return Problem(rhs, params, coefficients=coefficients, canonical=formulation == "hamilton")
 
 
 def system_problem(system: System, n: int, parameters: Mapping[str, ArrayLike]) -> Problem:

@@ -1,0 +1,94 @@
+"""One run of a problem with given settings: a method, a step that may fit each trajectory, a precision."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.ensembles.fitting import EXPONENT_AGAIN, EXPONENT_ONCE, fitted_steps
+from fastmech.ensembles.plausible import judge
+from fastmech.ensembles.problem import Problem
+from fastmech.ensembles.run import Progress, run_ensemble
+from fastmech.ensembles.spans import output_steps
+from fastmech.integrators.method import Method
+
+Floats = NDArray[np.float64]
+Precision = type[np.floating[Any]]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a problem is integrated."""
+
+    method: Method
+    dt: float | Floats  #: longest step [s], of all trajectories or of each (n,)
+    fit: tuple[float, ...] = ()  #: times [s] at which the steps are fitted to the energy; () for never
+    precision: Precision = np.float64
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What a run gives."""
+
+    y: Floats  #: states, shape (outputs, n, dim)
+    records: Floats  #: what was observed, shape (rows, n)
+    status: NDArray[np.int8]  #: shape (n,)
+    steps: NDArray[np.int64]  #: steps of each trajectory that runs to the end, shape (n,)
+    dt: Floats  #: longest step of each [s], shape (pieces, n): a piece ends where steps are fitted again
+
+
+def solve(
+    problem: Problem,
+    starts: Floats,
+    outputs: Floats,
+    settings: Settings,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Solution:
+    """Integrate from t = 0 through the output times [s].
+
+    Where steps are fitted again, the times at which that is done end a piece of the run.
+
+    Raises:
+        InputError: the step or the number of threads are wrong.
+    """
+    n = len(starts)
+    cuts = [t for t in settings.fit if 0.0 < t < outputs[-1]]
+    ends = [*cuts, float(outputs[-1])]
+    exponent = EXPONENT_AGAIN if cuts else EXPONENT_ONCE
+    y = np.empty((outputs.size, n, starts.shape[1]))
+    steps, taken = np.zeros(n, dtype=np.int64), np.empty((len(ends), n))
+    begin, now, shares = 0.0, problem.inward(starts), np.zeros(n)
+    for piece, end in enumerate(ends):
+        inside = (outputs <= end) & ((outputs > begin) | (piece == 0))
+        times = np.concatenate([[begin], outputs[inside]])
+        times = times if times[-1] == end and times.size > 1 else np.append(times, end)
+        dt = np.broadcast_to(np.asarray(settings.dt, dtype=np.float64), n)
+        if settings.fit and problem.coefficients is not None:
+            # No motion becomes faster than its start allows: a step never shrinks where one has blown up.
+            fitted = fitted_steps(problem.coefficients, problem.outward(now), 1.0, exponent)
+            shares = np.maximum(fitted, shares)
+            dt = dt * shares
+        run = run_ensemble(
+            problem.rhs,
+            problem.params,
+            now,
+            times,
+            dt,
+            settings.method,
+            problem.observation,
+            threads=threads,
+            precision=settings.precision,
+            progress=progress if end == ends[-1] else None,
+        )
+        y[inside] = run.states[: np.count_nonzero(inside)]
+        for length in np.unique(dt):
+            number = output_steps(times, float(length))
+            steps[dt == length] += number.sum()
+            taken[piece, dt == length] = np.max(np.diff(times) / np.maximum(number, 1))
+        begin, now = end, run.states[-1]
+    y = problem.outward(y)
+    return Solution(y, run.records, judge(run.status, starts, y[-1], problem.coefficients), steps, taken)
