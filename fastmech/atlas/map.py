@@ -14,7 +14,7 @@ from fastmech.atlas.assess import assess
 from fastmech.atlas.axes import Floats, check_axes, grid_coefficients
 from fastmech.atlas.coincidence import coincidences
 from fastmech.atlas.sheets import SheetBuilder
-from fastmech.atlas.wells import barriers
+from fastmech.atlas.wells import barriers, least_speeds
 from fastmech.ensembles.threads import thread_count
 from fastmech.equilibria.search import MOST
 from fastmech.equilibria.solve import solve
@@ -52,7 +52,7 @@ class Slab:
     frequency: Floats  #: lowest undamped natural frequency [rad/s], (n, 6); NaN where U falls
     decay_time: Floats  #: slowest linear mode falls to 1/e [s], (n, 6), inf: it does not; NaN: no minimum
     depth: Floats  #: energy from a minimum to the lowest way out of its well [J], (n, 6)
-    escape_speed: Floats  #: of M2, at which its own kinetic energy is that [m/s], (n, 6)
+    escape_speed: Floats  #: of M2, below which no kick leaves the well [m/s], (n, 6); see ``least_speeds``
 
     @classmethod
     def empty(cls, n: int) -> Slab:
@@ -189,7 +189,10 @@ def solve_in_slabs(
 def solve_block(
     coefficients: Floats, weight: Floats, constant: Floats, mass: Floats, wells: bool, out: Slab
 ) -> None:
-    """Solve and assess some points; ``weight`` [kg m2] and ``constant`` [J] turn energies into joules."""
+    """Solve and assess some points; ``weight`` [kg m2] and ``constant`` [J] turn energies into joules.
+
+    ``mass`` is m2 [kg].
+    """
     places = (coefficients, out.phi, out.theta)
     expected = np.empty(len(coefficients), dtype=np.int8)
     solve(
@@ -207,7 +210,7 @@ def solve_block(
         out.depth[:] = (out.depth - out.energy) * weight[:, None]
     else:
         out.depth[:] = np.nan
-    out.escape_speed[:] = np.sqrt(2.0 * out.depth / mass[:, None])
+    out.escape_speed[:] = least_speeds(*places, out.depth, mass)
     with np.errstate(divide="ignore"):
         np.divide(1.0, out.decay_time, out=out.decay_time)
     out.energy[:] = out.energy * weight[:, None] + constant[:, None]

@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 from fastmech.equilibria.outcome import Outcome
 from fastmech.equilibria.solve import INDICES
 from fastmech.jit import MATRIX, STATUSES, inlined, kernel
-from fastmech.mechanism.reduced import potential_gradient, potential_hessian
+from fastmech.mechanism.reduced import (
+    metric_determinant,
+    potential_gradient,
+    potential_hessian,
+    slider_ratio,
+)
 
 Floats = NDArray[np.float64]
 Codes = NDArray[np.int8]
@@ -121,3 +126,31 @@ def barriers(
                     barrier[row, first] = energy[row, i]
                 if np.isnan(barrier[row, second]):
                     barrier[row, second] = energy[row, i]
+
+
+def least_speeds(coefficients: Floats, phi: Floats, theta: Floats, depth: Floats, mass: Floats) -> Floats:
+    """Least speed of M2 [m/s] at which the mechanism's kinetic energy is ``depth`` [J], (n, 6).
+
+    At rest's position the velocity v of M2 determines both rates, v = J q', hence the energy of the whole
+    mechanism: T = v.W^-1 v / 2 with the mobility W = J M^-1 J^T, M the metric of paper (11). Since M2 hangs
+    at M1 by a rod, W has the eigenvalues 1/m2 across the rod M1M2, where M2 swings alone, and 1/m along it,
+    where it drags M1 and the slider with it:
+
+        m = m2 + (m1 + m3 k^2) / cos^2(phi + theta),    k = -(dx3/dphi)/l.
+
+    So T lies between m2 v^2/2 and m v^2/2, and a kick that gives M2 less than sqrt(2 depth / m) leaves T
+    below the depth: it does not leave the well, in whatever direction, and with damping still less. The
+    bound is reached along the rod; a blow across it needs sqrt(2 depth / m2), and an impulse on M2 in any
+    direction at least sqrt(2 m2 depth), which depends on the depth alone. Where cos(phi + theta) = 0 crank
+    and rod are in line, M1 can move while M2 rests, and the bound is 0: M2's speed tells nothing there.
+
+    Args:
+        coefficients: (n, 8) rows as ``solve`` takes them.
+        phi, theta, depth: (n, 6) [rad], [rad], [J].
+        mass: (n,) m2 [kg].
+    """
+    ratio, slider = coefficients[:, 0, None], coefficients[:, 1, None]
+    k, _ = slider_ratio(np.sin(phi), np.cos(phi))
+    cosine = np.cos(phi + theta)
+    mobility = cosine**2 / (metric_determinant(ratio, slider, k, cosine) * mass[:, None])
+    return np.asarray(np.sqrt(2.0 * depth * mobility))

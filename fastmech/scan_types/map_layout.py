@@ -69,7 +69,7 @@ def point_variables(grid: tuple[str, ...], found: Slab) -> dict[str, Variable]:
             roots,
             found.escape_speed,
             "m/s",
-            "speed at which M2 alone has the depth as kinetic energy; a blow that moves M1 too needs less",
+            "least speed of M2 with the depth as kinetic energy of all; no slower kick leaves (blow along rod M1M2)",
         ),
     }
 
