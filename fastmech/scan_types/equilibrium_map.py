@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+from fastmech.atlas.axes import refuse_decaying_load
 from fastmech.atlas.map import Slab, map_equilibria, solve_in_slabs
 from fastmech.atlas.sheets import SheetBuilder
 from fastmech.errors import InputError
@@ -27,6 +28,8 @@ from fastmech.store.stream import Piece, Stream
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from fastmech.store.read import Section
 
 #: Points above which a map is written as it is computed instead of being held in memory.
 IN_MEMORY = 1_500_000
@@ -72,10 +75,7 @@ class EquilibriumMap(Scan):
 
     def check(self, scene: Scene) -> None:
         """Every value of every axis must be one the scene accepts, and every axis must matter."""
-        if "F0" in self.axes and scene.alpha > 0:
-            raise InputError(
-                f"alpha = {scene.alpha:g}: must be 0 1/s for a map over F0, or no force is left at rest"
-            )
+        refuse_decaying_load(scene, self.axes)
         total = math.prod(axis.num for axis in self.axes.values())
         if total > MOST_POINTS:
             raise InputError(f"axes: ask for {total:.3g} points, at most {MOST_POINTS:.0e} are allowed")
@@ -145,6 +145,13 @@ class EquilibriumMap(Scan):
         one = shaped(Slab.empty(int(np.prod(grid[1:]))), 1)
         one |= sheet_variables(names, np.zeros((1, *grid[1:], 6), dtype=np.int32), None)
         return Stream(fixed, one, names[0], pieces)
+
+    @staticmethod
+    def read(section: Section, scene: Mapping[str, float]) -> Dataset:
+        """What is drawn of the map, whatever its size."""
+        from fastmech.plots.map_view import load_drawn
+
+        return load_drawn(section, scene)
 
     @staticmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:

@@ -69,7 +69,7 @@ def point_variables(grid: tuple[str, ...], found: Slab) -> dict[str, Variable]:
             roots,
             found.escape_speed,
             "m/s",
-            "least speed of M2 with the depth as kinetic energy of all; no slower kick leaves (blow along rod M1M2)",
+            "least speed of M2 at which the kinetic energy is the depth: no slower kick leaves the well",
         ),
     }
 
