@@ -1,9 +1,15 @@
 """Equilibria over one to three parameters: how many, how many stable, where, how deep, how fast they settle.
 
-Layout: six slots along ``root`` at every point, the deepest equilibrium first; slots beyond ``count`` hold
-NaN in numbers and -1 in codes. ``sheet`` says which slots of different points are one equilibrium, continued.
-A map over two parameters also holds its fold curves, cusps and vanishing-damping curves, point after point;
-a map over one its folds.
+Layout: a point has four or six equilibria, and six slots along ``root``, the deepest equilibrium first;
+slots beyond ``count`` hold NaN in numbers and -1 in codes. So reductions over ``root`` that skip NaN need no
+mask, and ``where(map.morse_index == 0)`` leaves the stable ones. ``sheet`` says which slots of different points
+are one equilibrium, continued: ``map.phi.where(map.sheet == 3).max("root")`` is one of them over the whole map.
+Coordinates: the axes in their units, ``root`` (rank by energy), ``mode`` (rank by real part) and ``entry``
+(which second derivative). A map over two parameters also holds its fold curves, cusps and vanishing-damping
+curves, point after point, ``fold_curve`` and ``unreached_curve`` numbering them; a map over one its folds.
+
+A fold curve is found where it separates points of the grid: an island of six equilibria (or of four) that
+lies between the points, parting no two neighbours, is not seen. A finer grid sees it.
 """
 
 from __future__ import annotations
@@ -21,7 +27,7 @@ from fastmech.atlas.sheets import SheetBuilder
 from fastmech.errors import InputError
 from fastmech.results import Dataset, Variable
 from fastmech.scan_types.map_curves import curve_variables
-from fastmech.scan_types.map_layout import point_variables, sheet_variables
+from fastmech.scan_types.map_layout import point_variables, sheet_variables, slot_variables
 from fastmech.scan_types.request import RunContext, Scan
 from fastmech.scene import Scene, nearest
 from fastmech.store.stream import Piece, Stream
@@ -91,9 +97,11 @@ class EquilibriumMap(Scan):
             name: Variable((name,), values, *scene.described()[name][1:]) for name, values in axes.items()
         }
         fixed |= curve_variables(scene, axes, context.threads)
+        fixed |= slot_variables(self.variables)
         attrs = {
             "axes": tuple(axes),
             "layout": "six slots along root, the deepest first; beyond count NaN, codes -1",
+            "curves": "every fold curve that parts neighbouring points; islands between the points are not seen",
         }
         if total > IN_MEMORY:
             return self._stream(scene, axes, total, context, Dataset(fixed, attrs))

@@ -9,6 +9,7 @@ from fastmech.atlas.coincidence import Coincidence
 from fastmech.atlas.map import Slab
 from fastmech.atlas.verdicts import Verdict
 from fastmech.equilibria.outcome import Outcome
+from fastmech.equilibria.search import MOST
 from fastmech.results import Variable, flags
 
 CRITERIA = {
@@ -72,6 +73,20 @@ def point_variables(grid: tuple[str, ...], found: Slab) -> dict[str, Variable]:
             "least speed of M2 at which the kinetic energy is the depth: no slower kick leaves the well",
         ),
     }
+
+
+def slot_variables(kept: list[str] | None) -> dict[str, Variable]:
+    """Coordinates of the dimensions that are no parameters and that the variables kept (None: all) have."""
+    variables = {
+        "root": Variable(("root",), np.arange(MOST, dtype=np.int8), "1", "rank of the equilibrium by energy")
+    }
+    if kept is None or {"eigenvalue_re", "eigenvalue_im"} & set(kept):
+        modes = np.arange(4, dtype=np.int8)
+        variables["mode"] = Variable(("mode",), modes, "1", "rank of the eigenvalue by real part")
+    if kept is None or "hessian" in kept:
+        entries = np.array(["phi phi", "phi theta", "theta theta"], dtype=object)
+        variables["entry"] = Variable(("entry",), entries, "1", "which second derivative")
+    return variables
 
 
 def sheet_variables(
