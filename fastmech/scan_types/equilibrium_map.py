@@ -2,11 +2,12 @@
 
 Layout: a point has four or six equilibria, and six slots along ``root``, the deepest equilibrium first;
 slots beyond ``count`` hold NaN in numbers and -1 in codes. So reductions over ``root`` that skip NaN need no
-mask, and ``where(map.morse_index == 0)`` leaves the stable ones. ``sheet`` says which slots of different points
-are one equilibrium, continued: ``map.phi.where(map.sheet == 3).max("root")`` is one of them over the whole map.
-Coordinates: the axes in their units, ``root`` (rank by energy), ``mode`` (rank by real part) and ``entry``
-(which second derivative). A map over two parameters also holds its fold curves, cusps and vanishing-damping
-curves, point after point, ``fold_curve`` and ``unreached_curve`` numbering them; a map over one its folds.
+mask, and ``where(map.morse_index == 0)`` leaves the stable ones. ``sheet`` says which slots of different
+points are one equilibrium, continued: ``map.phi.where(map.sheet == 3).max("root")`` is one of them over the
+whole map. Coordinates: the axes in their units, ``root`` (rank by energy), ``mode`` (rank by real part) and
+``entry`` (which second derivative). A map over two parameters also holds its fold curves, cusps and
+vanishing-damping curves, point after point, ``fold_curve`` and ``unreached_curve`` numbering them; a map over
+one its folds.
 
 A fold curve is found where it separates points of the grid: an island of six equilibria (or of four) that
 lies between the points, parting no two neighbours, is not seen. A finer grid sees it.
@@ -101,7 +102,7 @@ class EquilibriumMap(Scan):
         attrs = {
             "axes": tuple(axes),
             "layout": "six slots along root, the deepest first; beyond count NaN, codes -1",
-            "curves": "every fold curve that parts neighbouring points; islands between the points are not seen",
+            "curves": "all fold curves that part neighbouring points; islands between them are not seen",
         }
         if total > IN_MEMORY:
             return self._stream(scene, axes, total, context, Dataset(fixed, attrs))
