@@ -9,7 +9,7 @@ from fastmech.bench.multistart import SCENE, TOLD, multistart
 
 
 def test_what_one_start_cannot_find_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The bistable scene has six equilibria (2 minima, 3 saddles, 1 maximum), and a start finds one at most."""
+    """The bistable scene has six equilibria, and a start finds one at most."""
     monkeypatch.setattr("fastmech.bench.multistart.STARTS", 2)
     monkeypatch.setattr("fastmech.bench.multistart.TOLD", (1, 2))
     finished: list[int] = []
