@@ -2,10 +2,10 @@
 
 Layout: a point has four or six equilibria, and six slots along ``root``, the deepest equilibrium first;
 slots beyond ``count`` hold NaN in numbers and -1 in codes. So reductions over ``root`` that skip NaN need no
-mask, and ``map.phi.where(map.morse_index == 0)`` leaves the stable ones. ``sheet`` says which slots of different
-points are one equilibrium, continued: ``map.phi.where(map.sheet == 3).max("root")`` is one of them over the
-whole map. Coordinates: the axes in their units, ``root`` (rank by energy), ``mode`` (rank by real part) and
-``entry`` (which second derivative). A map over two parameters also holds its fold curves, cusps and
+mask, and ``map.phi.where(map.morse_index == 0)`` leaves the stable ones. ``sheet`` says which slots of
+different points are one equilibrium, continued: ``map.phi.where(map.sheet == 3).max("root")`` is one of them
+over the whole map. Coordinates: the axes in their units, ``root`` (rank by energy), ``mode`` (rank by real
+part) and ``entry`` (which second derivative). A map over two parameters also holds its fold curves, cusps and
 vanishing-damping curves, point after point, ``fold_curve`` and ``unreached_curve`` numbering them; a map over
 one its folds.
 
