@@ -28,7 +28,7 @@ def test_verified_sets_lie_on_a_curve(name: str) -> None:
         ("F0", np.linspace(F0 - 40.0, F0 + 37.0, 41)),
         ("c2", np.linspace(max(c2 - 30.0, 0.0), c2 + 33.0, 43)),
     )
-    curves = [curve for curve in trace_unreached(scene, *axes) if curve.vanishes == name.strip()]
+    curves = [curve for curve in trace_unreached(scene, *axes).curves if curve.vanishes == name.strip()]
     assert all(curve.residual < 1e-12 for curve in curves)
     near = min(
         np.min(
