@@ -18,7 +18,7 @@ Codes = NDArray[np.int8]
 PLAIN = 4.0
 
 #: Tracking gives up below this part of the way between two scenes: a fold is in between.
-SHORTEST = 1.0 / 1024.0
+SHORTEST = 1.0 / 16384.0
 
 #: Longest Newton correction [rad] that still counts as following the same equilibrium.
 LEAP = 0.05
@@ -57,7 +57,8 @@ def follow(
     """Track an equilibrium from scene ``start`` to scene ``end``, coefficients changing linearly.
 
     Each stretch of the way is taken by Newton's method; it is halved where the first correction is long, the
-    second not much shorter, or the determinant changes sign. ``between`` (8,) is for working in.
+    second not much shorter, or the determinant changes by more than a factor of two: a step across two folds
+    would give itself away by one of these. ``between`` (8,) is for working in.
 
     Returns:
         Where it ends, and whether it got there.
@@ -74,8 +75,9 @@ def follow(
         d1, d2, determinant = newton_step(between, x, y)
         second = np.hypot(d1, d2)
         x, y = x + d1, y + d2
-        if first < LEAP and second <= 0.25 * first + 8.0 * EPS and determinant * before > 0.0:
-            phi, theta, at = x, y, at + stretch
+        change = determinant / before
+        if first < LEAP and second <= 0.1 * first + 8.0 * EPS and 0.5 < change < 2.0:
+            phi, theta, at, before = x, y, at + stretch, determinant
             stretch = 2.0 * stretch
         else:
             stretch = 0.5 * stretch
