@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.atlas.continuation import LONGEST, System, distance, newton, regular, trace
-from fastmech.atlas.folds import EXPLAINED, apart, checked_plane, finish_on_edge, inside, plane_of
+from fastmech.atlas.folds import EXPLAINED, MOST_POINTS, apart, checked_plane, finish_on_edge, inside, plane_of
 from fastmech.atlas.map import EquilibriumMap, map_equilibria
 from fastmech.atlas.systems import Plane, dead_centre, point_at, straight, unloaded
 from fastmech.scene import Scene
@@ -29,9 +29,6 @@ SYSTEMS: dict[str, Callable[[Plane], System]] = {
 
 #: A quantity this small, over its own scale, is zero within rounding.
 ZERO = 1e-9
-
-#: Points after which no further curve is begun; the edges that are left count as unexplained.
-MOST_POINTS = 40_000
 
 #: A curve ends this near to where its equilibrium stops being stable [rad and parts of the ranges].
 END = 1e-3
@@ -103,10 +100,13 @@ def trace_unreached(
             if any(distance(line, seed, apart)[0] < LONGEST for line in lines):
                 continue
             start = newton(equations, seed, reach=0.2) if traced < MOST_POINTS else None
-            if start is None or not regular(equations, start):
+            if (
+                start is None
+                or not regular(equations, start)
+                or not stable(plane, start)
+                or not inside(start)
+            ):
                 unexplained += 1
-                continue
-            if not stable(plane, start) or not inside(start):
                 continue
             if any(distance(line, start, apart)[0] < EXPLAINED for line in lines):
                 continue
