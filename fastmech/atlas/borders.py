@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,11 +27,15 @@ class Borders:
     Every field is a list of arrays, an item of the first dimension for each edge.
     """
 
-    point: list = field(default_factory=lambda: _none(2))  #: (edges, 2), numbers of the points in the grid
-    axis: list = field(default_factory=_none)  #: (edges,)
-    partner: list = field(default_factory=lambda: _none(MOST, dtype=np.int8))  #: (edges, 6), see ``match``
-    label: list = field(default_factory=lambda: _none(2, MOST, dtype=np.int32))  #: (edges, 2, 6)
-    angles: list = field(default_factory=lambda: _none(2, 2, MOST, dtype=np.float64))  #: phi and theta
+    point: list[Any] = field(
+        default_factory=lambda: _none(2)
+    )  #: (edges, 2), numbers of the points in the grid
+    axis: list[Any] = field(default_factory=_none)  #: (edges,)
+    partner: list[Any] = field(
+        default_factory=lambda: _none(MOST, dtype=np.int8)
+    )  #: (edges, 6), see ``match``
+    label: list[Any] = field(default_factory=lambda: _none(2, MOST, dtype=np.int32))  #: (edges, 2, 6)
+    angles: list[Any] = field(default_factory=lambda: _none(2, 2, MOST, dtype=np.float64))  #: phi and theta
 
     def add(
         self,

@@ -13,7 +13,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.atlas.continuation import LONGEST, System, distance, newton, regular, trace
-from fastmech.atlas.folds import EXPLAINED, MOST_POINTS, apart, checked_plane, finish_on_edge, inside, plane_of
+from fastmech.atlas.folds import (
+    EXPLAINED,
+    MOST_POINTS,
+    apart,
+    checked_plane,
+    finish_on_edge,
+    inside,
+    plane_of,
+)
 from fastmech.atlas.map import EquilibriumMap, map_equilibria
 from fastmech.atlas.systems import Plane, dead_centre, point_at, straight, unloaded
 from fastmech.scene import Scene

@@ -71,8 +71,9 @@ def join_islands(ground: Ground, forest: Forest, borders: Borders) -> None:
         order = np.lexsort((pairs[:, 1], pairs[:, 0], far))
         tried: dict[tuple[int, int], int] = {}
         for one, two in pairs[order]:
-            roots = tuple(sorted(forest.root(int(label[k].max())) // RANKS for k in (one, two)))
-            if roots[0] == roots[1] or tried.get(roots, 0) >= WAYS or len(tried) >= PAIRS:
+            low, high = sorted(forest.root(int(label[k].max())) // RANKS for k in (one, two))
+            roots = (low, high)
+            if low == high or tried.get(roots, 0) >= WAYS or len(tried) >= PAIRS:
                 continue
             tried[roots] = tried.get(roots, 0) + 1
             found = continued(ground, place[one], place[two], count)

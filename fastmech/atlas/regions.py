@@ -244,5 +244,5 @@ class Forest:
 
     def unite(self, one: NDArray[np.int64], two: NDArray[np.int64]) -> None:
         """Make the regions of two lists of labels one; labels at the same place are one equilibrium."""
-        one, two = (np.array([[self.root(int(label)) for label in labels]], dtype=np.int32) for labels in (one, two))
-        join(self.parent, self.rank, one[0], two[0], np.arange(one.size, dtype=np.int8), one.size)
+        mine, other = (np.array(labels, dtype=np.int32) for labels in (one, two))
+        join(self.parent, self.rank, mine, other, np.arange(one.size, dtype=np.int8), one.size)

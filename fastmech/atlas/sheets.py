@@ -89,7 +89,14 @@ class SheetBuilder:
         )  # fmt: skip
         rows, axis = borders[: filled[0]].T
         self._borders.add(
-            self._done - ghosts, rows, rows - strides[axis], axis, partners[: filled[0]], label, *arrays[1:3]
+            self._done - ghosts,
+            rows,
+            rows - strides[axis],
+            axis,
+            partners[: filled[0]],
+            label,
+            np.asarray(arrays[1], dtype=np.float64),
+            np.asarray(arrays[2], dtype=np.float64),
         )
         plane = int(strides[0])
         self._tail = (*(array[-plane:].copy() for array in arrays), label[-plane:].copy())
@@ -127,8 +134,10 @@ class SheetBuilder:
         node_branch = np.empty(groups.size, dtype=np.int64)
         node_branch[rank[place]] = branch_of
         _, firsts, branch = np.unique(node_branch, return_index=True, return_inverse=True)
-        branch = np.argsort(np.argsort(firsts))[branch].astype(np.int32)
-        return Sheets(pieces, morse[first][order], branch, self._breaks(borders, number))
+        in_order = np.argsort(np.argsort(firsts))[branch]
+        return Sheets(
+            pieces, morse[first][order], np.asarray(in_order, dtype=np.int32), self._breaks(borders, number)
+        )
 
     def _breaks(self, borders: Borders, number: Labels) -> NDArray[np.int32]:
         point, axis, sheet = borders.breaks(number)

@@ -48,7 +48,9 @@ def test_the_stable_position_of_the_paper_is_one_sheet() -> None:
     assert atlas.sheet_morse_index[sheet] == 0
 
 
-def gradient_and_hessian(scene: Scene, values: dict[str, float], q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def gradient_and_hessian(
+    scene: Scene, values: dict[str, float], q: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Of U = Pi - F x2, written out from the design's potential."""
     p = {**scene.model_dump(), **values}
     a = (p["m1"] + p["m2"]) * p["g"] * p["l"] - p["c2"] * p["l"] ** 2
@@ -135,10 +137,13 @@ def test_a_sheet_is_one_equilibrium_continued(name: str) -> None:
 
 @pytest.mark.parametrize("name", MAPS)
 def test_breaks_are_few_and_real(name: str) -> None:
-    """On an edge that is listed the sheet's equilibrium does not get across."""
+    """On an edge that is listed the sheet's equilibrium does not get across.
+
+    A curve from side to side crosses no more edges than the grid has lines; two sheets may be torn by it.
+    """
     scene, axes = MAPS[name]
     atlas = map_equilibria(scene, axes)
-    assert len(atlas.sheet_breaks) < 0.02 * atlas.count.size
+    assert len(atlas.sheet_breaks) <= 2 * sum(atlas.count.shape)
     for *two, axis, sheet in atlas.sheet_breaks[:10].tolist():
         one = [k - (d == axis) for d, k in enumerate(two)]
         i, j = (list(atlas.sheet[tuple(k)]).index(sheet) for k in (one, two))
@@ -155,8 +160,8 @@ def test_the_papers_plane_has_the_sheets_that_its_folds_say() -> None:
     Its folds (see ``trace_folds``) are a closed curve with four cusps around (0, 110) and two wedges that
     come in from the sides and end in a cusp. Outside there are a minimum, two saddles and a maximum. In the
     closed curve a saddle and a maximum are added; at its cusps a maximum between two saddles and a saddle
-    between two maxima vanish in turn, so two saddles and two maxima in it are one each from outside, cut: four
-    sheets more. In each wedge a minimum and a saddle are added, and at its cusp the minimum vanishes between
+    between two maxima vanish in turn, so two saddles and two maxima in it are one each from outside, cut:
+    four sheets more. In each wedge a minimum and a saddle are added; at its cusp the minimum vanishes between
     two saddles: the minimum and the two saddles, three sheets more a wedge. The branches: the minimum, the
     two saddles and the maximum from outside, and the minima of the wedges.
     """
