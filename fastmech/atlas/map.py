@@ -83,6 +83,8 @@ class EquilibriumMap(Slab):
     axes: dict[str, Floats]
     sheet: NDArray[np.int32]  #: grid + (6,), -1 where there is none
     sheet_morse_index: Codes  #: (sheets,)
+    sheet_branch: NDArray[np.int32]  #: (sheets,): sheets of one branch continue one another round a cusp
+    sheet_breaks: NDArray[np.int32]  #: (breaks, axes + 2): see ``fastmech.atlas.sheets``
 
 
 Progress = Callable[[int], None]
@@ -113,17 +115,19 @@ def map_equilibria(
     """
     checked = check_axes(scene, axes)
     grid = tuple(len(values) for values in checked.values())
-    builder = SheetBuilder(grid)
+    builder = SheetBuilder(scene, checked)
     whole = Slab.empty(math.prod(grid))
     for _ in solve_in_slabs(scene, checked, builder, whole.rows, wells, threads, progress):
         pass
-    sheet, sheet_index = builder.finish()
+    sheets = builder.finish()
     shaped = {name: array.reshape(grid + array.shape[1:]) for name, array in vars(whole).items()}
     return EquilibriumMap(
         **shaped,
         axes=checked,
-        sheet=np.concatenate(sheet).reshape(*grid, MOST),
-        sheet_morse_index=sheet_index,
+        sheet=np.concatenate(sheets.labels).reshape(*grid, MOST),
+        sheet_morse_index=sheets.morse_index,
+        sheet_branch=sheets.branch,
+        sheet_breaks=sheets.breaks,
     )
 
 

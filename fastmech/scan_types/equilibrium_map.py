@@ -4,8 +4,9 @@ Layout: a point has four or six equilibria, and six slots along ``root``, the de
 slots beyond ``count`` hold NaN in numbers and -1 in codes. So reductions over ``root`` that skip NaN need no
 mask, and ``map.phi.where(map.morse_index == 0)`` leaves the stable ones. ``sheet`` says which slots of
 different points are one equilibrium, continued: ``map.phi.where(map.sheet == 3).max("root")`` is one of them
-over the whole map. Coordinates: the axes in their units, ``root`` (rank by energy), ``mode`` (rank by real
-part) and ``entry`` (which second derivative). A map over two parameters also holds its fold curves, cusps and
+over the whole map; ``sheet_branch`` which sheets continue one another round a cusp; ``sheet_break`` where a
+sheet is torn. Coordinates: the axes in their units, ``root`` (rank by energy), ``mode`` (rank by real part)
+and ``entry`` (which second derivative). A map over two parameters also holds its fold curves, cusps and
 vanishing-damping curves, point after point, ``fold_curve`` and ``unreached_curve`` numbering them; a map over
 one its folds.
 
@@ -28,7 +29,7 @@ from fastmech.atlas.sheets import SheetBuilder
 from fastmech.errors import InputError
 from fastmech.results import Dataset, Variable
 from fastmech.scan_types.map_curves import curve_variables
-from fastmech.scan_types.map_layout import point_variables, sheet_variables, slot_variables
+from fastmech.scan_types.map_layout import point_variables, sheet_table, sheet_variables, slot_variables
 from fastmech.scan_types.request import RunContext, Scan
 from fastmech.scene import Scene, nearest
 from fastmech.store.stream import Piece, Stream
@@ -109,7 +110,8 @@ class EquilibriumMap(Scan):
         advance = context.stage("equilibrium map", total)
         found = map_equilibria(scene, axes, wells=self._wells, threads=context.threads, progress=advance)
         variables = self._kept(point_variables(tuple(axes), found))
-        variables |= sheet_variables(tuple(axes), found.sheet, found.sheet_morse_index)
+        variables |= sheet_variables(tuple(axes), found.sheet)
+        variables |= sheet_table(found.sheet_morse_index, found.sheet_branch, found.sheet_breaks)
         return Dataset({**fixed, **variables}, attrs)
 
     @property
@@ -133,7 +135,7 @@ class EquilibriumMap(Scan):
 
         def pieces() -> Iterator[Piece]:
             advance = context.stage("equilibrium map", total)
-            builder = SheetBuilder(grid)
+            builder = SheetBuilder(scene, axes)
 
             def place(rows: slice) -> Slab:
                 return Slab.empty(rows.stop - rows.start)
@@ -143,16 +145,16 @@ class EquilibriumMap(Scan):
             ):
                 variables = shaped(slab, planes.stop - planes.start)
                 yield planes, {name: variable.data for name, variable in variables.items()}
-            labelled, sheet_index = builder.finish()
+            sheets = builder.finish()
             start = 0
-            for sheet in labelled:
+            for sheet in sheets.labels:
                 piece = sheet.reshape(-1, *grid[1:], sheet.shape[-1])
                 yield slice(start, start + len(piece)), {"sheet": piece}
                 start += len(piece)
-            yield Dataset(sheet_variables(names, None, sheet_index))
+            yield Dataset(sheet_table(sheets.morse_index, sheets.branch, sheets.breaks))
 
         one = shaped(Slab.empty(int(np.prod(grid[1:]))), 1)
-        one |= sheet_variables(names, np.zeros((1, *grid[1:], 6), dtype=np.int32), None)
+        one |= sheet_variables(names, np.zeros((1, *grid[1:], 6), dtype=np.int32))
         return Stream(fixed, one, names[0], pieces)
 
     @staticmethod

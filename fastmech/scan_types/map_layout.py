@@ -89,20 +89,27 @@ def slot_variables(kept: list[str] | None) -> dict[str, Variable]:
     return variables
 
 
-def sheet_variables(
-    grid: tuple[str, ...], sheet: NDArray[np.int32] | None, morse_index: NDArray[np.int8] | None
+def sheet_variables(grid: tuple[str, ...], sheet: NDArray[np.int32]) -> dict[str, Variable]:
+    """The sheet of every slot."""
+    about = "equal numbers at neighbours: one equilibrium, continued, but for sheet_break; -1: none"
+    return {"sheet": Variable((*grid, "root"), sheet, "1", about)}
+
+
+def sheet_table(
+    morse_index: NDArray[np.int8], branch: NDArray[np.int32], breaks: NDArray[np.int32]
 ) -> dict[str, Variable]:
-    """The sheet of every slot, and the Morse index of every sheet; either may be left out."""
-    variables = {}
-    if sheet is not None:
-        variables["sheet"] = Variable(
-            (*grid, "root"),
-            sheet,
-            "1",
-            "equal numbers are one equilibrium, continued, but cut along some folds round a cusp; -1: none",
-        )
-    if morse_index is not None:
-        variables["sheet_morse_index"] = Variable(
-            ("sheet_number",), morse_index, "1", "negative eigenvalues of the Hessian all over a sheet"
-        )
-    return variables
+    """What is known of every sheet, and where a sheet is torn."""
+    each = ("sheet_number",)
+    torn = (
+        "where a sheet does not continue between neighbours: index along every axis of the second of them, "
+        "the axis along which the first is before it (0: first axis), the sheet"
+    )
+    return {
+        "sheet_morse_index": Variable(
+            each, morse_index, "1", "negative eigenvalues of the Hessian all over a sheet"
+        ),
+        "sheet_branch": Variable(
+            each, branch, "1", "sheets with equal numbers continue one another round a cusp or across a fold"
+        ),
+        "sheet_break": Variable(("break", "break_entry"), breaks, "1", torn),
+    }
