@@ -7,7 +7,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numba import carray, cfunc, njit, types
+from numba import carray, cfunc, njit, types  # type: ignore[attr-defined]
 
 from fastmech.bench.entrant import Entrant, Prepare, Solve
 from fastmech.bench.plain import accelerations
@@ -24,7 +24,7 @@ TOLERANCES = {
 }
 
 _COUNT = len(Coefficients._fields)
-_POINTER = types.CPointer(types.float64)
+_POINTER = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
 
 
 def entrants(problem: Problem) -> Iterator[Entrant]:

@@ -42,9 +42,7 @@ def equations(problem: Problem) -> list[Any]:
 def entrants(problem: Problem) -> Iterator[Entrant]:
     """Batches of the recommended size at all tolerances."""
     for tolerance in TOLERANCES:
-        yield Entrant(
-            "heyoka batch", f"tol = {tolerance:g}", prepared(tolerance), threaded=True
-        )
+        yield Entrant("heyoka batch", f"tol = {tolerance:g}", prepared(tolerance), threaded=True)
 
 
 def prepared(tolerance: float) -> Prepare:

@@ -42,8 +42,8 @@ def prepared(keywords: dict[str, Any]) -> Prepare:
     """A call of ``fm.integrate`` with these keywords."""
 
     def prepare(problem: Problem, threads: int) -> Solve:
-        return lambda starts: integrate(
-            problem.scene, starts, problem.t_end, threads=threads, **keywords
-        ).y[-1]
+        return lambda starts: integrate(problem.scene, starts, problem.t_end, threads=threads, **keywords).y[
+            -1
+        ]
 
     return prepare

@@ -47,7 +47,11 @@ class Throughput:
 def multiply_adds() -> Any:
     """A loop over lanes that does CHAINS x LENGTH multiply-adds in each, as machine code."""
     names = [f"a{j}" for j in range(CHAINS)]
-    lines = ["def loop(x, turns, factor):", "    for _ in range(turns):", "        for i in range(x.shape[0]):"]
+    lines = [
+        "def loop(x, turns, factor):",
+        "    for _ in range(turns):",
+        "        for i in range(x.shape[0]):",
+    ]
     lines += [f"            {name} = x[i] + {j}.0" for j, name in enumerate(names)]
     lines += [f"            {name} = {name} * factor + 1.0" for _ in range(LENGTH) for name in names]
     lines += [f"            x[i] = {' + '.join(names)}"]

@@ -67,9 +67,7 @@ def in_scalars(starts: Floats, p: Floats, h: float, steps: int) -> Floats:
         a, b, u, w = starts[i]
         for _ in range(steps):
             u1, w1 = accelerations(a, b, u, w, p)
-            u2, w2 = accelerations(
-                a + 0.5 * h * u, b + 0.5 * h * w, u + 0.5 * h * u1, w + 0.5 * h * w1, p
-            )
+            u2, w2 = accelerations(a + 0.5 * h * u, b + 0.5 * h * w, u + 0.5 * h * u1, w + 0.5 * h * w1, p)
             # The stages' rates are the angles' derivatives.
             ua, wa = u + 0.5 * h * u1, w + 0.5 * h * w1
             u3, w3 = accelerations(a + 0.5 * h * ua, b + 0.5 * h * wa, u + 0.5 * h * u2, w + 0.5 * h * w2, p)
@@ -89,9 +87,7 @@ def entrants(problem: Problem) -> Iterator[Entrant]:
     for kernel, how in ((one_at_a_time, "small arrays"), (in_scalars, "local numbers")):
         for dt in STEPS:
             h = dt * problem.pace
-            yield Entrant(
-                f"Numba RK4, one at a time, {how}", f"dt = {h:g} s", prepared(kernel, h), most=1024
-            )
+            yield Entrant(f"Numba RK4, one at a time, {how}", f"dt = {h:g} s", prepared(kernel, h), most=1024)
 
 
 def prepared(kernel: Any, h: float) -> Prepare:

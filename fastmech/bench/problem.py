@@ -50,7 +50,7 @@ def fast_starts(n: int = STARTS) -> Problem:
     return _problem("fast", "starts with |phi'|, |theta'| up to 10 rad/s", 10.0, 0.15, n)
 
 
-PROBLEMS: dict[str, Callable[[int], Problem]] = {"rest": rest_starts, "fast": fast_starts}
+PROBLEMS: dict[str, Callable[..., Problem]] = {"rest": rest_starts, "fast": fast_starts}
 
 
 def reference(name: str) -> Floats:

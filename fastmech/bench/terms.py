@@ -49,9 +49,7 @@ def costs(problem: Problem, advance: Callable[[int], None]) -> list[Cost]:
 
     def work(changes: dict[str, float], parameters: dict[str, Any]) -> Callable[[], Any]:
         scene = problem.scene.replace(**changes)
-        return lambda: integrate(
-            scene, starts, problem.t_end, DT, METHOD, threads=1, parameters=parameters
-        )
+        return lambda: integrate(scene, starts, problem.t_end, DT, METHOD, threads=1, parameters=parameters)
 
     works = {name: work(changes, {}) for name, changes in SCENES.items()}
     works[OWN_PARAMETERS] = work({}, own)
