@@ -18,10 +18,9 @@ from numpy.typing import NDArray
 from fastmech.bench.entrant import Entrant, Floats, Solve
 from fastmech.bench.problem import Problem
 
-#: Seconds of calls that one entrant is given, and repeats at most and at least.
-BUDGET = 1.0
+#: Processor seconds of timed calls that one entrant is given, and its calls at most.
+BUDGET = 0.8
 MOST_REPEATS = 7
-LEAST_REPEATS = 3
 
 #: Calls shorter than this [s] are given copies of the starts, up to the entrant's most.
 SHORT_CALL = 0.1
@@ -82,15 +81,17 @@ def measure(
     everyone: Sequence[tuple[Entrant, int]],
     advance: Callable[[int], None] = lambda done: None,
     failed: Callable[[Entrant, Exception], None] | None = None,
+    budget: float = BUDGET,
 ) -> list[Row]:
     """Time entrants, each with its number of threads; ``advance`` is told 1 twice for each.
 
-    An exception of an entrant is raised, or handed to ``failed`` where it is given.
+    ``budget`` is what each is given [s of processor time]; a call that takes longer is made once. An
+    exception of an entrant is raised, or handed to ``failed`` where it is given.
     """
     runners = []
     for entrant, threads in everyone:
         try:
-            runners.append(_prepare(problem, entrant, threads))
+            runners.append(_prepare(problem, entrant, threads, budget))
         except Exception as error:
             if failed is None:
                 raise
@@ -118,7 +119,7 @@ def measure(
     ]
 
 
-def _prepare(problem: Problem, entrant: Entrant, threads: int) -> _Runner:
+def _prepare(problem: Problem, entrant: Entrant, threads: int, budget: float) -> _Runner:
     """Compile, warm up, compare with the truth, and decide how often and on how many trajectories to time."""
     n = min(len(problem.starts), entrant.most)
     copies = max(1, -(-entrant.least // n))
@@ -129,11 +130,15 @@ def _prepare(problem: Problem, entrant: Entrant, threads: int) -> _Runner:
     first_call = time.perf_counter() - began
     errors = np.abs(final[:n] - problem.truth[:n]).max(axis=1)
     errors[~np.isfinite(errors)] = np.inf
-    began = time.process_time()
-    solve(starts)
-    taken = max(time.process_time() - began, 1e-6)
-    more = max(1, min(entrant.most // (n * copies), int(np.ceil(SHORT_CALL / taken)))) if copies == 1 else 1
-    repeats = int(np.clip(BUDGET / (taken * more), LEAST_REPEATS, MOST_REPEATS))
-    return _Runner(
-        entrant, threads, solve, np.tile(starts, (more, 1)), first_call, errors, 1 if taken > 4.0 else repeats
-    )
+    runner = _Runner(entrant, threads, solve, starts, first_call, errors, 0)
+    runner.time()
+    taken = max(runner.processor[0], 1e-6)
+    short = min(SHORT_CALL, budget / MOST_REPEATS)
+    more = min(entrant.most // len(starts), int(np.ceil(short / taken)))
+    if more > 1:
+        runner.starts = np.tile(starts, (more, 1))
+        runner.wall.clear()
+        runner.processor.clear()
+        taken *= more
+    runner.repeats = int(np.clip(budget / taken, 1, MOST_REPEATS)) - len(runner.wall)
+    return runner

@@ -15,7 +15,7 @@ from fastmech.bench import tables
 from fastmech.bench.atlas import run_atlas
 from fastmech.bench.entrant import Entrant
 from fastmech.bench.entrants import entrants, missing
-from fastmech.bench.measure import Row, measure
+from fastmech.bench.measure import BUDGET, Row, measure
 from fastmech.bench.peak import TURNS as PEAK_TURNS
 from fastmech.bench.peak import Throughput, throughputs
 from fastmech.bench.picture import draw_bench
@@ -29,7 +29,10 @@ from fastmech.store.provenance import processor_name, provenance
 from fastmech.store.write import check_writable, write_results
 
 #: Starts of ``--quick``, of those that have a reference.
-QUICK_STARTS = 64
+QUICK_STARTS = 8
+
+#: What ``--quick`` gives each entrant [s].
+QUICK_BUDGET = 0.05
 
 LIBRARIES = ("numba", "scipy", "heyoka", "torch", "jax", "diffrax", "numbalsoda", "CyRK", "pynamicalsys")
 
@@ -59,7 +62,7 @@ def run_bench(
             failures.append(f"{entrant.family}, {entrant.setting}: {type(error).__name__}: {error}")
             advance(1)
 
-        rows += measure(problem, everyone, advance, failed)
+        rows += measure(problem, everyone, advance, failed, QUICK_BUDGET if quick else BUDGET)
     peak, rhs = throughputs(problems[0], stage("right-hand sides", PEAK_TURNS))
     prices = costs(problems[0], stage("terms", TURNS))
     starts = [] if quick else list(started(stage("cold starts", len(STARTED))))
