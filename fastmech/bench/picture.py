@@ -63,7 +63,7 @@ def _draw(axes: Axes, rows: list[Row]) -> None:
             axes.plot(
                 errors, rates, marker=marker, color=color, linewidth=2.4 if prefix == "fastmech" else 1.4
             )
-            ends.append((errors[-1], rates[-1], label, color))
+            ends.append((errors[0], rates[0], label, color))
     _label(axes, ends)
 
 
@@ -72,10 +72,10 @@ def _shown(rows: Iterable[Row]) -> list[Row]:
 
 
 def _label(axes: Axes, ends: list[tuple[float, float, str, str]]) -> None:
-    """Names beside the fast end of the curves, moved apart where they would touch."""
+    """Names under the accurate end of the curves, moved apart where they would touch."""
     last = np.inf
-    for _, rate, label, color in sorted(ends, key=lambda end: -end[1]):
-        height = min(rate, last / 1.45)
-        axes.annotate(label, (0.985, height), xycoords=("axes fraction", "data"), color=color,
-                      ha="right", va="center", fontsize=9)  # fmt: skip
+    for error, rate, label, color in sorted(ends, key=lambda end: -end[1]):
+        height = min(0.86 * rate, last / 1.2)
+        side = "left" if error > 1e-10 else "right"
+        axes.text(error, height, label, color=color, ha=side, va="top", fontsize=9)
         last = height

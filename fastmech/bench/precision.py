@@ -15,7 +15,8 @@ TARGETS = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)
 def frontier(rows: Iterable[Row], count: int | None = None) -> list[Row]:
     """Settings that no other beats in both speed and error, the most accurate first."""
     best: list[Row] = []
-    for row in sorted(rows, key=lambda row: (row.max_error(count), -row.rate)):
+    # Errors that differ by rounding alone are equal.
+    for row in sorted(rows, key=lambda row: (float(f"{row.max_error(count):.2e}"), -row.rate)):
         if np.isfinite(row.max_error(count)) and (not best or row.rate > best[-1].rate):
             best.append(row)
     return best
