@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 #: Errors [rad, rad/s] that the picture shows: larger ones answer nothing.
 LARGEST, SMALLEST = 3e-2, 3e-15
 
+#: Where the axis ends, so that the names fit beside the curves.
+NAMES_END = 1e-18
+
 GREY = "0.35"
 
 #: Curves: what the family's name begins with, its label, marker; in the order of the colours.
@@ -44,7 +47,7 @@ def draw_bench(rows: list[Row], path: Path) -> None:
             problem = make(1)
             mine = [row for row in rows if (row.problem, row.threads) == (name, 1)]
             _draw(axes, mine)
-            axes.set(xscale="log", yscale="log", xlim=(LARGEST, SMALLEST))
+            axes.set(xscale="log", yscale="log", xlim=(LARGEST, NAMES_END))
             axes.set_title(f"{problem.description}, to {problem.t_end:g} s")
             axes.set_xlabel("largest error of a final state [rad, rad/s], smaller to the right")
         panels[0].set_ylabel("trajectories per second of one core")
@@ -72,10 +75,8 @@ def _shown(rows: Iterable[Row]) -> list[Row]:
 
 
 def _label(axes: Axes, ends: list[tuple[float, float, str, str]]) -> None:
-    """Names under the accurate end of the curves, moved apart where they would touch."""
+    """Names right of the accurate end of the curves, moved apart where they would touch."""
     last = np.inf
     for error, rate, label, color in sorted(ends, key=lambda end: -end[1]):
-        height = min(0.86 * rate, last / 1.2)
-        side = "left" if error > 1e-10 else "right"
-        axes.text(error, height, label, color=color, ha=side, va="top", fontsize=9)
-        last = height
+        last = min(rate, last / 1.2)
+        axes.text(error / 1.8, last, label, color=color, ha="left", va="center", fontsize=9)
