@@ -1,0 +1,109 @@
+"""The observers that stop a lane as soon as its capture is proved.
+
+Energy is looked at for all lanes at once, at multiples of an interval; the position only for lanes whose
+energy has fallen below the highest level at which any well captures, which happens about once a lane.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.capture.locate import AMPLITUDE, FIRST_WELL, INTERVAL, RATE, WELLS, locate
+from fastmech.ensembles.stopping import STOP_CODE, note_stop
+from fastmech.jit import OBSERVER_SIGNATURE, inlined, kernel
+from fastmech.kernels.sincos import REDUCTION_LIMIT, sincos
+from fastmech.mechanism.reduced import metric_11, potential, slider_ratio
+
+Floats = NDArray[np.float64]
+
+#: Rows of the record behind those of ``stopping`` (code: the well's number, from 1; time; state): the energy
+#: below which the lane's position is looked at next, its energy at the last look, and the well's turns.
+LEVEL, ENERGY, TURNS_PHI, TURNS_THETA, ROWS = 6, 7, 8, 9, 10
+
+#: Share of the time between looks that rounding of a step's time may take.
+ROUNDED = 1e-6
+
+
+@inlined
+def bounding_energy(params: Floats, push: float | None, y: Floats, i: int) -> float:
+    """Energy over m2 l^2 that lane ``i`` never exceeds again [1/s^2].
+
+    T + U for a force that is constant or absent: the damper only takes. For a force F that decays from now
+    on, T + Pi + |F| (2 l - sgn(F) x2) with the potential Pi of springs and weights: by parts, its future work
+    is F(t') x2(t') - F x2 - integral of F' x2, and |x2| <= 2 l. ``push`` is F/(m2 l), ``None`` where no
+    force decays. Infinite where the fast trigonometry does not reach.
+    """
+    s1, c1 = sincos(y[0, i])
+    s2, c2 = sincos(y[1, i])
+    s12 = s1 * c2 + c1 * s2
+    k, _ = slider_ratio(s1, c1)
+    u, v = y[2, i], y[3, i]
+    energy = 0.5 * (metric_11(params[0], params[1], k) * u * u + v * v) + s12 * u * v
+    energy = energy + potential(s1, c1, s2, c2, s12, params[2], params[3], params[4], params[5])
+    if push is not None:
+        energy = energy + 2.0 * abs(push) - push * (c1 - s2)
+    far = (abs(y[0, i]) > REDUCTION_LIMIT) | (abs(y[1, i]) > REDUCTION_LIMIT)
+    return np.inf if far else energy
+
+
+@inlined
+def is_look(t: float, interval: float) -> bool:
+    """Whether a step's end is one of the times at which lanes are looked at."""
+    looks = t / interval
+    return bool(abs(looks - np.floor(looks + 0.5)) < ROUNDED)
+
+
+@inlined
+def look(t: float, Y: Floats, params: Floats, record: Floats, push: float | None) -> None:
+    """Update energies and stop the lanes that are captured now."""
+    low = 0
+    for i in range(Y.shape[1]):
+        energy = bounding_energy(params, push, Y, i)
+        runs = record[STOP_CODE, i] == 0.0
+        record[ENERGY, i] = energy if runs else record[ENERGY, i]
+        low |= runs & (energy < record[LEVEL, i])
+    if low:
+        for i in range(Y.shape[1]):
+            if record[STOP_CODE, i] == 0.0 and record[ENERGY, i] < record[LEVEL, i]:
+                capture(t, Y, params, record, i)
+
+
+@inlined
+def capture(t: float, Y: Floats, params: Floats, record: Floats, i: int) -> None:
+    """Stop lane ``i`` if it is below its well's level, else set the energy of its next look.
+
+    Above the level of the well w that its position leads to, a lane is in a component that holds other
+    minima with w, and only wells of that component whose level is no higher can still take it.
+    """
+    wells = int(params[WELLS])
+    first = FIRST_WELL + 3 * wells
+    well, turns1, turns2 = locate(params, Y[0, i], Y[1, i])
+    if well < 0:
+        return
+    energy = record[ENERGY, i]
+    if energy < params[first + well]:
+        record[TURNS_PHI, i], record[TURNS_THETA, i] = turns1, turns2
+        note_stop(well + 1.0, t, Y, record, i)
+        return
+    following = -np.inf
+    for w in range(wells):
+        if params[first + w] <= energy:
+            following = max(following, params[first + w])
+    record[LEVEL, i] = following
+
+
+@kernel(OBSERVER_SIGNATURE)
+def observe_capture(t: float, Y: Floats, params: Floats, record: Floats) -> None:
+    """Capture under a constant force, or none; ``params`` as ``locate.pack`` makes them."""
+    if is_look(t, params[INTERVAL]):
+        look(t, Y, params, record, None)
+
+
+@kernel(OBSERVER_SIGNATURE)
+def observe_capture_decaying(t: float, Y: Floats, params: Floats, record: Floats) -> None:
+    """Capture while the force decays."""
+    if is_look(t, params[INTERVAL]):
+        look(t, Y, params, record, params[AMPLITUDE] * math.exp(-params[RATE] * t))
