@@ -24,7 +24,7 @@ from fastmech.capture.observe import (
     observe_capture_decaying,
 )
 from fastmech.ensembles import checks
-from fastmech.ensembles.run import Observation
+from fastmech.ensembles.run import CALL_STEPS_WITH_STOPS, Observation
 from fastmech.ensembles.stopping import STOP_CODE
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import unit
@@ -72,10 +72,13 @@ class Certificate:
         scene = self.scene
         return np.asarray((energy - (scene.c1 + scene.c2) * scene.l**2) / unit(scene))
 
-    def observation(self, interval: float, levels: Floats | None = None) -> Observation:
+    def observation(
+        self, interval: float, levels: Floats | None = None, call_steps: int = CALL_STEPS_WITH_STOPS
+    ) -> Observation:
         """An observer that stops captured lanes, looking every ``interval`` [s].
 
-        ``levels`` below those of capture stop lanes later: for how long they take to settle.
+        ``levels`` below those of capture stop lanes later: for how long they take to settle. Lanes leave
+        after at most ``call_steps`` steps.
         """
         levels = self.levels if levels is None else levels
         wells, equilibria = list(self.tree.wells), self.tree.equilibria
@@ -94,7 +97,11 @@ class Certificate:
         record = np.zeros(ROWS)
         record[LEVEL], record[ENERGY] = levels.max(), np.inf
         return Observation(
-            observe_capture_decaying if self.decays else observe_capture, params, record, stops=True
+            observe_capture_decaying if self.decays else observe_capture,
+            params,
+            record,
+            stops=True,
+            call_steps=call_steps,
         )
 
     def captured(self, states: Floats) -> Captured:

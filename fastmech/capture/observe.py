@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.capture.locate import AMPLITUDE, FIRST_WELL, INTERVAL, RATE, WELLS, locate
-from fastmech.ensembles.stopping import STOP_CODE, note_stop
+from fastmech.ensembles.stopping import note_stop
 from fastmech.jit import OBSERVER_SIGNATURE, inlined, kernel
 from fastmech.kernels.sincos import REDUCTION_LIMIT, sincos
 from fastmech.mechanism.reduced import metric_11, potential, slider_ratio
@@ -20,16 +20,19 @@ from fastmech.mechanism.reduced import metric_11, potential, slider_ratio
 Floats = NDArray[np.float64]
 
 #: Rows of the record behind those of ``stopping`` (code: the well's number, from 1; time; state): the energy
-#: below which the lane's position is looked at next, its energy at the last look, and the well's turns.
-LEVEL, ENERGY, TURNS_PHI, TURNS_THETA, ROWS = 6, 7, 8, 9, 10
+#: below which the lane's position is looked at next (minus infinity once captured), its energy at the last
+#: look, and of a captured lane the energy at capture and the well's turns.
+LEVEL, ENERGY, CAPTURE_ENERGY, TURNS_PHI, TURNS_THETA, ROWS = 6, 7, 8, 9, 10, 11
 
 #: Share of the time between looks that rounding of a step's time may take.
 ROUNDED = 1e-6
 
 
 @inlined
-def bounding_energy(params: Floats, push: float | None, y: Floats, i: int) -> float:
-    """Energy over m2 l^2 that lane ``i`` never exceeds again [1/s^2].
+def bounding_energy(
+    c: tuple[float, float, float, float, float, float], push: float | None, y: Floats, i: int
+) -> float:
+    """Energy over m2 l^2 that lane ``i`` never exceeds again [1/s^2]; ``c``: mass, slider, ..., force.
 
     T + U for a force that is constant or absent: the damper only takes. For a force F that decays from now
     on, T + Pi + |F| (2 l - sgn(F) x2) with the potential Pi of springs and weights: by parts, its future work
@@ -41,8 +44,8 @@ def bounding_energy(params: Floats, push: float | None, y: Floats, i: int) -> fl
     s12 = s1 * c2 + c1 * s2
     k, _ = slider_ratio(s1, c1)
     u, v = y[2, i], y[3, i]
-    energy = 0.5 * (metric_11(params[0], params[1], k) * u * u + v * v) + s12 * u * v
-    energy = energy + potential(s1, c1, s2, c2, s12, params[2], params[3], params[4], params[5])
+    energy = 0.5 * (metric_11(c[0], c[1], k) * u * u + v * v) + s12 * u * v
+    energy = energy + potential(s1, c1, s2, c2, s12, c[2], c[3], c[4], c[5])
     if push is not None:
         energy = energy + 2.0 * abs(push) - push * (c1 - s2)
     far = (abs(y[0, i]) > REDUCTION_LIMIT) | (abs(y[1, i]) > REDUCTION_LIMIT)
@@ -59,15 +62,16 @@ def is_look(t: float, interval: float) -> bool:
 @inlined
 def look(t: float, Y: Floats, params: Floats, record: Floats, push: float | None) -> None:
     """Update energies and stop the lanes that are captured now."""
+    c = (params[0], params[1], params[2], params[3], params[4], params[5])
+    level, energies = record[LEVEL], record[ENERGY]
     low = 0
     for i in range(Y.shape[1]):
-        energy = bounding_energy(params, push, Y, i)
-        runs = record[STOP_CODE, i] == 0.0
-        record[ENERGY, i] = energy if runs else record[ENERGY, i]
-        low |= runs & (energy < record[LEVEL, i])
+        energy = bounding_energy(c, push, Y, i)
+        energies[i] = energy
+        low |= energy < level[i]
     if low:
         for i in range(Y.shape[1]):
-            if record[STOP_CODE, i] == 0.0 and record[ENERGY, i] < record[LEVEL, i]:
+            if energies[i] < level[i]:
                 capture(t, Y, params, record, i)
 
 
@@ -83,15 +87,15 @@ def capture(t: float, Y: Floats, params: Floats, record: Floats, i: int) -> None
     well, turns1, turns2 = locate(params, Y[0, i], Y[1, i])
     if well < 0:
         return
-    energy = record[ENERGY, i]
+    energy, following = record[ENERGY, i], -np.inf
     if energy < params[first + well]:
+        record[CAPTURE_ENERGY, i] = energy
         record[TURNS_PHI, i], record[TURNS_THETA, i] = turns1, turns2
         note_stop(well + 1.0, t, Y, record, i)
-        return
-    following = -np.inf
-    for w in range(wells):
-        if params[first + w] <= energy:
-            following = max(following, params[first + w])
+    else:
+        for w in range(wells):
+            if params[first + w] <= energy:
+                following = max(following, params[first + w])
     record[LEVEL, i] = following
 
 
