@@ -1,9 +1,9 @@
 """``fm.label_basins``: the well, and its turn, in which every start ends, proved by capture.
 
 The certificate is about the path as it was computed, so every path is computed twice, with one step and with
-half of it, and a label counts only if both are captured by the same copy of the same well at the same time,
+two thirds of it, and a label counts only if both are captured by the same copy of the same well at the same time,
 so near to each other that what lies between them is captured too. Paths that run apart (they passed nearer
-to the stable manifold of a saddle than their error) are computed again with steps halved further.
+to the stable manifold of a saddle than their error) are computed again with ever smaller steps.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.basins.runs import Paths, follow
+from fastmech.basins.runs import Paths, follow, rounds_until
 from fastmech.basins.status import BasinStatus, counts
 from fastmech.basins.steps import coarse_steps
 from fastmech.capture.barriers import BarrierTree
@@ -33,8 +33,9 @@ from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
 
-#: Steps are halved at most so often: twelve digits of accuracy at capture, about, with the default method.
-MOST_HALVINGS = 4
+#: Steps a round of one computation after the other, a round being two of the coarsest steps. With the default
+#: method each makes the error some 25, 60, 256 and 256 times smaller, down to rounding.
+SUBSTEPS = (2, 3, 5, 10, 20)
 
 #: A path that has not been captured is at a saddle when it is so near to it [rad], in its norm.
 AT_SADDLE = 1e-3
@@ -78,8 +79,8 @@ def label_basins(
         scene: the mechanism, with a damper. A decaying force leads to the wells of springs and weights.
         starts: phi, theta [rad], phi', theta' [rad/s], shape (n, 4) or (4,); angles count their turns.
         t_end: end of the run [s]; what is not captured by then is undecided.
-        dt: coarse step [s]: each path is computed with it and with half of it, and with less where these
-            differ. By default it follows from the scene's frequencies and the start's energy.
+        dt: coarsest step [s]: each path is computed with it and with two thirds of it, and with less where
+            these differ. By default it follows from the scene's frequencies and the start's energy.
         method: name of the integration method.
         settle_radius: if given, also the time from which on a captured motion stays within so many rad of
             its well in the kinetic-energy norm (by its energy, to second order about the well).
@@ -142,7 +143,7 @@ def require_damper(scene: Scene) -> None:
 
 @dataclass
 class Ladder:
-    """Computations of the same starts with steps halved again and again."""
+    """Computations of the same starts with ever smaller steps."""
 
     certificate: Certificate
     t_end: float
@@ -152,13 +153,13 @@ class Ladder:
     steps: int = 0
 
     def __post_init__(self) -> None:
-        self.looks = max(1, int(np.ceil(self.t_end / self.coarse * (1.0 - 1e-12))))
-        self.interval = self.t_end / self.looks
+        self.rounds = rounds_until(self.t_end, SUBSTEPS[0] * self.coarse)
+        self.observer = self.certificate.params(self.certificate.levels)
 
-    def follow(self, starts: Floats, halvings: int, levels: Floats | None = None) -> Paths:
+    def follow(self, starts: Floats, substeps: int, observer: Floats) -> Paths:
         """One computation."""
         paths = follow(
-            self.certificate, starts, self.looks, self.interval, halvings, self.method, self.threads, levels
+            self.certificate, observer, starts, self.t_end, self.rounds, substeps, self.method, self.threads
         )
         self.steps += paths.steps
         return paths
@@ -167,14 +168,13 @@ class Ladder:
         self, begin: Floats, members: NDArray[np.intp], found: Paths, status: NDArray[np.int8]
     ) -> None:
         """Find labels and statuses of some starts."""
-        coarse = self.follow(begin[members], 0)
-        for halvings in range(1, MOST_HALVINGS + 1):
-            fine = self.follow(begin[members], halvings)
+        coarse = self.follow(begin[members], SUBSTEPS[0], self.observer)
+        for substeps in SUBSTEPS[1:]:
+            fine = self.follow(begin[members], substeps, self.observer)
             settled = self.agree(coarse, fine)
-            last = halvings == MOST_HALVINGS
+            last = substeps == SUBSTEPS[-1]
             done = np.flatnonzero(settled | last)
-            for name in ("code", "turns", "time", "energy", "state"):
-                getattr(found, name)[members[done]] = getattr(fine, name)[done]
+            found.put(members[done], fine.take(done))
             status[members[done]] = self.verdicts(begin[members[done]], coarse.take(done), fine.take(done), settled[done])
             rest = np.flatnonzero(~settled)
             members, coarse = members[rest], fine.take(rest)
@@ -185,14 +185,13 @@ class Ladder:
         """Which paths tell the same with both steps: not captured, or captured beyond their difference."""
         finite = np.isfinite(coarse.state).all(axis=1) & np.isfinite(fine.state).all(axis=1)
         same = (coarse.code == fine.code) & (coarse.turns == fine.turns).all(axis=1) & finite
-        same &= np.abs(coarse.time - fine.time) < 0.5 * self.interval
+        same &= np.abs(coarse.stop - fine.stop) < 0.5 * self.coarse
         apart = np.abs(np.where(finite[:, None], coarse.state - fine.state, np.inf))
         level = np.append(np.inf, self.certificate.levels)[fine.code]
         with np.errstate(invalid="ignore"):
             room = energy_change(self.certificate, fine.state, level, apart)
             proved = room < level - fine.energy
-        sound = ~breaks_energy_bounds(reduce(self.certificate.scene), fine.state, fine.state)
-        return np.asarray(same & np.where(fine.code > 0, proved, sound))
+        return np.asarray(same & (proved | (fine.code == 0)))
 
     def verdicts(
         self, starts: Floats, coarse: Paths, fine: Paths, settled: NDArray[np.bool_]
@@ -201,12 +200,13 @@ class Ladder:
         status = np.full(len(starts), BasinStatus.UNDECIDED, dtype=np.int8)
         status[settled & (fine.code > 0)] = BasinStatus.CAPTURED
         other = (coarse.code != fine.code) | (coarse.turns != fine.turns).any(axis=1)
-        split = ~settled & (coarse.code > 0) & (fine.code > 0) & other
-        free = fine.code == 0
-        status[split | (free & self.near_saddle(fine.state))] = BasinStatus.AT_SADDLE
-        impossible = breaks_energy_bounds(reduce(self.certificate.scene), starts, fine.state)
-        status[free & impossible] = BasinStatus.STEP_TOO_LARGE
-        status[~np.isfinite(fine.state).all(axis=1)] = BasinStatus.NOT_FINITE
+        status[~settled & (coarse.code > 0) & (fine.code > 0) & other] = BasinStatus.AT_SADDLE
+        free = np.flatnonzero(fine.code == 0)
+        start, state = starts[free], fine.state[free]
+        status[free[self.near_saddle(state)]] = BasinStatus.AT_SADDLE
+        impossible = breaks_energy_bounds(reduce(self.certificate.scene), start, state)
+        status[free[impossible]] = BasinStatus.STEP_TOO_LARGE
+        status[free[~np.isfinite(state).all(axis=1)]] = BasinStatus.NOT_FINITE
         return status
 
     def near_saddle(self, states: Floats) -> NDArray[np.bool_]:
@@ -234,7 +234,7 @@ class Ladder:
         levels = np.minimum(floor + energy, certificate.levels)
         times = np.full(members.size, np.nan)
         captured = np.flatnonzero(status[members] == BasinStatus.CAPTURED)
-        paths = self.follow(begin[members[captured]], 1, levels)
+        paths = self.follow(begin[members[captured]], SUBSTEPS[1], certificate.params(levels))
         same = paths.code == found.code[members[captured]]
         times[captured[same]] = paths.time[same]
         return times

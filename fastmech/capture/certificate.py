@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.capture.barriers import BarrierTree, barrier_tree, frozen_coefficients
-from fastmech.capture.locate import fill_cells, pack
+from fastmech.capture.locate import FIRST_WELL, INTERVAL, fill_cells, pack
 from fastmech.capture.observe import (
-    ENERGY,
     LEVEL,
     ROWS,
     TURNS_PHI,
@@ -72,41 +71,40 @@ class Certificate:
         scene = self.scene
         return np.asarray((energy - (scene.c1 + scene.c2) * scene.l**2) / unit(scene))
 
-    def observation(
-        self, interval: float, levels: Floats | None = None, call_steps: int = CALL_STEPS_WITH_STOPS
-    ) -> Observation:
-        """An observer that stops captured lanes, looking every ``interval`` [s].
-
-        ``levels`` below those of capture stop lanes later: for how long they take to settle. Lanes leave
-        after at most ``call_steps`` steps.
-        """
-        levels = self.levels if levels is None else levels
+    def params(self, levels: Floats) -> Floats:
+        """The observers' vector (see ``locate.pack``) with proved cells; its interval is still empty."""
         wells, equilibria = list(self.tree.wells), self.tree.equilibria
         amplitude, rate = (reduce(self.scene).force, self.scene.alpha) if self.decays else (0.0, 0.0)
         params = pack(
             frozen_coefficients(self.scene, equilibria),
             amplitude,
             rate,
-            interval,
             equilibria.phi[wells],
             equilibria.theta[wells],
             self.tree.radius,
             levels,
         )
         fill_cells(params)
+        return params
+
+    def observation(
+        self, params: Floats, interval: float, call_steps: int = CALL_STEPS_WITH_STOPS
+    ) -> Observation:
+        """An observer that stops captured lanes at multiples of ``interval`` [s].
+
+        They leave after at most ``call_steps`` steps. ``params`` is what the method of this name gives.
+        """
+        own = params.copy()
+        own[INTERVAL] = interval
+        wells = len(self.tree.wells)
         record = np.zeros(ROWS)
-        record[LEVEL], record[ENERGY] = levels.max(), np.inf
-        return Observation(
-            observe_capture_decaying if self.decays else observe_capture,
-            params,
-            record,
-            stops=True,
-            call_steps=call_steps,
-        )
+        record[LEVEL] = params[FIRST_WELL + 3 * wells : FIRST_WELL + 4 * wells].max()
+        observe = observe_capture_decaying if self.decays else observe_capture
+        return Observation(observe, own, record, stops=True, call_steps=call_steps)
 
     def captured(self, states: Floats) -> Captured:
         """Which states (n, 4) at t = 0 are captured already."""
-        observation = self.observation(1.0)
+        observation = self.observation(self.params(self.levels), 1.0)
         record = np.repeat(observation.record[:, None], len(states), axis=1)
         observation.observe(0.0, np.ascontiguousarray(states.T), observation.params, record)
         return self.decode(record)

@@ -26,7 +26,7 @@ from fastmech.mechanism.reduced import potential
 Floats = NDArray[np.float64]
 
 #: Places in the vector: reduced coefficients of the potential, amplitude and rate of the decaying force,
-#: time between looks [s], number of wells, cells along a turn; then four numbers a well; then the cells.
+#: time between stops [s], number of wells, cells along a turn; then four numbers a well; then the cells.
 AMPLITUDE, RATE, INTERVAL, WELLS, CELLS, FIRST_WELL = 8, 9, 10, 11, 12, 13
 
 #: Cells along one turn: a table of 16,384 numbers stays in the second-level cache.
@@ -44,22 +44,20 @@ def pack(
     coefficients: Floats,
     amplitude: float,
     rate: float,
-    interval: float,
     phi: Floats,
     theta: Floats,
     radius: Floats,
     level: Floats,
 ) -> Floats:
-    """The vector of an observer, its cells still empty.
+    """The vector of an observer; its interval and its cells are still empty.
 
     Args:
         coefficients: of the potential that holds the wells (8,), its constant force among them.
         amplitude, rate: of the decaying force over m2 l [1/s^2] and [1/s], 0 where there is none.
-        interval: time between looks [s].
         phi, theta, radius: of every minimum [rad], with its radius of convexity.
         level: energy over m2 l^2 below which a motion in a well's component is captured by it [1/s^2].
     """
-    head = [amplitude, rate, interval, float(len(phi)), float(SIDE)]
+    head = [amplitude, rate, 0.0, float(len(phi)), float(SIDE)]
     return np.concatenate([coefficients, head, phi, theta, radius, level, np.zeros(SIDE * SIDE)])
 
 

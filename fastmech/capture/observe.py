@@ -1,7 +1,8 @@
 """The observers that stop a lane as soon as its capture is proved.
 
-Energy is looked at for all lanes at once, at multiples of an interval; the position only for lanes whose
-energy has fallen below the highest level at which any well captures, which happens about once a lane.
+Energy is looked at for all lanes at once; the position only for lanes whose energy has fallen below the
+highest level at which any well captures, which happens about once a lane. A captured lane runs on to the next
+multiple of an interval, so that computations with different steps stop it at the same time.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.capture.locate import AMPLITUDE, FIRST_WELL, INTERVAL, RATE, WELLS, locate
-from fastmech.ensembles.stopping import note_stop
+from fastmech.ensembles.stopping import STOP_CODE, note_stop
 from fastmech.jit import OBSERVER_SIGNATURE, inlined, kernel
 from fastmech.kernels.sincos import REDUCTION_LIMIT, sincos
 from fastmech.mechanism.reduced import metric_11, potential, slider_ratio
@@ -21,10 +22,10 @@ Floats = NDArray[np.float64]
 
 #: Rows of the record behind those of ``stopping`` (code: the well's number, from 1; time; state): the energy
 #: below which the lane's position is looked at next (minus infinity once captured), its energy at the last
-#: look, and of a captured lane the energy at capture and the well's turns.
-LEVEL, ENERGY, CAPTURE_ENERGY, TURNS_PHI, TURNS_THETA, ROWS = 6, 7, 8, 9, 10, 11
+#: look; of a captured lane the well's number, its turns, the time of capture, and the energy where it stops.
+LEVEL, ENERGY, WELL, TURNS_PHI, TURNS_THETA, CAPTURE_TIME, STOP_ENERGY, ROWS = 6, 7, 8, 9, 10, 11, 12, 13
 
-#: Share of the time between looks that rounding of a step's time may take.
+#: Share of the time between stops that rounding of a step's time may take.
 ROUNDED = 1e-6
 
 
@@ -53,15 +54,15 @@ def bounding_energy(
 
 
 @inlined
-def is_look(t: float, interval: float) -> bool:
-    """Whether a step's end is one of the times at which lanes are looked at."""
-    looks = t / interval
-    return bool(abs(looks - np.floor(looks + 0.5)) < ROUNDED)
+def is_stop(t: float, interval: float) -> bool:
+    """Whether a step's end is one of the times at which captured lanes stop."""
+    stops = t / interval
+    return bool(abs(stops - np.floor(stops + 0.5)) < ROUNDED)
 
 
 @inlined
 def look(t: float, Y: Floats, params: Floats, record: Floats, push: float | None) -> None:
-    """Update energies and stop the lanes that are captured now."""
+    """Update energies, mark lanes that are captured now, and at times of stopping stop those marked."""
     c = (params[0], params[1], params[2], params[3], params[4], params[5])
     level, energies = record[LEVEL], record[ENERGY]
     low = 0
@@ -73,11 +74,16 @@ def look(t: float, Y: Floats, params: Floats, record: Floats, push: float | None
         for i in range(Y.shape[1]):
             if energies[i] < level[i]:
                 capture(t, Y, params, record, i)
+    if is_stop(t, params[INTERVAL]):
+        for i in range(Y.shape[1]):
+            if record[WELL, i] != 0.0 and record[STOP_CODE, i] == 0.0:
+                record[STOP_ENERGY, i] = energies[i]
+                note_stop(record[WELL, i], t, Y, record, i)
 
 
 @inlined
 def capture(t: float, Y: Floats, params: Floats, record: Floats, i: int) -> None:
-    """Stop lane ``i`` if it is below its well's level, else set the energy of its next look.
+    """Mark lane ``i`` if it is below its well's level, else set the energy of its next look.
 
     Above the level of the well w that its position leads to, a lane is in a component that holds other
     minima with w, and only wells of that component whose level is no higher can still take it.
@@ -89,9 +95,8 @@ def capture(t: float, Y: Floats, params: Floats, record: Floats, i: int) -> None
         return
     energy, following = record[ENERGY, i], -np.inf
     if energy < params[first + well]:
-        record[CAPTURE_ENERGY, i] = energy
+        record[WELL, i], record[CAPTURE_TIME, i] = well + 1.0, t
         record[TURNS_PHI, i], record[TURNS_THETA, i] = turns1, turns2
-        note_stop(well + 1.0, t, Y, record, i)
     else:
         for w in range(wells):
             if params[first + w] <= energy:
@@ -102,12 +107,10 @@ def capture(t: float, Y: Floats, params: Floats, record: Floats, i: int) -> None
 @kernel(OBSERVER_SIGNATURE)
 def observe_capture(t: float, Y: Floats, params: Floats, record: Floats) -> None:
     """Capture under a constant force, or none; ``params`` as ``locate.pack`` makes them."""
-    if is_look(t, params[INTERVAL]):
-        look(t, Y, params, record, None)
+    look(t, Y, params, record, None)
 
 
 @kernel(OBSERVER_SIGNATURE)
 def observe_capture_decaying(t: float, Y: Floats, params: Floats, record: Floats) -> None:
     """Capture while the force decays."""
-    if is_look(t, params[INTERVAL]):
-        look(t, Y, params, record, params[AMPLITUDE] * math.exp(-params[RATE] * t))
+    look(t, Y, params, record, params[AMPLITUDE] * math.exp(-params[RATE] * t))
