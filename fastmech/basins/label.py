@@ -1,4 +1,4 @@
-"""``fm.label_basins``: the well, and its turn, in which every start ends, proved by capture.
+"""``fm.labels_of``: the well, and its turn, in which every start ends, proved by capture.
 
 The certificate is about the path as it was computed, so every path is computed twice, with one step and with
 two thirds of it, and a label counts only if both are captured by the same copy of the same well at the same time,
@@ -41,17 +41,17 @@ SUBSTEPS = (2, 3, 5, 10, 20)
 AT_SADDLE = 1e-3
 
 #: Starts that are followed together.
-BATCH = 1 << 18
+BATCH = 1 << 16
 
 
 @dataclass(frozen=True)
 class Labels:
     """Where n starts end."""
 
-    tree: BarrierTree  #: the wells, their barriers and the scene's equilibria
+    tree: BarrierTree | None  #: wells, barriers and equilibria; of a system of your own: None
     well: NDArray[np.int8]  #: index of the well among the equilibria, -1: no label; shape (n,)
     turns: NDArray[np.int32]  #: full turns of phi and theta of that well from its listed place, (n, 2)
-    time: Floats  #: of capture [s], NaN: not captured; a multiple of the time between looks; (n,)
+    time: Floats  #: of capture [s], NaN: not captured; the end of a step; (n,)
     settle_time: Floats | None  #: s, from then on within the settling ball; NaN: not by t_end; (n,)
     status: NDArray[np.int8]  #: :class:`BasinStatus`, (n,)
     steps: int  #: integration steps of all computations of all starts
@@ -62,7 +62,7 @@ class Labels:
         return counts(self.status)
 
 
-def label_basins(
+def labels_of(
     scene: Scene,
     starts: ArrayLike,
     t_end: float = 60.0,

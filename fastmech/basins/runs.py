@@ -23,8 +23,8 @@ Floats = NDArray[np.float64]
 STAGES = ((2, 2, 1), (8, 3, 1), (32, 6, 2), (64, 16, 4))
 LATE = (32, 8)
 
-#: Lanes a block: calls are short here, so blocks are longer than elsewhere.
-BLOCK = 1024
+#: Lanes a block where calls are short, and where they are long.
+BLOCK, LATE_BLOCK = 1024, 256
 
 
 @dataclass
@@ -104,7 +104,7 @@ def follow(
             method,
             certificate.observation(observer, stop_rounds * interval, call_rounds * substeps),
             threads=threads,
-            block_lanes=BLOCK,
+            block_lanes=LATE_BLOCK if until == rounds else BLOCK,
         )
         code = run.records[STOP_CODE].astype(np.int8)
         stopped = code != 0
