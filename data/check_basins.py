@@ -92,8 +92,10 @@ def random_starts(n: int) -> int:
         final = fm.integrate(scene, starts, t_rest, dt=step, method="hairer10").y[-1]
         finer = fm.integrate(scene, starts[:500], t_rest, dt=step / 2, method="hairer10").y[-1]
         apart = np.abs(finer - final[:500]).max(axis=1)
-        print(f"{name}: reference {time.perf_counter() - began:.0f} s; half the step moves 500 final states by "
-              f"{np.median(apart):.0e} (median), {apart.max():.0e} (most)")
+        print(
+            f"{name}: reference {time.perf_counter() - began:.0f} s; half the step moves 500 final states by "
+            f"{np.median(apart):.0e} (median), {apart.max():.0e} (most)"
+        )
         wrong += compare(name, found, at_rest(scene, final))
         sample = rng.choice(len(starts), SCIPY_SAMPLE, replace=False)
         states = np.array([by_scipy(scene, starts[i], min(t_rest, 200.0)) for i in sample])

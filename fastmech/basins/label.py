@@ -1,9 +1,9 @@
 """``fm.labels_of``: the well, and its turn, in which every start ends, proved by capture.
 
 The certificate is about the path as it was computed, so every path is computed twice, with one step and with
-two thirds of it, and a label counts only if both are captured by the same copy of the same well at the same time,
-so near to each other that what lies between them is captured too. Paths that run apart (they passed nearer
-to the stable manifold of a saddle than their error) are computed again with ever smaller steps.
+two thirds of it, and a label counts only if both are captured by the same copy of the same well at the same
+time, so near to each other that what lies between them is captured too. Paths that run apart (they passed
+nearer to the stable manifold of a saddle than their error) are computed again with ever smaller steps.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ from fastmech.scene import Scene
 Floats = NDArray[np.float64]
 
 #: Steps a round of one computation after the other, a round being two of the coarsest steps. With the default
-#: method each makes the error some 25, 60, 256 and 256 times smaller, down to rounding.
-SUBSTEPS = (2, 3, 5, 10, 20)
+#: method each makes the error some 25, 60 and then 256 times smaller, down to rounding.
+SUBSTEPS = (2, 3, 5, 10, 20, 40)
 
 #: A path that has not been captured is at a saddle when it is so near to it [rad], in its norm.
 AT_SADDLE = 1e-3
@@ -109,9 +109,9 @@ def labels_of(
             members = same[first : first + BATCH]
             ladder = Ladder(certificate, t_end, float(step), formula, threads)
             ladder.label(begin, members, found, status)
-            found.steps += ladder.steps
             if settle is not None and settle_radius is not None:
                 settle[members] = ladder.settle_times(begin, members, found, status, settle_radius)
+            found.steps += ladder.steps
             if progress is not None:
                 progress(members.size)
     if progress is not None and not finite.all():
@@ -136,8 +136,8 @@ def require_damper(scene: Scene) -> None:
     """
     if scene.beta == 0.0:
         raise InputError(
-            "scene.beta = 0: must be greater than 0 N s/m: without damper nothing comes to rest and there is no "
-            "attractor; fastmech.trapped tells which states can never leave their well"
+            "scene.beta = 0: must be greater than 0 N s/m: without damper nothing comes to rest and there "
+            "is no attractor; fastmech.trapped tells which states can never leave their well"
         )
 
 
@@ -164,9 +164,7 @@ class Ladder:
         self.steps += paths.steps
         return paths
 
-    def label(
-        self, begin: Floats, members: NDArray[np.intp], found: Paths, status: NDArray[np.int8]
-    ) -> None:
+    def label(self, begin: Floats, members: NDArray[np.intp], found: Paths, status: NDArray[np.int8]) -> None:
         """Find labels and statuses of some starts."""
         coarse = self.follow(begin[members], SUBSTEPS[0], self.observer)
         for substeps in SUBSTEPS[1:]:
@@ -175,7 +173,9 @@ class Ladder:
             last = substeps == SUBSTEPS[-1]
             done = np.flatnonzero(settled | last)
             found.put(members[done], fine.take(done))
-            status[members[done]] = self.verdicts(begin[members[done]], coarse.take(done), fine.take(done), settled[done])
+            status[members[done]] = self.verdicts(
+                begin[members[done]], coarse.take(done), fine.take(done), settled[done]
+            )
             rest = np.flatnonzero(~settled)
             members, coarse = members[rest], fine.take(rest)
             if not members.size:
@@ -183,10 +183,10 @@ class Ladder:
 
     def agree(self, coarse: Paths, fine: Paths) -> NDArray[np.bool_]:
         """Which paths tell the same with both steps: not captured, or captured beyond their difference."""
-        finite = np.isfinite(coarse.state).all(axis=1) & np.isfinite(fine.state).all(axis=1)
+        finite = np.asarray(np.isfinite(coarse.state) & np.isfinite(fine.state)).all(axis=1)
         same = (coarse.code == fine.code) & (coarse.turns == fine.turns).all(axis=1) & finite
         same &= np.abs(coarse.stop - fine.stop) < 0.5 * self.coarse
-        apart = np.abs(np.where(finite[:, None], coarse.state - fine.state, np.inf))
+        apart = np.abs(np.where(finite.reshape(-1, 1), coarse.state - fine.state, np.inf))
         level = np.append(np.inf, self.certificate.levels)[fine.code]
         with np.errstate(invalid="ignore"):
             room = energy_change(self.certificate, fine.state, level, apart)
@@ -248,7 +248,9 @@ def energy_change(certificate: Certificate, states: Floats, level: Floats, apart
     """
     c: Coefficients = reduce(certificate.scene)
     dphi, dtheta, du, dv = apart.T
-    slope = np.hypot(c.lift, c.force) * dphi + np.hypot(c.gravity, c.force) * dtheta + c.spring * (dphi + dtheta)
+    slope = (
+        np.hypot(c.lift, c.force) * dphi + np.hypot(c.gravity, c.force) * dtheta + c.spring * (dphi + dtheta)
+    )
     if certificate.decays:
         slope = slope + abs(c.force) * (dphi + dtheta)
     angles = np.linspace(-np.pi, np.pi, 721)

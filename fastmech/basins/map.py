@@ -1,4 +1,4 @@
-"""``fm.map_basins``: where every start of a slice of state space ends, in how many turns, and after what time."""
+"""``fm.map_basins``: where every start of a slice of state space ends, after how many turns, and when."""
 
 from __future__ import annotations
 
@@ -122,7 +122,9 @@ def map_basins(
                 progress=progress,
             )
         else:
-            part = system_labels_of(scene, starts, t_end, dt=dt, method=method, threads=threads, progress=progress)
+            part = system_labels_of(
+                scene, starts, t_end, dt=dt, method=method, threads=threads, progress=progress
+            )
         return collected.put(points, part)
 
     if refine is None:
@@ -157,7 +159,9 @@ def grid_starts(
 ) -> Floats:
     """States (n, dim) of grid points by their flat indices, the last axis fastest."""
     places = dict(zip(axes, np.unravel_index(points, tuple(v.size for v in axes.values())), strict=True))
-    columns = [axes[name][places[name]] if name in axes else np.full(points.size, fixed[name]) for name in names]
+    columns = [
+        axes[name][places[name]] if name in axes else np.full(points.size, fixed[name]) for name in names
+    ]
     return np.stack(columns, axis=-1)
 
 
@@ -216,7 +220,9 @@ def _checked_fixed(
     for name in fixed:
         if name not in names or name in axes:
             others = [other for other in names if other not in axes]
-            raise InputError(f"fixed.{name}: must be one of the coordinates without an axis: {', '.join(others)}")
+            raise InputError(
+                f"fixed.{name}: must be one of the coordinates without an axis: {', '.join(others)}"
+            )
     return {
         name: checks.number(f"fixed.{name}", fixed.get(name, 0.0), "rad or rad/s")
         for name in names

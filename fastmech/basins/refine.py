@@ -52,7 +52,10 @@ def refine_grid(
         if stride == 1:
             return source
         # Until the next level, every point takes after the first corner of its block.
-        place = [np.searchsorted(tick, np.arange(n), side="right") - 1 for tick, n in zip(ticks, shape, strict=True)]
+        place = [
+            np.searchsorted(tick, np.arange(n), side="right") - 1
+            for tick, n in zip(ticks, shape, strict=True)
+        ]
         block = [np.minimum(p, max(len(tick) - 2, 0)) for p, tick in zip(place, ticks, strict=True)]
         after = nodes[np.ix_(*block)].ravel()
         other = ~computed

@@ -1,4 +1,4 @@
-"""One computation of where starts are captured: with one step, in stages that pack the lanes still running."""
+"""One computation of where starts are captured, in stages that pack the lanes still running."""
 
 from __future__ import annotations
 
@@ -111,14 +111,14 @@ def follow(
         end = np.where(stopped, run.records[STOP_TIME], (passed + ahead) * interval)
         reached = Paths(
             code,
-            run.records[[TURNS_PHI, TURNS_THETA]].T,
+            run.records[[TURNS_PHI, TURNS_THETA]].T.astype(np.int32),
             run.records[CAPTURE_TIME],
             end,
             run.records[STOP_ENERGY],
             run.states[-1],
         )
         paths.put(running, reached)
-        paths.steps += int(np.rint((end / interval - passed)).sum()) * substeps
+        paths.steps += int(np.rint(end / interval - passed).sum()) * substeps
         passed += ahead
         running = running[~stopped & np.isfinite(run.states[-1]).all(axis=1)]
     return paths

@@ -26,10 +26,10 @@ class BasinStatus(IntEnum):
 
 _ADVICE = {
     BasinStatus.CAPTURED: "proved to end in its well: energy and position leave no other way",
-    BasinStatus.UNDECIDED: "not captured by t_end, or the finest two steps do not agree on when; use a larger t_end",
-    BasinStatus.AT_SADDLE: "on the stable manifold of an unstable equilibrium, as far as the finest step can tell",
+    BasinStatus.UNDECIDED: "not captured by t_end, or the finest steps disagree; use a larger t_end",
+    BasinStatus.AT_SADDLE: "on an unstable equilibrium's stable manifold, as far as the finest steps tell",
     BasinStatus.NOT_FINITE: "became NaN or infinite with every step tried; use a smaller dt",
-    BasinStatus.STEP_TOO_LARGE: "has energy that the motion cannot have with every step tried; use a smaller dt",
+    BasinStatus.STEP_TOO_LARGE: "has energy that it cannot have, with every step tried; use a smaller dt",
     BasinStatus.START_NOT_FINITE: "the start is NaN or infinite",
 }
 

@@ -29,9 +29,9 @@ def system_labels_of(
 ) -> Labels:
     """Label starts (n, dim) by stop codes; a code has to be a whole number from 1 to 127.
 
-    Each trajectory is computed with the step ``dt`` and with two thirds of it; where codes or times of stopping
-    differ by more than a step, with ever smaller ones. What a code means, and whether it is final, is the
-    stopping condition's matter.
+    Each trajectory is computed with the step ``dt`` and with two thirds of it; where codes differ, or
+    times of stopping by more than a step, with ever smaller ones. What a code means, and whether it is final,
+    is the stopping condition's matter.
 
     Raises:
         InputError: no stopping condition, no step, or a wrong argument.
@@ -47,10 +47,9 @@ def system_labels_of(
     members = np.arange(n)
     before: tuple[NDArray[np.int64], Floats] | None = None
     for substeps in SUBSTEPS:
-        run = integrate(
-            system, starts[members], t_end, dt * SUBSTEPS[0] / substeps, method, threads=threads
-        )
-        assert run.stop_code is not None and run.stop_time is not None  # the system has a stopping condition
+        run = integrate(system, starts[members], t_end, dt * SUBSTEPS[0] / substeps, method, threads=threads)
+        assert run.stop_code is not None  # the system has a stopping condition
+        assert run.stop_time is not None
         code[members], time[members] = run.stop_code, run.stop_time
         steps += int(np.nansum(np.where(run.stop_code != 0, run.stop_time, t_end) / run.dt))
         ended = np.where(run.stop_code != 0, run.stop_time, t_end)

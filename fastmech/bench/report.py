@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from fastmech.bench.atlas import run_atlas
+from fastmech.bench.basins import run_basins
 from fastmech.bench.entrants import entrants, jitted_rhs
 from fastmech.bench.measure import Row, measure
 from fastmech.bench.picture import draw_bench
@@ -52,7 +53,7 @@ def run_bench(
             for threads in {1, thread_count(None)} if entrant.threaded else {1}:
                 rows.append(measure(problem, entrant, truth, threads))
             advance(1)
-    atlas = run_atlas(out, quick=quick, stage=stage)
+    others = run_atlas(out, quick=quick, stage=stage) + run_basins(out, quick=quick, stage=stage)
     table, picture = out / "bench.md", out / "bench.png"
     table.write_text(markdown(rows, floors), encoding="utf-8")
     draw_bench(rows, picture)
@@ -77,7 +78,7 @@ def run_bench(
         | provenance(thread_count(None)),
         replace=True,
     )
-    return [table, picture, data, *atlas]
+    return [table, picture, data, *others]
 
 
 def markdown(rows: list[Row], floors: dict[str, float]) -> str:

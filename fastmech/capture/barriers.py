@@ -114,7 +114,11 @@ def barrier_tree(scene: Scene) -> BarrierTree:
         for o, effect in zip(openings, effects, strict=True)
     )
     first = [
-        min(o.energy for o in named if well in o.wells and (o.wells[0] != o.wells[1] or o.turns[0] != o.turns[1]))
+        min(
+            o.energy
+            for o in named
+            if well in o.wells and (o.wells[0] != o.wells[1] or o.turns[0] != o.turns[1])
+        )
         for well in wells
     ]
     return BarrierTree(equilibria, named, tuple(wells.tolist()), np.array(first), radius)
@@ -182,7 +186,9 @@ def _lattice(vectors: list[Turns]) -> list[Turns]:
     while sum(v[0] != 0 for v in rest) > 1:  # Euclid's algorithm on the first turns
         rest.sort(key=lambda v: (v[0] == 0, abs(v[0])))
         pivot = rest[0]
-        rest[1:] = [(v[0] - v[0] // pivot[0] * pivot[0], v[1] - v[0] // pivot[0] * pivot[1]) for v in rest[1:]]
+        rest[1:] = [
+            (v[0] - v[0] // pivot[0] * pivot[0], v[1] - v[0] // pivot[0] * pivot[1]) for v in rest[1:]
+        ]
     second = int(np.gcd.reduce([v[1] for v in rest if v[0] == 0] or [0]))
     for v in rest:
         if v[0] != 0:

@@ -41,8 +41,8 @@ class Observation:
     """An observer (see :data:`fastmech.jit.OBSERVER_SIGNATURE`), its parameters and its empty record.
 
     ``record`` holds the start value of every row of a lane's record. Where ``stops`` is set, the rows begin
-    with those of :mod:`fastmech.ensembles.stopping` (its own may follow), and a lane whose code is not zero is taken out after at
-    most ``call_steps`` steps.
+    with those of :mod:`fastmech.ensembles.stopping` (its own may follow), and a lane whose code
+    is not zero is taken out after at most ``call_steps`` steps.
     """
 
     observe: Any

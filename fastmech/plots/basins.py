@@ -60,7 +60,10 @@ def draw_basins(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figur
     with style():
         slice_ = _Slice(dataset, Scene(**scene))
         figures = {"labels": _labels(slice_)}
-        for name, title in (("capture_time", "Time until capture is proved"), ("settle_time", "Time to settle")):
+        for name, title in (
+            ("capture_time", "Time until capture is proved"),
+            ("settle_time", "Time to settle"),
+        ):
             if name in dataset and np.isfinite(slice_.data(name)).any():
                 figures[name] = _times(slice_, name, title)
         return figures
@@ -78,7 +81,9 @@ class _Slice:
         self.index = tuple(slice(None) if n in self.axes else dataset.sizes[n] // 2 for n in names)
         self.swapped = names.index(self.axes[0]) > names.index(self.axes[1])
         self.held = {
-            name: float(dataset.attrs[f"fixed_{name}"]) for name in SYMBOLS if f"fixed_{name}" in dataset.attrs
+            name: float(dataset.attrs[f"fixed_{name}"])
+            for name in SYMBOLS
+            if f"fixed_{name}" in dataset.attrs
         }
         self.held |= {
             n: float(dataset[n].data[i]) for n, i in zip(names, self.index, strict=True) if n not in self.axes
@@ -116,7 +121,8 @@ def _labels(view: _Slice) -> Figure:
     present, number = np.unique(label[label >= 0], return_counts=True)
     order = present[np.argsort(-number, kind="stable")]
     shown, rest = order[: len(COLORS)], order[len(COLORS) :]
-    colors, handles = [], []
+    colors: list[str] = []
+    handles: list[Artist] = []
     picture = np.full(label.shape, -1)
     for basin, color in zip(shown, COLORS, strict=False):
         picture[label == basin] = len(colors)
@@ -137,7 +143,9 @@ def _labels(view: _Slice) -> Figure:
                 x, y = np.meshgrid(view.axis(0), view.axis(1), indexing="ij")
                 axes.plot(x[where], y[where], marker, color="black", ms=5, ls="none", zorder=4)
             text = f"{meaning}: {np.count_nonzero(where)} ({_share(where)})"
-            handles.append(_mark(marker, text) if few else Patch(facecolor=color, edgecolor="black", label=text))
+            handles.append(
+                _mark(marker, text) if few else Patch(facecolor=color, edgecolor="black", label=text)
+            )
     axes.pcolormesh(
         view.axis(0),
         view.axis(1),
@@ -190,7 +198,9 @@ def _decisive(axes: Axes, view: _Slice) -> list[Artist]:
             axes.contour(x, y, energy.T, levels=[level], colors="black", linewidths=1.6, linestyles=look)
             which = " and ".join(str(i + 1) for i in np.flatnonzero(barriers == level))
             of = f" of well{'s' * (' ' in which)} {which}" if wells.size > 1 else ""
-            handles.append(Line2D([], [], color="black", lw=1.6, ls=look, label=f"barrier energy{of}, {level:.4g} J"))
+            handles.append(
+                Line2D([], [], color="black", lw=1.6, ls=look, label=f"barrier energy{of}, {level:.4g} J")
+            )
     for index, (marker, name) in MARKERS.items():
         places = _places(view, index)
         if len(places):
@@ -198,7 +208,7 @@ def _decisive(axes: Axes, view: _Slice) -> list[Artist]:
             handles.append(_mark(marker, name))
     if wells.size > 1:
         for number, well in enumerate(wells):
-            for place in _places(view, 0, well):
+            for place in _places(view, 0, int(well)):
                 axes.annotate(
                     str(number + 1), place, xytext=(6, 5), textcoords="offset points", weight="bold", zorder=6
                 )
@@ -222,7 +232,9 @@ def _places(view: _Slice, index: int, only: int | None = None) -> Floats:
         copies = []
         for name, (low, high) in zip(view.axes, reach, strict=True):
             at = place.get(name, 0.0)
-            turns = np.arange(np.ceil((low - at) / (2.0 * np.pi)), np.floor((high - at) / (2.0 * np.pi)) + 1.0)
+            turns = np.arange(
+                np.ceil((low - at) / (2.0 * np.pi)), np.floor((high - at) / (2.0 * np.pi)) + 1.0
+            )
             copies.append(at + 2.0 * np.pi * turns if name in place else np.array([at] * (low <= at <= high)))
         found += [(a, b) for a in copies[0] for b in copies[1]]
     return np.array(found).reshape(-1, 2)
@@ -230,6 +242,7 @@ def _places(view: _Slice, index: int, only: int | None = None) -> Floats:
 
 def _times(view: _Slice, name: str, title: str) -> Figure:
     from matplotlib.colors import LogNorm, Normalize
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     figure = new_figure(8.2, 7.0)
     axes = figure.subplots()
@@ -240,9 +253,19 @@ def _times(view: _Slice, name: str, title: str) -> Figure:
     norm = LogNorm(low, high) if high > 20.0 * low else Normalize(low, max(high, low * 1.01))
     axes.set_facecolor("#d9d9d9")
     mesh = axes.pcolormesh(
-        view.axis(0), view.axis(1), np.maximum(times, low).T, norm=norm, cmap=FIELD, shading="nearest", rasterized=True
+        view.axis(0),
+        view.axis(1),
+        np.maximum(times, low).T,
+        norm=norm,
+        cmap=FIELD,
+        shading="nearest",
+        rasterized=True,
     )
-    figure.colorbar(mesh, ax=axes, label=f"{name.replace('_', ' ')} [s]")
+    bar = figure.colorbar(mesh, ax=axes, label=f"{name.replace('_', ' ')} [s]")
+    if isinstance(norm, LogNorm):
+        bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        bar.ax.yaxis.set_minor_formatter(NullFormatter())
     handles = _decisive(axes, view)
     if known.size < times.size:
         from matplotlib.patches import Patch
@@ -258,7 +281,11 @@ def _describe(axes: Axes, view: _Slice, title: str) -> None:
     """Labels with units, the scene's decisive parameters, and what is held."""
     scene = view.scene
     force = f"F0 = {scene.F0:g} N" + (f" exp(-{scene.alpha:g} t)" if scene.F0 and scene.alpha else "")
-    at_rest = all(value == 0.0 for value in view.held.values()) and "phi" not in view.held and "theta" not in view.held
+    at_rest = (
+        all(value == 0.0 for value in view.held.values())
+        and "phi" not in view.held
+        and "theta" not in view.held
+    )
     held = "starts at rest" if at_rest and set(view.axes) == {"phi", "theta"} else _held(view)
     axes.set_title(f"{title}\n{force}, c1 = {scene.c1:g} N/m, c2 = {scene.c2:g} N/m; {held}")
     for axis, name in (("x", view.axes[0]), ("y", view.axes[1])):

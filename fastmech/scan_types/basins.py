@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import AfterValidator, Field
@@ -74,7 +74,9 @@ class Basins(Scan):
             if name in self.fixed:
                 raise InputError(f"fixed.{name}: is an axis of the map; give one or the other")
             if axis.num > 1 and axis.stop <= axis.start:
-                raise InputError(f"axes.{name}.stop = {axis.stop:g}: must be greater than start = {axis.start:g}")
+                raise InputError(
+                    f"axes.{name}.stop = {axis.stop:g}: must be greater than start = {axis.start:g}"
+                )
 
     def run(self, scene: Scene, context: RunContext) -> Dataset:
         """Label the grid."""
@@ -91,9 +93,10 @@ class Basins(Scan):
             threads=context.threads,
             progress=context.stage("basin map", math.prod(axis.num for axis in self.axes.values())),
         )
-        attrs = {"axes": tuple(axes), "t_end": self.t_end, "method": self.method, "steps": found.steps}
-        attrs |= {f"fixed_{name}": value for name, value in found.fixed.items()} | found.counts
-        attrs |= {"refine": self.refine or 0}
+        attrs: dict[str, Any] = {"axes": tuple(axes), "t_end": self.t_end, "method": self.method}
+        attrs |= {"steps": found.steps, "refine": self.refine or 0}
+        attrs |= {f"fixed_{name}": value for name, value in found.fixed.items()}
+        attrs |= found.counts
         return Dataset(_coordinates(found) | _grid_variables(found) | _wells(found), attrs)
 
     @staticmethod
@@ -105,7 +108,12 @@ class Basins(Scan):
 
 
 def _coordinates(found: BasinMap) -> dict[str, Variable]:
-    described = {"phi": "angle phi", "theta": "angle theta", "phi_dot": "rate of phi", "theta_dot": "rate of theta"}
+    described = {
+        "phi": "angle phi",
+        "theta": "angle theta",
+        "phi_dot": "rate of phi",
+        "theta_dot": "rate of theta",
+    }
     return {
         name: Variable((name,), values, _UNITS[name], f"{described[name]} at the start")
         for name, values in found.axes.items()
@@ -128,12 +136,17 @@ def _grid_variables(found: BasinMap) -> dict[str, Variable]:
         "computed": Variable(names, found.computed, "1", "computed, not filled in between equal labels"),
         "basin_well": Variable(("basin",), table[:, 0].astype(np.int8), "1", "equilibrium of the basin"),
         "basin_turns_phi": Variable(("basin",), table[:, 1].astype(np.int32), "1", "its full turns of phi"),
-        "basin_turns_theta": Variable(("basin",), table[:, 2].astype(np.int32), "1", "its full turns of theta"),
+        "basin_turns_theta": Variable(
+            ("basin",), table[:, 2].astype(np.int32), "1", "its full turns of theta"
+        ),
         "basin_share": Variable(("basin",), share, "1", "share of the starts"),
     }
     if found.settle_time is not None:
         variables["settle_time"] = Variable(
-            names, found.settle_time, "s", "time from which on the motion stays in the settling ball, NaN: none"
+            names,
+            found.settle_time,
+            "s",
+            "time from which on the motion stays in the settling ball, NaN: none",
         )
     return variables
 
@@ -147,7 +160,9 @@ def _wells(found: BasinMap) -> dict[str, Variable]:
         "equilibrium_phi": Variable(each, equilibria.phi, "rad", "angle phi of the equilibrium"),
         "equilibrium_theta": Variable(each, equilibria.theta, "rad", "angle theta of the equilibrium"),
         "equilibrium_energy": Variable(each, equilibria.energy, "J", "potential energy of the equilibrium"),
-        "equilibrium_morse_index": Variable(each, equilibria.morse_index, "1", "unstable directions, 0: a well"),
+        "equilibrium_morse_index": Variable(
+            each, equilibria.morse_index, "1", "unstable directions, 0: a well"
+        ),
         "barrier": Variable(each, barrier, "J", "energy at which the well first meets another, NaN: no well"),
         "force": Variable((), np.array(equilibria.force), "N", "constant force that the wells hold for"),
     }
