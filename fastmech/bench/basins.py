@@ -91,7 +91,7 @@ def certified(starts: Floats, threads: int) -> BasinRow:
 
 
 def settled(starts: Floats) -> BasinRow:
-    """The same engine, each start followed once, with the finer of the certificate's steps, until it rests."""
+    """The same engine, each start followed once, with the certificate's finer step, until it rests."""
     plain = labels_of(SCENE, starts, T_END, threads=1)
     began = time.perf_counter()
     found = labels_of(SCENE, starts, T_END, settle_radius=REST, threads=1)
@@ -103,14 +103,16 @@ def settled(starts: Floats) -> BasinRow:
     return BasinRow(f"until within {REST:g} of rest", 1, len(starts), len(starts) / seconds, steps, 0)
 
 
-@njit(**FLAGS)
-def energy_above(y: Floats, p: Floats, bottom: float) -> float:
-    """T + U over m2 l^2 of one state above ``bottom`` [1/s^2], compiled: an event must not slow SciPy down."""
+def _energy_above(y: Floats, p: Floats, bottom: float) -> float:
+    """T + U over m2 l^2 of one state above ``bottom`` [1/s^2], an event for SciPy."""
     s1, c1, s2, c2 = np.sin(y[0]), np.cos(y[0]), np.sin(y[1]), np.cos(y[1])
     s12 = s1 * c2 + c1 * s2
     k, _ = slider_ratio(s1, c1)
     kinetic = 0.5 * (metric_11(p[0], p[1], k) * y[2] ** 2 + y[3] ** 2) + s12 * y[2] * y[3]
     return kinetic + potential(s1, c1, s2, c2, s12, p[2], p[3], p[4], p[5]) - bottom
+
+
+energy_above = njit(**FLAGS)(_energy_above)
 
 
 def lsoda(starts: Floats) -> BasinRow:
@@ -119,7 +121,8 @@ def lsoda(starts: Floats) -> BasinRow:
     enough = confining_energy(SCENE, well, REST) / unit(SCENE)
     p = np.array(reduce(SCENE))
 
-    bottom = energy_above(starts[0], p, 0.0) - float(excess_energy(SCENE, well, starts[:1])[0]) / unit(SCENE)
+    bottom = energy_above(starts[0], p, 0.0)
+    bottom -= float(excess_energy(SCENE, well, starts[:1])[0]) / unit(SCENE)
 
     def rests(t: float, y: Floats, p: Floats) -> float:
         return float(energy_above(y, p, bottom)) - enough
@@ -168,8 +171,8 @@ def markdown(rows: list[BasinRow]) -> str:
     lines += [
         "",
         f"The certificate takes 1/{rest.steps / first.steps:.0f} of the steps to rest, both of its "
-        f"computations counted, and labels {first.rate / peer.rate:,.0f} times as many starts a second on one "
-        "core as SciPy.",
+        f"computations counted, and labels {first.rate / peer.rate:,.0f} times as many starts a second "
+        "on one core as SciPy.",
         "",
     ]
     return "\n".join(lines)
