@@ -272,8 +272,9 @@ def _times(view: _Slice, name: str, title: str) -> Figure:
 
         handles.insert(0, Patch(facecolor="#d9d9d9", label="no time: not captured, or not computed"))
     figure.legend(handles=handles, loc="outside lower center", ncols=2)
-    quantiles = f"median {np.median(known):.3g} s, 99 % within {np.quantile(known, 0.99):.3g} s"
-    _describe(axes, view, f"{title} ({quantiles})")
+    if view.data("computed").all():  # else those near boundaries are over-represented
+        title += f" (median {np.median(known):.3g} s, 99 % within {np.quantile(known, 0.99):.3g} s)"
+    _describe(axes, view, title)
     return figure
 
 
