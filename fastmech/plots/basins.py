@@ -242,6 +242,7 @@ def _places(view: _Slice, index: int, only: int | None = None) -> Floats:
 
 def _times(view: _Slice, name: str, title: str) -> Figure:
     from matplotlib.colors import LogNorm, Normalize
+    from matplotlib.patches import Patch
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     figure = new_figure(8.2, 7.0)
@@ -268,8 +269,6 @@ def _times(view: _Slice, name: str, title: str) -> Figure:
         bar.ax.yaxis.set_minor_formatter(NullFormatter())
     handles = _decisive(axes, view)
     if known.size < times.size:
-        from matplotlib.patches import Patch
-
         handles.insert(0, Patch(facecolor="#d9d9d9", label="no time: not captured, or not computed"))
     figure.legend(handles=handles, loc="outside lower center", ncols=2)
     if view.data("computed").all():  # else those near boundaries are over-represented
