@@ -13,6 +13,7 @@ import numpy as np
 
 from fastmech.bench import tables
 from fastmech.bench.atlas import run_atlas
+from fastmech.bench.basins import run_basins
 from fastmech.bench.entrant import Entrant
 from fastmech.bench.entrants import entrants, missing
 from fastmech.bench.measure import BUDGET, Row, measure
@@ -66,7 +67,7 @@ def run_bench(
     peak, rhs = throughputs(problems[0], stage("right-hand sides", PEAK_TURNS))
     prices = costs(problems[0], stage("terms", TURNS))
     starts = [] if quick else list(started(stage("cold starts", len(STARTED))))
-    atlas = run_atlas(out, quick=quick, stage=stage)
+    others = run_atlas(out, quick=quick, stage=stage) + run_basins(out, quick=quick, stage=stage)
     table, picture = out / "bench.md", out / "bench.png"
     lines = _preamble(quick, failures)
     for problem in problems:
@@ -90,7 +91,7 @@ def run_bench(
         | provenance(thread_count(None)),
         replace=True,
     )
-    return [table, picture, data, *atlas]
+    return [table, picture, data, *others]
 
 
 def _threads(entrant: Entrant) -> list[int]:
