@@ -1,0 +1,1 @@
+"""Basins of attraction: where every start ends, and what follows from it."""
