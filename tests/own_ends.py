@@ -10,7 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fastmech as fm
-from fastmech.mechanism.lagrange import kinetic_energy, potential_energy, potential_gradient, potential_hessian
+from fastmech.mechanism.lagrange import (
+    kinetic_energy,
+    potential_energy,
+    potential_gradient,
+    potential_hessian,
+)
 
 TURN = 2.0 * np.pi
 
@@ -39,7 +44,7 @@ def go_down(scene: fm.Scene, q: NDArray[np.float64]) -> NDArray[np.float64]:
 def ends(
     scene: fm.Scene, starts: NDArray[np.float64], t_end: float, dt: float = 0.05, piece: float = 2.0
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-    """Label (n,) (index in ``find_equilibria``, -1: not captured by t_end), turns (n, 2) and time (n,) [s]."""
+    """Label (n,): index in ``find_equilibria``, -1: not captured by t_end; turns (n, 2); time (n,) [s]."""
     equilibria, depth = fm.find_equilibria(scene), depths(scene)
     minima = [i for i, e in enumerate(equilibria) if e.kind == "minimum"]
     places = np.array([[equilibria[i].phi, equilibria[i].theta] for i in minima])

@@ -27,6 +27,7 @@ LAYERS = (
     "equilibria",
     "atlas",
     "disturbance",
+    "basins",
     "results",
     "store",
     "plots",

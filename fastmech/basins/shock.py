@@ -1,7 +1,8 @@
 """The minimal critical shock: the smallest disturbance of a resting state that makes it end elsewhere.
 
 Halekotte and Feudel, Sci. Rep. 10 (2020) 11783 (minimal fatal shocks). In the norm it is the radius of the
-largest ball round the attractor within its basin: LIM, with the point of the boundary where that ball touches.
+largest ball round the attractor within its basin: LIM, with the point of the boundary where that ball
+touches.
 """
 
 from __future__ import annotations
@@ -82,7 +83,8 @@ def minimal_shock(
     spread = np.full(len(units), 0.5)
     # A turn by the angle s changes the size by s^2 at a smooth minimum.
     while np.isfinite(sizes).any() and (spread > 0.5 * np.sqrt(search.tolerance)).any():
-        turned = units[:, None] + spread[:, None, None] * rng.standard_normal((*units.shape[:1], TRIALS, units.shape[1]))
+        random = rng.standard_normal((len(units), TRIALS, units.shape[1]))
+        turned = units[:, None] + spread[:, None, None] * random
         turned /= np.linalg.norm(turned, axis=2, keepdims=True)
         limit = np.repeat(np.minimum(sizes, search.most), TRIALS)
         tried, ends = search.first_exits(turned.reshape(-1, units.shape[1]), limit)
@@ -165,7 +167,7 @@ class _Search:
         return found
 
     def first_exits(self, units: Floats, limit: Floats) -> tuple[Floats, Integers]:
-        """Size (n,) at which rays first have another label, inf: not up to ``limit``; that label, -1: none."""
+        """Sizes (n,) at which rays first have another label, inf: not up to ``limit``; these labels or -1."""
         n = len(units)
         fractions = np.arange(1, LEVELS + 1) / LEVELS
         radii = limit[:, None] * fractions
@@ -192,9 +194,12 @@ class _Search:
         """The smallest of shocks along ``units``."""
         best = int(np.argmin(sizes))
         found = bool(np.isfinite(sizes[best]))
+        shock = np.full(self.dim, np.nan)
+        if found:
+            shock = self.disturbances(sizes[best] * units[best : best + 1])[0]
         return Shock(
             size=float(sizes[best]) if found else np.nan,
-            shock=self.disturbances(sizes[best] * units[best : best + 1])[0] if found else np.full(self.dim, np.nan),
+            shock=shock,
             label=int(labels[best]),
             undecided_from=self.undecided if np.isfinite(self.undecided) else np.nan,
             trajectories=self.trajectories,

@@ -6,12 +6,12 @@ mean of S_i over all boxes, the boundary basin entropy over those with more than
 
 Two tests tell a fractal boundary from a smooth one by the boundary basin entropy:
 
-- the ln 2 criterion of that paper: almost all boxes on a smooth boundary hold two labels, so S_i <= ln 2, and a
-  mean above ln 2 proves a fractal boundary. With two labels on the whole map no box can exceed ln 2: then the
-  criterion can never fire, and says nothing.
-- that of Puy, Daza, Wagemakers, Sanjuan, Commun. Nonlinear Sci. Numer. Simul. 95 (2021) 105588, which works for
-  two labels too: over balls at random places that meet a smooth boundary the mean has a known value, 0.4395093
-  for discs; a mean above it speaks for a fractal boundary.
+- the ln 2 criterion of that paper: almost all boxes on a smooth boundary hold two labels, so S_i <= ln 2, and
+  a mean above ln 2 shows a fractal boundary. With two labels on the whole map no box can exceed ln 2: then
+  the criterion can never fire, and says nothing.
+- that of Puy, Daza, Wagemakers, Sanjuan, Commun. Nonlinear Sci. Numer. Simul. 95 (2021) 105588, which works
+  for two labels too: over balls at random places that meet a smooth boundary the mean has a known value,
+  0.4395093 for discs; a mean above it speaks for a fractal boundary.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def basin_entropy(labels: ArrayLike, edge: int = 5) -> BasinEntropy:
             used.
 
     Returns:
-        Entropies and the ln 2 criterion: ``fractal`` is True where it proves a fractal boundary, False where
+        Entropies and the ln 2 criterion: ``fractal`` is True where it shows a fractal boundary, False where
         it could have and did not, None where no box holds more than two labels, in which case
         :func:`fractal_boundary_test` can tell.
 
@@ -63,10 +63,11 @@ def basin_entropy(labels: ArrayLike, edge: int = 5) -> BasinEntropy:
     array = check_map(labels)
     edge = checks.whole_number("edge", edge, least=2, most=min(array.shape))
     boxes = _boxes(array, edge)
-    counts = np.stack([(boxes == label).sum(axis=1) for label in known_labels(array)] or [np.zeros(len(boxes))])
-    counts = counts[:, counts.sum(axis=0) > 0]
-    if not counts.shape[1]:
+    known = known_labels(boxes)
+    if not known.size:
         raise InputError("labels: no label is known")
+    counts = np.stack([(boxes == label).sum(axis=1) for label in known])
+    counts = counts[:, counts.sum(axis=0) > 0]
     entropy = entropies(counts)
     kinds = (counts > 0).sum(axis=0)
     mixed = kinds > 1
@@ -103,8 +104,9 @@ def fractal_boundary_test(
 
     Balls are put round random points of the map, wholly on it, and the entropies of those with more than one
     label are averaged. The value to compare with is that of flat boundaries with all directions and distances
-    alike, cut by the very points of the ball on the grid, so that a coarse ball is no disadvantage. A boundary
-    that is curved on the scale of the ball, or two that meet in one, raise the mean too: take the ball small.
+    alike, cut by the very points of the ball on the grid, so that a coarse ball is no disadvantage. A
+    boundary that is curved on the scale of the ball, or two that meet in one, raise the mean too: take the
+    ball small.
 
     The error is that of independent balls; balls that overlap carry less, so with many of them on a small map
     it is too small. Half of the map's volume over that of a ball is a fair number at most.
@@ -125,7 +127,7 @@ def fractal_boundary_test(
     rng = np.random.default_rng(checks.whole_number("seed", seed, least=0))
     reach = int(radius)
     if array.ndim < 2 or 2 * reach + 1 > min(array.shape):
-        raise InputError(f"radius = {radius:g}: a ball must fit a map of two or more axes, shape {array.shape}")
+        raise InputError(f"radius = {radius:g}: a ball must fit the map, of two or more axes: {array.shape}")
     points = _ball(array.ndim, radius)
     centres = rng.integers(reach, np.array(array.shape) - reach, (balls, array.ndim))
     which, numbers = known_labels(array), np.full(array.shape, -1)
@@ -154,8 +156,8 @@ def entropies(counts: Integers) -> Floats:
 def smooth_boundary_entropy(dim: int, radius: float) -> float:
     """Mean entropy of a ball of grid points that a flat boundary cuts, all directions and distances alike.
 
-    For large radii it tends to the integral over s from 0 to 1 of the entropy of the share that a plane at the
-    distance s from the centre cuts off: 0.4395093 for discs, 0.3960918 for spheres.
+    For large radii it tends to the integral over s from 0 to 1 of the entropy of the share that a plane at
+    the distance s from the centre cuts off: 0.4395093 for discs, 0.3960918 for spheres.
     """
     points = _ball(dim, radius)
     rng = np.random.default_rng(0)

@@ -1,10 +1,10 @@
 """Wada test by merging: do all basins share one boundary?
 
-Daza, Wagemakers, Sanjuan, Sci. Rep. 8 (2018) 9954: for every label all others are merged into one, which gives
-a boundary of two colours. If three or more basins have the Wada property, all these boundaries are one and the
-same set; on a map they then agree when fattened by a few points. Here the least fattening is computed at once:
-the largest distance from a point of one of the boundaries to another of the boundaries (their Hausdorff
-distance, in steps of the grid along the axes: fattening by squares).
+Daza, Wagemakers, Sanjuan, Sci. Rep. 8 (2018) 9954: for every label all others are merged into one, which
+gives a boundary of two colours. If three or more basins have the Wada property, all these boundaries are one
+and the same set; on a map they then agree when fattened by a few points. Here the least fattening is computed
+at once: the largest distance from a point of one of the boundaries to another of the boundaries (their
+Hausdorff distance, in steps of the grid along the axes: fattening by squares).
 """
 
 from __future__ import annotations
@@ -62,9 +62,9 @@ def wada_merge_test(labels: ArrayLike, fattening: int = 5) -> WadaTest:
     distance = np.zeros((which.size, which.size))
     far = np.zeros_like(distance)
     for j, to in enumerate(boundaries):
-        away: NDArray[np.floating] = (
-            distance_transform_cdt(~to, "chessboard").astype(np.float64) if to.any() else np.full(to.shape, np.inf)
-        )
+        away = np.full(to.shape, np.inf)
+        if to.any():
+            away[:] = distance_transform_cdt(~to, "chessboard")
         for i, other in enumerate(boundaries):
             distance[i, j] = away[other].max(initial=0.0)
             far[i, j] = np.mean(away[other] > fattening) if other.any() else 0.0
