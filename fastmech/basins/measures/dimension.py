@@ -9,11 +9,9 @@ from numpy.typing import ArrayLike
 from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.stats import t
 
+from fastmech.basins.measures.jackknife import PARTS, half_width, part_of
 from fastmech.basins.measures.labels import Floats, Integers, check_map
 from fastmech.errors import InputError
-
-#: Parts of the map along every axis that are left out in turn for the error bar.
-PARTS = 4
 
 
 @dataclass(frozen=True)
@@ -67,9 +65,7 @@ def boundary_dimension(labels: ArrayLike, edges: ArrayLike | None = None) -> Bou
     slope, scatter = _line(x, share[:, None])
     rest = places.sum(axis=1, keepdims=True) - places
     others, _ = _line(x, (mixed.sum(axis=1, keepdims=True) - mixed) / rest)
-    m = others.size
-    jackknife = np.sqrt((m - 1) / m * np.sum((others - others.mean()) ** 2))
-    error = np.hypot(t.ppf(0.975, m - 1) * jackknife, scatter[0])
+    error = np.hypot(half_width(others), scatter[0])
     return BoundaryDimension(
         edge=given.astype(np.int64),
         mixed=share,
@@ -82,12 +78,10 @@ def boundary_dimension(labels: ArrayLike, edges: ArrayLike | None = None) -> Bou
 
 def _count(labels: Integers, edge: int) -> Floats:
     """Places of a box with two labels, and with any, by part of the map; shape (2, parts)."""
-    highest = maximum_filter(labels, size=edge + 1, mode="mirror")
-    filled = np.where(labels < 0, np.iinfo(np.int64).max, labels)
+    highest = maximum_filter(np.maximum(labels, -1), size=edge + 1, mode="mirror")
+    filled = np.where(labels < 0, labels.max() + 1, labels)
     lowest = minimum_filter(filled, size=edge + 1, mode="mirror")
-    part = np.zeros(highest.shape, dtype=np.int64)
-    for index, length in zip(np.indices(highest.shape, sparse=True), highest.shape, strict=True):
-        part = part * PARTS + index * PARTS // length
+    part = part_of(np.indices(labels.shape, sparse=True), labels.shape)
     known = highest >= 0
     kinds = (known & (lowest < highest), known)
     return np.array([np.bincount(part[kind], minlength=PARTS**labels.ndim) for kind in kinds], np.float64)

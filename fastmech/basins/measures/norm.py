@@ -52,7 +52,6 @@ def norm_on(norm: ArrayLike, dim: int, coordinates: Sequence[int] | None = None)
         if not chosen or len(set(chosen)) != len(chosen):
             raise InputError(f"coordinates = {list(coordinates)}: must be different indices, at least one")
         matrix = matrix[chosen]
-    try:
-        return np.asarray(np.linalg.cholesky(matrix @ matrix.T))
-    except np.linalg.LinAlgError:
-        raise InputError("norm: is singular; every departure needs a length greater than 0") from None
+    if np.linalg.matrix_rank(matrix) < len(matrix):
+        raise InputError("norm: is singular; every departure needs a length greater than 0")
+    return np.asarray(np.linalg.cholesky(matrix @ matrix.T))
