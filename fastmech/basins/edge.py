@@ -75,7 +75,7 @@ def track_edge(
         near: distance that a bisection stops at. Below the error of ``label_of`` the two may come to be on
             one side; they are then drawn apart along their difference.
         far: distance at which the two have parted.
-        tolerance: the edge state rests if a whole stretch moves by no more than this.
+        tolerance: the edge state rests if a whole stretch moves by no more than this, ``far`` or more.
         interval: time between looks at their distance [s].
         dt: longest step [s].
         method: name of the method.
@@ -91,7 +91,7 @@ def track_edge(
     t_end = checks.number("t_end", t_end, "s", above=0.0)
     near = checks.number("near", near, "", above=0.0)
     far = checks.number("far", far, "", above=near)
-    tolerance = checks.number("tolerance", tolerance, "", above=0.0)
+    tolerance = checks.number("tolerance", tolerance, "", least=far)
     interval = checks.number("interval", interval, "s", above=0.0)
     first, second = (int(label) for label in ask(label_of, np.stack([a, b])))
     if first < 0 or second < 0 or first == second:

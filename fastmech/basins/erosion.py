@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -51,7 +52,9 @@ class ErosionProfile:
     upper: Floats  #: upper end
     gim: Floats  #: global integrity measure: share of the map
     lim: Floats  #: local integrity measure on the map [rad]; NaN also where the well is outside the window
+    lim_at_window: NDArray[np.bool_]  #: the window's edge limits it, not the basin
     factor: Floats  #: integrity factor on the map [rad]
+    factor_at_window: NDArray[np.bool_]  #: the same for the factor
     shock: Floats  #: minimal critical shock of all four states [rad]; NaN also: none up to the largest
     kick: Floats  #: the same for a kick of the rates alone [rad]
     undecided: Floats  #: share of the random starts without a label
@@ -80,8 +83,8 @@ def erosion(
             coordinates, rising in equal steps. States that are no axis are the well's own.
         most_shock: largest shock to look for [rad].
         n: random starts, uniform in the window, the same for all values.
-        directions: random directions of the search for a shock. From the second value on it also begins with
-            the shock found at the value before.
+        directions: random directions of the search for a shock. It also begins with those to the saddles, with
+            the smallest kick, and with the shock found at the value before.
         seed: of the starts and the search.
 
     Raises:
@@ -93,7 +96,11 @@ def erosion(
     atlas = map_equilibria(scene, {parameter: along})
     wells = np.flatnonzero(atlas.sheet_morse_index == 0)
     arrays = [field.name for field in fields(ErosionProfile)][3:]
-    profile = {name: np.full((along.size, wells.size), np.nan) for name in arrays}
+    flags = ("lim_at_window", "factor_at_window")
+    shape = along.size, wells.size
+    profile: dict[str, Any] = {
+        name: np.zeros(shape, dtype=bool) if name in flags else np.full(shape, np.nan) for name in arrays
+    }
     guesses: list[dict[str, Floats]] = [{} for _ in wells]
     for v, value in enumerate(along):
         now = scene.replace(**{parameter: float(value)})
@@ -172,22 +179,25 @@ def _measure(
         "undecided": share.missing / share.n,
         **_integrity(labels, window.lines, place[window.states], norm_on(norm, 4, window.states)),
     }
-    shocks: dict[str, Floats] = {}
-    for name, coordinates in (("shock", None), ("kick", (2, 3))):
-        result = minimal_shock(
-            copy_of,
-            place,
-            norm,
-            most=most_shock,
-            coordinates=coordinates,
-            guess=guesses.get(name),
-            directions=directions,
-            seed=seed,
-        )
-        measured[name] = result.size
-        if np.isfinite(result.size):
-            shocks[name] = result.shock
-    return shocks, measured
+    search = partial(minimal_shock, copy_of, place, norm, most=most_shock, directions=directions, seed=seed)
+    kick = search(coordinates=(2, 3), guess=guesses.get("kick"))
+    # A kick of the rates is a shock too, and so is a push onto a saddle.
+    known = [guesses.get("shock"), kick.shock[None], _saddles_from(equilibria, place)]
+    shock = search(
+        guess=np.concatenate([rows for rows in known if rows is not None and np.isfinite(rows).all()])
+    )
+    shocks = {"kick": kick, "shock": shock}
+    measured |= {name: result.size for name, result in shocks.items()}
+    found = {name: result.shock[None] for name, result in shocks.items() if np.isfinite(result.size)}
+    return found, measured
+
+
+def _saddles_from(equilibria: Equilibria, place: Floats) -> Floats:
+    """Disturbances (n, 4) that lead from a state onto the nearest copies of the saddles."""
+    saddles = equilibria.morse_index == 1
+    angles = np.column_stack([equilibria.phi, equilibria.theta])[saddles] - place[:2]
+    angles -= 2.0 * np.pi * np.round(angles / (2.0 * np.pi))
+    return np.concatenate([angles, np.zeros_like(angles)], axis=1)
 
 
 def _integrity(labels: Integers, lines: Sequence[Floats], place: Floats, norm: Floats) -> dict[str, float]:
@@ -196,7 +206,13 @@ def _integrity(labels: Integers, lines: Sequence[Floats], place: Floats, norm: F
     # Outside the window there is no largest ball round the well; the other measures need no centre.
     centre = place if within else window.mean(axis=1)
     result = integrity(labels, lines, 0, centre, norm)
-    return {"gim": result.gim, "lim": result.lim if within else np.nan, "factor": result.factor}
+    return {
+        "gim": result.gim,
+        "lim": result.lim if within else np.nan,
+        "lim_at_window": within and result.lim_at_window,
+        "factor": result.factor,
+        "factor_at_window": result.factor_at_window,
+    }
 
 
 def _index_at(equilibria: Equilibria, phi: float, theta: float) -> int:

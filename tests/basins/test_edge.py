@@ -28,15 +28,15 @@ def ring(t, x, y):
 def test_the_edge_of_two_wells_is_the_saddle_between() -> None:
     track = track_edge(
         fm.System(two_wells, ["x", "y"], {}), lambda y: (y[:, 0] > 0.0).astype(int), [-0.7, -1.0], [1.6, 0.3],
-        np.eye(2), t_end=60.0, tolerance=1e-6,
+        np.eye(2), t_end=60.0, tolerance=1e-4,
     )  # fmt: skip
     assert track.settled
     assert track.labels == (0, 1)
-    np.testing.assert_allclose(track.state, [0.0, 2.0], atol=1e-5)
+    np.testing.assert_allclose(track.state, [0.0, 2.0], atol=1e-4)
     assert (track.gap < 1e-10).all()
     # On the boundary y - 2 falls as exp(-t).
     decay = (track.y[:, 1] - 2.0) / np.exp(-track.t)
-    np.testing.assert_allclose(decay[:3], decay[0], rtol=1e-3)
+    np.testing.assert_allclose(decay[:2], decay[0], rtol=1e-3)
 
 
 def test_an_orbit_on_the_edge_never_settles() -> None:
@@ -49,8 +49,8 @@ def test_an_orbit_on_the_edge_never_settles() -> None:
     np.testing.assert_allclose(np.hypot(*track.y.T), 1.0, atol=1e-6)
 
 
-@pytest.mark.parametrize("from_well", [0, 1])
-def test_the_bistable_mechanism_s_edge_lands_on_a_saddle(from_well: int) -> None:
+@pytest.mark.parametrize(("from_well", "energy"), [(0, 163.932229), (1, 129.471686)])
+def test_the_bistable_mechanism_s_edge_lands_on_a_saddle(from_well: int, energy: float) -> None:
     wells = [e for e in fm.find_equilibria(BISTABLE) if e.kind == "minimum"]
     places = np.array([[e.phi, e.theta, 0.0, 0.0] for e in wells])
     inside = places[from_well]
@@ -64,8 +64,7 @@ def test_the_bistable_mechanism_s_edge_lands_on_a_saddle(from_well: int) -> None
     saddle, away = saddle_at(BISTABLE, track.state)
     assert saddle.morse_index == 1
     assert away < 1e-3
-    # The reached saddle is an equilibrium by the potential's own gradient, and not the nearest minimum.
-    assert min(np.abs(track.state[:2] - place[:2]).max() for place in places) > 0.5
+    assert saddle.energy == pytest.approx(energy, abs=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -73,6 +72,7 @@ def test_the_bistable_mechanism_s_edge_lands_on_a_saddle(from_well: int) -> None
     [
         ({"label_of": lambda y: np.zeros(len(y), dtype=int)}, "inside, outside: have the labels 0 and 0"),
         ({"scene": fm.Scene()}, "scene.alpha = 0.7: must be 0"),
+        ({"tolerance": 1e-6}, "tolerance = 1e-06: must be a finite number not less than 1e-05"),
         ({"near": 1e-3}, "far = 1e-05: must be a finite number greater than 0.001"),
         ({"outside": [0.0, 0.0]}, "outside: has shape (2,), must be (4,)"),
     ],
