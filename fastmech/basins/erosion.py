@@ -83,8 +83,8 @@ def erosion(
             coordinates, rising in equal steps. States that are no axis are the well's own.
         most_shock: largest shock to look for [rad].
         n: random starts, uniform in the window, the same for all values.
-        directions: random directions of the search for a shock. It also begins with those to the saddles, with
-            the smallest kick, and with the shock found at the value before.
+        directions: random directions of the search for a shock. It also begins with those to the saddles,
+            with the smallest kick, and with the shock found at the value before.
         seed: of the starts and the search.
 
     Raises:
@@ -182,11 +182,9 @@ def _measure(
     search = partial(minimal_shock, copy_of, place, norm, most=most_shock, directions=directions, seed=seed)
     kick = search(coordinates=(2, 3), guess=guesses.get("kick"))
     # A kick of the rates is a shock too, and so is a push onto a saddle.
-    known = [guesses.get("shock"), kick.shock[None], _saddles_from(equilibria, place)]
-    shock = search(
-        guess=np.concatenate([rows for rows in known if rows is not None and np.isfinite(rows).all()])
-    )
-    shocks = {"kick": kick, "shock": shock}
+    known = [guesses.get("shock", np.zeros((0, 4))), kick.shock[None], _saddles_from(equilibria, place)]
+    guess = np.concatenate(known)
+    shocks = {"kick": kick, "shock": search(guess=guess[np.isfinite(guess).all(axis=1)])}
     measured |= {name: result.size for name, result in shocks.items()}
     found = {name: result.shock[None] for name, result in shocks.items() if np.isfinite(result.size)}
     return found, measured

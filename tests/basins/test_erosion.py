@@ -92,13 +92,14 @@ def test_a_well_erodes_towards_its_fold() -> None:
 
     scene, values = BISTABLE.replace(F0=85.3), [95.0, 98.0, 100.0]
     axes = {"phi": np.linspace(-3.1, -2.2, 7), "theta": np.linspace(-2.1, -1.3, 7)}
-    profile = erosion(scene, "c2", values, real, axes, most_shock=1.5, n=100, directions=4)
+    profile = erosion(scene, "c2", values, real, axes, most_shock=0.3, n=100, directions=4)
     shallow = int(np.flatnonzero(np.isnan(profile.phi[-1]))[0])
     deep = 1 - shallow
     assert not np.isnan(profile.phi[:, deep]).any()
     for measure in (profile.shock, profile.kick, profile.stability, profile.gim):
         assert measure[0, shallow] > measure[1, shallow] > 0.0
         assert np.isnan(measure[2, shallow])
+    assert (profile.shock[:2, shallow] <= profile.kick[:2, shallow] * (1.0 + 1e-3)).all()
     for v in (0, 1):  # a kick out of the well has more energy than the well is deep
         now = scene.replace(c2=values[v])
         i = int(np.nanargmin(depths(now)))
