@@ -6,6 +6,9 @@ of {U < energy}, so this is a proof as long as the way down is followed closely.
 
 from __future__ import annotations
 
+from functools import cache
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,23 +23,33 @@ from fastmech.mechanism.lagrange import (
 TURN = 2.0 * np.pi
 
 
+@cache
 def depths(scene: fm.Scene) -> NDArray[np.float64]:
     """Depth [J] of every equilibrium's well in the order of ``find_equilibria``; NaN: no minimum."""
     found = fm.map_equilibria(scene, {"F0": [scene.F0]}, wells=True)
     return found.depth[0, : len(fm.find_equilibria(scene))]
 
 
+@cache
+def equilibria_of(scene: fm.Scene) -> Any:
+    """``find_equilibria``, once a scene."""
+    return fm.find_equilibria(scene)
+
+
 def go_down(scene: fm.Scene, q: NDArray[np.float64]) -> NDArray[np.float64]:
     """Bottoms (n, 2) of the ways down from positions q (n, 2), in steps of 0.05 rad at most."""
-    q = q.copy()
+    q, on = q.copy(), np.arange(len(q))
     for _ in range(600):
-        gradient = potential_gradient(scene, q, scene.F0)
-        hessian = potential_hessian(scene, q, scene.F0)
-        low = np.linalg.eigvalsh(hessian)[:, 0]
-        more = np.maximum(-low, 0.0) + np.linalg.norm(gradient, axis=1) / 0.05 + 1e-12
-        step = np.linalg.solve(hessian + more[:, None, None] * np.eye(2), -gradient[..., None])[..., 0]
-        q += step
-        if np.abs(step).max() < 1e-9:
+        g = potential_gradient(scene, q[on], scene.F0)
+        h = potential_hessian(scene, q[on], scene.F0)
+        low = 0.5 * (h[:, 0, 0] + h[:, 1, 1]) - np.hypot(0.5 * (h[:, 0, 0] - h[:, 1, 1]), h[:, 0, 1])
+        more = np.maximum(-low, 0.0) + np.hypot(*g.T) / 0.05 + 1e-12
+        a, b, d = h[:, 0, 0] + more, h[:, 0, 1], h[:, 1, 1] + more
+        step = np.stack([b * g[:, 1] - d * g[:, 0], b * g[:, 0] - a * g[:, 1]], axis=1)
+        step /= (a * d - b * b)[:, None]
+        q[on] += step
+        on = on[np.abs(step).max(axis=1) > 1e-6]
+        if not on.size:
             break
     return q
 
@@ -45,7 +58,7 @@ def ends(
     scene: fm.Scene, starts: NDArray[np.float64], t_end: float, dt: float = 0.05, piece: float = 2.0
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
     """Label (n,): index in ``find_equilibria``, -1: not captured by t_end; turns (n, 2); time (n,) [s]."""
-    equilibria, depth = fm.find_equilibria(scene), depths(scene)
+    equilibria, depth = equilibria_of(scene), depths(scene)
     minima = [i for i, e in enumerate(equilibria) if e.kind == "minimum"]
     places = np.array([[equilibria[i].phi, equilibria[i].theta] for i in minima])
     barrier = np.array([equilibria[i].energy + depth[i] for i in minima])

@@ -18,8 +18,14 @@ from fastmech.basins.measures.norm import norm_on
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
 
-#: Radii at which a ray is looked at before its first way out is narrowed down.
-LEVELS = 24
+#: Radii at which a ray is looked at before its first way out is narrowed down: at first, and once turned.
+LEVELS, TURNED_LEVELS = 24, 8
+
+#: Radii, of all those, at which rays are looked at together.
+TOGETHER = 4
+
+#: Points between two radii at which a way out is narrowed down.
+SECTIONS = 7
 
 #: Candidates that the search refines, and directions tried round each in a round.
 CANDIDATES, TRIALS = 6, 24
@@ -77,23 +83,21 @@ def minimal_shock(
     units = _random_units(rng, number, len(search.matrix))
     if guess is not None:
         units = np.concatenate([search.directions_of(guess), units])
-    sizes, labels = search.first_exits(units, np.full(len(units), search.most))
-    best = np.argsort(sizes, kind="stable")[:CANDIDATES]
-    units, sizes, labels = units[best], sizes[best], labels[best]
-    spread = np.full(len(units), 0.5)
+    found, ends = search.first_exits(units[None], np.array([search.most]), LEVELS, CANDIDATES)
+    best = np.argsort(found[0], kind="stable")[:CANDIDATES]
+    units, sizes, labels = units[best], found[0, best], ends[0, best]
+    spread, rows = np.full(len(units), 0.5), np.arange(len(units))
     # A turn by the angle s changes the size by s^2 at a smooth minimum.
     while np.isfinite(sizes).any() and (spread > 0.5 * np.sqrt(search.tolerance)).any():
         random = rng.standard_normal((len(units), TRIALS, units.shape[1]))
         turned = units[:, None] + spread[:, None, None] * random
         turned /= np.linalg.norm(turned, axis=2, keepdims=True)
-        limit = np.repeat(np.minimum(sizes, search.most), TRIALS)
-        tried, ends = search.first_exits(turned.reshape(-1, units.shape[1]), limit)
-        tried, ends = tried.reshape(-1, TRIALS), ends.reshape(-1, TRIALS)
-        rows, column = np.arange(len(units)), tried.argmin(axis=1)
-        better = tried[rows, column] < sizes * (1.0 - search.tolerance)
+        found, ends = search.first_exits(turned, np.minimum(sizes, search.most), TURNED_LEVELS, 1)
+        column = found.argmin(axis=1)
+        better = found[rows, column] < sizes * (1.0 - search.tolerance)
         units[better] = turned[rows, column][better]
         labels[better] = ends[rows, column][better]
-        sizes[better] = tried[rows, column][better]
+        sizes[better] = found[rows, column][better]
         spread[~better] *= 0.5
     return search.result(units, sizes, labels)
 
@@ -117,8 +121,8 @@ def brute_force_shock(
     search = _Search(label_of, attractor, norm, coordinates, most, tolerance)
     rng = np.random.default_rng(checks.whole_number("seed", seed, least=0))
     units = _random_units(rng, checks.whole_number("directions", directions, least=1), len(search.matrix))
-    sizes, labels = search.first_exits(units, np.full(len(units), search.most))
-    return search.result(units, sizes, labels)
+    sizes, labels = search.first_exits(units[None], np.array([search.most]), LEVELS, 1)
+    return search.result(units, sizes[0], labels[0])
 
 
 class _Search:
@@ -166,29 +170,54 @@ class _Search:
         self.undecided = min(self.undecided, float(radii[found < 0].min(initial=np.inf)))
         return found
 
-    def first_exits(self, units: Floats, limit: Floats) -> tuple[Floats, Integers]:
-        """Sizes (n,) at which rays first have another label, inf: not up to ``limit``; these labels or -1."""
-        n = len(units)
-        fractions = np.arange(1, LEVELS + 1) / LEVELS
-        radii = limit[:, None] * fractions
-        seen = self.labels(np.repeat(units, LEVELS, axis=0), radii.ravel()).reshape(n, LEVELS)
-        out = (seen >= 0) & (seen != self.label)
-        first = out.argmax(axis=1)
-        leaves = np.flatnonzero(out.any(axis=1))
-        upper, lower = np.full(n, np.inf), np.zeros(n)
-        label = np.full(n, -1, dtype=np.int64)
-        label[leaves] = seen[leaves, first[leaves]]
-        upper[leaves] = radii[leaves, first[leaves]]
-        lower[leaves] = upper[leaves] - limit[leaves] / LEVELS
+    def first_exits(self, units: Floats, limit: Floats, levels: int, keep: int) -> tuple[Floats, Integers]:
+        """Sizes at which rays first have another label, and these labels; inf and -1: not up to ``limit``.
+
+        Args:
+            units: directions of rays in groups (groups, rays, k).
+            limit: largest size to look at (groups,).
+            levels: radii to look at.
+            keep: so many of each group's shortest rays are narrowed down to the tolerance; the others only
+                until they are known not to be among them.
+
+        Returns:
+            Arrays (groups, rays).
+        """
+        shape = units.shape[:2]
+        units = units.reshape(-1, units.shape[2])
+        step = np.repeat(limit / levels, shape[1])
+        lower, upper = np.zeros(len(units)), np.full(len(units), np.inf)
+        label = np.full(len(units), -1, dtype=np.int64)
+
+        def promising() -> Floats:
+            """Of the rays, which might still be among the shortest."""
+            last = min(keep, shape[1]) - 1
+            worst = np.partition(upper.reshape(shape), last, axis=1)[:, last]
+            return np.asarray(lower < np.repeat(worst, shape[1]))
+
+        def look(rays: Integers, radii: Floats) -> None:
+            """Narrow down where rays leave by their labels at rising radii (rays, m)."""
+            m = radii.shape[1]
+            seen = self.labels(np.repeat(units[rays], m, axis=0), radii.ravel()).reshape(-1, m)
+            out = (seen >= 0) & (seen != self.label)
+            first, leaves = out.argmax(axis=1), out.any(axis=1)
+            row = np.arange(len(rays))
+            upper[rays[leaves]] = radii[row, first][leaves]
+            label[rays[leaves]] = seen[row, first][leaves]
+            inner = np.where(leaves, first, m) - 1
+            lower[rays[inner >= 0]] = radii[row, inner][inner >= 0]
+
+        for level in range(0, levels, TOGETHER):
+            rays = np.flatnonzero(np.isinf(upper) & promising())
+            several = np.arange(level + 1, min(level + TOGETHER, levels) + 1)
+            look(rays, step[rays, None] * several)
         while True:
-            open_ = leaves[upper[leaves] - lower[leaves] > self.tolerance * upper[leaves]]
-            if not open_.size:
-                return upper, label
-            middle = 0.5 * (upper[open_] + lower[open_])
-            there = self.labels(units[open_], middle)
-            left = (there >= 0) & (there != self.label)
-            upper[open_[left]], label[open_[left]] = middle[left], there[left]
-            lower[open_[~left]] = middle[~left]
+            wide = np.isfinite(upper) & (upper - lower > self.tolerance * upper)
+            rays = np.flatnonzero(wide & promising())
+            if not rays.size:
+                return upper.reshape(shape), label.reshape(shape)
+            share = np.arange(1, SECTIONS + 1) / (SECTIONS + 1)
+            look(rays, lower[rays, None] + (upper - lower)[rays, None] * share)
 
     def result(self, units: Floats, sizes: Floats, labels: Integers) -> Shock:
         """The smallest of shocks along ``units``."""
