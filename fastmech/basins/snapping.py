@@ -72,8 +72,8 @@ class SnappingMap:
 
     @property
     def smallest(self) -> Floats:
-        """The first of the forces that leaves, for every alpha [N]; NaN: none up to the largest (alphas,)."""
-        first = self.left.argmax(axis=1)
+        """The force of least magnitude that leaves, for every alpha [N] (alphas,); NaN: none of them does."""
+        first = np.where(self.left, np.abs(self.F0), np.inf).argmin(axis=1)
         return np.where(self.left.any(axis=1), self.F0[first], np.nan)
 
     def windows(self, k: int) -> list[Window]:
@@ -156,7 +156,7 @@ def critical_forces(
     method: str = "dop853",
     threads: int | None = None,
 ) -> Floats:
-    """The smallest force that leaves at every alpha of a map [N], narrowed down between its forces (alphas,).
+    """The least force that leaves at every alpha of a map [N], narrowed down between its forces (alphas,).
 
     NaN where none of the map's forces leaves. A window narrower than the map's steps, below the first force
     that leaves, is not seen.
@@ -172,22 +172,25 @@ def critical_forces(
     """
     tolerance = checks.number("tolerance", tolerance, "N", above=0.0)
     start = snapping.equilibria[snapping.start]
+    sign = np.sign(snapping.F0[0])
+    size, order = np.sort(np.abs(snapping.F0)), np.argsort(np.abs(snapping.F0))
     found = np.full(snapping.alpha.size, np.nan)
     for k, rate in enumerate(snapping.alpha):
-        leaves = np.flatnonzero(snapping.left[k])
+        leaves = np.flatnonzero(snapping.left[k, order])
         if not leaves.size:
             continue
-        low = 0.0 if leaves[0] == 0 else float(snapping.F0[leaves[0] - 1])
-        high = float(snapping.F0[leaves[0]])
+        low, high = float(np.append(0.0, size)[leaves[0]]), float(size[leaves[0]])
         while high - low > tolerance:
             between = np.linspace(low, high, 34)[1:-1]
+            forces = np.sort(sign * between)
             part = map_snapping(
-                scene, between, [rate], start=start, t_end=t_end, dt=dt, method=method, threads=threads
+                scene, forces, [rate], start=start, t_end=t_end, dt=dt, method=method, threads=threads
             )
             line = np.concatenate([[low], between, [high]])
-            first = int(np.argmax([*part.left[0], True])) + 1
+            left = part.left[0, np.argsort(np.abs(forces))]
+            first = int(np.argmax([*left, True])) + 1
             low, high = float(line[first - 1]), float(line[first])
-        found[k] = high
+        found[k] = sign * high
     return found
 
 

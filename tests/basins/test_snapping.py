@@ -66,6 +66,11 @@ def test_a_force_to_the_left_is_another_matter() -> None:
         right = scipy_turns(fm.Scene(F0=force, alpha=5.0), np.array([rest.phi, rest.theta, 0.0, 0.0]))
         np.testing.assert_array_equal(snapping.turns[0, k], right)
     assert snapping.left[0].tolist() == [True, True, False]
+    assert snapping.smallest.tolist() == [-1545.0]
+    (critical,) = critical_forces(snapping, fm.Scene(), tolerance=1.0)
+    assert -1545.0 < critical < -900.0
+    sides = map_snapping(fm.Scene(), [critical, critical + 1.0], [5.0])
+    assert sides.left.tolist() == [[True, False]]
 
 
 def test_the_critical_force_is_narrowed_down() -> None:
