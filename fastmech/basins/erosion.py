@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,9 +29,21 @@ from fastmech.scene import Scene, nearest
 #: States of the mechanism by the names of a map's axes.
 STATES = ("phi", "theta", "phi_dot", "theta_dot")
 
-#: Of starts (n, 4) of a scene: index in ``find_equilibria(scene)`` of the well that each ends in, (n,),
-#: negative where that is not known, and the full turns of phi and theta made on the way, (n, 2).
-LabelsOf = Callable[[Scene, Floats], tuple[NDArray[np.integer[Any]], NDArray[np.integer[Any]]]]
+
+class Ends(Protocol):
+    """Where n starts end."""
+
+    @property
+    def well(self) -> NDArray[np.integer[Any]]:
+        """Index of the well in ``find_equilibria(scene)``, negative where it is not known; shape (n,)."""
+
+    @property
+    def turns(self) -> NDArray[np.integer[Any]]:
+        """Full turns of phi and theta of that well from its listed place, shape (n, 2)."""
+
+
+#: Where starts (n, 4) of a scene end.
+LabelsOf = Callable[[Scene, Floats], Ends]
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,10 +176,11 @@ def _measure(
 
     def copy_of(y: Floats) -> Integers:
         """0: this copy of the well, 1: elsewhere, -1: not known."""
-        label, turns = (np.asarray(array) for array in labels_of(scene, y))
-        return np.where(label < 0, -1, (label != own) | (turns != 0).any(axis=1)).astype(np.int64)
+        ends = labels_of(scene, y)
+        elsewhere = (ends.well != own) | (ends.turns != 0).any(axis=1)
+        return np.where(ends.well < 0, -1, elsewhere).astype(np.int64)
 
-    share = basin_stability(labels_of(scene, window.starts(window.random, place))[0], own)
+    share = basin_stability(labels_of(scene, window.starts(window.random, place)).well, own)
     norm = kinetic_norm(scene, e)
     labels = copy_of(window.starts(window.grid(), place)).reshape([line.size for line in window.lines])
     measured = {

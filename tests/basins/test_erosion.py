@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from functools import cache, partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -12,8 +12,14 @@ from fastmech.basins.erosion import erosion
 from fastmech.basins.measures.norm import kinetic_norm, norm_on
 from fastmech.mechanism.lagrange import metric
 
-Arrays = tuple[np.ndarray, np.ndarray]
 BISTABLE = fm.Scene(F0=0.0, c1=294.9, c2=92.85, alpha=0.0)
+
+
+class Ends(NamedTuple):
+    well: np.ndarray
+    turns: np.ndarray
+
+
 GRID = {"phi": np.linspace(-3.2, 3.2, 41), "theta": np.linspace(-3.2, 3.2, 41)}
 RADIUS = 0.4
 
@@ -27,13 +33,13 @@ def wells_of(scene: fm.Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.array(index), places, np.array([kinetic_norm(scene, equilibria[i]) for i in index])
 
 
-def balls(scene: fm.Scene, y: np.ndarray) -> Arrays:
+def balls(scene: fm.Scene, y: np.ndarray) -> Ends:
     """A made-up rule: within RADIUS of a well in its norm one ends there, else there a turn further."""
     index, places, norms = wells_of(scene)
     sizes = np.linalg.norm((y - places[:, None]) @ norms, axis=2)
     turns = np.zeros((len(y), 2), dtype=int)
     turns[sizes.min(axis=0) > RADIUS, 1] = 1
-    return index[sizes.argmin(axis=0)], turns
+    return Ends(index[sizes.argmin(axis=0)], turns)
 
 
 def test_measures_of_known_basins() -> None:
@@ -87,8 +93,8 @@ def test_a_slice_of_rates_goes_through_the_well() -> None:
 def test_a_well_erodes_towards_its_fold() -> None:
     """The shallow well vanishes at c2 = 98.59 N/m: shock and stability fall, NaN behind it."""
 
-    def real(scene: fm.Scene, y: np.ndarray) -> Arrays:
-        return ends(scene, y, 10.0)[:2]
+    def real(scene: fm.Scene, y: np.ndarray) -> Ends:
+        return Ends(*ends(scene, y, 10.0)[:2])
 
     scene, values = BISTABLE.replace(F0=85.3), [95.0, 98.0, 100.0]
     axes = {"phi": np.linspace(-3.1, -2.2, 7), "theta": np.linspace(-2.1, -1.3, 7)}
