@@ -34,7 +34,7 @@ class Integrity:
     lim_at_window: bool  #: the window's edge limits it, not the basin's boundary: the true one is larger
     factor: float  #: IF
     factor_at_window: bool  #: the same for IF
-    centre: Floats  #: centre of the largest ball, a point of the map, (axes,); NaN: the basin is empty
+    centre: Floats  #: of the largest ball, a point of the map or the attractor, (axes,); NaN: no basin
     resolution: float  #: length of a cell's longest diagonal
 
 
@@ -86,6 +86,8 @@ def integrity(
     factor, factor_at_window, centre = 0.0, False, np.full(array.ndim, np.nan)
     if inside.any():
         centres = points[inside]
+        if lim > 0.0:  # so that IF is never less than LIM
+            centres = np.concatenate([centres, place[None]])
         boundary, edge = room(centres)
         best = int(np.argmax(np.minimum(boundary, edge)))
         factor, factor_at_window = float(min(boundary[best], edge[best])), bool(edge[best] < boundary[best])

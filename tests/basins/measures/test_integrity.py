@@ -70,6 +70,14 @@ def test_a_skew_norm_agrees_with_all_distances() -> None:
     assert result.lim == pytest.approx(room[here], abs=1e-4)
 
 
+def test_the_ball_round_the_attractor_counts_for_the_factor() -> None:
+    """Between the points of a coarse map the attractor may have more room than any point."""
+    labels = [[1, 1, 1, 1], [1, 0, 0, 1], [1, 0, 0, 1], [1, 1, 1, 1]]
+    result = integrity(labels, [range(4), range(4)], 0, [1.5, 1.5], np.eye(2))
+    assert result.lim == result.factor == 1.5
+    assert result.lim_at_window
+
+
 def test_an_empty_basin_has_no_integrity() -> None:
     result = integrity([[1, 1], [1, 1]], [[0, 1], [0, 1]], 0, [0.2, 0.2], np.eye(2))
     assert (result.gim, result.lim, result.factor) == (0.0, 0.0, 0.0)
