@@ -49,13 +49,15 @@ class Observation:
     """An observer (see :data:`fastmech.jit.OBSERVER_SIGNATURE`), its parameters and its empty record.
 
     ``record`` holds the start value of every row of a lane's record. Where ``stops`` is set, the rows begin
-    with those of :mod:`fastmech.ensembles.stopping`, and a lane whose code is not zero is taken out.
+    with those of :mod:`fastmech.ensembles.stopping` (its own may follow), and a lane whose code is not zero
+    is taken out after at most ``call_steps`` steps.
     """
 
     observe: Any
     params: Floats
     record: Floats
     stops: bool = False
+    call_steps: int = CALL_STEPS_WITH_STOPS
 
 
 NOTHING = Observation(observe_nothing, np.zeros(0), np.zeros(0))
@@ -99,7 +101,7 @@ def run_ensemble(
     own = np.asarray(params, dtype=np.float64)
     own = np.broadcast_to(own, (len(begin), own.shape[-1]))
     workers = thread_count(threads)
-    most = CALL_STEPS_WITH_STOPS * (1 + method.start_steps) if observation.stops else CALL_STEPS
+    most = observation.call_steps * (1 + method.start_steps) if observation.stops else CALL_STEPS
     ensemble = Ensemble(
         states=np.empty((clock.size - 1, *begin.shape)),
         records=np.empty((observation.record.size, len(begin))),

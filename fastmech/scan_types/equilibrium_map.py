@@ -1,9 +1,17 @@
 """Equilibria over one to three parameters: how many, how many stable, where, how deep, how fast they settle.
 
-Layout: six slots along ``root`` at every point, the deepest equilibrium first; slots beyond ``count`` hold
-NaN in numbers and -1 in codes. ``sheet`` says which slots of different points are one equilibrium, continued.
-A map over two parameters also holds its fold curves, cusps and vanishing-damping curves, point after point;
-a map over one its folds.
+Layout: a point has four or six equilibria, and six slots along ``root``, the deepest equilibrium first;
+slots beyond ``count`` hold NaN in numbers and -1 in codes. So reductions over ``root`` that skip NaN need no
+mask, and ``map.phi.where(map.morse_index == 0)`` leaves the stable ones. ``sheet`` says which slots of
+different points are one equilibrium, continued: ``map.phi.where(map.sheet == 3).max("root")`` is one of them
+over the whole map; ``sheet_branch`` which sheets continue one another round a cusp; ``sheet_break`` where a
+sheet is torn. Coordinates: the axes in their units, ``root`` (rank by energy), ``mode`` (rank by real part)
+and ``entry`` (which second derivative). A map over two parameters also holds its fold curves, cusps and
+vanishing-damping curves, point after point, ``fold_curve`` and ``unreached_curve`` numbering them; a map over
+one its folds.
+
+A fold curve is found where it separates points of the grid: an island of six equilibria (or of four) that
+lies between the points, parting no two neighbours, is not seen. A finer grid sees it.
 """
 
 from __future__ import annotations
@@ -15,18 +23,21 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+from fastmech.atlas.axes import refuse_decaying_load
 from fastmech.atlas.map import Slab, map_equilibria, solve_in_slabs
 from fastmech.atlas.sheets import SheetBuilder
 from fastmech.errors import InputError
 from fastmech.results import Dataset, Variable
 from fastmech.scan_types.map_curves import curve_variables
-from fastmech.scan_types.map_layout import point_variables, sheet_variables
+from fastmech.scan_types.map_layout import point_variables, sheet_table, sheet_variables, slot_variables
 from fastmech.scan_types.request import RunContext, Scan
 from fastmech.scene import Scene, nearest
 from fastmech.store.stream import Piece, Stream
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from fastmech.store.read import Section
 
 #: Points above which a map is written as it is computed instead of being held in memory.
 IN_MEMORY = 1_500_000
@@ -72,10 +83,7 @@ class EquilibriumMap(Scan):
 
     def check(self, scene: Scene) -> None:
         """Every value of every axis must be one the scene accepts, and every axis must matter."""
-        if "F0" in self.axes and scene.alpha > 0:
-            raise InputError(
-                f"alpha = {scene.alpha:g}: must be 0 1/s for a map over F0, or no force is left at rest"
-            )
+        refuse_decaying_load(scene, self.axes)
         total = math.prod(axis.num for axis in self.axes.values())
         if total > MOST_POINTS:
             raise InputError(f"axes: ask for {total:.3g} points, at most {MOST_POINTS:.0e} are allowed")
@@ -91,16 +99,19 @@ class EquilibriumMap(Scan):
             name: Variable((name,), values, *scene.described()[name][1:]) for name, values in axes.items()
         }
         fixed |= curve_variables(scene, axes, context.threads)
+        fixed |= slot_variables(self.variables)
         attrs = {
             "axes": tuple(axes),
             "layout": "six slots along root, the deepest first; beyond count NaN, codes -1",
+            "curves": "all fold curves that part neighbouring points; islands between them are not seen",
         }
         if total > IN_MEMORY:
             return self._stream(scene, axes, total, context, Dataset(fixed, attrs))
         advance = context.stage("equilibrium map", total)
         found = map_equilibria(scene, axes, wells=self._wells, threads=context.threads, progress=advance)
         variables = self._kept(point_variables(tuple(axes), found))
-        variables |= sheet_variables(tuple(axes), found.sheet, found.sheet_morse_index)
+        variables |= sheet_variables(tuple(axes), found.sheet)
+        variables |= sheet_table(found.sheet_morse_index, found.sheet_branch, found.sheet_breaks)
         return Dataset({**fixed, **variables}, attrs)
 
     @property
@@ -124,7 +135,7 @@ class EquilibriumMap(Scan):
 
         def pieces() -> Iterator[Piece]:
             advance = context.stage("equilibrium map", total)
-            builder = SheetBuilder(grid)
+            builder = SheetBuilder(scene, axes)
 
             def place(rows: slice) -> Slab:
                 return Slab.empty(rows.stop - rows.start)
@@ -134,17 +145,24 @@ class EquilibriumMap(Scan):
             ):
                 variables = shaped(slab, planes.stop - planes.start)
                 yield planes, {name: variable.data for name, variable in variables.items()}
-            labelled, sheet_index = builder.finish()
+            sheets = builder.finish()
             start = 0
-            for sheet in labelled:
+            for sheet in sheets.labels:
                 piece = sheet.reshape(-1, *grid[1:], sheet.shape[-1])
                 yield slice(start, start + len(piece)), {"sheet": piece}
                 start += len(piece)
-            yield Dataset(sheet_variables(names, None, sheet_index))
+            yield Dataset(sheet_table(sheets.morse_index, sheets.branch, sheets.breaks))
 
         one = shaped(Slab.empty(int(np.prod(grid[1:]))), 1)
-        one |= sheet_variables(names, np.zeros((1, *grid[1:], 6), dtype=np.int32), None)
+        one |= sheet_variables(names, np.zeros((1, *grid[1:], 6), dtype=np.int32))
         return Stream(fixed, one, names[0], pieces)
+
+    @staticmethod
+    def read(section: Section, scene: Mapping[str, float]) -> Dataset:
+        """What is drawn of the map, whatever its size."""
+        from fastmech.plots.map_view import load_drawn
+
+        return load_drawn(section, scene)
 
     @staticmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:

@@ -22,6 +22,8 @@ from fastmech.store.stream import Stream
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from fastmech.store.read import Section
+
 
 @dataclass(frozen=True)
 class RunContext:
@@ -64,6 +66,11 @@ class Scan(BaseModel, ABC):
     @abstractmethod
     def run(self, scene: Scene, context: RunContext) -> Dataset | Stream:
         """Compute the result, or say how it is computed while it is written. ``scene`` has the changes."""
+
+    @staticmethod
+    def read(section: Section, scene: Mapping[str, float]) -> Dataset:
+        """What ``draw`` needs of a result file's section; all of it, unless less will do."""
+        return section.load()
 
     @staticmethod
     @abstractmethod
