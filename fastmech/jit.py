@@ -33,6 +33,11 @@ STATUSES = types.Array(types.int8, 1, "C")
 RHS_SIGNATURE = types.void(types.float64, MATRIX, MATRIX, MATRIX)
 RHS = types.FunctionType(RHS_SIGNATURE)
 
+#: ``jacobian(t, Y, J, params)``: row ``r * dim + c`` of ``J`` (dim * dim, lanes) is the derivative of the
+#: rate of state ``r`` by state ``c``.
+JACOBIAN_SIGNATURE = types.void(types.float64, MATRIX, MATRIX, MATRIX)
+JACOBIAN = types.FunctionType(JACOBIAN_SIGNATURE)
+
 #: ``observe(t, Y, params, record)``: looks at a block after every step; ``record`` is (rows, lanes).
 OBSERVER_SIGNATURE = types.void(types.float64, MATRIX, VECTOR, MATRIX)
 OBSERVER = types.FunctionType(OBSERVER_SIGNATURE)

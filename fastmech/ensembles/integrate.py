@@ -16,6 +16,7 @@ from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.stopping import STOP_CODE, STOP_TIME
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError
+from fastmech.integrators.implicit_method import with_jacobian
 from fastmech.integrators.methods import find_method
 from fastmech.kernels.select import FORMULATIONS
 from fastmech.scene import Scene, nearest
@@ -86,7 +87,7 @@ def integrate(
         problem.inward(starts),
         times,
         dt,
-        formula,
+        with_jacobian(formula, problem.jacobian, problem.second_order),
         problem.observation,
         threads=threads,
         progress=progress,

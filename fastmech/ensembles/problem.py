@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError
+from fastmech.kernels.jacobians import canonical_jacobian, lagrange_jacobian
 from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.mechanism.equations import momenta_from_rates, rates_from_momenta
@@ -40,6 +41,8 @@ class Problem:
     inward: Callable[[Floats], Floats] = _unchanged  #: public states (..., n, dim) to integrated ones
     outward: Callable[[Floats], Floats] = _unchanged  #: and back
     coefficients: Coefficients | None = None  #: of a scene: numbers, or one a trajectory
+    jacobian: Any = None  #: block Jacobian for implicit methods; None: they take differences
+    second_order: bool = False  #: whether the state is two angles and then their velocities
 
 
 def scene_problem(scene: Scene, n: int, parameters: Mapping[str, ArrayLike], formulation: str) -> Problem:
@@ -58,13 +61,14 @@ def scene_problem(scene: Scene, n: int, parameters: Mapping[str, ArrayLike], for
     params = np.stack(columns, axis=-1).astype(np.float64)
     rhs = right_hand_side(coefficients, formulation)
     if formulation == "lagrange":
-        return Problem(rhs, params, coefficients=coefficients)
+        return Problem(rhs, params, coefficients=coefficients, jacobian=lagrange_jacobian, second_order=True)
     return Problem(
         rhs,
         params,
         inward=lambda y: with_momenta(coefficients, y),
         outward=lambda y: with_rates(coefficients, y),
         coefficients=coefficients,
+        jacobian=canonical_jacobian,
     )
 
 
