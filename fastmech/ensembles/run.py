@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.ensembles.failing import last_finite
 from fastmech.ensembles.spans import Span, spans
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
@@ -55,11 +56,17 @@ NOTHING = Observation(observe_nothing, np.zeros(0), np.zeros(0))
 
 @dataclass(frozen=True)
 class Ensemble:
-    """States at the output times (outputs, n, dim), records (rows, n) and :class:`Status` values (n,)."""
+    """States at the output times (outputs, n, dim), records (rows, n) and :class:`Status` values (n,).
+
+    A trajectory that fails has NaN from the next output on; ``failed`` (n,) is the time [s] of its last
+    finite state, NaN for the others, and ``last`` (n, dim) the last finite state of every trajectory.
+    """
 
     states: Floats
     records: Floats
     status: NDArray[np.int8]
+    failed: Floats
+    last: Floats
 
 
 def run_ensemble(
@@ -97,7 +104,9 @@ def run_ensemble(
     ensemble = Ensemble(
         states=np.empty((clock.size - 1, *begin.shape)),
         records=np.empty((observation.record.size, len(begin))),
-        status=np.empty(len(begin), dtype=np.int8),
+        status=np.full(len(begin), Status.OK, dtype=np.int8),
+        failed=np.full(len(begin), np.nan),
+        last=begin.copy(),
     )
     interrupted = threading.Event()
 
@@ -108,10 +117,12 @@ def run_ensemble(
         for span in way:
             if interrupted.is_set() or not lanes.members.size:
                 break
-            reached = _advance(rhs, observation, method, lanes, span, width)
-            _store(ensemble, lanes, span, reached, observation.stops)
-        finite = np.isfinite(ensemble.states[:, members]).all(axis=(0, 2))
-        ensemble.status[members] = np.where(finite, Status.OK, Status.NOT_FINITE)
+            begun = lanes.Y
+            lanes.Y = begun.copy()
+            reached, failed = _advance(rhs, observation, method, lanes, span, width)
+            _find_failures(rhs, method, ensemble, lanes, span, begun, failed, observation.stops)
+            _store(ensemble, lanes, span, reached, failed, observation.stops)
+        ensemble.last[lanes.members] = lanes.Y.T
         return members.size
 
     with ThreadPoolExecutor(workers) as pool:
@@ -142,14 +153,18 @@ class _Lanes:
 
 def _advance(
     rhs: Any, observation: Observation, method: Method, lanes: _Lanes, span: Span, width: int
-) -> Floats:
-    """Take lanes through a span, block by block; their states at its times, shape (pieces, dim, lanes)."""
+) -> tuple[Floats, Floats]:
+    """Take lanes through a span, block by block.
+
+    Their states at its times, shape (pieces, dim, lanes), and when the method gave them up (lanes,), or NaN.
+    """
     reached = np.empty((span.steps.size, *lanes.Y.shape))
+    failed = np.full(lanes.members.size, np.nan)
     for first in range(0, lanes.members.size, width):
         part = slice(first, first + width)
         Y, params, record = (a[:, part].copy() for a in (lanes.Y, lanes.params, lanes.record))
         out = np.empty((span.steps.size, *Y.shape))
-        method.run(
+        given_up = method.run(
             rhs,
             observation.observe,
             span.times,
@@ -161,23 +176,56 @@ def _advance(
             out,
         )
         lanes.Y[:, part], lanes.record[:, part], reached[:, :, part] = Y, record, out
-    return reached
+        if given_up is not None:
+            failed[part] = given_up
+    return reached, failed
 
 
-def _store(ensemble: Ensemble, lanes: _Lanes, span: Span, reached: Floats, stops: bool) -> None:
-    """Store what a span has brought; who has stopped or is not finite any more leaves, if ``stops``."""
+def _find_failures(
+    rhs: Any,
+    method: Method,
+    ensemble: Ensemble,
+    lanes: _Lanes,
+    span: Span,
+    begun: Floats,
+    failed: Floats,
+    stops: bool,
+) -> None:
+    """Complete ``failed`` (lanes,) by those that are not finite; note status, last state and its time."""
+    running = ~_stopped(lanes) if stops else np.ones(lanes.members.size, dtype=bool)
+    failed[~running] = np.nan
+    given_up = ~np.isnan(failed)
+    lost = running & ~given_up & ~np.isfinite(lanes.Y).all(axis=0)
+    if lost.any():
+        failed[lost], lanes.Y[:, lost] = last_finite(rhs, method, span, begun[:, lost], lanes.params[:, lost])
+    ensemble.status[lanes.members[given_up]] = Status.NOT_CONVERGED
+    ensemble.status[lanes.members[lost]] = Status.NOT_FINITE
+    over = given_up | lost
+    ensemble.failed[lanes.members[over]] = failed[over]
+    ensemble.last[lanes.members[over]] = lanes.Y[:, over].T
+
+
+def _store(
+    ensemble: Ensemble, lanes: _Lanes, span: Span, reached: Floats, failed: Floats, stops: bool
+) -> None:
+    """Store what a span has brought; who has failed or stopped leaves and costs nothing any more."""
     ensemble.records[:, lanes.members] = lanes.record
     for piece, output in enumerate(span.outputs):
         if output >= 0:
             if stops:
                 before = _stopped(lanes) & (lanes.record[STOP_TIME] <= span.times[piece + 1])
                 reached[piece][:, before] = lanes.record[STOP_STATE:, before]
+            reached[piece][:, failed < span.times[piece + 1]] = np.nan
             ensemble.states[output, lanes.members] = reached[piece].T
+    gone = ~np.isnan(failed)
+    ensemble.states[span.passed :, lanes.members[gone]] = np.nan
     if stops:
         stopped = _stopped(lanes)
         lanes.Y[:, stopped] = lanes.record[STOP_STATE:, stopped]
-        gone = stopped | ~np.isfinite(lanes.Y).all(axis=0)
-        ensemble.states[span.passed :, lanes.members[gone]] = lanes.Y[:, gone].T
+        ensemble.states[span.passed :, lanes.members[stopped]] = lanes.Y[:, stopped].T
+        ensemble.last[lanes.members[stopped]] = lanes.Y[:, stopped].T
+        gone |= stopped
+    if gone.any():
         lanes.keep(~gone)
 
 

@@ -63,7 +63,7 @@ class ImplicitRungeKutta:
         observer_params: Floats,
         record: Floats,
         out: Floats,
-    ) -> Floats:
+    ) -> Floats | None:
         """Take a block of lanes through all output times; see ``explicit.integrate_block``.
 
         Returns:

@@ -58,7 +58,7 @@ class ImplicitTableau(Tableau):
         """The tableau with its eigenvalues, see the driver."""
         nodes, matrix = np.array(self.c), self.matrix
         group = matrix[:1, :1] if self.diagonal else matrix
-        inverse = np.linalg.inv(group)
+        inverse = np.asarray(np.linalg.inv(group), dtype=np.float64)
         back, eigenvalues = _real_form(inverse)
         extrapolation = np.empty((0, 0))
         if not self.diagonal:
@@ -80,7 +80,8 @@ class ImplicitTableau(Tableau):
 def _real_form(matrix: Floats) -> tuple[Floats, Floats]:
     """T and (real, re, im) such that T^-1 matrix T holds at most one real eigenvalue and one pair."""
     values, vectors = np.linalg.eig(matrix)
-    columns, eigenvalues = [], np.zeros(3)
+    columns: list[Floats] = []
+    eigenvalues = np.zeros(3)
     for value, vector in zip(values, vectors.T, strict=True):
         if abs(value.imag) < 1e-10 * abs(value):
             eigenvalues[0] = value.real

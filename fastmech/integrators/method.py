@@ -48,8 +48,13 @@ class Method(Protocol):
         observer_params: Floats,
         record: Floats,
         out: Floats,
-    ) -> None:
-        """Take a block of lanes through all output times; see ``explicit.integrate_block``."""
+    ) -> Floats | None:
+        """Take a block of lanes through all output times; see ``explicit.integrate_block``.
+
+        Returns:
+            ``None``, or of a method that can fail (lanes,): NaN, or the time [s] of the last state of a lane
+            that has failed, which it keeps.
+        """
 
 
 @dataclass(frozen=True)
