@@ -25,6 +25,7 @@ LAYERS = (
     "stability",
     "step_limits",
     "ensembles",
+    "transients",
     "equilibria",
     "atlas",
     "disturbance",
