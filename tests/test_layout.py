@@ -35,6 +35,7 @@ LAYERS = (
     "scan_types",
     "runner",
     "paper",
+    "hardcases",
     "bench",
     "cli",
     "__main__",

@@ -11,7 +11,7 @@ RATIO = 1.03
 
 
 def first_crossing(function: Callable[[float], float], start: float, stop: float) -> float:
-    """Least x at which ``function`` turns positive; 0.0 if it is so at ``start``, inf if not up to ``stop``."""
+    """Least x at which ``function`` turns positive; 0.0 if so at ``start``, inf if not up to ``stop``."""
     x = start
     if function(x) > 0.0:
         return 0.0

@@ -49,7 +49,7 @@ def largest_lyapunov(
     """Largest Lyapunov exponent of motions (Benettin, Galgani, Giorgilli, Strelcyn, Meccanica 15 (1980)).
 
     Args:
-        scene: the mechanism, whose Jacobian is known, or a system of your own, of which differences are taken.
+        scene: the mechanism, whose Jacobian is known, or a system of your own (differences).
         y0: starts, shape (n, dim) or (dim,).
         t_end: length of the motion [s]; estimates converge like 1/t.
         dt: longest step [s] of ``dop853``.
