@@ -28,25 +28,27 @@ from fastmech.jit import CUBE, INTEGERS, JACOBIAN, MATRIX, OBSERVER, RHS, VECTOR
 DIFFERENCES, GENERAL, SECOND_ORDER = 0, 1, 2
 
 #: Iterations before a lane is started again without extrapolation, and before it is given up.
-FIRST_ATTEMPT, MOST_ITERATIONS = 10, 24
+FIRST_ATTEMPT, MOST_ITERATIONS = 16, 40
 
-#: What is left after an iteration that is accepted, and what rounding may leave where nothing improves any
-#: more, both relative to the lane's largest state or increment. A remainder is no random rounding, it points
-#: the same way step after step: 1e-16 would cost 1e-10 of the energy in a million steps.
-REMAINDER, ROUNDED = 1e-20, 1e-9
+#: What rounding may leave where nothing improves any more, relative to the lane's largest state or increment.
+ROUNDED = 1e-9
+
+#: Iterations after which convergence is slow, the step being long for its Jacobian, and what then may remain.
+PATIENCE, SLOW_REMAINDER = 8, 1e-14
 
 
 @inlined
 def accept(
-    step: Floats, last: Floats, scale: Floats, active: Floats, iteration: int, alive: Floats, base: Floats
+    step: Floats, last: Floats, scale: Floats, active: Floats, iteration: int, base: Floats, remainder: float
 ) -> int:
     """Take converged lanes out of ``active``; returns how many are left. ``step`` is the last correction.
 
     With the contraction q = step/last, what is left is q/(1-q) step.
     """
     left = 0
+    remainder = remainder if iteration < PATIENCE else SLOW_REMAINDER
     for i in range(step.shape[0]):
-        size = REMAINDER * (base[i] + scale[i])
+        size = remainder * (base[i] + scale[i])
         q = step[i] / last[i]
         small = (step[i] <= size) | ((iteration > 0) & (q < 1.0) & (q * step[i] <= (1.0 - q) * size))
         rounded = (iteration > 1) & (q > 0.5) & (step[i] <= ROUNDED * (base[i] + scale[i]))
@@ -69,6 +71,7 @@ def accept(
         MATRIX,
         VECTOR,
         MATRIX,
+        types.float64,
         VECTOR,
         INTEGERS,
         MATRIX,
@@ -91,6 +94,7 @@ def integrate_implicit_block(
     forth: Floats,
     eigenvalues: Floats,
     extrapolation: Floats,
+    remainder: float,
     times: Floats,
     steps: Integers,
     Y: Floats,
@@ -106,7 +110,8 @@ def integrate_implicit_block(
     the group's part of ``a``, ``back`` is T and ``forth`` T^-1 A_g^-1, where T^-1 A_g^-1 T holds the real
     eigenvalue ``eigenvalues[0]`` (0: none) and then the block [[re, -im], [im, re]] of
     ``eigenvalues[1:]`` (im = 0: none). ``final`` = b A^-1 makes the step of the stages' increments,
-    ``extrapolation`` (empty: none) the next step's first guess of this step's increments.
+    ``extrapolation`` (empty: none) the next step's first guess of this step's increments. ``remainder`` is
+    what an accepted iteration may leave, relative to the lane's largest state.
 
     ``failed`` (lanes,) is NaN or, for a lane that has been given up, the time of its last state, which it
     keeps. The other arguments are those of :func:`fastmech.integrators.explicit.integrate_block`.
@@ -213,7 +218,7 @@ def integrate_implicit_block(
                                     change[i] + move - move if move != move else max(change[i], abs(move))
                                 )
                                 scale[i] = max(scale[i], abs(Z[first + k, x, i]))
-                    left = accept(change, last, scale, active, iteration % FIRST_ATTEMPT, alive, base)
+                    left = accept(change, last, scale, active, iteration % FIRST_ATTEMPT, base, remainder)
                 if left:
                     for i in range(lanes):
                         if active[i] > 0.0:

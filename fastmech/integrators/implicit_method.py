@@ -85,6 +85,7 @@ class ImplicitRungeKutta:
             prepared.forth,
             prepared.eigenvalues,
             prepared.extrapolation,
+            prepared.remainder,
             times,
             steps,
             Y,

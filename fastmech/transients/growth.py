@@ -2,7 +2,8 @@
 
 The norm of (xi, eta) is xi |K| xi + eta M eta with the small motion's matrices: twice the energy at a
 minimum; elsewhere the directions in which U falls count as if it rose, so that the norm stays one.
-Reactivity and amplification: Neubert, Caswell, Ecology 78 (1997); Trefethen, Embree, *Spectra and Pseudospectra*, ch. 14.
+Reactivity and amplification: Neubert, Caswell, Ecology 78 (1997); Trefethen, Embree, *Spectra and
+Pseudospectra*, chapter 14.
 """
 
 from __future__ import annotations

@@ -154,6 +154,10 @@ def test_the_form_that_the_driver_reads() -> None:
         np.testing.assert_allclose(form, expected, atol=1e-13)
 
 
+def test_which_methods_are_symplectic() -> None:
+    assert {name for name, t in IMPLICIT_TABLEAUS.items() if t.symplectic} == {"gauss2", "gauss4", "gauss6"}
+
+
 def test_a_wrong_tableau_is_refused() -> None:
     good = IMPLICIT_TABLEAUS["gauss4"]
     with pytest.raises(ValueError, match="row 1 of a has 1 entries, must have 2"):

@@ -31,7 +31,7 @@ def _run(quick: bool) -> Sequence[Row]:
     left = np.linalg.inv(np.column_stack([vectors.real, vectors.imag])[:, _basis(values)])[0]
     times = np.arange(DT, LONGEST, 10 * DT)
     rows = []
-    for method in ("dop853",) if quick else ("rk4", "dop853", "abm12", "gauss6", "radau5"):
+    for method in ("dop853",) if quick else ("rk4", "dop853", "abm8", "gauss6", "radau5"):
 
         def leave(
             offset: NDArray[np.float64], method: str = method
