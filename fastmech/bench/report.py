@@ -14,6 +14,7 @@ from fastmech.bench.entrants import entrants, jitted_rhs
 from fastmech.bench.measure import Row, measure
 from fastmech.bench.picture import draw_bench
 from fastmech.bench.problem import PROBLEMS, reference
+from fastmech.bench.stiff import run_stiff
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.threads import thread_count
 from fastmech.results import Dataset, Variable
@@ -53,6 +54,7 @@ def run_bench(
                 rows.append(measure(problem, entrant, truth, threads))
             advance(1)
     atlas = run_atlas(out, quick=quick, stage=stage)
+    stiff = run_stiff(out, quick=quick, stage=stage)
     table, picture = out / "bench.md", out / "bench.png"
     table.write_text(markdown(rows, floors), encoding="utf-8")
     draw_bench(rows, picture)
@@ -77,7 +79,7 @@ def run_bench(
         | provenance(thread_count(None)),
         replace=True,
     )
-    return [table, picture, data, *atlas]
+    return [table, picture, data, *atlas, *stiff]
 
 
 def markdown(rows: list[Row], floors: dict[str, float]) -> str:
