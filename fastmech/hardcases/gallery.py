@@ -9,7 +9,7 @@ import numpy as np
 
 from fastmech.ensembles.status import Status
 from fastmech.hardcases.case import HardCase, Row
-from fastmech.hardcases.cases import CASES
+from fastmech.hardcases.registry import CASES
 from fastmech.results import Dataset, Variable, flags
 
 

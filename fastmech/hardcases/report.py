@@ -20,6 +20,7 @@ from fastmech.hardcases.cases.conservative import (
     energy_history,
 )
 from fastmech.hardcases.gallery import gallery_dataset, gallery_markdown, run_gallery, verdict
+from fastmech.hardcases.registry import CASES
 from fastmech.integrators.methods import METHODS
 from fastmech.plots.energy_drift import draw_energy_drift
 from fastmech.plots.stability_region import draw_stability_regions
@@ -57,8 +58,6 @@ def write_hardcases(
     Raises:
         InputError: the folder cannot be written.
     """
-    from fastmech.hardcases.cases import CASES
-
     started = time.perf_counter()
     try:
         out.mkdir(parents=True, exist_ok=True)

@@ -9,8 +9,8 @@ import pytest
 
 import fastmech as fm
 from fastmech.hardcases.case import Row
-from fastmech.hardcases.cases import CASES
 from fastmech.hardcases.gallery import Result, gallery_dataset, gallery_markdown, verdict
+from fastmech.hardcases.registry import CASES
 
 
 @pytest.mark.parametrize("name", CASES)
