@@ -31,7 +31,11 @@ if TYPE_CHECKING:
     from fastmech.mechanism.reactions import reactions
     from fastmech.scene import Scene
     from fastmech.stability.classify import classify
+    from fastmech.step_limits.predict import largest_stable_step
+    from fastmech.step_limits.warning import step_warning
     from fastmech.store.read import open_results
+    from fastmech.transients.growth import transient_growth
+    from fastmech.transients.lyapunov import largest_lyapunov
 
 try:
     __version__ = metadata.version("fastmech")
@@ -55,13 +59,17 @@ _MODULES = {
     "find_snap": "fastmech.atlas.snap",
     "integrate": "fastmech.ensembles.integrate",
     "labels_of": "fastmech.basins.label",
+    "largest_lyapunov": "fastmech.transients.lyapunov",
+    "largest_stable_step": "fastmech.step_limits.predict",
     "linear_range": "fastmech.disturbance.linear_range",
     "map_basins": "fastmech.basins.map",
     "map_equilibria": "fastmech.atlas.map",
     "open_results": "fastmech.store.read",
     "reactions": "fastmech.mechanism.reactions",
     "sin": "fastmech.kernels.sincos",
+    "step_warning": "fastmech.step_limits.warning",
     "trace_folds": "fastmech.atlas.folds",
+    "transient_growth": "fastmech.transients.growth",
     "trapped": "fastmech.capture.certificate",
 }
 
@@ -82,13 +90,17 @@ __all__ = [
     "find_snap",
     "integrate",
     "labels_of",
+    "largest_lyapunov",
+    "largest_stable_step",
     "linear_range",
     "map_basins",
     "map_equilibria",
     "open_results",
     "reactions",
     "sin",
+    "step_warning",
     "trace_folds",
+    "transient_growth",
     "trapped",
 ]
 

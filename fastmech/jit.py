@@ -51,7 +51,14 @@ def observer_signature(precision: Any) -> Any:
 
 
 RHS_SIGNATURE = rhs_signature(types.float64)
+RHS = types.FunctionType(RHS_SIGNATURE)
 OBSERVER_SIGNATURE = observer_signature(types.float64)
+OBSERVER = types.FunctionType(OBSERVER_SIGNATURE)
+
+#: ``jacobian(t, Y, J, params)``: row ``r * dim + c`` of ``J`` (dim * dim, lanes) is the derivative of the
+#: rate of state ``r`` by state ``c``.
+JACOBIAN_SIGNATURE = types.void(types.float64, MATRIX, MATRIX, MATRIX)
+JACOBIAN = types.FunctionType(JACOBIAN_SIGNATURE)
 
 
 def driver_signature(precision: Any, *method: Any) -> Any:

@@ -30,6 +30,8 @@ COMPILED = (
     "ensembles",
     "equilibria",
     "stability",
+    "step_limits",
+    "transients",
     "disturbance",
     "atlas",
     "capture",

@@ -22,6 +22,7 @@ from fastmech.bench.peak import Throughput, throughputs
 from fastmech.bench.picture import draw_bench
 from fastmech.bench.problem import PROBLEMS, Problem
 from fastmech.bench.startup import STARTED, Start, started
+from fastmech.bench.stiff import run_stiff
 from fastmech.bench.terms import TURNS, Cost, costs
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.threads import thread_count
@@ -67,7 +68,9 @@ def run_bench(
     peak, rhs = throughputs(problems[0], stage("right-hand sides", PEAK_TURNS))
     prices = costs(problems[0], stage("terms", TURNS))
     starts = [] if quick else list(started(stage("cold starts", len(STARTED))))
-    others = run_atlas(out, quick=quick, stage=stage) + run_basins(out, quick=quick, stage=stage)
+    others = [
+        path for run in (run_atlas, run_basins, run_stiff) for path in run(out, quick=quick, stage=stage)
+    ]
     table, picture = out / "bench.md", out / "bench.png"
     lines = _preamble(quick, failures)
     for problem in problems:

@@ -14,7 +14,7 @@ import click
 from fastmech import __version__
 from fastmech.cli.failure import Failure, one_line
 
-COMMANDS = ("run", "info", "plot", "equilibria", "paper", "bench")
+COMMANDS = ("run", "info", "plot", "equilibria", "paper", "hardcases", "bench")
 
 
 class _Commands(click.Group):

@@ -17,7 +17,9 @@ from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.status import Status
 from fastmech.equilibria.find import Equilibria, Equilibrium, find_equilibria
 from fastmech.errors import InputError
+from fastmech.integrators.implicit_method import with_jacobian
 from fastmech.integrators.methods import find_method
+from fastmech.kernels.jacobians import lagrange_jacobian
 from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
@@ -109,7 +111,7 @@ def disturb(
         starts,
         times,
         dt,
-        find_method(method),
+        with_jacobian(find_method(method), lagrange_jacobian, True),
         _observation(center, size, return_radius),
         threads=threads,
         progress=progress,
@@ -125,6 +127,7 @@ def disturb(
     status = judge(run.status, starts, final, reduce(scene))
     outcome[status == Status.STEP_TOO_LARGE] = Outcome.STEP_TOO_LARGE
     outcome[status == Status.NOT_FINITE] = Outcome.NOT_FINITE
+    outcome[status == Status.NOT_CONVERGED] = Outcome.NOT_CONVERGED
     last_outside, step = run.records[LAST_OUTSIDE], times[-1] / output_steps(times, dt)[0]
     left = (size(starts - center) > return_radius) | (last_outside > 0.0)
     inside_since = np.where(left, last_outside + step, 0.0)

@@ -27,6 +27,7 @@ class Outcome(IntEnum):
     UNDECIDED = 3
     NOT_FINITE = 4
     STEP_TOO_LARGE = 5
+    NOT_CONVERGED = 6
 
     @property
     def advice(self) -> str:
@@ -40,6 +41,7 @@ _ADVICE = {
     Outcome.AT_UNSTABLE: "still in the ball of an unstable equilibrium: it will leave; use a larger t_end",
     Outcome.UNDECIDED: "still moving at t_end; use a larger t_end",
     Outcome.NOT_FINITE: "became NaN or infinite on the way; use a smaller dt",
+    Outcome.NOT_CONVERGED: "Newton's iteration found no solution of a step; use a smaller dt",
     Outcome.STEP_TOO_LARGE: "has energy at the end that the motion cannot have; use a smaller dt",
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -16,10 +17,12 @@ from fastmech.ensembles.stopping import STOP_CODE, STOP_TIME
 from fastmech.ensembles.system import System
 from fastmech.ensembles.tolerance import solve_to_tolerance
 from fastmech.errors import InputError
+from fastmech.integrators.implicit_method import ImplicitRungeKutta
+from fastmech.integrators.method import Method
 from fastmech.integrators.methods import find_method
 from fastmech.kernels.select import FORMULATIONS
 from fastmech.scene import Scene, nearest
-
+from fastmech.step_limits.warning import step_warning
 
 #: Longest step [s] where neither a step nor a tolerance is given.
 DEFAULT_DT = 0.01
@@ -38,10 +41,15 @@ class Trajectories:
     dt: float  #: longest step taken [s]
     method: str  #: name of the method
     own_steps: NDArray[np.int64]  #: steps of each trajectory that runs to the end, shape (n,)
-    own_dt: NDArray[np.float64]  #: longest step of each [s], shape (pieces, n); one piece, or one for each fit
+    own_dt: NDArray[
+        np.float64
+    ]  #: longest step of each [s], shape (pieces, n); one piece, or one for each fit
     precision: str = "float64"  #: of the lanes
     stop_code: NDArray[np.int64] | None = None  #: why each stopped, 0: it did not; only where it could; (n,)
     stop_time: NDArray[np.float64] | None = None  #: when [s], NaN: it did not; (n,)
+    failed: NDArray[np.float64] | None = (
+        None  #: when each that failed was last finite [s], NaN: did not; (n,)
+    )
     error: NDArray[np.float64] | None = None  #: estimate for each trajectory (n,), of runs to a tolerance
     error_estimate: float | None = None  #: estimate of the quantile asked for, of runs to a tolerance
 
@@ -105,7 +113,9 @@ def integrate(
     checks.memory(outputs.size * starts.size, 2 if tol is None else 4)
     if tol is not None:
         if dt is not None or fit is not False or dtype != "float64":
-            raise InputError("tol: chooses the step and the precision itself; give no dt, fit or dtype with it")
+            raise InputError(
+                "tol: chooses the step and the precision itself; give no dt, fit or dtype with it"
+            )
         tol = checks.number("tol", tol, "", above=0.0)
         quantile = checks.number("quantile", quantile, "", above=0.0)
         if quantile > 1.0:
@@ -114,12 +124,13 @@ def integrate(
             find_method(method)
         found = solve_to_tolerance(problem, starts, outputs, tol, quantile, method, threads, progress)
         return _trajectories(problem, outputs, found.solution, found.settings, found.error, found.estimate)
-    settings = Settings(
-        find_method(method or "rk4"),
-        checks.number("dt", DEFAULT_DT if dt is None else dt, "s", above=0.0),
-        _fit_times(fit, scene),
-        _precision(dtype, problem),
-    )
+    formula = find_method(method or "rk4")
+    step = checks.number("dt", DEFAULT_DT if dt is None else dt, "s", above=0.0)
+    if isinstance(scene, Scene) and not parameters:
+        told = step_warning(scene, step, formula.name, starts)
+        if told:
+            warnings.warn(told, stacklevel=2)
+    settings = Settings(formula, step, _fit_times(fit, scene), _precision(dtype, problem, formula))
     solution = solve(problem, starts, outputs, settings, threads, progress)
     return _trajectories(problem, outputs, solution, settings)
 
@@ -148,6 +159,7 @@ def _trajectories(
         precision=np.dtype(settings.precision).name,
         stop_code=code,
         stop_time=time,
+        failed=solution.failed,
         error=error,
         error_estimate=estimate,
     )
@@ -161,12 +173,14 @@ def _fit_times(fit: bool | ArrayLike, scene: Scene | System) -> tuple[float, ...
     return (0.0,) if fit is True else tuple(checks.rising_times("fit", fit).tolist())  # type: ignore[arg-type]
 
 
-def _precision(dtype: str, problem: Problem) -> Precision:
+def _precision(dtype: str, problem: Problem, method: Method) -> Precision:
     known: dict[str, Precision] = {"float64": np.float64, "float32": np.float32}
     if dtype not in known:
         raise InputError(f"dtype = {dtype!r}: must be one of {', '.join(known)}")
     if dtype == "float32" and problem.observation.stops:
         raise InputError("dtype = 'float32': not with a stopping condition")
+    if dtype == "float32" and isinstance(method, ImplicitRungeKutta):
+        raise InputError(f"dtype = 'float32': not with the implicit method {method.name}")
     return known[dtype]
 
 

@@ -52,9 +52,10 @@ class Lanes:
         blocks, rows, width = blocked.shape
         return blocked.transpose(0, 2, 1).reshape(blocks * width, rows)[: self.members.size]
 
-    def keep(self, which: NDArray[np.bool_]) -> None:
-        """Let the others leave, if enough of them have ended to be worth the move."""
-        if which.all() or (which.any() and np.count_nonzero(~which) < WORTH_MOVING * which.size):
+    def keep(self, which: NDArray[np.bool_], at_once: bool) -> None:
+        """Let the others leave: ``at_once``, or if enough of them have ended to be worth the move."""
+        few = which.any() and np.count_nonzero(~which) < WORTH_MOVING * which.size
+        if which.all() or (few and not at_once):
             return
         states, params, record = (self.rows(a)[which] for a in (self.Y, self.params, self.record))
         self.members = self.members[which]

@@ -15,6 +15,9 @@ Floats = NDArray[np.float64]
 #: the step resolves the motion.
 SLACK = 1e-2
 
+#: Trajectories judged at once: what is computed on the way stays in the caches.
+AT_ONCE = 2**14
+
 
 def judge(
     reached: NDArray[np.int8], start: Floats, final: Floats, c: Coefficients | None
@@ -26,7 +29,11 @@ def judge(
     """
     status = reached.copy()
     if c is not None:
-        status[(reached == Status.OK) & breaks_energy_bounds(c, start, final)] = Status.STEP_TOO_LARGE
+        for first in range(0, len(start), AT_ONCE):
+            part = slice(first, first + AT_ONCE)
+            own = Coefficients(*(v[part] if np.ndim(v) else v for v in c))
+            broken = breaks_energy_bounds(own, start[part], final[part])
+            status[part][broken & (reached[part] == Status.OK)] = Status.STEP_TOO_LARGE
     status[~np.isfinite(start).all(axis=1)] = Status.START_NOT_FINITE
     return status
 

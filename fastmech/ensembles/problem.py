@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError
+from fastmech.kernels.jacobians import canonical_jacobian, lagrange_jacobian
 from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.mechanism.equations import momenta_from_rates, rates_from_momenta
@@ -35,6 +36,8 @@ class Problem:
     observation: Observation = NOTHING
     coefficients: Coefficients | None = None  #: of a scene: numbers, or one a trajectory
     canonical: bool = False  #: momenta are integrated in place of rates
+    jacobian: Any = None  #: block Jacobian for implicit methods; None: they take differences
+    second_order: bool = False  #: whether the state is two angles and then their velocities
 
     def inward(self, y: Floats) -> Floats:
         """Integrated states from public ones (..., n, dim)."""
@@ -68,7 +71,9 @@ def scene_problem(scene: Scene, n: int, parameters: Mapping[str, ArrayLike], for
         coefficients = Coefficients(*(np.broadcast_to(value, n) for value in coefficients))
     params = np.stack([np.asarray(c, dtype=np.float64) for c in coefficients], axis=-1)
     rhs = right_hand_side(coefficients, formulation)
-    return Problem(rhs, params, coefficients=coefficients, canonical=formulation == "hamilton")
+    if formulation == "lagrange":
+        return Problem(rhs, params, coefficients=coefficients, jacobian=lagrange_jacobian, second_order=True)
+    return Problem(rhs, params, coefficients=coefficients, canonical=True, jacobian=canonical_jacobian)
 
 
 def system_problem(system: System, n: int, parameters: Mapping[str, ArrayLike]) -> Problem:

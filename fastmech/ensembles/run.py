@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.ensembles.failing import last_finite
 from fastmech.ensembles.lanes import VECTOR_LANES, Lanes
 from fastmech.ensembles.spans import Span, spans
 from fastmech.ensembles.status import Status
@@ -65,11 +66,27 @@ NOTHING = Observation(observe_nothing, np.zeros(0), np.zeros(0))
 
 @dataclass(frozen=True)
 class Ensemble:
-    """States at the output times (outputs, n, dim), records (rows, n) and :class:`Status` values (n,)."""
+    """States at the output times (outputs, n, dim), records (rows, n) and :class:`Status` values (n,).
+
+    A trajectory that fails has NaN from the next output on; ``failed`` (n,) is the time [s] of its last
+    finite state, NaN for the others.
+    """
 
     states: Floats
     records: Floats
     status: NDArray[np.int8]
+    failed: Floats
+    lost: list[
+        tuple[NDArray[np.int64], Floats]
+    ]  #: members that failed together, and their last finite states
+
+    @property
+    def last(self) -> Floats:
+        """Last finite states, shape (n, dim)."""
+        last = self.states[-1].copy()
+        for members, states in self.lost:
+            last[members] = states
+        return last
 
 
 def run_ensemble(
@@ -105,7 +122,9 @@ def run_ensemble(
     ensemble = Ensemble(
         states=np.empty((clock.size - 1, *begin.shape)),
         records=np.empty((observation.record.size, len(begin))),
-        status=np.empty(len(begin), dtype=np.int8),
+        status=np.full(len(begin), Status.OK, dtype=np.int8),
+        failed=np.full(len(begin), np.nan),
+        lost=[],
     )
     interrupted = threading.Event()
     observe = observation.observe
@@ -120,10 +139,20 @@ def run_ensemble(
             if interrupted.is_set() or not lanes.members.size:
                 break
             batch = lanes.batch(span, observation.params)
-            method.run(rhs, observe, batch)
-            _store(ensemble, lanes, span, batch, observation.stops)
-        finite = np.isfinite(ensemble.states[:, members]).all(axis=(0, 2))
-        ensemble.status[members] = np.where(finite, Status.OK, Status.NOT_FINITE)
+            begun = lanes.rows(lanes.Y).copy()
+            given_up = method.run(rhs, observe, batch)
+            now, failed = lanes.rows(batch.Y).copy(), np.full(lanes.members.size, np.nan)
+            if given_up is not None:
+                failed = given_up.reshape(-1)[: lanes.members.size].copy()
+            stopped = _stopped(lanes, batch) if observation.stops else np.zeros(failed.size, dtype=np.bool_)
+            failed[stopped] = np.nan
+            lost = np.isnan(failed) & ~stopped & ~np.isfinite(now).all(axis=1)
+            ensemble.status[lanes.members[~np.isnan(failed)]] = Status.NOT_CONVERGED
+            ensemble.status[lanes.members[lost]] = Status.NOT_FINITE
+            if lost.any():
+                own_params = lanes.rows(lanes.params)[lost]
+                failed[lost], now[lost] = last_finite(rhs, method, span, begun[lost], own_params)
+            _store(ensemble, lanes, span, batch, now, failed, stopped)
         return members.size
 
     width = min(block_lanes, max(VECTOR_LANES, CALL_OUTPUT // (begin.shape[1] * clock.size)))
@@ -169,20 +198,37 @@ def _in_threads(
             raise
 
 
-def _store(ensemble: Ensemble, lanes: Lanes, span: Span, batch: Batch, stops: bool) -> None:
-    """Store what a span has brought; who has stopped or is not finite any more leaves, if ``stops``."""
-    record = lanes.rows(batch.record)
-    ensemble.records[:, lanes.members] = record.T
+def _stopped(lanes: Lanes, batch: Batch) -> NDArray[np.bool_]:
+    """Which trajectories have stopped."""
+    return np.asarray(lanes.rows(batch.record)[:, STOP_CODE] != 0.0)
+
+
+def _store(
+    ensemble: Ensemble,
+    lanes: Lanes,
+    span: Span,
+    batch: Batch,
+    now: Floats,
+    failed: Floats,
+    stopped: NDArray[np.bool_],
+) -> None:
+    """Store what a span has brought; who has failed or stopped leaves and costs nothing any more."""
+    record, members = lanes.rows(batch.record), lanes.members
+    ensemble.records[:, members] = record.T
+    stop_state = record[stopped, STOP_STATE : STOP_STATE + now.shape[1]]
     for piece, output in enumerate(span.outputs):
         if output >= 0:
             reached = lanes.rows(batch.out[:, piece])
-            if stops:
-                before = (record[:, STOP_CODE] != 0.0) & (record[:, STOP_TIME] <= span.times[piece + 1])
-                reached = np.where(before[:, None], record[:, STOP_STATE:], reached)
-            ensemble.states[output, lanes.members] = reached
-    if stops:
-        now, stopped = lanes.rows(batch.Y), record[:, STOP_CODE] != 0.0
-        now = np.where(stopped[:, None], record[:, STOP_STATE:], now)
-        gone = stopped | ~np.isfinite(now).all(axis=1)
-        ensemble.states[span.passed :, lanes.members[gone]] = now[gone]
-        lanes.keep(~gone)
+            if stopped.any():
+                before = record[stopped, STOP_TIME] <= span.times[piece + 1]
+                reached[np.flatnonzero(stopped)[before]] = stop_state[before]
+            reached[failed < span.times[piece + 1]] = np.nan
+            ensemble.states[output, members] = reached
+    over = ~np.isnan(failed)
+    ensemble.states[span.passed :, members[stopped]] = stop_state
+    if over.any():
+        ensemble.states[span.passed :, members[over]] = np.nan
+        ensemble.failed[members[over]] = failed[over]
+        ensemble.lost.append((members[over], now[over]))
+    if stopped.any() or over.any():
+        lanes.keep(~(stopped | over), at_once=bool(over.any()))

@@ -13,6 +13,8 @@ from fastmech.ensembles.plausible import judge
 from fastmech.ensembles.problem import Problem
 from fastmech.ensembles.run import Progress, run_ensemble
 from fastmech.ensembles.spans import output_steps
+from fastmech.ensembles.status import Status
+from fastmech.integrators.implicit_method import with_jacobian
 from fastmech.integrators.method import Method
 
 Floats = NDArray[np.float64]
@@ -38,6 +40,7 @@ class Solution:
     status: NDArray[np.int8]  #: shape (n,)
     steps: NDArray[np.int64]  #: steps of each trajectory that runs to the end, shape (n,)
     dt: Floats  #: longest step of each [s], shape (pieces, n): a piece ends where steps are fitted again
+    failed: Floats  #: time of the last finite state of a trajectory that failed [s], else NaN, shape (n,)
 
 
 def solve(
@@ -59,9 +62,11 @@ def solve(
     cuts = [t for t in settings.fit if 0.0 < t < outputs[-1]]
     ends = [*cuts, float(outputs[-1])]
     exponent = EXPONENT_AGAIN if cuts else EXPONENT_ONCE
-    y = np.empty((outputs.size, n, starts.shape[1]))
+    pieces: list[Floats] = []
+    status, failed = np.full(n, Status.OK, dtype=np.int8), np.full(n, np.nan)
     steps, taken = np.zeros(n, dtype=np.int64), np.empty((len(ends), n))
     begin, now, shares = 0.0, problem.inward(starts), np.zeros(n)
+    method = with_jacobian(settings.method, problem.jacobian, problem.second_order)
     for piece, end in enumerate(ends):
         inside = (outputs <= end) & ((outputs > begin) | (piece == 0))
         times = np.concatenate([[begin], outputs[inside]])
@@ -78,17 +83,21 @@ def solve(
             now,
             times,
             dt,
-            settings.method,
+            method,
             problem.observation,
             threads=threads,
             precision=settings.precision,
             progress=progress if end == ends[-1] else None,
         )
-        y[inside] = run.states[: np.count_nonzero(inside)]
+        pieces.append(run.states[: np.count_nonzero(inside)])
+        worse = run.status != Status.OK
+        status[worse & (status == Status.OK)] = run.status[worse & (status == Status.OK)]
+        failed = np.where(np.isnan(failed), run.failed, failed)
         for length in np.unique(dt):
             number = output_steps(times, float(length))
             steps[dt == length] += number.sum()
             taken[piece, dt == length] = np.max(np.diff(times) / np.maximum(number, 1))
         begin, now = end, run.states[-1]
-    y = problem.outward(y)
-    return Solution(y, run.records, judge(run.status, starts, y[-1], problem.coefficients), steps, taken)
+    y = problem.outward(pieces[0] if len(pieces) == 1 else np.concatenate(pieces))
+    judged = judge(status, starts, y[-1], problem.coefficients)
+    return Solution(y, run.records, judged, steps, taken, failed)

@@ -12,6 +12,7 @@ class Status(IntEnum):
     NOT_FINITE = 1
     STEP_TOO_LARGE = 2
     START_NOT_FINITE = 3
+    NOT_CONVERGED = 4
 
     @property
     def advice(self) -> str:
@@ -23,5 +24,6 @@ _ADVICE = {
     Status.OK: "reached the end of the run, or its stopping condition",
     Status.NOT_FINITE: "became NaN or infinite on the way; use a smaller dt",
     Status.STEP_TOO_LARGE: "has energy at the end that the motion cannot have; use a smaller dt",
+    Status.NOT_CONVERGED: "Newton's iteration found no solution of a step; use a smaller dt",
     Status.START_NOT_FINITE: "the start is NaN or infinite",
 }

@@ -11,8 +11,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.integrators.batch import Batch
 from fastmech.integrators import explicit, multistep
+from fastmech.integrators.batch import Batch, Floats
 from fastmech.integrators.multistep_weights import bashforth, moulton
 from fastmech.integrators.tableau import Tableau
 
@@ -39,8 +39,13 @@ class Method(Protocol):
     def evaluations(self, steps: int) -> int:
         """Right-hand sides that so many steps of equal length take, the starter's included."""
 
-    def run(self, rhs: Any, observe: Any, batch: Batch) -> None:
-        """Take a batch through its times."""
+    def run(self, rhs: Any, observe: Any, batch: Batch) -> Floats | None:
+        """Take a batch through its times.
+
+        Returns:
+            ``None``, or of a method that can fail (blocks, lanes): NaN, or the time [s] of the last state of a
+            lane that has failed, which it keeps.
+        """
 
 
 def _driver(module: ModuleType, name: str, batch: Batch) -> Any:

@@ -14,13 +14,20 @@ abruptly,
     ========  ====  ======  =====  =====  ======  ======
 
 for y' = lambda y with real lambda < 0.
+
+The implicit methods are stable at any step for every decaying motion: ``gauss2``, ``gauss4`` and ``gauss6``
+(A-stable) keep the energy of conservative scenes over long times in Hamilton's formulation; ``radau3``,
+``radau5`` and ``sdirk4`` (L-stable) are for heavy damping, where the explicit methods' limit and not the
+accuracy would set the step.
 """
 
 from __future__ import annotations
 
 from fastmech.errors import InputError
+from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Adams, Method, RungeKutta
 from fastmech.integrators.tableaus import TABLEAUS
+from fastmech.integrators.tableaus.implicit import IMPLICIT_TABLEAUS
 
 _EXPLICIT = (
     "Adams; Bashforth, Adams, Theories of Capillary Action, 1883; weights derived in multistep_weights"
@@ -38,6 +45,7 @@ _ALL: tuple[Method, ...] = (
     Adams("abm8", 8, True, TABLEAUS["dop853"], _CORRECTED),
     Adams("abm10", 10, True, TABLEAUS["dop853"], _CORRECTED),
     Adams("abm12", 12, True, TABLEAUS["dop853"], _CORRECTED),
+    *map(ImplicitRungeKutta, IMPLICIT_TABLEAUS.values()),
 )
 
 #: Every method by its name.

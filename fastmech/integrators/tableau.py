@@ -86,14 +86,20 @@ class Tableau:
         if len(self.a) != stages or len(self.c) != stages:
             raise ValueError(f"{self.name}: a, b and c disagree on the number of stages")
         for i, row in enumerate(self.a):
-            if len(row) != i:
-                raise ValueError(f"{self.name}: row {i} of a has {len(row)} entries, must have {i}")
+            if len(row) != self.row_length(i):
+                raise ValueError(
+                    f"{self.name}: row {i} of a has {len(row)} entries, must have {self.row_length(i)}"
+                )
             if abs(sum(row) - self.c[i]) > ROUNDING * sum(map(abs, row)):
                 raise ValueError(f"{self.name}: row {i} of a sums to {sum(row)}, its node is {self.c[i]}")
         for order in range(1, min(self.order, CHECKED_ORDER) + 1):
             residuals, rounding = self.order_residuals(order)
             if (residuals > rounding).any():
                 raise ValueError(f"{self.name}: a condition of order {order} fails by {residuals.max():.1e}")
+
+    def row_length(self, i: int) -> int:
+        """Entries of row ``i`` of ``a``."""
+        return i
 
     @property
     def stages(self) -> int:
@@ -105,7 +111,7 @@ class Tableau:
         """Coefficients as a full square matrix, shape (stages, stages)."""
         full = np.zeros((self.stages, self.stages))
         for i, row in enumerate(self.a):
-            full[i, :i] = row
+            full[i, : len(row)] = row
         return full
 
     def order_residuals(self, order: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

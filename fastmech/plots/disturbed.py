@@ -22,6 +22,7 @@ LEFT_OVER = {
     "undecided": ("still moving", "#d0d0d0"),
     "not_finite": ("not finite", "#000000"),
     "step_too_large": ("step too large", "#5a5a5a"),
+    "not_converged": ("not converged", "#8c6d46"),
 }
 BOX = (0.05, 0.25, 0.5, 0.75, 0.95)
 SHOWN_QUANTILES = (0.5, 0.95, 0.99)

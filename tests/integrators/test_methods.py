@@ -7,6 +7,7 @@ import pytest
 from integrators.driving import counting, drive
 
 from fastmech.errors import InputError
+from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.methods import METHODS, find_method
 from fastmech.integrators.tableaus import TABLEAUS
 
@@ -32,11 +33,15 @@ def test_every_tableau_is_a_method() -> None:
 @pytest.mark.parametrize("steps", [0, 1, 5, 40])
 @EVERY_METHOD
 def test_right_hand_sides_a_run(name: str, steps: int) -> None:
-    """Counted by the right-hand side itself."""
+    """Counted by the right-hand side itself; an implicit method's count is what it usually takes at most."""
     *_, calls = drive(counting, name, np.zeros((1, 1)), np.array([0.0, 2.0]), [steps], np.zeros(1))
-    assert calls[0, 0] == METHODS[name].evaluations(steps)
+    expected = METHODS[name].evaluations(steps)
+    if isinstance(METHODS[name], ImplicitRungeKutta):
+        assert steps * METHODS[name].tableau.stages <= calls[0, 0] <= expected
+    else:
+        assert calls[0, 0] == expected
 
 
 def test_unknown_method_lists_the_known_ones() -> None:
-    with pytest.raises(InputError, match=r"^method = 'rk5': unknown; known: euler, .*dop853.*abm12$"):
+    with pytest.raises(InputError, match=r"^method = 'rk5': unknown; known: euler, .*dop853.*abm12.*sdirk4$"):
         find_method("rk5")

@@ -187,8 +187,8 @@ def test_outcomes(run: Run) -> None:
     expected = [[run.outcome(i, p) for p in e] for i, e in enumerate(run.places)]
     assert decoded(run.section["outcome"]) == expected
     attrs = run.section["outcome"].attrs
-    meanings = "returned elsewhere at_unstable undecided not_finite step_too_large"
-    assert (attrs["flag_values"].tolist(), attrs["flag_meanings"]) == ([0, 1, 2, 3, 4, 5], meanings)
+    meanings = "returned elsewhere at_unstable undecided not_finite step_too_large not_converged"
+    assert (attrs["flag_values"].tolist(), attrs["flag_meanings"]) == (list(range(7)), meanings)
     assert run.section.attrs["failed"] == 0
 
 

@@ -1,0 +1,1 @@
+"""A gallery of hard cases: what makes each hard, an oracle from outside, and what must happen."""

@@ -1,0 +1,34 @@
+"""Final states of hard motions in extended precision, made by ``data/make_hardcases.py``."""
+
+from __future__ import annotations
+
+import tomllib
+from functools import cache
+from importlib import resources
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.scene import Scene
+
+
+class Motion(NamedTuple):
+    """A motion whose end is known to better than double precision."""
+
+    scene: Scene
+    start: NDArray[np.float64]  #: (4,): rad, rad/s
+    t: float  #: s
+    state: NDArray[np.float64]  #: (4,) at that time
+
+
+@cache
+def _content() -> dict[str, Any]:
+    return tomllib.loads(resources.files(__package__).joinpath("references.toml").read_text(encoding="utf-8"))
+
+
+def motion(name: str) -> Motion:
+    """The reference of this name; its scene is the paper's with a few changes."""
+    entry = _content()[name]
+    scene = Scene(c2=1100 / 3).replace(**entry["scene"])
+    return Motion(scene, np.array(entry["start"]), entry["t"], np.array([float(x) for x in entry["state"]]))

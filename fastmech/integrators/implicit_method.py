@@ -1,0 +1,96 @@
+"""Implicit Runge-Kutta methods as those who run them see them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fastmech.integrators.batch import Batch, Floats
+from fastmech.integrators.implicit import DIFFERENCES, GENERAL, SECOND_ORDER, integrate_implicit_block
+from fastmech.integrators.implicit_tableau import ImplicitTableau
+from fastmech.integrators.method import Method
+
+#: Newton iterations that a step of ordinary length takes: what ``evaluations`` reckons with.
+TYPICAL_ITERATIONS = 4
+
+
+@dataclass(frozen=True)
+class ImplicitRungeKutta:
+    """An implicit Runge-Kutta method, and the Jacobian of what it is to integrate.
+
+    ``jacobian`` is a block kernel (:data:`fastmech.jit.JACOBIAN`); ``None`` takes forward differences of the
+    right-hand side. ``second_order`` says that the state is two angles and then their velocities.
+    """
+
+    tableau: ImplicitTableau
+    jacobian: Any = None
+    second_order: bool = False
+
+    @property
+    def name(self) -> str:
+        """Name in the registry."""
+        return self.tableau.name
+
+    @property
+    def order(self) -> int:
+        """Order of the error in the step's length."""
+        return self.tableau.order
+
+    @property
+    def source(self) -> str:
+        """Where its coefficients come from."""
+        return self.tableau.source
+
+    @property
+    def start_steps(self) -> int:
+        """None: every step stands alone."""
+        return 0
+
+    def evaluations(self, steps: int) -> int:
+        """Right-hand sides that so many steps take where Newton's iteration converges as usual."""
+        return steps * self.tableau.stages * TYPICAL_ITERATIONS
+
+    def run(self, rhs: Any, observe: Any, batch: Batch) -> Floats | None:
+        """Take a batch through its times.
+
+        Returns:
+            (blocks, lanes): NaN, or the time [s] at which Newton's iteration no longer converged; such a lane
+            keeps the state that it had then.
+        """
+        prepared = self.tableau.prepared
+        blocks, _, lanes = batch.Y.shape
+        failed = np.full((blocks, lanes), np.nan)
+        kind = DIFFERENCES if self.jacobian is None else SECOND_ORDER if self.second_order else GENERAL
+        for block in range(blocks):
+            integrate_implicit_block(
+                rhs,
+                rhs if self.jacobian is None else self.jacobian,
+                observe,
+                kind,
+                prepared.a,
+                prepared.nodes,
+                prepared.final,
+                prepared.back,
+                prepared.forth,
+                prepared.eigenvalues,
+                prepared.extrapolation,
+                prepared.remainder,
+                batch.times,
+                batch.steps,
+                batch.Y[block],
+                batch.params[block],
+                batch.observer_params,
+                batch.record[block],
+                batch.out[block],
+                failed[block],
+            )
+        return failed
+
+
+def with_jacobian(method: Method, jacobian: Any, second_order: bool) -> Method:
+    """The method, told the Jacobian if it is one that needs it."""
+    if isinstance(method, ImplicitRungeKutta) and jacobian is not None:
+        return replace(method, jacobian=jacobian, second_order=second_order)
+    return method

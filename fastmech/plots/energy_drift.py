@@ -1,0 +1,33 @@
+"""Energy error of conservative motions against time, one curve a method."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.plots.style import legend_below, new_figure, style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Floats = NDArray[np.float64]
+
+#: Error that is drawn for zero, below the rounding of an energy.
+FLOOR = 1e-17
+
+
+def draw_energy_drift(histories: Mapping[str, tuple[Floats, Floats]]) -> Figure:
+    """``histories``: label -> (times [s], relative energy error), on two logarithmic axes."""
+    with style():
+        figure = new_figure(7.6, 4.6)
+        axes = figure.subplots()
+        for label, (times, error) in histories.items():
+            axes.loglog(times, np.maximum(np.abs(error), FLOOR), lw=1.1, label=label)
+        axes.set_xlabel("time t [s]")
+        axes.set_ylabel("|E − E(0)| / (E(0) − min U)")
+        axes.set_title("Energy error of an undamped motion", loc="left")
+        legend_below(figure, axes, 2)
+    return figure

@@ -1,0 +1,40 @@
+"""What a method makes of the impulse of a force that decays: F0 exp(-alpha t) gives F0/alpha in all.
+
+A method sees the force at its nodes only. Where it decays within a step, almost nothing of that is the true
+impulse: RK4 at h alpha = 1e4 takes the first node's share, h F0 / 6.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fastmech.integrators.implicit_method import ImplicitRungeKutta
+from fastmech.integrators.method import Adams, Method, RungeKutta
+from fastmech.step_limits.crossing import first_crossing
+
+#: Relative error of the impulse that a step may make.
+TOLERATED = 1e-2
+
+
+def impulse_ratio(method: Method, x: float) -> float:
+    """Impulse by the method over the true one, for x = h alpha > 0, of a run that starts with the force."""
+    if isinstance(method, Adams):
+        starter, taken = method.starter, method.start_steps
+        ages = np.arange(float(method.predictor.size))
+        if method.corrects:
+            weights, times = method.corrector, 1.0 - np.arange(float(method.corrector.size))
+        else:
+            weights, times = method.predictor, -ages
+        beyond = float(weights @ np.exp(-(taken + times) * x))
+    else:
+        assert isinstance(method, RungeKutta | ImplicitRungeKutta)
+        starter, taken, beyond = method.tableau, 0, 0.0
+        beyond = float(np.array(starter.b) @ np.exp(-np.array(starter.c) * x))
+    first = float(np.array(starter.b) @ np.exp(-np.array(starter.c) * x))
+    share = -np.expm1(-x)
+    return x * (first * -np.expm1(-taken * x) + beyond) / share
+
+
+def impulse_limit(method: Method) -> float:
+    """Largest h alpha up to which the impulse is right to :data:`TOLERATED`."""
+    return first_crossing(lambda x: abs(impulse_ratio(method, x) - 1.0) - TOLERATED, 1e-3, 1e3)

@@ -1,0 +1,98 @@
+"""The largest stable step as the method itself shows it: where its differenced one-step map turns unstable.
+
+The map of one step about the equilibrium is differenced (central differences through the compiled driver and
+the nonlinear equations of motion) and its spectral radius watched: growth just beyond the limit may be 1e-5 a
+step, which no trajectory would show. An Adams method's map takes its history, so its formula is applied to
+histories around the equilibrium, with the compiled right-hand side.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.integrators.batch import Batch
+from fastmech.integrators.explicit import observe_nothing
+from fastmech.integrators.implicit_method import with_jacobian
+from fastmech.integrators.method import Adams, Method
+from fastmech.integrators.methods import find_method
+from fastmech.kernels.jacobians import lagrange_jacobian
+from fastmech.kernels.select import right_hand_side
+from fastmech.mechanism.coefficients import reduce
+from fastmech.scene import Scene
+from fastmech.stability.linearize import Rest, jacobian
+from fastmech.step_limits.crossing import first_crossing
+
+Floats = NDArray[np.float64]
+
+#: Half width of the differences [rad, rad/s]: its square and the rounding over it are both near 1e-11.
+WIDTH = 1e-5
+
+
+def measured_stable_step(scene: Scene, equilibrium: Rest, method: str) -> float:
+    """Least step [s] at which the spectral radius of the differenced one-step map crosses 1; inf if none.
+
+    Raises:
+        InputError: no such method.
+    """
+    formula = with_jacobian(find_method(method), lagrange_jacobian, True)
+    frozen = scene.replace(F0=equilibrium.force, alpha=0.0)
+    fastest = float(np.abs(np.linalg.eigvals(jacobian(scene, equilibrium))).max())
+    at = np.array([equilibrium.phi, equilibrium.theta, 0.0, 0.0])
+    params = np.array(reduce(frozen), dtype=np.float64)
+    rhs = right_hand_side(reduce(frozen))
+
+    def excess(h: float) -> float:
+        if isinstance(formula, Adams):
+            matrix = _history_map(formula, rhs, params, at, h)
+        else:
+            matrix = _step_map(formula, rhs, params, at, h)
+        return float(np.abs(np.linalg.eigvals(matrix)).max()) - 1.0
+
+    return first_crossing(excess, 0.01 / fastest, 100.0 / fastest)
+
+
+def _around(at: Floats) -> Floats:
+    """Columns: ``at`` with each component ahead by WIDTH, then each behind."""
+    shifts = WIDTH * np.eye(at.size)
+    return np.ascontiguousarray(at[:, None] + np.concatenate([shifts, -shifts], axis=1))
+
+
+def _difference(after: Floats) -> Floats:
+    ahead, behind = np.split(after, 2, axis=1)
+    return np.asarray((ahead - behind) / (2.0 * WIDTH))
+
+
+def _step_map(method: Method, rhs: Any, params: Floats, at: Floats, h: float) -> Floats:
+    Y = _around(at)
+    batch = Batch(
+        times=np.array([0.0, h]),
+        steps=np.array([1]),
+        params=np.repeat(params[None, :, None], Y.shape[1], axis=2),
+        observer_params=np.zeros(0),
+        Y=Y[None],
+        record=np.zeros((1, 0, Y.shape[1])),
+        out=np.empty((1, 1, *Y.shape)),
+    )
+    method.run(rhs, observe_nothing, batch)
+    return _difference(batch.Y[0])
+
+
+def _history_map(method: Adams, rhs: Any, params: Floats, at: Floats, h: float) -> Floats:
+    rows = method.predictor.size
+    history = _around(np.tile(at, rows)).reshape(rows, at.size, -1)
+    own = np.repeat(params[:, None], history.shape[2], axis=1)
+
+    def slope(Y: Floats) -> Floats:
+        dY = np.empty_like(Y)
+        rhs(0.0, np.ascontiguousarray(Y), dY, own)
+        return dY
+
+    slopes = np.array([slope(Y) for Y in history])
+    ahead = history[0] + h * np.tensordot(method.predictor, slopes, 1)
+    if method.corrects:
+        corrected = method.corrector[0] * slope(ahead) + np.tensordot(method.corrector[1:], slopes, 1)
+        ahead = history[0] + h * corrected
+    return _difference(np.concatenate([ahead[None], history[:-1]]).reshape(rows * at.size, -1))

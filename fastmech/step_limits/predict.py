@@ -1,0 +1,67 @@
+"""The largest stable step at an equilibrium, predicted from the eigenvalues of the small motion."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastmech.integrators.implicit_method import ImplicitRungeKutta
+from fastmech.integrators.method import Method
+from fastmech.integrators.methods import find_method
+from fastmech.scene import Scene
+from fastmech.stability.linearize import Rest, jacobian
+from fastmech.step_limits.amplification import amplification
+from fastmech.step_limits.crossing import first_crossing
+
+#: Growth a radian that a mode without damping may have: such a mode sits on the edge of every region.
+GROWTH_PER_RADIAN = 1e-6
+
+#: Real part, relative to the eigenvalue, below which a mode counts as undamped.
+UNDAMPED = 1e-12
+
+#: Product of step and largest eigenvalue at which the search begins and ends.
+NEAREST, FARTHEST = 1e-3, 1e6
+
+
+def stable_step(method: Method, eigenvalues: ArrayLike) -> float:
+    """Largest step [s] up to which no decaying mode grows; inf for an A-stable method.
+
+    Growing modes set no limit. A mode without damping may grow by :data:`GROWTH_PER_RADIAN`.
+    """
+    values = np.asarray(eigenvalues, dtype=np.complex128)
+    values = values[(values.real <= UNDAMPED * np.abs(values)) & (values != 0.0)]
+    if not values.size or isinstance(method, ImplicitRungeKutta):
+        return np.inf
+    undamped = values.real > -UNDAMPED * np.abs(values)
+    values = np.where(undamped, 1j * values.imag, values)
+    fastest = float(np.abs(values).max())
+    slack = np.where(undamped, GROWTH_PER_RADIAN * np.abs(values), 0.0)
+
+    def excess(h: float) -> float:
+        return float((amplification(method, h * values) - 1.0 - h * slack).max())
+
+    return first_crossing(excess, NEAREST / fastest, FARTHEST / fastest)
+
+
+def largest_stable_step(scene: Scene, equilibrium: Rest, method: str) -> float:
+    """Largest step [s] at which small motions about a stable equilibrium die out as they should.
+
+    Args:
+        scene: the mechanism; the force is the equilibrium's, frozen.
+        equilibrium: one of :func:`fastmech.equilibria.find.find_equilibria`. Where it is unstable, the modes
+            that decay set the limit.
+        method: a name from :data:`fastmech.integrators.methods.METHODS`.
+
+    Returns:
+        inf for an A-stable method.
+
+    Raises:
+        InputError: no such method.
+    """
+    return stable_step(find_method(method), np.linalg.eigvals(jacobian(scene, equilibrium)))
+
+
+def limiting_eigenvalues(scene: Scene, equilibrium: Rest) -> NDArray[np.complex128]:
+    """Eigenvalues [1/s] of the small motion that decay: what scales a method's region."""
+    values = np.linalg.eigvals(jacobian(scene, equilibrium)).astype(np.complex128)
+    return values[values.real <= 0.0]

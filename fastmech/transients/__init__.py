@@ -1,0 +1,1 @@
+"""How small disturbances grow: Lyapunov exponents along motions, transient growth at equilibria."""

@@ -1,0 +1,56 @@
+"""Containment: who fails keeps the last finite state and its time; nobody else notices."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import fastmech as fm
+from fastmech.ensembles.problem import system_problem
+from fastmech.ensembles.run import run_ensemble
+from fastmech.integrators.methods import METHODS
+
+
+def square(t: float, y: float) -> tuple[float]:
+    return (y * y,)
+
+
+BLOW_UP = fm.System(square, ["y"], {})
+
+
+def far(t: float, y: float) -> float:
+    return 3.0 if y > 1e3 else 0.0
+
+
+@pytest.mark.parametrize("method", ["rk4", "abm8", "dop853", "gauss4"])
+def test_last_finite_state_and_time(method: str) -> None:
+    """y' = y^2 is y0 / (1 - y0 t): infinite at t = 1/y0 in starts that are positive."""
+    starts = np.array([[-1.0], [1.0], [0.5], [-0.3], [2.0], [np.inf]])
+    p = system_problem(BLOW_UP, 6, {})
+    times = np.linspace(0.0, 100.0, 201)
+    run = run_ensemble(p.rhs, p.params, starts, times, 0.005, METHODS[method])
+    tame = [0, 3]
+    alone = run_ensemble(p.rhs, p.params, starts[tame], times, 0.005, METHODS[method])
+    np.testing.assert_array_equal(run.states[:, tame], alone.states)
+    np.testing.assert_array_equal(run.last[tame], run.states[-1, tame])
+    wrong = fm.Status.NOT_CONVERGED if method == "gauss4" else fm.Status.NOT_FINITE
+    assert run.status.tolist() == [0, wrong, wrong, 0, wrong, wrong]
+    assert np.isnan(run.failed[tame]).all()
+    np.testing.assert_allclose(run.failed[[1, 2, 4]], [1.0, 2.0, 0.5], atol=0.1)
+    assert run.failed[5] == 0.0
+    assert np.isfinite(run.last[:5]).all()
+    # Finite outputs before the failure, none after it.
+    for lane in (1, 2, 4):
+        finite = np.isfinite(run.states[:, lane, 0])
+        np.testing.assert_array_equal(finite, times[1:] <= run.failed[lane])
+
+
+def test_a_stop_before_the_end_is_no_failure() -> None:
+    """It stops at y > 1000, finite; the steps after it in the same call overflow."""
+    system = fm.System(square, ["y"], {}, stop=far)
+    p = system_problem(system, 2, {})
+    run = run_ensemble(p.rhs, p.params, [[1.0], [-1.0]], [0.0, 5.0], 0.001, METHODS["rk4"], p.observation)
+    assert run.status.tolist() == [0, 0]
+    assert np.isnan(run.failed).all()
+    assert 1e3 < run.last[0, 0] < np.inf
+    assert run.states[0, 0, 0] == run.last[0, 0]

@@ -1,0 +1,99 @@
+"""Lyapunov exponents and transient growth: published values, SciPy's tangent flow, closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.linalg
+from scipy.integrate import solve_ivp
+
+import fastmech as fm
+from fastmech.equilibria.find import find_equilibria
+from fastmech.errors import InputError
+from fastmech.stability.linearize import jacobian
+from fastmech.transients.growth import transient_growth
+from fastmech.transients.lyapunov import largest_lyapunov
+
+CONSERVATIVE = fm.Scene(c2=1100 / 3, beta=0.0, F0=0.0)
+
+
+def lorenz(t: float, x: float, y: float, z: float) -> tuple[float, float, float]:
+    return 10.0 * (y - x), x * (28.0 - z) - y, x * y - 8.0 / 3.0 * z
+
+
+def henon_heiles(t: float, x: float, y: float, u: float, v: float) -> tuple[float, float, float, float]:
+    return u, v, -x - 2.0 * x * y, -y - x * x + y * y
+
+
+def damped(t: float, x: float, v: float) -> tuple[float, float]:
+    return v, -4.0 * x - 0.2 * v
+
+
+def test_lorenz() -> None:
+    """0.9056 for the standard parameters (Sprott, Chaos and Time-Series Analysis, 2003)."""
+    system = fm.System(lorenz, ["x", "y", "z"], {})
+    starts = np.random.default_rng(0).uniform([-5, -5, 15], [5, 5, 30], (16, 3))
+    found = largest_lyapunov(system, starts, 300.0, 0.01)
+    spread = found.largest.std() / 4.0
+    assert found.largest.mean() == pytest.approx(0.9056, abs=4 * spread)
+    assert spread < 0.01
+
+
+def test_henon_heiles_against_scipy_s_tangent_flow() -> None:
+    """Finite time, E = 1/8, chaotic and regular starts: the same number from the variational equations."""
+
+    def variational(t: float, s: np.ndarray) -> np.ndarray:
+        x, y, u, v = s[:4]
+        J = np.array([[0, 0, 1, 0], [0, 0, 0, 1], [-1 - 2 * y, -2 * x, 0, 0], [-2 * x, -1 + 2 * y, 0, 0]])
+        return np.concatenate([[u, v, -x - 2 * x * y, -y - x * x + y * y], J @ s[4:]])
+
+    first = 1.0 / np.sqrt(np.arange(2.0, 6.0))
+    starts = np.array([[0.0, -0.25, 0.42, 0.0], [0.0, 0.1, 0.48, 0.1]])
+    found = largest_lyapunov(fm.System(henon_heiles, ["x", "y", "u", "v"], {}), starts, 100.0, 0.05)
+    for i, start in enumerate(starts):
+        begin = np.concatenate([start, first / np.linalg.norm(first)])
+        solution = solve_ivp(variational, (0, 100), begin, method="DOP853", rtol=1e-12, atol=1e-12)
+        expected = np.log(np.linalg.norm(solution.y[4:, -1])) / 100.0
+        assert found.largest[i] == pytest.approx(expected, abs=1e-6)
+    assert found.largest[0] > 2 * found.largest[1]
+
+
+def test_a_linear_system_decays_at_its_rate() -> None:
+    found = largest_lyapunov(fm.System(damped, ["x", "v"], {}), [1.0, 0.0], 400.0, 0.02)
+    assert found.largest[0] == pytest.approx(-0.1, abs=2e-3)
+
+
+def test_the_mechanism() -> None:
+    """Energetic undamped motion is chaotic, small oscillation is not; doubling the time halves the latter."""
+    starts = np.array([[0.3, 2.5, 3.0, -4.0], [0.966643893412244, 0.4487989505128276, 0.0, 0.0]])
+    found = largest_lyapunov(CONSERVATIVE, starts, 400.0, 0.01)
+    assert found.largest[0] > 0.3
+    assert found.largest[1] < 0.03
+    assert found.exponents.shape == (20, 2)
+
+
+def test_wrong_arguments() -> None:
+    with pytest.raises(InputError, match=r"^dt = 0: "):
+        largest_lyapunov(CONSERVATIVE, [0, 0, 0, 0], 1.0, 0)
+    with pytest.raises(InputError, match=r"^scene = 3: must be a Scene or a System"):
+        largest_lyapunov(3, [0, 0, 0, 0], 1.0)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("change", [{}, {"beta": 0.0}, {"c1": 294.9, "c2": 92.85, "F0": 85.3}])
+def test_transient_growth(change: dict[str, float]) -> None:
+    """At a passive minimum the energy norm never grows; at a saddle at least as the eigenvalue says."""
+    scene = fm.Scene(alpha=0.0).replace(**change)
+    kinds = set()
+    for e in find_equilibria(scene):
+        growth = transient_growth(scene, e, 2.0)
+        fastest = float(np.linalg.eigvals(jacobian(scene, e)).real.max())
+        kinds.add(e.kind)
+        if e.morse_index == 0:
+            assert growth.reactivity == pytest.approx(0.0, abs=1e-12)
+            assert growth.amplification == pytest.approx(1.0, abs=1e-12)
+        else:
+            assert growth.reactivity >= fastest - 1e-9
+            assert growth.amplification >= np.exp(2.0 * fastest) * (1 - 1e-9)
+            flow = scipy.linalg.expm(2.0 * jacobian(scene, e))
+            assert growth.amplification <= np.linalg.cond(flow) * np.exp(2.0 * growth.reactivity)
+    assert {"minimum", "saddle"} <= kinds
