@@ -24,6 +24,9 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 FLAGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 
+#: Options of what is compiled into its caller.
+INLINED: Any = {"forceinline": True, **FLAGS}
+
 VECTOR = types.Array(types.float64, 1, "C")
 MATRIX = types.Array(types.float64, 2, "C")
 CUBE = types.Array(types.float64, 3, "C")
@@ -127,7 +130,7 @@ def by_precision(double: F, single: F) -> F:
     def choose(x: Any) -> Any:
         return single if x == types.float32 else double
 
-    overload(function, jit_options={"forceinline": True, **FLAGS}, strict=False)(choose)
+    overload(function, jit_options=INLINED, strict=False)(choose)
     return function  # type: ignore[return-value]
 
 
@@ -140,7 +143,7 @@ def rounded_to(x: Any, value: Any) -> Any:
     return value
 
 
-@overload(rounded_to, jit_options={"forceinline": True, **FLAGS}, strict=False)
+@overload(rounded_to, jit_options=INLINED, strict=False)
 def _rounded_to(x: Any, value: Any) -> Any:
     if getattr(x, "dtype", x) == types.float32:
         return lambda x, value: np.float32(value)

@@ -68,9 +68,9 @@ def run_bench(
     peak, rhs = throughputs(problems[0], stage("right-hand sides", PEAK_TURNS))
     prices = costs(problems[0], stage("terms", TURNS))
     starts = [] if quick else list(started(stage("cold starts", len(STARTED))))
-    others = [
-        path for run in (run_atlas, run_basins, run_stiff) for path in run(out, quick=quick, stage=stage)
-    ]
+    others: list[Path] = []
+    for study in (run_atlas, run_basins, run_stiff):
+        others += study(out, quick=quick, stage=stage)
     table, picture = out / "bench.md", out / "bench.png"
     lines = _preamble(quick, failures)
     for problem in problems:

@@ -16,8 +16,8 @@ from fastmech.mechanism.coefficients import Coefficients
 
 Floats = NDArray[np.float64]
 
-#: How the step shrinks with the bound on the speed, where it is fitted once and where it is fitted again as the
-#: motion slows down. The local error alone asks for 1; fast trajectories also pass saddles, which magnify
+#: How the step shrinks with the bound on the speed: where it is fitted once, and where it is fitted again as
+#: the motion slows down. The local error alone asks for 1; fast trajectories also pass saddles, which magnify
 #: their errors. Measured on ensembles from rest and with rates up to 10 rad/s.
 EXPONENT_ONCE, EXPONENT_AGAIN = 1.0, 1.5
 
@@ -29,8 +29,8 @@ def fitted_steps(c: Coefficients, starts: Floats, dt: float, exponent: float) ->
     """The step [s] of every trajectory, shape (n,), at most ``dt``, from states (n, 4).
 
     ``dt`` belongs to motions as slow as the linear vibrations; the others have it divided by
-    (speed bound / vibration's frequency)^``exponent``, rounded up to a power of 2^(1/4). A trajectory's step depends
-    on its own start and parameters alone.
+    (speed bound / vibration's frequency)^``exponent``, rounded up to a power of 2^(1/4). A trajectory's step
+    depends on its own start and parameters alone.
     """
     with np.errstate(invalid="ignore", over="ignore"):
         ratio = speed_bound(c, starts) / vibration_frequency(c)

@@ -16,7 +16,7 @@ from fastmech.ensembles.solve import Precision, Settings, Solution, solve
 from fastmech.ensembles.stopping import STOP_CODE, STOP_TIME
 from fastmech.ensembles.system import System
 from fastmech.ensembles.tolerance import solve_to_tolerance
-from fastmech.errors import InputError
+from fastmech.errors import InputError, StepWarning
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Method
 from fastmech.integrators.methods import find_method
@@ -129,7 +129,7 @@ def integrate(
     if isinstance(scene, Scene) and not parameters:
         told = step_warning(scene, step, formula.name, starts)
         if told:
-            warnings.warn(told, stacklevel=2)
+            warnings.warn(told, StepWarning, stacklevel=2)
     settings = Settings(formula, step, _fit_times(fit, scene), _precision(dtype, problem, formula))
     solution = solve(problem, starts, outputs, settings, threads, progress)
     return _trajectories(problem, outputs, solution, settings)
@@ -170,7 +170,7 @@ def _fit_times(fit: bool | ArrayLike, scene: Scene | System) -> tuple[float, ...
         return ()
     if isinstance(scene, System):
         raise InputError("fit: only for a scene, whose energy bounds its speed")
-    return (0.0,) if fit is True else tuple(checks.rising_times("fit", fit).tolist())  # type: ignore[arg-type]
+    return (0.0,) if fit is True else tuple(checks.rising_times("fit", fit).tolist())
 
 
 def _precision(dtype: str, problem: Problem, method: Method) -> Precision:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,7 +33,8 @@ def judge(
     if c is not None:
         for first in range(0, len(start), AT_ONCE):
             part = slice(first, first + AT_ONCE)
-            own = Coefficients(*(v[part] if np.ndim(v) else v for v in c))
+            values: Any = (np.asarray(v)[part] if np.ndim(v) else v for v in c)
+            own = Coefficients(*values)
             broken = breaks_energy_bounds(own, start[part], final[part])
             status[part][broken & (reached[part] == Status.OK)] = Status.STEP_TOO_LARGE
     status[~np.isfinite(start).all(axis=1)] = Status.START_NOT_FINITE

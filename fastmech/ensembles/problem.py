@@ -51,7 +51,10 @@ class Problem:
         """The same for some of the trajectories."""
         if self.params.ndim == 1:
             return self
-        own = self.coefficients and Coefficients(*(np.asarray(c)[members] for c in self.coefficients))
+        own: Any = self.coefficients
+        if own is not None:
+            values: Any = (np.asarray(c)[members] for c in own)
+            own = Coefficients(*values)
         return replace(self, params=self.params[members], coefficients=own)
 
 
@@ -66,9 +69,10 @@ def scene_problem(scene: Scene, n: int, parameters: Mapping[str, ArrayLike], for
         for extreme in (column.min(), column.max()) if n else ():
             scene.replace(**{name: float(extreme)})
     scenes: Any = SimpleNamespace(**(scene.model_dump() | own))
-    coefficients = reduce(scenes)
+    coefficients: Any = reduce(scenes)
     if own:
-        coefficients = Coefficients(*(np.broadcast_to(value, n) for value in coefficients))
+        values: Any = (np.broadcast_to(value, n) for value in coefficients)
+        coefficients = Coefficients(*values)
     params = np.stack([np.asarray(c, dtype=np.float64) for c in coefficients], axis=-1)
     rhs = right_hand_side(coefficients, formulation)
     if formulation == "lagrange":

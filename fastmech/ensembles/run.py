@@ -225,7 +225,8 @@ def _store(
             reached[failed < span.times[piece + 1]] = np.nan
             ensemble.states[output, members] = reached
     over = ~np.isnan(failed)
-    ensemble.states[span.passed :, members[stopped]] = stop_state
+    if stopped.any():
+        ensemble.states[span.passed :, members[stopped]] = stop_state
     if over.any():
         ensemble.states[span.passed :, members[over]] = np.nan
         ensemble.failed[members[over]] = failed[over]

@@ -1,4 +1,4 @@
-"""A tolerance in place of a step: method, step and precision from a calibration, and an estimate of the error.
+"""A tolerance in place of a step: method, step and precision from a calibration, and the error estimated.
 
 The error of a run is estimated by step doubling in its finer form: a second run with steps longer by
 sqrt(2) differs from it by (2^(p/2) - 1) times its error, for a method of order p (Hairer, Norsett, Wanner,
@@ -24,8 +24,8 @@ from fastmech.integrators.methods import find_method
 
 Floats = NDArray[np.float64]
 
-#: Methods that lead down to a tolerance, least tolerance first: one of one or two right-hand sides a step, and
-#: one for outputs so close that starting the former anew costs more. Measured by ``fastmech bench``.
+#: Methods that lead down to a tolerance, least first: one of one or two right-hand sides a step, and one for
+#: outputs so close that starting the former anew costs more. Measured by ``fastmech bench``.
 FRONTIER = (
     (1e-8, "abm12", "dop853"),
     (3e-6, "ab7", "dop853"),

@@ -43,8 +43,8 @@ class Method(Protocol):
         """Take a batch through its times.
 
         Returns:
-            ``None``, or of a method that can fail (blocks, lanes): NaN, or the time [s] of the last state of a
-            lane that has failed, which it keeps.
+            ``None``, or of a method that can fail (blocks, lanes): NaN, or the time [s] of the last state of
+            a lane that has failed, which it keeps.
         """
 
 

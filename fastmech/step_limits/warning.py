@@ -23,6 +23,10 @@ SIDE = 24
 #: Angle [rad] within which eigenvalues of the same direction are told by their largest alone.
 DIRECTION = 0.03
 
+#: Steps up to this many times the scene's limit are let pass: a motion crosses the few configurations that set
+#: the limit, and what grows there for a moment dies out again.
+CROSSED = 3.0
+
 #: Angle [rad] by which a body may turn in one step.
 TURN = 1.0
 
@@ -91,22 +95,28 @@ def step_warning(scene: Scene, dt: float, method: str, starts: ArrayLike | None 
         InputError: no such method.
     """
     formula = find_method(method)
-    limits = [(step_limit(scene, method), "motions that die out would grow")]
+    stable = step_limit(scene, method)
+    limits = [(CROSSED * stable, stable, "motions that die out would grow")]
     if scene.alpha > 0.0 and scene.F0 != 0.0:
         ratio = impulse_ratio(formula, dt * scene.alpha)
         reason = f"the decaying force would give {ratio:.3g} times its impulse"
-        limits.append((impulse_limit(formula) / scene.alpha, reason))
+        decay = impulse_limit(formula) / scene.alpha
+        limits.append((decay, decay, reason))
     if starts is not None:
         rates = np.abs(np.asarray(starts, dtype=np.float64)[..., 2:])
         fastest = float(np.max(rates[np.isfinite(rates)], initial=0.0))
         if fastest > 0.0:
             limits.append(
-                (TURN / fastest, f"at {fastest:.3g} rad/s it would turn {dt * fastest:.3g} rad a step")
+                (
+                    TURN / fastest,
+                    TURN / fastest,
+                    f"at {fastest:.3g} rad/s it would turn {dt * fastest:.3g} rad a step",
+                )
             )
-    limit, reason = min(limits)
+    limit, good, reason = min(limits)
     if dt <= limit:
         return None
-    return f"dt = {dt:g} s: too long for {method} here, {reason}; dt = {_below(limit):g} s would do"
+    return f"dt = {dt:g} s: too long for {method} here, {reason}; dt = {_below(good):g} s would do"
 
 
 def _below(limit: float) -> float:

@@ -125,7 +125,6 @@ def test_y0_of_any_kind_of_numbers() -> None:
         ({"dt": np.inf}, "dt = inf: must be a finite number of s greater than 0"),
         ({"dt": "0.1"}, "dt = '0.1': must be a finite number of s greater than 0"),
         ({"dt": True}, "dt = True: must be a finite number of s greater than 0"),
-        ({"dt": None}, "dt = None: must be a finite number of s greater than 0"),
         ({"t_end": 0.0}, "t_end = 0.0: must be a finite number of s greater than 0"),
         ({"t_end": -1.0}, "t_end = -1.0: must be a finite number of s greater than 0"),
         ({"t_end": np.inf}, "t_end = inf: must be a finite number of s greater than 0"),

@@ -53,6 +53,19 @@ def observe_times(t: float, Y: Floats, params: Floats, record: Floats) -> None:
         record[3, i] = Y[0, i]
 
 
+def one_block(Y: Floats, params: Floats, times: Floats, steps: int) -> Batch:
+    """A batch of one block (dim, lanes) that passes one interval, with parameters (count, lanes)."""
+    return Batch(
+        times=times,
+        steps=np.array([steps]),
+        params=params[None].copy(),
+        observer_params=np.zeros(0),
+        Y=Y[None].copy(),
+        record=np.zeros((1, 0, Y.shape[1])),
+        out=np.empty((1, 1, *Y.shape)),
+    )
+
+
 def drive(
     rhs: Any,
     method: str,

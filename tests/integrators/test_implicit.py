@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from integrators.driving import A, W, drive, polynomial, rotation
+from integrators.driving import A, W, drive, one_block, polynomial, rotation
 from integrators.systems import Floats
 
 import fastmech as fm
@@ -53,14 +53,11 @@ def amplification(tableau: ImplicitTableau, z: complex) -> complex:
 def one_step(method: str, z: Floats) -> Floats:
     """The driver's R(z): one step of length 1 from y = 1, one lane a value of z."""
     Y = np.stack([np.ones(z.size), np.zeros(z.size)])
-    out = np.empty((1, 2, z.size))
     bound = ImplicitRungeKutta(IMPLICIT_TABLEAUS[method], spiral_jacobian)
-    failed = bound.run(
-        spiral, observe_nothing, np.array([0.0, 1.0]), np.array([1]), Y, np.stack([z.real, z.imag]),
-        np.zeros(0), np.zeros((0, z.size)), out,
-    )  # fmt: skip
+    batch = one_block(Y, np.stack([z.real, z.imag]), np.array([0.0, 1.0]), 1)
+    failed = bound.run(spiral, observe_nothing, batch)
     assert np.isnan(failed).all()
-    return np.asarray(out[0, 0] + 1j * out[0, 1])
+    return np.asarray(batch.Y[0, 0] + 1j * batch.Y[0, 1])
 
 
 @EVERY_IMPLICIT
@@ -123,13 +120,10 @@ def test_a_lane_that_does_not_converge_keeps_its_last_state(method: str) -> None
 
     def run(starts: list[float]) -> tuple[Floats, Floats]:
         Y = np.array([starts])
-        out = np.empty((1, 1, len(starts)))
-        failed = METHODS[method].run(
-            unsolvable, observe_nothing, np.array([0.0, 2.0]), np.array([40]), Y, np.ones((1, len(starts))),
-            np.zeros(0), np.zeros((0, len(starts))), out,
-        )  # fmt: skip
+        batch = one_block(Y, np.ones((1, len(starts))), np.array([0.0, 2.0]), 40)
+        failed = METHODS[method].run(unsolvable, observe_nothing, batch)
         assert failed is not None
-        return out[0, 0], failed
+        return batch.Y[0, 0], failed[0]
 
     together, failed = run([-1.0, 1.0, -0.5, np.nan])
     alone, fine = run([-1.0, -0.5])

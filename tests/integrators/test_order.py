@@ -17,10 +17,16 @@ MECHANISM_STEPS = {1: (1280, 5120), 2: (80, 320), 3: (40, 160), 4: (40, 160), 5:
                    7: (20, 56), 8: (14, 26), 10: (8, 20)}  # fmt: skip
 
 #: The Adams methods need smaller steps: on the linear system, or where that is unstable on the driven one.
-ADAMS_LINEAR_STEPS = {"ab5": (226, 905), "ab6": (320, 1280), "abm8": (113, 640), "abm10": (160, 400)}
+ADAMS_LINEAR_STEPS = {
+    "ab5": (226, 905),
+    "ab6": (320, 1280),
+    "ab7": (452, 1280),
+    "abm8": (113, 640),
+    "abm10": (160, 400),
+}
 ADAMS_DRIVEN_STEPS = {"ab8": (905, 1810), "abm12": (905, 1280)}
-ADAMS_MECHANISM_STEPS = {"ab5": (80, 320), "ab6": (113, 452), "ab8": (160, 320), "abm8": (40, 113),
-                         "abm10": (56, 113), "abm12": (80, 113)}  # fmt: skip
+ADAMS_MECHANISM_STEPS = {"ab5": (80, 320), "ab6": (113, 452), "ab7": (320, 452), "ab8": (160, 320),
+                         "abm8": (40, 113), "abm10": (56, 113), "abm12": (80, 113)}  # fmt: skip
 
 #: Methods whose leading error term is so small that the next one rules down to rounding (and, on the
 #: mechanism, those whose error is down to rounding soon after the order begins to show): their error falls as
