@@ -23,8 +23,8 @@ SIDE = 24
 #: Angle [rad] within which eigenvalues of the same direction are told by their largest alone.
 DIRECTION = 0.03
 
-#: Steps up to this many times the scene's limit are let pass: a motion crosses the few configurations that set
-#: the limit, and what grows there for a moment dies out again.
+#: Steps up to this many times the scene's limit are let pass: a motion crosses the few configurations that
+#: set the limit, and what grows there for a moment dies out again.
 CROSSED = 3.0
 
 #: Angle [rad] by which a body may turn in one step.

@@ -25,7 +25,7 @@ ADAMS_LINEAR_STEPS = {
     "abm10": (160, 400),
 }
 ADAMS_DRIVEN_STEPS = {"ab8": (905, 1810), "abm12": (905, 1280)}
-ADAMS_MECHANISM_STEPS = {"ab5": (80, 320), "ab6": (113, 452), "ab7": (320, 452), "ab8": (160, 320),
+ADAMS_MECHANISM_STEPS = {"ab5": (80, 320), "ab6": (113, 452), "ab7": (113, 452), "ab8": (160, 320),
                          "abm8": (40, 113), "abm10": (56, 113), "abm12": (80, 113)}  # fmt: skip
 
 #: Methods whose leading error term is so small that the next one rules down to rounding (and, on the
