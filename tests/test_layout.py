@@ -31,6 +31,7 @@ LAYERS = (
     "store",
     "plots",
     "scan_types",
+    "tiles",
     "runner",
     "paper",
     "bench",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
@@ -12,24 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
-from fastmech.ensembles.run import Progress
 from fastmech.errors import InputError
 from fastmech.integrators.methods import find_method
-from fastmech.results import Dataset, check_name
+from fastmech.results import Dataset, Variable, check_name
+from fastmech.scan_types.tiling import RunContext as RunContext
+from fastmech.scan_types.tiling import Tiles, Tiling
 from fastmech.scene import Scene, explain, nearest, read_toml
-from fastmech.store.stream import Stream
+from fastmech.store.stream import Stream, in_memory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-@dataclass(frozen=True)
-class RunContext:
-    """What a scan may use while it runs."""
-
-    threads: int | None = None  #: threads to use, all processors by default
-    stage: Callable[[str, int], Progress] = lambda name, total: lambda finished: None
-    """``stage(name, total)`` announces a piece of work; its result is told what has been finished since."""
 
 
 def _known_method(name: str) -> str:
@@ -46,6 +38,7 @@ class Scan(BaseModel, ABC):
 
     To add one, write a module in :mod:`fastmech.scan_types` with a sub-class: the fields of its request with
     defaults and limits, ``kind`` (the name in request files), ``run`` and ``draw``. It is found by itself.
+    One that takes more than a minute is a :class:`TiledScan`: ``tiling`` instead of ``run``.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
@@ -62,13 +55,58 @@ class Scan(BaseModel, ABC):
         """
 
     @abstractmethod
-    def run(self, scene: Scene, context: RunContext) -> Dataset | Stream:
-        """Compute the result, or say how it is computed while it is written. ``scene`` has the changes."""
+    def run(self, scene: Scene, context: RunContext) -> Dataset:
+        """Compute the result in memory. ``scene`` has the changes."""
+
+    def tiling(self, scene: Scene) -> Tiling:
+        """How the work is divided: not at all, unless a kind of scan says otherwise."""
+        return Whole(self, scene)
 
     @staticmethod
     @abstractmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
         """Pictures of a result, by name. ``scene`` are the scene's parameters with this scan's changes."""
+
+
+class TiledScan(Scan):
+    """A kind of scan whose work is divided into tiles."""
+
+    @abstractmethod
+    def tiling(self, scene: Scene) -> Tiling:
+        """How the work is divided; must be cheap."""
+
+    def run(self, scene: Scene, context: RunContext) -> Dataset:
+        """Compute one tile after the other."""
+        tiling = self.tiling(scene)
+        advance = context.stage(tiling.what, sum(tiling.items(index) for index in range(tiling.count)))
+        tiles = []
+        for index in range(tiling.count):
+            tiles.append(tiling.compute(index, RunContext(context.threads)))
+            advance(tiling.items(index))
+        result = tiling.assemble(tiles.__getitem__)
+        return in_memory(result) if isinstance(result, Stream) else result
+
+
+class Whole(Tiling):
+    """The one tile of a scan that is not divided."""
+
+    what = "all"
+    count = 1
+
+    def __init__(self, scan: Scan, scene: Scene) -> None:
+        self.scan, self.scene = scan, scene
+
+    def items(self, index: int) -> int:
+        """One: the scan itself tells its progress."""
+        return 1
+
+    def compute(self, index: int, context: RunContext) -> Dataset:
+        """Run the scan."""
+        return self.scan.run(self.scene, context)
+
+    def assemble(self, tile: Tiles) -> Dataset:
+        """The tile is the section."""
+        return tile(0)
 
 
 #: What ``error_estimate`` of a section is.
@@ -88,6 +126,14 @@ class Request:
     scene: Scene
     scans: Mapping[str, Scan]
     text: str
+
+    @property
+    def parameters(self) -> dict[str, Variable]:
+        """The scene's parameters as a result file holds them."""
+        return {
+            name: Variable((), np.array(value), unit, about)
+            for name, (value, unit, about) in self.scene.described().items()
+        }
 
     def scene_of(self, name: str) -> Scene:
         """The scene of one scan: the file's with the scan's own changes."""

@@ -1,0 +1,108 @@
+"""Tiles on a Dask cluster: in processes of this machine, or wherever a scheduler has workers."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from concurrent.futures import Executor, Future
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from fastmech.errors import InputError
+from fastmech.scan_types.request import RunContext
+from fastmech.tiles.identity import code_in_use
+from fastmech.tiles.work import Task, Workers
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+    from fastmech.tiles.run import Hiring
+
+#: Tiles in all queues for each thread of the workers: one at work, one to go on with.
+DEPTH = 2
+
+#: Seconds after which the workers are counted again.
+PERIOD = 2.0
+
+#: Seconds to wait for a scheduler.
+PATIENCE = 20
+
+
+class ClusterWorkers:
+    """The workers of a Dask cluster, of which some may come or go.
+
+    Args:
+        client: connected to the scheduler.
+        executor: the client's.
+    """
+
+    def __init__(self, client: Client, executor: Executor) -> None:
+        self._client, self._executor = client, executor
+        self._asked, self._threads = -math.inf, 0
+
+    @property
+    def slots(self) -> int:
+        """Tiles to hand out at a time, by the threads that the cluster has now."""
+        now = time.monotonic()
+        if now - self._asked > PERIOD:
+            self._asked, self._threads = now, sum(self._client.nthreads().values())
+        return DEPTH * max(1, self._threads)
+
+    def submit(self, task: Task) -> Future[bytes]:
+        """Send the tile to a worker; it runs in one thread there."""
+        return self._executor.submit(_compute, task, code_in_use())
+
+
+def _compute(task: Task, code: dict[str, str]) -> bytes:
+    """Compute a tile, on the worker."""
+    mine = code_in_use()
+    if mine != code:
+        differing = ", ".join(name for name in code if mine.get(name) != code[name])
+        raise InputError(f"a Dask worker has another version than this process of: {differing}")
+    return task.section.compute(task.index, RunContext(threads=1))
+
+
+@contextmanager
+def cluster(workers: int | None, scheduler: str | None) -> Iterator[Hiring]:
+    """A cluster to compute tiles.
+
+    Args:
+        workers: number of processes of one thread on this machine, or
+        scheduler: address of a scheduler that runs already, such as ``tcp://host:8786``.
+
+    Raises:
+        InputError: Dask is not installed, or no scheduler answers.
+    """
+    try:
+        from distributed import Client, LocalCluster
+    except ImportError:
+        raise InputError(
+            "--workers and --scheduler need Dask; install it with: pip install 'fastmech[distributed]'"
+        ) from None
+    settings: dict[str, Any] = {"timeout": PATIENCE, "set_as_default": False}
+    try:
+        if scheduler is None:
+            local = LocalCluster(
+                n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=50
+            )
+        else:
+            local = None
+        client = Client(local if local is not None else scheduler, **settings)
+    except (OSError, ValueError) as error:
+        raise InputError(f"--scheduler {scheduler}: no Dask scheduler answers: {error}") from None
+    try:
+
+        @contextmanager
+        def hire(tasks: list[Task], context: RunContext) -> Iterator[Workers]:
+            with client.get_executor(pure=False) as executor:
+                try:
+                    yield ClusterWorkers(client, executor)
+                finally:
+                    executor.shutdown(wait=False)
+
+        yield hire
+    finally:
+        client.close()
+        if local is not None:
+            local.close()
