@@ -12,8 +12,8 @@ from fastmech.scan_types.request import RunContext, read_request
 from fastmech.store.read import Results, open_results
 from fastmech.tiles.assemble import CHANGE
 from fastmech.tiles.report import RunReport
-from fastmech.tiles.run import Hiring, ScanRun
-from fastmech.tiles.work import thread_workers
+from fastmech.tiles.run import ScanRun
+from fastmech.tiles.work import Hiring, ThreadHiring
 
 
 def default_output(path: str | Path) -> Path:
@@ -27,7 +27,7 @@ def run_request(
     *,
     fresh: bool = False,
     context: RunContext | None = None,
-    hire: Hiring = thread_workers,
+    hire: Hiring | None = None,
     tell: Callable[[str], None] = lambda line: None,
 ) -> RunReport:
     """Run every scan of a request file and write one result file; an interrupted run goes on.
@@ -52,7 +52,8 @@ def run_request(
     """
     request = read_request(path, scan_kinds())
     target = Path(out) if out is not None else default_output(path)
-    return ScanRun(request, Path(path), target, context or RunContext(), hire, tell).run(fresh)
+    run = ScanRun(request, Path(path), target, context or RunContext(), hire or ThreadHiring(), tell)
+    return run.run(fresh)
 
 
 def scene_of_section(results: Results, name: str) -> dict[str, float]:

@@ -35,6 +35,7 @@ LAYERS = (
     "runner",
     "paper",
     "bench",
+    "faults",
     "cli",
     "__main__",
 )

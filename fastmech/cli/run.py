@@ -13,7 +13,7 @@ import click
 if TYPE_CHECKING:
     from fastmech.scan_types.request import RunContext
     from fastmech.tiles.report import RunReport
-    from fastmech.tiles.run import Hiring
+    from fastmech.tiles.work import Hiring
 
 
 @click.command(name="run")
@@ -71,12 +71,10 @@ def command(
 
 
 @contextmanager
-def _hiring(workers: int | None, scheduler: str | None) -> Iterator[Hiring]:
-    """Who computes: a cluster where one is asked for, else the threads of this process."""
+def _hiring(workers: int | None, scheduler: str | None) -> Iterator[Hiring | None]:
+    """The cluster that computes, where one is asked for."""
     if workers is None and scheduler is None:
-        from fastmech.tiles.work import thread_workers
-
-        yield thread_workers
+        yield None
         return
     from fastmech.tiles.cluster import cluster
 

@@ -12,34 +12,24 @@ import numpy.typing as npt
 from fastmech.results import Dataset, Variable
 from fastmech.store.schema import COMPACT_BYTES, DIM_NUMBER, DIM_NUMBERS, DIMENSION_ONLY
 
-_COMPRESSED: dict[str, Any] = {
-    "chunks": True,
-    "compression": "gzip",
-    "compression_opts": 4,
-    "shuffle": True,
-    "fletcher32": True,
-}
 
-
-def put_dataset(group: h5py.Group, dataset: Dataset, numbers: Iterator[int], plain: bool = False) -> None:
+def put_dataset(group: h5py.Group, dataset: Dataset, numbers: Iterator[int]) -> None:
     """Write a dataset into an empty group, its dimensions first, so that all variables can refer to them.
 
     Args:
         group: where to.
         dataset: what.
         numbers: gives a number to each dimension, unique in the file.
-        plain: whether to leave arrays as they are, without compression and checksum.
     """
-    storage = {} if plain else _COMPRESSED
     dim_numbers = {dim: np.int32(next(numbers)) for dim in dataset.sizes}
-    scales = {dim: _put_scale(group, dim, size, dataset, storage) for dim, size in dataset.sizes.items()}
+    scales = {dim: _put_scale(group, dim, size, dataset) for dim, size in dataset.sizes.items()}
     for dim, scale in scales.items():
         scale.attrs[DIM_NUMBER] = dim_numbers[dim]
     for name, variable in dataset.variables.items():
         if name in scales:
             stored = scales[name]
         else:
-            stored = _put_variable(group, name, variable, storage)
+            stored = _put_variable(group, name, variable)
             for axis, dim in enumerate(variable.dims):
                 stored.dims[axis].attach_scale(scales[dim])
         if variable.dims:
@@ -59,11 +49,9 @@ def _fixed_length(texts: npt.ArrayLike, least: int) -> npt.NDArray[np.bytes_]:
     return encoded.astype(h5py.string_dtype("utf-8", max(least, encoded.dtype.itemsize)))
 
 
-def _put_scale(
-    group: h5py.Group, dim: str, size: int, dataset: Dataset, storage: Mapping[str, Any]
-) -> h5py.Dataset:
+def _put_scale(group: h5py.Group, dim: str, size: int, dataset: Dataset) -> h5py.Dataset:
     if dim in dataset.variables:
-        scale = _put_variable(group, dim, dataset.variables[dim], storage)
+        scale = _put_variable(group, dim, dataset.variables[dim])
         scale.make_scale(dim)
     else:
         # never written, so it takes no room: only its shape counts
@@ -72,16 +60,23 @@ def _put_scale(
     return scale
 
 
-def _put_variable(
-    group: h5py.Group, name: str, variable: Variable, storage: Mapping[str, Any]
-) -> h5py.Dataset:
+def _put_variable(group: h5py.Group, name: str, variable: Variable) -> h5py.Dataset:
     text = variable.data.dtype == object
     # of two bytes at least: netCDF readers take strings of one byte for the characters of longer ones
     data = _fixed_length(variable.data, 2) if text else variable.data
     if data.nbytes <= COMPACT_BYTES:
         stored = _create_compact(group, name, data.shape, data.dtype)
     else:
-        stored = group.create_dataset(name, shape=data.shape, dtype=data.dtype, **storage)
+        stored = group.create_dataset(
+            name,
+            shape=data.shape,
+            dtype=data.dtype,
+            chunks=True,
+            compression="gzip",
+            compression_opts=4,
+            shuffle=True,
+            fletcher32=True,
+        )
     if data.size:
         stored[...] = data
     if text:

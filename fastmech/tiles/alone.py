@@ -95,7 +95,7 @@ def compute_alone(path: Path, tile: str, context: RunContext, target: Path) -> L
         request=request,
         section=section,
         index=index,
-        dataset=tile_dataset(data, tile),
+        dataset=tile_dataset(data),
         content=head.content,
         seconds=head.seconds,
         same=None if kept is None else kept.content == head.content,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -16,8 +16,6 @@ from fastmech.tiles.work import Task, Workers
 
 if TYPE_CHECKING:
     from distributed import Client
-
-    from fastmech.tiles.run import Hiring
 
 #: Tiles in all queues for each thread of the workers: one at work, one to go on with.
 DEPTH = 2
@@ -54,6 +52,28 @@ class ClusterWorkers:
         return self._executor.submit(_compute, task, code_in_use())
 
 
+class ClusterHiring:
+    """Hires whoever is in a Dask cluster.
+
+    Args:
+        client: connected to the scheduler.
+    """
+
+    together = True
+
+    def __init__(self, client: Client) -> None:
+        self._client = client
+
+    @contextmanager
+    def __call__(self, tasks: Sequence[Task], context: RunContext) -> Iterator[Workers]:
+        """All workers."""
+        executor = self._client.get_executor(pure=False)
+        try:
+            yield ClusterWorkers(self._client, executor)
+        finally:
+            executor.shutdown(wait=False)
+
+
 def _compute(task: Task, code: dict[str, str]) -> bytes:
     """Compute a tile, on the worker."""
     mine = code_in_use()
@@ -64,7 +84,7 @@ def _compute(task: Task, code: dict[str, str]) -> bytes:
 
 
 @contextmanager
-def cluster(workers: int | None, scheduler: str | None) -> Iterator[Hiring]:
+def cluster(workers: int | None, scheduler: str | None) -> Iterator[ClusterHiring]:
     """A cluster to compute tiles.
 
     Args:
@@ -92,16 +112,7 @@ def cluster(workers: int | None, scheduler: str | None) -> Iterator[Hiring]:
     except (OSError, ValueError) as error:
         raise InputError(f"--scheduler {scheduler}: no Dask scheduler answers: {error}") from None
     try:
-
-        @contextmanager
-        def hire(tasks: list[Task], context: RunContext) -> Iterator[Workers]:
-            with client.get_executor(pure=False) as executor:
-                try:
-                    yield ClusterWorkers(client, executor)
-                finally:
-                    executor.shutdown(wait=False)
-
-        yield hire
+        yield ClusterHiring(client)
     finally:
         client.close()
         if local is not None:

@@ -185,7 +185,7 @@ class Parts:
         if data is None:
             raise DamagedTileError(f"{path}: is gone")
         self._checked(path, data, section, index)
-        return tile_dataset(data, str(path))
+        return tile_dataset(data)
 
     def drop(self, section: TiledSection, index: int) -> None:
         """Forget a tile."""

@@ -6,7 +6,6 @@ import os
 import platform
 import time
 from collections.abc import Callable
-from contextlib import AbstractContextManager
 from pathlib import Path
 
 from fastmech.ensembles.run import Progress
@@ -23,13 +22,10 @@ from fastmech.tiles.parts import Manifest, Parts
 from fastmech.tiles.report import RunReport
 from fastmech.tiles.section import TiledSection, sections_of
 from fastmech.tiles.tile_file import DamagedTileError, check_tile
-from fastmech.tiles.work import Crash, Task, Workers, compute_tiles, thread_workers
+from fastmech.tiles.work import Crash, Hiring, Task, compute_tiles
 
 #: How often a result is assembled anew because a tile was damaged meanwhile.
 ASSEMBLIES = 3
-
-#: Gives the workers for some tiles.
-Hiring = Callable[[list[Task], RunContext], AbstractContextManager[Workers]]
 
 
 class ScanRun:
@@ -40,7 +36,7 @@ class ScanRun:
         request_file: where it was read from, for messages and provenance.
         target: the result file to be.
         context: threads to use and where progress is told.
-        hire: who computes tiles; threads of this process by default.
+        hire: who computes tiles.
         tell: is given lines for the user.
     """
 
@@ -50,7 +46,7 @@ class ScanRun:
         request_file: Path,
         target: Path,
         context: RunContext,
-        hire: Hiring = thread_workers,
+        hire: Hiring,
         tell: Callable[[str], None] = lambda line: None,
     ) -> None:
         self.request, self.request_file, self.target = request, request_file, target
@@ -78,7 +74,9 @@ class ScanRun:
             CrashedTilesError: tiles have failed.
             Stopped: the user stopped it.
         """
-        self._refuse_other_result(fresh)
+        if self._is_complete(fresh):
+            self.report.was_complete = True
+            return self.report
         with self.parts.held():
             try:
                 if not self._begin(fresh):
@@ -101,15 +99,17 @@ class ScanRun:
         self.report.seconds = time.perf_counter() - self.started
         return self.report
 
-    def _refuse_other_result(self, fresh: bool) -> None:
+    def _is_complete(self, fresh: bool) -> bool:
+        """Whether the result is there and nothing of it is in progress."""
         target = self.parts.target
         if target.is_dir():
             raise InputError(f"{self.target}: is a folder; give the name of a file in it")
         if fresh or not target.exists() or self.parts.folder.is_dir():
-            return
+            return False
         there = asked_of_result(target)
         if there != self.asked:
             raise InputError(self._other_result(there))
+        return True
 
     def _begin(self, fresh: bool) -> bool:
         """Make the folder ready; False where the result is there already."""
@@ -196,8 +196,8 @@ class ScanRun:
             raise CrashedTilesError(self._crash_report())
 
     def _groups(self, missing: list[Task]) -> list[list[Task]]:
-        """Tiles that are handed out together: section after section where threads share the machine."""
-        if self.hire is not thread_workers:
+        """Tiles that are handed out together: section after section unless they are handed out together."""
+        if self.hire.together:
             return [missing] if missing else []
         groups = [[task for task in missing if task.section == section] for section in self.sections]
         return [group for group in groups if group]

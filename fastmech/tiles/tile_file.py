@@ -66,10 +66,10 @@ def check_tile(data: bytes, identity: str, section: str, index: int) -> TileHead
     return found
 
 
-def tile_dataset(data: bytes, where: str) -> Dataset:
+def tile_dataset(data: bytes) -> Dataset:
     """The dataset of a tile that has been checked."""
     _, image = _split(data, checked=True)
-    return dataset_of_image(image, where)
+    return dataset_of_image(image)
 
 
 def _split(data: bytes, checked: bool = False) -> tuple[bytes, memoryview]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ThreadPoolExecutor, wait
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -49,6 +49,20 @@ class Workers(Protocol):
         """Have a tile computed."""
 
 
+class Hiring(Protocol):
+    """Gives workers for some tiles.
+
+    Attributes:
+        together: whether tiles of different sections are handed out together; else one section follows the
+            other.
+    """
+
+    together: bool
+
+    def __call__(self, tasks: Sequence[Task], context: RunContext) -> AbstractContextManager[Workers]:
+        """Workers for some tiles; when the block is left by an exception, tiles in hand end soon."""
+
+
 class ThreadWorkers:
     """Threads of this process: some tiles side by side or, if there are few, threads inside of each.
 
@@ -56,40 +70,47 @@ class ThreadWorkers:
         pool: where tiles run.
         side: tiles at a time.
         context: threads in all and where progress within a tile is told.
+        stopping: set when tiles in hand are to end.
     """
 
-    def __init__(self, pool: Executor, side: int, context: RunContext) -> None:
+    def __init__(self, pool: Executor, side: int, context: RunContext, stopping: threading.Event) -> None:
         self.slots = side + 1  # one more, so that none waits while a tile is written
-        self._pool, self._share = pool, 1.0 / side
+        self._pool, self._share, self._stopping = pool, 1.0 / side, stopping
         self._context = replace(context, threads=max(1, thread_count(context.threads) // side))
 
     def submit(self, task: Task) -> Future[bytes]:
         """Queue the tile."""
-        return self._pool.submit(task.section.compute, task.index, self._context, self._share)
+
+        def stage(name: str, total: int) -> Progress:
+            tell = self._context.stage(f"{task.section.name}: {name}", total)
+
+            def advance(finished: int) -> None:
+                if self._stopping.is_set():
+                    raise KeyboardInterrupt
+                tell(finished)
+
+            return advance
+
+        context = replace(self._context, stage=stage)
+        return self._pool.submit(task.section.compute, task.index, context, self._share)
 
 
-@contextmanager
-def thread_workers(tasks: Sequence[Task], context: RunContext) -> Iterator[ThreadWorkers]:
-    """Threads for some tasks; when the block is left by an exception, tiles in hand end soon."""
-    side = max(1, min(thread_count(context.threads), len(tasks)))
-    stopping = threading.Event()
+class ThreadHiring:
+    """Hires threads of this process."""
 
-    def stage(name: str, total: int) -> Progress:
-        tell = context.stage(f"{tasks[0].section.name}: {name}", total)
+    together = False
 
-        def advance(finished: int) -> None:
-            if stopping.is_set():
-                raise KeyboardInterrupt
-            tell(finished)
-
-        return advance
-
-    pool = ThreadPoolExecutor(side)
-    try:
-        yield ThreadWorkers(pool, side, replace(context, stage=stage))
-    finally:
-        stopping.set()
-        pool.shutdown(wait=False, cancel_futures=True)
+    @contextmanager
+    def __call__(self, tasks: Sequence[Task], context: RunContext) -> Iterator[ThreadWorkers]:
+        """As many as the context allows."""
+        side = max(1, min(thread_count(context.threads), len(tasks)))
+        stopping = threading.Event()
+        pool = ThreadPoolExecutor(side)
+        try:
+            yield ThreadWorkers(pool, side, context, stopping)
+        finally:
+            stopping.set()
+            pool.shutdown(wait=False, cancel_futures=True)
 
 
 def compute_tiles(

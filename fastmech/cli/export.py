@@ -1,0 +1,10 @@
+"""stub"""
+
+from __future__ import annotations
+
+import click
+
+
+@click.command(name="x")
+def command() -> None:
+    """Stub."""

@@ -1,0 +1,7 @@
+"""Importing this makes the tiles of equilibrium maps so small that a second's scan has some thirty of them."""
+
+from __future__ import annotations
+
+from fastmech.scan_types import map_tiling
+
+map_tiling.TILE_POINTS = 20
