@@ -14,7 +14,7 @@ from types import FrameType
 
 from fastmech.errors import InputError
 from fastmech.faults.processes import FaultFound
-from fastmech.faults.victim import REQUEST
+from fastmech.faults.victim import REQUEST, content_of, values_of
 from fastmech.runner import run_request
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import read_request
@@ -25,6 +25,19 @@ PATIENCE = 20
 
 #: Bytes by which reading damaged files may let the process grow.
 GROWTH = 512 << 20
+
+
+#: A request whose result has variables of every kind: scalars, texts, flags, small and chunked arrays.
+SMALL = """
+[scene]
+alpha = 0.0
+[scan.rest]
+kind = "equilibria"
+[scan.line]
+kind = "equilibrium_map"
+axes.c2 = { start = 1.0, stop = 900.0, num = 200 }
+variables = ["count", "outcome", "phi"]
+"""
 
 
 @dataclass
@@ -67,15 +80,15 @@ def fuzz_requests(count: int, seed: int, tell: Callable[[int], None] = lambda n:
 
 
 def fuzz_results(count: int, seed: int, tell: Callable[[int], None] = lambda n: None) -> FuzzCount:
-    """Read damaged result files, every variable of them.
+    """Read damaged result files, every variable of them: it is refused, or has the undamaged values.
 
     Args and errors as of `fuzz_requests`.
     """
     with tempfile.TemporaryDirectory() as folder:
         request, result = Path(folder) / "scan.toml", Path(folder) / "scan.h5"
-        request.write_text(REQUEST, encoding="utf-8")
+        request.write_text(SMALL, encoding="utf-8")
         run_request(request, result)
-        image = result.read_bytes()
+        image, whole = result.read_bytes(), content_of(result)
 
     def read(path: Path) -> None:
         refusal = None
@@ -83,9 +96,12 @@ def fuzz_results(count: int, seed: int, tell: Callable[[int], None] = lambda n: 
             for name in results:
                 for variable in results[name]:
                     try:
-                        results[name][variable]
+                        found = values_of(results[name][variable])
                     except InputError as error:
                         refusal = error
+                        continue
+                    if found != whole.get(f"{name}/{variable}"):
+                        raise FaultFound(f"{name}/{variable} was read with other values")
         if refusal is not None:
             raise refusal
 

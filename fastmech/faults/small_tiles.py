@@ -1,4 +1,4 @@
-"""Importing this makes the tiles of equilibrium maps so small that a second's scan has some thirty of them."""
+"""Importing this makes the tiles of equilibrium maps so small that a short scan has many of them."""
 
 from __future__ import annotations
 

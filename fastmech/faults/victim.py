@@ -12,6 +12,7 @@ from typing import Any
 import fastmech.faults.small_tiles  # noqa: F401 - many tiles
 from fastmech.ensembles.run import Progress
 from fastmech.errors import InputError
+from fastmech.results import Variable
 from fastmech.runner import run_request
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import RunContext
@@ -110,12 +111,15 @@ def content_of(path: Path) -> dict[str, bytes]:
         for name in results:
             content |= _attributes(name, results[name].attrs)
             for variable_name in results[name]:
-                variable = results[name][variable_name]
-                data = variable.data
-                raw = repr(data.tolist()).encode() if data.dtype == object else data.tobytes()
-                about = repr((variable.dims, data.dtype.str, data.shape, variable.units)).encode()
-                content[f"{name}/{variable_name}"] = about + raw
+                content[f"{name}/{variable_name}"] = values_of(results[name][variable_name])
     return content
+
+
+def values_of(variable: Variable) -> bytes:
+    """Values, type, shape and unit of a variable."""
+    data = variable.data
+    raw = repr(data.tolist()).encode() if data.dtype == object else data.tobytes()
+    return repr((variable.dims, data.dtype.str, data.shape, variable.units)).encode() + raw
 
 
 def computed_again(log: Iterable[str]) -> int:

@@ -17,7 +17,7 @@ from fastmech.integrators.methods import find_method
 from fastmech.results import Dataset, Variable, check_name
 from fastmech.scan_types.tiling import RunContext as RunContext
 from fastmech.scan_types.tiling import Tiles, Tiling
-from fastmech.scene import Scene, explain, nearest, read_toml
+from fastmech.scene import Scene, explain, nearest, parse_toml, read_text
 from fastmech.store.stream import Stream, in_memory
 
 if TYPE_CHECKING:
@@ -146,7 +146,16 @@ def read_request(path: str | Path, kinds: Mapping[str, type[Scan]]) -> Request:
     Raises:
         InputError: the file cannot be read, or anything in it is unknown, of a wrong type or out of range.
     """
-    table = read_toml(path)
+    return request_of_text(read_text(path), path, kinds)
+
+
+def request_of_text(text: str, path: str | Path, kinds: Mapping[str, type[Scan]]) -> Request:
+    """Validate the text of a request file; ``path`` is for messages and the default title.
+
+    Raises:
+        InputError: it is no TOML, or anything in it is unknown, of a wrong type or out of range.
+    """
+    table = parse_toml(text, path)
     allowed = ["title", "scene", "scan"]
     for name in table:
         if name not in allowed:
@@ -164,7 +173,7 @@ def read_request(path: str | Path, kinds: Mapping[str, type[Scan]]) -> Request:
         title=title,
         scene=scene,
         scans={name: _scan(name, entry, kinds) for name, entry in scans.items()},
-        text=Path(path).read_text(encoding="utf-8"),
+        text=text,
     )
     for name, scan in request.scans.items():
         try:

@@ -6,12 +6,14 @@ That leaves out links to other files, data kept in other files, and filters that
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
 import h5py
 import numpy as np
+import numpy.typing as npt
 
 from fastmech.errors import InputError
 from fastmech.results import RESERVED_ATTRS, Variable
@@ -46,13 +48,25 @@ def dimensions(stored: Iterable[h5py.Dataset]) -> dict[int, str]:
     return {int(scale.attrs[DIM_NUMBER]): _own_name(scale) for scale in stored if scale.is_scale}
 
 
-def get_variable(stored: h5py.Dataset, dims: Mapping[int, str], where: str) -> Variable:
-    """Read a stored variable whole.
+def own_dimensions(stored: h5py.Dataset, dims: Mapping[int, str]) -> tuple[str, ...]:
+    """Names of a variable's dimensions; ``dims`` are the group's."""
+    return tuple(dims[number] for number in stored.attrs[DIM_NUMBERS]) if stored.ndim else ()
+
+
+#: Bytes of a variable that are in memory at a time when only a part of it is wanted.
+PIECE_BYTES = 1 << 24
+
+
+def get_variable(
+    stored: h5py.Dataset, dims: Mapping[int, str], where: str, part: Mapping[str, slice] | None = None
+) -> Variable:
+    """Read a stored variable.
 
     Args:
         stored: the variable.
         dims: the group's dimensions.
         where: the variable's full name, for messages.
+        part: what to take along some dimensions, all of the others.
 
     Raises:
         InputError: its data are damaged or kept in another way than the store's own.
@@ -60,10 +74,26 @@ def get_variable(stored: h5py.Dataset, dims: Mapping[int, str], where: str) -> V
     with named_damage(where):
         _check_storage(stored)
         text = h5py.check_string_dtype(stored.dtype) is not None
-        data = np.asarray(stored.asstr()[()], dtype=object) if text else np.asarray(stored[()])
         attrs = get_attrs(stored)
-        own_dims = tuple(dims[number] for number in stored.attrs[DIM_NUMBERS]) if stored.ndim else ()
+        own_dims = own_dimensions(stored, dims)
+        wanted = [(part or {}).get(dim, slice(None)) for dim in own_dims]
+        if text:
+            data = np.asarray(stored.asstr()[()], dtype=object)[tuple(wanted)]
+        elif all(piece == slice(None) for piece in wanted):
+            data = np.asarray(stored[()])
+        else:
+            data = _read_part(stored, wanted)
         return Variable(own_dims, data, attrs.pop("units"), attrs.pop("long_name"), attrs)
+
+
+def _read_part(stored: h5py.Dataset, part: list[slice]) -> npt.NDArray[Any]:
+    """A part of numbers: neighbouring rows at a time, thinned in memory, which is faster than in the file."""
+    rows = range(*part[0].indices(stored.shape[0]))
+    row_bytes = stored.dtype.itemsize * math.prod(stored.shape[1:])
+    together = max(1, PIECE_BYTES // max(1, row_bytes * rows.step))
+    pieces = [rows[k : k + together] for k in range(0, len(rows), together)]
+    read = [stored[piece.start : piece.stop][:: piece.step][:, *part[1:]] for piece in pieces if len(piece)]
+    return np.concatenate(read) if read else np.empty((0, *stored.shape[1:]), stored.dtype)[:, *part[1:]]
 
 
 def get_attrs(stored: h5py.Group | h5py.Dataset) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -18,8 +18,10 @@ from fastmech.store.decode import (
     is_dimension_only,
     members,
     named_damage,
+    own_dimensions,
 )
 from fastmech.store.schema import FORMAT, SCHEMA_VERSION
+from fastmech.store.select import select
 
 if TYPE_CHECKING:
     import xarray
@@ -109,25 +111,27 @@ class Section:
     """One section of a result file, used like a `fastmech.results.Dataset`: `section["phi"]` is a `Variable`.
 
     Attributes:
+        where: the file and the section's name, for messages.
         attrs: the section's attributes.
         sizes: length of each dimension.
         variables: the variables by name, each read anew whenever it is asked for.
     """
 
     def __init__(self, group: h5py.Group, where: str) -> None:
-        self._where = where
+        self.where = where
         with named_damage(where):
             stored = {n: member for n, member in members(group).items() if isinstance(member, h5py.Dataset)}
             variables = {name: member for name, member in stored.items() if not is_dimension_only(member)}
             dims = dimensions(stored.values())
             self.sizes = {dim: int(stored[dim].size) for dim in dims.values()}
             self.attrs: dict[str, Any] = get_attrs(group)
-        self.variables: Mapping[str, Variable] = _StoredVariables(variables, dims, where)
+        self._stored = _StoredVariables(variables, dims, where)
+        self.variables: Mapping[str, Variable] = self._stored
 
     def __getitem__(self, name: str) -> Variable:
         if name not in self.variables:
             known = ", ".join(self.variables) or "none"
-            raise InputError(f"variable {name!r}: is not in {self._where}; it has {known}")
+            raise InputError(f"variable {name!r}: is not in {self.where}; it has {known}")
         return self.variables[name]
 
     def __contains__(self, name: object) -> bool:
@@ -139,13 +143,35 @@ class Section:
     def __len__(self) -> int:
         return len(self.variables)
 
-    def load(self) -> Dataset:
-        """Read all variables.
+    def dims(self, name: str) -> tuple[str, ...]:
+        """Dimensions of a variable, which is not read."""
+        return self._stored.dims(name)
+
+    def load(self, names: Collection[str] | None = None, part: Mapping[str, slice] | None = None) -> Dataset:
+        """Read variables.
+
+        Args:
+            names: which; None: all.
+            part: what to take along some dimensions, with steps of 1 or more; nothing else is kept in memory.
 
         Raises:
             InputError: a variable's data are damaged; the message names it.
         """
-        return Dataset(dict(self.variables), self.attrs)
+        chosen = [name for name in self.variables if names is None or name in names]
+        return Dataset({name: self._stored.read(name, part) for name in chosen}, self.attrs)
+
+    def select(self, names: Collection[str] | None = None, **values: float) -> Dataset:
+        """The section at one value of some coordinates: ``results["map"].select(F0=100.0)``.
+
+        Args:
+            names: variables to read; None: all. The coordinates of their dimensions come too.
+            values: the nearest point along each coordinate or, along a dimension without coordinate, a place
+                counted from 0. The dimension is dropped; its coordinate stays as a scalar.
+
+        Raises:
+            InputError: an unknown dimension or variable, a place that is none, or damaged data.
+        """
+        return select(self, values, names)
 
     def to_xarray(self) -> xarray.Dataset:
         """Read all variables as an `xarray.Dataset`.
@@ -165,11 +191,25 @@ class _StoredVariables(Mapping[str, Variable]):
         self._where = where
 
     def __getitem__(self, name: str) -> Variable:
+        return self.read(name, None)
+
+    def read(self, name: str, part: Mapping[str, slice] | None) -> Variable:
+        """A variable, or a part of it."""
+        return get_variable(self._open(name), self._dims, self._called(name), part)
+
+    def dims(self, name: str) -> tuple[str, ...]:
+        """Dimensions of a variable."""
+        with named_damage(self._called(name)):
+            return own_dimensions(self._open(name), self._dims)
+
+    def _open(self, name: str) -> h5py.Dataset:
         stored = self._stored[name]
-        where = f"{self._where}: variable {name!r}"
         if not stored:
-            raise InputError(f"{where}: the file is closed; read it before")
-        return get_variable(stored, self._dims, where)
+            raise InputError(f"{self._called(name)}: the file is closed; read it before")
+        return stored
+
+    def _called(self, name: str) -> str:
+        return f"{self._where}: variable {name!r}"
 
     def __contains__(self, name: object) -> bool:
         return name in self._stored

@@ -20,19 +20,22 @@ CHANGE = "scene_"
 IN_MEMORY_BYTES = 64 << 20
 
 
-def assembled(section: TiledSection, tile: Tiles, seconds: float) -> Dataset | Stream:
+def assembled(
+    section: TiledSection, tile: Tiles, seconds: float, notes: Mapping[str, str] | None = None
+) -> Dataset | Stream:
     """A section of its tiles, with the attributes that every section has.
 
     Args:
         section: which.
         tile: gives its tiles.
         seconds: wall time that they took [s].
+        notes: further attributes.
     """
     result = section.tiling.assemble(tile)
     if isinstance(result, Stream) and result.nbytes <= IN_MEMORY_BYTES:
         result = in_memory(result)
     changes = {f"{CHANGE}{key}": float(value) for key, value in section.scan.scene.items()}
-    own = {"kind": section.scan.kind, **changes}
+    own = {"kind": section.scan.kind, **changes, **(notes or {})}
     if isinstance(result, Stream):
         attrs = {**own, **result.fixed.attrs, "wall_time_s": seconds}
         return replace(result, fixed=Dataset(result.fixed.variables, attrs))
