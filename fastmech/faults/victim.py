@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import fastmech.faults.small_tiles  # noqa: F401 - many tiles
 from fastmech.ensembles.run import Progress
 from fastmech.errors import InputError
+from fastmech.faults.small_tiles import small_tiles
 from fastmech.results import Variable
 from fastmech.runner import run_request
 from fastmech.scan_types import scan_kinds
@@ -71,7 +71,8 @@ def run_victim(folder: str, log: str) -> None:
 
     request, out = Path(folder) / "scan.toml", Path(folder) / "scan.h5"
     try:
-        run_request(request, out, context=RunContext(THREADS, stage), hire=_NotedHiring(note))
+        with small_tiles():
+            run_request(request, out, context=RunContext(THREADS, stage), hire=_NotedHiring(note))
     except InputError as error:
         note(f"refused {error}")
     else:

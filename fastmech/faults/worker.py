@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from fastmech.faults.processes import FaultFound, Reference, place
+from fastmech.faults.small_tiles import small_tiles
 from fastmech.faults.victim import content_of
 from fastmech.runner import run_request
 from fastmech.scan_types.request import RunContext
@@ -46,11 +47,12 @@ def worker_campaign(
 
     from fastmech.tiles.cluster import ClusterHiring
 
-    settings = {"dashboard_address": None, "silence_logs": 50, "preload": ["fastmech.faults.victim"]}
+    settings = {"dashboard_address": None, "silence_logs": 50, "preload": ["fastmech.faults.small_tiles"]}
     rng, report = random.Random(seed), WorkerReport()
     while report.kills < kills:
         with (
             place() as here,
+            small_tiles(),
             LocalCluster(n_workers=2, threads_per_worker=1, **settings) as cluster,
             Client(cluster, set_as_default=False) as client,
         ):

@@ -9,6 +9,7 @@ from fastmech.runner import run_request
 from fastmech.scan_types.request import RunContext
 from fastmech.store.read import open_results
 from fastmech.tiles.report import RunReport
+from fastmech.tiles.section import _tiling
 
 #: Eight tiles: a line's folds, six of its points, and a section that is not divided.
 REQUEST = """
@@ -30,6 +31,7 @@ Run = Callable[..., RunReport]
 @pytest.fixture(autouse=True)
 def _small_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("fastmech.scan_types.map_tiling.TILE_POINTS", 10)
+    _tiling.cache_clear()
 
 
 @pytest.fixture
