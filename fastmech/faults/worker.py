@@ -47,7 +47,7 @@ def worker_campaign(
 
     from fastmech.tiles.cluster import ClusterHiring
 
-    settings = {"dashboard_address": None, "silence_logs": 50, "preload": ["fastmech.faults.small_tiles"]}
+    settings = {"dashboard_address": ":0", "silence_logs": 50, "preload": ["fastmech.faults.small_tiles"]}
     rng, report = random.Random(seed), WorkerReport()
     while report.kills < kills:
         with (

@@ -14,7 +14,7 @@ from fastmech.store.write import write_results
 from fastmech.tiles.identity import asked_for, identity_of
 from fastmech.tiles.parts import Parts
 from fastmech.tiles.section import TiledSection, sections_of
-from fastmech.tiles.tile_file import DamagedTileError, check_tile, tile_dataset
+from fastmech.tiles.tile_file import DamagedTileError, head_of, tile_dataset
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def compute_alone(path: Path, tile: str, context: RunContext, target: Path) -> L
         raise InputError(f"--tile {tile}: {name} has the tiles 0 to {section.tiling.count - 1}")
     index = int(number)
     data = section.compute(index, context)
-    head = check_tile(data, section.identity, name, index)
+    head = head_of(data)
     parts = Parts(target)
     parts.look(list(sections.values()))
     try:

@@ -104,7 +104,7 @@ def cluster(workers: int | None, scheduler: str | None) -> Iterator[ClusterHirin
     try:
         if scheduler is None:
             local = LocalCluster(
-                n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=50
+                n_workers=workers, threads_per_worker=1, dashboard_address=":0", silence_logs=50
             )
         else:
             local = None

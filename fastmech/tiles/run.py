@@ -21,7 +21,7 @@ from fastmech.tiles.identity import asked_for, asked_of_result, differences, ide
 from fastmech.tiles.parts import Manifest, Parts
 from fastmech.tiles.report import RunReport
 from fastmech.tiles.section import TiledSection, sections_of
-from fastmech.tiles.tile_file import DamagedTileError, check_tile
+from fastmech.tiles.tile_file import DamagedTileError, head_of
 from fastmech.tiles.work import Crash, Hiring, Task, compute_tiles
 
 #: How often a result is assembled anew because a tile was damaged meanwhile.
@@ -182,9 +182,8 @@ class ScanRun:
                 stages[section.name] = self.context.stage(f"{section.name}: {section.tiling.what}", total)
 
         def keep(task: Task, data: bytes) -> None:
-            head = check_tile(data, self.identity, task.section.name, task.index)
             self.parts.store(task.section, task.index, data)
-            self.seconds[task] = head.seconds
+            self.seconds[task] = head_of(data).seconds
             self.report.computed += 1
             if task.section.name in stages:
                 stages[task.section.name](task.section.tiling.items(task.index))

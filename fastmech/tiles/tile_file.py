@@ -1,7 +1,7 @@
-"""A tile as bytes: a line that says what it is, its content, and a digest of both.
+"""A tile as bytes: a line that says what it is, its content, and a digest of the line.
 
-The digest covers every byte of the file, also the line; a tile under another name, of another request or cut
-short is told as surely as one with a flipped bit.
+The line holds a digest of the content, so every byte is covered; a tile under another name, of another request
+or cut short is told as surely as one with a flipped bit.
 """
 
 from __future__ import annotations
@@ -47,7 +47,13 @@ def encode_tile(identity: str, section: str, index: int, dataset: Dataset, secon
     image = dataset_image(dataset)
     head = TileHead(identity, section, index, _digest(image).hex(), round(seconds, 4))
     line = json.dumps({"format": FORMAT, **asdict(head)}).encode() + b"\n"
-    return b"".join((line, image, _digest(line, image)))
+    return b"".join((line, image, _digest(line)))
+
+
+def head_of(data: bytes) -> TileHead:
+    """What a tile that has just been computed is; nothing is checked."""
+    line, _ = _split(data)
+    return TileHead(**{name: value for name, value in json.loads(line).items() if name != "format"})
 
 
 def check_tile(data: bytes, identity: str, section: str, index: int) -> TileHead:
@@ -56,11 +62,12 @@ def check_tile(data: bytes, identity: str, section: str, index: int) -> TileHead
     Raises:
         DamagedTileError: they are damaged, cut short, or another tile's.
     """
-    line, _ = _split(data)
-    head = json.loads(line)
-    if head.pop("format") != FORMAT:
-        raise DamagedTileError(f"is no {FORMAT}")
-    found = TileHead(**head)
+    line, image = _split(data)
+    if _digest(line) != data[-DIGEST_BYTES:] or json.loads(line)["format"] != FORMAT:
+        raise DamagedTileError("does not match its checksum")
+    found = head_of(data)
+    if _digest(image).hex() != found.content:
+        raise DamagedTileError("does not match its checksum")
     if (found.identity, found.section, found.index) != (identity, section, index):
         raise DamagedTileError(f"is tile {found.index} of {found.section} of another request")
     return found
@@ -68,22 +75,16 @@ def check_tile(data: bytes, identity: str, section: str, index: int) -> TileHead
 
 def tile_dataset(data: bytes) -> Dataset:
     """The dataset of a tile that has been checked."""
-    _, image = _split(data, checked=True)
+    _, image = _split(data)
     return dataset_of_image(image)
 
 
-def _split(data: bytes, checked: bool = False) -> tuple[bytes, memoryview]:
+def _split(data: bytes) -> tuple[bytes, memoryview]:
     end = data.find(b"\n", 0, _LONGEST_LINE) + 1
     if not end or len(data) < end + DIGEST_BYTES:
         raise DamagedTileError("is cut short")
-    view = memoryview(data)
-    if not checked and _digest(view[:-DIGEST_BYTES]) != data[-DIGEST_BYTES:]:
-        raise DamagedTileError("does not match its checksum")
-    return data[:end], view[end:-DIGEST_BYTES]
+    return data[:end], memoryview(data)[end:-DIGEST_BYTES]
 
 
-def _digest(*parts: bytes | memoryview) -> bytes:
-    digest = hashlib.blake2b(digest_size=DIGEST_BYTES)
-    for part in parts:
-        digest.update(part)
-    return digest.digest()
+def _digest(data: bytes | memoryview) -> bytes:
+    return hashlib.blake2b(data, digest_size=DIGEST_BYTES).digest()

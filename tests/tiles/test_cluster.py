@@ -19,7 +19,7 @@ pytestmark = pytest.mark.filterwarnings("default")
 
 
 def test_a_worker_dies_and_the_result_is_the_same(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    settings = {"dashboard_address": None, "silence_logs": 50, "preload": ["fastmech.faults.small_tiles"]}
+    settings = {"dashboard_address": ":0", "silence_logs": 50, "preload": ["fastmech.faults.small_tiles"]}
     monkeypatch.setattr("fastmech.scan_types.map_tiling.TILE_POINTS", 20)  # as on the workers
     whole = content(run("whole.h5").path)
     with (
