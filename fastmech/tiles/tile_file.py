@@ -1,7 +1,7 @@
 """A tile as bytes: a line that says what it is, its content, and a digest of the line.
 
-The line holds a digest of the content, so every byte is covered; a tile under another name, of another request
-or cut short is told as surely as one with a flipped bit.
+The line holds a digest of the content, so every byte is covered; a tile under another name, of another
+request or cut short is told as surely as one with a flipped bit.
 """
 
 from __future__ import annotations
