@@ -13,6 +13,11 @@ if TYPE_CHECKING:
     from fastmech.atlas.folds import trace_folds
     from fastmech.atlas.map import map_equilibria
     from fastmech.atlas.snap import find_snap
+    from fastmech.basins.label import labels_of
+    from fastmech.basins.map import map_basins
+    from fastmech.basins.status import BasinStatus
+    from fastmech.capture.barriers import barrier_tree
+    from fastmech.capture.certificate import trapped
     from fastmech.disturbance.ensemble import disturb
     from fastmech.disturbance.linear_range import linear_range
     from fastmech.disturbance.motion import disturbed_motion
@@ -34,11 +39,13 @@ except metadata.PackageNotFoundError:  # run from its sources, not installed
     __version__ = "unknown"
 
 _MODULES = {
+    "BasinStatus": "fastmech.basins.status",
     "InputError": "fastmech.errors",
     "Outcome": "fastmech.disturbance.outcome",
     "Scene": "fastmech.scene",
     "Status": "fastmech.ensembles.status",
     "System": "fastmech.ensembles.system",
+    "barrier_tree": "fastmech.capture.barriers",
     "classify": "fastmech.stability.classify",
     "cos": "fastmech.kernels.sincos",
     "disturb": "fastmech.disturbance.ensemble",
@@ -47,20 +54,25 @@ _MODULES = {
     "find_folds": "fastmech.atlas.fold_points",
     "find_snap": "fastmech.atlas.snap",
     "integrate": "fastmech.ensembles.integrate",
+    "labels_of": "fastmech.basins.label",
     "linear_range": "fastmech.disturbance.linear_range",
+    "map_basins": "fastmech.basins.map",
     "map_equilibria": "fastmech.atlas.map",
     "open_results": "fastmech.store.read",
     "reactions": "fastmech.mechanism.reactions",
     "sin": "fastmech.kernels.sincos",
     "trace_folds": "fastmech.atlas.folds",
+    "trapped": "fastmech.capture.certificate",
 }
 
 __all__ = [
+    "BasinStatus",
     "InputError",
     "Outcome",
     "Scene",
     "Status",
     "System",
+    "barrier_tree",
     "classify",
     "cos",
     "disturb",
@@ -69,12 +81,15 @@ __all__ = [
     "find_folds",
     "find_snap",
     "integrate",
+    "labels_of",
     "linear_range",
+    "map_basins",
     "map_equilibria",
     "open_results",
     "reactions",
     "sin",
     "trace_folds",
+    "trapped",
 ]
 
 

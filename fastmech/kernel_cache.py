@@ -32,6 +32,7 @@ COMPILED = (
     "stability",
     "disturbance",
     "atlas",
+    "capture",
 )
 
 

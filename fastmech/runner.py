@@ -81,8 +81,8 @@ def draw_results(path: str | Path, out: str | Path | None = None) -> Iterator[Pa
         folder = Path(out) if out is not None else Path(path).with_suffix("")
         _make_folder(folder)
         for name in results:
-            section = results[name].load()
-            figures = kinds[section.attrs["kind"]].draw(section, scene_of_section(results, name))
+            kind, scene = kinds[results[name].attrs["kind"]], scene_of_section(results, name)
+            figures = kind.draw(kind.read(results[name], scene), scene)
             for what, figure in figures.items():
                 picture = folder / f"{name}_{what}.png"
                 try:

@@ -27,6 +27,8 @@ LAYERS = (
     "equilibria",
     "atlas",
     "disturbance",
+    "capture",
+    "basins",
     "results",
     "store",
     "plots",

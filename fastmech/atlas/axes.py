@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from types import SimpleNamespace
 from typing import Any
 
@@ -20,35 +20,60 @@ def check_axes(scene: Scene, axes: Mapping[str, ArrayLike], most: int = 3) -> di
     """The axes as float64 vectors, every value one that the scene accepts.
 
     Raises:
-        InputError: none or more than ``most`` axes, an unknown name, or a value that the scene refuses.
+        InputError: no mapping, none or more than ``most`` axes, an unknown name, values that are no numbers
+            or that the scene refuses, or F0 where the scene's force decays.
     """
+    if not isinstance(axes, Mapping):
+        raise InputError(f"axes = {_short(axes)}: must map parameter names to their values")
     if not 1 <= len(axes) <= most:
         raise InputError(f"axes: {len(axes)} given; one to {_WORDS[most]} parameters are allowed")
-    if "F0" in axes and scene.alpha > 0.0 and "alpha" not in axes:
-        raise InputError(
-            f"scene.alpha = {scene.alpha:g}: must be 0 1/s where F0 is an axis, or no force is left at rest"
-        )
-    return {name: check_axis(scene, name, values) for name, values in axes.items()}
+    checked = {name: _check_values(scene, name, values) for name, values in axes.items()}
+    refuse_decaying_load(scene, checked)
+    return checked
 
 
 _WORDS = {2: "two", 3: "three"}
 
 
-def check_axis(scene: Scene, name: str, values: ArrayLike) -> Floats:
-    """One axis as a float64 vector.
+def refuse_decaying_load(scene: Scene, names: Collection[str]) -> None:
+    """F0 is a load at rest only where it is constant.
 
     Raises:
-        InputError: see ``check_axes``.
+        InputError: F0 is one of the parameters that vary, and the scene's force decays.
     """
+    if "F0" in names and scene.alpha > 0.0 and "alpha" not in names:
+        raise InputError(
+            f"scene.alpha = {scene.alpha:g}: must be 0 1/s where F0 is an axis, or no force is left at rest"
+        )
+
+
+def check_axis(scene: Scene, name: str, values: ArrayLike) -> Floats:
+    """One axis of a search for folds as a float64 vector.
+
+    Raises:
+        InputError: as ``check_axes``, or the parameter is alpha, which moves no fold.
+    """
+    vector = _check_values(scene, name, values)
+    if name == "alpha":
+        raise InputError("axes.alpha: equilibria do not depend on how fast a force decays; choose another")
+    refuse_decaying_load(scene, (name,))
+    return vector
+
+
+def _check_values(scene: Scene, name: str, values: ArrayLike) -> Floats:
     names = list(Scene.model_fields)
     if name not in names:
-        raise InputError(f"axes.{name}: unknown parameter; {nearest(name, names)}")
+        hint = nearest(name, names) if isinstance(name, str) else f"allowed: {', '.join(names)}"
+        raise InputError(f"axes.{name}: unknown parameter; {hint}")
     try:
-        vector = np.ascontiguousarray(values, dtype=np.float64)
+        array = np.asarray(values)
     except (TypeError, ValueError):
-        raise InputError(f"axes.{name}: must be a sequence of numbers") from None
-    if vector.ndim != 1 or vector.size == 0:
-        raise InputError(f"axes.{name}: shape {vector.shape}: must be one-dimensional and not empty")
+        array = np.array(None)
+    if array.size and array.dtype.kind not in "iuf":
+        raise InputError(f"axes.{name} = {_short(values)}: must be a sequence of numbers")
+    vector = np.ascontiguousarray(array, dtype=np.float64)
+    if array.ndim != 1 or array.size == 0:
+        raise InputError(f"axes.{name}: shape {array.shape}: must be one-dimensional and not empty")
     for value in (vector.min(), vector.max()):
         # What a scene allows of a parameter is an interval of finite numbers.
         try:
@@ -56,6 +81,11 @@ def check_axis(scene: Scene, name: str, values: ArrayLike) -> Floats:
         except InputError:
             _name_the_value(scene, name, vector)
     return vector
+
+
+def _short(value: object) -> str:
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def _name_the_value(scene: Scene, name: str, vector: Floats) -> None:

@@ -23,10 +23,16 @@ LONGEST, SHORTEST = 0.02, 1e-8
 #: Cosine of the largest turn of the tangent in one step.
 TURN = 0.985
 
+#: How a march along a curve ends.
+CLOSED, LEFT, CUT_SHORT = "closed", "left the rectangle", "cut short"
+
 #: Newton's method ends when a step is this short.
 SETTLED = 1e-14
 
 MOST_STEPS = 20_000
+
+#: Singular values below this part of the largest one are zero within rounding.
+RANK = 1e-9
 
 
 @dataclass(frozen=True)
@@ -36,6 +42,13 @@ class Curve:
     points: Floats  #: (points, n + 1)
     tangents: Floats  #: (points, n + 1), of unit length, all pointing onwards
     closed: bool  #: the last point is the first one again
+    finished: bool = True  #: False: cut short at ``MOST_STEPS``, or where the curve could not be followed
+
+
+def regular(system: System, z: Floats) -> bool:
+    """Whether the solutions near z are one curve: the Jacobian has full rank beyond rounding."""
+    sizes = np.linalg.svd(system(z)[1], compute_uv=False)
+    return bool(sizes[-1] > RANK * sizes[0])
 
 
 def newton(system: System, z: Floats, reach: float, normal: Floats | None = None) -> Floats | None:
@@ -93,12 +106,14 @@ def trace(
         longest: longest step.
     """
     tangent = tangent_at(system, start)
-    points, tangents, closed = _march(system, start, tangent, inside, finish, apart, longest)
-    if not closed:
-        back, back_tangents, _ = _march(system, start, -tangent, inside, finish, apart, longest)
+    points, tangents, end = _march(system, start, tangent, inside, finish, apart, longest)
+    ends = [end]
+    if end != CLOSED:
+        back, back_tangents, end = _march(system, start, -tangent, inside, finish, apart, longest)
         points = back[:0:-1] + points
         tangents = [-t for t in back_tangents[:0:-1]] + tangents
-    return Curve(np.array(points), np.array(tangents), closed)
+        ends.append(end)
+    return Curve(np.array(points), np.array(tangents), CLOSED in ends, CUT_SHORT not in ends)
 
 
 def _march(
@@ -109,7 +124,7 @@ def _march(
     finish: Callable[[Floats, Floats], Floats],
     apart: Callable[[Floats, Floats], Floats],
     longest: float,
-) -> tuple[list[Floats], list[Floats], bool]:
+) -> tuple[list[Floats], list[Floats], str]:
     points, tangents = [start], [tangent]
     step = 0.25 * longest
     while step >= SHORTEST and len(points) < MOST_STEPS:
@@ -124,17 +139,17 @@ def _march(
             gap = apart(start, z)
             along = float(gap @ t)
             if 0.0 < along <= 1.2 * step and np.linalg.norm(gap - along * t) < 0.3 * step:
-                return [*points, z + gap], [*tangents, tangents[0]], True
+                return [*points, z + gap], [*tangents, tangents[0]], CLOSED
         if not inside(there):
             end = finish(z, there)
             if np.linalg.norm(end - z) > 0.0:
                 points.append(end)
                 tangents.append(ahead)
-            break
+            return points, tangents, LEFT
         points.append(there)
         tangents.append(ahead)
         step = min(longest, 1.5 * step)
-    return points, tangents, False
+    return points, tangents, CUT_SHORT
 
 
 def distance(curve: Floats, point: Floats, apart: Callable[[Floats, Floats], Floats]) -> tuple[float, int]:

@@ -12,8 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.atlas.continuation import LONGEST, System, distance, newton, trace
-from fastmech.atlas.folds import EXPLAINED, apart, checked_plane, finish_on_edge, inside, plane_of
+from fastmech.atlas.continuation import LONGEST, System, distance, newton, regular, trace
+from fastmech.atlas.folds import (
+    EXPLAINED,
+    MOST_POINTS,
+    apart,
+    checked_plane,
+    finish_on_edge,
+    inside,
+    plane_of,
+)
 from fastmech.atlas.map import EquilibriumMap, map_equilibria
 from fastmech.atlas.systems import Plane, dead_centre, point_at, straight, unloaded
 from fastmech.scene import Scene
@@ -26,6 +34,9 @@ SYSTEMS: dict[str, Callable[[Plane], System]] = {
     SIN_PSI: straight,
     UNLOADED: unloaded,
 }
+
+#: A quantity this small, over its own scale, is zero within rounding.
+ZERO = 1e-9
 
 #: A curve ends this near to where its equilibrium stops being stable [rad and parts of the ranges].
 END = 1e-3
@@ -43,13 +54,38 @@ class UnreachedCurve:
     residual: float  #: largest scaled residual on the curve
 
 
+@dataclass(frozen=True, eq=False)
+class UnreachedSheet:
+    """Stable equilibria of which the damper misses a mode all over a part of the plane, not on a curve."""
+
+    vanishes: str  #: as for ``UnreachedCurve``
+    x: float  #: one of the points
+    y: float
+    phi: float  #: the stable equilibrium there [rad]
+    theta: float  #: [rad]
+    share: float  #: of the grid's points
+
+
+@dataclass(frozen=True, eq=False)
+class UnreachedSet:
+    """Where, in a plane of two parameters, the damper misses a mode of a stable equilibrium."""
+
+    curves: tuple[UnreachedCurve, ...]
+    everywhere: tuple[UnreachedSheet, ...]
+    crossings: int  #: edges of the grid along which one of the quantities changes sign on a stable sheet
+    unexplained: int  #: of these, how many have no curve, because none was found or ``MOST_POINTS`` was met
+    unfinished: int  #: curves that end where they could not be followed any further
+
+
 def trace_unreached(
     scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike], *, threads: int | None = None
-) -> tuple[UnreachedCurve, ...]:
+) -> UnreachedSet:
     """Vanishing-damping curves of ``scene`` in the plane of two parameters.
 
     The values are the grid of the map that seeds them: a curve passes wherever one of the three quantities
-    changes sign between neighbours of one stable sheet. Nothing is found without a damper (beta = 0).
+    changes sign between neighbours of one stable sheet. Where a quantity vanishes all over a sheet (with
+    c2 = m1 g / l the rod is unloaded whatever F0 and c1 are) there is no curve, and the sheet is named
+    instead. Nothing is found without a damper (beta = 0).
 
     Raises:
         InputError: as ``trace_folds``.
@@ -57,17 +93,28 @@ def trace_unreached(
     axes = checked_plane(scene, x, y)
     plane = plane_of(scene, axes)
     if scene.beta == 0.0 and "beta" not in axes:
-        return ()
+        return UnreachedSet((), (), 0, 0, 0)
     atlas = map_equilibria(scene, axes, threads=threads)
-    curves = []
+    curves: list[UnreachedCurve] = []
+    everywhere: list[UnreachedSheet] = []
+    crossings = unexplained = unfinished = traced = 0
     for name, make in SYSTEMS.items():
         equations = make(plane)
         lines: list[Floats] = []
-        for seed in seeds(plane, atlas, name):
+        places, sheets = seeds(plane, atlas, name)
+        everywhere += sheets
+        crossings += len(places)
+        for seed in places:
             if any(distance(line, seed, apart)[0] < LONGEST for line in lines):
                 continue
-            start = newton(equations, seed, reach=0.2)
-            if start is None or not stable(plane, start) or not inside(start):
+            start = newton(equations, seed, reach=0.2) if traced < MOST_POINTS else None
+            if (
+                start is None
+                or not regular(equations, start)
+                or not stable(plane, start)
+                or not inside(start)
+            ):
+                unexplained += 1
                 continue
             if any(distance(line, start, apart)[0] < EXPLAINED for line in lines):
                 continue
@@ -75,8 +122,10 @@ def trace_unreached(
                 equations, start, lambda z: inside(z) and stable(plane, z), finish(plane, equations), apart
             )
             lines.append(line.points)
+            traced += len(line.points)
+            unfinished += not line.finished
         curves += [curve_of(plane, name, equations, line) for line in lines if len(line) > 1]
-    return tuple(curves)
+    return UnreachedSet(tuple(curves), tuple(everywhere), crossings, unexplained, unfinished)
 
 
 def stable(plane: Plane, z: Floats) -> bool:
@@ -103,15 +152,18 @@ def finish(plane: Plane, equations: System) -> Callable[[Floats, Floats], Floats
     return end
 
 
-def seeds(plane: Plane, atlas: EquilibriumMap, name: str) -> Floats:
-    """Points (n, 4) near which the quantity vanishes, by linear interpolation between neighbours."""
+def seeds(plane: Plane, atlas: EquilibriumMap, name: str) -> tuple[Floats, list[UnreachedSheet]]:
+    """Points (n, 4) near which the quantity vanishes, by linear interpolation between neighbours.
+
+    Cells of the grid at whose four corners it vanishes are no place of a curve: their sheets are told apart.
+    """
     first, second = (np.asarray(values) for values in atlas.axes.values())
     u, v = np.meshgrid(
         plane.parts(np.stack([first, np.full_like(first, plane.low[1])], axis=-1))[:, 0],
         plane.parts(np.stack([np.full_like(second, plane.low[0]), second], axis=-1))[:, 1],
         indexing="ij",
     )
-    found = []
+    found, everywhere = [], []
     for sheet in np.flatnonzero(atlas.sheet_morse_index == 0):
         there = atlas.sheet == sheet
 
@@ -126,15 +178,35 @@ def seeds(plane: Plane, atlas: EquilibriumMap, name: str) -> Floats:
             SIN_PSI: np.sin(phi + theta),
             UNLOADED: np.where(np.isnan(phi), np.nan, (p.hessian[2] - p.spring).reshape(phi.shape)),
         }[name]
+        flat = all_over(np.abs(size) < ZERO)
+        if flat.any():
+            everywhere.append(sheet_of(plane, name, z[flat], flat.mean()))
         for one, two in (
             ((slice(None, -1), slice(None)), (slice(1, None), slice(None))),
             ((slice(None), slice(None, -1)), (slice(None), slice(1, None))),
         ):
-            change = size[one] * size[two] <= 0.0
+            change = (size[one] * size[two] <= 0.0) & ~flat[one] & ~flat[two]
             start, gap = z[one][change], apart(z[two][change], z[one][change])
             a, b = size[one][change], size[two][change]
             found.append(start + (a / np.where(a == b, 1.0, a - b))[:, None] * gap)
-    return np.concatenate(found) if found else np.empty((0, 4))
+    return np.concatenate(found) if found else np.empty((0, 4)), everywhere
+
+
+def all_over(zero: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The corners of the cells of which all four corners are zero."""
+    cell = zero[1:, 1:] & zero[1:, :-1] & zero[:-1, 1:] & zero[:-1, :-1]
+    flat = np.zeros_like(zero)
+    for rows in (slice(1, None), slice(None, -1)):
+        for columns in (slice(1, None), slice(None, -1)):
+            flat[rows, columns] |= cell
+    return flat
+
+
+def sheet_of(plane: Plane, name: str, places: Floats, share: float) -> UnreachedSheet:
+    """A sheet that vanishes at these places (n, 4), told by the middle one, in the parameters' units."""
+    phi, theta, u, v = places[len(places) // 2]
+    x, y = (float(value) for value in plane.values((u, v)).values())
+    return UnreachedSheet(name, x, y, float(phi), float(theta), float(share))
 
 
 def curve_of(plane: Plane, name: str, equations: System, points: Floats) -> UnreachedCurve:

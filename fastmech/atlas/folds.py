@@ -20,6 +20,9 @@ Floats = NDArray[np.float64]
 #: A seed this near to a traced curve is explained by it: a tenth of the longest step.
 EXPLAINED = 0.1 * LONGEST
 
+#: Points after which no further curve is begun; the edges that are left count as unexplained.
+MOST_POINTS = 40_000
+
 
 @dataclass(frozen=True, eq=False)
 class FoldCurve:
@@ -55,6 +58,7 @@ class FoldSet:
     cusps: tuple[CuspPoint, ...]
     crossings: int  #: edges of the grid between whose ends the number of equilibria changes
     unexplained: int  #: of these, how many no curve crosses
+    unfinished: int  #: curves that end where they could not be followed any further
 
 
 def trace_folds(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike]) -> FoldSet:
@@ -80,6 +84,9 @@ def trace_folds(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike]
     for seed in seeds:
         if any(distance(line.points, seed, apart)[0] < EXPLAINED for line in lines):
             continue
+        if sum(len(line.points) for line in lines) > MOST_POINTS:
+            unexplained += 1
+            continue
         special = symmetry.branching(plane, seed)
         line = trace_branching(plane, seed, *special) if special else trace_fold(plane, seed)
         if line is None:
@@ -93,7 +100,12 @@ def trace_folds(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike]
         points = line.points if branch else with_cusps(plane, line, cusps)
         curves.append(fold_curve(plane, points, line.closed, branch))
     return FoldSet(
-        (x[0], y[0]), tuple(curves), tuple(cusp_point(plane, z) for z in cusps), len(seeds), unexplained
+        (x[0], y[0]),
+        tuple(curves),
+        tuple(cusp_point(plane, z) for z in cusps),
+        len(seeds),
+        unexplained,
+        sum(not line.finished for line in lines),
     )
 
 
@@ -148,7 +160,7 @@ def trace_branching(plane: Plane, seed: Floats, equations: System, largest: int)
     flat = trace(equations, start, inside, finish_on_edge(equations), lambda a, b: a - b)
     _, _, phi, theta = margins_at(plane, flat.points)
     angles = settled(plane, np.unwrap(np.column_stack([phi, theta]), axis=0), flat.points, largest)
-    return Curve(np.column_stack([angles, flat.points]), flat.tangents, flat.closed)
+    return Curve(np.column_stack([angles, flat.points]), flat.tangents, flat.closed, flat.finished)
 
 
 def inside(z: Floats) -> bool:

@@ -14,7 +14,7 @@ from fastmech.atlas.assess import assess
 from fastmech.atlas.axes import Floats, check_axes, grid_coefficients
 from fastmech.atlas.coincidence import coincidences
 from fastmech.atlas.sheets import SheetBuilder
-from fastmech.atlas.wells import barriers
+from fastmech.atlas.wells import barriers, least_speeds
 from fastmech.ensembles.threads import thread_count
 from fastmech.equilibria.search import MOST
 from fastmech.equilibria.solve import solve
@@ -52,7 +52,7 @@ class Slab:
     frequency: Floats  #: lowest undamped natural frequency [rad/s], (n, 6); NaN where U falls
     decay_time: Floats  #: slowest linear mode falls to 1/e [s], (n, 6), inf: it does not; NaN: no minimum
     depth: Floats  #: energy from a minimum to the lowest way out of its well [J], (n, 6)
-    escape_speed: Floats  #: of M2, at which its own kinetic energy is that [m/s], (n, 6)
+    escape_speed: Floats  #: of M2, below which no kick leaves the well [m/s], (n, 6); see ``least_speeds``
 
     @classmethod
     def empty(cls, n: int) -> Slab:
@@ -83,6 +83,8 @@ class EquilibriumMap(Slab):
     axes: dict[str, Floats]
     sheet: NDArray[np.int32]  #: grid + (6,), -1 where there is none
     sheet_morse_index: Codes  #: (sheets,)
+    sheet_branch: NDArray[np.int32]  #: (sheets,): sheets of one branch continue one another round a cusp
+    sheet_breaks: NDArray[np.int32]  #: (breaks, axes + 2): see ``fastmech.atlas.sheets``
 
 
 Progress = Callable[[int], None]
@@ -113,17 +115,19 @@ def map_equilibria(
     """
     checked = check_axes(scene, axes)
     grid = tuple(len(values) for values in checked.values())
-    builder = SheetBuilder(grid)
+    builder = SheetBuilder(scene, checked)
     whole = Slab.empty(math.prod(grid))
     for _ in solve_in_slabs(scene, checked, builder, whole.rows, wells, threads, progress):
         pass
-    sheet, sheet_index = builder.finish()
+    sheets = builder.finish()
     shaped = {name: array.reshape(grid + array.shape[1:]) for name, array in vars(whole).items()}
     return EquilibriumMap(
         **shaped,
         axes=checked,
-        sheet=np.concatenate(sheet).reshape(*grid, MOST),
-        sheet_morse_index=sheet_index,
+        sheet=np.concatenate(sheets.labels).reshape(*grid, MOST),
+        sheet_morse_index=sheets.morse_index,
+        sheet_branch=sheets.branch,
+        sheet_breaks=sheets.breaks,
     )
 
 
@@ -189,7 +193,10 @@ def solve_in_slabs(
 def solve_block(
     coefficients: Floats, weight: Floats, constant: Floats, mass: Floats, wells: bool, out: Slab
 ) -> None:
-    """Solve and assess some points; ``weight`` [kg m2] and ``constant`` [J] turn energies into joules."""
+    """Solve and assess some points; ``weight`` [kg m2] and ``constant`` [J] turn energies into joules.
+
+    ``mass`` is m2 [kg].
+    """
     places = (coefficients, out.phi, out.theta)
     expected = np.empty(len(coefficients), dtype=np.int8)
     solve(
@@ -207,7 +214,7 @@ def solve_block(
         out.depth[:] = (out.depth - out.energy) * weight[:, None]
     else:
         out.depth[:] = np.nan
-    out.escape_speed[:] = np.sqrt(2.0 * out.depth / mass[:, None])
+    out.escape_speed[:] = least_speeds(*places, out.depth, mass)
     with np.errstate(divide="ignore"):
         np.divide(1.0, out.decay_time, out=out.decay_time)
     out.energy[:] = out.energy * weight[:, None] + constant[:, None]

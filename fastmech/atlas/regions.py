@@ -4,17 +4,20 @@ Points whose equilibria continue one another completely, none appearing or vanis
 a region an equilibrium is known by its rank there (0 to 5); its label is 8 times the region's number plus the
 rank. Regions are found in one pass over the grid in the order of memory. Where two turn out to be one, the
 second refers to the first together with how its ranks are permuted, so a label stands for one equilibrium at
-every point, whatever the order. (Continuing round a hole of a region may permute the equilibria; there the
-region has a cut, on which the pass happens to close.)
+every point, whatever the order. Continuing round a hole of a region may permute the equilibria; there the
+region has a cut, on which the pass happens to close. The edges of that cut are listed with those between
+regions.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass, field
 
 import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fastmech.atlas.matching import match
+from fastmech.atlas.matching import match, trust
 from fastmech.equilibria.search import MOST
 from fastmech.equilibria.solve import INDICES
 from fastmech.jit import INTEGERS, MATRIX, STATUSES, inlined, kernel
@@ -30,6 +33,7 @@ RANKS = 8
 NO_LABEL = -1
 
 LABELS = types.Array(types.int32, 2, "C")
+PLACES = types.Array(types.int64, 2, "C")
 LABEL_LIST = types.Array(types.int32, 1, "C")
 
 
@@ -44,16 +48,29 @@ def resolve(parent: Labels, rank: Codes, label: int) -> int:
 
 
 @inlined
-def join(parent: Labels, rank: Codes, mine: Labels, other: Labels, partner: Codes, count: int) -> None:
-    """Make two regions one: slot i of ``other`` continues to slot partner[i] of ``mine``."""
-    root = resolve(parent, rank, other[0]) // RANKS
-    attached = resolve(parent, rank, mine[0]) // RANKS
+def join(parent: Labels, rank: Codes, mine: Labels, other: Labels, partner: Codes, count: int) -> bool:
+    """Make two regions one: slot i of ``other`` continues to slot partner[i] of ``mine``.
+
+    Returns:
+        Whether they are one now with every slot where it continues. If they were one before and it is not,
+        going round a hole of the region exchanges equilibria.
+    """
+    root, attached, agree = -1, -1, True
+    for i in range(count):
+        if other[i] < 0:
+            continue
+        a = resolve(parent, rank, mine[partner[i]])
+        b = resolve(parent, rank, other[i])
+        agree = agree and a == b
+        attached, root = a // RANKS, b // RANKS
     if root == attached:
-        return
+        return agree
     swap = root > attached
     if swap:
         root, attached = attached, root
     for i in range(count):
+        if other[i] < 0:
+            continue
         a = resolve(parent, rank, mine[partner[i]]) % RANKS
         b = resolve(parent, rank, other[i]) % RANKS
         if swap:
@@ -61,6 +78,7 @@ def join(parent: Labels, rank: Codes, mine: Labels, other: Labels, partner: Code
         else:
             rank[attached, a] = b
     parent[attached] = root
+    return True
 
 
 @kernel(
@@ -77,8 +95,10 @@ def join(parent: Labels, rank: Codes, mine: Labels, other: Labels, partner: Code
         types.int64,
         LABEL_LIST,
         INDICES,
+        INDICES,
         LABELS,
-        LABELS,
+        PLACES,
+        INDICES,
         INTEGERS,
     )
 )
@@ -95,9 +115,11 @@ def label_points(
     regions: int,
     parent: Labels,
     rank: Codes,
+    morse: Codes,
     label: Labels,
-    loose: Labels,
-    loose_count: NDArray[np.int64],
+    borders: NDArray[np.int64],
+    partners: Codes,
+    border_count: NDArray[np.int64],
 ) -> int:
     """Label the points after the first ``ghosts``, which have their labels already.
 
@@ -108,65 +130,79 @@ def label_points(
         strides, lengths: of the grid's axes, in points.
         regions: number of regions so far.
         parent, rank: trees of regions, with room for one more region for every point; written.
+        morse: (room, 8) Morse index of every label; written.
         label: (n, 6); written.
-        loose: (room, 2) receives pairs of labels that continue one another between regions.
-        loose_count: (1,) how many pairs; written.
+        borders: (room, 2) receives the edges of the grid across which not everything continues: row of
+            the second end, and axis.
+        partners: (room, 6) slot of the second end that each slot of the first continues to, -1: none.
+        border_count: (1,) how many such edges; written.
 
     Returns:
         The number of regions now.
     """
     axes = len(strides)
     partner = np.empty((axes, MOST), dtype=np.int8)
-    pairs = np.empty(axes, dtype=np.int64)
+    border = np.empty(axes, dtype=np.bool_)
     between = np.empty(coefficients.shape[1])
+    regular = np.empty((len(count), MOST))
+    known = np.zeros(len(count), dtype=np.int8)
+    for p in range(len(count)):
+        for i in range(count[p]):
+            if index[p, i] >= 0:
+                regular[p, i] = trust(coefficients[p], phi[p, i], theta[p, i])
+                known[p] += 1
     filled = 0
     for p in range(ghosts, len(count)):
         n = int(count[p])
         label[p] = NO_LABEL
         settled = False
         for axis in range(axes):
-            pairs[axis] = 0
+            border[axis] = False
             if ((offset + p) // strides[axis]) % lengths[axis] == 0:
                 continue
             q = p - strides[axis]
             m = int(count[q])
-            pairs[axis] = match(
+            pairs = match(
                 coefficients[q],
                 coefficients[p],
                 phi[q],
                 theta[q],
                 index[q],
+                regular[q],
                 m,
                 phi[p],
                 theta[p],
                 index[p],
+                regular[p],
                 n,
                 between,
                 partner[axis],
             )
-            if n > 0 and m == n and pairs[axis] == n:
+            border[axis] = True
+            if pairs > 0 and m == n and pairs == known[p] and pairs == known[q]:
                 if settled:
-                    join(parent, rank, label[p], label[q], partner[axis], n)
+                    border[axis] = not join(parent, rank, label[p], label[q], partner[axis], n)
                 else:
                     for i in range(n):
-                        label[p, partner[axis, i]] = label[q, i]
+                        if partner[axis, i] >= 0:
+                            label[p, partner[axis, i]] = label[q, i]
                     settled = True
-                pairs[axis] = 0
-        if not settled and n > 0:
+                    border[axis] = False
+        if not settled and known[p] > 0:
             parent[regions] = regions
             for i in range(n):
                 if index[p, i] >= 0:
                     label[p, i] = regions * RANKS + i
+                    morse[regions, i] = index[p, i]
             regions += 1
         for axis in range(axes):
-            if pairs[axis] > 0:
+            if border[axis]:
                 q = p - strides[axis]
-                for i in range(count[q]):
-                    if partner[axis, i] >= 0:
-                        loose[filled, 0] = label[q, i]
-                        loose[filled, 1] = label[p, partner[axis, i]]
-                        filled += 1
-    loose_count[0] = filled
+                borders[filled, 0], borders[filled, 1] = p, axis
+                for i in range(MOST):
+                    partners[filled, i] = partner[axis, i] if i < count[q] else -1
+                filled += 1
+    border_count[0] = filled
     return regions
 
 
@@ -177,3 +213,36 @@ def resolve_all(parent: Labels, rank: Codes, label: Labels) -> None:
         for i in range(label.shape[1]):
             if label[p, i] >= 0:
                 label[p, i] = resolve(parent, rank, label[p, i])
+
+
+@dataclass
+class Forest:
+    """The trees of regions, growing."""
+
+    regions: int = 0
+    parent: Labels = field(default_factory=lambda: np.empty(0, dtype=np.int32))
+    rank: Codes = field(default_factory=lambda: np.empty((0, RANKS), dtype=np.int8))
+    morse: Codes = field(default_factory=lambda: np.empty((0, RANKS), dtype=np.int8))  #: of every label
+
+    def make_room(self, n: int) -> None:
+        """Make room for n more regions."""
+        if self.regions + n <= len(self.parent):
+            return
+        n = 2 * n + 1024
+        self.parent = np.concatenate([self.parent[: self.regions], np.empty(n, dtype=np.int32)])
+        extra = np.empty((n, RANKS), dtype=np.int8)
+        self.rank = np.concatenate([self.rank[: self.regions], extra])
+        self.morse = np.concatenate([self.morse[: self.regions], extra])
+
+    def resolve(self, label: Labels) -> None:
+        """Replace labels (n, 6) by those at the roots of their regions' trees."""
+        resolve_all(self.parent, self.rank, label)
+
+    def root(self, label: int) -> int:
+        """The label at the root of its region's tree."""
+        return int(resolve(self.parent, self.rank, label))
+
+    def unite(self, one: NDArray[np.int64], two: NDArray[np.int64]) -> None:
+        """Make the regions of two lists of labels one; labels at the same place are one equilibrium."""
+        mine, other = (np.array(labels, dtype=np.int32) for labels in (one, two))
+        join(self.parent, self.rank, mine, other, np.arange(one.size, dtype=np.int8), one.size)

@@ -1,22 +1,50 @@
 """Sheets: each equilibrium's identity across a map.
 
-A sheet is one equilibrium continued over parameters; it has at most one value at a point, and its Morse index
-is the same everywhere. Sheets meet and end at folds. Regions (see ``fastmech.atlas.regions``) are joined
-across folds by what survives there, the longest common border first, as long as no point gets a sheet twice.
+The equilibria over a plane of parameters are a smooth surface, and along the folds its tangent plane stands
+upright. Cut along the folds it falls into **branches**: what can be continued without meeting a fold, all of
+one Morse index. A branch may pass over a point more than once. Between the two folds that meet in a cusp
+there are two minima that are one and the same when continued round the cusp. A **sheet** is a part of a
+branch with at most one equilibrium at a point:
+
+- Regions (see ``fastmech.atlas.regions``) continue one another across folds by what survives there.
+- Where a branch is twice over a region, these two are sheets of their own there, and the branch's other
+  sheets end at the region's border. So nothing jumps at a fold, and neither of the two is preferred.
+
+Hence neighbouring points with the same sheet number have the same equilibrium, continued along the straight
+line between them, except on the edges that are listed as **breaks**: where two folds pass between
+neighbours, or where going round a hole of the map exchanges two equilibria.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.atlas.regions import RANKS, Labels, label_points, resolve_all
+from fastmech.atlas.borders import Borders
+from fastmech.atlas.channels import Ground
+from fastmech.atlas.joining import branches, join_islands, separate
+from fastmech.atlas.regions import RANKS, Forest, Labels, label_points
 from fastmech.equilibria.search import MOST
+from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
 Codes = NDArray[np.int8]
+
+
+@dataclass(frozen=True, eq=False)
+class Sheets:
+    """The sheets of a map.
+
+    Minima come first, then saddles, then maxima; in each of them the sheet of most points first.
+    """
+
+    labels: list[Labels]  #: an array (points, 6) for every piece of the map, -1 where there is none
+    morse_index: Codes  #: (sheets,)
+    branch: NDArray[np.int32]  #: (sheets,): sheets of one branch continue one another
+    breaks: NDArray[np.int32]  #: (breaks, axes + 2): indices of the edge's second end, its axis, the sheet
 
 
 @dataclass
@@ -24,23 +52,22 @@ class SheetBuilder:
     """Labels a grid in consecutive pieces and joins the labels to sheets in the end.
 
     Args:
-        grid: lengths of the axes.
+        scene: gives every parameter that is no axis.
+        axes: the grid, checked.
     """
 
-    grid: tuple[int, ...]
+    scene: Scene
+    axes: Mapping[str, Floats]
     _labels: list[Labels] = field(default_factory=list)
-    _parent: Labels = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
-    _rank: Codes = field(default_factory=lambda: np.zeros((0, RANKS), dtype=np.int8))
-    _regions: int = 0
+    _forest: Forest = field(default_factory=Forest)
+    _borders: Borders = field(default_factory=Borders)
     _done: int = 0
-    _links: dict[tuple[int, int], int] = field(default_factory=dict)
     _tail: tuple[NDArray[np.generic], ...] | None = None
-    _index_of: dict[int, int] = field(default_factory=dict)
 
     def add(self, coefficients: Floats, phi: Floats, theta: Floats, index: Codes, count: Codes) -> None:
         """Label the next points, at least one plane of the first axis or all."""
-        lengths = np.array(self.grid, dtype=np.int64)
-        strides = np.array([int(np.prod(self.grid[k + 1 :])) for k in range(len(self.grid))], dtype=np.int64)
+        lengths = np.array([len(values) for values in self.axes.values()], dtype=np.int64)
+        strides = np.append(np.cumprod(lengths[:0:-1])[::-1], 1).astype(np.int64)
         n = len(count)
         arrays: tuple[NDArray[np.generic], ...] = (coefficients, phi, theta, index, count)
         label = np.empty((n, MOST), dtype=np.int32)
@@ -51,83 +78,69 @@ class SheetBuilder:
                 np.concatenate([old, new]) for old, new in zip(self._tail[:-1], arrays, strict=True)
             )
             label = np.concatenate([self._tail[-1], label])
-        room = self._regions + n
-        if room > len(self._parent):
-            self._parent = np.concatenate(
-                [self._parent[: self._regions], np.empty(2 * n + 1024, dtype=np.int32)]
-            )
-            extra = np.empty((2 * n + 1024, RANKS), dtype=np.int8)
-            self._rank = np.concatenate([self._rank[: self._regions], extra])
-        loose = np.empty((n * len(self.grid) * MOST, 2), dtype=np.int32)
+        forest = self._forest
+        forest.make_room(n)
+        borders = np.empty((n * len(lengths), 2), dtype=np.int64)
+        partners = np.empty((n * len(lengths), MOST), dtype=np.int8)
         filled = np.zeros(1, dtype=np.int64)
-        self._regions = label_points(
-            *arrays, ghosts, self._done - ghosts, strides, lengths, self._regions,
-            self._parent, self._rank, label, loose, filled,
+        forest.regions = label_points(
+            *arrays, ghosts, self._done - ghosts, strides, lengths, forest.regions,
+            forest.parent, forest.rank, forest.morse, label, borders, partners, filled,
         )  # fmt: skip
-        pairs, times = np.unique(loose[: filled[0]], axis=0, return_counts=True)
-        for pair, number in zip(pairs, times, strict=True):
-            key = (int(pair[0]), int(pair[1]))
-            self._links[key] = self._links.get(key, 0) + int(number)
+        rows, axis = borders[: filled[0]].T
+        self._borders.add(
+            self._done - ghosts,
+            rows,
+            rows - strides[axis],
+            axis,
+            partners[: filled[0]],
+            label,
+            np.asarray(arrays[1], dtype=np.float64),
+            np.asarray(arrays[2], dtype=np.float64),
+        )
         plane = int(strides[0])
         self._tail = (*(array[-plane:].copy() for array in arrays), label[-plane:].copy())
         self._labels.append(label[ghosts:].copy() if ghosts else label)
         self._done += n
-        new, first = np.unique(label[ghosts:], return_index=True)
-        flat = index.ravel()
-        for value, place in zip(new, first, strict=True):
-            if value >= 0:
-                self._index_of.setdefault(int(value), int(flat[place]))
 
-    def finish(self) -> tuple[list[Labels], Codes]:
-        """The sheets, an array (points, 6) for every ``add``, -1 where there is none; their Morse indices.
-
-        Minima come first, then saddles, then maxima; in each of them the sheet of most points first.
-        """
+    def finish(self) -> Sheets:
+        """The sheets of all that was added."""
         pieces, self._labels = self._labels, []
-        size = np.zeros(self._regions * RANKS + 1, dtype=np.int64)
+        forest, borders = self._forest, self._borders.joined()
+        borders.resolve(forest)
+        join_islands(Ground(self.scene, self.axes), forest, borders)
+        borders.resolve(forest)
+        size = np.zeros(forest.regions * RANKS + 1, dtype=np.int64)
         for piece in pieces:
-            resolve_all(self._parent, self._rank, piece)
+            forest.resolve(piece)
             size += np.bincount(piece.ravel() + 1, minlength=size.size)
         size = size[1:]
-        index_of: dict[int, int] = {}
-        for value, morse in self._index_of.items():
-            index_of.setdefault(self._resolved(value), morse)
-        groups = self._joined({node: {node // RANKS} for node in index_of})
-        members: dict[int, list[int]] = {}
-        for node, group in groups.items():
-            members.setdefault(group, []).append(node)
-        points = {group: sum(int(size[node]) for node in nodes) for group, nodes in members.items()}
-        order = sorted(members, key=lambda group: (index_of[group], -points[group], group))
-        number = np.full(self._regions * RANKS + 1, -1, dtype=np.int32)
-        for rank, group in enumerate(order):
-            number[members[group]] = rank
+        nodes = np.flatnonzero(size)
+        morse = forest.morse.ravel()
+        links = borders.links()
+        branch_of = branches(nodes, links)
+        group_of = separate(nodes, links, size)
+        groups = np.unique(group_of)
+        place = np.searchsorted(groups, group_of)
+        points = np.bincount(place, weights=size[nodes]).astype(np.int64)
+        first = nodes[np.unique(place, return_index=True)[1]]
+        order = np.lexsort((first, -points, morse[first]))
+        rank = np.empty(groups.size, dtype=np.int32)
+        rank[order] = np.arange(groups.size, dtype=np.int32)
+        number = np.full(forest.regions * RANKS + 1, -1, dtype=np.int32)
+        number[nodes] = rank[place]
         for piece in pieces:
             piece[:] = number[piece]
-        return pieces, np.array([index_of[group] for group in order], dtype=np.int8)
+        node_branch = np.empty(groups.size, dtype=np.int64)
+        node_branch[rank[place]] = branch_of
+        _, firsts, branch = np.unique(node_branch, return_index=True, return_inverse=True)
+        in_order = np.argsort(np.argsort(firsts))[branch]
+        return Sheets(
+            pieces, morse[first][order], np.asarray(in_order, dtype=np.int32), self._breaks(borders, number)
+        )
 
-    def _resolved(self, label: int) -> int:
-        region, k = divmod(label, RANKS)
-        while self._parent[region] != region:
-            region, k = int(self._parent[region]), int(self._rank[region, k])
-        return region * RANKS + k
-
-    def _joined(self, regions: dict[int, set[int]]) -> dict[int, int]:
-        """Group of every label; ``regions`` says where a label is and is used up."""
-        links: dict[tuple[int, int], int] = {}
-        for (a, b), times in self._links.items():
-            a, b = sorted((self._resolved(a), self._resolved(b)))
-            links[a, b] = links.get((a, b), 0) + times
-        group = {node: node for node in regions}
-
-        def find(node: int) -> int:
-            while group[node] != node:
-                group[node] = group[group[node]]
-                node = group[node]
-            return node
-
-        for (a, b), _ in sorted(links.items(), key=lambda item: (-item[1], item[0])):
-            a, b = find(a), find(b)
-            if a != b and regions[a].isdisjoint(regions[b]):
-                group[b] = a
-                regions[a] |= regions.pop(b)
-        return {node: find(node) for node in group}
+    def _breaks(self, borders: Borders, number: Labels) -> NDArray[np.int32]:
+        point, axis, sheet = borders.breaks(number)
+        grid = tuple(len(values) for values in self.axes.values())
+        where = np.unravel_index(point, grid)
+        return np.stack([*where, axis, sheet], axis=1).astype(np.int32)

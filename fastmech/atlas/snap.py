@@ -33,16 +33,18 @@ class Snap:
     exhaustive: bool  #: beyond the range there is no fold, so None means never
 
     @property
-    def sentence(self) -> str:
-        """The answer in words."""
-        low, high = self.searched
-        never = "no load whatever" if self.exhaustive else "no load in that range"
+    def answer(self) -> str:
+        """Where it disappears, in words."""
         loads = [f"{load:.6g} N" for load in (self.below, self.above) if load is not None]
-        gone = f"disappears at {' and at '.join(loads)}" if loads else f"disappears at {never}"
-        return (
-            f"the position ({self.phi:.4f}, {self.theta:.4f}) rad at {self.force:g} N {gone}"
-            f" (searched from {low:.6g} to {high:.6g} N)"
-        )
+        gone = " and at ".join(loads) or ("no load whatever" if self.exhaustive else "no load in that range")
+        low, high = self.searched
+        beyond = "; no position merges with another beyond" if self.exhaustive else ""
+        return f"disappears at {gone} (searched from {low:.6g} to {high:.6g} N{beyond})"
+
+    @property
+    def sentence(self) -> str:
+        """The position, its load and the answer in words."""
+        return f"the position ({self.phi:z.4f}, {self.theta:z.4f}) rad at {self.force:g} N {self.answer}"
 
 
 def find_snap(
@@ -53,7 +55,8 @@ def find_snap(
     """The constant loads F0, below and above the present one, at which a stable position disappears.
 
     The position is followed as the load changes, until it merges with a saddle. The present load is F0 where
-    alpha = 0 and 0 where alpha > 0, as in ``find_equilibria``.
+    alpha = 0 and 0 where alpha > 0, as in ``find_equilibria``; the loads searched are constant ones. (A map
+    or a search for folds over F0 asks for alpha = 0, since there F0 would be no load at all.)
 
     Args:
         scene: the mechanism at its present load.
@@ -69,9 +72,7 @@ def find_snap(
     present = found.force
     everywhere = 2.0 * scene.c1 * scene.l
     limit = 1.01 * max(everywhere, abs(present)) + 1.0
-    low, high = (-limit, limit) if searched is None else searched
-    if not (math.isfinite(low) and math.isfinite(high) and low < high and low <= present <= high):
-        raise InputError(f"searched = {(low, high)}: must be a range of forces that holds {present:g} N")
+    low, high = (-limit, limit) if searched is None else _range(searched, present)
     chosen = _chosen(found.items, equilibrium)
     plane = Plane(scene.replace(F0=present, alpha=0.0), ("F0",), (low,), (high,))
     start = np.array([chosen.phi, chosen.theta, *plane.parts([present])])
@@ -86,12 +87,26 @@ def find_snap(
     )
 
 
+def _range(searched: object, present: float) -> tuple[float, float]:
+    try:
+        ends = np.asarray(searched)
+    except ValueError:
+        ends = np.array(None)
+    if ends.dtype.kind in "iuf" and ends.shape == (2,) and np.isfinite(ends).all():
+        low, high = (float(end) for end in ends)
+        if low < high and low <= present <= high:
+            return low, high
+    raise InputError(f"searched = {searched!r}: must be a range of forces [N] that holds {present:g} N")
+
+
 def _chosen(items: tuple[Equilibrium, ...], wanted: Equilibrium | None) -> Equilibrium:
     stable = [item for item in items if item.morse_index == 0]
     if not stable:
         raise InputError("equilibrium: the scene has no stable one")
     if wanted is None:
         return stable[0]
+    if not isinstance(wanted, Equilibrium):
+        raise InputError(f"equilibrium = {wanted!r}: must be one that find_equilibria gives")
     for item in stable:
         if math.hypot(item.phi - wanted.phi, item.theta - wanted.theta) <= 1e-6:
             return item
@@ -101,7 +116,11 @@ def _chosen(items: tuple[Equilibrium, ...], wanted: Equilibrium | None) -> Equil
 
 
 def _merging(plane: Plane, start: Floats, direction: float) -> float | None:
-    """Load at which the branch from ``start`` first turns back, None if it leaves the range before."""
+    """Load at which the branch from ``start`` first turns back, None if it leaves the range before.
+
+    A minimum can always be followed a little further. Where no step succeeds, the branch has come as near to
+    its end as a step is short, and what Newton's method cannot polish there is that end.
+    """
     equations = rest(plane)
     z, step = start, 0.25 * STEP
     tangent = tangent_at(equations, z)
@@ -121,4 +140,4 @@ def _merging(plane: Plane, start: Floats, direction: float) -> float | None:
             step *= 0.5
             continue
         z, tangent, step = there, ahead, min(STEP, 1.5 * step)
-    return None
+    return float(plane.values(z[2:])["F0"]) if 0.0 <= z[2] <= 1.0 else None

@@ -10,7 +10,7 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,24 @@ from numpy.typing import NDArray
 from scipy import optimize
 
 from fastmech.atlas.folds import trace_folds
-from fastmech.atlas.map import EquilibriumMap, map_equilibria
+from fastmech.atlas.map import map_equilibria
+from fastmech.bench.multistart import (
+    C1_RANGE,
+    F0_RANGE,
+    NEAR_FOLD,
+    SCENE,
+    STARTS,
+    TOLD,
+    AtlasRow,
+    fold_scenes,
+    gradient,
+    grid,
+    hessian,
+    loads,
+    multistart,
+    random_scenes,
+    region_scenes,
+)
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.threads import thread_count
 from fastmech.equilibria.outcome import Outcome
@@ -26,28 +43,7 @@ from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
 
-SCENE = Scene(c1=294.9, c2=92.85, F0=85.3, alpha=0.0)
-F0_RANGE, C1_RANGE = (-400.0, 400.0), (0.0, 400.0)
-
-STARTS = 64
-
-#: Distance in F0 [N] of the scenes beside folds.
-NEAR_FOLD = 0.01
 REPEATS = 3
-
-
-@dataclass(frozen=True)
-class AtlasRow:
-    """What one way of finding equilibria did on the same region of parameters."""
-
-    name: str
-    threads: int
-    points: int
-    rate: float  #: points per second, median of warm calls
-    found: int  #: equilibria found
-    missed: int  #: equilibria that exist, by the certified map, and were not found
-    incomplete: int  #: points at which at least one is missing
-    unproved: int  #: points without a proof that all are found
 
 
 @dataclass(frozen=True)
@@ -69,14 +65,9 @@ def run_atlas(
     stage: Callable[[str, int], Progress] = lambda name, total: lambda done: None,
 ) -> list[Path]:
     """Measure and write ``atlas.md`` into the folder ``out``; ``quick`` is for trying the command."""
-    side, sample = (200, 100) if quick else (1000, 2000)
-    rows = []
-    advance = stage("maps", 2)
-    for threads in sorted({1, thread_count(None)}):
-        rows.append(certified(side, threads))
-        advance(1)
-    advance = stage("multistart", 3 * sample)
-    rows.append(multistart("in the map's region", region_scenes(sample), advance))
+    side, sample = (200, 99) if quick else (1000, 1998)
+    rows, ratios = side_by_side(side, region_scenes(sample), stage("maps and multistart", sample))
+    advance = stage("multistart elsewhere", 2 * sample)
     rows.append(multistart("random scenes", random_scenes(sample), advance))
     rows.append(multistart(f"within {NEAR_FOLD:g} N of a fold", fold_scenes(sample), advance))
     advance = stage("fold curves", 2)
@@ -86,117 +77,57 @@ def run_atlas(
     advance(1)
     out.mkdir(parents=True, exist_ok=True)
     table = out / "atlas.md"
-    table.write_text(markdown(rows, folds), encoding="utf-8")
+    table.write_text(markdown(rows, ratios, folds), encoding="utf-8")
     return [table]
 
 
-def grid(side: int) -> dict[str, Floats]:
-    """The map's axes."""
-    return {"F0": np.linspace(*F0_RANGE, side), "c1": np.linspace(*C1_RANGE, side)}
+def side_by_side(
+    side: int, scenes: list[Scene], advance: Progress
+) -> tuple[list[AtlasRow], dict[int, tuple[float, float, float]]]:
+    """The map with one thread and with all, and multistart, in turns, so that each meets the same machine.
 
-
-def certified(side: int, threads: int) -> AtlasRow:
-    """The package's map, certificate, stability and sheets included."""
-    map_equilibria(SCENE, grid(20), threads=threads)
-    seconds = []
-    for _ in range(REPEATS):
-        began = time.perf_counter()
-        atlas = map_equilibria(SCENE, grid(side), threads=threads)
-        seconds.append(time.perf_counter() - began)
+    Returns:
+        A row for each, and by the map's threads the least, median and largest ratio of rates over the turns.
+    """
+    threads = sorted({1, thread_count(None)})
+    rates: dict[int, list[float]] = {n: [] for n in threads}
+    turns: list[AtlasRow] = []
+    for n in threads:
+        map_equilibria(SCENE, grid(20), threads=n)
+    for turn in range(REPEATS):
+        for n in threads:
+            began = time.perf_counter()
+            atlas = map_equilibria(SCENE, grid(side), threads=n)
+            rates[n].append(side * side / (time.perf_counter() - began))
+        turns.append(multistart("in the map's region", scenes[turn::REPEATS], advance))
     unproved = int(np.count_nonzero(atlas.outcome != Outcome.COMPLETE))
-    rate = side * side / statistics.median(seconds)
-    return AtlasRow(
-        "fastmech map_equilibria", threads, side * side, rate, int(atlas.count.sum(dtype=int)), 0, 0, unproved
-    )
-
-
-def gradient(q: Floats, a: float, C: float, b: float, f: float) -> list[float]:
-    """Gradient of U as a user would type it."""
-    pull = C * np.cos(q[0] + q[1])
-    return [a * np.cos(q[0]) + f * np.sin(q[0]) - pull, b * np.sin(q[1]) + f * np.cos(q[1]) - pull]
-
-
-def hessian(q: Floats, a: float, C: float, b: float, f: float) -> list[list[float]]:
-    """Its Jacobian."""
-    s = C * np.sin(q[0] + q[1])
-    return [
-        [f * np.cos(q[0]) - a * np.sin(q[0]) + s, s],
-        [s, b * np.cos(q[1]) - f * np.sin(q[1]) + s],
-    ]
-
-
-def loads(s: Scene) -> tuple[float, float, float, float]:
-    """a, C, b, f of a scene [J]."""
-    return (s.m1 + s.m2) * s.g * s.l - s.c2 * s.l**2, s.c1 * s.l**2, s.m2 * s.g * s.l, s.F0 * s.l
-
-
-def region_scenes(n: int) -> list[Scene]:
-    """Random points of the map's region."""
-    rng = np.random.default_rng(1)
-    return [SCENE.replace(F0=rng.uniform(*F0_RANGE), c1=rng.uniform(*C1_RANGE)) for _ in range(n)]
-
-
-def random_scenes(n: int) -> list[Scene]:
-    """Four decades of stiffness, forces of both signs, l 0.2-4 m, masses 0.1-100 kg."""
-    rng = np.random.default_rng(2)
-    return [
-        Scene(
-            **{name: 10 ** rng.uniform(-1.0, 2.0) for name in ("m1", "m2", "m3")},
-            **{name: 10 ** rng.uniform(0.0, 4.0) for name in ("c1", "c2")},
-            l=rng.uniform(0.2, 4.0),
-            F0=rng.choice([-1.0, 1.0]) * 10 ** rng.uniform(-1.0, 4.0),
-            alpha=0.0,
+    found = int(atlas.count.sum(dtype=int))
+    rows = [
+        AtlasRow(
+            "fastmech map_equilibria",
+            n,
+            side * side,
+            statistics.median(rates[n]),
+            found,
+            (0,) * len(TOLD),
+            0,
+            unproved,
         )
-        for _ in range(n)
+        for n in threads
     ]
-
-
-def fold_scenes(n: int) -> list[Scene]:
-    """Points of the map's region just beside its fold curves, on either side."""
-    rng = np.random.default_rng(4)
-    curves = trace_folds(SCENE, *grid(201).items()).curves
-    x, y = (np.concatenate([getattr(curve, name) for curve in curves]) for name in ("x", "y"))
-    chosen = rng.integers(x.size, size=n)
-    sides = rng.choice([-NEAR_FOLD, NEAR_FOLD], n)
-    return [
-        SCENE.replace(F0=float(x[k] + side), c1=float(y[k])) for k, side in zip(chosen, sides, strict=True)
-    ]
-
-
-def multistart(where: str, scenes: list[Scene], advance: Progress) -> AtlasRow:
-    """SciPy from random starts, duplicates removed; what it misses is counted by the certified count."""
-    rng = np.random.default_rng(3)
-    missed = incomplete = total = 0
-    seconds = 0.0
-    for scene in scenes:
-        args = loads(scene)
-        size = sum(abs(x) for x in args)
-        began = time.perf_counter()
-        found: list[Floats] = []
-        for start in rng.uniform(-np.pi, np.pi, (STARTS, 2)):
-            solution = optimize.root(gradient, start, args=args, jac=hessian)
-            if np.abs(solution.fun).max() < 1e-9 * size and not any(
-                np.abs(np.exp(1j * solution.x) - np.exp(1j * other)).max() < 1e-6 for other in found
-            ):
-                found.append(solution.x)
-        seconds += time.perf_counter() - began
-        exact = map_equilibria(scene, {"F0": [scene.F0]}, threads=1)
-        lacking = int(exact.count[0]) - reached(exact, found)
-        missed += lacking
-        incomplete += lacking > 0
-        total += len(found)
-        advance(1)
-    name, n = f"scipy.optimize.root, {STARTS} starts, {where}", len(scenes)
-    return AtlasRow(name, 1, n, n / seconds, total, missed, incomplete, n)
-
-
-def reached(exact: EquilibriumMap, found: list[Floats]) -> int:
-    """How many certified equilibria of a point are among those found."""
-    places = np.stack([exact.phi[0], exact.theta[0]], axis=-1)[: exact.count[0]]
-    return sum(
-        any(np.abs(np.exp(1j * place) - np.exp(1j * other)).max() < 1e-5 for other in found)
-        for place in places
-    )
+    together = turns[0]
+    for row in turns[1:]:
+        together = replace(
+            together,
+            points=together.points + row.points,
+            found=together.found + row.found,
+            missed=tuple(a + b for a, b in zip(together.missed, row.missed, strict=True)),
+            incomplete=together.incomplete + row.incomplete,
+            unproved=together.unproved + row.unproved,
+        )
+    rows.append(replace(together, rate=statistics.median(row.rate for row in turns)))
+    ratios = {n: sorted(mine / row.rate for mine, row in zip(rates[n], turns, strict=True)) for n in threads}
+    return rows, {n: (each[0], statistics.median(each), each[-1]) for n, each in ratios.items()}
 
 
 def traced() -> FoldRow:
@@ -259,24 +190,37 @@ def plain_continuation() -> FoldRow:
     return FoldRow("pseudo-arclength, SciPy fsolve", seconds, 1, 0, len(points), residual)
 
 
-def markdown(rows: list[AtlasRow], folds: list[FoldRow]) -> str:
+def markdown(
+    rows: list[AtlasRow], ratios: dict[int, tuple[float, float, float]], folds: list[FoldRow]
+) -> str:
     """The tables."""
+    starts = ", ".join(map(str, TOLD))
     lines = ["# The equilibrium atlas", ""]
     lines += [
         f"Bistable scene, F0 from {F0_RANGE[0]:g} to {F0_RANGE[1]:g} N, c1 from {C1_RANGE[0]:g} to "
-        f"{C1_RANGE[1]:g} N/m; medians of warm calls. The map includes proof, stability and sheets.",
+        f"{C1_RANGE[1]:g} N/m; medians of warm calls in turns. The map includes proof, stability and sheets. "
+        f"Missed: equilibria of the certified map that multistart has not found after {starts} starts; its "
+        f"rate and the other columns are for {STARTS}.",
         "",
         "| search | threads | points | points/s | equilibria | missed | points incomplete | no proof |",
         "|---|---:|---:|---:|---:|---:|---:|---:|",
     ]
     for row in rows:
+        missed = ", ".join(map(str, row.missed)) if any(row.missed) else "0"
         lines.append(
-            f"| {row.name} | {row.threads} | {row.points:,} | {row.rate:,.4g} | {row.found:,} | {row.missed} "
+            f"| {row.name} | {row.threads} | {row.points:,} | {row.rate:,.4g} | {row.found:,} | {missed} "
             f"| {row.incomplete} | {row.unproved} |"
         )
-    best = max(row.rate for row in rows)
-    peer = next(row.rate for row in rows if row.name.startswith("scipy"))
-    lines += ["", f"In that region the map does {best / peer:,.0f} times as many points a second.", ""]
+    lines.append("")
+    for row in (row for row in rows if row.name.startswith("fastmech")):
+        low, middle, high = ratios[row.threads]
+        by = f"{row.threads} thread{'s' * (row.threads > 1)}"
+        lines += [
+            f"In that region the map with {by} does {middle:,.0f} times as many points a second as "
+            f"multistart with one ({low:,.0f} to {high:,.0f} over {REPEATS} turns); a million take "
+            f"{1e6 / row.rate:.1f} s.",
+            "",
+        ]
     lines += [
         "| fold curves | s | curves | cusps | points | largest residual |",
         "|---|---:|---:|---:|---:|---:|",

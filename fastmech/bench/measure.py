@@ -1,18 +1,29 @@
-"""Timing one entrant: first call apart, medians of warm calls, error against the reference."""
+"""Timing: everyone is prepared first, then timed in turns, so that a busy machine disturbs all alike.
+
+Rates are trajectories per second of processor time, all threads of the process together: on a quiet machine
+that is wall time on one thread, on a busy one the time spent waiting for a core does not count, and an
+integrator that secretly takes two threads pays for both. Wall times stand beside them.
+"""
 
 from __future__ import annotations
 
 import statistics
 import time
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.bench.entrants import Entrant
+from fastmech.bench.entrant import Entrant, Floats, Solve
 from fastmech.bench.problem import Problem
 
-REPEATS = 3
+#: Processor seconds of timed calls that one entrant is given, and its calls at most.
+BUDGET = 0.8
+MOST_REPEATS = 7
+
+#: Calls shorter than this [s] are given copies of the starts, up to the entrant's most.
+SHORT_CALL = 0.1
 
 
 @dataclass(frozen=True)
@@ -23,36 +34,111 @@ class Row:
     family: str
     setting: str
     threads: int
-    trajectories: int
-    rate: float  #: trajectories per second, median of warm calls
-    compared: int  #: trajectories whose error is known, the same ones for every entrant
-    max_error: float  #: largest error of any component of any of these final states [rad, rad/s]
-    median_error: float  #: median over them of the largest error of a component
-    first_call: float  #: s, on a few trajectories: compiling or loading included
+    trajectories: int  #: in each timed call
+    wall: float  #: s, median of timed calls
+    processor: float  #: s of processor time, median of timed calls
+    first_call: float  #: s, preparing and the first call: compiling or loading included
+    errors: NDArray[np.float64] = field(repr=False)  #: largest error of any component, by trajectory
+
+    @property
+    def rate(self) -> float:
+        """Trajectories per second: of processor time on one thread, of wall time on more."""
+        return self.trajectories / (self.processor if self.threads == 1 else self.wall)
+
+    def max_error(self, count: int | None = None) -> float:
+        """Largest error of the first ``count`` trajectories, of all known by default."""
+        return float(self.errors[:count].max())
+
+    @property
+    def median_error(self) -> float:
+        """Median over trajectories."""
+        return float(np.median(self.errors))
 
 
-def measure(problem: Problem, entrant: Entrant, reference: NDArray[np.float64], threads: int) -> Row:
-    """Time an entrant on its share of the problem's starts."""
-    n = max(len(reference), round(len(problem.starts) * entrant.share))
-    starts = problem.starts[:n]
+@dataclass
+class _Runner:
+    """A prepared entrant and its times so far."""
+
+    entrant: Entrant
+    threads: int
+    solve: Solve
+    starts: Floats
+    first_call: float
+    errors: Floats
+    repeats: int
+    wall: list[float] = field(default_factory=list)
+    processor: list[float] = field(default_factory=list)
+
+    def time(self) -> None:
+        wall, processor = time.perf_counter(), time.process_time()
+        self.solve(self.starts)
+        self.processor.append(time.process_time() - processor)
+        self.wall.append(time.perf_counter() - wall)
+
+
+def measure(
+    problem: Problem,
+    everyone: Sequence[tuple[Entrant, int]],
+    advance: Callable[[int], None] = lambda done: None,
+    failed: Callable[[Entrant, Exception], None] | None = None,
+    budget: float = BUDGET,
+) -> list[Row]:
+    """Time entrants, each with its number of threads; ``advance`` is told 1 twice for each.
+
+    ``budget`` is what each is given [s of processor time]; a call that takes longer is made once. An
+    exception of an entrant is raised, or handed to ``failed`` where it is given.
+    """
+    runners = []
+    for entrant, threads in everyone:
+        try:
+            runners.append(_prepare(problem, entrant, threads, budget))
+        except Exception as error:
+            if failed is None:
+                raise
+            failed(entrant, error)
+        advance(1)
+    for turn in range(MOST_REPEATS):
+        for runner in runners:
+            if turn < runner.repeats:
+                runner.time()
+            if turn == 0:
+                advance(1)
+    return [
+        Row(
+            problem.name,
+            runner.entrant.family,
+            runner.entrant.setting,
+            runner.threads,
+            len(runner.starts),
+            statistics.median(runner.wall),
+            statistics.median(runner.processor),
+            runner.first_call,
+            runner.errors,
+        )
+        for runner in runners
+    ]
+
+
+def _prepare(problem: Problem, entrant: Entrant, threads: int, budget: float) -> _Runner:
+    """Compile, warm up, compare with the truth, and decide how often and on how many trajectories to time."""
+    n = min(len(problem.starts), entrant.most)
+    copies = max(1, -(-entrant.least // n))
+    starts = np.tile(problem.starts[:n], (copies, 1))
     began = time.perf_counter()
-    entrant.run(problem, starts[:8], threads)
+    solve = entrant.prepare(problem, threads)
+    final = solve(starts)
     first_call = time.perf_counter() - began
-    seconds = []
-    for _ in range(REPEATS):
-        began = time.perf_counter()
-        final = entrant.run(problem, starts, threads)
-        seconds.append(time.perf_counter() - began)
-    errors = np.abs(final[: len(reference)] - reference).max(axis=1)
-    return Row(
-        problem.name,
-        entrant.family,
-        entrant.setting,
-        threads,
-        n,
-        n / statistics.median(seconds),
-        len(reference),
-        float(errors.max()),
-        float(np.median(errors)),
-        first_call,
-    )
+    errors = np.abs(final[:n] - problem.truth[:n]).max(axis=1)
+    errors[~np.isfinite(errors)] = np.inf
+    runner = _Runner(entrant, threads, solve, starts, first_call, errors, 0)
+    runner.time()
+    taken = max(runner.processor[0], 1e-6)
+    short = min(SHORT_CALL, budget / MOST_REPEATS)
+    more = min(entrant.most // len(starts), int(np.ceil(short / taken)))
+    if more > 1:
+        runner.starts = np.tile(starts, (more, 1))
+        runner.wall.clear()
+        runner.processor.clear()
+        taken *= more
+    runner.repeats = int(np.clip(budget / taken, 1, MOST_REPEATS)) - len(runner.wall)
+    return runner

@@ -2,38 +2,81 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from fastmech.bench.precision import frontier
 from fastmech.bench.problem import PROBLEMS
-from fastmech.plots.style import LINES, legend_below, new_figure, save, style
+from fastmech.plots.style import LINES, new_figure, save, style
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from fastmech.bench.measure import Row
 
-_MARKERS = "osD^vPX*<>"
+#: Errors [rad, rad/s] that the picture shows: larger ones answer nothing.
+LARGEST, SMALLEST = 3e-2, 3e-15
+
+#: Where the axis ends, so that the names fit beside the curves.
+NAMES_END = 1e-18
+
+GREY = "0.35"
+
+#: Curves: what the family's name begins with, its label, marker; in the order of the colours.
+CURVES = (
+    ("fastmech", "fastmech, best method", "o"),
+    ("heyoka", "heyoka batch", "s"),
+    ("torch", "torch.compile, best step", "D"),
+    ("CyRK", "CyRK", "^"),
+    ("numbalsoda", "numbalsoda", "v"),
+    ("diffrax", "diffrax", "P"),
+    ("Numba RK4", "plain Numba RK4", "X"),
+    ("SciPy", "SciPy, best solver", "*"),
+)
 
 
 def draw_bench(rows: list[Row], path: Path) -> None:
-    """One line for each integrator, one thread."""
+    """The fastest settings of every library on one thread; the package's own methods thin behind."""
     with style():
-        figure = new_figure(11.0, 5.6)
+        figure = new_figure(11.0, 6.2)
         panels = figure.subplots(1, len(PROBLEMS), sharey=True, squeeze=False)[0]
-        families = list(dict.fromkeys(row.family for row in rows))
         for axes, (name, make) in zip(panels, PROBLEMS.items(), strict=True):
-            for i, family in enumerate(families):
-                own = [r for r in rows if (r.problem, r.family, r.threads) == (name, family, 1)]
-                axes.loglog(
-                    [r.max_error for r in own],
-                    [r.rate for r in own],
-                    marker=_MARKERS[i % len(_MARKERS)],
-                    color=LINES[i % len(LINES)],
-                    linestyle="-" if family.startswith("fastmech") else "--",
-                    label=family,
-                )
-            axes.set_title(make(1).description)
-            axes.set_xlabel("largest error of a final state [rad, rad/s]")
-            axes.invert_xaxis()
-        panels[0].set_ylabel("trajectories per second, one thread")
-        legend_below(figure, panels[0], 4)
+            problem = make(1)
+            mine = [row for row in rows if (row.problem, row.threads) == (name, 1)]
+            _draw(axes, mine)
+            axes.set(xscale="log", yscale="log", xlim=(LARGEST, NAMES_END))
+            axes.set_title(f"{problem.description}, to {problem.t_end:g} s")
+            axes.set_xlabel("largest error of a final state [rad, rad/s], smaller to the right")
+        panels[0].set_ylabel("trajectories per second of one core")
         save(figure, path)
+
+
+def _draw(axes: Axes, rows: list[Row]) -> None:
+    for family in dict.fromkeys(row.family for row in rows if row.family.startswith("fastmech")):
+        own = sorted(_shown(row for row in rows if row.family == family), key=lambda row: row.max_error())
+        axes.plot([row.max_error() for row in own], [row.rate for row in own], color="0.75", linewidth=0.8)
+    ends: list[tuple[float, float, str, str]] = []
+    for (prefix, label, marker), color in zip(CURVES, [*LINES, GREY], strict=True):
+        best = frontier(_shown(row for row in rows if row.family.startswith(prefix)))
+        if best:
+            errors, rates = [row.max_error() for row in best], [row.rate for row in best]
+            axes.plot(
+                errors, rates, marker=marker, color=color, linewidth=2.4 if prefix == "fastmech" else 1.4
+            )
+            ends.append((errors[0], rates[0], label, color))
+    _label(axes, ends)
+
+
+def _shown(rows: Iterable[Row]) -> list[Row]:
+    return [row for row in rows if SMALLEST < row.max_error() < LARGEST]
+
+
+def _label(axes: Axes, ends: list[tuple[float, float, str, str]]) -> None:
+    """Names right of the accurate end of the curves, moved apart where they would touch."""
+    last = np.inf
+    for error, rate, label, color in sorted(ends, key=lambda end: -end[1]):
+        last = min(rate, last / 1.2)
+        axes.text(error / 1.8, last, label, color=color, ha="left", va="center", fontsize=9)

@@ -2,26 +2,40 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable
-from dataclasses import fields
+from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from fastmech.bench import tables
 from fastmech.bench.atlas import run_atlas
-from fastmech.bench.entrants import entrants, jitted_rhs
-from fastmech.bench.measure import Row, measure
+from fastmech.bench.basins import run_basins
+from fastmech.bench.entrant import Entrant
+from fastmech.bench.entrants import entrants, missing
+from fastmech.bench.measure import BUDGET, Row, measure
+from fastmech.bench.peak import TURNS as PEAK_TURNS
+from fastmech.bench.peak import Throughput, throughputs
 from fastmech.bench.picture import draw_bench
-from fastmech.bench.problem import PROBLEMS, reference
+from fastmech.bench.problem import PROBLEMS, Problem
+from fastmech.bench.startup import STARTED, Start, started
+from fastmech.bench.terms import TURNS, Cost, costs
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.threads import thread_count
 from fastmech.results import Dataset, Variable
-from fastmech.scene import Scene
-from fastmech.store.provenance import provenance
+from fastmech.store.provenance import processor_name, provenance
 from fastmech.store.write import check_writable, write_results
 
-_UNITS = {"rate": "1/s", "max_error": "rad or rad/s", "median_error": "rad or rad/s", "first_call": "s"}
+#: Starts of ``--quick``, of those that have a reference.
+QUICK_STARTS = 8
+
+#: What ``--quick`` gives each entrant [s].
+QUICK_BUDGET = 0.05
+
+LIBRARIES = ("numba", "scipy", "heyoka", "torch", "jax", "diffrax", "numbalsoda", "CyRK", "pynamicalsys")
 
 
 def run_bench(
@@ -32,85 +46,147 @@ def run_bench(
 ) -> list[Path]:
     """Measure and write ``bench.md``, ``bench.png`` and ``bench.h5`` into the folder ``out``.
 
-    ``quick`` takes a sixteenth of the trajectories: for trying the command, not for quoting.
+    ``quick`` takes few trajectories, every third setting and no libraries beyond SciPy: for trying the
+    command, not for quoting.
     """
     data = out / "bench.h5"
     check_writable(data, replace=True)
     began = time.perf_counter()
-    n, compared = (512, 16) if quick else (8192, 256)
-    everyone = list(entrants())
+    problems = [make(QUICK_STARTS) if quick else make() for make in PROBLEMS.values()]
     rows: list[Row] = []
-    floors: dict[str, float] = {}
-    for make in PROBLEMS.values():
-        problem = make(n)
-        advance = stage(f"reference, {problem.name}", 1)
-        truth = reference(problem, compared, jitted_rhs, 1e-13)
-        floors[problem.name] = float(np.abs(reference(problem, compared, jitted_rhs, 1e-12) - truth).max())
-        advance(1)
-        advance = stage(f"entrants, {problem.name}", len(everyone))
-        for entrant in everyone:
-            for threads in {1, thread_count(None)} if entrant.threaded else {1}:
-                rows.append(measure(problem, entrant, truth, threads))
+    failures: list[str] = []
+    for problem in problems:
+        everyone = [(entrant, n) for entrant in entrants(problem, quick) for n in _threads(entrant)]
+        advance = stage(f"{problem.name}: prepare and time", 2 * len(everyone))
+
+        def failed(entrant: Entrant, error: Exception, advance: Progress = advance) -> None:
+            failures.append(f"{entrant.family}, {entrant.setting}: {type(error).__name__}: {error}")
             advance(1)
-    atlas = run_atlas(out, quick=quick, stage=stage)
+
+        rows += measure(problem, everyone, advance, failed, QUICK_BUDGET if quick else BUDGET)
+    peak, rhs = throughputs(problems[0], stage("right-hand sides", PEAK_TURNS))
+    prices = costs(problems[0], stage("terms", TURNS))
+    starts = [] if quick else list(started(stage("cold starts", len(STARTED))))
+    others = run_atlas(out, quick=quick, stage=stage) + run_basins(out, quick=quick, stage=stage)
     table, picture = out / "bench.md", out / "bench.png"
-    table.write_text(markdown(rows, floors), encoding="utf-8")
+    lines = _preamble(quick, failures)
+    for problem in problems:
+        lines += tables.problem_section(problem, rows)
+    lines += tables.machine_sections(peak, rhs, prices, starts)
+    table.write_text("\n".join(lines) + "\n", encoding="utf-8")
     draw_bench(rows, picture)
-    columns = {
-        field.name: Variable(
-            ("row",),
-            np.array([getattr(row, field.name) for row in rows]),
-            _UNITS.get(field.name, "1"),
-            field.name,
-        )
-        for field in fields(Row)
-    }
-    scene = Scene(alpha=0.0)
     write_results(
         data,
         scene_parameters={
             name: Variable((), np.array(value), unit, about)
-            for name, (value, unit, about) in scene.described().items()
+            for name, (value, unit, about) in problems[0].scene.described().items()
         },
-        sections={"bench": Dataset(columns)},
+        sections={
+            "speed": speed_dataset(rows, problems),
+            "rhs": throughput_dataset(peak, rhs),
+            "terms": cost_dataset(prices),
+        }
+        | ({"starts": start_dataset(starts)} if starts else {}),
         attrs={"title": "Speed against error", "wall_time_s": time.perf_counter() - began}
         | provenance(thread_count(None)),
         replace=True,
     )
-    return [table, picture, data, *atlas]
+    return [table, picture, data, *others]
 
 
-def markdown(rows: list[Row], floors: dict[str, float]) -> str:
-    """A table for each problem: rate, errors, and the ratio to the plain RK4 with the same step."""
+def _threads(entrant: Entrant) -> list[int]:
+    every = thread_count(None)
+    return [1, every] if entrant.threaded and every > 1 else [1]
+
+
+def _preamble(quick: bool, failures: list[str]) -> list[str]:
+    """What was measured, how, and on what."""
     lines = ["# Speed against error", ""]
+    if quick:
+        lines += ["**A quick run: few trajectories, few settings. Not for quoting.**", ""]
+    versions = []
+    for library in LIBRARIES:
+        try:
+            versions.append(f"{library} {metadata.version(library)}")
+        except metadata.PackageNotFoundError:
+            continue
+    load = f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
     lines += [
-        "Rates are medians of three warm calls. Errors are the largest and the median over the same "
-        f"{rows[0].compared} trajectories for every integrator, against SciPy's DOP853 at rtol 1e-13.",
+        f"{processor_name()}, {thread_count(None)} cores, load {load} at the end. {', '.join(versions)}.",
+        "",
+        "Everyone solves the same problems: Table 1 with its force constant. Errors are the largest and the "
+        "median over trajectories of the largest component of a final state's error, against a reference of "
+        "24 digits (`data/make_bench_reference.py`). All are prepared and warmed up first and then timed in "
+        "turns; rates on one thread are medians per second of processor time, on a quiet machine wall time.",
         "",
     ]
-    for name, make in PROBLEMS.items():
-        problem = make(1)
-        lines += [f"## {name}: {problem.description}, t = {problem.t_end:g} s", ""]
-        lines += [f"The reference moves by {floors[name]:.0e} when its tolerance is ten times larger.", ""]
-        lines += [
-            "| integrator | setting | threads | trajectories/s | max error | median error | first call [s] |"
-        ]
-        lines += ["|---|---|---:|---:|---:|---:|---:|"]
-        for row in (r for r in rows if r.problem == name):
-            lines.append(
-                f"| {row.family} | {row.setting} | {row.threads} | {row.rate:,.0f} | {row.max_error:.0e} "
-                f"| {row.median_error:.0e} | {row.first_call:.2f} |"
-            )
-        lines += ["", "Ratios at the same method and step (RK4, one thread):", ""]
-        lines += [f"- {setting}: {ratio:.1f} times" for setting, ratio in ratios(rows, name)] + [""]
-    return "\n".join(lines)
+    if missing():
+        lines += [f"Not installed: {', '.join(missing())}.", ""]
+    if failures:
+        lines += ["Failed:", "", *(f"- {failure}" for failure in failures), ""]
+    return lines
 
 
-def ratios(rows: list[Row], problem: str) -> list[tuple[str, float]]:
-    """Rate of the package's RK4 over that of plain numba's, at every common step, one thread."""
-    found = {(r.family, r.setting): r.rate for r in rows if r.problem == problem and r.threads == 1}
-    return [
-        (setting, rate / found["numba RK4, one at a time", setting])
-        for (family, setting), rate in found.items()
-        if family == "fastmech rk4" and ("numba RK4, one at a time", setting) in found
-    ]
+def _strings(values: list[str]) -> np.ndarray[Any, Any]:
+    return np.array(values, dtype=object)
+
+
+def speed_dataset(rows: list[Row], problems: list[Problem]) -> Dataset:
+    """Every row with the error of each of its trajectories, NaN where it was not given one."""
+    errors = np.full((len(rows), max(len(problem.starts) for problem in problems)), np.nan)
+    for line, row in zip(errors, rows, strict=True):
+        line[: row.errors.size] = row.errors
+    columns = {
+        "problem": (_strings([r.problem for r in rows]), "1", "problem"),
+        "family": (_strings([r.family for r in rows]), "1", "integrator"),
+        "setting": (_strings([r.setting for r in rows]), "1", "step or tolerance"),
+        "threads": (np.array([r.threads for r in rows]), "1", "threads"),
+        "trajectories": (np.array([r.trajectories for r in rows]), "1", "trajectories in a timed call"),
+        "wall": (np.array([r.wall for r in rows]), "s", "wall time of a call, median"),
+        "processor": (np.array([r.processor for r in rows]), "s", "processor time of a call, median"),
+        "first_call": (np.array([r.first_call for r in rows]), "s", "preparing and the first call"),
+        "max_error": (np.array([r.max_error() for r in rows]), "rad or rad/s", "largest error"),
+        "median_error": (np.array([r.median_error for r in rows]), "rad or rad/s", "median error"),
+    }
+    variables = {name: Variable(("row",), *column) for name, column in columns.items()}
+    about = "largest error of a component of the final state, by trajectory"
+    return Dataset(variables | {"error": Variable(("row", "trajectory"), errors, "rad or rad/s", about)})
+
+
+def throughput_dataset(peak: float, found: list[Throughput]) -> Dataset:
+    """Right-hand sides per second, and the peak."""
+    return Dataset(
+        {
+            "peak": Variable(
+                (), np.array(peak), "1/s", "fused multiply-adds of doubles of one core, measured"
+            ),
+            "place": Variable(("place",), _strings([t.name for t in found]), "1", "where they are evaluated"),
+            "rhs": Variable(("place",), np.array([t.rhs for t in found]), "1/s", "right-hand sides"),
+        }
+    )
+
+
+def cost_dataset(found: list[Cost]) -> Dataset:
+    """Rates by kind of scene."""
+    return Dataset(
+        {
+            "kind": Variable(("kind",), _strings([c.name for c in found]), "1", "terms of the scene"),
+            "rate": Variable(("kind",), np.array([c.rate for c in found]), "1/s", "trajectories"),
+        }
+    )
+
+
+def start_dataset(found: list[Start]) -> Dataset:
+    """Cold starts."""
+    return Dataset(
+        {
+            "entrant": Variable(("entrant",), _strings([s.name for s in found]), "1", "integrator"),
+            "first": Variable(
+                ("entrant",), np.array([s.first_process for s in found]), "s", "to the first result"
+            ),
+            "second": Variable(
+                ("entrant",), np.array([s.second_process for s in found]), "s", "the same in a second process"
+            ),
+            "steady": Variable(("entrant",), np.array([s.steady for s in found]), "s", "a later call"),
+        }
+    )

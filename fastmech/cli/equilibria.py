@@ -50,8 +50,9 @@ class _SceneCommand(click.Command):
 def command(scene_file: Path | None, at: float, **parameters: float | None) -> None:
     """List every equilibrium of a scene and its stability.
 
-    A sentence says whether the list is proved to be complete. The scene is that of SCENE.toml (its
-    table [scene]), else the paper's Table 1; the options change it.
+    For every stable one a sentence tells the constant loads F0 at which it disappears, and one for all says
+    whether the list is proved to be complete. The scene is that of SCENE.toml (its table [scene]), else the
+    paper's Table 1; the options change it.
     """
     from rich.console import Console
 
@@ -61,6 +62,7 @@ def command(scene_file: Path | None, at: float, **parameters: float | None) -> N
     scene = Scene.from_toml(scene_file) if scene_file else Scene()
     scene = scene.replace(**{name: value for name, value in parameters.items() if value is not None})
     with ProgressBars() as bars, bars.preparing():
+        from fastmech.atlas.snap import find_snap
         from fastmech.equilibria.find import find_equilibria
         from fastmech.stability.classify import classify
     found = find_equilibria(scene, at)
@@ -72,6 +74,10 @@ def command(scene_file: Path | None, at: float, **parameters: float | None) -> N
         console.print(_table(found, results))
     for number, result in enumerate(results, start=1):
         console.print(f"{number}: {result.explanation}.")
+    loaded = scene.replace(F0=found.force, alpha=0.0)
+    for number, equilibrium in enumerate(found, start=1):
+        if equilibrium.morse_index == 0:
+            console.print(f"{number}: as the load F0 changes, it {find_snap(loaded, equilibrium).answer}.")
     sentence = found.certificate.sentence
     console.print(f"{sentence[0].upper()}{sentence[1:]}.")
 

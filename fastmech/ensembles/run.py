@@ -41,13 +41,15 @@ class Observation:
     """An observer (see :data:`fastmech.jit.OBSERVER_SIGNATURE`), its parameters and its empty record.
 
     ``record`` holds the start value of every row of a lane's record. Where ``stops`` is set, the rows begin
-    with those of :mod:`fastmech.ensembles.stopping`, and a lane whose code is not zero is taken out.
+    with those of :mod:`fastmech.ensembles.stopping` (its own may follow), and a lane whose code
+    is not zero is taken out after at most ``call_steps`` steps.
     """
 
     observe: Any
     params: Floats
     record: Floats
     stops: bool = False
+    call_steps: int = CALL_STEPS_WITH_STOPS
 
 
 NOTHING = Observation(observe_nothing, np.zeros(0), np.zeros(0))
@@ -92,7 +94,7 @@ def run_ensemble(
     # Small ensembles are shared among the threads too, in whole vectors.
     width = max(1, min(block_lanes, -(-len(begin) // (8 * workers)) * 8))
     chunk = width * CHUNK_BLOCKS if observation.stops else width
-    most = CALL_STEPS_WITH_STOPS * (1 + method.start_steps) if observation.stops else CALL_STEPS
+    most = observation.call_steps * (1 + method.start_steps) if observation.stops else CALL_STEPS
     way = list(spans(clock, dt, most))
     ensemble = Ensemble(
         states=np.empty((clock.size - 1, *begin.shape)),
@@ -135,6 +137,11 @@ class _Lanes:
     params: Floats
     record: Floats
 
+    @property
+    def stop_state(self) -> Floats:
+        """States at which lanes stopped, where they did."""
+        return self.record[STOP_STATE : STOP_STATE + len(self.Y)]
+
     def keep(self, which: NDArray[np.bool_]) -> None:
         self.members, self.Y = self.members[which], self.Y[:, which]
         self.params, self.record = self.params[:, which], self.record[:, which]
@@ -171,11 +178,11 @@ def _store(ensemble: Ensemble, lanes: _Lanes, span: Span, reached: Floats, stops
         if output >= 0:
             if stops:
                 before = _stopped(lanes) & (lanes.record[STOP_TIME] <= span.times[piece + 1])
-                reached[piece][:, before] = lanes.record[STOP_STATE:, before]
+                reached[piece][:, before] = lanes.stop_state[:, before]
             ensemble.states[output, lanes.members] = reached[piece].T
     if stops:
         stopped = _stopped(lanes)
-        lanes.Y[:, stopped] = lanes.record[STOP_STATE:, stopped]
+        lanes.Y[:, stopped] = lanes.stop_state[:, stopped]
         gone = stopped | ~np.isfinite(lanes.Y).all(axis=0)
         ensemble.states[span.passed :, lanes.members[gone]] = lanes.Y[:, gone].T
         lanes.keep(~gone)

@@ -7,7 +7,7 @@ from numba import boolean, types
 from numpy.typing import NDArray
 
 from fastmech.equilibria.balance import EPS, Pulls, expected_count, normal_form, pulls, vanishing
-from fastmech.equilibria.certificate import AT_FOLD, COMPLETE, UNPROVED, apart, certify
+from fastmech.equilibria.certificate import AT_FOLD, COMPLETE, UNPROVED, apart, certify, unbalance
 from fastmech.equilibria.outcome import Outcome
 from fastmech.equilibria.search import LAPS, MOST, FloatArray, candidates, hessian, polish
 from fastmech.jit import MATRIX, STATUSES, VECTOR, inlined, kernel
@@ -28,8 +28,14 @@ INDICES = types.Array(types.int8, 2, "C")
 
 
 @inlined
-def merge_singular(count: int, phi: FloatArray, theta: FloatArray, radius: FloatArray) -> int:
-    """Drop what is within ``MERGE`` of another unproved entry: the same one, displaced by rounding."""
+def merge_singular(
+    p: Pulls, error: float, count: int, phi: FloatArray, theta: FloatArray, radius: FloatArray
+) -> int:
+    """Of unproved entries that are the same one, displaced by rounding, keep the one that balances best.
+
+    The margin to the fold is uncertain by ``error`` rad, a position at a cusp by the cube root of that.
+    """
+    reach = max(MERGE, 4.0 * np.cbrt(error))
     kept = 0
     for i in range(count):
         again = False
@@ -37,9 +43,11 @@ def merge_singular(count: int, phi: FloatArray, theta: FloatArray, radius: Float
             if (
                 np.isinf(radius[i])
                 and np.isinf(radius[j])
-                and apart(phi[i], theta[i], phi[j], theta[j]) < MERGE
+                and apart(phi[i], theta[i], phi[j], theta[j]) < reach
             ):
                 again = True
+                if unbalance(p, phi[i], theta[i]) < unbalance(p, phi[j], theta[j]):
+                    phi[j], theta[j] = phi[i], theta[i]
         if not again:
             phi[kept], theta[kept], radius[kept] = phi[i], theta[i], radius[i]
             kept += 1
@@ -136,7 +144,7 @@ def solve(
             found = candidates(p, n, at_phi, at_theta)
             outcome[row] = certify(p, n, found, at_phi, at_theta, at_radius)
         if outcome[row] == AT_FOLD:
-            found = min(MOST, merge_singular(found, at_phi, at_theta, at_radius))
+            found = min(MOST, merge_singular(p, n.error, found, at_phi, at_theta, at_radius))
         phi[row, :found], theta[row, :found] = at_phi[:found], at_theta[:found]
         radius[row, :found] = at_radius[:found]
         scale = max(np.hypot(lift, force), np.hypot(gravity, force), spring)

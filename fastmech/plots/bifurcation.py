@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,10 +20,18 @@ Floats = NDArray[np.float64]
 
 #: How sheets look, by their Morse index.
 LOOKS = {
-    0: (PALETTE["blue"], "-", 2.2, "stable"),
     1: (PALETTE["vermillion"], "--", 1.3, "unstable: saddle"),
     2: (PALETTE["purple"], ":", 1.6, "unstable: maximum"),
 }
+
+#: Colours of stable sheets, all of the first one where there are more.
+STABLE = (PALETTE["blue"], PALETTE["green"], PALETTE["orange"])
+
+#: How many times the least decay time the picture shows; beyond, damping misses a mode.
+SLOWEST = 1e6
+
+#: Folds whose values the title tells at most.
+TOLD = 4
 
 
 def draw_bifurcation(view: View) -> Figure:
@@ -33,14 +42,13 @@ def draw_bifurcation(view: View) -> Figure:
     panels = figure.subplots(3 if third else 2, 1, sharex=True)
     folds = _folds(view, name)
     for axes, variable, symbol in zip(panels, ("phi", "theta"), ("φ", "θ"), strict=False):
-        labelled: set[int] = set()
-        for index, x, y in _sheets(view, name, variable, folds):
-            color, dash, width, label = LOOKS[index]
+        labelled: set[str] = set()
+        for (color, dash, width, label), x, y in _looks(_sheets(view, name, variable, folds)):
             axes.plot(
                 x, y, color=color, ls=dash, lw=width, marker="." if np.isfinite(y).sum() < 2 else "",
-                label="" if index in labelled else label,
+                label="" if label in labelled else label,
             )  # fmt: skip
-            labelled.add(index)
+            labelled.add(label)
         if folds:
             places = folds[f"fold_{variable}"]
             axes.plot(folds["at"], places, "o", color="white", mec="black", ms=6, ls="none", label="fold")
@@ -50,18 +58,48 @@ def draw_bifurcation(view: View) -> Figure:
         axes.set_yticks(*PI_TICKS)
         _own(axes, view)
     if third:
-        stable = view.data("morse_index") == 0
-        x = np.broadcast_to(view.axis(name)[:, None], stable.shape)
-        time = np.where(np.isfinite(view.data("decay_time")), view.data("decay_time"), np.nan)
-        panels[2].semilogy(x[stable], time[stable], ".", color=PALETTE["blue"], ms=3.0)
-        if np.isfinite(time[stable]).any():
-            logarithmic(panels[2].yaxis)
-        panels[2].set_ylabel("slowest decay time\nof the stable [s]")
-        _own(panels[2], view)
+        _decay(panels[2], view, name)
     panels[-1].set_xlabel(view.label(name))
-    panels[0].set_title(f"Equilibria over {name}{view.note}")
-    legend_below(figure, panels[0], 5)
+    panels[0].set_title(f"Equilibria over {name}{_told(view, folds, name)}\n{view.setting}")
+    legend_below(figure, panels[0], 4)
     return figure
+
+
+def _looks(
+    sheets: list[tuple[int, Floats, Floats]],
+) -> Iterator[tuple[tuple[str, str, float, str], Floats, Floats]]:
+    """How each sheet looks: the stable ones by their order, the unstable ones by their Morse index."""
+    stable = sum(index == 0 for index, _, _ in sheets)
+    seen = 0
+    for index, x, y in sheets:
+        if index != 0:
+            yield LOOKS[index], x, y
+            continue
+        several = 1 < stable <= len(STABLE)
+        label = f"stable, number {seen + 1}" if several else "stable"
+        yield (STABLE[seen if several else 0], "-", 2.2, label), x, y
+        seen += 1
+
+
+def _decay(axes: Axes, view: View, name: str) -> None:
+    sheets = [sheet for sheet in _sheets(view, name, "decay_time", {}) if sheet[0] == 0]
+    for (color, dash, width, _), x, y in _looks(sheets):
+        axes.semilogy(x, y, color=color, ls=dash, lw=width, marker="." if np.isfinite(y).sum() < 2 else "")
+    known = np.concatenate([np.zeros(0), *(y[np.isfinite(y)] for _, _, y in sheets)])
+    if known.size:
+        if known.max() > SLOWEST * known.min():
+            axes.set_ylim(0.5 * known.min(), SLOWEST * known.min())
+        logarithmic(axes.yaxis)
+    axes.set_ylabel("slowest decay time\nof the stable [s]")
+    _own(axes, view)
+
+
+def _told(view: View, folds: dict[str, Floats], name: str) -> str:
+    """The values of the parameter at the folds, if they are few."""
+    values = folds.get("at", np.zeros(0))
+    if not 0 < values.size <= TOLD:
+        return ""
+    return f"; folds at {', '.join(f'{value:.6g}' for value in values)} {view.dataset[name].units}"
 
 
 def _own(axes: Axes, view: View) -> None:
@@ -79,7 +117,7 @@ def _folds(view: View, name: str) -> dict[str, Floats]:
 def _sheets(
     view: View, name: str, variable: str, folds: dict[str, Floats]
 ) -> list[tuple[int, Floats, Floats]]:
-    """Morse index, parameter and angle of every sheet, led to the folds that it ends at, broken at +-pi."""
+    """Morse index, parameter and a variable of every sheet; angles lead to its folds and break at +-pi."""
     sheet, values, x = view.data("sheet"), view.data(variable), view.axis(name)
     curves = []
     for number, index in enumerate(view.dataset["sheet_morse_index"].data):
@@ -88,7 +126,12 @@ def _sheets(
         curves.append((int(index), x.copy(), np.asarray(line, dtype=np.float64)))
     for at, angle in zip(folds.get("at", ()), folds.get(f"fold_{variable}", ()), strict=True):
         _lead_to_fold(curves, float(at), float(angle))
-    return [(index, *_cut(xs, ys)) for index, xs, ys in curves if np.isfinite(ys).any()]
+    goes_round = variable in ("phi", "theta")
+    return [
+        (index, *(_cut(xs, ys) if goes_round else (xs, ys)))
+        for index, xs, ys in curves
+        if np.isfinite(ys).any()
+    ]
 
 
 def _lead_to_fold(curves: list[tuple[int, Floats, Floats]], at: float, angle: float) -> None:

@@ -28,7 +28,7 @@ COUNT_COLORS = {
     1: PALETTE["sky"],
     2: PALETTE["orange"],
     3: PALETTE["purple"],
-    4: "#7fb3d5",
+    4: "#d5e3ec",
     5: PALETTE["green"],
     6: PALETTE["yellow"],
 }
@@ -36,8 +36,14 @@ COUNT_COLORS = {
 #: Half of the smallest range of a colour bar of angles [rad]: rounding shall not look like structure.
 LEAST_SPAN = 1e-3
 
-#: Decades of a quantity that has extremes that its colours show; the rest has the colour of the end.
-DECADES = 1e4
+#: How many times the least decay time colours still tell; beyond, damping misses a mode.
+SLOWEST = 1e4
+
+#: What part of the deepest well colours still tell; towards a fold depths vanish.
+SHALLOWEST = 1e-2
+
+#: Part of the largest speed a root of energy below which crank and rod M1M2 count as in line.
+IN_LINE = 1e-2
 
 #: Marks of points whose count is not an ordinary proved one.
 UNSETTLED = {"at_fold": "|", "degenerate": "x", "unproved": "+"}
@@ -88,8 +94,8 @@ def _counts(view: View) -> Figure:
         curves = draw_curves(axes, view)
         handles += _mark_unsettled(axes, view) + _mark_own(axes, view)
         axes.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3)
-        _label(axes, view, f"{title}{view.note}")
-    _legend(figure, curves)
+        _label(axes, view, title)
+    _finish(figure, view, curves)
     return figure
 
 
@@ -122,9 +128,9 @@ def _angles(view: View) -> Figure:
             axes = panels[row, rank]
             mesh = axes.pcolormesh(*map(view.axis, view.axes), field.T, shading="nearest", **look)
             curves = draw_curves(axes, view) + _mark_own(axes, view)
-            _label(axes, view, f"{symbol} of the {_ORDER[rank]} stable equilibrium{view.note}")
+            _label(axes, view, f"{symbol} of the {_ORDER[rank]} stable equilibrium")
         figure.colorbar(mesh, ax=panels[row, :], label=f"{symbol} [rad]")
-    _legend(figure, curves)
+    _finish(figure, view, curves + _nothing(view))
     return figure
 
 
@@ -138,48 +144,84 @@ def _angle_look(fields: list[Floats]) -> dict[str, object]:
 
 
 def _barrier(view: View) -> Figure:
-    """Depth of each well; the colour bar tells it as an energy and, for a given m2, as a speed of M2."""
-    fields = [view.stable(rank, view.data("depth")) for rank in view.ranks]
-    high = max(np.nanmax(field) for field in fields if np.isfinite(field).any())
-    low = max(min(np.nanmin(field) for field in fields if np.isfinite(field).any()), high / DECADES)
-    title = "Energy to leave the {} well"
-    figure, bar = _fields(view, fields, title, (low, high), "depth of the well [J]")
-    if "m2" not in view.dataset.attrs["axes"]:
-        m2 = view.scene["m2"]
-        speed = bar.ax.secondary_yaxis(
-            -0.8, functions=(lambda e: np.sqrt(2.0 * np.abs(e) / m2), lambda v: 0.5 * m2 * v**2)
-        )
-        speed.set_ylabel("least speed of M2 with that energy [m/s]")
+    """Depth of each well, and the speed of M2 that a kick needs at least to leave it."""
+    rows = [("depth", "Energy to leave the {} well", "depth [J]")]
+    if view.has("escape_speed"):
+        rows.append(("escape_speed", "No slower kick of M2 leaves the {} well", "speed of M2 [m/s]"))
+    figure = new_figure(0.6 + 5.4 * len(view.ranks), 1.4 + 4.2 * len(rows))
+    panels = figure.subplots(len(rows), len(view.ranks), squeeze=False, sharex=True, sharey=True)
+    handles: list[Artist] = []
+    for row, (name, title, label) in zip(panels, rows, strict=True):
+        for rank, axes in zip(view.ranks, row, strict=True):
+            field = view.stable(rank, view.data(name))
+            _label(axes, view, title.format(_ORDER[rank]))
+            known = field[np.isfinite(field) & (field > 0.0)]
+            if known.size:
+                low = max(float(known.min()), SHALLOWEST * float(known.max()))
+                mesh = _field(axes, view, field, low, float(known.max()))
+                _bar(figure, mesh, [axes], label, "min" if float(np.nanmin(field)) < low else "neither")
+            handles = draw_curves(axes, view) + _mark_own(axes, view)
+    _finish(figure, view, handles + _in_line(view) + _nothing(view))
     return figure
 
 
+def _in_line(view: View) -> list[Artist]:
+    """Why the least speed may vanish though the well is deep."""
+    from matplotlib.patches import Patch
+
+    if not view.has("escape_speed"):
+        return []
+    with np.errstate(invalid="ignore", divide="ignore"):
+        lightness = view.data("escape_speed") / np.sqrt(view.data("depth"))
+    if not np.nanmin(lightness) < IN_LINE * np.nanmax(lightness):
+        return []
+    return [Patch(color="#00224e", label="speed near 0 in a deep well: crank and rod in line")]
+
+
 def _decay(view: View) -> Figure:
+    """Time in which the slowest linear mode of each stable equilibrium falls to 1/e."""
     fields = [view.stable(rank, view.data("decay_time")) for rank in view.ranks]
     known = np.concatenate([field[np.isfinite(field)] for field in fields])
-    low = float(known.min())
-    high = max(min(float(known.max()), low * DECADES), low * 1.0001)
-    title = "Slowest mode of the {} stable equilibrium"
-    return _fields(view, fields, title, (low, high), "time to fall to 1/e [s]")[0]
+    low, high = float(known.min()), min(float(known.max()), SLOWEST * float(known.min()))
+    figure = new_figure(1.9 + 4.6 * len(fields), 5.4)
+    panels = figure.subplots(1, len(fields), squeeze=False, sharey=True)[0]
+    for rank, (axes, field) in enumerate(zip(panels, fields, strict=True)):
+        mesh = _field(axes, view, field, low, high)
+        handles = draw_curves(axes, view) + _mark_own(axes, view)
+        _label(axes, view, f"Slowest mode of the {_ORDER[rank]} stable equilibrium")
+    slower = any(float(np.nanmax(field, initial=low)) > high for field in fields)
+    _bar(figure, mesh, list(panels), "time to fall to 1/e [s]", "max" if slower else "neither")
+    _finish(figure, view, handles + _nothing(view))
+    return figure
 
 
-def _fields(
-    view: View, fields: list[Floats], title: str, limits: tuple[float, float], label: str
-) -> tuple[Figure, Any]:
-    """One panel for each stable equilibrium, deepest first, with a common logarithmic colour bar."""
+def _field(axes: Axes, view: View, field: Floats, low: float, high: float) -> Any:
+    """A field in logarithmic colours; values beyond the limits have the colour of the nearer one."""
     from matplotlib.colors import LogNorm
 
-    figure = new_figure(1.9 + 4.6 * len(fields), 5.2)
-    panels = figure.subplots(1, len(fields), squeeze=False, sharey=True)[0]
-    low, high = limits
     norm = LogNorm(low, high if high > low else low * 1.0001)
-    for rank, (axes, field) in enumerate(zip(panels, fields, strict=True)):
-        shown = np.clip(field, *limits)
-        mesh = axes.pcolormesh(*map(view.axis, view.axes), shown.T, shading="nearest", norm=norm, cmap=FIELD)
-        curves = draw_curves(axes, view) + _mark_own(axes, view)
-        _label(axes, view, f"{title.format(_ORDER[rank])}{view.note}")
-    bar = figure.colorbar(mesh, ax=panels, label=label)
-    _legend(figure, curves)
-    return figure, bar
+    shown = np.clip(field, low, high)
+    return axes.pcolormesh(*map(view.axis, view.axes), shown.T, shading="nearest", norm=norm, cmap=FIELD)
+
+
+def _bar(figure: Figure, mesh: Any, panels: list[Axes], label: str, extend: str) -> None:
+    """A colour bar with an arrow at the end beyond which there are values."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    bar = figure.colorbar(mesh, ax=panels, label=label, extend=extend)
+    if mesh.norm.vmax <= 3.0 * mesh.norm.vmin / SHALLOWEST:
+        bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    bar.ax.yaxis.set_minor_formatter(NullFormatter())
+
+
+def _nothing(view: View) -> list[Artist]:
+    """What white means where not every point has as many stable equilibria as panels."""
+    from matplotlib.patches import Patch
+
+    if int(view.data("count_stable").min()) == len(view.ranks):
+        return []
+    return [Patch(facecolor="white", edgecolor="#808080", label="white: no such equilibrium")]
 
 
 def _label(axes: Axes, view: View, title: str) -> None:
@@ -189,7 +231,9 @@ def _label(axes: Axes, view: View, title: str) -> None:
     axes.grid(visible=False)
 
 
-def _legend(figure: Figure, handles: list[Artist]) -> None:
+def _finish(figure: Figure, view: View, handles: list[Artist]) -> None:
+    """The scene above everything, the legend below."""
+    figure.suptitle(view.setting, fontsize=10.0)
     if handles:
         columns = 2 if figure.get_figwidth() > 8.0 else 1
         figure.legend(handles=handles, loc="outside lower center", ncols=columns)

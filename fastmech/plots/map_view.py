@@ -1,4 +1,4 @@
-"""What is drawn of an equilibrium map: up to two of its axes, and values picked by depth."""
+"""What is drawn of an equilibrium map: up to two of its axes, not too many points, values picked by depth."""
 
 from __future__ import annotations
 
@@ -9,8 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.results import Dataset
+from fastmech.scene import Scene
+from fastmech.store.read import Section
 
 Floats = NDArray[np.float64]
+
+#: Points of an axis that are drawn at most; of longer ones every n-th is read.
+MOST_DRAWN = 1000
+
+#: Variables over the equilibria that pictures show; the others stay in the file.
+DRAWN = ("phi", "theta", "energy", "morse_index", "sheet", "depth", "escape_speed", "decay_time")
 
 #: Relative difference of energies that rounding may cause.
 ROUNDING = 1e-10
@@ -31,12 +39,20 @@ class View:
         return tuple(self.held.get(name, slice(None)) for name in self.dataset.attrs["axes"])
 
     @property
-    def note(self) -> str:
-        """For titles: where further axes are held."""
-        values = [
-            f"{name} = {self.axis(name)[i]:.4g} {self.dataset[name].units}" for name, i in self.held.items()
+    def setting(self) -> str:
+        """For titles: what is not on the axes, as far as it differs from Table 1, and what is left out."""
+        own = {name: value for name, value in self.scene.items() if name not in self.axes and name != "alpha"}
+        own |= {name: float(self.axis(name)[i]) for name, i in self.held.items()}
+        decayed = own.get("alpha", self.scene["alpha"]) > 0.0 and "alpha" not in self.axes
+        told = [
+            f"{name} = {own[name]:.6g} {unit}"
+            for name, (value, unit, _) in Scene().described().items()
+            if name in own and own[name] != value and not (decayed and name in ("F0", "alpha"))
         ]
-        return ", ".join(["", *values])
+        if decayed:
+            told.append("the force decayed")
+        left_out = str(self.dataset.attrs.get("drawn", ""))
+        return " with ".join(["Table 1", *([", ".join(told)] if told else [])]) + left_out
 
     def data(self, name: str) -> NDArray[np.generic]:
         """A variable over the axes drawn."""
@@ -81,11 +97,41 @@ class View:
         return all(name in self.dataset for name in names)
 
 
+def free_axes(names: tuple[str, ...], sizes: Mapping[str, int]) -> tuple[str, ...]:
+    """The first two axes that vary."""
+    return tuple(name for name in names if sizes[name] > 1)[:2] or names[:1]
+
+
 def make_view(dataset: Dataset, scene: Mapping[str, float]) -> View:
     """The first two axes that vary; the others are held where the scene is."""
     names = tuple(dataset.attrs["axes"])
-    free = tuple(name for name in names if dataset.sizes[name] > 1)[:2] or names[:1]
+    free = free_axes(names, dataset.sizes)
     held = {
         name: int(np.argmin(np.abs(dataset[name].data - scene[name]))) for name in names if name not in free
     }
     return View(dataset, scene, free, held)
+
+
+def load_drawn(section: Section, scene: Mapping[str, float]) -> Dataset:
+    """What pictures show of a map's section, read without the rest of it ever being in memory.
+
+    Of two axes with more than ``MOST_DRAWN`` values every n-th is taken, of a third axis the one held.
+    """
+    names = tuple(section.attrs["axes"])
+    free = free_axes(names, section.sizes)
+    part, left_out = {}, ""
+    for name in names:
+        if name not in free:
+            k = int(np.argmin(np.abs(section[name].data - scene[name])))
+            part[name] = slice(k, k + 1)
+        elif len(free) == 2 and section.sizes[name] > MOST_DRAWN:
+            step = -(-section.sizes[name] // MOST_DRAWN)
+            part[name] = slice(None, None, step)
+            left_out += f"; 1 in {step} values of {name}"
+    wanted = [name for name in section if name in DRAWN or not _over_equilibria(section, name)]
+    dataset = section.load(wanted, part)
+    return Dataset(dataset.variables, {**dataset.attrs, **({"drawn": left_out} if left_out else {})})
+
+
+def _over_equilibria(section: Section, name: str) -> bool:
+    return "root" in section.dims(name)

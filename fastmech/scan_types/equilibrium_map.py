@@ -1,9 +1,17 @@
 """Equilibria over one to three parameters: how many, how many stable, where, how deep, how fast they settle.
 
-Layout: six slots along ``root`` at every point, the deepest equilibrium first; slots beyond ``count`` hold
-NaN in numbers and -1 in codes. ``sheet`` says which slots of different points are one equilibrium, continued.
-A map over two parameters also holds its fold curves, cusps and vanishing-damping curves, point after point;
-a map over one its folds.
+Layout: a point has four or six equilibria, and six slots along ``root``, the deepest equilibrium first;
+slots beyond ``count`` hold NaN in numbers and -1 in codes. So reductions over ``root`` that skip NaN need no
+mask, and ``map.phi.where(map.morse_index == 0)`` leaves the stable ones. ``sheet`` says which slots of
+different points are one equilibrium, continued: ``map.phi.where(map.sheet == 3).max("root")`` is one of them
+over the whole map; ``sheet_branch`` which sheets continue one another round a cusp; ``sheet_break`` where a
+sheet is torn. Coordinates: the axes in their units, ``root`` (rank by energy), ``mode`` (rank by real part)
+and ``entry`` (which second derivative). A map over two parameters also holds its fold curves, cusps and
+vanishing-damping curves, point after point, ``fold_curve`` and ``unreached_curve`` numbering them; a map over
+one its folds.
+
+A fold curve is found where it separates points of the grid: an island of six equilibria (or of four) that
+lies between the points, parting no two neighbours, is not seen. A finer grid sees it.
 """
 
 from __future__ import annotations
@@ -15,6 +23,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+from fastmech.atlas.axes import refuse_decaying_load
 from fastmech.atlas.map import Slab
 from fastmech.errors import InputError
 from fastmech.results import Dataset, Variable
@@ -26,6 +35,8 @@ from fastmech.scene import Scene, nearest
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from fastmech.store.read import Section
 
 #: Points of the largest map: its sheets take 24 bytes a point in memory, its file about 100.
 MOST_POINTS = 50_000_000
@@ -68,10 +79,7 @@ class EquilibriumMap(TiledScan):
 
     def check(self, scene: Scene) -> None:
         """Every value of every axis must be one the scene accepts, and every axis must matter."""
-        if "F0" in self.axes and scene.alpha > 0:
-            raise InputError(
-                f"alpha = {scene.alpha:g}: must be 0 1/s for a map over F0, or no force is left at rest"
-            )
+        refuse_decaying_load(scene, self.axes)
         total = math.prod(axis.num for axis in self.axes.values())
         if total > MOST_POINTS:
             raise InputError(f"axes: ask for {total:.3g} points, at most {MOST_POINTS:.0e} are allowed")
@@ -94,6 +102,13 @@ class EquilibriumMap(TiledScan):
         if self.variables is None:
             return variables
         return {name: variable for name, variable in variables.items() if name in self.variables}
+
+    @staticmethod
+    def read(section: Section, scene: Mapping[str, float]) -> Dataset:
+        """What is drawn of the map, whatever its size."""
+        from fastmech.plots.map_view import load_drawn
+
+        return load_drawn(section, scene)
 
     @staticmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:

@@ -22,6 +22,10 @@ Floats = NDArray[np.float64]
 SEED_VALUES = 151
 
 
+#: Dimension of what is told of all curves together.
+TALLY = "total_unexplained_and_unfinished"
+
+
 class Merging(IntEnum):
     """What merges with a saddle on a fold."""
 
@@ -95,9 +99,9 @@ def _fold_curves(scene: Scene, x: tuple[str, Floats], y: tuple[str, Floats]) -> 
         "cusp_phi": _numbers(cusp, [c.phi for c in found.cusps], "rad", "phi where three equilibria merge"),
         "cusp_theta": _numbers(cusp, [c.theta for c in found.cusps], "rad", "theta where three merge"),
     }
-    about = "edges of the map between whose ends the count changes, and those that no fold curve crosses"
-    counts = np.array([found.crossings, found.unexplained])
-    variables["fold_crossings"] = Variable(("total_and_unexplained",), counts, "1", about)
+    about = "edges between whose ends the count changes, those that no fold curve crosses, curves cut short"
+    counts = np.array([found.crossings, found.unexplained, found.unfinished])
+    variables["fold_crossings"] = Variable((TALLY,), counts, "1", about)
     return variables
 
 
@@ -107,7 +111,10 @@ def _unreached_curves(
     thin = [
         (name, np.linspace(values[0], values[-1], min(values.size, SEED_VALUES))) for name, values in (x, y)
     ]
-    curves = trace_unreached(scene, *thin, threads=threads)
+    found = trace_unreached(scene, *thin, threads=threads)
+    curves, sheets = found.curves, found.everywhere
+    one = ("unreached_sheet",)
+    told = "of one of the points of a sheet on which the damper misses a mode everywhere"
     units = [scene.described()[name][1] for name, _ in (x, y)]
     each = ("unreached_point",)
     what = "where the damper misses a mode"
@@ -122,6 +129,22 @@ def _unreached_curves(
             [v for c in curves for v in [_VANISHING[c.vanishes]] * c.x.size],
             "what vanishes there",
             Vanishing,
+        ),
+        f"unreached_sheet_{x[0]}": _numbers(one, [s.x for s in sheets], units[0], f"{x[0]} {told}"),
+        f"unreached_sheet_{y[0]}": _numbers(one, [s.y for s in sheets], units[1], f"{y[0]} {told}"),
+        "unreached_sheet_phi": _numbers(one, [s.phi for s in sheets], "rad", f"phi {told}"),
+        "unreached_sheet_theta": _numbers(one, [s.theta for s in sheets], "rad", f"theta {told}"),
+        "unreached_sheet_share": _numbers(
+            one, [s.share for s in sheets], "1", "share of the map's points at which that sheet has it"
+        ),
+        "unreached_sheet_vanishes": _codes(
+            one, [_VANISHING[s.vanishes] for s in sheets], "what vanishes all over the sheet", Vanishing
+        ),
+        "unreached_crossings": Variable(
+            (TALLY,),
+            np.array([found.crossings, found.unexplained, found.unfinished]),
+            "1",
+            "edges of the seeding grid that such a curve crosses, those without a curve, curves cut short",
         ),
     }
 

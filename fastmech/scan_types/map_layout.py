@@ -9,6 +9,7 @@ from fastmech.atlas.coincidence import Coincidence
 from fastmech.atlas.map import Slab
 from fastmech.atlas.verdicts import Verdict
 from fastmech.equilibria.outcome import Outcome
+from fastmech.equilibria.search import MOST
 from fastmech.results import Variable, flags
 
 CRITERIA = {
@@ -69,25 +70,46 @@ def point_variables(grid: tuple[str, ...], found: Slab) -> dict[str, Variable]:
             roots,
             found.escape_speed,
             "m/s",
-            "speed at which M2 alone has the depth as kinetic energy; a blow that moves M1 too needs less",
+            "least speed of M2 at which the kinetic energy is the depth: no slower kick leaves the well",
         ),
     }
 
 
-def sheet_variables(
-    grid: tuple[str, ...], sheet: NDArray[np.int32] | None, morse_index: NDArray[np.int8] | None
-) -> dict[str, Variable]:
-    """The sheet of every slot, and the Morse index of every sheet; either may be left out."""
-    variables = {}
-    if sheet is not None:
-        variables["sheet"] = Variable(
-            (*grid, "root"),
-            sheet,
-            "1",
-            "equal numbers are one equilibrium, continued, but cut along some folds round a cusp; -1: none",
-        )
-    if morse_index is not None:
-        variables["sheet_morse_index"] = Variable(
-            ("sheet_number",), morse_index, "1", "negative eigenvalues of the Hessian all over a sheet"
-        )
+def slot_variables(kept: list[str] | None) -> dict[str, Variable]:
+    """Coordinates of the dimensions that are no parameters and that the variables kept (None: all) have."""
+    variables = {
+        "root": Variable(("root",), np.arange(MOST, dtype=np.int8), "1", "rank of the equilibrium by energy")
+    }
+    if kept is None or {"eigenvalue_re", "eigenvalue_im"} & set(kept):
+        modes = np.arange(4, dtype=np.int8)
+        variables["mode"] = Variable(("mode",), modes, "1", "rank of the eigenvalue by real part")
+    if kept is None or "hessian" in kept:
+        entries = np.array(["phi phi", "phi theta", "theta theta"], dtype=object)
+        variables["entry"] = Variable(("entry",), entries, "1", "which second derivative")
     return variables
+
+
+def sheet_variables(grid: tuple[str, ...], sheet: NDArray[np.int32]) -> dict[str, Variable]:
+    """The sheet of every slot."""
+    about = "equal numbers at neighbours: one equilibrium, continued, but for sheet_break; -1: none"
+    return {"sheet": Variable((*grid, "root"), sheet, "1", about)}
+
+
+def sheet_table(
+    morse_index: NDArray[np.int8], branch: NDArray[np.int32], breaks: NDArray[np.int32]
+) -> dict[str, Variable]:
+    """What is known of every sheet, and where a sheet is torn."""
+    each = ("sheet_number",)
+    torn = (
+        "where a sheet does not continue between neighbours: index along every axis of the second of them, "
+        "the axis along which the first is before it (0: first axis), the sheet"
+    )
+    return {
+        "sheet_morse_index": Variable(
+            each, morse_index, "1", "negative eigenvalues of the Hessian all over a sheet"
+        ),
+        "sheet_branch": Variable(
+            each, branch, "1", "sheets with equal numbers continue one another round a cusp or across a fold"
+        ),
+        "sheet_break": Variable(("break", "break_entry"), breaks, "1", torn),
+    }

@@ -16,7 +16,7 @@ from fastmech.atlas.sheets import SheetBuilder
 from fastmech.ensembles.threads import thread_count
 from fastmech.results import Dataset, Variable
 from fastmech.scan_types.map_curves import curve_variables
-from fastmech.scan_types.map_layout import point_variables, sheet_variables
+from fastmech.scan_types.map_layout import point_variables, sheet_table, sheet_variables, slot_variables
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
 from fastmech.scene import Scene
 from fastmech.store.stream import Piece, Stream
@@ -29,6 +29,8 @@ _FOR_SHEETS = ("phi", "theta", "morse_index", "count")
 
 
 class _Request(Protocol):
+    @property
+    def variables(self) -> list[str] | None: ...
     @property
     def wells(self) -> bool: ...
     def kept(self, variables: dict[str, Variable]) -> dict[str, Variable]: ...
@@ -92,10 +94,12 @@ class MapTiling(Tiling):
         attrs = {
             "axes": tuple(self.axes),
             "layout": "six slots along root, the deepest first; beyond count NaN, codes -1",
+            "curves": "all fold curves that part neighbouring points; islands between them are not seen",
         }
         one = self._shaped(Slab.empty(self.plane))
-        one |= sheet_variables(tuple(self.axes), np.zeros((1, *self.others, 6), dtype=np.int32), None)
-        fixed = Dataset({**about, **tile(0).variables}, attrs)
+        one |= sheet_variables(tuple(self.axes), np.zeros((1, *self.others, 6), dtype=np.int32))
+        slots = slot_variables(self.request.variables)
+        fixed = Dataset({**about, **tile(0).variables, **slots}, attrs)
         return Stream(fixed, one, self.first, lambda: self._pieces(tile))
 
     def missing(self, index: int) -> Dataset:
@@ -110,7 +114,7 @@ class MapTiling(Tiling):
         return Dataset(self._shaped(slab, for_sheets=True))
 
     def _pieces(self, tile: Tiles) -> Iterator[Piece]:
-        builder = SheetBuilder((len(self.axes[self.first]), *self.others))
+        builder = SheetBuilder(self.scene, self.axes)
         kept = set(self._shaped(Slab.empty(self.plane)))
         for index, part in enumerate(self.parts, start=1):
             variables = tile(index).variables
@@ -123,10 +127,10 @@ class MapTiling(Tiling):
                 count.reshape(-1),
             )
             yield part, {name: variables[name].data for name in variables if name in kept}
-        labelled, sheet_index = builder.finish()
-        for part, sheet in zip(self.parts, labelled, strict=True):
+        sheets = builder.finish()
+        for part, sheet in zip(self.parts, sheets.labels, strict=True):
             yield part, {"sheet": sheet.reshape(-1, *self.others, sheet.shape[-1])}
-        yield Dataset(sheet_variables(tuple(self.axes), None, sheet_index))
+        yield Dataset(sheet_table(sheets.morse_index, sheets.branch, sheets.breaks))
 
     def _coefficients(self, index: int) -> tuple[NDArray[np.float64], ...]:
         values = self.axes[self.first][self.parts[index - 1]]

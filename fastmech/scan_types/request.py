@@ -23,6 +23,8 @@ from fastmech.store.stream import Stream, in_memory
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from fastmech.store.read import Section
+
 
 def _known_method(name: str) -> str:
     find_method(name)
@@ -61,6 +63,11 @@ class Scan(BaseModel, ABC):
     def tiling(self, scene: Scene) -> Tiling:
         """How the work is divided: not at all, unless a kind of scan says otherwise."""
         return Whole(self, scene)
+
+    @staticmethod
+    def read(section: Section, scene: Mapping[str, float]) -> Dataset:
+        """What ``draw`` needs of a result file's section; all of it, unless less will do."""
+        return section.load()
 
     @staticmethod
     @abstractmethod

@@ -47,13 +47,13 @@ class SnapScan(Scan):
                     each,
                     loads([s.below for s in found]),
                     "N",
-                    "it disappears when the load falls to; NaN: never",
+                    "it disappears when the load falls to; NaN: at no load searched",
                 ),
                 "snap_above": Variable(
                     each,
                     loads([s.above for s in found]),
                     "N",
-                    "it disappears when the load rises to; NaN: never",
+                    "it disappears when the load rises to; NaN: at no load searched",
                 ),
                 "searched": Variable(
                     (*each, "end"),

@@ -28,7 +28,7 @@ def test_verified_sets_lie_on_a_curve(name: str) -> None:
         ("F0", np.linspace(F0 - 40.0, F0 + 37.0, 41)),
         ("c2", np.linspace(max(c2 - 30.0, 0.0), c2 + 33.0, 43)),
     )
-    curves = [curve for curve in trace_unreached(scene, *axes) if curve.vanishes == name.strip()]
+    curves = [curve for curve in trace_unreached(scene, *axes).curves if curve.vanishes == name.strip()]
     assert all(curve.residual < 1e-12 for curve in curves)
     near = min(
         np.min(
@@ -48,7 +48,7 @@ def test_points_of_the_curves_are_stable_and_silent() -> None:
     scene = Scene(c1=294.9, alpha=0.0)
     curves = trace_unreached(
         scene, ("F0", np.linspace(-300.0, 300.0, 61)), ("c2", np.linspace(10.0, 300.0, 41))
-    )
+    ).curves
     assert {curve.vanishes for curve in curves} >= {SIN_PHI, UNLOADED}
     for curve in curves:
         for k in np.linspace(2, len(curve.x) - 3, 4).astype(int):
@@ -68,4 +68,44 @@ def test_points_of_the_curves_are_stable_and_silent() -> None:
 
 def test_no_damper_no_curve() -> None:
     scene = Scene(beta=0.0, alpha=0.0)
-    assert trace_unreached(scene, ("F0", [0.0, 1.0]), ("c1", [0.0, 1.0])) == ()
+    found = trace_unreached(scene, ("F0", [0.0, 1.0]), ("c1", [0.0, 1.0]))
+    assert (found.curves, found.everywhere, found.crossings) == ((), (), 0)
+
+
+@pytest.mark.parametrize("c2", [78.4532, 10 * 9.80665 / 1.25, np.nextafter(78.4532, 79.0)])
+def test_a_sheet_that_damping_misses_everywhere_is_named(c2: float) -> None:
+    """c2 = m1 g / l: where R = sqrt((m2 g)^2 + F0^2) < 2 c1 l the two tilted minima have an unloaded rod.
+
+    With a = b equilibria have cos x (R + 2 C sin x) = 0 for x = phi - atan2(f, a); the second factor gives
+    U_theta,theta = C identically.
+    """
+    scene = Scene(F0=60.0, c1=120.0, c2=c2, alpha=0.0)
+    F0, c1 = np.linspace(-400.0, 400.0, 41), np.linspace(0.0, 400.0, 41)
+    found = trace_unreached(scene, ("F0", F0), ("c1", c1))
+    assert [sheet.vanishes for sheet in found.everywhere] == [UNLOADED, UNLOADED]
+    assert (found.unexplained, found.unfinished) == (0, 0)
+    assert UNLOADED not in {curve.vanishes for curve in found.curves}
+    there = np.hypot(12 * 9.80665, F0)[:, None] < 2.0 * c1 * 1.25
+    for sheet in found.everywhere:
+        # Cells are counted whole, so points at the rim may be left out.
+        assert there.mean() - 0.03 < sheet.share <= there.mean()
+        point = scene.replace(F0=sheet.x, c1=sheet.y)
+        (e,) = (
+            e for e in find_equilibria(point) if np.hypot(e.phi - sheet.phi, e.theta - sheet.theta) < 1e-9
+        )
+        assert e.kind == "minimum"
+        assert classify(point, e).hurwitz.verdict == "critical"
+
+
+def test_what_cannot_be_traced_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    axes = (("F0", np.linspace(-300.0, 300.0, 31)), ("c2", np.linspace(10.0, 300.0, 21)))
+    scene = Scene(c1=294.9, alpha=0.0)
+    whole = trace_unreached(scene, *axes)
+    assert (whole.unexplained, whole.unfinished) == (0, 0)
+    monkeypatch.setattr("fastmech.atlas.continuation.MOST_STEPS", 7)
+    assert trace_unreached(scene, *axes).unfinished > 0
+    monkeypatch.undo()
+    monkeypatch.setattr("fastmech.atlas.damping.MOST_POINTS", 0)
+    none = trace_unreached(scene, *axes)
+    assert none.curves == ()
+    assert none.unexplained == none.crossings == whole.crossings > 0

@@ -5,10 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fastmech.atlas.fold_points import find_folds
+from fastmech.atlas.folds import trace_folds
 from fastmech.atlas.map import EquilibriumMap, map_equilibria
+from fastmech.atlas.snap import find_snap
 from fastmech.equilibria.find import find_equilibria
 from fastmech.equilibria.outcome import Outcome
 from fastmech.errors import InputError
+from fastmech.scan_types.equilibrium_map import EquilibriumMap as EquilibriumMapScan
 from fastmech.scene import Scene
 from fastmech.stability.classify import classify
 
@@ -149,7 +153,19 @@ def test_degenerate_point_is_marked() -> None:
         ({"cc1": [1.0]}, r"^axes\.cc1: unknown parameter; did you mean 'c1'\?"),
         ({"c1": []}, r"^axes\.c1: shape \(0,\)"),
         ({"c1": [[1.0]]}, r"^axes\.c1: shape \(1, 1\)"),
-        ({"c1": ["stiff"]}, r"^axes\.c1: must be a sequence of numbers"),
+        ({"c1": ["stiff"]}, r"^axes\.c1 = \['stiff'\]: must be a sequence of numbers$"),
+        ({"c1": ["1", "2"]}, r"^axes\.c1 = \['1', '2'\]: must be a sequence of numbers$"),
+        ({"c1": [True]}, r"^axes\.c1 = \[True\]: must be a sequence of numbers$"),
+        ({"c1": [1j]}, r"^axes\.c1 = \[1j\]: must be a sequence of numbers$"),
+        ({"c1": [[1.0], [1.0, 2.0]]}, r"^axes\.c1 = .*: must be a sequence of numbers$"),
+        ({"c1": "12"}, r"^axes\.c1 = '12': must be a sequence of numbers$"),
+        ({"F0": None}, r"^axes\.F0 = None: must be a sequence of numbers$"),
+        ({"F0": [None, 1.0]}, r"^axes\.F0 = \[None, 1\.0\]: must be a sequence of numbers$"),
+        ({"F0": 5.0}, r"^axes\.F0: shape \(\): must be one-dimensional"),
+        ({7: [1.0]}, r"^axes\.7: unknown parameter; allowed: m1, "),
+        ("F0", r"^axes = 'F0': must map parameter names to their values$"),
+        (["F0", [1.0]], r"^axes = \['F0', \[1\.0\]\]: must map parameter names"),
+        (None, r"^axes = None: must map parameter names"),
         ({"c1": [1.0, -2.0]}, r"^axes\.c1: scene\.c1 = -2\.0: "),
         ({"F0": [np.nan]}, r"^axes\.F0: scene\.F0 = nan: "),
     ],
@@ -166,5 +182,26 @@ def test_wrong_thread_count_is_refused(threads: int) -> None:
 
 
 def test_a_force_that_decays_is_no_axis() -> None:
-    with pytest.raises(InputError, match=r"^scene\.alpha = 0\.7: must be 0 1/s where F0 is an axis"):
-        map_equilibria(Scene(), {"F0": [1.0, 2.0]})
+    """F0 means the load at rest in maps and in searches for folds; where it decays each refuses it."""
+    loads = [1.0, 2.0]
+    for search in (
+        lambda: map_equilibria(Scene(), {"F0": loads}),
+        lambda: find_folds(Scene(), "F0", loads),
+        lambda: trace_folds(Scene(), ("c1", loads), ("F0", loads)),
+        lambda: EquilibriumMapScan(axes={"F0": {"start": 1.0, "stop": 2.0, "num": 2}}).check(Scene()),
+    ):
+        with pytest.raises(InputError, match=r"^scene\.alpha = 0\.7: must be 0 1/s where F0 is an axis"):
+            search()
+    # Over other parameters each takes the force for what is left of it.
+    stiffness = np.linspace(0.0, 400.0, 50)
+    free = PAPER.replace(F0=0.0)
+    decaying = PAPER.replace(alpha=0.7)
+    assert find_folds(decaying, "c1", stiffness) == find_folds(free, "c1", stiffness) != ()
+    one, two = (map_equilibria(scene, {"c1": stiffness}) for scene in (decaying, free))
+    np.testing.assert_array_equal(one.count, two.count)
+    assert find_snap(decaying) == find_snap(free)
+
+
+def test_alpha_moves_no_fold() -> None:
+    with pytest.raises(InputError, match=r"^axes\.alpha: equilibria do not depend on how fast"):
+        find_folds(PAPER, "alpha", [0.0, 1.0])

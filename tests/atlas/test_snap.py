@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 
@@ -81,8 +82,12 @@ def test_wrong_requests_are_refused() -> None:
     saddle = next(e for e in find_equilibria(BISTABLE) if e.kind == "saddle")
     with pytest.raises(InputError, match=r"^equilibrium = .*: must be a stable one"):
         find_snap(BISTABLE, saddle)
-    with pytest.raises(InputError, match=r"^searched = \(100\.0, 200\.0\): must be a range"):
-        find_snap(BISTABLE, searched=(100.0, 200.0))
+    with pytest.raises(InputError, match=r"^equilibrium = 3: must be one that find_equilibria gives$"):
+        find_snap(BISTABLE, 3)  # type: ignore[arg-type]
+    for searched in ((100.0, 200.0), (1.0,), "ab", 5, (None, None), ("-500", "500"), (np.nan, 500.0)):
+        message = f"searched = {searched!r}: must be a range of forces [N] that holds 85.3 N"
+        with pytest.raises(InputError, match=f"^{re.escape(message)}$"):
+            find_snap(BISTABLE, searched=searched)  # type: ignore[arg-type]
 
 
 def test_searched_range_is_kept_to() -> None:

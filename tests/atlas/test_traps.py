@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import mpmath
 import numpy as np
 import pytest
 
@@ -50,11 +51,49 @@ def test_a_unit_root_that_is_no_equilibrium(force: float) -> None:
     assert (line.radius[1][np.isfinite(line.phi[1])] < 1e-10).all()
 
 
+#: Equilibria at Table 1 without the spring c2, from paper (17) with theta eliminated, by bisection in mpmath.
+NO_C2 = (
+    (-0.61233601, 1.5567908),
+    (-0.54596372, 1.4064046),
+    (2.0776361, 2.5494874),
+    (-1.8229393, -2.0538151),
+    (-0.94092814, -0.40004833),
+    (1.8477708, -0.46112042),
+)
+
+
+def test_without_c2_there_are_six() -> None:
+    """Six balance to 45 digits and differ, and no more exist: the polynomial keeps its degree six."""
+    with mpmath.workdps(50):
+        a, b = 22 * mpmath.mpf("9.80665") * 1.25, 12 * mpmath.mpf("9.80665") * 1.25
+        C, f = mpmath.mpf("162.5") * mpmath.mpf("1.25") ** 2, mpmath.mpf(125)
+
+        def gradient(phi: mpmath.mpf, theta: mpmath.mpf) -> list[mpmath.mpf]:
+            pull = C * mpmath.cos(phi + theta)
+            return [
+                a * mpmath.cos(phi) + f * mpmath.sin(phi) - pull,
+                b * mpmath.sin(theta) + f * mpmath.cos(theta) - pull,
+            ]
+
+        exact = [mpmath.findroot(gradient, start) for start in NO_C2]
+        for place, start in zip(exact, NO_C2, strict=True):
+            assert mpmath.norm(mpmath.matrix(gradient(*place))) < mpmath.mpf(10) ** -45
+            assert mpmath.norm(place - mpmath.matrix(start)) < 1e-6
+        leading = -C * mpmath.mpc(f, b) * mpmath.mpc(a, -f) ** 2
+        assert abs(leading) > 1e6
+        places = np.array([[float(x) for x in place] for place in exact])
+    one = map_equilibria(Scene(c2=0.0, alpha=0.0), {"F0": [100.0]})
+    assert (one.outcome[0], one.count[0]) == (Outcome.COMPLETE, 6)
+    found = np.stack([one.phi[0], one.theta[0]], axis=-1)
+    nearest = np.abs(found[:, None] - places).max(axis=-1)
+    assert nearest.min(axis=0).max() < 1e-12
+    assert sorted(nearest.argmin(axis=0)) == list(range(6))
+
+
 def test_only_the_triple_case_is_degenerate() -> None:
     balanced = 22 * WEIGHT / 1.25
     for changes in ({"c1": 0.0}, {"c2": 0.0, "F0": 100.0, "c1": 0.0}, {"F0": 0.0, "c2": balanced}):
         one = map_equilibria(PAPER.replace(**changes), {"l": [1.25]})
         assert (one.outcome[0], one.count[0]) == (Outcome.COMPLETE, 4), changes
-    assert map_equilibria(PAPER.replace(c2=0.0), {"l": [1.25]}).outcome[0] == Outcome.COMPLETE
     triple = map_equilibria(PAPER.replace(F0=0.0, c1=0.0, c2=balanced), {"l": [1.25]})
     assert (triple.outcome[0], triple.count[0]) == (Outcome.DEGENERATE, 0)

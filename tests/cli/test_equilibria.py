@@ -49,6 +49,18 @@ def test_scene_of_a_file_with_changes(invoke):
     assert "force F = -30 N" in invoke("equilibria", "scene.toml", "--F0", "-30").stdout
 
 
+def test_the_load_at_which_each_position_disappears(invoke):
+    bistable = ["--alpha", "0", "--F0", "85.3", "--c1", "294.9", "--c2", "92.85"]
+    # The folds of data/folds.toml.
+    text = " ".join(invoke("equilibria", *bistable).stdout.split())
+    assert "1: as the load F0 changes, it disappears at -671.163 N (searched from -745.623" in text
+    assert "2: as the load F0 changes, it disappears at 671.163 N (searched from -745.623" in text
+    assert text.count("disappears at") == 2
+    for at in ([], ["--at", "0"]):
+        text = " ".join(invoke("equilibria", *at).stdout.split())
+        assert text.count("disappears at no load whatever (searched from -411.312 to 411.312 N; no") == 1
+
+
 def test_no_isolated_equilibria(invoke):
     result = invoke("equilibria", "--c1", "0", "--F0", "0", "--g", "0")
     assert result.exit_code == 0

@@ -194,6 +194,25 @@ def test_mirror_images_keep_their_order():
     assert (np.ma.compressed(first) <= np.ma.compressed(second)).all()
 
 
+def test_pictures_tell_their_scene():
+    grid = {"F0": axis(-100.0, 100.0, 3), "c2": axis(0.0, 400.0, 3)}
+    titles = {
+        "Table 1": draw("equilibrium_map", CONSTANT, axes=grid)["count"],
+        "Table 1 with c1 = 294.9 N/m": draw("equilibrium_map", BISTABLE, axes=grid)["decay"],
+        "Table 1 with l = 2 m, the force decayed": draw(
+            "equilibrium_map", Scene(l=2.0), axes={"c1": axis(1.0, 2.0, 2), "c2": axis(1.0, 2.0, 2)}
+        )["count"],
+    }
+    for title, figure in titles.items():
+        assert figure.get_suptitle() == title
+    line = draw("equilibrium_map", BISTABLE, axes={"F0": axis(-800.0, 800.0, 161)})["branches"].axes[0]
+    # The folds of data/folds.toml.
+    assert line.get_title() == (
+        "Equilibria over F0; folds at -671.163, 671.163 N\nTable 1 with c1 = 294.9 N/m, c2 = 92.85 N/m"
+    )
+    assert {"stable, number 1", "stable, number 2"} <= {curve.get_label() for curve in line.lines}
+
+
 def test_stable_branches_are_solid_and_unstable_dashed():
     dataset = run("equilibrium_map", CONSTANT, axes={"F0": axis(-3.0, 3.0, 41)})
     axes = scan_kinds()["equilibrium_map"].draw(dataset, CONSTANT.model_dump())["branches"].axes[0]

@@ -67,8 +67,19 @@ def test_xarray_opens_a_map_with_names_and_units(tmp_path: Path) -> None:
         assert opened["c2"].attrs["units"] == "N/m"
         assert opened["phi"].sel(F0=300.0, c2=0.0).dims == ("root",)
         assert all("units" in variable.attrs for variable in opened.variables.values())
+        assert set(opened.coords) == {"F0", "c2", "root", "mode", "entry"}
+        assert list(opened["root"]) == list(range(6))
+        count = opened["phi"].notnull().sum("root")
+        assert count.equals(opened["count"].astype(count.dtype))
+        # What the layout's text promises: the deepest first, reductions without a mask, entries by name.
+        first = opened["energy"].isel(root=0)
+        assert bool((first == opened["energy"].min("root")).all())
+        stiff = opened["hessian"].sel(entry="theta theta").where(opened["morse_index"] == 0)
+        assert float(stiff.min()) > 0.0
+        assert opened["eigenvalue_re"].sel(mode=0).dims == ("F0", "c2", "root")
         # One identity across the map: pick a sheet and there is one value at a point.
         one = opened["phi"].where(opened["sheet"] == 0)
+        assert one.max("root").dims == ("F0", "c2")
         assert int(one.notnull().sum("root").max()) == 1
 
 
@@ -96,6 +107,43 @@ def test_tiles_agree_with_the_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPa
             np.testing.assert_allclose(two.data[settled], one.data[settled], rtol=1e-6, atol=1e-6)
         else:
             np.testing.assert_array_equal(two.data, one.data)
+
+
+def test_pictures_read_a_part_of_a_large_map(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = mapped()
+    path = tmp_path / "map.h5"
+    attrs = {**provenance(1), "title": "map"}
+    write_results(path, scene_parameters={}, sections={"map": whole}, attrs=attrs)
+    monkeypatch.setattr("fastmech.plots.map_view.MOST_DRAWN", 10)
+    monkeypatch.setattr("fastmech.store.decode.PIECE_BYTES", 4000)
+    with open_results(path) as results:
+        drawn = EquilibriumMap.read(results["map"], SCENE.model_dump())
+    assert drawn.sizes["F0"] <= 10
+    assert drawn.sizes["c2"] <= 10
+    for name in drawn:
+        part = tuple({"F0": slice(None, None, 4), "c2": slice(None, None, 3)}.get(d, slice(None))
+                     for d in whole[name].dims)  # fmt: skip
+        np.testing.assert_array_equal(drawn[name].data, whole[name].data[part], err_msg=name)
+        assert drawn[name].dims == whole[name].dims
+    assert {"phi", "sheet", "count", "fold_F0", "unreached_c2"} <= set(drawn)
+    assert not {"hessian", "eigenvalue_re", "radius"} & set(drawn)
+    figures = EquilibriumMap.draw(drawn, SCENE.model_dump())
+    assert figures["count"].get_suptitle().endswith("; 1 in 4 values of F0; 1 in 3 values of c2")
+
+
+def test_of_a_third_axis_only_the_drawn_plane_is_read(tmp_path: Path) -> None:
+    axes = AXES | {"c1": {"start": 280.0, "stop": 310.0, "num": 4}}
+    whole = EquilibriumMap(axes=axes).run(SCENE, RunContext())
+    assert isinstance(whole, Dataset)
+    path = tmp_path / "map.h5"
+    attrs = {**provenance(1), "title": "map"}
+    write_results(path, scene_parameters={}, sections={"map": whole}, attrs=attrs)
+    with open_results(path) as results:
+        drawn = EquilibriumMap.read(results["map"], SCENE.model_dump())
+    # 290 N/m is the nearest of 280, 290, 300, 310 to the scene's 294.9.
+    assert list(drawn["c1"].data) == [290.0]
+    np.testing.assert_array_equal(drawn["phi"].data, whole["phi"].data[:, :, 1:2])
+    assert "c1 = 290 N/m" in EquilibriumMap.draw(drawn, SCENE.model_dump())["count"].get_suptitle()
 
 
 def test_chosen_variables_only() -> None:

@@ -34,6 +34,19 @@ def test_access(write: Write, content: dict[str, Any]) -> None:
         assert section.to_xarray()["phi"].attrs["units"] == "rad"
 
 
+def test_a_part_of_a_section(write: Write, content: dict[str, Any]) -> None:
+    with open_results(write()) as results:
+        section = results["equilibria"]
+        part = section.load(["phi", "label", "complete"], {"equilibrium": slice(1, None, 2)})
+        whole = section.load()
+        assert section.dims("phi") == ("equilibrium",)
+    assert list(part) == ["phi", "label", "complete"]
+    np.testing.assert_array_equal(part["phi"].data, whole["phi"].data[1::2])
+    assert list(part["label"].data) == list(whole["label"].data[1::2])
+    assert part["complete"].data == whole["complete"].data
+    assert part["phi"].units == whole["phi"].units
+
+
 def test_unknown_names_list_the_known(write: Write) -> None:
     with open_results(write()) as results:
         with pytest.raises(InputError, match=r"'basins'.*equilibria, atlas"):

@@ -1,0 +1,184 @@
+"""The edge state: what rules the boundary between two basins, found by bisection and tracking.
+
+A start on a boundary stays on it and tends to the edge state, an attractor within the boundary. Two starts on
+either side are brought together by bisection, followed until they part, brought together again, and so on
+(Skufca, Yorke, Eckhardt, Phys. Rev. Lett. 96 (2006) 174101; Schneider, Eckhardt, Yorke, Phys. Rev. Lett. 99
+(2007) 034502). For the mechanism under a constant force it is a saddle with one falling direction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fastmech.basins.measures.labels import Floats, LabelOf, ask, check_point
+from fastmech.basins.measures.norm import norm_on
+from fastmech.disturbance.ensemble import require_constant_force
+from fastmech.ensembles import checks
+from fastmech.ensembles.integrate import integrate
+from fastmech.ensembles.system import System
+from fastmech.equilibria.find import Equilibrium, find_equilibria
+from fastmech.errors import InputError
+from fastmech.scene import Scene
+
+#: Points between two starts whose labels are asked for at once.
+SECTIONS = 15
+
+#: Doublings of their distance by which two starts that came to be on one side are drawn apart.
+DOUBLINGS = 24
+
+#: Outputs of a stretch, after which two starts that have not parted are followed further.
+OUTPUTS = 64
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeTrack:
+    """The way along a boundary; k stretches, each begun by a bisection."""
+
+    t: Floats  #: time of every bisection [s] (k,)
+    y: Floats  #: state there, on the first basin's side (k, dim)
+    gap: Floats  #: distance to the state on the other side, in the norm (k,)
+    state: Floats  #: the last one (dim,)
+    moved: float  #: largest distance between the last stretch's states, in the norm
+    settled: bool  #: ``moved`` is within the tolerance: the edge state is a resting one, this one
+    lost: bool  #: no boundary was found any more near the track
+    labels: tuple[int, int]  #: basins on either side at the start
+
+
+def track_edge(
+    scene: Scene | System,
+    label_of: LabelOf,
+    inside: ArrayLike,
+    outside: ArrayLike,
+    norm: ArrayLike,
+    *,
+    t_end: float,
+    near: float = 1e-10,
+    far: float = 1e-5,
+    tolerance: float = 1e-3,
+    interval: float = 0.25,
+    dt: float = 0.02,
+    method: str = "dop853",
+) -> EdgeTrack:
+    """Follow the boundary between two starts until it comes to rest.
+
+    Args:
+        scene: a scene with a constant force, or a system of your own whose right-hand side has no time in it.
+        label_of: labels (n,) of starts (n, dim), negative: none. Starts without a label count to neither
+            side; a bisection ends where there are no others.
+        inside: a start in the first basin (dim,).
+        outside: one in another basin (dim,).
+        norm: matrix N (dim, dim): ``|d @ N|`` is a distance.
+        t_end: longest time to follow the boundary [s].
+        near: distance that a bisection stops at. Below the error of ``label_of`` the two may come to be on
+            one side; they are then drawn apart along their difference.
+        far: distance at which the two have parted.
+        tolerance: the edge state rests if a whole stretch moves by no more than this, ``far`` or more.
+        interval: time between looks at their distance [s].
+        dt: longest step [s].
+        method: name of the method.
+
+    Raises:
+        InputError: an argument is wrong, the force decays, or the starts' labels are not two known ones.
+    """
+    if isinstance(scene, Scene):
+        require_constant_force(scene)
+    a = check_point("inside", inside)
+    b = check_point("outside", outside, a.size)
+    matrix = norm_on(norm, a.size)
+    t_end = checks.number("t_end", t_end, "s", above=0.0)
+    near = checks.number("near", near, "", above=0.0)
+    far = checks.number("far", far, "", above=near)
+    tolerance = checks.number("tolerance", tolerance, "", least=far)
+    interval = checks.number("interval", interval, "s", above=0.0)
+    first, second = (int(label) for label in ask(label_of, np.stack([a, b])))
+    if first < 0 or second < 0 or first == second:
+        raise InputError(f"inside, outside: have the labels {first} and {second}, must have two known ones")
+    labels = first, second
+
+    def distance(x: Floats, y: Floats) -> Floats:
+        return np.asarray(np.linalg.norm((x - y) @ matrix, axis=-1))
+
+    times, states, gaps = [], [], []
+    t, moved, lost = 0.0, np.inf, False
+    looks = interval * np.arange(1, OUTPUTS + 1)
+    while True:
+        a, b = _bisect(label_of, first, a, b, float(distance(a, b)), near)
+        times.append(t)
+        states.append(a)
+        gaps.append(float(distance(a, b)))
+        if t >= t_end or moved <= tolerance:
+            break
+        way = integrate(scene, np.stack([a, b]), dt=dt, method=method, t_eval=looks).y
+        parted = np.flatnonzero(distance(way[:, 0], way[:, 1]) > far)
+        last = int(parted[0]) if parted.size else OUTPUTS - 1
+        moved = float(distance(way[: last + 1, 0], a).max())
+        sides = _sides(label_of, way[last, 0], way[last, 1])
+        if sides is None:
+            lost = True
+            break
+        first, a, b = sides
+        t += float(looks[last])
+    settled = not lost and moved <= tolerance
+    return EdgeTrack(
+        np.array(times), np.array(states), np.array(gaps), states[-1], moved, settled, lost, labels
+    )
+
+
+def saddle_at(scene: Scene, state: ArrayLike) -> tuple[Equilibrium, float]:
+    """The index-1 saddle of a scene nearest to a state (4,), and its distance [rad, rad/s as they are].
+
+    Angles are compared up to full turns.
+
+    Raises:
+        InputError: the force decays, or the state is not four finite numbers.
+    """
+    require_constant_force(scene)
+    y = check_point("state", state, 4)
+    best: tuple[Equilibrium, float] | None = None
+    for e in find_equilibria(scene):
+        if e.morse_index == 1:
+            angles = y[:2] - np.array([e.phi, e.theta])
+            angles -= 2.0 * np.pi * np.round(angles / (2.0 * np.pi))
+            away = float(np.linalg.norm([*angles, *y[2:]]))
+            if best is None or away < best[1]:
+                best = e, away
+    if best is None:
+        raise InputError("scene: has no saddle with one falling direction")
+    return best
+
+
+def _sides(label_of: LabelOf, a: Floats, b: Floats) -> tuple[int, Floats, Floats] | None:
+    """Two points on the line through a and b with different known labels, the nearest, and the first's."""
+    apart = np.concatenate([[0.0], 2.0 ** np.arange(DOUBLINGS)])
+    line = np.concatenate([-apart[:0:-1], apart])
+    points = a + line[:, None] * (b - a)
+    labels = ask(label_of, points)
+    known = np.flatnonzero(labels >= 0)
+    changes = np.flatnonzero(np.diff(labels[known]) != 0)
+    if not changes.size:
+        return None
+    pairs = np.stack([known[changes], known[changes + 1]], axis=1)
+    nearest = pairs[np.abs(line[pairs]).max(axis=1).argmin()]
+    return int(labels[nearest[0]]), points[nearest[0]], points[nearest[1]]
+
+
+def _bisect(
+    label_of: LabelOf, first: int, a: Floats, b: Floats, gap: float, near: float
+) -> tuple[Floats, Floats]:
+    """Two points on the segment from a to b, the one labelled ``first``, the next known one not."""
+    while gap > near:
+        share = np.arange(1, SECTIONS + 1)[:, None] / (SECTIONS + 1)
+        points = np.concatenate([a[None], a + share * (b - a), b[None]])
+        labels = np.array([first, *ask(label_of, points[1:-1]), -1])
+        labels[-1] = first + 1  # b is known to be on the other side
+        other = np.flatnonzero((labels >= 0) & (labels != first))[0]
+        own = np.flatnonzero(labels[:other] == first)[-1]
+        shrunk = gap * (other - own) / (SECTIONS + 1)
+        a, b = points[own], points[other]
+        if shrunk >= gap:  # all between have no label
+            break
+        gap = shrunk
+    return a, b

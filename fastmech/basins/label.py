@@ -1,0 +1,261 @@
+"""``fm.labels_of``: the well, and its turn, in which every start ends, proved by capture.
+
+The certificate is about the path as it was computed, so every path is computed twice, with one step and with
+two thirds of it, and a label counts only if both are captured by the same copy of the same well at the same
+time, so near to each other that what lies between them is captured too. Paths that run apart (they passed
+nearer to the stable manifold of a saddle than their error) are computed again with ever smaller steps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastmech.basins.runs import Paths, follow, rounds_until
+from fastmech.basins.status import BasinStatus, counts
+from fastmech.basins.steps import coarse_steps
+from fastmech.capture.barriers import BarrierTree
+from fastmech.capture.certificate import Certificate, certificate_of
+from fastmech.disturbance.outcome import confining_energy
+from fastmech.disturbance.size import size_at
+from fastmech.ensembles import checks
+from fastmech.ensembles.plausible import breaks_energy_bounds
+from fastmech.ensembles.run import Progress
+from fastmech.errors import InputError
+from fastmech.integrators.method import Method
+from fastmech.integrators.methods import find_method
+from fastmech.mechanism.coefficients import Coefficients, reduce
+from fastmech.mechanism.lagrange import unit
+from fastmech.mechanism.reduced import metric_11, slider_ratio
+from fastmech.scene import Scene
+
+Floats = NDArray[np.float64]
+
+#: Steps a round of one computation after the other, a round being two of the coarsest steps. With the default
+#: method each makes the error some 25, 60 and then 256 times smaller, down to rounding.
+SUBSTEPS = (2, 3, 5, 10, 20, 40)
+
+#: A path that has not been captured is at a saddle when it is so near to it [rad], in its norm.
+AT_SADDLE = 1e-3
+
+#: Starts that are followed together.
+BATCH = 1 << 16
+
+
+@dataclass(frozen=True)
+class Labels:
+    """Where n starts end."""
+
+    tree: BarrierTree | None  #: wells, barriers and equilibria; of a system of your own: None
+    well: NDArray[np.int8]  #: index of the well among the equilibria, -1: no label; shape (n,)
+    turns: NDArray[np.int32]  #: full turns of phi and theta of that well from its listed place, (n, 2)
+    time: Floats  #: of capture [s], NaN: not captured; the end of a step; (n,)
+    settle_time: Floats | None  #: s, from then on within the settling ball; NaN: not by t_end; (n,)
+    status: NDArray[np.int8]  #: :class:`BasinStatus`, (n,)
+    steps: int  #: integration steps of all computations of all starts
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many starts have each status."""
+        return counts(self.status)
+
+
+def labels_of(
+    scene: Scene,
+    starts: ArrayLike,
+    t_end: float = 60.0,
+    *,
+    dt: float | None = None,
+    method: str = "dop853",
+    settle_radius: float | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Labels:
+    """Label starts by the well that captures them.
+
+    Args:
+        scene: the mechanism, with a damper. A decaying force leads to the wells of springs and weights.
+        starts: phi, theta [rad], phi', theta' [rad/s], shape (n, 4) or (4,); angles count their turns.
+        t_end: end of the run [s]; what is not captured by then is undecided.
+        dt: coarsest step [s]: each path is computed with it and with two thirds of it, and with less where
+            these differ. By default it follows from the scene's frequencies and the start's energy.
+        method: name of the integration method.
+        settle_radius: if given, also the time from which on a captured motion stays within so many rad of
+            its well in the kinetic-energy norm (by its energy, to second order about the well).
+        threads: threads to use, all processors by default. The result does not depend on it.
+        progress: is told how many starts are done since its last call.
+
+    Raises:
+        InputError: an argument is wrong, the scene has no damper, or its wells are not certain.
+    """
+    require_damper(scene)
+    begin = checks.states("starts", starts, 4)
+    t_end = checks.number("t_end", t_end, "s", above=0.0)
+    formula, certificate = find_method(method), certificate_of(scene)
+    if dt is not None:
+        dt = checks.number("dt", dt, "s", above=0.0)
+    if settle_radius is not None:
+        settle_radius = checks.number("settle_radius", settle_radius, "rad", above=0.0)
+    finite = np.isfinite(begin).all(axis=1)
+    coarse = coarse_steps(reduce(scene), begin) if dt is None else np.full(len(begin), dt)
+    found = Paths.empty(len(begin))
+    status = np.where(finite, BasinStatus.UNDECIDED, BasinStatus.START_NOT_FINITE).astype(np.int8)
+    settle = None if settle_radius is None else np.full(len(begin), np.nan)
+    for step in np.unique(coarse[finite]):
+        same = np.flatnonzero(finite & (coarse == step))
+        for first in range(0, same.size, BATCH):
+            members = same[first : first + BATCH]
+            ladder = Ladder(certificate, t_end, float(step), formula, threads)
+            ladder.label(begin, members, found, status)
+            if settle is not None and settle_radius is not None:
+                settle[members] = ladder.settle_times(begin, members, found, status, settle_radius)
+            found.steps += ladder.steps
+            if progress is not None:
+                progress(members.size)
+    if progress is not None and not finite.all():
+        progress(int(np.count_nonzero(~finite)))
+    captured = status == BasinStatus.CAPTURED
+    return Labels(
+        certificate.tree,
+        np.where(captured, np.append(-1, certificate.tree.wells)[found.code], -1).astype(np.int8),
+        np.where(captured[:, None], found.turns, 0).astype(np.int32),
+        np.where(captured, found.time, np.nan),
+        settle,
+        status,
+        found.steps,
+    )
+
+
+def require_damper(scene: Scene) -> None:
+    """Refuse a scene in which nothing comes to rest.
+
+    Raises:
+        InputError: ``beta`` is zero.
+    """
+    if scene.beta == 0.0:
+        raise InputError(
+            "scene.beta = 0: must be greater than 0 N s/m: without damper nothing comes to rest and there "
+            "is no attractor; fastmech.trapped tells which states can never leave their well"
+        )
+
+
+@dataclass
+class Ladder:
+    """Computations of the same starts with ever smaller steps."""
+
+    certificate: Certificate
+    t_end: float
+    coarse: float  #: s
+    method: Method
+    threads: int | None
+    steps: int = 0
+
+    def __post_init__(self) -> None:
+        self.rounds = rounds_until(self.t_end, SUBSTEPS[0] * self.coarse)
+        self.observer = self.certificate.params(self.certificate.levels)
+
+    def follow(self, starts: Floats, substeps: int, observer: Floats) -> Paths:
+        """One computation."""
+        paths = follow(
+            self.certificate, observer, starts, self.t_end, self.rounds, substeps, self.method, self.threads
+        )
+        self.steps += paths.steps
+        return paths
+
+    def label(self, begin: Floats, members: NDArray[np.intp], found: Paths, status: NDArray[np.int8]) -> None:
+        """Find labels and statuses of some starts."""
+        coarse = self.follow(begin[members], SUBSTEPS[0], self.observer)
+        for substeps in SUBSTEPS[1:]:
+            fine = self.follow(begin[members], substeps, self.observer)
+            settled = self.agree(coarse, fine)
+            last = substeps == SUBSTEPS[-1]
+            done = np.flatnonzero(settled | last)
+            found.put(members[done], fine.take(done))
+            status[members[done]] = self.verdicts(
+                begin[members[done]], coarse.take(done), fine.take(done), settled[done]
+            )
+            rest = np.flatnonzero(~settled)
+            members, coarse = members[rest], fine.take(rest)
+            if not members.size:
+                break
+
+    def agree(self, coarse: Paths, fine: Paths) -> NDArray[np.bool_]:
+        """Which paths tell the same with both steps: not captured, or captured beyond their difference."""
+        finite = np.asarray(np.isfinite(coarse.state) & np.isfinite(fine.state)).all(axis=1)
+        same = (coarse.code == fine.code) & (coarse.turns == fine.turns).all(axis=1) & finite
+        same &= np.abs(coarse.stop - fine.stop) < 0.5 * self.coarse
+        apart = np.abs(np.where(finite.reshape(-1, 1), coarse.state - fine.state, np.inf))
+        level = np.append(np.inf, self.certificate.levels)[fine.code]
+        with np.errstate(invalid="ignore"):
+            room = energy_change(self.certificate, fine.state, level, apart)
+            proved = room < level - fine.energy
+        return np.asarray(same & (proved | (fine.code == 0)))
+
+    def verdicts(
+        self, starts: Floats, coarse: Paths, fine: Paths, settled: NDArray[np.bool_]
+    ) -> NDArray[np.int8]:
+        """Statuses of paths whose computation ends here."""
+        status = np.full(len(starts), BasinStatus.UNDECIDED, dtype=np.int8)
+        status[settled & (fine.code > 0)] = BasinStatus.CAPTURED
+        other = (coarse.code != fine.code) | (coarse.turns != fine.turns).any(axis=1)
+        status[~settled & (coarse.code > 0) & (fine.code > 0) & other] = BasinStatus.AT_SADDLE
+        free = np.flatnonzero(fine.code == 0)
+        start, state = starts[free], fine.state[free]
+        status[free[self.near_saddle(state)]] = BasinStatus.AT_SADDLE
+        impossible = breaks_energy_bounds(reduce(self.certificate.scene), start, state)
+        status[free[impossible]] = BasinStatus.STEP_TOO_LARGE
+        status[free[~np.isfinite(state).all(axis=1)]] = BasinStatus.NOT_FINITE
+        return status
+
+    def near_saddle(self, states: Floats) -> NDArray[np.bool_]:
+        """Which states (n, 4) rest at an unstable equilibrium."""
+        scene, equilibria = self.certificate.scene, self.certificate.tree.equilibria
+        held = scene.replace(F0=equilibria.force, alpha=0.0)
+        near = np.zeros(len(states), dtype=np.bool_)
+        for e in equilibria:
+            if e.kind != "minimum":
+                away = states - np.array([e.phi, e.theta, 0.0, 0.0])
+                with np.errstate(invalid="ignore"):
+                    away[:, :2] -= 2.0 * np.pi * np.round(away[:, :2] / (2.0 * np.pi))
+                    near |= size_at(held, e.phi, e.theta)(away) < AT_SADDLE
+        return near
+
+    def settle_times(
+        self, begin: Floats, members: NDArray[np.intp], found: Paths, status: NDArray[np.int8], radius: float
+    ) -> Floats:
+        """Times [s] from which on captured starts have no energy to leave the ball about their well."""
+        certificate, tree = self.certificate, self.certificate.tree
+        held = certificate.scene.replace(F0=tree.equilibria.force, alpha=0.0)
+        wells = [tree.equilibria[w] for w in tree.wells]
+        floor = certificate.reduced(np.array([e.energy for e in wells]))
+        energy = np.array([confining_energy(held, e, radius) for e in wells]) / unit(held)
+        levels = np.minimum(floor + energy, certificate.levels)
+        times = np.full(members.size, np.nan)
+        captured = np.flatnonzero(status[members] == BasinStatus.CAPTURED)
+        paths = self.follow(begin[members[captured]], SUBSTEPS[1], certificate.params(levels))
+        same = paths.code == found.code[members[captured]]
+        times[captured[same]] = paths.time[same]
+        return times
+
+
+def energy_change(certificate: Certificate, states: Floats, level: Floats, apart: Floats) -> Floats:
+    """Bound on how much the bounding energy of states (n, 4) changes over the box of half-widths ``apart``.
+
+    Over m2 l^2 [1/s^2]. The change of U is at most its largest slope times the way; T is quadratic in the
+    rates with coefficients whose slopes are at most ``slider max|k k'|`` and 1.
+    """
+    c: Coefficients = reduce(certificate.scene)
+    dphi, dtheta, du, dv = apart.T
+    slope = (
+        np.hypot(c.lift, c.force) * dphi + np.hypot(c.gravity, c.force) * dtheta + c.spring * (dphi + dtheta)
+    )
+    if certificate.decays:
+        slope = slope + abs(c.force) * (dphi + dtheta)
+    angles = np.linspace(-np.pi, np.pi, 721)
+    k, dk = slider_ratio(np.sin(angles), np.cos(angles))
+    a11 = metric_11(c.mass, c.slider, float(np.abs(k).max()))
+    u, v = np.abs(states[:, 2]) + du, np.abs(states[:, 3]) + dv
+    kinetic = (c.slider * float(np.abs(k * dk).max()) * u * u + u * v) * dphi + u * v * dtheta
+    return np.asarray(slope + kinetic + (a11 * u + v) * du + (u + v) * dv)

@@ -1,0 +1,230 @@
+"""``fm.map_basins``: where every start of a slice of state space ends, after how many turns, and when."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastmech.basins.label import Labels, labels_of
+from fastmech.basins.refine import refine_grid
+from fastmech.basins.status import BasinStatus, counts
+from fastmech.basins.system import system_labels_of
+from fastmech.capture.barriers import BarrierTree
+from fastmech.ensembles import checks
+from fastmech.ensembles.run import Progress
+from fastmech.ensembles.system import System
+from fastmech.errors import InputError
+from fastmech.scene import Scene, nearest
+
+Floats = NDArray[np.float64]
+
+#: Coordinates of a scene's state space.
+STATE = ("phi", "theta", "phi_dot", "theta_dot")
+
+#: Points of the largest map: its arrays take some 150 bytes a point in memory.
+MOST_POINTS = 50_000_000
+
+
+@dataclass(frozen=True)
+class BasinMap:
+    """Labels over a grid of starts; arrays have one axis for each of ``axes``, in their order."""
+
+    axes: dict[str, Floats]  #: values along each axis [rad, rad/s]
+    fixed: dict[str, float]  #: the other coordinates of the starts
+    tree: BarrierTree | None  #: wells, barriers and equilibria; of a system of your own: None
+    well: NDArray[np.int8]  #: index of the well among the equilibria (a system's stop code), -1: no label
+    turns: NDArray[np.int32]  #: full turns of phi and theta of that well from its listed place, (..., 2)
+    time: Floats  #: of capture [s]; NaN: not captured, or not computed (refinement)
+    settle_time: Floats | None  #: s, from then on within the settling ball; NaN as in ``time``
+    status: NDArray[np.int8]  #: :class:`fastmech.basins.status.BasinStatus`
+    computed: NDArray[np.bool_]  #: which points were computed; the others have their surroundings' label
+    t_end: float  #: s
+    steps: int  #: integration steps of all computations
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many starts have each status."""
+        return counts(self.status)
+
+    @property
+    def labels(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """One integer for each (well, turns), -1 without label, and the table (labels, 3) they point into.
+
+        The table is sorted by well, then turns of phi, then of theta.
+        """
+        rows = np.column_stack([self.well.ravel(), self.turns.reshape(-1, 2)]).astype(np.int64)
+        known = rows[:, 0] >= 0
+        table, index = np.unique(rows[known], axis=0, return_inverse=True)
+        label = np.full(len(rows), -1, dtype=np.int64)
+        label[known] = index.ravel()
+        return label.reshape(self.well.shape), table
+
+
+def map_basins(
+    scene: Scene | System,
+    axes: Mapping[str, ArrayLike],
+    t_end: float = 60.0,
+    *,
+    fixed: Mapping[str, float] | None = None,
+    refine: int | None = None,
+    dt: float | None = None,
+    method: str = "dop853",
+    settle_radius: float | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> BasinMap:
+    """Label every start of a grid by the copy of the well in which it provably ends.
+
+    Args:
+        scene: the mechanism, with a damper; or a system of your own with a stopping condition, whose stop
+            code is the label.
+        axes: values along two, three or four of phi, theta [rad], phi_dot, theta_dot [rad/s], rising (of a
+            system: names of its states, one or more).
+        t_end: end of the run [s]; what is not captured by then is undecided.
+        fixed: values of the other coordinates, 0 by default.
+        refine: compute a coarse grid with so many points between neighbours (a power of two) and then only
+            what is near boundaries, see :mod:`fastmech.basins.refine`. This is a heuristic: a part of a
+            basin thinner than that which touches no boundary seen otherwise is missed. Points that were not
+            computed have no times.
+        dt: coarsest step [s], see :func:`fastmech.basins.label.labels_of`; a system needs one.
+        method: name of the integration method.
+        settle_radius: see there; a scene's only.
+        threads: threads to use, all processors by default. The result does not depend on it.
+        progress: is told how many starts are done since its last call.
+
+    Raises:
+        InputError: an argument is wrong, the scene has no damper, or its wells are not certain.
+    """
+    names = STATE if isinstance(scene, Scene) else tuple(scene.state)
+    values = _checked_axes(axes, names, least=2 if isinstance(scene, Scene) else 1)
+    held = _checked_fixed(fixed or {}, values, names)
+    shape = tuple(v.size for v in values.values())
+    size = math.prod(shape)
+    if size > MOST_POINTS:
+        raise InputError(f"axes: ask for {size:.3g} starts, at most {MOST_POINTS:.0e} are allowed")
+    collected = _Collected(size)
+
+    def compute(points: NDArray[np.intp]) -> NDArray[np.int64]:
+        starts = grid_starts(values, held, names, points)
+        if isinstance(scene, Scene):
+            part = labels_of(
+                scene,
+                starts,
+                t_end,
+                dt=dt,
+                method=method,
+                settle_radius=settle_radius,
+                threads=threads,
+                progress=progress,
+            )
+        else:
+            part = system_labels_of(
+                scene, starts, t_end, dt=dt, method=method, threads=threads, progress=progress
+            )
+        return collected.put(points, part)
+
+    if refine is None:
+        source = np.arange(size)
+        compute(source)
+    else:
+        refine = checks.whole_number("refine", refine, least=2, most=1 << 20)
+        if refine & (refine - 1):
+            raise InputError(f"refine = {refine}: must be a power of two")
+        source = refine_grid(shape, refine, compute)
+    computed = source == np.arange(size)
+    if progress is not None and not computed.all():
+        progress(int(np.count_nonzero(~computed)))
+    settle = collected.settle if settle_radius is not None else None
+    return BasinMap(
+        axes=values,
+        fixed=held,
+        tree=collected.tree,
+        well=collected.well[source].reshape(shape),
+        turns=collected.turns[source].reshape(*shape, 2),
+        time=collected.time.reshape(shape),
+        settle_time=None if settle is None else settle.reshape(shape),
+        status=collected.status[source].reshape(shape),
+        computed=computed.reshape(shape),
+        t_end=t_end,
+        steps=collected.steps,
+    )
+
+
+def grid_starts(
+    axes: Mapping[str, Floats], fixed: Mapping[str, float], names: tuple[str, ...], points: NDArray[np.intp]
+) -> Floats:
+    """States (n, dim) of grid points by their flat indices, the last axis fastest."""
+    places = dict(zip(axes, np.unravel_index(points, tuple(v.size for v in axes.values())), strict=True))
+    columns = [
+        axes[name][places[name]] if name in axes else np.full(points.size, fixed[name]) for name in names
+    ]
+    return np.stack(columns, axis=-1)
+
+
+class _Collected:
+    """Labels of all points of a grid, filled piece by piece."""
+
+    def __init__(self, size: int) -> None:
+        self.well = np.full(size, -1, dtype=np.int8)
+        self.turns = np.zeros((size, 2), dtype=np.int32)
+        self.time, self.settle = np.full(size, np.nan), np.full(size, np.nan)
+        self.status = np.full(size, BasinStatus.UNDECIDED, dtype=np.int8)
+        self.tree: BarrierTree | None = None
+        self.steps = 0
+
+    def put(self, points: NDArray[np.intp], part: Labels) -> NDArray[np.int64]:
+        """Fill some points; one integer for each that tells labels and statuses apart."""
+        self.tree, self.steps = part.tree, self.steps + part.steps
+        self.well[points], self.turns[points] = part.well, part.turns
+        self.time[points], self.status[points] = part.time, part.status
+        if part.settle_time is not None:
+            self.settle[points] = part.settle_time
+        turns = part.turns.astype(np.int64) + (1 << 20)
+        return ((part.status.astype(np.int64) << 8) + part.well << 44) + (turns[:, 0] << 22) + turns[:, 1]
+
+
+def _checked_axes(axes: Mapping[str, ArrayLike], names: tuple[str, ...], least: int) -> dict[str, Floats]:
+    """Axes as rising arrays.
+
+    Raises:
+        InputError: too few axes, an unknown one, or values that do not rise.
+    """
+    if not least <= len(axes) <= len(names):
+        raise InputError(f"axes = {list(axes)}: must be {least} to {len(names)} of {', '.join(names)}")
+    checked = {}
+    for name, values in axes.items():
+        if name not in names:
+            raise InputError(f"axes.{name}: unknown name; {nearest(name, list(names))}")
+        try:
+            array = np.array(values, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError(f"axes.{name}: must be numbers") from None
+        if array.ndim != 1 or not array.size or not np.isfinite(array).all() or (np.diff(array) <= 0.0).any():
+            raise InputError(f"axes.{name}: must be a row of finite, strictly rising values")
+        checked[name] = array
+    return checked
+
+
+def _checked_fixed(
+    fixed: Mapping[str, float], axes: Mapping[str, Floats], names: tuple[str, ...]
+) -> dict[str, float]:
+    """Values of the coordinates that are no axes.
+
+    Raises:
+        InputError: an unknown name, one of an axis, or no finite number.
+    """
+    for name in fixed:
+        if name not in names or name in axes:
+            others = [other for other in names if other not in axes]
+            raise InputError(
+                f"fixed.{name}: must be one of the coordinates without an axis: {', '.join(others)}"
+            )
+    return {
+        name: checks.number(f"fixed.{name}", fixed.get(name, 0.0), "rad or rad/s")
+        for name in names
+        if name not in axes
+    }

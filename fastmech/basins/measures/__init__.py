@@ -1,0 +1,1 @@
+"""Measures of basins, on maps of labels (grids) or on samples; one file a measure."""

@@ -1,0 +1,135 @@
+"""How much of the starts ends where: basin fractions, basin stability, finite-time basin stability.
+
+Every share comes with its Wilson interval (E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209): for k of n
+independent starts and the normal quantile z of the confidence,
+``(k + z^2/2 -+ z sqrt(k (n - k)/n + z^2/4)) / (n + z^2)``. It stays within [0, 1] and is honest at k = 0 and
+k = n, where the usual k/n -+ z sqrt(k (n - k)/n^3) has no width. For a grid, whose points are more even than
+random ones, it is wider than it need be.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.stats import binomtest
+
+from fastmech.basins.measures.labels import Floats, Integers, check_labels, known_labels
+from fastmech.ensembles import checks
+from fastmech.errors import InputError
+
+
+@dataclass(frozen=True)
+class Shares:
+    """Shares of n starts, arrays of one shape."""
+
+    count: Integers  #: starts that belong to each
+    n: int  #: all starts
+    missing: int  #: starts without a label: they belong to none, and are counted in ``n``
+    fraction: Floats  #: count / n
+    lower: Floats  #: lower end of the Wilson interval
+    upper: Floats  #: upper end of the Wilson interval
+    at_most: Floats  #: the fraction if every start without a label belonged there
+
+
+def wilson(count: ArrayLike, n: int, confidence: float = 0.95) -> tuple[Floats, Floats]:
+    """Lower and upper ends of the Wilson interval for ``count`` of ``n``, shapes as ``count``.
+
+    Raises:
+        InputError: not 0 <= count <= n with n >= 1, or the confidence is not between 0 and 1.
+    """
+    n = checks.whole_number("n", n, least=1)
+    if not checks.number("confidence", confidence, "", above=0.0) < 1.0:
+        raise InputError(f"confidence = {confidence!r}: must be less than 1")
+    k = np.asarray(count)
+    if not np.issubdtype(k.dtype, np.integer) or (k < 0).any() or (k > n).any():
+        raise InputError(f"count: must be integers from 0 to n = {n}")
+    different, place = np.unique(k, return_inverse=True)
+    ends = np.array([binomtest(int(c), n).proportion_ci(confidence, method="wilson") for c in different])
+    ends = ends.reshape(-1, 2)[place.reshape(k.shape)]
+    return ends[..., 0], ends[..., 1]
+
+
+def basin_fractions(labels: ArrayLike, *, confidence: float = 0.95) -> tuple[Integers, Shares]:
+    """Share of every label in a map or a sample.
+
+    Args:
+        labels: any shape, negative: no label.
+        confidence: of the intervals, each by itself.
+
+    Returns:
+        The labels that occur, rising, and their shares, arrays (labels,). With missing labels the fractions
+        do not add up to 1: what is missing is ``missing / n``.
+
+    Raises:
+        InputError: the labels are not integers, or the confidence is not between 0 and 1.
+    """
+    array = check_labels(labels)
+    which = known_labels(array)
+    count = np.array([np.count_nonzero(array == label) for label in which], dtype=np.int64)
+    return which, _shares(count, array, confidence)
+
+
+def basin_stability(labels: ArrayLike, label: int, *, confidence: float = 0.95) -> Shares:
+    """Basin stability of one attractor: the probability that a random start returns to it.
+
+    S_B = integral of 1_B(x) rho(x) dx, with B the basin and rho the density that the starts were drawn from
+    (Menck, Heitzig, Marwan, Kurths, Nature Physics 9 (2013) 89); estimated by the share of the starts that
+    end there.
+
+    Args:
+        labels: of independent starts drawn from rho, any shape; negative: no label.
+        label: the attractor's label.
+        confidence: of the interval.
+
+    Raises:
+        InputError: the labels are not integers, or the confidence is not between 0 and 1.
+    """
+    array = check_labels(labels)
+    label = checks.whole_number("label", label, least=0)
+    return _shares(np.array(np.count_nonzero(array == label)), array, confidence)
+
+
+def finite_time_basin_stability(
+    labels: ArrayLike, times: ArrayLike, label: int, horizons: ArrayLike, *, confidence: float = 0.95
+) -> Shares:
+    """Probability that a random start has returned to an attractor within a given time.
+
+    S_B(T) = P(x in B and its time of return <= T) (Schultz, Hellmann, Webster, Kurths, Chaos 28 (2018)
+    043102); it rises with T towards the basin stability. The time of return is whatever ``times`` hold: of
+    capture, or of settling within a ball.
+
+    Args:
+        labels: of independent starts, any shape; negative: no label.
+        times: of return [s], the shape of ``labels``; not looked at where the label is another one.
+        label: the attractor's label.
+        horizons: times T [s], any shape.
+        confidence: of the intervals, each by itself.
+
+    Raises:
+        InputError: the shapes differ, a time of return is NaN, or another argument is wrong.
+    """
+    array, moments = check_labels(labels), np.asarray(times, dtype=np.float64)
+    label = checks.whole_number("label", label, least=0)
+    if moments.shape != array.shape:
+        raise InputError(f"times: has shape {moments.shape}, must be that of labels, {array.shape}")
+    own = np.sort(moments[array == label])
+    within = np.asarray(horizons, dtype=np.float64)
+    if np.isnan(own).any() or np.isnan(within).any():
+        raise InputError("times, horizons: must not be NaN where they are needed")
+    return _shares(np.asarray(np.searchsorted(own, within, side="right")), array, confidence)
+
+
+def _shares(count: Integers, labels: Integers, confidence: float) -> Shares:
+    n, missing = labels.size, int(np.count_nonzero(labels < 0))
+    lower, upper = wilson(count, n, confidence)
+    return Shares(
+        count=count,
+        n=n,
+        missing=missing,
+        fraction=count / n,
+        lower=lower,
+        upper=upper,
+        at_most=(count + missing) / n,
+    )

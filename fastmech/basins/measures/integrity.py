@@ -1,0 +1,109 @@
+"""Dynamical integrity of a basin on a map: GIM, LIM and IF.
+
+Measures by Soliman and Thompson, J. Sound Vib. 135 (1989) 453, and Rega and Lenci, Nonlinear Analysis 63
+(2005) 902:
+
+- GIM, global integrity measure: the hypervolume of the basin within the window of the map.
+- LIM, local integrity measure: the radius of the largest ball round the attractor that lies in the basin.
+- IF, integrity factor: the radius of the largest ball in the basin, wherever its centre.
+
+They use them relative to a reference (the basin without excitation); divide two results for that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import KDTree
+
+from fastmech.basins.measures.labels import Floats, check_axes, check_map, check_point
+from fastmech.basins.measures.norm import norm_on
+from fastmech.ensembles import checks
+from fastmech.errors import InputError
+
+
+@dataclass(frozen=True)
+class Integrity:
+    """Integrity of one basin on one map. Radii are lengths in the stated norm."""
+
+    gim: float  #: share of the map's points: the basin's volume over the window's
+    lim: float  #: radius round the attractor; 0: the map's nearest point does not belong to the basin
+    lim_at_window: bool  #: the window's edge limits it, not the basin's boundary: the true one is larger
+    factor: float  #: IF
+    factor_at_window: bool  #: the same for IF
+    centre: Floats  #: of the largest ball, a point of the map or the attractor, (axes,); NaN: no basin
+    resolution: float  #: length of a cell's longest diagonal
+
+
+def integrity(
+    labels: ArrayLike, axes: Sequence[ArrayLike], label: int, attractor: ArrayLike, norm: ArrayLike
+) -> Integrity:
+    """GIM, LIM and IF of the basin ``label`` on a map.
+
+    A ball lies in the basin if no point of the map in its inside has another label or none, and its inside is
+    within the window (the span of the axes: nothing is known beyond). So a radius is the distance from the
+    centre to the nearest such point or edge, exact on the map; the true boundary is nearer by up to
+    ``resolution``, and filaments of another basin thinner than a cell are not seen.
+
+    Args:
+        labels: on the grid, any number of axes; negative: no label, which does not belong to the basin.
+        axes: coordinates along every axis, rising in equal steps.
+        label: of the basin.
+        attractor: its coordinates on the map's axes (axes,), within the window.
+        norm: matrix N (axes, axes): ``|d @ N|`` is the length of a departure d along the axes. For a slice of
+            the mechanism's state space: ``norm_on(kinetic_norm(scene, equilibrium), 4, coordinates)``.
+
+    Raises:
+        InputError: an argument is wrong, or the attractor lies outside the window.
+    """
+    array = check_map(labels)
+    lines = check_axes(axes, array.shape)
+    label = checks.whole_number("label", label, least=0)
+    place = check_point("attractor", attractor, array.ndim)
+    first, last = np.array([line[0] for line in lines]), np.array([line[-1] for line in lines])
+    if (place < first).any() or (place > last).any():
+        raise InputError(f"attractor = {place.tolist()}: must lie within the map's window")
+    matrix = norm_on(norm, array.ndim)
+    inside = array == label
+    points = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
+    others = points[~inside] @ matrix
+    tree = KDTree(others) if len(others) else None
+
+    def room(centres: Floats) -> tuple[Floats, Floats]:
+        """Distances (n,) to the nearest point outside the basin and to the window's edge."""
+        # The distance to a face of the box is measured along the norm's own normal.
+        reach = np.sqrt(np.diag(np.linalg.inv(matrix @ matrix.T)))
+        edge = (np.minimum(centres - first, last - centres) / reach).min(axis=1)
+        boundary = tree.query(centres @ matrix)[0] if tree else np.full(len(centres), np.inf)
+        return np.asarray(boundary), edge
+
+    nearest = tuple(int(np.abs(line - x).argmin()) for line, x in zip(lines, place, strict=True))
+    boundary, edge = room(place[None]) if inside[nearest] else (np.zeros(1), np.ones(1))
+    lim, lim_at_window = float(min(boundary[0], edge[0])), bool(edge[0] < boundary[0])
+    factor, factor_at_window, centre = 0.0, False, np.full(array.ndim, np.nan)
+    if inside.any():
+        centres = points[inside]
+        if lim > 0.0:  # so that IF is never less than LIM
+            centres = np.concatenate([centres, place[None]])
+        boundary, edge = room(centres)
+        best = int(np.argmax(np.minimum(boundary, edge)))
+        factor, factor_at_window = float(min(boundary[best], edge[best])), bool(edge[best] < boundary[best])
+        centre = centres[best]
+    return Integrity(
+        gim=float(inside.mean()),
+        lim=lim,
+        lim_at_window=lim_at_window,
+        factor=factor,
+        factor_at_window=factor_at_window,
+        centre=centre,
+        resolution=_longest_diagonal(lines, matrix),
+    )
+
+
+def _longest_diagonal(lines: list[Floats], matrix: Floats) -> float:
+    widest = np.array([np.diff(line).max() for line in lines])
+    signs = np.stack(np.meshgrid(*[[-1.0, 1.0]] * len(lines), indexing="ij"), axis=-1).reshape(-1, len(lines))
+    return float(np.linalg.norm(signs * widest @ matrix, axis=1).max())

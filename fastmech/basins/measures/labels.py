@@ -1,0 +1,126 @@
+"""Labels: which attractor a start ends at, as integers; a negative label is no label.
+
+Labels are numbers >= 0, in any order and with gaps. Undecided and failed starts have negative ones: they are
+counted in every total and never taken for a basin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastmech.errors import InputError
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+#: Labels (n,) of starts (n, dim).
+LabelOf = Callable[[Floats], NDArray[np.integer[Any]]]
+
+
+def check_labels(labels: ArrayLike, name: str = "labels") -> Integers:
+    """Labels of any shape as integers.
+
+    Raises:
+        InputError: there are none, or they are not integers.
+    """
+    array = np.asarray(labels)
+    if not array.size or not np.issubdtype(array.dtype, np.integer):
+        raise InputError(f"{name}: must be integers, at least one; is {array.dtype} of shape {array.shape}")
+    return array.astype(np.int64)
+
+
+def check_map(labels: ArrayLike) -> Integers:
+    """Labels on a grid, at least two points along every axis.
+
+    Raises:
+        InputError: they are not.
+    """
+    array = check_labels(labels)
+    if array.ndim < 1 or min(array.shape) < 2:
+        raise InputError(f"labels: has shape {array.shape}, must be a grid of two or more points an axis")
+    return array
+
+
+def known_labels(labels: Integers) -> Integers:
+    """The labels that occur, rising, without the negative ones."""
+    found = np.unique(labels)
+    return found[found >= 0]
+
+
+def ask(label_of: LabelOf, starts: Floats) -> Integers:
+    """Labels (n,) of starts (n, dim) by ``label_of``.
+
+    Raises:
+        InputError: it gives something else.
+    """
+    if not len(starts):
+        return np.zeros(0, dtype=np.int64)
+    told = check_labels(label_of(starts), "label_of(starts)")
+    if told.shape != (len(starts),):
+        raise InputError(f"label_of(starts): has shape {told.shape}, must be ({len(starts)},)")
+    return told
+
+
+def check_point(name: str, values: ArrayLike, dim: int | None = None) -> Floats:
+    """A finite point (dim,).
+
+    Raises:
+        InputError: it is not.
+    """
+    try:
+        point = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: must be numbers") from None
+    if point.ndim != 1 or not point.size or (dim is not None and point.size != dim):
+        wanted = "(dim,)" if dim is None else f"({dim},)"
+        raise InputError(f"{name}: has shape {point.shape}, must be {wanted}")
+    if not np.isfinite(point).all():
+        raise InputError(f"{name}: must be finite")
+    return point
+
+
+def check_axes(axes: Sequence[ArrayLike], shape: tuple[int, ...]) -> list[Floats]:
+    """Coordinates along every axis of a grid, finite, rising in equal steps.
+
+    Raises:
+        InputError: they are not, or do not fit the grid's shape.
+    """
+    if len(axes) != len(shape):
+        raise InputError(f"axes: has {len(axes)} axes, the labels have {len(shape)}")
+    checked = []
+    for k, (axis, length) in enumerate(zip(axes, shape, strict=True)):
+        values = check_point(f"axes[{k}]", axis, length)
+        step = (values[-1] - values[0]) / (length - 1)
+        if not step > 0.0 or np.abs(np.diff(values) - step).max() > 1e-6 * step:
+            raise InputError(f"axes[{k}]: must rise in equal steps")
+        checked.append(values)
+    return checked
+
+
+def number_turns(label: ArrayLike, turns: ArrayLike) -> tuple[Integers, Integers]:
+    """One label for every copy of an attractor: attractor and turns numbered together.
+
+    Args:
+        label: attractors, any shape; negative: none.
+        turns: full turns of every angle, the shape of ``label`` and the number of angles behind it.
+
+    Returns:
+        Labels 0, 1, ... of the same shape (-1 where ``label`` is negative), and the attractor and the turns
+        that each of them stands for, shape (labels, 1 + angles), in rising order.
+
+    Raises:
+        InputError: not integers, or the shapes do not fit.
+    """
+    attractor, made = check_labels(label, "label"), check_labels(turns, "turns")
+    if made.ndim != attractor.ndim + 1 or made.shape[:-1] != attractor.shape:
+        raise InputError(f"turns: has shape {made.shape}, must be {attractor.shape} and the angles")
+    known = attractor >= 0
+    rows = np.column_stack([attractor[known], made[known]])
+    table, place = np.unique(rows, axis=0, return_inverse=True)
+    numbered = np.full(attractor.shape, -1, dtype=np.int64)
+    numbered[known] = place.ravel()
+    return numbered, table

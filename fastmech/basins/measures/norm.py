@@ -1,0 +1,57 @@
+"""The metric in which balls and shocks are measured: a matrix that turns departures into lengths.
+
+Angles [rad] and rates [rad/s] have no common length by themselves. For the mechanism it is given by the
+kinetic-energy norm at the equilibrium (:class:`fastmech.disturbance.size.Size`); for a system of your own it
+is a matrix that you state, the identity if all its states have one unit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fastmech.basins.measures.labels import Floats
+from fastmech.disturbance.size import size_at
+from fastmech.ensembles import checks
+from fastmech.equilibria.find import Equilibrium
+from fastmech.errors import InputError
+from fastmech.scene import Scene
+
+
+def kinetic_norm(scene: Scene, equilibrium: Equilibrium) -> Floats:
+    """Matrix N (4, 4) of the kinetic-energy norm at an equilibrium: ``|departure @ N|`` is a size [rad].
+
+    ``size^2 = (xi' a xi + eta' a eta / omega^2) / (m2 l^2)`` for departures xi [rad] and eta [rad/s], with
+    the metric ``a`` at the equilibrium, paper (11), and the highest natural frequency omega [rad/s]. The
+    kinetic energy of a kick is ``size^2 omega^2 m2 l^2 / 2``. The force is the equilibrium's frozen one.
+    """
+    frozen = scene.replace(F0=equilibrium.force, alpha=0.0)
+    return size_at(frozen, equilibrium.phi, equilibrium.theta).to_ball
+
+
+def norm_on(norm: ArrayLike, dim: int, coordinates: Sequence[int] | None = None) -> Floats:
+    """Lower triangular matrix L (k, k) of a norm on k of ``dim`` coordinates, the others not departed.
+
+    ``|d @ L|`` is the length of a departure d (k,) along ``coordinates`` (all by default).
+
+    Args:
+        norm: matrix (dim, dim), not singular.
+        dim: number of states.
+        coordinates: indices of states.
+
+    Raises:
+        InputError: the norm is no such matrix, or the coordinates are not different indices of states.
+    """
+    matrix = checks.states("norm", norm, dim)
+    if matrix.shape != (dim, dim) or not np.isfinite(matrix).all():
+        raise InputError(f"norm: has shape {matrix.shape}, must be a finite matrix ({dim}, {dim})")
+    if coordinates is not None:
+        chosen = [checks.whole_number("coordinates", k, least=0, most=dim - 1) for k in coordinates]
+        if not chosen or len(set(chosen)) != len(chosen):
+            raise InputError(f"coordinates = {list(coordinates)}: must be different indices, at least one")
+        matrix = matrix[chosen]
+    if np.linalg.matrix_rank(matrix) < len(matrix):
+        raise InputError("norm: is singular; every departure needs a length greater than 0")
+    return np.asarray(np.linalg.cholesky(matrix @ matrix.T))

@@ -1,0 +1,124 @@
+"""One computation of where starts are captured, in stages that pack the lanes still running."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.capture.certificate import Certificate
+from fastmech.capture.observe import CAPTURE_TIME, STOP_ENERGY, TURNS_PHI, TURNS_THETA
+from fastmech.ensembles.run import run_ensemble
+from fastmech.ensembles.stopping import STOP_CODE, STOP_TIME
+from fastmech.integrators.method import Method
+from fastmech.kernels.select import right_hand_side
+from fastmech.mechanism.coefficients import reduce
+
+Floats = NDArray[np.float64]
+
+#: Stages: rounds after which the lanes still running are packed anew, rounds a call, and rounds between stops
+#: until then. Most lanes of a dissipative scene are captured early, and blocks should not run on for a few;
+#: lanes captured late lose little energy in a round, so their capture is confirmed some rounds later.
+STAGES = ((2, 2, 1), (8, 3, 1), (32, 6, 2), (64, 16, 4))
+LATE = (32, 8)
+
+#: Lanes a block where calls are short, and where they are long.
+BLOCK, LATE_BLOCK = 1024, 256
+
+
+@dataclass
+class Paths:
+    """Where n lanes came to; those not captured have the code 0."""
+
+    code: NDArray[np.int8]  #: number of the well, from 1
+    turns: NDArray[np.int32]  #: (n, 2)
+    time: Floats  #: of capture [s]
+    stop: Floats  #: end of the computation [s]
+    energy: Floats  #: bounding energy there, over m2 l^2
+    state: Floats  #: state there, (n, 4)
+    steps: int = 0  #: of all lanes together
+
+    @classmethod
+    def empty(cls, n: int) -> Paths:
+        """Nothing known yet."""
+        return cls(
+            np.zeros(n, dtype=np.int8),
+            np.zeros((n, 2), dtype=np.int32),
+            np.full(n, np.nan),
+            np.full(n, np.nan),
+            np.full(n, np.nan),
+            np.full((n, 4), np.nan),
+        )
+
+    def put(self, where: NDArray[np.intp], other: Paths) -> None:
+        """Fill some of the lanes."""
+        for name in ARRAYS:
+            getattr(self, name)[where] = getattr(other, name)
+
+    def take(self, which: NDArray[np.intp]) -> Paths:
+        """Some of the lanes."""
+        return Paths(*(getattr(self, name)[which] for name in ARRAYS))
+
+
+ARRAYS = ("code", "turns", "time", "stop", "energy", "state")
+
+
+def rounds_until(t_end: float, longest: float) -> int:
+    """Number of rounds, each at most ``longest`` [s], such that there is a stop at the end."""
+    rounds = max(1, int(np.ceil(t_end / longest * (1.0 - 1e-12))))
+    every = next((stops for until, _, stops in STAGES if rounds <= until), LATE[1])
+    return -(-rounds // every) * every
+
+
+def follow(
+    certificate: Certificate,
+    observer: Floats,
+    starts: Floats,
+    t_end: float,
+    rounds: int,
+    substeps: int,
+    method: Method,
+    threads: int | None,
+) -> Paths:
+    """Follow starts (n, 4) until ``t_end`` [s] with so many steps a round.
+
+    ``rounds`` is a number that ``rounds_until`` gives, ``observer`` the observers' vector.
+    """
+    c = reduce(certificate.scene)
+    rhs, params = right_hand_side(c), np.array(c, dtype=np.float64)
+    paths = Paths.empty(len(starts))
+    paths.state[:] = starts
+    running, passed = np.arange(len(starts)), 0
+    interval = t_end / rounds
+    for until, call_rounds, stop_rounds in [*STAGES, (rounds, *LATE)]:
+        ahead = min(until, rounds) - passed
+        if ahead <= 0 or not running.size:
+            continue
+        run = run_ensemble(
+            rhs,
+            params,
+            paths.state[running],
+            [passed * interval, (passed + ahead) * interval],
+            interval / substeps,
+            method,
+            certificate.observation(observer, stop_rounds * interval, call_rounds * substeps),
+            threads=threads,
+            block_lanes=LATE_BLOCK if until == rounds else BLOCK,
+        )
+        code = run.records[STOP_CODE].astype(np.int8)
+        stopped = code != 0
+        end = np.where(stopped, run.records[STOP_TIME], (passed + ahead) * interval)
+        reached = Paths(
+            code,
+            run.records[[TURNS_PHI, TURNS_THETA]].T.astype(np.int32),
+            run.records[CAPTURE_TIME],
+            end,
+            run.records[STOP_ENERGY],
+            run.states[-1],
+        )
+        paths.put(running, reached)
+        paths.steps += int(np.rint(end / interval - passed).sum()) * substeps
+        passed += ahead
+        running = running[~stopped & np.isfinite(run.states[-1]).all(axis=1)]
+    return paths

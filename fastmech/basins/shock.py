@@ -1,0 +1,240 @@
+"""The minimal critical shock: the smallest disturbance of a resting state that makes it end elsewhere.
+
+Halekotte and Feudel, Sci. Rep. 10 (2020) 11783 (minimal fatal shocks). In the norm it is the radius of the
+largest ball round the attractor within its basin: LIM, with the point of the boundary where that ball
+touches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fastmech.basins.measures.labels import Floats, Integers, LabelOf, ask, check_point
+from fastmech.basins.measures.norm import norm_on
+from fastmech.ensembles import checks
+from fastmech.errors import InputError
+
+#: Radii at which a ray is looked at before its first way out is narrowed down: at first, and once turned.
+LEVELS, TURNED_LEVELS = 24, 8
+
+#: Radii, of all those, at which rays are looked at together.
+TOGETHER = 4
+
+#: Points between two radii at which a way out is narrowed down.
+SECTIONS = 7
+
+#: Candidates that the search refines, and directions tried round each in a round.
+CANDIDATES, TRIALS = 6, 24
+
+
+@dataclass(frozen=True, eq=False)
+class Shock:
+    """The smallest shock found."""
+
+    size: float  #: in the norm; NaN: nothing left the basin up to ``most``
+    shock: Floats  #: disturbance of the state (dim,); NaN likewise
+    label: int  #: where it ends; -1: nowhere else
+    undecided_from: float  #: size of the smallest disturbance tried whose end is not known; NaN: none
+    trajectories: int  #: starts that were labelled
+
+
+def minimal_shock(
+    label_of: LabelOf,
+    attractor: ArrayLike,
+    norm: ArrayLike,
+    *,
+    most: float,
+    coordinates: Sequence[int] | None = None,
+    guess: ArrayLike | None = None,
+    directions: int = 128,
+    tolerance: float = 1e-4,
+    seed: int = 0,
+) -> Shock:
+    """Search for the minimal critical shock of an attractor.
+
+    Random directions and the guesses are followed outwards to their first way out of the basin; the best are
+    turned a little at random again and again, less each time that nothing improves. No gradients are used.
+    The result lies outside the basin, so the true minimum is not larger; that nothing smaller was missed is
+    not proved: compare with :func:`brute_force_shock`.
+
+    Args:
+        label_of: labels (n,) of starts (n, dim), negative: none. A start without a label is not taken to have
+            left the basin; ``undecided_from`` tells of it.
+        attractor: the resting state (dim,); its own label must be known.
+        norm: matrix N (dim, dim): ``|d @ N|`` is the size of a disturbance d;
+            :func:`fastmech.basins.measures.norm.kinetic_norm` for the mechanism.
+        most: largest size to look at.
+        coordinates: states that the shock may change, all by default; (2, 3) is a velocity kick.
+        guess: disturbances (n, dim) whose directions are tried too.
+        directions: random directions to begin with.
+        tolerance: relative, of the size along a direction.
+        seed: of NumPy's ``default_rng``.
+
+    Raises:
+        InputError: an argument is wrong, or the attractor itself has no label.
+    """
+    search = _Search(label_of, attractor, norm, coordinates, most, tolerance)
+    rng = np.random.default_rng(checks.whole_number("seed", seed, least=0))
+    number = checks.whole_number("directions", directions, least=1)
+    units = _random_units(rng, number, len(search.matrix))
+    if guess is not None:
+        units = np.concatenate([search.directions_of(guess), units])
+    found, ends = search.first_exits(units[None], np.array([search.most]), LEVELS, CANDIDATES)
+    best = np.argsort(found[0], kind="stable")[:CANDIDATES]
+    units, sizes, labels = units[best], found[0, best], ends[0, best]
+    spread, rows = np.full(len(units), 0.5), np.arange(len(units))
+    # A turn by the angle s changes the size by s^2 at a smooth minimum.
+    while np.isfinite(sizes).any() and (spread > 0.5 * np.sqrt(search.tolerance)).any():
+        random = rng.standard_normal((len(units), TRIALS, units.shape[1]))
+        turned = units[:, None] + spread[:, None, None] * random
+        turned /= np.linalg.norm(turned, axis=2, keepdims=True)
+        found, ends = search.first_exits(turned, np.minimum(sizes, search.most), TURNED_LEVELS, 1)
+        column = found.argmin(axis=1)
+        better = found[rows, column] < sizes * (1.0 - search.tolerance)
+        units[better] = turned[rows, column][better]
+        labels[better] = ends[rows, column][better]
+        sizes[better] = found[rows, column][better]
+        spread[~better] *= 0.5
+    return search.result(units, sizes, labels)
+
+
+def brute_force_shock(
+    label_of: LabelOf,
+    attractor: ArrayLike,
+    norm: ArrayLike,
+    *,
+    most: float,
+    coordinates: Sequence[int] | None = None,
+    directions: int = 4096,
+    tolerance: float = 1e-4,
+    seed: int = 0,
+) -> Shock:
+    """The smallest shock over many random directions, each followed to its first way out: a check.
+
+    Arguments, result and errors as :func:`minimal_shock`. It approaches the minimum from above as the number
+    of directions grows.
+    """
+    search = _Search(label_of, attractor, norm, coordinates, most, tolerance)
+    rng = np.random.default_rng(checks.whole_number("seed", seed, least=0))
+    units = _random_units(rng, checks.whole_number("directions", directions, least=1), len(search.matrix))
+    sizes, labels = search.first_exits(units[None], np.array([search.most]), LEVELS, 1)
+    return search.result(units, sizes[0], labels[0])
+
+
+class _Search:
+    """Rays from an attractor in a norm, and the labels along them."""
+
+    def __init__(
+        self,
+        label_of: LabelOf,
+        attractor: ArrayLike,
+        norm: ArrayLike,
+        coordinates: Sequence[int] | None,
+        most: float,
+        tolerance: float,
+    ) -> None:
+        self.label_of = label_of
+        self.attractor = check_point("attractor", attractor)
+        self.dim = self.attractor.size
+        self.matrix = norm_on(norm, self.dim, coordinates)
+        self.chosen = list(range(self.dim) if coordinates is None else coordinates)
+        self.most = checks.number("most", most, "", above=0.0)
+        self.tolerance = checks.number("tolerance", tolerance, "", above=0.0)
+        self.label = int(ask(label_of, self.attractor[None])[0])
+        if self.label < 0:
+            raise InputError("attractor: has no label itself; it must be in a basin")
+        self.trajectories, self.undecided = 1, np.inf
+
+    def disturbances(self, points: Floats) -> Floats:
+        """Disturbances (n, dim) whose images in the ball are ``points`` (n, k)."""
+        full = np.zeros((len(points), self.dim))
+        full[:, self.chosen] = points @ np.linalg.inv(self.matrix)
+        return full
+
+    def directions_of(self, guess: ArrayLike) -> Floats:
+        """Unit points (n, k) in the directions of disturbances (n, dim)."""
+        given = checks.states("guess", guess, self.dim)[:, self.chosen] @ self.matrix
+        length = np.linalg.norm(given, axis=1, keepdims=True)
+        if not (np.isfinite(length) & (length > 0.0)).all():
+            raise InputError("guess: must be finite and differ from 0 in the chosen coordinates")
+        return np.asarray(given / length)
+
+    def labels(self, units: Floats, radii: Floats) -> Integers:
+        """Labels (n,) of the starts at ``radii`` along ``units``."""
+        found = ask(self.label_of, self.attractor + self.disturbances(units * radii[:, None]))
+        self.trajectories += len(units)
+        self.undecided = min(self.undecided, float(radii[found < 0].min(initial=np.inf)))
+        return found
+
+    def first_exits(self, units: Floats, limit: Floats, levels: int, keep: int) -> tuple[Floats, Integers]:
+        """Sizes at which rays first have another label, and these labels; inf and -1: not up to ``limit``.
+
+        Args:
+            units: directions of rays in groups (groups, rays, k).
+            limit: largest size to look at (groups,).
+            levels: radii to look at.
+            keep: so many of each group's shortest rays are narrowed down to the tolerance; the others only
+                until they are known not to be among them.
+
+        Returns:
+            Arrays (groups, rays).
+        """
+        shape = units.shape[:2]
+        units = units.reshape(-1, units.shape[2])
+        step = np.repeat(limit / levels, shape[1])
+        lower, upper = np.zeros(len(units)), np.full(len(units), np.inf)
+        label = np.full(len(units), -1, dtype=np.int64)
+
+        def promising() -> Floats:
+            """Of the rays, which might still be among the shortest."""
+            last = min(keep, shape[1]) - 1
+            worst = np.partition(upper.reshape(shape), last, axis=1)[:, last]
+            return np.asarray(lower < np.repeat(worst, shape[1]))
+
+        def look(rays: Integers, radii: Floats) -> None:
+            """Narrow down where rays leave by their labels at rising radii (rays, m)."""
+            m = radii.shape[1]
+            seen = self.labels(np.repeat(units[rays], m, axis=0), radii.ravel()).reshape(-1, m)
+            out = (seen >= 0) & (seen != self.label)
+            first, leaves = out.argmax(axis=1), out.any(axis=1)
+            row = np.arange(len(rays))
+            upper[rays[leaves]] = radii[row, first][leaves]
+            label[rays[leaves]] = seen[row, first][leaves]
+            inner = np.where(leaves, first, m) - 1
+            lower[rays[inner >= 0]] = radii[row, inner][inner >= 0]
+
+        for level in range(0, levels, TOGETHER):
+            rays = np.flatnonzero(np.isinf(upper) & promising())
+            several = np.arange(level + 1, min(level + TOGETHER, levels) + 1)
+            look(rays, step[rays, None] * several)
+        while True:
+            wide = np.isfinite(upper) & (upper - lower > self.tolerance * upper)
+            rays = np.flatnonzero(wide & promising())
+            if not rays.size:
+                return upper.reshape(shape), label.reshape(shape)
+            share = np.arange(1, SECTIONS + 1) / (SECTIONS + 1)
+            look(rays, lower[rays, None] + (upper - lower)[rays, None] * share)
+
+    def result(self, units: Floats, sizes: Floats, labels: Integers) -> Shock:
+        """The smallest of shocks along ``units``."""
+        best = int(np.argmin(sizes))
+        found = bool(np.isfinite(sizes[best]))
+        shock = np.full(self.dim, np.nan)
+        if found:
+            shock = self.disturbances(sizes[best] * units[best : best + 1])[0]
+        return Shock(
+            size=float(sizes[best]) if found else np.nan,
+            shock=shock,
+            label=int(labels[best]),
+            undecided_from=self.undecided if np.isfinite(self.undecided) else np.nan,
+            trajectories=self.trajectories,
+        )
+
+
+def _random_units(rng: np.random.Generator, n: int, dim: int) -> Floats:
+    normal = rng.standard_normal((n, dim))
+    return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))

@@ -1,0 +1,39 @@
+"""What is known in the end about a start of a basin map: distinct statuses, each with its advice."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class BasinStatus(IntEnum):
+    """Status of a start."""
+
+    CAPTURED = 0
+    UNDECIDED = 1
+    AT_SADDLE = 2
+    NOT_FINITE = 3
+    STEP_TOO_LARGE = 4
+    START_NOT_FINITE = 5
+
+    @property
+    def advice(self) -> str:
+        """What it means and what to do."""
+        return _ADVICE[self]
+
+
+_ADVICE = {
+    BasinStatus.CAPTURED: "proved to end in its well: energy and position leave no other way",
+    BasinStatus.UNDECIDED: "not captured by t_end, or the finest steps disagree; use a larger t_end",
+    BasinStatus.AT_SADDLE: "on an unstable equilibrium's stable manifold, as far as the finest steps tell",
+    BasinStatus.NOT_FINITE: "became NaN or infinite with every step tried; use a smaller dt",
+    BasinStatus.STEP_TOO_LARGE: "has energy that it cannot have, with every step tried; use a smaller dt",
+    BasinStatus.START_NOT_FINITE: "the start is NaN or infinite",
+}
+
+
+def counts(status: NDArray[np.int8]) -> dict[str, int]:
+    """How many starts have each status, by its name in lower case."""
+    return {kind.name.lower(): int(np.count_nonzero(status == kind)) for kind in BasinStatus}

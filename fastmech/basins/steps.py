@@ -1,0 +1,73 @@
+"""Steps for basin maps: bounded by the scene's frequencies and by how fast a start can ever move."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.ensembles.plausible import energy
+from fastmech.mechanism.coefficients import Coefficients
+from fastmech.mechanism.reduced import metric_11, metric_determinant, potential_hessian, slider_ratio
+
+Floats = NDArray[np.float64]
+
+#: Coarse step times the highest frequency [rad], and times the fastest turning that the energy allows. With
+#: ``dop853`` the error of such a step is some 1e-3 by the time of capture; half of it makes that 1e-5.
+PHASE, TURNING = 1.0, 2.5
+
+#: Octaves below the scene's own step that a start may take: rates of some thousand rad/s. A start that is
+#: faster still comes out as what that step makes of it.
+MOST_OCTAVES = 7.0
+
+#: Points along a turn at which the scene's frequencies are looked up.
+GRID = 48
+
+
+def highest_frequency(c: Coefficients) -> float:
+    """Largest sqrt|eigenvalue| of Hessian and metric over the torus [rad/s], on a grid."""
+    angles = np.linspace(-np.pi, np.pi, GRID, endpoint=False)
+    phi, theta = np.meshgrid(angles, angles)
+    s1, c1, s12 = np.sin(phi), np.cos(phi), np.sin(phi + theta)
+    push = abs(c.force)
+    h11, h12, h22 = potential_hessian(
+        s1, c1, np.sin(theta), np.cos(theta), s12, c.lift, c.spring, c.gravity, push
+    )
+    k, _ = slider_ratio(s1, c1)
+    a11, determinant = (
+        metric_11(c.mass, c.slider, k),
+        metric_determinant(c.mass, c.slider, k, np.cos(phi + theta)),
+    )
+    # Roots of det(H - x a) = 0 with a = [[a11, s12], [s12, 1]].
+    middle = 0.5 * (h11 + h22 * a11 - 2.0 * h12 * s12) / determinant
+    product = (h11 * h22 - h12 * h12) / determinant
+    largest = np.abs(middle) + np.sqrt(np.maximum(middle * middle - product, 0.0))
+    return float(np.sqrt(largest.max()))
+
+
+def fastest_rate(c: Coefficients, starts: Floats) -> Floats:
+    """Bound on the angular rates [rad/s] that the energy of each start (n, 4) allows, shape (n,).
+
+    The metric's smaller eigenvalue is at least its determinant over its trace. A force, decaying or not, can
+    add at most what it does from one end of its reach to the other.
+    """
+    angles = np.linspace(-np.pi, np.pi, 8 * GRID)
+    k, _ = slider_ratio(np.sin(angles), np.cos(angles))
+    least = float(
+        (metric_determinant(c.mass, c.slider, k, 0.0) / (metric_11(c.mass, c.slider, k) + 1.0)).min()
+    )
+    lowest = -(abs(c.lift) + c.gravity + c.spring)
+    with np.errstate(invalid="ignore", over="ignore"):
+        total, _ = energy(c, starts, np.zeros(len(starts)))
+        return np.asarray(np.sqrt(2.0 * np.maximum(total - lowest + 4.0 * abs(c.force), 0.0) / least))
+
+
+def coarse_steps(c: Coefficients, starts: Floats) -> Floats:
+    """Coarse step [s] of each start, shape (n,): the scene's own, halved until it is small enough.
+
+    Steps come in octaves, so that starts of about the same speed run together; a start's step depends on
+    nothing but the start and the scene.
+    """
+    slow = highest_frequency(c)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        octaves = np.ceil(np.log2(fastest_rate(c, starts) * PHASE / (TURNING * slow)) - 1e-9)
+    return np.asarray(PHASE / slow * 0.5 ** np.clip(np.nan_to_num(octaves), 0.0, MOST_OCTAVES))

@@ -1,0 +1,111 @@
+"""Right-hand sides per second against what the same core can multiply and add at most."""
+
+from __future__ import annotations
+
+import re
+import statistics
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from fastmech.bench.problem import Problem
+from fastmech.ensembles.integrate import integrate
+from fastmech.ensembles.run import BLOCK_LANES
+from fastmech.integrators.methods import find_method
+from fastmech.jit import FLAGS
+from fastmech.kernels.select import right_hand_side
+from fastmech.mechanism.coefficients import reduce
+
+Floats = NDArray[np.float64]
+
+#: Independent chains of multiply-adds in a lane, and their length: enough to hide each one's latency.
+CHAINS, LENGTH = 8, 32
+
+TURNS = 7
+
+#: Packed fused multiply-adds of doubles in x86 (AVX2, AVX-512) and Arm code.
+PACKED = re.compile(r"vfn?madd\d+pd|\bfmla\s+v")
+
+
+@dataclass(frozen=True)
+class Throughput:
+    """Evaluations of right-hand sides per second of one core."""
+
+    name: str
+    rhs: float  #: right-hand sides of one trajectory, per second
+    share: float  #: of the kernel alone
+    slots: float  #: multiply-adds that the core could have done in the time of one
+
+
+@cache
+def multiply_adds() -> Any:
+    """A loop over lanes that does CHAINS x LENGTH multiply-adds in each, as machine code."""
+    names = [f"a{j}" for j in range(CHAINS)]
+    lines = [
+        "def loop(x, turns, factor):",
+        "    for _ in range(turns):",
+        "        for i in range(x.shape[0]):",
+    ]
+    lines += [f"            {name} = x[i] + {j}.0" for j, name in enumerate(names)]
+    lines += [f"            {name} = {name} * factor + 1.0" for _ in range(LENGTH) for name in names]
+    lines += [f"            x[i] = {' + '.join(names)}"]
+    scope: dict[str, Any] = {}
+    exec(compile("\n".join(lines), "<multiply-adds>", "exec"), scope)
+    return njit(["void(float64[::1], int64, float64)"], nogil=True, **FLAGS)(scope["loop"])
+
+
+def packed_multiply_adds() -> int:
+    """How many packed fused multiply-adds the machine code of that loop holds."""
+    (code,) = multiply_adds().inspect_asm().values()
+    return len(PACKED.findall(code))
+
+
+@cache
+def evaluations() -> Any:
+    """A loop that calls a block right-hand side over and over."""
+
+    def loop(rhs, t, Y, dY, p, turns):  # type: ignore[no-untyped-def]
+        for _ in range(turns):
+            rhs(t, Y, dY, p)
+
+    return njit(nogil=True, **FLAGS)(loop)
+
+
+def throughputs(problem: Problem, advance: Callable[[int], None]) -> tuple[float, list[Throughput]]:
+    """The measured peak [multiply-adds/s], and right-hand sides alone and inside of methods."""
+    x, turns = np.ones(BLOCK_LANES), 2000
+    Y = np.ascontiguousarray(np.resize(problem.starts, (BLOCK_LANES, 4)).T)
+    coefficients = reduce(problem.scene)
+    p = np.repeat(np.array(coefficients)[:, None], BLOCK_LANES, axis=1)
+    rhs, dY = right_hand_side(coefficients), np.empty_like(Y)
+    many = np.tile(problem.starts, (max(1, 4096 // len(problem.starts)), 1))
+    works: dict[str, tuple[Callable[[], Any], int]] = {
+        "peak": (lambda: multiply_adds()(x, turns, 0.5), turns * x.size * CHAINS * LENGTH),
+        "kernel alone": (lambda: evaluations()(rhs, 0.0, Y, dY, p, turns), turns * BLOCK_LANES),
+    }
+    for method, dt in (("rk4", 0.02), ("dop853", 0.05), ("abm12", 0.0125)):
+        steps = int(np.ceil(problem.t_end / dt * (1.0 - 1e-12)))
+
+        def run(method: str = method, dt: float = dt) -> Any:
+            return integrate(problem.scene, many, problem.t_end, dt, method, threads=1)
+
+        works[f"inside {method}"] = (run, len(many) * find_method(method).evaluations(steps))
+    for work, _ in works.values():
+        work()
+    seconds: dict[str, list[float]] = {name: [] for name in works}
+    for _ in range(TURNS):
+        for name, (work, _) in works.items():
+            began = time.process_time()
+            work()
+            seconds[name].append(time.process_time() - began)
+        advance(1)
+    rates = {name: count / statistics.median(seconds[name]) for name, (_, count) in works.items()}
+    peak = rates.pop("peak")
+    alone = rates["kernel alone"]
+    return peak, [Throughput(name, rate, rate / alone, peak / rate) for name, rate in rates.items()]

@@ -1,0 +1,171 @@
+"""The benchmark as Markdown: speed at equal error first, then everything that was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from fastmech.bench.measure import Row
+from fastmech.bench.peak import Throughput
+from fastmech.bench.precision import TARGETS, fastest_at, rate_at
+from fastmech.bench.problem import Problem
+from fastmech.bench.startup import Start
+from fastmech.bench.terms import Cost
+
+OWN = "fastmech"
+
+#: Rows of the package's engine and of its yardstick at the same method and step.
+FUSED = "hand-fused"
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """A Markdown table, numbers to the right."""
+    return [
+        f"| {' | '.join(head)} |",
+        f"|---|{'---:|' * (len(head) - 1)}",
+        *(f"| {' | '.join(row)} |" for row in rows),
+        "",
+    ]
+
+
+def own(rows: Iterable[Row]) -> list[Row]:
+    """Rows of the package."""
+    return [row for row in rows if row.family.startswith(OWN)]
+
+
+def peers(rows: Iterable[Row]) -> dict[str, list[Row]]:
+    """Rows of everyone else but the yardstick, by family."""
+    found: dict[str, list[Row]] = {}
+    for row in rows:
+        if not row.family.startswith((OWN, FUSED)):
+            found.setdefault(row.family, []).append(row)
+    return found
+
+
+def equal_error(rows: list[Row], threads: int) -> list[str]:
+    """The package's rate at each error, and how many times the rate of each peer that is."""
+    mine = own(rows)
+    first = ["fastmech, best method"]
+    for error in TARGETS:
+        best = fastest_at(mine, error)
+        first.append("-" if best is None else f"{best[1]:,.0f} ({best[0].removeprefix(OWN).strip()})")
+    lines = [first]
+    for family, theirs in peers(rows).items():
+        count = min(len(row.errors) for row in theirs)
+        line = [family + (f" (first {count})" if count < len(mine[0].errors) else "")]
+        for error in TARGETS:
+            rate, best = rate_at(theirs, error, count), fastest_at(mine, error, count)
+            line.append("-" if rate is None or best is None else f"{best[1] / rate:.2f} x ({rate:,.0f})")
+        lines.append(line)
+    unit = "core second" if threads == 1 else "second"
+    return [
+        f"Trajectories per {unit} at equal largest error, {threads} thread{'s' * (threads > 1)}; for the "
+        "others fastmech's rate over theirs, and theirs in brackets. A peer that was given fewer "
+        "trajectories is compared on those. `-`: no setting is as accurate.",
+        "",
+        *table(["largest error", *(f"{error:.0e}" for error in TARGETS)], lines),
+    ]
+
+
+def same_step(rows: list[Row]) -> list[str]:
+    """The engine against the hand-fused loop and against plain Numba, same method and step."""
+    found = {(row.family, row.setting): row for row in rows if row.threads == 1}
+    lines = []
+    for (family, setting), row in found.items():
+        if family.startswith(FUSED):
+            method = family.removeprefix(FUSED).strip()
+            engine = found.get((f"{OWN} {method}", setting))
+            if engine is not None:
+                lines.append([f"{family}, {setting}", f"{row.rate:,.0f}", f"{engine.rate:,.0f}",
+                              f"{engine.rate / row.rate:.2f}"])  # fmt: skip
+        elif family.startswith("Numba RK4") and (f"{OWN} rk4", setting) in found:
+            engine = found[f"{OWN} rk4", setting]
+            lines.append([f"{family}, {setting}", f"{row.rate:,.0f}", f"{engine.rate:,.0f}",
+                          f"{engine.rate / row.rate:.2f}"])  # fmt: skip
+    return [
+        "The same method and step, one thread, trajectories per core second. The hand-fused loop is the "
+        "engine's yardstick: this mechanism and this method alone, in the same blocks.",
+        "",
+        *table(["against", "its rate", "fastmech", "ratio"], lines),
+    ]
+
+
+def speed_up(rows: list[Row]) -> list[str]:
+    """All threads over one, by wall time, of the package."""
+    one = {(row.family, row.setting): row for row in rows if row.threads == 1}
+    lines = []
+    for row in rows:
+        if row.threads > 1:
+            single = one[row.family, row.setting]
+            ratio = (single.wall / single.trajectories) / (row.wall / row.trajectories)
+            used = row.processor / row.wall
+            lines.append([f"{row.family}, {row.setting}", str(row.threads), f"{ratio:.2f}", f"{used:.2f}"])
+    if not lines:
+        return []
+    return [
+        "All threads over one, by wall time, and the cores that it got.",
+        "",
+        *table(["integrator", "threads", "speed-up", "cores used"], lines),
+    ]
+
+
+def everything(rows: list[Row]) -> list[str]:
+    """Every row."""
+    head = ["integrator", "setting", "threads", "n", "1/s a core", "1/s wall", "largest error",
+            "median error", "compared", "first call [s]"]  # fmt: skip
+    return table(
+        head,
+        (
+            [
+                row.family, row.setting, str(row.threads), str(row.trajectories),
+                f"{row.trajectories / row.processor:,.0f}", f"{row.trajectories / row.wall:,.0f}",
+                f"{row.max_error():.1e}", f"{row.median_error:.1e}", str(len(row.errors)),
+                f"{row.first_call:.2f}",
+            ]
+            for row in rows
+        ),
+    )  # fmt: skip
+
+
+def problem_section(problem: Problem, rows: list[Row]) -> list[str]:
+    """All that was measured on one problem."""
+    mine = [row for row in rows if row.problem == problem.name]
+    lines = [f"## {problem.name}: {problem.description}, to t = {problem.t_end:g} s", ""]
+    for threads in sorted({row.threads for row in mine}):
+        lines += equal_error([row for row in mine if row.threads == threads], threads)
+    return [*lines, *same_step(mine), *speed_up(mine), "Every setting:", "", *everything(mine)]
+
+
+def machine_sections(
+    peak: float, throughputs: list[Throughput], costs: list[Cost], starts: list[Start]
+) -> list[str]:
+    """Peak, terms and cold starts."""
+    lines = [
+        "## Right-hand sides and the core's peak",
+        "",
+        f"Measured peak: {peak / 1e9:.1f} billion fused multiply-adds of doubles per core second.",
+        "",
+        *table(
+            ["where", "million right-hand sides/s", "of the kernel alone", "multiply-adds in that time"],
+            ([t.name, f"{t.rhs / 1e6:.1f}", f"{t.share:.2f}", f"{t.slots:.0f}"] for t in throughputs),
+        ),
+        "## Terms of a scene (RK4, dt = 0.02 s)",
+        "",
+        *table(
+            ["scene", "trajectories per core second", "relative"],
+            ([c.name, f"{c.rate:,.0f}", f"{c.relative:.3f}"] for c in costs),
+        ),
+    ]
+    if starts:
+        lines += [
+            "## Cold start and steady state",
+            "",
+            "Seconds from the first import to the first result of 1,024 rest starts, in a first process and "
+            "in a second one that finds what the first has left on the disk, and of a later call.",
+            "",
+            *table(
+                ["integrator", "first process", "second process", "later call"],
+                ([s.name, f"{s.first_process:.2f}", f"{s.second_process:.2f}", f"{s.steady:.4f}"]
+                 for s in starts),
+            ),
+        ]  # fmt: skip
+    return lines

@@ -1,0 +1,116 @@
+"""The observers that stop a lane as soon as its capture is proved.
+
+Energy is looked at for all lanes at once; the position only for lanes whose energy has fallen below the
+highest level at which any well captures, which happens about once a lane. A captured lane runs on to the next
+multiple of an interval, so that computations with different steps stop it at the same time.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.capture.locate import AMPLITUDE, FIRST_WELL, INTERVAL, RATE, WELLS, locate
+from fastmech.ensembles.stopping import STOP_CODE, note_stop
+from fastmech.jit import OBSERVER_SIGNATURE, inlined, kernel
+from fastmech.kernels.sincos import REDUCTION_LIMIT, sincos
+from fastmech.mechanism.reduced import metric_11, potential, slider_ratio
+
+Floats = NDArray[np.float64]
+
+#: Rows of the record behind those of ``stopping`` (code: the well's number, from 1; time; state): the energy
+#: below which the lane's position is looked at next (minus infinity once captured), its energy at the last
+#: look; of a captured lane the well's number, its turns, the time of capture, and the energy where it stops.
+LEVEL, ENERGY, WELL, TURNS_PHI, TURNS_THETA, CAPTURE_TIME, STOP_ENERGY, ROWS = 6, 7, 8, 9, 10, 11, 12, 13
+
+#: Share of the time between stops that rounding of a step's time may take.
+ROUNDED = 1e-6
+
+
+@inlined
+def bounding_energy(
+    c: tuple[float, float, float, float, float, float], push: float | None, y: Floats, i: int
+) -> float:
+    """Energy over m2 l^2 that lane ``i`` never exceeds again [1/s^2]; ``c``: mass, slider, ..., force.
+
+    T + U for a force that is constant or absent: the damper only takes. For a force F that decays from now
+    on, T + Pi + |F| (2 l - sgn(F) x2) with the potential Pi of springs and weights: by parts, its future work
+    is F(t') x2(t') - F x2 - integral of F' x2, and |x2| <= 2 l. ``push`` is F/(m2 l), ``None`` where no
+    force decays. Infinite where the fast trigonometry does not reach.
+    """
+    s1, c1 = sincos(y[0, i])
+    s2, c2 = sincos(y[1, i])
+    s12 = s1 * c2 + c1 * s2
+    k, _ = slider_ratio(s1, c1)
+    u, v = y[2, i], y[3, i]
+    energy = 0.5 * (metric_11(c[0], c[1], k) * u * u + v * v) + s12 * u * v
+    energy = energy + potential(s1, c1, s2, c2, s12, c[2], c[3], c[4], c[5])
+    if push is not None:
+        energy = energy + 2.0 * abs(push) - push * (c1 - s2)
+    far = (abs(y[0, i]) > REDUCTION_LIMIT) | (abs(y[1, i]) > REDUCTION_LIMIT)
+    return np.inf if far else energy
+
+
+@inlined
+def is_stop(t: float, interval: float) -> bool:
+    """Whether a step's end is one of the times at which captured lanes stop."""
+    stops = t / interval
+    return bool(abs(stops - np.floor(stops + 0.5)) < ROUNDED)
+
+
+@inlined
+def look(t: float, Y: Floats, params: Floats, record: Floats, push: float | None) -> None:
+    """Update energies, mark lanes that are captured now, and at times of stopping stop those marked."""
+    c = (params[0], params[1], params[2], params[3], params[4], params[5])
+    level, energies = record[LEVEL], record[ENERGY]
+    low = 0
+    for i in range(Y.shape[1]):
+        energy = bounding_energy(c, push, Y, i)
+        energies[i] = energy
+        low |= energy < level[i]
+    if low:
+        for i in range(Y.shape[1]):
+            if energies[i] < level[i]:
+                capture(t, Y, params, record, i)
+    if is_stop(t, params[INTERVAL]):
+        for i in range(Y.shape[1]):
+            if record[WELL, i] != 0.0 and record[STOP_CODE, i] == 0.0:
+                record[STOP_ENERGY, i] = energies[i]
+                note_stop(record[WELL, i], t, Y, record, i)
+
+
+@inlined
+def capture(t: float, Y: Floats, params: Floats, record: Floats, i: int) -> None:
+    """Mark lane ``i`` if it is below its well's level, else set the energy of its next look.
+
+    Above the level of the well w that its position leads to, a lane is in a component that holds other
+    minima with w, and only wells of that component whose level is no higher can still take it.
+    """
+    wells = int(params[WELLS])
+    first = FIRST_WELL + 3 * wells
+    well, turns1, turns2 = locate(params, Y[0, i], Y[1, i])
+    if well < 0:
+        return
+    energy, following = record[ENERGY, i], -np.inf
+    if energy < params[first + well]:
+        record[WELL, i], record[CAPTURE_TIME, i] = well + 1.0, t
+        record[TURNS_PHI, i], record[TURNS_THETA, i] = turns1, turns2
+    else:
+        for w in range(wells):
+            if params[first + w] <= energy:
+                following = max(following, params[first + w])
+    record[LEVEL, i] = following
+
+
+@kernel(OBSERVER_SIGNATURE)
+def observe_capture(t: float, Y: Floats, params: Floats, record: Floats) -> None:
+    """Capture under a constant force, or none; ``params`` as ``locate.pack`` makes them."""
+    look(t, Y, params, record, None)
+
+
+@kernel(OBSERVER_SIGNATURE)
+def observe_capture_decaying(t: float, Y: Floats, params: Floats, record: Floats) -> None:
+    """Capture while the force decays."""
+    look(t, Y, params, record, params[AMPLITUDE] * math.exp(-params[RATE] * t))

@@ -1,0 +1,63 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from analytic import cantor, newton
+
+from fastmech.basins.measures.dimension import boundary_dimension
+from fastmech.errors import InputError
+
+pytestmark = pytest.mark.nojit
+
+X = np.linspace(-1, 1, 400)
+SMOOTH = {
+    "along an axis": X[:, None] + 0 * X > 0.013,
+    "inclined": X[:, None] + 0.37 * X > 0.1,
+    "circle": X[:, None] ** 2 + X**2 < 0.5,
+    "ellipse": X[:, None] ** 2 + 4 * X**2 < 0.5,
+    "wave": 0.3 * np.sin(5 * X[:, None]) < X,
+}
+
+
+@pytest.mark.parametrize("inside", SMOOTH.values(), ids=SMOOTH)
+def test_smooth_boundaries_have_dimension_one_within_their_error_bar(inside: np.ndarray) -> None:
+    result = boundary_dimension(np.where(inside, 5, 2))
+    assert result.smooth
+    assert abs(result.dimension - 1.0) < 0.005
+    assert np.abs(result.local_dimensions - 1.0).max() < 0.02
+
+
+def test_a_sphere_has_dimension_two() -> None:
+    x = np.linspace(-1, 1, 64)
+    inside = x[:, None, None] ** 2 + x[:, None] ** 2 + x**2 < 0.5
+    result = boundary_dimension(inside.astype(int), [1, 2, 4])
+    assert abs(result.dimension - 2.0) < 0.05
+    assert result.smooth
+
+
+def test_a_cantor_set_has_their_known_dimension() -> None:
+    """A row of points in the middle of 3^-11 cells; edges by factors of 3 show the set's similarity."""
+    x = (np.arange(3**11) + 0.5) / 3**11
+    result = boundary_dimension(cantor(x[:, None], 11), [27, 81, 243, 729, 2187])
+    assert abs(result.dimension - np.log(2) / np.log(3)) <= result.error < 0.1
+    assert not result.smooth
+
+
+def test_newton_s_boundary_is_fractal() -> None:
+    result = boundary_dimension(newton(500))
+    assert not result.smooth
+    assert result.dimension - result.error > 1.3
+
+
+def test_missing_labels_make_no_boundary() -> None:
+    labels = np.where(SMOOTH["circle"], 0, 1)
+    labels[np.random.default_rng(0).random(labels.shape) < 0.02] = -1
+    assert abs(boundary_dimension(labels, [4, 8, 16]).dimension - 1.0) < 0.05
+    assert np.isnan(boundary_dimension(np.where(labels == 0, 0, -1)).dimension)
+
+
+def test_wrong_edges_are_refused() -> None:
+    with pytest.raises(InputError, match=r"^edges: must rise from 1 or more to at most a quarter of 40"):
+        boundary_dimension(np.zeros((40, 40), int), [1, 11])
+    with pytest.raises(InputError, match=r"^edges: must be two or more integers; a map needs 32"):
+        boundary_dimension(np.zeros((20, 20), int))

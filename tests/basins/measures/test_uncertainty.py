@@ -1,0 +1,88 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from analytic import cantor, disc
+
+from fastmech.basins.measures.slopes import fit_counts
+from fastmech.basins.measures.uncertainty import uncertainty_exponent
+from fastmech.errors import InputError
+
+pytestmark = pytest.mark.nojit
+
+SCALES = np.geomspace(3e-3, 5e-2, 7)
+
+
+def test_a_smooth_boundary_has_exponent_one_within_its_error_bar() -> None:
+    """The error bar is that of 95 % confidence: of 200 experiments at most 20 miss."""
+    runs = [uncertainty_exponent(disc, [-1, -1], [1, 1], SCALES, n=2000, seed=seed) for seed in range(200)]
+    assert runs[0].smooth
+    assert sum(run.smooth for run in runs) >= 180
+    # An error bar that is merely wide would cover too: it must be that of the scatter.
+    exponents = [run.law.exponent for run in runs]
+    assert np.mean([run.law.error for run in runs]) < 1.5 * 1.96 * np.std(exponents)
+    assert abs(np.mean(exponents) - 1.0) < 0.02
+    assert abs(runs[0].dimension - 1.0) <= runs[0].law.error
+
+
+def test_a_cantor_boundary_has_its_known_exponent() -> None:
+    """Scales by factors of 3, at which the Cantor set is similar to itself."""
+    scales = 3.0 ** np.arange(-12, -6)
+    runs = [uncertainty_exponent(cantor, [0.0], [1.0], scales, n=20_000, seed=seed) for seed in range(40)]
+    true = 1.0 - np.log(2) / np.log(3)
+    assert sum(abs(run.law.exponent - true) <= run.law.error for run in runs) >= 34
+    assert not any(run.smooth for run in runs)
+    local = np.array([run.law.local_slopes - true for run in runs])
+    inside = np.abs(local) <= [run.law.local_errors for run in runs]
+    assert 0.9 < inside.mean() < 0.99
+    assert runs[0].dimension == pytest.approx(1.0 - runs[0].law.exponent)
+
+
+def test_fixed_states_do_not_count_as_dimensions() -> None:
+    run = uncertainty_exponent(disc, [-1, -1, 0.5], [1, 1, 0.5], SCALES, n=4000)
+    assert abs(run.dimension - 1.0) <= run.law.error
+
+
+def test_starts_without_a_label_are_counted_and_left_out() -> None:
+    def holed(y: np.ndarray) -> np.ndarray:
+        return np.where(y[:, 0] > 0.5, -1, disc(y))
+
+    run = uncertainty_exponent(holed, [-1, -1], [1, 1], SCALES, n=4000)
+    assert (run.missing > 900).all()
+    assert (run.starts + run.missing == 4000).all()
+    assert run.smooth
+
+
+def test_without_a_boundary_there_is_no_exponent() -> None:
+    run = uncertainty_exponent(lambda y: np.zeros(len(y), dtype=int), [0], [1], SCALES, n=50)
+    assert np.isnan(run.law.exponent)
+    assert not run.smooth
+
+
+def test_a_power_law_is_fitted_exactly() -> None:
+    scales = 2.0 ** np.arange(5)
+    law = fit_counts(scales, 1000 * 4 ** np.arange(5), np.full(5, 10**7))
+    assert law.exponent == pytest.approx(2.0, abs=1e-12)
+    np.testing.assert_allclose(law.local_slopes, 2.0)
+
+
+def test_scatter_beyond_counting_widens_the_error() -> None:
+    hits = np.array([10_000, 30_000, 25_000, 90_000])
+    law = fit_counts(2.0 ** np.arange(4), hits, np.full(4, 10**6))
+    assert law.error > 0.3
+    assert fit_counts(2.0 ** np.arange(4), 10_000 * 2 ** np.arange(4), np.full(4, 10**6)).error < 0.03
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "epsilon", "message"),
+    [
+        ([0, 0], [0, 0], SCALES, "high: must have the shape of low"),
+        ([0], [1, 1], SCALES, "high: must have the shape of low"),
+        ([0], [1], [0.1], "epsilon: must be two or more rising distances"),
+        ([0], [1], [0.1, 0.9], "epsilon: must be two or more rising distances"),
+    ],
+)
+def test_wrong_arguments_are_refused(low: list, high: list, epsilon: list, message: str) -> None:
+    with pytest.raises(InputError) as refusal:
+        uncertainty_exponent(disc, low, high, epsilon)
+    assert str(refusal.value).startswith(message)

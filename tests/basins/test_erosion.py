@@ -1,0 +1,136 @@
+from __future__ import annotations
+
+from functools import cache, partial
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from own_ends import depths, ends
+
+import fastmech as fm
+from fastmech.basins.erosion import erosion
+from fastmech.basins.measures.norm import kinetic_norm, norm_on
+from fastmech.mechanism.lagrange import metric
+
+BISTABLE = fm.Scene(F0=0.0, c1=294.9, c2=92.85, alpha=0.0)
+
+
+class Ends(NamedTuple):
+    well: np.ndarray
+    turns: np.ndarray
+
+
+GRID = {"phi": np.linspace(-3.2, 3.2, 41), "theta": np.linspace(-3.2, 3.2, 41)}
+RADIUS = 0.4
+
+
+@cache
+def wells_of(scene: fm.Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Indices, states and norms of a scene's minima."""
+    equilibria = fm.find_equilibria(scene)
+    index = [i for i, e in enumerate(equilibria) if e.kind == "minimum"]
+    places = np.array([[equilibria[i].phi, equilibria[i].theta, 0.0, 0.0] for i in index])
+    return np.array(index), places, np.array([kinetic_norm(scene, equilibria[i]) for i in index])
+
+
+def balls(scene: fm.Scene, y: np.ndarray) -> Ends:
+    """A made-up rule: within RADIUS of a well in its norm one ends there, else there a turn further."""
+    index, places, norms = wells_of(scene)
+    sizes = np.linalg.norm((y - places[:, None]) @ norms, axis=2)
+    turns = np.zeros((len(y), 2), dtype=int)
+    turns[sizes.min(axis=0) > RADIUS, 1] = 1
+    return Ends(index[sizes.argmin(axis=0)], turns)
+
+
+def test_measures_of_known_basins() -> None:
+    """Each well's own copy has a ball as its basin: all radii are the ball's."""
+    profile = erosion(BISTABLE, "F0", [85.3], balls, GRID, most_shock=1.0, n=4000, directions=16)
+    scene = BISTABLE.replace(F0=85.3)
+    wells = [e for e in fm.find_equilibria(scene) if e.kind == "minimum"]
+    np.testing.assert_allclose(profile.shock, RADIUS, rtol=1e-3)
+    np.testing.assert_allclose(profile.kick, RADIUS, rtol=1e-3)
+    assert profile.stability.sum() == pytest.approx(1.0)  # turns do not count there
+    for w in range(len(wells)):
+        e = wells[int(np.argmin([abs(e.phi - profile.phi[0, w]) for e in wells]))]
+        part = norm_on(kinetic_norm(scene, e), 4, (0, 1))
+        step = np.linalg.norm(np.array([0.16, 0.16]) @ part)
+        assert RADIUS - 1e-9 <= profile.lim[0, w] < RADIUS + step
+        assert RADIUS - step < profile.factor[0, w] < RADIUS + step
+        assert not profile.lim_at_window[0, w]
+        # The ball's area over the window's: pi r^2/det(part).
+        a = metric(scene, (e.phi, e.theta)) / (scene.m2 * scene.l**2)
+        area = np.pi * RADIUS**2 / np.sqrt(np.linalg.det(a)) / 6.4**2
+        assert profile.gim[0, w] == pytest.approx(area, rel=0.2)
+        assert profile.lower[0, w] < profile.stability[0, w] < profile.upper[0, w]
+
+
+def test_wells_keep_their_identity_where_their_order_changes() -> None:
+    """At F0 = 0 the two wells are mirror images: which is the deeper one changes there."""
+    values = np.linspace(-40.0, 40.0, 5)
+    small = {name: line[::10] for name, line in GRID.items()}
+    profile = erosion(BISTABLE, "F0", values, balls, small, most_shock=1.0, n=500, directions=4)
+    deepest = [fm.find_equilibria(BISTABLE.replace(F0=float(v)))[0].phi for v in values]
+    assert deepest[0] > 2.0
+    assert deepest[-1] < 1.0
+    assert profile.phi.shape == (5, 2)
+    assert (np.abs(np.sin(np.diff(profile.phi, axis=0))) < 0.4).all()
+    assert (np.abs(np.diff(profile.theta, axis=0)) < 0.4).all()
+    # Mirrored: phi to pi - phi, theta to -theta, F0 to -F0.
+    np.testing.assert_allclose(np.cos(profile.phi[::-1, 1]), -np.cos(profile.phi[:, 0]), atol=1e-9)
+    np.testing.assert_allclose(profile.theta[::-1, 1], -profile.theta[:, 0], atol=1e-9)
+
+
+def test_a_slice_of_rates_goes_through_the_well() -> None:
+    rates = {"theta_dot": np.linspace(-4, 4, 41), "phi_dot": np.linspace(-4, 4, 41)}
+    profile = erosion(BISTABLE, "c1", [290.0], balls, rates, most_shock=1.0, n=200, directions=4)
+    scene = BISTABLE.replace(c1=290.0)
+    e = fm.find_equilibria(scene)[0]
+    step = np.abs(np.array([0.2, 0.2]) @ norm_on(kinetic_norm(scene, e), 4, (3, 2))).sum()
+    assert (profile.lim >= RADIUS - 1e-9).all()
+    assert (profile.lim < RADIUS + step).all()
+
+
+def test_a_well_erodes_towards_its_fold() -> None:
+    """The shallow well vanishes at c2 = 98.59 N/m: shock and stability fall, NaN behind it."""
+
+    def real(scene: fm.Scene, y: np.ndarray) -> Ends:
+        return Ends(*ends(scene, y, 10.0)[:2])
+
+    scene, values = BISTABLE.replace(F0=85.3), [95.0, 98.0, 100.0]
+    axes = {"phi": np.linspace(-3.1, -2.2, 7), "theta": np.linspace(-2.1, -1.3, 7)}
+    profile = erosion(scene, "c2", values, real, axes, most_shock=0.3, n=100, directions=4)
+    shallow = int(np.flatnonzero(np.isnan(profile.phi[-1]))[0])
+    deep = 1 - shallow
+    assert not np.isnan(profile.phi[:, deep]).any()
+    for measure in (profile.shock, profile.kick, profile.stability, profile.gim):
+        assert measure[0, shallow] > measure[1, shallow] > 0.0
+        assert np.isnan(measure[2, shallow])
+    assert (profile.shock[:2, shallow] <= profile.kick[:2, shallow] * (1.0 + 1e-3)).all()
+    for v in (0, 1):  # a kick out of the well has more energy than the well is deep
+        now = scene.replace(c2=values[v])
+        i = int(np.nanargmin(depths(now)))
+        e = fm.find_equilibria(now)[i]
+        a = metric(now, (e.phi, e.theta))
+        square = np.linalg.eigvals(np.linalg.solve(a, e.hessian)).max()
+        energy = 0.5 * profile.kick[v, shallow] ** 2 * square * now.m2 * now.l**2
+        assert energy > depths(now)[i]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"scene": fm.Scene()}, "scene.alpha = 0.7: must be 0"),
+        ({"axes": {"ph": [0.0, 1.0]}}, "axes.ph: unknown name; did you mean 'phi'?"),
+        ({"axes": {}}, "axes: must name at least one state"),
+        ({"n": 0}, "n = 0: must be an integer not less than 1"),
+        ({"parameter": "F1"}, "axes.F1: unknown parameter"),
+    ],
+)
+def test_wrong_arguments_are_refused(changes: dict[str, Any], message: str) -> None:
+    arguments: dict[str, Any] = {
+        "scene": BISTABLE, "parameter": "F0", "values": [1.0, 2.0], "labels_of": partial(balls), "axes": GRID,
+        "most_shock": 1.0,
+    }  # fmt: skip
+    with pytest.raises(fm.InputError) as refusal:
+        erosion(**(arguments | changes))
+    assert str(refusal.value).startswith(message)

@@ -1,0 +1,133 @@
+"""Labels against integration to rest by SciPy, symmetry, statuses, independence of steps and threads."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scan_types.values import scipy_motion
+
+import fastmech as fm
+from fastmech.basins.status import BasinStatus
+
+TURN = 2.0 * np.pi
+CONSTANT = fm.Scene(alpha=0.0)
+BISTABLE = fm.Scene(F0=85.3, c1=294.9, c2=92.85, alpha=0.0)
+
+
+def random_starts(n: int, fastest: float = 0.0, seed: int = 5) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    return np.concatenate(
+        [rng.uniform(-np.pi, np.pi, (n, 2)), fastest * rng.uniform(-1.0, 1.0, (n, 2))], axis=1
+    )
+
+
+@pytest.mark.parametrize(
+    ("scene", "well"),
+    [(CONSTANT, (1.45143, -0.23315)), (fm.Scene(), (np.pi / 2, 0.0))],
+    ids=["constant", "decaying"],
+)
+def test_every_label_of_a_map_is_where_scipy_comes_to_rest(
+    scene: fm.Scene, well: tuple[float, float]
+) -> None:
+    """DOP853 at 1e-12 from equations typed in the tests; 12 x 12 starts at rest, off any symmetry."""
+    angle = -np.pi + (np.arange(12) + 0.37) * TURN / 12
+    found = fm.map_basins(scene, {"phi": angle, "theta": angle})
+    starts = np.zeros((144, 4))
+    starts[:, :2] = np.stack(np.meshgrid(angle, angle, indexing="ij"), -1).reshape(-1, 2)
+    final = scipy_motion(scene.model_dump(), starts, np.array([0.0, 25.0]))[-1]
+    turns = np.round((final[:, :2] - well) / TURN)
+    assert np.abs(final[:, :2] - TURN * turns - well).max() < 0.7
+    assert (found.status == BasinStatus.CAPTURED).all()
+    np.testing.assert_array_equal(found.turns.reshape(-1, 2), turns)
+    assert len(np.unique(turns, axis=0)) >= 4
+
+
+def test_mirror_image() -> None:
+    """Without force and slider (pi - phi, -theta) has the energies of (phi, theta): both are trapped or none.
+
+    The slider is on one side, so with it, or with its damper, motions are no mirror images.
+    """
+    scene = fm.Scene(F0=0.0, m3=0.0, alpha=0.0)
+    starts = random_starts(2000, 4.0)
+    mirrored = np.column_stack([np.pi - starts[:, 0], -starts[:, 1], -starts[:, 2:]])
+    one, two = fm.trapped(scene, starts), fm.trapped(scene, mirrored)
+    assert 0.1 < (one.well >= 0).mean() < 0.9
+    np.testing.assert_array_equal(one.well, two.well)
+    np.testing.assert_array_equal(one.turns, -two.turns)
+
+
+def test_a_start_turned_by_full_turns_ends_so_many_turns_further() -> None:
+    starts = random_starts(200, 3.0)
+    turned = starts + np.array([2 * TURN, -3 * TURN, 0.0, 0.0])
+    one, two = fm.labels_of(CONSTANT, starts), fm.labels_of(CONSTANT, turned)
+    np.testing.assert_array_equal(one.well, two.well)
+    np.testing.assert_array_equal(one.turns + np.array([2, -3]), two.turns)
+
+
+@pytest.mark.parametrize(("scene", "t_end"), [(CONSTANT, 30.0), (BISTABLE, 60.0)])
+def test_same_for_any_threads_and_company(scene: fm.Scene, t_end: float) -> None:
+    starts = random_starts(700, 3.0)
+    one = fm.labels_of(scene, starts, t_end, threads=1)
+    two = fm.labels_of(scene, starts, t_end, threads=3)
+    few = fm.labels_of(scene, starts[300:309], t_end)
+    for name in ("well", "turns", "time", "status"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
+        np.testing.assert_array_equal(getattr(one, name)[300:309], getattr(few, name))
+
+
+def test_steps_do_not_matter() -> None:
+    starts = random_starts(500, 6.0)
+    usual, small = fm.labels_of(CONSTANT, starts), fm.labels_of(CONSTANT, starts, dt=0.02)
+    np.testing.assert_array_equal(usual.well, small.well)
+    np.testing.assert_array_equal(usual.turns, small.turns)
+    large = fm.labels_of(CONSTANT, starts, dt=0.4)  # useless at first: what counts is that they agree
+    known = large.well >= 0
+    np.testing.assert_array_equal(large.turns[known], usual.turns[known])
+
+
+def test_capture_long_before_rest() -> None:
+    """A twentieth of the steps; both counts are of the same lanes."""
+    starts = random_starts(300)
+    found = fm.labels_of(CONSTANT, starts, 200.0, settle_radius=1e-3)
+    assert found.settle_time is not None
+    assert np.isfinite(found.settle_time).all()
+    assert 20.0 * found.time.mean() < found.settle_time.mean()
+    assert (found.settle_time >= found.time).all()
+    last = fm.integrate(
+        CONSTANT, starts, t_eval=np.sort(found.settle_time)[[-1]] + 5.0, dt=0.02, method="dop853"
+    )
+    assert np.abs(last.y[-1][:, :2] - TURN * found.turns - [1.45143, -0.23315]).max() < 2e-3
+
+
+def test_statuses() -> None:
+    saddle = next(e for e in fm.find_equilibria(fm.Scene(F0=0.0, alpha=0.0)) if e.kind == "saddle")
+    starts = np.array(
+        [
+            [1.4, 0.1, 0.0, 0.0],
+            [saddle.phi, saddle.theta, 0.0, 0.0],
+            [np.nan, 0.0, 0.0, 0.0],
+            [0.0, 0.0, 1e200, 0.0],
+        ]
+    )
+    found = fm.labels_of(fm.Scene(F0=0.0, alpha=0.0), starts, 4.0)
+    kinds = [BasinStatus(s).name for s in found.status]
+    assert kinds[:3] == ["CAPTURED", "AT_SADDLE", "START_NOT_FINITE"]
+    assert kinds[3] in ("NOT_FINITE", "STEP_TOO_LARGE")
+    assert sum(found.counts.values()) == 4
+    undecided = fm.labels_of(BISTABLE, random_starts(50), 2.0)
+    assert undecided.counts["undecided"] > 25
+    assert (undecided.well[undecided.status == BasinStatus.UNDECIDED] == -1).all()
+
+
+def test_without_damper_there_are_no_basins() -> None:
+    scene = fm.Scene(beta=0.0, alpha=0.0)
+    with pytest.raises(fm.InputError, match=r"scene.beta = 0: .*no attractor; fastmech.trapped"):
+        fm.labels_of(scene, np.zeros((1, 4)))
+    # What is trapped stays: the energy is conserved, and no angle leaves its turn in 200 s.
+    starts = random_starts(300, 2.0)
+    held = fm.trapped(scene, starts).well >= 0
+    y = fm.integrate(scene, starts[held], t_eval=np.linspace(1.0, 200.0, 100), dt=0.02, method="dop853").y
+    assert held.sum() > 30
+    turns = fm.trapped(scene, starts[held]).turns
+    for states in y:
+        np.testing.assert_array_equal(fm.trapped(scene, states).turns, turns)

@@ -1,0 +1,126 @@
+"""Maps: slices, refinement, systems with basins known in closed form, wrong requests."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fastmech as fm
+from fastmech.basins.refine import refine_grid
+from fastmech.basins.status import BasinStatus
+
+CONSTANT = fm.Scene(alpha=0.0)
+BISTABLE = fm.Scene(F0=85.3, c1=294.9, c2=92.85, alpha=0.0)
+FULL = np.linspace(-np.pi, np.pi, 41)
+
+
+def bent(t: float, x: float, y: float, bend: float) -> tuple[float, float]:
+    """u' = u - u^3, y' = -y with u = x + bend y^2: basins meet where u = 0."""
+    u = x + bend * y * y
+    return u - u * u * u + 2.0 * bend * y * y, -y
+
+
+def arrived(t: float, x: float, y: float) -> float:
+    """Near one of the two attractors (+-1, 0)."""
+    return (2.0 if x > 0.0 else 1.0) if abs(abs(x) - 1.0) + abs(y) < 0.05 else 0.0
+
+
+BENT = fm.System(bent, state=["x", "y"], parameters={"bend": 0.7}, stop=arrived)
+
+
+@pytest.mark.parametrize("refine", [None, 8])
+def test_a_basin_in_closed_form(refine: int | None) -> None:
+    x, y = np.linspace(-2.0, 2.0, 65), np.linspace(-1.5, 1.5, 51)
+    found = fm.map_basins(BENT, {"x": x, "y": y}, 30.0, dt=0.1, refine=refine)
+    side = x[:, None] + 0.7 * y**2
+    expected = np.where(side > 0.0, 2, 1)
+    clear = np.abs(side) > 1e-9
+    np.testing.assert_array_equal(found.well[clear], expected[clear])
+    assert found.computed.all() == (refine is None)
+    assert found.counts["captured"] >= np.count_nonzero(clear)
+
+
+def test_a_start_on_the_boundary_of_a_system_is_undecided() -> None:
+    found = fm.map_basins(BENT, {"x": [-1.0, 0.0, 1.0]}, 20.0, dt=0.1)
+    assert found.status.tolist() == [BasinStatus.CAPTURED, BasinStatus.UNDECIDED, BasinStatus.CAPTURED]
+    assert found.tree is None
+
+
+@pytest.mark.parametrize(
+    ("scene", "axes", "t_end"),
+    [
+        (CONSTANT, {"phi": FULL, "theta": FULL}, 60.0),
+        (fm.Scene(), {"phi": FULL, "theta": FULL}, 60.0),
+        (CONSTANT, {"theta": FULL, "theta_dot": np.linspace(-9.0, 9.0, 37)}, 60.0),
+        (BISTABLE, {"phi": np.linspace(0.0, 1.4, 33), "theta": np.linspace(0.0, 1.0, 33)}, 60.0),
+        (CONSTANT, {"phi": FULL[::3], "theta": FULL[::3], "phi_dot": np.linspace(-3.0, 3.0, 7)}, 60.0),
+    ],
+)
+def test_refined_maps_are_the_full_ones(scene: fm.Scene, axes: dict[str, Any], t_end: float) -> None:
+    full = fm.map_basins(scene, axes, t_end)
+    some = fm.map_basins(scene, axes, t_end, refine=4)
+    for name in ("well", "turns", "status"):
+        np.testing.assert_array_equal(getattr(full, name), getattr(some, name))
+    np.testing.assert_array_equal(full.time[some.computed], some.time[some.computed])
+    assert np.isnan(some.time[~some.computed]).all()
+    assert not some.computed.all()
+    assert full.computed.all()
+
+
+def test_refinement_follows_a_boundary_that_it_has_seen_once() -> None:
+    """A comb of teeth one point wide: the first level sees its back and follows it into each tooth."""
+    picture = np.zeros((65, 65), dtype=np.int64)
+    picture[:20] = 1
+    picture[20:60:, 9:57:6] = 1
+    asked: list[int] = []
+
+    def compute(points: np.ndarray) -> np.ndarray:
+        asked.extend(points.tolist())
+        return picture.ravel()[points]
+
+    source = refine_grid(picture.shape, 8, compute)
+    assert (picture.ravel()[source] == picture.ravel())[: 24 * 65].all()
+    assert len(set(asked)) == len(asked) < picture.size
+    island = np.zeros((33, 33), dtype=np.int64)
+    island[4:6, 4:6] = 1  # between the nodes of the first level: missed, as the documentation says
+    source = refine_grid(island.shape, 8, lambda points: island.ravel()[points])
+    assert (island.ravel()[source] == 0).all()
+
+
+def test_labels_number_wells_and_turns() -> None:
+    found = fm.map_basins(CONSTANT, {"phi": FULL, "theta": FULL}, 60.0)
+    label, table = found.labels
+    np.testing.assert_array_equal(table[label][..., 0], found.well)
+    np.testing.assert_array_equal(table[label][..., 1:], found.turns)
+    assert sorted(map(tuple, table)) == [tuple(row) for row in table]
+
+
+def test_fixed_coordinates_are_starts() -> None:
+    axes = {"phi_dot": np.linspace(-5.0, 5.0, 9), "theta": np.linspace(-1.0, 2.0, 5)}
+    found = fm.map_basins(CONSTANT, axes, fixed={"phi": -2.0, "theta_dot": 1.5})
+    i, j = 2, 3
+    one = fm.labels_of(CONSTANT, [-2.0, axes["theta"][j], axes["phi_dot"][i], 1.5])
+    assert found.well[i, j] == one.well[0]
+    assert found.turns[i, j].tolist() == one.turns[0].tolist()
+    assert found.time[i, j] == one.time[0]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"axes": {"phi": [0.0, 1.0]}}, r"axes = \['phi'\]: must be 2 to 4"),
+        ({"axes": {"phi": [0.0, 1.0], "thta": [0.0]}}, r"axes.thta: unknown name; did you mean 'theta'"),
+        ({"axes": {"phi": [1.0, 0.0], "theta": [0.0]}}, r"axes.phi: .*strictly rising"),
+        ({"fixed": {"phi": 1.0}}, r"fixed.phi: must be one of the coordinates without an axis"),
+        ({"refine": 3}, r"refine = 3: must be a power of two"),
+        ({"t_end": 0.0}, r"t_end = 0.0: must be a finite number of s greater than 0"),
+        ({"scene": fm.Scene(beta=0.0)}, r"scene.beta = 0"),
+        ({"scene": BENT, "axes": {"x": [0.0]}}, r"dt: missing"),
+    ],
+)
+def test_wrong_requests(change: dict[str, Any], message: str) -> None:
+    good = {"scene": CONSTANT, "axes": {"phi": [0.0, 1.0], "theta": [0.0, 1.0]}}
+    with pytest.raises(fm.InputError, match=message):
+        fm.map_basins(**(good | change))
