@@ -18,6 +18,7 @@ from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import RunContext
 from fastmech.store.read import open_results
 from fastmech.tiles.identity import code_in_use
+from fastmech.tiles.tile_file import Tile
 from fastmech.tiles.work import Task, ThreadHiring, ThreadWorkers
 
 REQUEST = """
@@ -99,7 +100,7 @@ class _NotedWorkers:
     def slots(self) -> int:
         return self._workers.slots
 
-    def submit(self, task: Task) -> Future[bytes]:
+    def submit(self, task: Task) -> Future[Tile]:
         self._note(f"tile {task.section.name}:{task.index}")
         return self._workers.submit(task)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,12 +10,13 @@ from fastmech.errors import InputError
 from fastmech.results import Dataset
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import Request, RunContext, read_request
+from fastmech.store.image import dataset_image, dataset_of_image
 from fastmech.store.provenance import provenance
 from fastmech.store.write import write_results
 from fastmech.tiles.identity import asked_for, identity_of
 from fastmech.tiles.parts import Parts
 from fastmech.tiles.section import TiledSection, sections_of
-from fastmech.tiles.tile_file import DamagedTileError, head_of, tile_dataset
+from fastmech.tiles.tile_file import DamagedTileError
 
 
 @dataclass(frozen=True)
@@ -24,7 +26,7 @@ class LoneTile:
     Attributes:
         request, section, index: which it is.
         dataset: its content.
-        content: digest of the content, equal for equal bits.
+        content: SHA-256 of the content, equal for equal bits.
         seconds: wall time [s].
         same: whether the tile that a run has kept has the same content; None: there is none.
     """
@@ -83,20 +85,20 @@ def compute_alone(path: Path, tile: str, context: RunContext, target: Path) -> L
     if not (number.isascii() and number.isdigit()) or int(number) >= section.tiling.count:
         raise InputError(f"--tile {tile}: {name} has the tiles 0 to {section.tiling.count - 1}")
     index = int(number)
-    data = section.compute(index, context)
-    head = head_of(data)
+    made = section.compute(index, context)
+    image = b"".join(chunk.data for chunk in made.image)
     parts = Parts(target)
     parts.look(list(sections.values()))
     try:
-        kept = parts.check(section, index)
+        kept = b"".join(chunk.data for chunk in dataset_image(parts.load(section, index)))
     except DamagedTileError:
         kept = None
     return LoneTile(
         request=request,
         section=section,
         index=index,
-        dataset=tile_dataset(data),
-        content=head.content,
-        seconds=head.seconds,
-        same=None if kept is None else kept.content == head.content,
+        dataset=dataset_of_image(memoryview(image)),
+        content=hashlib.sha256(image).hexdigest(),
+        seconds=made.head.seconds,
+        same=None if kept is None else kept == image,
     )

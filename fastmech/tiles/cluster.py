@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from fastmech.errors import InputError
 from fastmech.scan_types.request import RunContext
 from fastmech.tiles.identity import code_in_use
+from fastmech.tiles.tile_file import Tile
 from fastmech.tiles.work import Task, Workers
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ class ClusterWorkers:
             self._asked, self._threads = now, sum(self._client.nthreads().values())
         return DEPTH * max(1, self._threads)
 
-    def submit(self, task: Task) -> Future[bytes]:
+    def submit(self, task: Task) -> Future[Tile]:
         """Send the tile to a worker; it runs in one thread there."""
         return self._executor.submit(_compute, task, code_in_use())
 
@@ -74,7 +75,7 @@ class ClusterHiring:
             executor.shutdown(wait=False)
 
 
-def _compute(task: Task, code: dict[str, str]) -> bytes:
+def _compute(task: Task, code: dict[str, str]) -> Tile:
     """Compute a tile, on the worker."""
     mine = code_in_use()
     if mine != code:

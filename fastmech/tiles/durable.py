@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import os
+from collections.abc import Iterable
 from pathlib import Path
 
 #: Ending of what is not whole yet.
 UNFINISHED = ".tmp"
 
 
-def write_durably(path: Path, data: bytes) -> None:
+def write_durably(path: Path, chunks: Iterable[bytes | memoryview]) -> None:
     """Write aside, flush to the disk, take the name, flush the folder.
 
     There must be one writer of ``path``.
@@ -21,7 +22,7 @@ def write_durably(path: Path, data: bytes) -> None:
     aside = path.with_name(path.name + UNFINISHED)
     try:
         with aside.open("wb") as file:
-            file.write(data)
+            file.writelines(chunks)
             file.flush()
             os.fsync(file.fileno())
         os.replace(aside, path)

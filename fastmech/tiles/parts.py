@@ -10,13 +10,14 @@
         000042.tile      one file a finished tile
       *.tmp              what is being written
 
-Whatever ends in ``.tile`` is whole; its own digest says so.
+Whatever ends in ``.tile`` is whole; its own checksums say so.
 """
 
 from __future__ import annotations
 
 import contextlib
 import json
+import os
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -24,13 +25,14 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from filelock import FileLock, Timeout
 
 from fastmech.errors import InputError
 from fastmech.results import Dataset
 from fastmech.tiles.durable import UNFINISHED, write_durably
 from fastmech.tiles.section import TiledSection
-from fastmech.tiles.tile_file import DamagedTileError, TileHead, check_tile, tile_dataset
+from fastmech.tiles.tile_file import Bytes, DamagedTileError, Tile, TileHead, check_tile, tile_dataset
 
 #: Seconds to wait for a lock that `fastmech status` may hold for a moment.
 PATIENCE = 0.5
@@ -148,7 +150,8 @@ class Parts:
         self._places = {section.name: f"{k:03d}_{section.name}" for k, section in enumerate(sections)}
         for place in self._places.values():
             self._make(self.folder / place)
-        write_durably(self.folder / "manifest.json", json.dumps(asdict(manifest), indent=1).encode() + b"\n")
+        text = json.dumps(asdict(manifest), indent=1) + "\n"
+        write_durably(self.folder / "manifest.json", [text.encode()])
 
     def look(self, sections: Sequence[TiledSection]) -> None:
         """Know where the sections' tiles are, without changing anything."""
@@ -162,9 +165,9 @@ class Parts:
         """The files of finished tiles."""
         return sorted((self.folder / self._places[section.name]).glob("*.tile"))
 
-    def store(self, section: TiledSection, index: int, data: bytes) -> None:
+    def store(self, section: TiledSection, tile: Tile) -> None:
         """Keep a finished tile for good."""
-        write_durably(self.path(section, index), data)
+        write_durably(self.path(section, tile.head.index), tile.chunks)
 
     def check(self, section: TiledSection, index: int) -> TileHead | None:
         """A tile's head, or None where it is not there yet.
@@ -203,16 +206,18 @@ class Parts:
     def _lock(self) -> Path:
         return self.folder / "lock"
 
-    def _read(self, section: TiledSection, index: int) -> tuple[Path, bytes | None]:
+    def _read(self, section: TiledSection, index: int) -> tuple[Path, memoryview | None]:
         path = self.path(section, index)
         try:
-            return path, path.read_bytes()
+            with path.open("rb") as file:
+                data = np.empty(os.fstat(file.fileno()).st_size, dtype=np.uint8).data
+                return path, data[: file.readinto(data)]
         except FileNotFoundError:
             return path, None
         except OSError as error:
             raise DamagedTileError(f"{path}: cannot be read: {error.strerror}") from None
 
-    def _checked(self, path: Path, data: bytes, section: TiledSection, index: int) -> TileHead:
+    def _checked(self, path: Path, data: Bytes, section: TiledSection, index: int) -> TileHead:
         try:
             return check_tile(data, section.identity, section.name, index)
         except DamagedTileError as error:

@@ -21,7 +21,7 @@ from fastmech.tiles.identity import asked_for, asked_of_result, differences, ide
 from fastmech.tiles.parts import Manifest, Parts
 from fastmech.tiles.report import RunReport
 from fastmech.tiles.section import TiledSection, sections_of
-from fastmech.tiles.tile_file import DamagedTileError, head_of
+from fastmech.tiles.tile_file import DamagedTileError, Tile
 from fastmech.tiles.work import Crash, Hiring, Task, compute_tiles
 
 #: How often a result is assembled anew because a tile was damaged meanwhile.
@@ -181,9 +181,9 @@ class ScanRun:
             if total and section.tiling.count > 1:
                 stages[section.name] = self.context.stage(f"{section.name}: {section.tiling.what}", total)
 
-        def keep(task: Task, data: bytes) -> None:
-            self.parts.store(task.section, task.index, data)
-            self.seconds[task] = head_of(data).seconds
+        def keep(task: Task, tile: Tile) -> None:
+            self.parts.store(task.section, tile)
+            self.seconds[task] = tile.head.seconds
             self.report.computed += 1
             if task.section.name in stages:
                 stages[task.section.name](task.section.tiling.items(task.index))

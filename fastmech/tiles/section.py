@@ -10,7 +10,7 @@ from fastmech.errors import InputError
 from fastmech.scan_types.request import Request, RunContext, Scan
 from fastmech.scan_types.tiling import Tiling
 from fastmech.scene import Scene
-from fastmech.tiles.tile_file import encode_tile
+from fastmech.tiles.tile_file import Tile, make_tile
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,16 +37,13 @@ class TiledSection:
         """How the section is divided; found once in a process."""
         return _tiling(self)
 
-    def compute(self, index: int, context: RunContext, share: float = 1.0) -> bytes:
+    def compute(self, index: int, context: RunContext, share: float = 1.0) -> Tile:
         """Compute a tile.
 
         Args:
             index: which.
             context: threads to use and where progress is told.
             share: part of the machine that it has to itself, for the account of the wall time.
-
-        Returns:
-            the bytes of its file.
 
         Raises:
             InputError: the scan refuses.
@@ -57,7 +54,7 @@ class TiledSection:
         except InputError as error:
             raise InputError(f"scan.{self.name}: {error}") from None
         seconds = (time.perf_counter() - started) * share
-        return encode_tile(self.identity, self.name, index, dataset, seconds)
+        return make_tile(self.identity, self.name, index, dataset, seconds)
 
 
 @lru_cache(maxsize=64)

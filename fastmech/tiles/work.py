@@ -14,6 +14,7 @@ from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError
 from fastmech.scan_types.request import RunContext
 from fastmech.tiles.section import TiledSection
+from fastmech.tiles.tile_file import Tile
 
 #: How often a tile is tried before it is given up.
 TRIES = 2
@@ -45,7 +46,7 @@ class Workers(Protocol):
     def slots(self) -> int:
         """How many tiles to hand out at a time."""
 
-    def submit(self, task: Task) -> Future[bytes]:
+    def submit(self, task: Task) -> Future[Tile]:
         """Have a tile computed."""
 
 
@@ -78,7 +79,7 @@ class ThreadWorkers:
         self._pool, self._share, self._stopping = pool, 1.0 / side, stopping
         self._context = replace(context, threads=max(1, thread_count(context.threads) // side))
 
-    def submit(self, task: Task) -> Future[bytes]:
+    def submit(self, task: Task) -> Future[Tile]:
         """Queue the tile."""
 
         def stage(name: str, total: int) -> Progress:
@@ -116,7 +117,7 @@ class ThreadHiring:
 def compute_tiles(
     tasks: Sequence[Task],
     workers: Workers,
-    keep: Callable[[Task, bytes], None],
+    keep: Callable[[Task, Tile], None],
     crashed: Callable[[Crash], None],
 ) -> None:
     """Compute tiles and keep each as soon as it is finished, in this thread.
@@ -134,7 +135,7 @@ def compute_tiles(
     """
     waiting = list(reversed(tasks))
     tries: dict[Task, int] = {}
-    running: dict[Future[bytes], Task] = {}
+    running: dict[Future[Tile], Task] = {}
     try:
         while waiting or running:
             while waiting and len(running) < workers.slots:
@@ -144,7 +145,7 @@ def compute_tiles(
             for future in done:
                 task = running.pop(future)
                 try:
-                    data = future.result()
+                    tile = future.result()
                 except InputError:
                     raise
                 except CancelledError:
@@ -156,7 +157,7 @@ def compute_tiles(
                     else:
                         crashed(Crash(task, f"{type(error).__name__}: {error}"))
                     continue
-                keep(task, data)
+                keep(task, tile)
     except KeyboardInterrupt:
         _keep_what_ends(running, keep)
         raise
@@ -165,7 +166,7 @@ def compute_tiles(
             future.cancel()
 
 
-def _keep_what_ends(running: dict[Future[bytes], Task], keep: Callable[[Task, bytes], None]) -> None:
+def _keep_what_ends(running: dict[Future[Tile], Task], keep: Callable[[Task, Tile], None]) -> None:
     for future in running:
         future.cancel()
     done, _ = wait(running, timeout=GRACE)

@@ -28,14 +28,16 @@ def test_there_and_back(array, texts, text, number, integer) -> None:
     dataset = Dataset(
         {"array": Variable(dims, array, "m", text), "texts": Variable(("t",), words, attrs=attrs)}, attrs
     )
-    image = dataset_image(dataset)
-    again = dataset_of_image(image)
-    assert bytes(dataset_image(again)) == bytes(image)
+    image = b"".join(dataset_image(dataset))
+    again = dataset_of_image(memoryview(bytearray(image)))
+    assert b"".join(dataset_image(again)) == image
     assert list(again) == list(dataset)
     for name in dataset:
         one, two = dataset[name], again[name]
         assert (one.dims, one.units, one.long_name) == (two.dims, two.units, two.long_name)
         assert one.data.dtype == two.data.dtype
+        assert two.data.flags.aligned
+        assert two.data.flags.writeable
         assert one.data.shape == two.data.shape
         assert one.data.tolist() == two.data.tolist() or one.data.tobytes() == two.data.tobytes()
     for found in (again.attrs, again["texts"].attrs):
