@@ -2,28 +2,18 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import numpy as np
-
-from fastmech.ensembles.run import Progress
-from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError
 from fastmech.plots.style import save
-from fastmech.results import Dataset, Variable
 from fastmech.scan_types import scan_kinds
-from fastmech.scan_types.request import Request, RunContext, read_request
-from fastmech.scene import Scene
-from fastmech.store.provenance import provenance
+from fastmech.scan_types.request import RunContext, read_request
 from fastmech.store.read import Results, open_results
-from fastmech.store.stream import Stream, write_stream
-from fastmech.store.write import check_writable, write_results
-
-#: Prefix of the attributes of a section that hold its changes of the scene.
-CHANGE = "scene_"
+from fastmech.tiles.assemble import CHANGE
+from fastmech.tiles.report import RunReport
+from fastmech.tiles.run import ScanRun
+from fastmech.tiles.work import Hiring, ThreadHiring
 
 
 def default_output(path: str | Path) -> Path:
@@ -37,48 +27,33 @@ def run_request(
     *,
     fresh: bool = False,
     context: RunContext | None = None,
-) -> Path:
-    """Run every scan of a request file and write one result file.
+    hire: Hiring | None = None,
+    tell: Callable[[str], None] = lambda line: None,
+) -> RunReport:
+    """Run every scan of a request file and write one result file; an interrupted run goes on.
 
-    Everything is validated, and the place of the result tried, before the first scan runs. Nothing is
-    written unless all scans succeed. Each section of the file is one scan's dataset with the attributes
-    ``kind``, ``wall_time_s`` and, for every parameter that the scan changes, ``scene_NAME``.
+    Everything is validated, and the place of the result tried, before the first scan runs. The result file is
+    written when all scans have succeeded; until then finished tiles are kept in ``FILE.parts`` beside it.
+    Each section of the file is one scan's dataset with the attributes ``kind``, ``wall_time_s`` and, for
+    every parameter that the scan changes, ``scene_NAME``.
 
     Args:
         path: request file (TOML).
         out: result file, :func:`default_output` by default; missing folders are made.
-        fresh: whether an existing result file may be replaced.
+        fresh: whether to start anew and replace an existing result file.
         context: threads to use and where progress is told.
-
-    Returns:
-        the result file.
+        hire: who computes, threads of this process by default; see :mod:`fastmech.tiles.cluster`.
+        tell: is given lines for the user.
 
     Raises:
         InputError: the request is wrong, the result cannot be written, or it exists and ``fresh`` is False.
+        CrashedTilesError: some tiles could not be computed; the others are kept.
+        Stopped: by Ctrl-C or SIGTERM; finished tiles are kept.
     """
-    context = context or RunContext()
     request = read_request(path, scan_kinds())
     target = Path(out) if out is not None else default_output(path)
-    check_writable(target, replace=fresh)
-    started = time.perf_counter()
-    sections = {name: _run_scan(request, name, context) for name in request.scans}
-    parameters = _parameters(request.scene)
-
-    def attrs() -> dict[str, str | int | float]:
-        return {
-            **provenance(thread_count(context.threads)),
-            "title": request.title,
-            "request_file": Path(path).name,
-            "request": request.text,
-            "wall_time_s": time.perf_counter() - started,
-        }
-
-    whole = {name: section for name, section in sections.items() if isinstance(section, Dataset)}
-    if len(whole) < len(sections):
-        write_stream(target, scene_parameters=parameters, sections=sections, attrs=attrs, replace=fresh)
-    else:
-        write_results(target, scene_parameters=parameters, sections=whole, attrs=attrs(), replace=fresh)
-    return target
+    run = ScanRun(request, Path(path), target, context or RunContext(), hire or ThreadHiring(), tell)
+    return run.run(fresh)
 
 
 def scene_of_section(results: Results, name: str) -> dict[str, float]:
@@ -115,31 +90,6 @@ def draw_results(path: str | Path, out: str | Path | None = None) -> Iterator[Pa
                 except OSError as error:
                     raise InputError(f"{picture}: cannot be written: {error.strerror}") from None
                 yield picture
-
-
-def _run_scan(request: Request, name: str, context: RunContext) -> Dataset | Stream:
-    def stage(what: str, total: int) -> Progress:
-        return context.stage(f"{name}: {what}", total)
-
-    scan = request.scans[name]
-    started = time.perf_counter()
-    try:
-        dataset = scan.run(request.scene_of(name), replace(context, stage=stage))
-    except InputError as error:
-        raise InputError(f"scan.{name}: {error}") from None
-    seconds = time.perf_counter() - started
-    changes = {f"{CHANGE}{key}": float(value) for key, value in scan.scene.items()}
-    if isinstance(dataset, Stream):
-        fixed = Dataset(dataset.fixed.variables, {"kind": scan.kind, **changes, **dataset.fixed.attrs})
-        return replace(dataset, fixed=fixed)
-    return Dataset(dataset.variables, {"kind": scan.kind, **changes, **dataset.attrs, "wall_time_s": seconds})
-
-
-def _parameters(scene: Scene) -> dict[str, Variable]:
-    return {
-        name: Variable((), np.array(value), unit, about)
-        for name, (value, unit, about) in scene.described().items()
-    }
 
 
 def _make_folder(folder: Path) -> None:

@@ -110,12 +110,32 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     Raises:
         InputError: the file is missing, unreadable or not TOML.
     """
+    return parse_toml(read_text(path), path)
+
+
+def read_text(path: str | Path) -> str:
+    """Text of a file in UTF-8.
+
+    Raises:
+        InputError: the file is missing, unreadable or not UTF-8.
+    """
     try:
-        with open(path, "rb") as file:
-            return tomllib.load(file)
+        return Path(path).read_bytes().decode("utf-8")
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: is not valid TOML: {error}") from None
+
+
+def parse_toml(text: str, path: str | Path) -> dict[str, Any]:
+    """Content of the text of a TOML file.
+
+    Raises:
+        InputError: it is not TOML.
+    """
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(f"{path}: is not valid TOML: {error}") from None
 
 

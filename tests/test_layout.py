@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from fastmech.kernel_cache import COMPILED, PACKAGE, compiled_sources
+from fastmech.tiles.identity import _SOURCES
 
 pytestmark = pytest.mark.nojit
 
@@ -35,10 +36,12 @@ LAYERS = (
     "store",
     "plots",
     "scan_types",
+    "tiles",
     "runner",
     "paper",
     "hardcases",
     "bench",
+    "faults",
     "cli",
     "__main__",
 )
@@ -138,6 +141,17 @@ def test_compiled_places_import_compiled_places_only(path: Path) -> None:
     if is_compiled(path):
         allowed = {name.removesuffix(".py") for name in COMPILED} | {"scene", "errors", "kernel_cache"}
         assert set(imported(tree(path))) <= allowed
+
+
+def test_whatever_a_scan_computes_with_decides_its_identity() -> None:
+    """Kept tiles of other sources are not continued; what only tells, shows or writes may change."""
+    apart = {"", "errors", "kernel_cache", "store", "plots"}
+    reached: set[str] = set()
+    more = {"scan_types"}
+    while more - reached:
+        reached |= more
+        more = {other for path in MODULES if layer(path) in reached for other in imported(tree(path))} - apart
+    assert reached == {source.removesuffix(".py") for source in _SOURCES}
 
 
 @EVERY_MODULE

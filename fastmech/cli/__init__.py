@@ -14,7 +14,18 @@ import click
 from fastmech import __version__
 from fastmech.cli.failure import Failure, one_line
 
-COMMANDS = ("run", "info", "plot", "equilibria", "paper", "hardcases", "bench")
+COMMANDS = (
+    "run",
+    "status",
+    "info",
+    "export",
+    "plot",
+    "equilibria",
+    "paper",
+    "hardcases",
+    "bench",
+    "faults",
+)
 
 
 class _Commands(click.Group):

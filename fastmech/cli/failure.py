@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import IO, Any
@@ -9,6 +10,7 @@ from typing import IO, Any
 import click
 
 from fastmech.errors import InputError
+from fastmech.tiles.ends import CrashedTilesError, Stopped
 
 
 class Failure(click.ClickException):
@@ -30,6 +32,18 @@ class Interrupted(Failure):
     exit_code = 130
 
 
+class Terminated(Failure):
+    """SIGTERM has stopped the command."""
+
+    exit_code = 143
+
+
+class Crashed(Failure):
+    """Parts of a scan have failed; the others are kept."""
+
+    exit_code = 1
+
+
 @contextmanager
 def one_line() -> Iterator[None]:
     """Turn what a user causes (a wrong command line, wrong input, an interruption) into a `Failure`."""
@@ -42,5 +56,10 @@ def one_line() -> Iterator[None]:
         raise Failure(str(error)) from None
     except MemoryError as error:
         raise Failure(f"more memory is needed than there is: {error}") from None
+    except CrashedTilesError as error:
+        raise Crashed(str(error)) from None
+    except Stopped as stopped:
+        kind = Terminated if stopped.signal_number == signal.SIGTERM else Interrupted
+        raise kind(str(stopped)) from None
     except KeyboardInterrupt:
         raise Interrupted("interrupted") from None

@@ -1,8 +1,9 @@
-"""Progress bars on standard error, one for each piece of work of a run."""
+"""Progress on standard error: bars on a terminal, a line every so often in a log file."""
 
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import timedelta
@@ -45,10 +46,41 @@ class _Time(ProgressColumn):
         return Text("" if left is None else f"{timedelta(seconds=int(left))} left")
 
 
+#: Seconds between lines in a log file.
+LOG_PERIOD = 30.0
+
+
+class LogLine:
+    """One piece of work in a log file: how far it is, at most once every `LOG_PERIOD` seconds.
+
+    Args:
+        name: the piece of work.
+        total: its items.
+    """
+
+    def __init__(self, name: str, total: int) -> None:
+        self._name, self._total, self._done = name, total, 0
+        self._begun = self._told = time.monotonic()
+
+    def advance(self, finished: int) -> None:
+        """Count items, and say so if it is time."""
+        self._done += finished
+        now = time.monotonic()
+        if now - self._told < LOG_PERIOD:
+            return
+        self._told = now
+        rate = self._done / (now - self._begun)
+        left = timedelta(seconds=int((self._total - self._done) / rate)) if rate else "unknown"
+        share = self._done / self._total if self._total else 1.0
+        print(f"fastmech: {self._name}: {share:.0%}, {rate:,.3g}/s, {left} left", file=sys.stderr, flush=True)
+
+
 class ProgressBars:
-    """Bars with percentage, rate and time left, where standard error is a terminal; nothing elsewhere."""
+    """Bars with percentage, rate and time left; without a terminal, a line every so often."""
 
     def __init__(self, quiet: bool = False) -> None:
+        self._quiet = quiet
+        self._logs = not quiet and not sys.stderr.isatty()
         self._progress = Progress(
             TextColumn(
                 "{task.description}", markup=False, table_column=Column(overflow="ellipsis", no_wrap=True)
@@ -72,8 +104,12 @@ class ProgressBars:
         """Announce a piece of work; the result is told how many items have been finished since."""
         task = self._progress.add_task(name, total=total)
 
+        log = LogLine(name, total) if self._logs else None
+
         def advance(finished: int) -> None:
             self._progress.advance(task, finished)
+            if log is not None:
+                log.advance(finished)
 
         return advance
 
@@ -85,6 +121,11 @@ class ProgressBars:
             self._progress.update(task, completed=done, total=total)
 
         return tell
+
+    def tell(self, line: str) -> None:
+        """Show a line above the bars."""
+        if not self._quiet:
+            self._progress.console.print(f"fastmech: {line}", markup=False, highlight=False, soft_wrap=True)
 
     @contextmanager
     def preparing(self) -> Iterator[None]:

@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
+
+if TYPE_CHECKING:
+    from fastmech.scan_types.request import RunContext
+    from fastmech.tiles.report import RunReport
+    from fastmech.tiles.work import Hiring
 
 
 @click.command(name="run")
@@ -15,35 +24,93 @@ import click
     type=click.Path(path_type=Path),
     help="Result file [default: results/SCAN.h5].",
 )
-@click.option("--fresh", is_flag=True, help="Replace the result file if it exists.")
+@click.option("--fresh", is_flag=True, help="Start anew; replace the result file if it exists.")
 @click.option("--threads", metavar="N", type=click.IntRange(min=1), help="Threads to use [default: all].")
-@click.option("--quiet", is_flag=True, help="No progress bars.")
-def command(request_file: Path, out: Path | None, fresh: bool, threads: int | None, quiet: bool) -> None:
-    """Run every scan of a request, write one HDF5 file."""
-    from fastmech.cli.progress import ProgressBars
-    from fastmech.errors import InputError
+@click.option("--workers", metavar="N", type=click.IntRange(min=1), help="Compute in N processes (Dask).")
+@click.option("--scheduler", metavar="ADDRESS", help="Compute on a Dask cluster: tcp://HOST:8786.")
+@click.option("--tile", metavar="SECTION:INDEX", help="Compute one tile alone; --out keeps it.")
+@click.option("--quiet", is_flag=True, help="No progress.")
+@click.option("--json", "as_json", is_flag=True, help="End with a summary in JSON.")
+def command(
+    request_file: Path,
+    out: Path | None,
+    fresh: bool,
+    threads: int | None,
+    workers: int | None,
+    scheduler: str | None,
+    tile: str | None,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Run every scan of a request, write one HDF5 file.
 
-    with ProgressBars(quiet) as bars:
+    Finished work is kept: after an interruption the same command goes on.
+    """
+    from fastmech.cli.progress import ProgressBars
+    from fastmech.tiles.ends import terminable
+
+    if workers is not None and scheduler is not None:
+        raise click.UsageError("--workers and --scheduler exclude each other")
+    with terminable(), ProgressBars(quiet) as bars:
         with bars.preparing():
             from fastmech.runner import default_output, run_request
             from fastmech.scan_types.request import RunContext
+        context = RunContext(threads, bars.stage)
+        if tile is not None:
+            _run_tile(request_file, tile, out, context)
+            return
         target = out or default_output(request_file)
-        if target.is_file() and not fresh:
-            raise InputError(f"{target}: exists already; --fresh replaces it, --out names another file")
-        run_request(request_file, target, fresh=fresh, context=RunContext(threads, bars.stage))
-    _report(target)
+        with _hiring(workers, scheduler) as hire:
+            report = run_request(
+                request_file, target, fresh=fresh, context=context, hire=hire, tell=bars.tell
+            )
+    if as_json:
+        click.echo(json.dumps(report.summary()))
+    else:
+        _show(report)
 
 
-def _report(target: Path) -> None:
+@contextmanager
+def _hiring(workers: int | None, scheduler: str | None) -> Iterator[Hiring | None]:
+    """The cluster that computes, where one is asked for."""
+    if workers is None and scheduler is None:
+        yield None
+        return
+    from fastmech.tiles.cluster import cluster
+
+    with cluster(workers, scheduler) as hire:
+        yield hire
+
+
+def _run_tile(request_file: Path, tile: str, out: Path | None, context: RunContext) -> None:
+    from fastmech.runner import default_output
+    from fastmech.tiles.alone import compute_alone
+
+    alone = compute_alone(request_file, tile, context, default_output(request_file))
+    click.echo(f"{alone.seconds:9.2f} s  {tile}: {alone.items:,} {alone.what}")
+    click.echo(f"Content: {alone.content}")
+    if alone.same is not None:
+        click.echo("The tile kept beside the result is " + ("the same." if alone.same else "ANOTHER ONE."))
+    if out is not None:
+        alone.write(out)
+        click.echo(f"Results: {out}")
+
+
+def _show(report: RunReport) -> None:
     from fastmech.store.read import open_results
 
+    target = report.path
     with open_results(target) as results:
         for name in results:
-            click.echo(f"{results[name].attrs['wall_time_s']:9.2f} s  {name}")
+            if not report.was_complete:
+                click.echo(f"{results[name].attrs['wall_time_s']:9.2f} s  {name}")
             failed = results[name].attrs.get("failed", 0)
             if failed:
                 click.echo(f"{name}: {failed} trajectories failed; use a smaller dt", err=True)
-        click.echo(f"{results.attrs['wall_time_s']:9.2f} s  in all")
+    if report.was_complete:
+        click.echo(f"{target} holds this result already; --fresh computes it again")
+    else:
+        click.echo(f"{report.seconds:9.2f} s  in all")
     click.echo(f"Results: {target}")
     click.echo(f"Next:    fastmech info {target}")
     click.echo(f"         fastmech plot {target}")

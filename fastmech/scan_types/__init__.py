@@ -5,6 +5,7 @@ from __future__ import annotations
 import pkgutil
 from functools import cache
 from importlib import import_module
+from inspect import isabstract
 
 from fastmech.scan_types.request import Scan
 
@@ -19,4 +20,4 @@ def scan_kinds() -> dict[str, type[Scan]]:
         for value in vars(module).values()
         if isinstance(value, type) and issubclass(value, Scan) and value.__module__ == module.__name__
     ]
-    return {scan.kind: scan for scan in classes if scan is not Scan}
+    return {scan.kind: scan for scan in classes if not isabstract(scan)}

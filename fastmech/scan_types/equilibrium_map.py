@@ -17,30 +17,26 @@ lies between the points, parting no two neighbours, is not seen. A finer grid se
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from fastmech.atlas.axes import refuse_decaying_load
-from fastmech.atlas.map import Slab, map_equilibria, solve_in_slabs
-from fastmech.atlas.sheets import SheetBuilder
+from fastmech.atlas.map import Slab
 from fastmech.errors import InputError
 from fastmech.results import Dataset, Variable
-from fastmech.scan_types.map_curves import curve_variables
-from fastmech.scan_types.map_layout import point_variables, sheet_table, sheet_variables, slot_variables
-from fastmech.scan_types.request import RunContext, Scan
+from fastmech.scan_types.map_layout import point_variables
+from fastmech.scan_types.map_tiling import MapTiling
+from fastmech.scan_types.request import TiledScan
+from fastmech.scan_types.tiling import Tiling
 from fastmech.scene import Scene, nearest
-from fastmech.store.stream import Piece, Stream
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fastmech.store.read import Section
-
-#: Points above which a map is written as it is computed instead of being held in memory.
-IN_MEMORY = 1_500_000
 
 #: Points of the largest map: its sheets take 24 bytes a point in memory, its file about 100.
 MOST_POINTS = 50_000_000
@@ -71,7 +67,7 @@ def _known_variables(names: list[str]) -> list[str]:
     return names
 
 
-class EquilibriumMap(Scan):
+class EquilibriumMap(TiledScan):
     """Every equilibrium at every point of a grid of parameters, with the proof that none is missing."""
 
     kind: ClassVar[str] = "equilibrium_map"
@@ -91,71 +87,21 @@ class EquilibriumMap(Scan):
             for value in (axis.start, axis.stop):
                 scene.replace(**{name: value})
 
-    def run(self, scene: Scene, context: RunContext) -> Dataset | Stream:
-        """Search the grid; the force is the one at rest (F0 where alpha = 0)."""
+    def tiling(self, scene: Scene) -> Tiling:
+        """Planes of the first axis, and the curves as a tile of their own."""
         axes = {name: np.linspace(axis.start, axis.stop, axis.num) for name, axis in self.axes.items()}
-        total = int(np.prod([values.size for values in axes.values()]))
-        fixed = {
-            name: Variable((name,), values, *scene.described()[name][1:]) for name, values in axes.items()
-        }
-        fixed |= curve_variables(scene, axes, context.threads)
-        fixed |= slot_variables(self.variables)
-        attrs = {
-            "axes": tuple(axes),
-            "layout": "six slots along root, the deepest first; beyond count NaN, codes -1",
-            "curves": "all fold curves that part neighbouring points; islands between them are not seen",
-        }
-        if total > IN_MEMORY:
-            return self._stream(scene, axes, total, context, Dataset(fixed, attrs))
-        advance = context.stage("equilibrium map", total)
-        found = map_equilibria(scene, axes, wells=self._wells, threads=context.threads, progress=advance)
-        variables = self._kept(point_variables(tuple(axes), found))
-        variables |= sheet_variables(tuple(axes), found.sheet)
-        variables |= sheet_table(found.sheet_morse_index, found.sheet_branch, found.sheet_breaks)
-        return Dataset({**fixed, **variables}, attrs)
+        return MapTiling(self, scene, axes)
 
     @property
-    def _wells(self) -> bool:
+    def wells(self) -> bool:
+        """Whether the depths of wells are asked for."""
         return self.variables is None or bool({"depth", "escape_speed"} & set(self.variables))
 
-    def _kept(self, variables: dict[str, Variable]) -> dict[str, Variable]:
+    def kept(self, variables: dict[str, Variable]) -> dict[str, Variable]:
+        """Those of the variables that are asked for."""
         if self.variables is None:
             return variables
         return {name: variable for name, variable in variables.items() if name in self.variables}
-
-    def _stream(
-        self, scene: Scene, axes: dict[str, np.ndarray], total: int, context: RunContext, fixed: Dataset
-    ) -> Stream:
-        grid = tuple(len(values) for values in axes.values())
-        names = tuple(axes)
-
-        def shaped(slab: Slab, planes: int) -> dict[str, Variable]:
-            arrays = {name: a.reshape(planes, *grid[1:], *a.shape[1:]) for name, a in vars(slab).items()}
-            return self._kept(point_variables(names, Slab(**arrays)))
-
-        def pieces() -> Iterator[Piece]:
-            advance = context.stage("equilibrium map", total)
-            builder = SheetBuilder(scene, axes)
-
-            def place(rows: slice) -> Slab:
-                return Slab.empty(rows.stop - rows.start)
-
-            for planes, slab in solve_in_slabs(
-                scene, axes, builder, place, self._wells, context.threads, advance
-            ):
-                variables = shaped(slab, planes.stop - planes.start)
-                yield planes, {name: variable.data for name, variable in variables.items()}
-            sheets = builder.finish()
-            start = 0
-            for sheet in sheets.labels:
-                piece = sheet.reshape(-1, *grid[1:], sheet.shape[-1])
-                yield slice(start, start + len(piece)), {"sheet": piece}
-                start += len(piece)
-            yield Dataset(sheet_table(sheets.morse_index, sheets.branch, sheets.breaks))
-
-        one = shaped(Slab.empty(int(np.prod(grid[1:]))), 1)
-        one |= sheet_variables(names, np.zeros((1, *grid[1:], 6), dtype=np.int32))
-        return Stream(fixed, one, names[0], pieces)
 
     @staticmethod
     def read(section: Section, scene: Mapping[str, float]) -> Dataset:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
@@ -12,26 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
-from fastmech.ensembles.run import Progress
 from fastmech.errors import InputError
 from fastmech.integrators.methods import find_method
-from fastmech.results import Dataset, check_name
-from fastmech.scene import Scene, explain, nearest, read_toml
-from fastmech.store.stream import Stream
+from fastmech.results import Dataset, Variable, check_name
+from fastmech.scan_types.tiling import RunContext as RunContext
+from fastmech.scan_types.tiling import Tiles, Tiling
+from fastmech.scene import Scene, explain, nearest, parse_toml, read_text
+from fastmech.store.stream import Stream, in_memory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fastmech.store.read import Section
-
-
-@dataclass(frozen=True)
-class RunContext:
-    """What a scan may use while it runs."""
-
-    threads: int | None = None  #: threads to use, all processors by default
-    stage: Callable[[str, int], Progress] = lambda name, total: lambda finished: None
-    """``stage(name, total)`` announces a piece of work; its result is told what has been finished since."""
 
 
 def _known_method(name: str) -> str:
@@ -48,6 +40,7 @@ class Scan(BaseModel, ABC):
 
     To add one, write a module in :mod:`fastmech.scan_types` with a sub-class: the fields of its request with
     defaults and limits, ``kind`` (the name in request files), ``run`` and ``draw``. It is found by itself.
+    One that takes more than a minute is a :class:`TiledScan`: ``tiling`` instead of ``run``.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
@@ -64,8 +57,12 @@ class Scan(BaseModel, ABC):
         """
 
     @abstractmethod
-    def run(self, scene: Scene, context: RunContext) -> Dataset | Stream:
-        """Compute the result, or say how it is computed while it is written. ``scene`` has the changes."""
+    def run(self, scene: Scene, context: RunContext) -> Dataset:
+        """Compute the result in memory. ``scene`` has the changes."""
+
+    def tiling(self, scene: Scene) -> Tiling:
+        """How the work is divided: not at all, unless a kind of scan says otherwise."""
+        return Whole(self, scene)
 
     @staticmethod
     def read(section: Section, scene: Mapping[str, float]) -> Dataset:
@@ -76,6 +73,47 @@ class Scan(BaseModel, ABC):
     @abstractmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
         """Pictures of a result, by name. ``scene`` are the scene's parameters with this scan's changes."""
+
+
+class TiledScan(Scan):
+    """A kind of scan whose work is divided into tiles."""
+
+    @abstractmethod
+    def tiling(self, scene: Scene) -> Tiling:
+        """How the work is divided; must be cheap."""
+
+    def run(self, scene: Scene, context: RunContext) -> Dataset:
+        """Compute one tile after the other."""
+        tiling = self.tiling(scene)
+        advance = context.stage(tiling.what, sum(tiling.items(index) for index in range(tiling.count)))
+        tiles = []
+        for index in range(tiling.count):
+            tiles.append(tiling.compute(index, RunContext(context.threads)))
+            advance(tiling.items(index))
+        result = tiling.assemble(tiles.__getitem__)
+        return in_memory(result) if isinstance(result, Stream) else result
+
+
+class Whole(Tiling):
+    """The one tile of a scan that is not divided."""
+
+    what = "all"
+    count = 1
+
+    def __init__(self, scan: Scan, scene: Scene) -> None:
+        self.scan, self.scene = scan, scene
+
+    def items(self, index: int) -> int:
+        """One: the scan itself tells its progress."""
+        return 1
+
+    def compute(self, index: int, context: RunContext) -> Dataset:
+        """Run the scan."""
+        return self.scan.run(self.scene, context)
+
+    def assemble(self, tile: Tiles) -> Dataset:
+        """The tile is the section."""
+        return tile(0)
 
 
 #: What ``error_estimate`` of a section is.
@@ -96,6 +134,14 @@ class Request:
     scans: Mapping[str, Scan]
     text: str
 
+    @property
+    def parameters(self) -> dict[str, Variable]:
+        """The scene's parameters as a result file holds them."""
+        return {
+            name: Variable((), np.array(value), unit, about)
+            for name, (value, unit, about) in self.scene.described().items()
+        }
+
     def scene_of(self, name: str) -> Scene:
         """The scene of one scan: the file's with the scan's own changes."""
         return self.scene.replace(**self.scans[name].scene)
@@ -107,7 +153,16 @@ def read_request(path: str | Path, kinds: Mapping[str, type[Scan]]) -> Request:
     Raises:
         InputError: the file cannot be read, or anything in it is unknown, of a wrong type or out of range.
     """
-    table = read_toml(path)
+    return request_of_text(read_text(path), path, kinds)
+
+
+def request_of_text(text: str, path: str | Path, kinds: Mapping[str, type[Scan]]) -> Request:
+    """Validate the text of a request file; ``path`` is for messages and the default title.
+
+    Raises:
+        InputError: it is no TOML, or anything in it is unknown, of a wrong type or out of range.
+    """
+    table = parse_toml(text, path)
     allowed = ["title", "scene", "scan"]
     for name in table:
         if name not in allowed:
@@ -125,7 +180,7 @@ def read_request(path: str | Path, kinds: Mapping[str, type[Scan]]) -> Request:
         title=title,
         scene=scene,
         scans={name: _scan(name, entry, kinds) for name, entry in scans.items()},
-        text=Path(path).read_text(encoding="utf-8"),
+        text=text,
     )
     for name, scan in request.scans.items():
         try:

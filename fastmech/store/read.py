@@ -21,6 +21,7 @@ from fastmech.store.decode import (
     own_dimensions,
 )
 from fastmech.store.schema import FORMAT, SCHEMA_VERSION
+from fastmech.store.select import select
 
 if TYPE_CHECKING:
     import xarray
@@ -110,13 +111,14 @@ class Section:
     """One section of a result file, used like a `fastmech.results.Dataset`: `section["phi"]` is a `Variable`.
 
     Attributes:
+        where: the file and the section's name, for messages.
         attrs: the section's attributes.
         sizes: length of each dimension.
         variables: the variables by name, each read anew whenever it is asked for.
     """
 
     def __init__(self, group: h5py.Group, where: str) -> None:
-        self._where = where
+        self.where = where
         with named_damage(where):
             stored = {n: member for n, member in members(group).items() if isinstance(member, h5py.Dataset)}
             variables = {name: member for name, member in stored.items() if not is_dimension_only(member)}
@@ -129,7 +131,7 @@ class Section:
     def __getitem__(self, name: str) -> Variable:
         if name not in self.variables:
             known = ", ".join(self.variables) or "none"
-            raise InputError(f"variable {name!r}: is not in {self._where}; it has {known}")
+            raise InputError(f"variable {name!r}: is not in {self.where}; it has {known}")
         return self.variables[name]
 
     def __contains__(self, name: object) -> bool:
@@ -157,6 +159,19 @@ class Section:
         """
         chosen = [name for name in self.variables if names is None or name in names]
         return Dataset({name: self._stored.read(name, part) for name in chosen}, self.attrs)
+
+    def select(self, names: Collection[str] | None = None, **values: float) -> Dataset:
+        """The section at one value of some coordinates: ``results["map"].select(F0=100.0)``.
+
+        Args:
+            names: variables to read; None: all. The coordinates of their dimensions come too.
+            values: the nearest point along each coordinate or, along a dimension without coordinate, a place
+                counted from 0. The dimension is dropped; its coordinate stays as a scalar.
+
+        Raises:
+            InputError: an unknown dimension or variable, a place that is none, or damaged data.
+        """
+        return select(self, values, names)
 
     def to_xarray(self) -> xarray.Dataset:
         """Read all variables as an `xarray.Dataset`.

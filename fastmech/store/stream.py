@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import os
-import shutil
-import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,14 +14,17 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.errors import InputError
 from fastmech.results import Dataset, Variable
 from fastmech.store import write
 from fastmech.store.encode import put_attrs, put_dataset
+from fastmech.store.guarded import GuardedFile
 from fastmech.store.schema import DIM_NUMBER, DIM_NUMBERS, DIMENSION_ONLY, LIBRARY_VERSIONS
 
-#: Part of the streamed variables along the first dimension, or small variables that are known only then.
-Piece: TypeAlias = "tuple[slice, Mapping[str, NDArray[Any]]] | Dataset"
+#: Where a part of the streamed variables lies: along the first dimension, or along several from the first on.
+Place: TypeAlias = "slice | tuple[slice, ...]"
+
+#: Part of the streamed variables, or small variables that are known only then.
+Piece: TypeAlias = "tuple[Place, Mapping[str, NDArray[Any]]] | Dataset"
 
 #: Bytes of a chunk of a streamed variable, about: read as a whole, kept while it is filled.
 CHUNK_BYTES = 1 << 20
@@ -33,9 +35,9 @@ class Stream:
     """A dataset that is computed while it is written.
 
     Attributes:
-        fixed: its attributes and small variables, the coordinates among them; `wall_time_s` is added.
+        fixed: its attributes and small variables, the coordinates among them.
         plane: the streamed variables with one entry along their first dimension: types, units, meanings.
-        along: the streamed variables' first dimension, a coordinate of ``fixed``.
+        along: the streamed variables' first dimension, one of ``fixed``.
         pieces: computes the content.
     """
 
@@ -43,6 +45,33 @@ class Stream:
     plane: Mapping[str, Variable]
     along: str
     pieces: Callable[[], Iterator[Piece]]
+
+    @property
+    def nbytes(self) -> int:
+        """Size of the streamed variables in memory [bytes]."""
+        return sum(variable.data.nbytes for variable in self.plane.values()) * self.fixed.sizes[self.along]
+
+
+def in_memory(stream: Stream) -> Dataset:
+    """The dataset that a stream makes, whole."""
+    length = stream.fixed.sizes[stream.along]
+    arrays = {
+        name: np.empty((length, *variable.data.shape[1:]), variable.data.dtype)
+        for name, variable in stream.plane.items()
+    }
+    late: dict[str, Variable] = {}
+    for piece in stream.pieces():
+        if isinstance(piece, Dataset):
+            late |= piece.variables
+            continue
+        place, parts = piece
+        for name, part in parts.items():
+            arrays[name][place] = part
+    streamed = {
+        name: Variable(about.dims, arrays[name], about.units, about.long_name, about.attrs)
+        for name, about in stream.plane.items()
+    }
+    return Dataset({**stream.fixed.variables, **streamed, **late}, stream.fixed.attrs)
 
 
 def write_stream(
@@ -52,46 +81,53 @@ def write_stream(
     sections: Mapping[str, Dataset | Stream],
     attrs: Callable[[], Mapping[str, Any]],
     replace: bool = False,
+    aside: Path | None = None,
 ) -> None:
     """Like `fastmech.store.write.write_results`, for sections of which some are streams.
 
-    The file is composed on the disk beside its final place and takes its name once it is whole. A stream's
-    memory is that of a piece.
+    The file is composed on the disk and takes its name once it is whole; a piece at a time is in memory.
 
     Args:
         path, scene_parameters, replace: as there.
         sections: one dataset or stream for each section of the request.
         attrs: gives the attributes of the whole, asked for in the end.
+        aside: folder on the same file system in which it is composed, by default that of the file.
 
     Raises:
-        InputError: as there, or the disk has no room for the next piece.
+        InputError: as there.
     """
     datasets = {name: part if isinstance(part, Dataset) else part.fixed for name, part in sections.items()}
     root = write._checked_root(scene_parameters, datasets)
     with write._readable_reasons(path):
         target = write._target(path, replace)
-        temporary = write._aside(target)
+        temporary = write._aside(aside / target.name if aside is not None else target)
         try:
-            with h5py.File(temporary, "x", libver=LIBRARY_VERSIONS, track_order=True) as file:
-                numbers = itertools.count()
-                put_dataset(file, root, numbers)
-                for name, section in sections.items():
-                    group = file.create_group(name, track_order=True)
-                    if isinstance(section, Stream):
-                        started = time.perf_counter()
-                        _put_stream(group, section, numbers, target.parent)
-                        put_attrs(group, {"wall_time_s": time.perf_counter() - started})
-                    else:
-                        put_dataset(group, section, numbers)
-                put_attrs(file, write._checked_root_attrs(attrs()))
-            with temporary.open("rb") as written:
-                os.fsync(written.fileno())
+            with temporary.open("xb+", buffering=0) as disk:
+                guarded = GuardedFile(disk)
+                try:
+                    with h5py.File(guarded, "w", libver=LIBRARY_VERSIONS, track_order=True) as file:
+                        numbers = itertools.count()
+                        put_dataset(file, root, numbers)
+                        for name, section in sections.items():
+                            group = file.create_group(name, track_order=True)
+                            if isinstance(section, Stream):
+                                _put_stream(group, section, numbers, guarded)
+                            else:
+                                put_dataset(group, section, numbers)
+                                guarded.check()
+                        put_attrs(file, write._checked_root_attrs(attrs()))
+                except (RuntimeError, ValueError, OSError):
+                    guarded.check()  # HDF5's complaint follows from the disk's
+                    raise
+                guarded.check()
+                os.fsync(disk.fileno())
             write._publish(temporary, target, replace)
         finally:
-            temporary.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                temporary.unlink(missing_ok=True)
 
 
-def _put_stream(group: h5py.Group, stream: Stream, numbers: Iterator[int], folder: Path) -> None:
+def _put_stream(group: h5py.Group, stream: Stream, numbers: Iterator[int], guarded: GuardedFile) -> None:
     put_dataset(group, stream.fixed, numbers)
     length = stream.fixed.sizes[stream.along]
     _put_missing_dimensions(group, stream, numbers)
@@ -100,13 +136,10 @@ def _put_stream(group: h5py.Group, stream: Stream, numbers: Iterator[int], folde
         if isinstance(piece, Dataset):
             put_dataset(group, piece, numbers)
             continue
-        rows, arrays = piece
-        needed = sum(array.nbytes for array in arrays.values())
-        # HDF5 may crash the process when the disk is full, so it is asked before.
-        if shutil.disk_usage(folder).free < 2 * needed:
-            raise InputError(f"{folder}: has no room for the result's next {needed / 1e6:.0f} MB")
+        place, arrays = piece
         for name, array in arrays.items():
-            stored[name][rows] = array
+            stored[name][place] = array
+        guarded.check()
 
 
 def _put_missing_dimensions(group: h5py.Group, stream: Stream, numbers: Iterator[int]) -> None:

@@ -43,6 +43,7 @@ def write_results(
     sections: Mapping[str, Dataset],
     attrs: Mapping[str, Any],
     replace: bool = False,
+    aside: Path | None = None,
 ) -> None:
     """Write a result file (see `fastmech.store.schema`); missing parent folders are made.
 
@@ -56,6 +57,7 @@ def write_results(
         attrs: attributes of the whole: at least those of `schema.REQUIRED_ATTRS`, most of which
             `fastmech.store.provenance.provenance` gives.
         replace: whether a file of that name may be replaced.
+        aside: folder on the same file system in which it is written first, by default that of the file.
 
     Raises:
         InputError: the folder is unwritable, the disk is full, the path is a folder, the file exists and
@@ -64,7 +66,7 @@ def write_results(
     image = _image(_checked_root(scene_parameters, sections), sections, _checked_root_attrs(attrs))
     with _readable_reasons(path):
         target = _target(path, replace)
-        temporary = _aside(target)
+        temporary = _aside(aside / target.name if aside is not None else target)
         try:
             with temporary.open("xb") as file:
                 file.write(image)
@@ -72,7 +74,8 @@ def write_results(
                 os.fsync(file.fileno())
             _publish(temporary, target, replace)
         finally:
-            temporary.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                temporary.unlink(missing_ok=True)
 
 
 def _image(root: Dataset, sections: Mapping[str, Dataset], attrs: Mapping[str, Any]) -> memoryview:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -122,19 +123,51 @@ def test_output_that_cannot_be_written(invoke, tiny, monkeypatch, fresh):
     assert files() == {"tiny.toml", "file"}
 
 
-def test_failing_scan_writes_nothing(invoke, tiny, monkeypatch):
-    def fail(self, scene, context):
-        raise RuntimeError("out of luck")
+def out_of_luck(self, scene, context):
+    raise RuntimeError("out of luck")
 
-    monkeypatch.setattr("fastmech.scan_types.equilibria.EquilibriaScan.run", fail)
-    with pytest.raises(RuntimeError, match="out of luck"):
-        invoke("run", tiny, "--out", "x.h5")
-    assert files() == {"tiny.toml"}
-    Path("x.h5").write_text("older", encoding="utf-8")
-    with pytest.raises(RuntimeError, match="out of luck"):
-        invoke("run", tiny, "--out", "x.h5", "--fresh")
+
+def test_a_crash_is_one_line_with_the_command_that_repeats_it(invoke, tiny, monkeypatch):
+    with monkeypatch.context() as patched:
+        patched.setattr("fastmech.scan_types.equilibria.EquilibriaScan.run", out_of_luck)
+        result = invoke("run", tiny, "--out", "x.h5")
+        assert result.exit_code == 1
+        assert result.stdout == ""
+        (line,) = result.stderr.splitlines()
+        assert "1 of 2 tiles failed twice, the first with RuntimeError: out of luck" in line
+        assert "fastmech run tiny.toml --tile rest:0" in line
+        assert "1 of 2 tiles are kept in x.h5.parts; the same command goes on" in line
+        assert not Path("x.h5").exists()
+        with pytest.raises(RuntimeError, match="out of luck"):
+            invoke("run", tiny, "--tile", "rest:0")
+    monkeypatch.setattr(Motion, "run", out_of_luck)  # this tile is there already
+    assert invoke("run", tiny, "--out", "x.h5").exit_code == 0
     assert files() == {"tiny.toml", "x.h5"}
+
+
+def test_a_tile_that_crashes_once_is_tried_again(invoke, tiny, monkeypatch):
+    run, calls = Motion.run, []
+
+    def fail_once(self, scene, context):
+        calls.append(scene)
+        return out_of_luck(self, scene, context) if len(calls) == 1 else run(self, scene, context)
+
+    monkeypatch.setattr(Motion, "run", fail_once)
+    assert invoke("run", tiny, "--out", "x.h5").exit_code == 0
+    assert len(calls) == 2
+
+
+def test_a_crash_leaves_the_older_file(invoke, tiny, monkeypatch):
+    Path("x.h5").write_text("older", encoding="utf-8")
+    with monkeypatch.context() as patched:
+        patched.setattr("fastmech.scan_types.equilibria.EquilibriaScan.run", out_of_luck)
+        assert invoke("run", tiny, "--out", "x.h5", "--fresh").exit_code == 1
     assert Path("x.h5").read_text(encoding="utf-8") == "older"
+    result = invoke("run", tiny, "--out", "x.h5")
+    assert result.exit_code == 0, "what was begun with --fresh goes on without"
+    assert "1 of 2 tiles are kept from before" in result.stderr
+    with open_results("x.h5") as results:
+        assert results.sections == ("swing", "rest")
 
 
 def test_interruption_is_one_line_and_writes_nothing(invoke, tiny, monkeypatch):
@@ -148,3 +181,46 @@ def test_interruption_is_one_line_and_writes_nothing(invoke, tiny, monkeypatch):
     assert result.stderr == "fastmech: interrupted\n"
     assert result.stdout == ""
     assert files() == {"tiny.toml"}
+
+
+def test_the_same_run_again_has_nothing_to_do(invoke, tiny, monkeypatch):
+    assert invoke("run", tiny, "--out", "x.h5").exit_code == 0
+    before = Path("x.h5").read_bytes()
+    result = invoke("run", tiny, "--out", "x.h5", "--json")
+    assert result.exit_code == 0
+    summary = json.loads(result.stdout)
+    assert summary["was_complete"] is True
+    assert (summary["tiles"], summary["computed"]) == (2, 0)
+    assert Path("x.h5").read_bytes() == before
+    tiny.write_text("# a remark\n" + tiny.read_text(encoding="utf-8"), encoding="utf-8")
+    assert "holds this result already" in invoke("run", tiny, "--out", "x.h5").stdout
+
+
+def test_a_changed_request_is_refused_with_what_differs(invoke, tiny):
+    assert invoke("run", tiny, "--out", "x.h5").exit_code == 0
+    tiny.write_text(tiny.read_text(encoding="utf-8").replace("t_end = 0.1", "t_end = 0.2"), encoding="utf-8")
+    assert_refused(
+        invoke("run", tiny, "--out", "x.h5"),
+        "x.h5: exists already and differs: scan.swing.t_end = 0.1 there, 0.2 here",
+        "--fresh",
+    )
+
+
+@pytest.mark.parametrize("tile", ["swing", "swing:1", "swing:-1", "swing:x", "none:0", "swing:0:0", ":"])
+def test_a_tile_that_is_none(invoke, tiny, tile):
+    assert_refused(invoke("run", tiny, "--tile", tile), f"--tile {tile}")
+
+
+def test_one_tile_alone(invoke, tiny):
+    result = invoke("run", tiny, "--tile", "swing:0", "--out", "tile.h5")
+    assert result.exit_code == 0
+    assert "Content: " in result.stdout
+    assert invoke("run", tiny, "--out", "x.h5").exit_code == 0
+    with open_results("tile.h5") as tile, open_results("x.h5") as whole:
+        assert set(tile["swing"]) == set(whole["swing"])
+        for name in tile["swing"]:
+            assert tile["swing"][name].data.tobytes() == whole["swing"][name].data.tobytes()
+
+
+def test_workers_and_scheduler_exclude_each_other(invoke, tiny):
+    assert_refused(invoke("run", tiny, "--workers", "2", "--scheduler", "tcp://a:1"), "exclude")

@@ -12,7 +12,7 @@ from scan_types.values import check_labels, decoded, stored
 import fastmech as fm
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.basins import Basins
-from fastmech.scan_types.request import read_request
+from fastmech.scan_types.request import RunContext, read_request
 
 CONSTANT = fm.Scene(alpha=0.0)
 BISTABLE = fm.Scene(F0=85.3, c1=294.9, c2=92.85, alpha=0.0)
@@ -40,6 +40,46 @@ def test_layout(tmp_path: Path) -> None:
     label = section["label"].data
     np.testing.assert_array_equal(section["basin_turns_theta"].data[label], section["turns_theta"].data)
     assert section.attrs["captured"] == label.size
+
+
+@pytest.mark.parametrize("settle_radius", [None, 0.01])
+def test_tiles_are_the_whole_bit_for_bit(
+    settle_radius: float | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scan = Basins(axes=AXES, t_end=20.0, settle_radius=settle_radius)
+    values = {name: np.linspace(axis.start, axis.stop, axis.num) for name, axis in scan.axes.items()}
+    whole = fm.map_basins(BISTABLE, values, t_end=20.0, settle_radius=settle_radius)
+    monkeypatch.setattr("fastmech.scan_types.basin_tiling.TILE_POINTS", 60)
+    tiling = scan.tiling(BISTABLE)
+    assert tiling.count == 7
+    assert sum(map(tiling.items, range(7))) == 21 * 17
+    tiles = [tiling.compute(index, RunContext(threads=1)) for index in range(7)]
+    joined = tiling.assemble(tiles.__getitem__)
+    arrays = {
+        "well": whole.well,
+        "capture_time": whole.time,
+        "status": whole.status,
+        "label": whole.labels[0],
+    }
+    arrays |= {"turns_phi": whole.turns[..., 0], "turns_theta": whole.turns[..., 1]}
+    if settle_radius is not None:
+        arrays["settle_time"] = whole.settle_time
+    assert ("settle_time" in joined) == (settle_radius is not None)
+    for name, array in arrays.items():
+        np.testing.assert_array_equal(joined[name].data, array, err_msg=name)
+    assert joined.attrs["steps"] == whole.steps
+    assert joined.attrs["undecided"] == whole.counts["undecided"] > 0
+    assert joined["computed"].data.all()
+    # A look at it before its second tile is there: three planes of theta are missing.
+    look = tiling.assemble(lambda index: tiling.missing(index) if index == 1 else tiles[index])
+    there = np.arange(21) // 3 != 1
+    np.testing.assert_array_equal(look["computed"].data, np.repeat(there[:, None], 17, axis=1))
+    np.testing.assert_array_equal(look["well"].data[there], whole.well[there])
+    assert set(look["well"].data[~there].ravel()) == {-1}
+
+
+def test_a_refined_map_is_one_tile() -> None:
+    assert Basins(axes=AXES, refine=4).tiling(BISTABLE).count == 1
 
 
 @pytest.mark.parametrize(

@@ -83,11 +83,14 @@ def test_xarray_opens_a_map_with_names_and_units(tmp_path: Path) -> None:
         assert int(one.notnull().sum("root").max()) == 1
 
 
-def test_streamed_and_in_memory_agree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tiles_agree_with_the_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = mapped()
-    monkeypatch.setattr("fastmech.scan_types.equilibrium_map.IN_MEMORY", 100)
-    monkeypatch.setattr("fastmech.atlas.map.SLAB", 100)
-    result = EquilibriumMap(axes=AXES).run(SCENE, RunContext())
+    monkeypatch.setattr("fastmech.scan_types.map_tiling.TILE_POINTS", 100)
+    tiling = EquilibriumMap(axes=AXES).tiling(SCENE)
+    assert tiling.count == 9
+    assert sum(map(tiling.items, range(tiling.count))) == 31 * 23
+    tiles = [tiling.compute(index, RunContext(threads=1)) for index in range(tiling.count)]
+    result = tiling.assemble(tiles.__getitem__)
     assert isinstance(result, Stream)
     path = tmp_path / "map.h5"
     attrs = {**provenance(1), "title": "map"}
@@ -99,7 +102,7 @@ def test_streamed_and_in_memory_agree(tmp_path: Path, monkeypatch: pytest.Monkey
         one, two = whole[name], streamed[name]
         assert (one.dims, one.units, one.long_name) == (two.dims, two.units, two.long_name), name
         if one.data.dtype.kind == "f":
-            # Pieces start afresh, so angles may differ in their last bits, and a rate of nothing entirely.
+            # Tiles start afresh, so angles may differ in their last bits, and a rate of nothing entirely.
             settled = np.isfinite(one.data) & (np.abs(one.data) < 1e6)
             np.testing.assert_allclose(two.data[settled], one.data[settled], rtol=1e-6, atol=1e-6)
         else:

@@ -1,0 +1,51 @@
+"""``fastmech export``: a result file as CSV, netCDF or npz."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+
+@click.command(name="export")
+@click.argument("file", metavar="FILE.h5", type=click.Path(path_type=Path))
+@click.option("--to", "form", type=click.Choice(["csv", "nc", "npz"]), required=True, help="Format.")
+@click.option("--section", metavar="NAME", help="Only this section.")
+@click.option(
+    "--variable", "variables", metavar="NAME", multiple=True, help="Only this variable; repeatable."
+)
+@click.option(
+    "--select",
+    "selections",
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="The nearest point along a coordinate, or the number of a place along a dimension; repeatable.",
+)
+@click.option(
+    "--out",
+    metavar="DIR",
+    type=click.Path(path_type=Path),
+    help="Folder for the files [default: FILE without its ending].",
+)
+@click.option("--fresh", is_flag=True, help="Replace files that exist.")
+def command(
+    file: Path,
+    form: str,
+    section: str | None,
+    variables: tuple[str, ...],
+    selections: tuple[str, ...],
+    out: Path | None,
+    fresh: bool,
+) -> None:
+    """Write a result file in another format.
+
+    csv: one table for each set of dimensions of a section; nc: netCDF-4, one file for each section (needs
+    xarray); npz: one file for each section.
+    """
+    from fastmech.store.export import export_results
+
+    folder = out if out is not None else file.with_suffix("")
+    for path in export_results(
+        file, folder, form, section=section, variables=variables, selections=selections, replace=fresh
+    ):
+        click.echo(path)

@@ -1,0 +1,159 @@
+"""A look at a scan in progress: how far it is, and what there is of its result."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from fastmech.errors import InputError
+from fastmech.results import Dataset
+from fastmech.scan_types import scan_kinds
+from fastmech.scan_types.request import Request, request_of_text
+from fastmech.scan_types.tiling import Tiles
+from fastmech.store.provenance import provenance
+from fastmech.tiles.assemble import assembled, write_assembled
+from fastmech.tiles.identity import asked_for, identity_of
+from fastmech.tiles.parts import Manifest, Parts
+from fastmech.tiles.section import TiledSection, sections_of
+from fastmech.tiles.tile_file import DamagedTileError
+
+
+@dataclass(frozen=True)
+class SectionProgress:
+    """How far a section is.
+
+    Attributes:
+        name: of the section.
+        done, tiles: finished tiles, and all.
+        items_done, items: finished items of work, and all.
+        what: what the items are.
+    """
+
+    name: str
+    done: int
+    tiles: int
+    items_done: int
+    items: int
+    what: str
+
+
+@dataclass(frozen=True)
+class ScanProgress:
+    """How far a scan is.
+
+    Attributes:
+        complete: whether the result file is there and nothing is in progress.
+        worker: the process that works on it, in words; None: none does.
+        running: seconds since it began; None: none does.
+        since: tiles finished since then.
+        left: estimated seconds that are left; None: unknown.
+        sections: in the order of the request.
+    """
+
+    complete: bool
+    worker: str | None = None
+    running: float | None = None
+    since: int = 0
+    left: float | None = None
+    sections: tuple[SectionProgress, ...] = ()
+
+
+class ScanLook:
+    """A scan in progress, read by another process than the one that works on it.
+
+    Args:
+        target: the result file to be.
+
+    Raises:
+        InputError: there is neither a result nor a scan in progress.
+    """
+
+    def __init__(self, target: Path) -> None:
+        self.parts = Parts(target)
+        manifest = self.parts.manifest()
+        self.manifest: Manifest | None = manifest
+        if manifest is None:
+            if not target.is_file():
+                raise InputError(f"{target}: there is neither a result nor a scan in progress")
+            return
+        self.request: Request = request_of_text(manifest.request, manifest.request_file, scan_kinds())
+        self.sections = sections_of(self.request, identity_of(manifest.asked))
+        self.parts.look(self.sections)
+
+    def progress(self) -> ScanProgress:
+        """How far it is, by the names of the finished tiles."""
+        if self.manifest is None:
+            return ScanProgress(complete=True)
+        held = self.parts.is_held
+        begun = self.parts.run_notes().get("since") if held else None
+        begun = float(begun) if isinstance(begun, int | float) else None
+        sections, since, work, left = [], 0, 0.0, 0.0
+        for section in self.sections:
+            names = self.parts.names(section)
+            items = {int(path.stem): section.tiling.items(int(path.stem)) for path in names}
+            tiles, total = self.manifest.tiles[section.name], self.manifest.items[section.name]
+            sections.append(
+                SectionProgress(
+                    section.name, len(names), tiles, sum(items.values()), total, section.tiling.what
+                )
+            )
+            share = (tiles - len(names)) / tiles
+            left += share
+            if begun is not None:
+                new = sum(path.stat().st_mtime >= begun for path in names)
+                since, work = since + new, work + new / tiles
+        running = None if begun is None else time.time() - begun
+        return ScanProgress(
+            complete=False,
+            worker=self.parts.worker() if held else None,
+            running=running,
+            since=since,
+            left=left * running / work if running is not None and work else None,
+            sections=tuple(sections),
+        )
+
+    def write_snapshot(self, out: Path, replace: bool = False) -> None:
+        """Write what there is as a result file, with the attribute ``partial``.
+
+        Sections that cannot be shown in part are left out until they are complete.
+
+        Raises:
+            InputError: nothing is there yet, other sources of fastmech are at work, or it cannot be written.
+        """
+        if self.manifest is None:
+            raise InputError(f"{self.parts.target}: is complete; there is nothing in progress")
+        if self.manifest.asked != asked_for(self.request):
+            raise InputError(f"{self.parts.folder}: another version of fastmech works on it; use that one")
+        shown = {}
+        for section in self.sections:
+            there = {int(path.stem) for path in self.parts.names(section)}
+            if len(there) == section.tiling.count or (there and section.tiling.missing(0) is not None):
+                note = {"partial": f"{len(there)} of {section.tiling.count} tiles"}
+                shown[section.name] = assembled(section, self._tiles(section), 0.0, note)
+        if not shown:
+            raise InputError(f"{self.parts.target}: no section can be shown yet")
+        notes = {
+            "title": self.request.title,
+            "request": self.manifest.request,
+            "partial": "a scan in progress",
+        }
+        write_assembled(
+            out,
+            shown,
+            parameters=self.request.parameters,
+            attrs=lambda: {**provenance(1), **notes},
+            replace=replace,
+        )
+
+    def _tiles(self, section: TiledSection) -> Tiles:
+        def tile(index: int) -> Dataset:
+            try:
+                return self.parts.load(section, index)
+            except DamagedTileError:
+                missing = section.tiling.missing(index)
+                if missing is None:
+                    raise
+                return missing
+
+        return tile

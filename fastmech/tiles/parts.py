@@ -1,0 +1,235 @@
+"""The folder of a scan in progress: ``FILE.parts`` beside the result file.
+
+::
+
+    FILE.parts/
+      lock               held by the process that works on it
+      manifest.json      what was asked for; written once
+      run.json           which process works on it since when; for `fastmech status`
+      000_SECTION/       one folder a section
+        000042.tile      one file a finished tile
+      *.tmp              what is being written
+
+Whatever ends in ``.tile`` is whole; its own checksums say so.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from filelock import FileLock, Timeout
+
+from fastmech.errors import InputError
+from fastmech.results import Dataset
+from fastmech.tiles.durable import UNFINISHED, write_durably
+from fastmech.tiles.section import TiledSection
+from fastmech.tiles.tile_file import Bytes, DamagedTileError, Tile, TileHead, check_tile, tile_dataset
+
+#: Seconds to wait for a lock that `fastmech status` may hold for a moment.
+PATIENCE = 0.5
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What was asked for.
+
+    Attributes:
+        asked: see `fastmech.tiles.identity.asked_for`.
+        request_file: name of the request file.
+        request: its text.
+        replace: whether the result may replace an older file.
+        tiles: number of tiles of each section.
+        items: number of items of work of each section.
+    """
+
+    asked: str
+    request_file: str
+    request: str
+    replace: bool
+    tiles: dict[str, int]
+    items: dict[str, int]
+
+
+class Parts:
+    """The folder of a scan in progress.
+
+    Args:
+        target: the result file to be.
+    """
+
+    def __init__(self, target: Path) -> None:
+        self.target = target
+        self.folder = target.with_name(target.name + ".parts")
+        self._places: dict[str, str] = {}
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Work on the folder, which is made, alone.
+
+        Raises:
+            InputError: another process works on it, or the folder cannot be made.
+        """
+        lock = FileLock(self._lock, timeout=PATIENCE)
+        while not lock.is_locked:
+            self._make(self.folder)
+            try:
+                lock.acquire()
+            except Timeout:
+                raise InputError(
+                    f"{self.target}: {self.worker()} is working on it; wait for it or stop it"
+                ) from None
+            except (OSError, NotImplementedError) as error:
+                raise InputError(f"{self.folder}: cannot be locked: {error}") from None
+            if not self._lock.exists():  # who held it before has finished and removed the folder
+                lock.release()
+        try:
+            for leftover in self.folder.rglob(f"*{UNFINISHED}"):
+                leftover.unlink(missing_ok=True)
+            yield
+        finally:
+            with contextlib.suppress(OSError):
+                (self.folder / "run.json").unlink(missing_ok=True)
+                self._remove_if_empty()
+            lock.release()
+
+    @property
+    def is_held(self) -> bool:
+        """Whether a process works on the folder."""
+        if not self._lock.exists():
+            return False
+        try:
+            with FileLock(self._lock, timeout=0):
+                return False
+        except (Timeout, OSError, NotImplementedError):
+            return True
+
+    def worker(self) -> str:
+        """Which process works on it, in words."""
+        run = self.run_notes()
+        return (
+            f"process {run['pid']} on {run['host']}" if {"pid", "host"} <= run.keys() else "another process"
+        )
+
+    def run_notes(self) -> dict[str, Any]:
+        """What the process that works on the folder has said about itself; nothing if there is none."""
+        try:
+            notes = json.loads((self.folder / "run.json").read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return {}
+        return notes if isinstance(notes, dict) else {}
+
+    def note_run(self, notes: dict[str, Any]) -> None:
+        """Say for `fastmech status` who works on the folder."""
+        (self.folder / "run.json").write_text(json.dumps(notes), encoding="utf-8")
+
+    def manifest(self) -> Manifest | None:
+        """What was asked for, or None where there is no scan in progress.
+
+        Raises:
+            InputError: the manifest is damaged.
+        """
+        path = self.folder / "manifest.json"
+        try:
+            return Manifest(**json.loads(path.read_text(encoding="utf-8")))
+        except FileNotFoundError:
+            return None
+        except (OSError, ValueError, TypeError, RecursionError) as error:
+            raise InputError(f"{path}: is damaged; start anew with --fresh: {error}") from None
+
+    def begin(self, manifest: Manifest, sections: Sequence[TiledSection]) -> None:
+        """Write the manifest, unless it is there, and make the sections' folders."""
+        self._places = {section.name: f"{k:03d}_{section.name}" for k, section in enumerate(sections)}
+        for place in self._places.values():
+            self._make(self.folder / place)
+        text = json.dumps(asdict(manifest), indent=1) + "\n"
+        write_durably(self.folder / "manifest.json", [text.encode()])
+
+    def look(self, sections: Sequence[TiledSection]) -> None:
+        """Know where the sections' tiles are, without changing anything."""
+        self._places = {section.name: f"{k:03d}_{section.name}" for k, section in enumerate(sections)}
+
+    def path(self, section: TiledSection, index: int) -> Path:
+        """The file of a tile."""
+        return self.folder / self._places[section.name] / f"{index:06d}.tile"
+
+    def names(self, section: TiledSection) -> list[Path]:
+        """The files of finished tiles."""
+        return sorted((self.folder / self._places[section.name]).glob("*.tile"))
+
+    def store(self, section: TiledSection, tile: Tile) -> None:
+        """Keep a finished tile for good."""
+        write_durably(self.path(section, tile.head.index), tile.chunks)
+
+    def check(self, section: TiledSection, index: int) -> TileHead | None:
+        """A tile's head, or None where it is not there yet.
+
+        Raises:
+            DamagedTileError: it is damaged.
+        """
+        path, data = self._read(section, index)
+        return None if data is None else self._checked(path, data, section, index)
+
+    def load(self, section: TiledSection, index: int) -> Dataset:
+        """Read a tile.
+
+        Raises:
+            DamagedTileError: it is damaged or gone.
+        """
+        path, data = self._read(section, index)
+        if data is None:
+            raise DamagedTileError(f"{path}: is gone")
+        self._checked(path, data, section, index)
+        return tile_dataset(data)
+
+    def drop(self, section: TiledSection, index: int) -> None:
+        """Forget a tile."""
+        self.path(section, index).unlink(missing_ok=True)
+
+    def remove(self) -> None:
+        """Remove everything but the lock, the manifest last."""
+        for entry in sorted(self.folder.iterdir(), key=lambda entry: entry.name == "manifest.json"):
+            if entry.is_dir():
+                shutil.rmtree(entry, ignore_errors=True)
+            elif entry.name != "lock":
+                entry.unlink(missing_ok=True)
+
+    @property
+    def _lock(self) -> Path:
+        return self.folder / "lock"
+
+    def _read(self, section: TiledSection, index: int) -> tuple[Path, memoryview | None]:
+        path = self.path(section, index)
+        try:
+            with path.open("rb") as file:
+                data = np.empty(os.fstat(file.fileno()).st_size, dtype=np.uint8).data
+                return path, data[: file.readinto(data)]
+        except FileNotFoundError:
+            return path, None
+        except OSError as error:
+            raise DamagedTileError(f"{path}: cannot be read: {error.strerror}") from None
+
+    def _checked(self, path: Path, data: Bytes, section: TiledSection, index: int) -> TileHead:
+        try:
+            return check_tile(data, section.identity, section.name, index)
+        except DamagedTileError as error:
+            raise DamagedTileError(f"{path}: {error}") from None
+
+    def _remove_if_empty(self) -> None:
+        """Leave no folder behind that keeps nothing: no tile and no manifest of a finished result."""
+        if not any(self.folder.rglob("*.tile")):
+            shutil.rmtree(self.folder, ignore_errors=True)
+
+    def _make(self, folder: Path) -> None:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{self.target}: cannot be written: {error.strerror}") from None

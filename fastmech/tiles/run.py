@@ -1,0 +1,257 @@
+"""A scan from its request to its result file, in tiles that are kept; run again, it goes on."""
+
+from __future__ import annotations
+
+import os
+import platform
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from fastmech.ensembles.run import Progress
+from fastmech.ensembles.threads import thread_count
+from fastmech.errors import InputError
+from fastmech.results import Dataset
+from fastmech.scan_types.request import Request, RunContext
+from fastmech.scan_types.tiling import Tiles
+from fastmech.store.provenance import provenance
+from fastmech.tiles.assemble import assembled, write_assembled
+from fastmech.tiles.ends import CrashedTilesError, Stopped, signal_of
+from fastmech.tiles.identity import asked_for, asked_of_result, differences, identity_of
+from fastmech.tiles.parts import Manifest, Parts
+from fastmech.tiles.report import RunReport
+from fastmech.tiles.section import TiledSection, sections_of
+from fastmech.tiles.tile_file import DamagedTileError, Tile
+from fastmech.tiles.work import Crash, Hiring, Task, compute_tiles
+
+#: How often a result is assembled anew because a tile was damaged meanwhile.
+ASSEMBLIES = 3
+
+
+class ScanRun:
+    """One run of a request.
+
+    Args:
+        request: what is asked for.
+        request_file: where it was read from, for messages and provenance.
+        target: the result file to be.
+        context: threads to use and where progress is told.
+        hire: who computes tiles.
+        tell: is given lines for the user.
+    """
+
+    def __init__(
+        self,
+        request: Request,
+        request_file: Path,
+        target: Path,
+        context: RunContext,
+        hire: Hiring,
+        tell: Callable[[str], None] = lambda line: None,
+    ) -> None:
+        self.request, self.request_file, self.target = request, request_file, target
+        self.context, self.hire, self.tell = context, hire, tell
+        self.asked = asked_for(request)
+        self.identity = identity_of(self.asked)
+        self.sections = sections_of(request, self.identity)
+        self.parts = Parts(Path(os.path.realpath(target)))
+        self.tasks = [Task(s, index) for s in self.sections for index in range(s.tiling.count)]
+        self.seconds: dict[Task, float] = {}
+        self.crashes: list[Crash] = []
+        self.replace = False
+        self.started = time.perf_counter()
+        self.report = RunReport(target, len(self.tasks))
+
+    def run(self, fresh: bool) -> RunReport:
+        """Compute what is missing and assemble the result file.
+
+        Args:
+            fresh: whether to start anew and replace an older result.
+
+        Raises:
+            InputError: the request differs from the one in progress or done, something cannot be written, or
+                a scan refuses.
+            CrashedTilesError: tiles have failed.
+            Stopped: the user stopped it.
+        """
+        if self._is_complete(fresh):
+            self.report.was_complete = True
+            return self.report
+        with self.parts.held():
+            try:
+                if not self._begin(fresh):
+                    self.report.was_complete = True
+                    return self.report
+                self._check_tiles()
+                for _ in range(ASSEMBLIES):
+                    self._compute()
+                    if self._assemble():
+                        break
+                else:
+                    raise InputError(f"{self.parts.folder}: tiles are damaged time and again; check the disk")
+                self.parts.remove()
+            except KeyboardInterrupt as interrupt:
+                raise Stopped(self._kept("interrupted"), signal_of(interrupt)) from None
+            except InputError as error:
+                raise InputError(self._kept(str(error))) from None
+            except OSError as error:
+                raise InputError(self._kept(f"{self.target}: cannot be written: {error.strerror}")) from None
+        self.report.seconds = time.perf_counter() - self.started
+        return self.report
+
+    def _is_complete(self, fresh: bool) -> bool:
+        """Whether the result is there and nothing of it is in progress."""
+        target = self.parts.target
+        if target.is_dir():
+            raise InputError(f"{self.target}: is a folder; give the name of a file in it")
+        if fresh or not target.exists() or self.parts.folder.is_dir():
+            return False
+        there = asked_of_result(target)
+        if there != self.asked:
+            raise InputError(self._other_result(there))
+        return True
+
+    def _begin(self, fresh: bool) -> bool:
+        """Make the folder ready; False where the result is there already."""
+        target, manifest = self.parts.target, None
+        if fresh:
+            self.parts.remove()
+        else:
+            manifest = self.parts.manifest()
+        if not fresh and target.exists():
+            there = asked_of_result(target)
+            if there == self.asked:
+                self.parts.remove()
+                return False
+            if manifest is None or not manifest.replace:
+                raise InputError(self._other_result(there))
+        if manifest is not None and manifest.asked != self.asked:
+            raise InputError(
+                f"{self.target}: a scan in progress differs: {differences(manifest.asked, self.asked)};"
+                " --fresh starts anew, --out names another file"
+            )
+        self.replace = fresh or (manifest is not None and manifest.replace)
+        items = {s.name: sum(map(s.tiling.items, range(s.tiling.count))) for s in self.sections}
+        self.parts.begin(
+            Manifest(
+                asked=self.asked,
+                request_file=self.request_file.name,
+                request=self.request.text,
+                replace=self.replace,
+                tiles={s.name: s.tiling.count for s in self.sections},
+                items=items,
+            ),
+            self.sections,
+        )
+        self.parts.note_run({"pid": os.getpid(), "host": platform.node(), "since": time.time()})
+        return True
+
+    def _other_result(self, there: str | None) -> str:
+        why = f" and differs: {differences(there, self.asked)}" if there else ""
+        return f"{self.target}: exists already{why}; --fresh replaces it, --out names another file"
+
+    def _check_tiles(self) -> None:
+        """Find out which tiles are there."""
+        present = [task for task in self.tasks if self.parts.path(task.section, task.index).exists()]
+        if not present:
+            return
+        advance = self.context.stage("checking finished tiles", len(present))
+        for task in present:
+            try:
+                head = self.parts.check(task.section, task.index)
+            except DamagedTileError as error:
+                self._damaged(task, error)
+            else:
+                if head is not None:
+                    self.seconds[task] = head.seconds
+            advance(1)
+        self.tell(f"{len(self.seconds)} of {len(self.tasks)} tiles are kept from before")
+
+    def _damaged(self, task: Task, error: DamagedTileError) -> None:
+        self.tell(f"{error}; it is computed again")
+        self.report.damaged.append(self.parts.path(task.section, task.index))
+        self.seconds.pop(task, None)
+        self.parts.drop(task.section, task.index)
+
+    def _compute(self) -> None:
+        missing = [task for task in self.tasks if task not in self.seconds]
+        stages: dict[str, Progress] = {}
+        for section in self.sections:
+            total = sum(section.tiling.items(task.index) for task in missing if task.section == section)
+            if total and section.tiling.count > 1:
+                stages[section.name] = self.context.stage(f"{section.name}: {section.tiling.what}", total)
+
+        def keep(task: Task, tile: Tile) -> None:
+            self.parts.store(task.section, tile)
+            self.seconds[task] = tile.head.seconds
+            self.report.computed += 1
+            if task.section.name in stages:
+                stages[task.section.name](task.section.tiling.items(task.index))
+
+        for group in self._groups(missing):
+            with self.hire(group, self.context) as workers:
+                compute_tiles(group, workers, keep, self.crashes.append)
+        if self.crashes:
+            raise CrashedTilesError(self._crash_report())
+
+    def _groups(self, missing: list[Task]) -> list[list[Task]]:
+        """Tiles that are handed out together: section after section unless they are handed out together."""
+        if self.hire.together:
+            return [missing] if missing else []
+        groups = [[task for task in missing if task.section == section] for section in self.sections]
+        return [group for group in groups if group]
+
+    def _assemble(self) -> bool:
+        """Write the result file; False where a tile turned out to be damaged."""
+        reading: list[Task] = []
+
+        def tiles(section: TiledSection) -> Tiles:
+            def tile(index: int) -> Dataset:
+                reading[:] = [Task(section, index)]
+                return self.parts.load(section, index)
+
+            return tile
+
+        advance = self.context.stage("assembling", len(self.sections))
+        try:
+            parts = {}
+            for section in self.sections:
+                seconds = sum(s for task, s in self.seconds.items() if task.section == section)
+                parts[section.name] = assembled(section, tiles(section), seconds)
+                advance(1)
+            write_assembled(
+                self.parts.target,
+                parts,
+                parameters=self.request.parameters,
+                attrs=self._attrs,
+                replace=self.replace,
+                aside=self.parts.folder,
+            )
+        except DamagedTileError as error:
+            self._damaged(reading[0], error)
+            return False
+        return True
+
+    def _attrs(self) -> dict[str, str | int | float]:
+        return {
+            **provenance(thread_count(self.context.threads)),
+            "title": self.request.title,
+            "request_file": self.request_file.name,
+            "request": self.request.text,
+            "asked_for": self.asked,
+            "wall_time_s": time.perf_counter() - self.started,
+        }
+
+    def _kept(self, what: str) -> str:
+        if not self.seconds:
+            return what
+        kept = f"{len(self.seconds)} of {len(self.tasks)} tiles are kept in {self.parts.folder.name}"
+        return f"{what}; {kept}; the same command goes on"
+
+    def _crash_report(self) -> str:
+        first = self.crashes[0]
+        where = f"{first.task.section.name}:{first.task.index}"
+        return self._kept(
+            f"{len(self.crashes)} of {len(self.tasks)} tiles failed twice, the first with {first.reason}"
+            f" (alone: fastmech run {self.request_file} --tile {where})"
+        )

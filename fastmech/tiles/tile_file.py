@@ -1,0 +1,124 @@
+"""A tile as bytes: a line that says what it is, its content, and a checksum of the line.
+
+The line holds a checksum of the content and its length, so every byte is covered; a tile under another name,
+of another request or cut short is told as surely as one with a flipped bit. The checksum is CRC-32: it finds
+every error within 32 neighbouring bits, misses one in 2^32 of the others, and costs a fifth of what a
+cryptographic digest does.
+"""
+
+from __future__ import annotations
+
+import json
+import zlib
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.errors import InputError
+from fastmech.results import Dataset
+from fastmech.store.image import ALIGNMENT, dataset_image, dataset_of_image
+
+FORMAT = "fastmech tile 1"
+SUM_BYTES = 4
+_LONGEST_LINE = 4096
+
+Bytes: TypeAlias = "bytes | memoryview"
+
+
+class DamagedTileError(InputError):
+    """A tile's bytes are not those that were written."""
+
+
+@dataclass(frozen=True)
+class TileHead:
+    """What a tile is.
+
+    Attributes:
+        identity: of the request, see `fastmech.tiles.identity`.
+        section: name of the section.
+        index: number of the tile.
+        seconds: share of the wall time that it took [s].
+        length: of the content [bytes].
+        checksum: of the content.
+    """
+
+    identity: str
+    section: str
+    index: int
+    seconds: float
+    length: int
+    checksum: int
+
+
+@dataclass(frozen=True, eq=False)
+class Tile:
+    """A tile that has just been computed, on its way to its file.
+
+    Attributes:
+        head: what it is.
+        image: its content, see `fastmech.store.image`.
+    """
+
+    head: TileHead
+    image: list[NDArray[np.uint8]]
+
+    @property
+    def chunks(self) -> list[Bytes]:
+        """The bytes of its file, chunk after chunk."""
+        line = json.dumps({"format": FORMAT, **asdict(self.head)}).encode()
+        line += b" " * (-(len(line) + 1) % ALIGNMENT) + b"\n"
+        return [line, *(chunk.data for chunk in self.image), _sum([line]).to_bytes(SUM_BYTES, "little")]
+
+
+def make_tile(identity: str, section: str, index: int, dataset: Dataset, seconds: float) -> Tile:
+    """A dataset as a tile."""
+    image = dataset_image(dataset)
+    length = sum(chunk.size for chunk in image)
+    return Tile(
+        TileHead(identity, section, index, round(seconds, 4), length, _sum(chunk.data for chunk in image)),
+        image,
+    )
+
+
+def check_tile(data: Bytes, identity: str, section: str, index: int) -> TileHead:
+    """Check a tile's bytes and what they are.
+
+    Raises:
+        DamagedTileError: they are damaged, cut short, or another tile's.
+    """
+    line, image = _split(data)
+    if _sum([line]) != int.from_bytes(memoryview(data)[-SUM_BYTES:], "little"):
+        raise DamagedTileError("does not match its checksum")
+    about = json.loads(line)
+    if about.pop("format") != FORMAT:
+        raise DamagedTileError("is of another format")
+    found = TileHead(**about)
+    if (len(image), _sum([image])) != (found.length, found.checksum):
+        raise DamagedTileError("does not match its checksum")
+    if (found.identity, found.section, found.index) != (identity, section, index):
+        raise DamagedTileError(f"is tile {found.index} of {found.section} of another request")
+    return found
+
+
+def tile_dataset(data: Bytes) -> Dataset:
+    """The dataset of a tile that has been checked; its arrays are views of the bytes."""
+    _, image = _split(data)
+    return dataset_of_image(image)
+
+
+def _split(data: Bytes) -> tuple[bytes, memoryview]:
+    view = memoryview(data)
+    end = bytes(view[:_LONGEST_LINE]).find(b"\n") + 1
+    if not end or len(view) < end + SUM_BYTES:
+        raise DamagedTileError("is cut short")
+    return bytes(view[:end]), view[end:-SUM_BYTES]
+
+
+def _sum(chunks: Iterable[Bytes]) -> int:
+    found = 0
+    for chunk in chunks:
+        found = zlib.crc32(chunk, found)
+    return found

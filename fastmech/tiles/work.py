@@ -1,0 +1,175 @@
+"""Computing tiles: some at a time, each kept as soon as it is finished, a crash retried once."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ThreadPoolExecutor, wait
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+from fastmech.ensembles.run import Progress
+from fastmech.ensembles.threads import thread_count
+from fastmech.errors import InputError
+from fastmech.scan_types.request import RunContext
+from fastmech.tiles.section import TiledSection
+from fastmech.tiles.tile_file import Tile
+
+#: How often a tile is tried before it is given up.
+TRIES = 2
+
+#: Seconds that tiles in hand have to end in after an interrupt.
+GRACE = 0.7
+
+
+@dataclass(frozen=True)
+class Task:
+    """A tile to compute."""
+
+    section: TiledSection
+    index: int
+
+
+@dataclass(frozen=True)
+class Crash:
+    """A tile that could not be computed."""
+
+    task: Task
+    reason: str
+
+
+class Workers(Protocol):
+    """Who computes tiles."""
+
+    @property
+    def slots(self) -> int:
+        """How many tiles to hand out at a time."""
+
+    def submit(self, task: Task) -> Future[Tile]:
+        """Have a tile computed."""
+
+
+class Hiring(Protocol):
+    """Gives workers for some tiles.
+
+    Attributes:
+        together: whether tiles of different sections are handed out together; else one section follows the
+            other.
+    """
+
+    together: bool
+
+    def __call__(self, tasks: Sequence[Task], context: RunContext) -> AbstractContextManager[Workers]:
+        """Workers for some tiles; when the block is left by an exception, tiles in hand end soon."""
+
+
+class ThreadWorkers:
+    """Threads of this process: some tiles side by side or, if there are few, threads inside of each.
+
+    Args:
+        pool: where tiles run.
+        side: tiles at a time.
+        context: threads in all and where progress within a tile is told.
+        stopping: set when tiles in hand are to end.
+    """
+
+    def __init__(self, pool: Executor, side: int, context: RunContext, stopping: threading.Event) -> None:
+        self.slots = side + 1  # one more, so that none waits while a tile is written
+        self._pool, self._share, self._stopping = pool, 1.0 / side, stopping
+        self._context = replace(context, threads=max(1, thread_count(context.threads) // side))
+
+    def submit(self, task: Task) -> Future[Tile]:
+        """Queue the tile."""
+
+        def stage(name: str, total: int) -> Progress:
+            tell = self._context.stage(f"{task.section.name}: {name}", total)
+
+            def advance(finished: int) -> None:
+                if self._stopping.is_set():
+                    raise KeyboardInterrupt
+                tell(finished)
+
+            return advance
+
+        context = replace(self._context, stage=stage)
+        return self._pool.submit(task.section.compute, task.index, context, self._share)
+
+
+class ThreadHiring:
+    """Hires threads of this process."""
+
+    together = False
+
+    @contextmanager
+    def __call__(self, tasks: Sequence[Task], context: RunContext) -> Iterator[ThreadWorkers]:
+        """As many as the context allows."""
+        side = max(1, min(thread_count(context.threads), len(tasks)))
+        stopping = threading.Event()
+        pool = ThreadPoolExecutor(side)
+        try:
+            yield ThreadWorkers(pool, side, context, stopping)
+        finally:
+            stopping.set()
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def compute_tiles(
+    tasks: Sequence[Task],
+    workers: Workers,
+    keep: Callable[[Task, Tile], None],
+    crashed: Callable[[Crash], None],
+) -> None:
+    """Compute tiles and keep each as soon as it is finished, in this thread.
+
+    Args:
+        tasks: which, in the order in which they are handed out.
+        workers: who computes.
+        keep: is given every finished tile.
+        crashed: is told of every tile that failed `TRIES` times; the others go on.
+
+    Raises:
+        InputError: a scan refuses.
+        OSError: ``keep`` failed.
+        KeyboardInterrupt: the user stops it; what ends within `GRACE` seconds is kept.
+    """
+    waiting = list(reversed(tasks))
+    tries: dict[Task, int] = {}
+    running: dict[Future[Tile], Task] = {}
+    try:
+        while waiting or running:
+            while waiting and len(running) < workers.slots:
+                task = waiting.pop()
+                running[workers.submit(task)] = task
+            done, _ = wait(running, return_when=FIRST_COMPLETED)
+            for future in done:
+                task = running.pop(future)
+                try:
+                    tile = future.result()
+                except InputError:
+                    raise
+                except CancelledError:
+                    raise InputError("the connection to the Dask scheduler is lost") from None
+                except Exception as error:
+                    tries[task] = tries.get(task, 1) + 1
+                    if tries[task] <= TRIES:
+                        waiting.append(task)
+                    else:
+                        crashed(Crash(task, f"{type(error).__name__}: {error}"))
+                    continue
+                keep(task, tile)
+    except KeyboardInterrupt:
+        _keep_what_ends(running, keep)
+        raise
+    finally:
+        for future in running:
+            future.cancel()
+
+
+def _keep_what_ends(running: dict[Future[Tile], Task], keep: Callable[[Task, Tile], None]) -> None:
+    for future in running:
+        future.cancel()
+    done, _ = wait(running, timeout=GRACE)
+    for future in done:
+        if not future.cancelled() and future.exception() is None:
+            keep(running[future], future.result())

@@ -1,0 +1,45 @@
+"""What a disturbed-ensemble file says: how large a shock each equilibrium survives.
+
+Usage: python scans/analysis/disturbed.py [results/paper.h5]
+"""
+
+from __future__ import annotations
+
+import sys
+from itertools import pairwise
+
+import numpy as np
+
+import fastmech as fm
+
+BINS = 5
+
+
+def main(path: str = "results/paper.h5") -> None:
+    with fm.open_results(path) as results:
+        section = results["disturbed"]
+        radius = section.attrs["radius"]
+        values, meanings = section["outcome"].attrs["flag_values"], section["outcome"].attrs["flag_meanings"]
+        names = dict(zip(values.tolist(), meanings.split(), strict=True))
+        for index in range(section.sizes["equilibrium"]):
+            # One equilibrium at a time: nothing of the others is read.
+            one = section.select(
+                ["phi", "theta", "outcome", "excursion", "time_to_return"], equilibrium=index
+            )
+            outcome = one["outcome"].data
+            print(f"phi = {one['phi'].data:.4f} rad, theta = {one['theta'].data:.4f} rad")
+            for value in np.unique(outcome):
+                print(f"  {names[int(value)]:14s} {np.mean(outcome == value):7.2%}")
+            largest = one["excursion"].data.max(axis=1)
+            edges = np.quantile(largest, np.linspace(0.0, 1.0, BINS + 1))
+            back = outcome == values[meanings.split().index("returned")]
+            if not back.any():
+                continue
+            for low, high in pairwise(edges):
+                inside = (largest >= low) & (largest <= high)
+                print(f"  excursion {low:6.3f} to {high:6.3f} rad: {np.mean(back[inside]):7.2%} return")
+    print(f"disturbances up to {radius:g} rad in the kinetic-energy norm")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

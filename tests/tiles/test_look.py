@@ -1,0 +1,80 @@
+"""What a look at a scan in progress shows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from filelock import FileLock
+from tiles.conftest import TILES, Run, content
+from tiles.test_run import stopped_after, tiles
+
+from fastmech.errors import InputError
+from fastmech.runner import draw_results
+from fastmech.store.read import open_results
+from fastmech.tiles.ends import Stopped
+from fastmech.tiles.look import ScanLook
+
+
+def interrupted(run: Run, count: int) -> None:
+    with stopped_after(count, KeyboardInterrupt()), pytest.raises(Stopped):
+        run(threads=1)
+
+
+def test_progress(run: Run, tmp_path: Path) -> None:
+    target = tmp_path / "scan.h5"
+    with pytest.raises(InputError, match="neither a result nor a scan in progress"):
+        ScanLook(target)
+    interrupted(run, 4)
+    progress = ScanLook(target).progress()
+    rest, line = progress.sections
+    assert (rest.name, rest.done, rest.tiles) == ("rest", 1, 1)
+    assert (line.name, line.done, line.tiles) == ("line", 3, TILES - 1)
+    assert (line.items_done, line.items, line.what) == (20, 59, "points of the map")
+    assert (progress.complete, progress.worker, progress.left) == (False, None, None)
+    run()
+    assert ScanLook(target).progress().complete
+
+
+def test_a_running_scan_says_who_and_how_long(run: Run, tmp_path: Path) -> None:
+    interrupted(run, 4)
+    look = ScanLook(tmp_path / "scan.h5")
+    begun = min(path.stat().st_mtime for path in tiles(tmp_path))
+    with FileLock(look.parts.folder / "lock"):
+        look.parts.note_run({"pid": 123, "host": "here", "since": begun - 4.0})
+        progress = look.progress()
+    assert progress.worker == "process 123 on here"
+    assert progress.since == 4
+    assert progress.running is not None
+    assert progress.left is not None
+    # One section of two is done, and three sevenths of the other: 4/7 are left of 10/7.
+    assert progress.left == pytest.approx(0.4 * progress.running, rel=1e-6)
+
+
+def test_a_snapshot_is_a_result_file(run: Run, tmp_path: Path) -> None:
+    interrupted(run, 4)
+    snapshot = tmp_path / "now.h5"
+    ScanLook(tmp_path / "scan.h5").write_snapshot(snapshot)
+    with open_results(snapshot) as results:
+        assert results.sections == ("rest", "line")
+        assert results["line"].attrs["partial"] == f"3 of {TILES - 1} tiles"
+        count, phi = results["line"]["count"].data, results["line"]["phi"].data
+    assert (count[:20] > 0).all()
+    assert (count[20:] == 0).all()
+    assert np.isnan(phi[20:]).all()
+    assert [path.name for path in draw_results(snapshot)]
+    report = run()
+    whole = content(report.path)["line", "phi"]
+    assert np.frombuffer(whole[-1])[: 20 * 6].tobytes() == phi[:20].tobytes()
+    with pytest.raises(InputError, match="nothing in progress"):
+        ScanLook(tmp_path / "scan.h5").write_snapshot(tmp_path / "later.h5")
+
+
+def test_a_snapshot_leaves_out_what_is_not_complete(run: Run, tmp_path: Path) -> None:
+    with stopped_after(0, KeyboardInterrupt()), pytest.raises(Stopped):
+        run(threads=1)
+    interrupted(run, 1)
+    ScanLook(tmp_path / "scan.h5").write_snapshot(tmp_path / "now.h5")
+    with open_results(tmp_path / "now.h5") as results:
+        assert results.sections == ("rest",)
