@@ -42,9 +42,9 @@ demo: $(VENV)/.demo
 # Compiled; then small tests in plain Python, where a silent trap of compiled code shows as an exception;
 # then the kernels' tests with every array index checked.
 test: $(VENV)/.test
-	$(BIN)/python -m pytest
-	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -m nojit
-	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest -m nojit
+	$(BIN)/python -m pytest -n auto
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -n auto -m nojit
+	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest -n auto -m nojit
 
 lint: $(VENV)/.lint
 	$(BIN)/ruff format --check .

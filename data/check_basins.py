@@ -18,7 +18,7 @@ from scipy.integrate import solve_ivp
 
 import fastmech as fm
 from fastmech.basins.label import Labels
-from fastmech.bench.problem import scalar_rhs
+from fastmech.bench.plain import scalar_rhs
 from fastmech.mechanism.coefficients import reduce
 
 CONSTANT = fm.Scene(alpha=0.0)
@@ -39,10 +39,7 @@ SCIPY_SAMPLE = 40
 def _rhs(t, y, p):
     now = p.copy()
     now[5] = p[5] * np.exp(-p[7] * t)
-    return plain(t, y, now)
-
-
-plain = numba.njit(scalar_rhs)
+    return scalar_rhs(t, y, now)
 
 
 def at_rest(scene: fm.Scene, states: np.ndarray) -> np.ndarray:
@@ -113,7 +110,7 @@ def scipy_map(side: int) -> int:
     p = np.array(reduce(CONSTANT))
 
     def together(t: float, y: np.ndarray) -> np.ndarray:
-        return scalar_rhs(t, y.reshape(4, -1), p).ravel()
+        return scalar_rhs.py_func(t, y.reshape(4, -1), p).ravel()
 
     states = []
     for part in np.array_split(starts, max(1, len(starts) // 1024)):

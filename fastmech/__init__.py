@@ -69,6 +69,7 @@ _MODULES = {
     "sin": "fastmech.kernels.sincos",
     "step_warning": "fastmech.step_limits.warning",
     "trace_folds": "fastmech.atlas.folds",
+    "trace_unreached": "fastmech.atlas.damping",
     "transient_growth": "fastmech.transients.growth",
     "trapped": "fastmech.capture.certificate",
 }
@@ -100,6 +101,7 @@ __all__ = [
     "sin",
     "step_warning",
     "trace_folds",
+    "trace_unreached",
     "transient_growth",
     "trapped",
 ]

@@ -26,6 +26,10 @@ ROOTS = types.Array(types.complex128, 3, "C")
 VERDICTS = types.Array(types.int8, 3, "C")
 
 
+#: Imaginary part of a real eigenvalue that rounding explains, relative to the largest eigenvalue.
+REAL = 64 * 2.0**-52
+
+
 @inlined
 def squares(s: SmallMotion) -> tuple[float, float]:
     """Squares of the undamped natural frequencies [1/s^2], rising; see ``modes.squared_frequencies``."""
@@ -90,6 +94,11 @@ def motion_roots(
         fill_state_matrix(s, real)
         matrix[:] = real
         roots[:] = np.linalg.eigvals(matrix)
+        # The matrix is real: an imaginary part as small as rounding is none.
+        noise = REAL * np.abs(roots).max()
+        for k in range(4):
+            if abs(roots[k].imag) <= noise:
+                roots[k] = roots[k].real
     sort_roots(roots)
 
 

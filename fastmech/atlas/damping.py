@@ -85,7 +85,9 @@ def trace_unreached(
     The values are the grid of the map that seeds them: a curve passes wherever one of the three quantities
     changes sign between neighbours of one stable sheet. Where a quantity vanishes all over a sheet (with
     c2 = m1 g / l the rod is unloaded whatever F0 and c1 are) there is no curve, and the sheet is named
-    instead. Nothing is found without a damper (beta = 0).
+    instead. A curve along which a quantity touches zero without changing sign (the symmetric positions along
+    F0 = 0) is not found, unless grid points lie on it: then it counts as unexplained. Nothing is found
+    without a damper (beta = 0).
 
     Raises:
         InputError: as ``trace_folds``.

@@ -102,8 +102,6 @@ def spectrum_code(
     """
     settled = True
     for root in roots:
-        if root.imag < 0.0:
-            continue  # its conjugate says the same
         r = np.sqrt(root.real * root.real + root.imag * root.imag)
         h = e[3] + r * (e[2] + r * (e[1] + r * e[0]))
         h += ROUNDING * (abs(p[3]) + r * (abs(p[2]) + r * (abs(p[1]) + r * (abs(p[0]) + r))))

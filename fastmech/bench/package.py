@@ -16,12 +16,24 @@ STEPS: dict[str, tuple[float, ...]] = {
     "verner6": (0.2, 0.14, 0.1, 0.06, 0.035, 0.02),
     "dop853": (0.25, 0.18, 0.12, 0.08, 0.05, 0.03, 0.018),
     "hairer10": (0.3, 0.22, 0.16, 0.1, 0.07, 0.045, 0.03),
-    "ab5": (0.033, 0.025, 0.017, 0.01),
     "ab6": (0.025, 0.017, 0.012, 0.008, 0.005),
-    "ab8": (0.012, 0.009, 0.006, 0.004),
-    "abm10": (0.03, 0.022, 0.016, 0.011, 0.008, 0.0055),
     "abm12": (0.022, 0.016, 0.0125, 0.009, 0.0065, 0.0045, 0.004),
 }
+
+#: The same where each trajectory's step is fitted to its energy: no step is scaled, fitting does that.
+FITTED: dict[str, tuple[float, ...]] = {
+    "ab6": (0.0235, 0.022, 0.018, 0.014, 0.011, 0.008),
+    "ab7": (0.0115, 0.01, 0.0085, 0.007, 0.0055),
+    "abm12": (0.018, 0.016, 0.014, 0.012, 0.01, 0.0085, 0.007, 0.006),
+}
+
+#: Steps of methods in float32, where rounding leaves them something to say.
+SINGLE: dict[str, tuple[float, ...]] = {"ab6": (0.0235, 0.022, 0.018, 0.014), "rk4": (0.08, 0.05, 0.03)}
+
+#: Shares of the run at which steps are fitted again.
+AGAIN = (0.0, 0.125, 0.5)
+
+TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 
 
 def settings(problem: Problem) -> Iterator[tuple[str, str, dict[str, Any]]]:
@@ -30,6 +42,19 @@ def settings(problem: Problem) -> Iterator[tuple[str, str, dict[str, Any]]]:
         for dt in steps:
             h = dt * problem.pace
             yield f"fastmech {method}", f"dt = {h:g} s", {"method": method, "dt": h}
+    again = [share * problem.t_end for share in AGAIN]
+    for method, steps in FITTED.items():
+        for dt in steps:
+            chosen = {"method": method, "dt": dt}
+            yield f"fastmech {method}, fitted", f"dt = {dt:g} s", chosen | {"fit": True}
+            yield f"fastmech {method}, fitted again", f"dt = {dt:g} s", chosen | {"fit": again}
+    for method, steps in SINGLE.items():
+        for dt in steps:
+            chosen = {"method": method, "dt": dt, "dtype": "float32", "fit": again}
+            yield f"fastmech {method}, fitted, float32", f"dt = {dt:g} s", chosen
+    for tol in TOLERANCES:
+        yield "fastmech tol", f"tol = {tol:g}, every error estimated", {"tol": tol}
+        yield "fastmech tol, 99 %", f"tol = {tol:g}, 99 % quantile", {"tol": tol, "quantile": 0.99}
 
 
 def entrants(problem: Problem) -> Iterator[Entrant]:

@@ -7,15 +7,26 @@ from pathlib import Path
 
 import click
 
+from fastmech.errors import InputError
+
 
 @click.command(name="info")
-@click.argument("file", metavar="FILE", type=click.Path(path_type=Path))
-def command(file: Path) -> None:
-    """Show a result file: origin, scene, variables."""
+@click.argument("file", metavar="[FILE]", required=False, type=click.Path(path_type=Path))
+@click.option("--system", is_flag=True, help="Show what fastmech runs on here: processor, vectors, caches.")
+def command(file: Path | None, system: bool) -> None:
+    """Show a result file (origin, scene, variables), or this system."""
     from rich.console import Console
 
+    if (file is None) != system:
+        raise InputError("FILE: give a result file, or --system")
+    console = Console(width=None if sys.stdout.isatty() else 100)
+    if file is None:
+        from fastmech.cli.system import describe_system
+
+        console.print(describe_system())
+        return
     from fastmech.store.read import open_results
     from fastmech.store.summary import summarize
 
     with open_results(file) as results:
-        Console(width=None if sys.stdout.isatty() else 100).print(summarize(results))
+        console.print(summarize(results))

@@ -205,3 +205,14 @@ def test_a_force_that_decays_is_no_axis() -> None:
 def test_alpha_moves_no_fold() -> None:
     with pytest.raises(InputError, match=r"^axes\.alpha: equilibria do not depend on how fast"):
         find_folds(PAPER, "alpha", [0.0, 1.0])
+
+
+def test_no_saddle_is_called_settling() -> None:
+    """Sylvester's sign rules every criterion: beside a real positive eigenvalue that LAPACK gave, too."""
+    line = map_equilibria(PAPER.replace(c1=131.0), {"F0": np.linspace(-400.0, 400.0, 801)})
+    unstable = line.morse_index > 0
+    assert unstable.sum() > 1500
+    assert (line.verdict[unstable] == line.verdict[unstable][0, 0]).all(axis=-1).mean() > 0.999
+    assert not np.isin(line.verdict[unstable], line.verdict[line.morse_index == 0]).any()
+    real = np.abs(line.eigenvalues.imag) > 0.0
+    assert (np.abs(line.eigenvalues.imag[real]) > 1e-9).all()
