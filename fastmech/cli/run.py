@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 @click.option("--threads", metavar="N", type=click.IntRange(min=1), help="Threads to use [default: all].")
 @click.option("--workers", metavar="N", type=click.IntRange(min=1), help="Compute in N processes (Dask).")
 @click.option("--scheduler", metavar="ADDRESS", help="Compute on a Dask cluster: tcp://HOST:8786.")
-@click.option("--tile", metavar="SECTION:INDEX", help="Compute one tile alone; --out keeps it.")
+@click.option("--tile", metavar="SECTION:INDEX", help="Compute one tile alone.")
+@click.option("--keep", metavar="FILE.h5", type=click.Path(path_type=Path), help="Keep that tile here.")
 @click.option("--quiet", is_flag=True, help="No progress.")
 @click.option("--json", "as_json", is_flag=True, help="End with a summary in JSON.")
 def command(
@@ -39,6 +40,7 @@ def command(
     workers: int | None,
     scheduler: str | None,
     tile: str | None,
+    keep: Path | None,
     quiet: bool,
     as_json: bool,
 ) -> None:
@@ -49,6 +51,8 @@ def command(
     from fastmech.cli.progress import ProgressBars
     from fastmech.tiles.ends import terminable
 
+    if keep is not None and tile is None:
+        raise click.UsageError("--keep needs --tile")
     if workers is not None and scheduler is not None:
         raise click.UsageError("--workers and --scheduler exclude each other")
     with terminable(), ProgressBars(quiet) as bars:
@@ -56,10 +60,10 @@ def command(
             from fastmech.runner import default_output, run_request
             from fastmech.scan_types.request import RunContext
         context = RunContext(threads, bars.stage)
-        if tile is not None:
-            _run_tile(request_file, tile, out, context)
-            return
         target = out or default_output(request_file)
+        if tile is not None:
+            _run_tile(request_file, tile, target, keep, context)
+            return
         with _hiring(workers, scheduler) as hire:
             report = run_request(
                 request_file, target, fresh=fresh, context=context, hire=hire, tell=bars.tell
@@ -82,18 +86,17 @@ def _hiring(workers: int | None, scheduler: str | None) -> Iterator[Hiring | Non
         yield hire
 
 
-def _run_tile(request_file: Path, tile: str, out: Path | None, context: RunContext) -> None:
-    from fastmech.runner import default_output
+def _run_tile(request_file: Path, tile: str, target: Path, keep: Path | None, context: RunContext) -> None:
     from fastmech.tiles.alone import compute_alone
 
-    alone = compute_alone(request_file, tile, context, default_output(request_file))
+    alone = compute_alone(request_file, tile, context, target)
     click.echo(f"{alone.seconds:9.2f} s  {tile}: {alone.items:,} {alone.what}")
     click.echo(f"Content: {alone.content}")
     if alone.same is not None:
         click.echo("The tile kept beside the result is " + ("the same." if alone.same else "ANOTHER ONE."))
-    if out is not None:
-        alone.write(out)
-        click.echo(f"Results: {out}")
+    if keep is not None:
+        alone.write(keep)
+        click.echo(f"Results: {keep}")
 
 
 def _show(report: RunReport) -> None:

@@ -212,7 +212,7 @@ def test_a_tile_that_is_none(invoke, tiny, tile):
 
 
 def test_one_tile_alone(invoke, tiny):
-    result = invoke("run", tiny, "--tile", "swing:0", "--out", "tile.h5")
+    result = invoke("run", tiny, "--tile", "swing:0", "--keep", "tile.h5")
     assert result.exit_code == 0
     assert "Content: " in result.stdout
     assert invoke("run", tiny, "--out", "x.h5").exit_code == 0
