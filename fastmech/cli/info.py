@@ -7,8 +7,6 @@ from pathlib import Path
 
 import click
 
-from fastmech.errors import InputError
-
 
 @click.command(name="info")
 @click.argument("file", metavar="[FILE]", required=False, type=click.Path(path_type=Path))
@@ -18,7 +16,7 @@ def command(file: Path | None, system: bool) -> None:
     from rich.console import Console
 
     if (file is None) != system:
-        raise InputError("FILE: give a result file, or --system")
+        raise click.UsageError("FILE: give a result file, or --system")
     console = Console(width=None if sys.stdout.isatty() else 100)
     if file is None:
         from fastmech.cli.system import describe_system

@@ -84,7 +84,8 @@ def test_a_tiny_run(tmp_path, monkeypatch):
 
     monkeypatch.setattr(report, "entrants", few)
     monkeypatch.setattr(report, "QUICK_STARTS", 8)
-    monkeypatch.setattr(report, "run_atlas", lambda out, *, quick, stage: [])
+    for study in ("run_atlas", "run_basins", "run_stiff"):
+        monkeypatch.setattr(report, study, lambda out, *, quick, stage: [])
     table, picture, data = report.run_bench(tmp_path, quick=True)
     text = table.read_text()
     assert "A quick run" in text
