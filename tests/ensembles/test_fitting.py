@@ -29,7 +29,9 @@ def kinetic_norm(scene: Any, y: Floats) -> Floats:
     first = u**2
     second = (-np.sin(phi) * u - np.cos(theta) * v) ** 2 + (np.cos(phi) * u + np.sin(theta) * v) ** 2
     slider = ((np.sin(phi) + np.sin(phi) * np.cos(phi) / np.sqrt(4.0 - np.sin(phi) ** 2)) * u) ** 2
-    return np.asarray(np.sqrt((scene["m1"] * first + scene["m2"] * second + scene["m3"] * slider) / scene["m2"]))
+    return np.asarray(
+        np.sqrt((scene["m1"] * first + scene["m2"] * second + scene["m3"] * slider) / scene["m2"])
+    )
 
 
 def random_scenes(n: int, decaying: bool) -> dict[str, Floats]:
@@ -71,9 +73,7 @@ def test_the_bound_is_the_speed_itself_where_the_energy_is_least() -> None:
     """From the bottom of U no motion becomes faster than it is; elsewhere by the height above the bottom."""
     c, rates = reduce(HANGING), np.random.default_rng(3).uniform(-9.0, 9.0, (20, 2))
     starts = np.concatenate([np.tile(BOTTOM, (20, 1)), rates], axis=1)
-    np.testing.assert_allclose(
-        speed_bound(c, starts), kinetic_norm(HANGING.model_dump(), starts), rtol=1e-12
-    )
+    np.testing.assert_allclose(speed_bound(c, starts), kinetic_norm(HANGING.model_dump(), starts), rtol=1e-12)
     top = np.array([[np.pi / 2, np.pi, 0.0, 0.0]])  # 2 l ((m1 + m2) g + m2 g) above
     m1, m2, l, g = HANGING.m1, HANGING.m2, HANGING.l, HANGING.g
     np.testing.assert_allclose(

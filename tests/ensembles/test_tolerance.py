@@ -89,6 +89,20 @@ def test_a_quantile_of_the_errors_is_within_the_tolerance_and_known(
     assert true / 3.0 <= run.error_estimate <= 3.0 * true
 
 
+@CASES
+@pytest.mark.parametrize("quantile", [0.5, 1.0])
+def test_outputs_closer_than_the_tolerance_s_steps(name: str, quantile: float) -> None:
+    """A few steps between outputs would do: the two runs that are compared must differ all the same."""
+    scene, starts, _ = case(name)
+    times = np.linspace(0.0, 2.0, 11)
+    right = motions(pendulum_rates, starts, times) if name == "system" else motions_of(scene, starts, times)
+    run = fm.integrate(scene, starts, t_eval=times, tol=3e-2, quantile=quantile)
+    true = float(np.sort(errors(run.y, right))[math.ceil(quantile * N) - 1])
+    assert run.error_estimate is not None
+    assert true <= 3e-2
+    assert true / 3.0 <= run.error_estimate <= 3.0 * true
+
+
 @pytest.mark.parametrize("quantile", [0.9, 1.0])
 def test_a_tolerance_that_rounding_forbids_is_told(quantile: float) -> None:
     """Nothing reaches 1e-17 in double precision, and the estimate does not claim it."""

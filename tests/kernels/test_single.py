@@ -63,7 +63,7 @@ def points() -> Singles:
 
 
 def test_absolute_error_up_to_10_000() -> None:
-    """1.3e-7 is twice what rounding to float32 costs below 1; NumPy's float64 functions are exact beside it."""
+    """Twice what rounding to float32 costs below 1; NumPy's float64 functions are exact beside it."""
     x = points()
     s, c, sine, cosine = sines(x)
     assert np.abs(s - np.sin(x.astype(np.float64))).max() <= 1.3e-7
