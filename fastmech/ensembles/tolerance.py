@@ -37,8 +37,9 @@ FRONTIER = (
 FIRST_GUESS = {"ab6": 0.07, "ab7": 0.077, "abm12": 0.14, "dop853": 0.45, "tsit5": 0.15}
 GUESSED_ERROR, GUESS = 1e-6, 0.05
 
-#: The coarser of two runs has steps longer by this.
-RATIO = math.sqrt(2.0)
+#: The coarser of two runs has steps longer by this, and fewer of them where the finer has so many between
+#: outputs: two equal runs would tell of no error.
+RATIO, FEWEST = math.sqrt(2.0), 4
 
 #: Trajectories of the sample for the largest error, and for a quantile.
 SAMPLE_MAXIMUM, SAMPLE_QUANTILE = 64, 256
@@ -153,13 +154,13 @@ class _Trial:
 
     def calibrate(self, method: Method, tol: float) -> Settings:
         """The longest step at which the sample's quantile of the errors is within the tolerance."""
-        c, span = self.problem.coefficients, float(self.outputs[-1])
-        power = 1.0 / method.order
-        dt = span / 64.0
+        c, power = self.problem.coefficients, 1.0 / method.order
+        longest = float(np.max(np.diff(self.outputs, prepend=0.0))) / FEWEST or 1.0  # s; any step ends at 0 s
+        dt = float(self.outputs[-1]) / 64.0 or longest
         if c is not None:
             guess = FIRST_GUESS.get(method.name, GUESS) * (tol / GUESSED_ERROR) ** power
             dt = guess / float(np.max(vibration_frequency(c)))
-        settings = Settings(method, min(dt, span), self.fit())
+        settings = Settings(method, min(dt, longest), self.fit())
         scale = 1.0 / (RATIO**method.order - 1.0)
         good, bad = 0.0, math.inf
         for _ in range(CALIBRATIONS):
@@ -171,15 +172,15 @@ class _Trial:
             else:
                 bad = dt
             wanted = (AIM * tol / max(found, 1e-300)) ** power if np.isfinite(found) else 0.5
-            if good == dt and (wanted < 1.25 or bad < 1.25 * good or good >= span):
+            if good == dt and (wanted < 1.25 or bad < 1.25 * good or good >= longest):
                 break
             step = dt * min(max(wanted, 0.25), 4.0)
             if good and step >= bad:
                 step = math.sqrt(good * bad)
             if good and step <= good:
                 break
-            settings = replace(settings, dt=min(step, span))
-        return replace(settings, dt=good or min(bad, span))
+            settings = replace(settings, dt=min(step, longest))
+        return replace(settings, dt=good or min(bad, longest))
 
     def ratio(self, settings: Settings, exact: Settings) -> _Ratio:
         """Errors of these settings, seen by a finer run of ``exact`` ones, over the distance of two runs."""

@@ -1,0 +1,237 @@
+"""Runs to a tolerance: true errors, by SciPy at 1e-12, against what was asked for and what was estimated."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import re
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from ensembles.references import Floats, errors, motions, motions_of, rest_starts
+from ensembles.starts import random_starts
+
+import fastmech as fm
+from fastmech.ensembles.tolerance import ROUNDING
+from fastmech.errors import InputError
+from fastmech.scene import Scene
+
+N = 24
+TIMES = np.linspace(0.0, 4.0, 9)
+#: Scenes with their starts: slow, undamped, decaying and fast ones.
+SCENES: dict[str, tuple[Scene, Floats]] = {
+    "constant": (Scene(alpha=0.0), rest_starts(N)),
+    "undamped": (Scene(alpha=0.0, beta=0.0), rest_starts(N, seed=1) * 0.4),
+    "decaying": (Scene(), random_starts(N, seed=2)),
+}
+
+
+@cache
+def pendulum() -> Any:
+    path = Path(__file__).parents[2] / "scans" / "systems" / "pendulum.py"
+    spec = importlib.util.spec_from_file_location("pendulum", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.system
+
+
+def pendulum_rates(t: float, y: Floats) -> Floats:
+    return np.stack([y[:, 1], -0.1 * y[:, 1] + 0.5 - np.sin(y[:, 0])], axis=1)
+
+
+@cache
+def case(name: str) -> tuple[Any, Floats, Floats]:
+    """Scene or system, starts, right states at the output times."""
+    if name == "system":
+        starts = random_starts(N, seed=3)[:, [0, 2]]
+        return pendulum(), starts, motions(pendulum_rates, starts, TIMES)
+    scene, starts = SCENES[name]
+    return scene, starts, motions_of(scene, starts, TIMES)
+
+
+CASES = pytest.mark.parametrize("name", [*SCENES, "system"])
+
+
+@CASES
+@pytest.mark.parametrize("tol", [1e-2, 1e-5, 1e-8])
+def test_the_largest_error_is_within_the_tolerance_and_known(name: str, tol: float) -> None:
+    scene, starts, right = case(name)
+    run = fm.integrate(scene, starts, t_eval=TIMES, tol=tol)
+    true = errors(run.y, right)
+    assert run.error is not None
+    assert run.error_estimate is not None
+    assert run.error.shape == (N,)
+    assert run.error_estimate == run.error.max()
+    assert run.precision == "float64"
+    assert run.error_estimate <= tol
+    assert true.max() <= tol
+    assert true.max() / 3.0 <= run.error_estimate <= 3.0 * max(true.max(), ROUNDING)
+
+
+@CASES
+@pytest.mark.parametrize(("tol", "quantile"), [(1e-3, 0.5), (1e-4, 0.9), (1e-7, 0.75)])
+def test_a_quantile_of_the_errors_is_within_the_tolerance_and_known(
+    name: str, tol: float, quantile: float
+) -> None:
+    """The sample is all of them here: what is left is the estimate itself."""
+    scene, starts, right = case(name)
+    run = fm.integrate(scene, starts, t_eval=TIMES, tol=tol, quantile=quantile)
+    true = float(np.sort(errors(run.y, right))[math.ceil(quantile * N) - 1])
+    assert run.error is None
+    assert run.error_estimate is not None
+    assert run.error_estimate <= tol
+    assert true <= tol
+    assert true / 3.0 <= run.error_estimate <= 3.0 * true
+
+
+@CASES
+@pytest.mark.parametrize("quantile", [0.5, 1.0])
+def test_outputs_closer_than_the_tolerance_s_steps(name: str, quantile: float) -> None:
+    """A few steps between outputs would do: the two runs that are compared must differ all the same."""
+    scene, starts, _ = case(name)
+    times = np.linspace(0.0, 2.0, 11)
+    right = motions(pendulum_rates, starts, times) if name == "system" else motions_of(scene, starts, times)
+    run = fm.integrate(scene, starts, t_eval=times, tol=3e-2, quantile=quantile)
+    true = float(np.sort(errors(run.y, right))[math.ceil(quantile * N) - 1])
+    assert run.error_estimate is not None
+    assert true <= 3e-2
+    assert true / 3.0 <= run.error_estimate <= 3.0 * true
+
+
+@pytest.mark.parametrize("quantile", [0.9, 1.0])
+def test_a_tolerance_that_rounding_forbids_is_told(quantile: float) -> None:
+    """Nothing reaches 1e-17 in double precision, and the estimate does not claim it."""
+    scene, starts, _ = case("constant")
+    run = fm.integrate(scene, starts[:6], 1.0, tol=1e-17, quantile=quantile)
+    assert run.error_estimate is not None
+    assert 1e-17 < run.error_estimate < 1e-9
+
+
+def test_a_larger_ensemble_from_its_sample() -> None:
+    """400 trajectories, of which 256 or 64 are the sample: errors against abm12 with short steps."""
+    scene, starts = Scene(alpha=0.0), rest_starts(400, seed=8)
+    right = fm.integrate(scene, starts, 4.0, dt=0.002, method="abm12").y
+    for quantile in (0.9, 1.0):
+        run = fm.integrate(scene, starts, 4.0, tol=1e-5, quantile=quantile)
+        true = float(np.sort(errors(run.y, right))[math.ceil(quantile * 400) - 1])
+        assert run.error_estimate is not None
+        assert true <= 1e-5
+        assert true / 3.0 <= run.error_estimate <= 3.0 * true
+
+
+def test_the_method_asked_for_is_kept() -> None:
+    scene, starts, right = case("constant")
+    for method in ("rk4", "tsit5", "gauss4"):
+        run = fm.integrate(scene, starts, t_eval=TIMES, tol=1e-5, method=method)
+        assert run.method == method
+        assert errors(run.y, right).max() <= 1e-5
+
+
+def test_what_was_chosen_is_reported() -> None:
+    """Adams methods where outputs are few, a Runge-Kutta one where they are many; float32 for quantiles."""
+    scene, starts, _ = case("constant")
+    few = fm.integrate(scene, starts, 4.0, tol=1e-5)
+    assert few.method.startswith("ab")
+    many = fm.integrate(scene, starts, t_eval=np.linspace(0.0, 4.0, 201), tol=1e-5)
+    assert not many.method.startswith("ab")
+    rough = fm.integrate(scene, starts, 4.0, tol=1e-2, quantile=0.5)
+    assert rough.precision == "float32"
+    assert few.own_dt.shape == (1, N)
+    assert few.own_steps.shape == (N,)
+    assert few.dt == few.own_dt.max()
+
+
+@CASES
+@pytest.mark.parametrize("quantile", [0.9, 1.0])
+def test_a_bad_start_leaves_others_alone(name: str, quantile: float) -> None:
+    scene, starts, _ = case(name)
+    right = fm.integrate(scene, starts, t_eval=TIMES, tol=1e-4, quantile=quantile)
+    bad = np.insert(starts, 7, np.nan, axis=0)
+    run, others = fm.integrate(scene, bad, t_eval=TIMES, tol=1e-4, quantile=quantile), np.arange(N + 1) != 7
+    np.testing.assert_array_equal(run.y[:, others], right.y)
+    np.testing.assert_array_equal(run.status == fm.Status.START_NOT_FINITE, ~others)
+    assert run.error_estimate == right.error_estimate
+    if quantile == 1.0:
+        assert run.error is not None
+        assert right.error is not None
+        np.testing.assert_array_equal(run.error[others], right.error)
+
+
+@pytest.mark.parametrize("quantile", [0.9, 1.0])
+@pytest.mark.parametrize("starts", [np.empty((0, 4)), np.full((3, 4), np.nan)], ids=["none", "all bad"])
+def test_no_usable_start(starts: Floats, quantile: float) -> None:
+    run = fm.integrate(Scene(), starts, 0.5, tol=1e-4, quantile=quantile)
+    assert run.y.shape == (1, len(starts), 4)
+    assert (run.status == fm.Status.START_NOT_FINITE).all()
+
+
+@CASES
+def test_the_number_of_threads_does_not_matter(name: str) -> None:
+    scene, starts, _ = case(name)
+    for quantile in (0.5, 1.0):
+        runs = [
+            fm.integrate(scene, starts, t_eval=TIMES, tol=1e-5, quantile=quantile, threads=threads)
+            for threads in (1, 3)
+        ]
+        np.testing.assert_array_equal(runs[0].y, runs[1].y)
+        np.testing.assert_array_equal(runs[0].own_dt, runs[1].own_dt)
+        assert runs[0].error_estimate == runs[1].error_estimate
+        if quantile == 1.0:
+            np.testing.assert_array_equal(runs[0].error, runs[1].error)
+
+
+def test_every_trajectory_may_have_its_own_parameters() -> None:
+    """Own forces and dampers; each against its own scene."""
+    n, times = 8, [1.0, 3.0]
+    own = {"F0": np.linspace(-150.0, 150.0, n), "beta": np.linspace(0.0, 200.0, n)}
+    starts = random_starts(n, seed=5) * np.array([1.0, 1.0, 0.5, 0.5])
+    run = fm.integrate(Scene(), starts, t_eval=times, tol=1e-6, parameters=own)
+    for i, start in enumerate(starts):
+        scene = Scene().replace(**{name: float(values[i]) for name, values in own.items()})
+        assert errors(run.y[:, i : i + 1], motions_of(scene, start[None], times)).max() <= 1e-6
+
+
+def test_the_only_output_may_be_the_start() -> None:
+    """As with a step."""
+    starts = rest_starts(3)
+    run = fm.integrate(Scene(), starts, t_eval=[0.0], tol=1e-6)
+    np.testing.assert_array_equal(run.y[0], starts)
+    assert run.error_estimate == 0.0
+
+
+def test_progress_counts_every_trajectory_once() -> None:
+    told: list[int] = []
+    fm.integrate(Scene(), rest_starts(30), 1.0, tol=1e-6, progress=told.append)
+    assert sum(told) == 30
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"tol": 1e-4, "dt": 0.01}, "tol: chooses the step and the precision itself; give no dt"),
+        ({"tol": 1e-4, "fit": True}, "tol: chooses the step and the precision itself"),
+        ({"tol": 1e-4, "fit": [0.0, 1.0]}, "tol: chooses the step and the precision itself"),
+        ({"tol": 1e-4, "dtype": "float32"}, "tol: chooses the step and the precision itself"),
+        ({"tol": 0.0}, "tol = 0.0: must be a finite number greater than 0"),
+        ({"tol": -1e-3}, "tol = -0.001: must be a finite number greater than 0"),
+        ({"tol": np.nan}, "tol = nan: must be a finite number greater than 0"),
+        ({"tol": np.inf}, "tol = inf: must be a finite number greater than 0"),
+        ({"tol": "1e-4"}, "tol = '1e-4': must be a finite number greater than 0"),
+        ({"tol": True}, "tol = True: must be a finite number greater than 0"),
+        ({"tol": 1e-4, "quantile": 0.0}, "quantile = 0.0: must be a finite number greater than 0"),
+        ({"tol": 1e-4, "quantile": -0.5}, "quantile = -0.5: must be a finite number greater than 0"),
+        ({"tol": 1e-4, "quantile": 1.5}, "quantile = 1.5: must not be greater than 1"),
+        ({"tol": 1e-4, "quantile": np.nan}, "quantile = nan: must be a finite number greater than 0"),
+        ({"tol": 1e-4, "method": "rk5"}, "method = 'rk5': unknown; known: euler"),
+        ({"tol": 1e-4, "threads": 0}, "threads = 0: must be an integer not less than 1"),
+    ],
+)
+def test_wrong_arguments_are_refused_in_one_line(arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=f"^{re.escape(message)}") as error:
+        fm.integrate(Scene(), rest_starts(2), 1.0, **arguments)
+    assert "\n" not in str(error.value)

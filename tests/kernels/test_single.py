@@ -1,0 +1,238 @@
+"""Lanes of float32: their sine and cosine, what the compiler made of their kernels, their motions."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from typing import Any
+
+import llvmlite.binding as llvm
+import mpmath
+import numba
+import numpy as np
+import pytest
+from ensembles.references import errors, rest_starts
+from kernels.blocks_of_lanes import MODULES, evaluate, kernel, lanes
+from kernels.test_compiled_code import LIBRARY, basic_blocks
+from numpy.typing import NDArray
+
+import fastmech as fm
+from fastmech.ensembles.run import run_ensemble
+from fastmech.errors import InputError
+from fastmech.integrators.methods import METHODS
+from fastmech.jit import FLAGS
+from fastmech.kernels.select import right_hand_side
+from fastmech.kernels.sincos import REDUCTION_LIMIT_SINGLE, cos, sin, sincos
+from fastmech.kernels.single import in_single
+from fastmech.mechanism.coefficients import reduce
+from fastmech.scene import Scene
+
+Singles = NDArray[np.float32]
+SCENE = Scene(alpha=0.0)
+TIMES = np.linspace(0.0, 5.0, 11)
+
+
+@cache
+def compiled() -> Any:
+    """``sincos`` as kernels for float32 compile it, and ``sin`` and ``cos`` of right-hand sides."""
+
+    @numba.njit(**FLAGS)
+    def run(x: Singles, out: Singles) -> None:
+        for i in range(x.size):
+            out[0, i], out[1, i] = sincos(x[i])
+            out[2, i], out[3, i] = sin(x[i]), cos(x[i])
+
+    return run
+
+
+def sines(x: Singles) -> Singles:
+    out = np.empty((4, x.size), dtype=np.float32)
+    compiled()(x, out)
+    return out
+
+
+@cache
+def points() -> Singles:
+    """100,000 ones, and the neighbours of every multiple of pi/2 up to 10,000."""
+    random = np.random.default_rng(7)
+    spread = np.concatenate([random.uniform(-1e4, 1e4, 60_000), random.uniform(-10.0, 10.0, 40_000)])
+    near = (np.arange(-6366, 6367) * (np.pi / 2)).astype(np.float32)
+    up, down = np.nextafter(near, np.float32(np.inf)), np.nextafter(near, np.float32(-np.inf))
+    edge = np.array([1e4, -1e4, 0.0], dtype=np.float32)
+    return np.concatenate([spread.astype(np.float32), near, up, down, edge])
+
+
+def test_absolute_error_up_to_10_000() -> None:
+    """Twice what rounding to float32 costs below 1; NumPy's float64 functions are exact beside it."""
+    x = points()
+    s, c, sine, cosine = sines(x)
+    assert np.abs(s - np.sin(x.astype(np.float64))).max() <= 1.3e-7
+    assert np.abs(c - np.cos(x.astype(np.float64))).max() <= 1.3e-7
+    np.testing.assert_array_equal(sine, s)
+    np.testing.assert_array_equal(cosine, c)
+
+
+def test_some_of_them_against_mpmath() -> None:
+    x = points()[::60]
+    s, c, *_ = sines(x)
+    with mpmath.workdps(30):
+        right = np.array([[float(mpmath.sin(v)), float(mpmath.cos(v))] for v in x.tolist()]).T
+    assert np.abs([s, c] - right).max() <= 1.3e-7
+
+
+def test_beyond_the_limit_and_not_finite() -> None:
+    limit = np.float32(REDUCTION_LIMIT_SINGLE)
+    x = np.array([np.nextafter(limit, np.float32(np.inf)), -3e4, np.nan, np.inf], dtype=np.float32)
+    assert np.isnan(sines(x)[2:]).all()
+    assert np.isnan(sines(x)[:2, 2]).all()
+
+
+NAMES = ("free", "damped_constant", "damped_decaying")
+KERNELS = {f"{formulation}-{terms}": (formulation, terms) for formulation in MODULES for terms in NAMES}
+SCENES = {"free": Scene(beta=0.0, F0=0.0), "damped_constant": SCENE, "damped_decaying": Scene()}
+
+
+@pytest.mark.parametrize("name", KERNELS)
+def test_derivatives_are_those_of_float64(name: str) -> None:
+    """To a share of the largest derivative; two lanes lie beyond the reduction's limit."""
+    formulation, terms = KERNELS[name]
+    Y = lanes(33).astype(np.float32)
+    Y[0, 5], Y[1, 20] = 2e4, -5e5
+    params = np.repeat(np.array(reduce(SCENES[terms]), dtype=np.float32)[:, None], 33, axis=1)
+    dY = np.full(Y.shape, np.nan, dtype=np.float32)
+    in_single(kernel(formulation, terms))(0.3, Y, dY, params)
+    right = evaluate(kernel(formulation, terms), SCENES[terms], Y.astype(np.float64), t=0.3)
+    assert dY.dtype == np.float32
+    assert (np.abs(dY - right).max(axis=1) <= 1e-5 * np.abs(right).max(axis=1)).all()
+
+
+needs_fma = pytest.mark.skipif(
+    not llvm.get_host_cpu_features().get("fma", False),
+    reason="no packed fused instructions on this processor",
+)
+
+
+@cache
+def compiled_anew(formulation: str, terms: str) -> Any:
+    single = in_single(kernel(formulation, terms))
+    (signature,) = single.signatures
+    return numba.njit(signature, nogil=True, **FLAGS)(single.py_func)
+
+
+def lane_loop(code: str) -> str:
+    """Blocks that take packed square roots and floors."""
+    calls = (r"= .*call .*@llvm\.floor\.v(?:4|8|16)f32", r"= .*call .*@llvm\.sqrt\.v(?:4|8|16)f32")
+    return "\n".join(b for b in basic_blocks(code) if all(re.search(call, b) for call in calls))
+
+
+@needs_fma
+@pytest.mark.parametrize("name", ["lagrange-damped_constant", "hamilton-damped_decaying"])
+def test_lanes_are_packed_float32(name: str) -> None:
+    """No number of the loop over lanes is a double, none is converted, no library is called."""
+    loop = lane_loop("".join(compiled_anew(*KERNELS[name]).inspect_llvm().values()))
+    assert len(re.findall(r"= f(?:add|sub|mul|div) .*<(?:4|8|16) x float>", loop)) >= 40
+    assert not re.search(r"\bdouble\b|fpext|fptrunc", loop)
+    assert not LIBRARY.search(loop)
+
+
+@needs_fma
+def test_machine_code_of_the_loop_is_packed_float32() -> None:
+    code = "".join(compiled_anew("lagrange", "damped_constant").inspect_asm().values())
+    loops = [b for b in basic_blocks(code) if re.search(r"\bv(?:round|rndscale)ps\s.*%[yz]mm", b)]
+    loops = [b for b in loops if re.search(r"\bvsqrtps\s.*%[yz]mm|\bvrsqrt", b)]
+    assert loops
+    for loop in loops:
+        assert len(re.findall(r"\bv(?:f?n?m(?:add|sub)\d*|mul)\w*ps\s.*%[yz]mm", loop)) >= 40
+        assert not re.search(r"\bv\w+[ps]d\s|\bcall", loop)
+
+
+@cache
+def magnification() -> NDArray[np.float64]:
+    """How far a change of 1e-6 of any component of the start goes in 5 s, over 1e-6: by abm12 in float64."""
+    starts, found = rest_starts(100), np.zeros(100)
+    right = fm.integrate(SCENE, starts, t_eval=TIMES, dt=0.005, method="abm12").y
+    for component in range(4):
+        moved = fm.integrate(
+            SCENE, starts + 1e-6 * np.eye(4)[component], t_eval=TIMES, dt=0.005, method="abm12"
+        )
+        found = np.maximum(found, errors(moved.y, right) / 1e-6)
+    return found
+
+
+@pytest.mark.parametrize("method", ["tsit5", "ab6"])
+@pytest.mark.parametrize("formulation", ["lagrange", "hamilton"])
+def test_motions_are_those_of_float64(method: str, formulation: str) -> None:
+    """100 starts from rest, 5 s: 1e-4 rad and rad/s, but for the one that passes a saddle's edge.
+
+    Its motion magnifies every error 3,000 times; no precision of the lanes is blamed for that.
+    """
+    starts = rest_starts(100)
+    arguments: dict[str, Any] = {"dt": 0.01, "method": method, "formulation": formulation}
+    double = fm.integrate(SCENE, starts, t_eval=TIMES, **arguments)
+    single = fm.integrate(SCENE, starts, t_eval=TIMES, dtype="float32", **arguments)
+    assert (double.precision, single.precision) == ("float64", "float32")
+    assert single.y.dtype == np.float64
+    assert not single.status.any()
+    ordinary = magnification() < 1000.0
+    assert np.count_nonzero(ordinary) == 99
+    found = errors(single.y, double.y)
+    assert 0.0 < found[ordinary].max() <= 1e-4
+    assert found[~ordinary].max() <= 1e-5 * magnification().max()
+
+
+@pytest.mark.parametrize("method", ["rk4", "ab6"])
+def test_block_size_and_threads_do_not_matter(method: str) -> None:
+    starts, params = rest_starts(300), np.array(reduce(SCENE))
+
+    def states(block_lanes: int, threads: int) -> Any:
+        return run_ensemble(
+            right_hand_side(reduce(SCENE)),
+            params,
+            starts,
+            [0.0, 0.3, 0.5],
+            0.02,
+            METHODS[method],
+            threads=threads,
+            block_lanes=block_lanes,
+            precision=np.float32,
+        ).states
+
+    right = states(256, 1)
+    np.testing.assert_array_equal(right, right.astype(np.float32))
+    for block_lanes, threads in ((1, 1), (7, 2), (48, 1), (300, 2)):
+        np.testing.assert_array_equal(states(block_lanes, threads), right)
+
+
+def test_statuses_in_float32() -> None:
+    starts = rest_starts(40)
+    right = fm.integrate(SCENE, starts, 0.5, dtype="float32")
+    starts[3, 0] = np.nan
+    run, others = fm.integrate(SCENE, starts, 0.5, dtype="float32"), np.arange(40) != 3
+    np.testing.assert_array_equal(run.y[:, others], right.y[:, others])
+    np.testing.assert_array_equal(run.status == fm.Status.START_NOT_FINITE, ~others)
+
+
+def falling(t: float, x: float) -> tuple[float]:
+    return (-1.0,)
+
+
+def below_zero(t: float, x: float) -> float:
+    return 7.0 if x < 0.0 else 0.0
+
+
+def test_a_system_in_float32() -> None:
+    """x' = -1: exact in either precision where the steps are."""
+    run = fm.integrate(fm.System(falling, ["x"], {}), [[1.0], [2.5]], 2.0, 0.125, dtype="float32")
+    np.testing.assert_allclose(run.y[0, :, 0], [-1.0, 0.5], atol=1e-6)
+
+
+def test_what_float32_cannot_do_is_refused() -> None:
+    stopping = fm.System(falling, ["x"], {}, stop=below_zero)
+    with pytest.raises(InputError, match=r"^dtype = 'float32': not with a stopping condition$"):
+        fm.integrate(stopping, [1.0], 2.0, 0.1, dtype="float32")
+    for method in ("gauss4", "radau5", "sdirk4"):
+        message = f"^dtype = 'float32': not with the implicit method {method}$"
+        with pytest.raises(InputError, match=message):
+            fm.integrate(SCENE, rest_starts(1), 1.0, 0.1, method, dtype="float32")
+    with pytest.raises(InputError, match=r"^dtype = 'float16': must be one of float64, float32$"):
+        fm.integrate(SCENE, rest_starts(1), 1.0, 0.1, dtype="float16")
