@@ -89,7 +89,8 @@ def integrate(
         fit: whether each trajectory's step is fitted to its energy: ``dt`` then belongs to slow motions, and
             the faster a trajectory can become, the shorter its own step, see
             :mod:`fastmech.ensembles.fitting`. True: once, so that a trajectory's step is the same all along;
-            times [s]: at each of them, which pays where a damper slows fast motion down. Scenes only.
+            times [s]: at the start and at each of them, which pays where a damper slows fast motion down.
+            Scenes only.
         t_eval: output times [s], rising, not negative; only ``t_end`` by default.
         parameters: values of parameters, by name, that differ between trajectories, each of shape (n,).
         formulation: of a scene: "lagrange" integrates angles and rates (paper (13)), "hamilton" angles and
@@ -166,11 +167,13 @@ def _trajectories(
 
 
 def _fit_times(fit: bool | ArrayLike, scene: Scene | System) -> tuple[float, ...]:
-    if fit is False:
+    if isinstance(fit, bool | np.bool_) and not fit:
         return ()
     if isinstance(scene, System):
         raise InputError("fit: only for a scene, whose energy bounds its speed")
-    return (0.0,) if fit is True else tuple(checks.rising_times("fit", fit).tolist())
+    if isinstance(fit, bool | np.bool_):
+        return (0.0,)
+    return tuple(checks.rising_times("fit", fit).tolist())
 
 
 def _precision(dtype: str, problem: Problem, method: Method) -> Precision:

@@ -265,7 +265,7 @@ def _audit(
     Where one is above the tolerance the finer run is kept, and measured in its turn.
     """
     finite = np.flatnonzero(np.isfinite(starts).all(axis=1))
-    worst = finite[np.argsort(-np.nan_to_num(error[finite], nan=np.inf), kind="stable")[:AUDITED]]
+    worst = finite[np.argsort(-error[finite], kind="stable")[:AUDITED]]
     for _ in range(ROUNDS):
         if not worst.size:
             return
@@ -285,14 +285,11 @@ def _replace(best: Solution, which: NDArray[np.int64], run: Solution, part: NDAr
 
 
 def _distance(a: Floats, b: Floats) -> Floats:
-    """Largest difference of two runs (outputs, n, dim) over outputs and components, shape (n,)."""
+    """Largest difference of two runs (outputs, n, dim), shape (n,); infinite where one is not finite."""
     with np.errstate(invalid="ignore", over="ignore"):
-        return np.asarray(np.abs(a - b).max(axis=(0, 2)))
+        return np.nan_to_num(np.abs(a - b).max(axis=(0, 2)), nan=np.inf, posinf=np.inf)
 
 
 def _quantile(errors: Floats, level: float) -> float:
-    """An order statistic, so that what is not finite counts as large."""
-    if not errors.size:
-        return 0.0
-    ordered = np.sort(np.where(np.isfinite(errors), errors, np.inf))
-    return float(ordered[math.ceil(level * errors.size) - 1])
+    """An order statistic."""
+    return float(np.sort(errors)[math.ceil(level * errors.size) - 1]) if errors.size else 0.0
