@@ -50,8 +50,12 @@ def settings(problem: Problem) -> Iterator[tuple[str, str, dict[str, Any]]]:
             yield f"fastmech {method}, fitted again", f"dt = {dt:g} s", chosen | {"fit": again}
     for method, steps in SINGLE.items():
         for dt in steps:
-            chosen = {"method": method, "dt": dt, "dtype": "float32", "fit": again}
-            yield f"fastmech {method}, fitted, float32", f"dt = {dt:g} s", chosen
+            h = dt * problem.pace
+            yield (
+                f"fastmech {method}, float32",
+                f"dt = {h:g} s",
+                {"method": method, "dt": h, "dtype": "float32"},
+            )
     for tol in TOLERANCES:
         yield "fastmech tol", f"tol = {tol:g}, every error estimated", {"tol": tol}
         yield "fastmech tol, 99 %", f"tol = {tol:g}, 99 % quantile", {"tol": tol, "quantile": 0.99}

@@ -46,11 +46,13 @@ def whole_number(name: str, value: Any, *, least: int, most: int | None = None) 
 def states(name: str, values: ArrayLike, columns: int) -> NDArray[np.float64]:
     """An array of shape (n, columns); a single state becomes one row. Values need not be finite.
 
+    Not copied where it is one already: ten million states take 320 MB.
+
     Raises:
         InputError: not numbers, or another shape.
     """
     try:
-        array = np.array(values, dtype=np.float64, order="C", ndmin=2)
+        array = np.array(values, dtype=np.float64, order="C", ndmin=2, copy=None)
     except (TypeError, ValueError):
         raise InputError(f"{name}: must be numbers of shape (n, {columns})") from None
     if array.ndim != 2 or array.shape[1] != columns:
