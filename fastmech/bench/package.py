@@ -15,9 +15,9 @@ STEPS: dict[str, tuple[float, ...]] = {
     "tsit5": (0.15, 0.12, 0.08, 0.05, 0.03, 0.015),
     "verner6": (0.2, 0.14, 0.1, 0.06, 0.035, 0.02),
     "dop853": (0.25, 0.18, 0.12, 0.08, 0.05, 0.03, 0.018),
-    "hairer10": (0.3, 0.22, 0.16, 0.1, 0.07, 0.045, 0.03),
-    "ab6": (0.025, 0.017, 0.012, 0.008, 0.005),
-    "abm12": (0.022, 0.016, 0.0125, 0.009, 0.0065, 0.0045, 0.004),
+    "hairer10": (0.22, 0.16, 0.1, 0.07, 0.045, 0.03),
+    "ab6": (0.0225, 0.017, 0.012, 0.008, 0.005),
+    "abm12": (0.016, 0.0125, 0.009, 0.0065, 0.0045, 0.004),
 }
 
 #: The same where each trajectory's step is fitted to its energy: no step is scaled, fitting does that.
@@ -28,7 +28,7 @@ FITTED: dict[str, tuple[float, ...]] = {
 }
 
 #: Steps of methods in float32, where rounding leaves them something to say.
-SINGLE: dict[str, tuple[float, ...]] = {"ab6": (0.0235, 0.022, 0.018, 0.014), "rk4": (0.08, 0.05, 0.03)}
+SINGLE: dict[str, tuple[float, ...]] = {"ab6": (0.0225, 0.018, 0.014), "rk4": (0.08, 0.05, 0.03)}
 
 #: Shares of the run at which steps are fitted again.
 AGAIN = (0.0, 0.125, 0.5)

@@ -95,45 +95,6 @@ def observe_nothing(t: float, Y: Floats, params: Floats, record: Floats) -> None
     """The observer of runs that keep nothing but states."""
 
 
-@inlined
-def advance_block(
-    rhs: BlockRHS,
-    observe: Observer,
-    start: Integers,
-    stage: Integers,
-    weight: Floats,
-    nodes: Floats,
-    times: Floats,
-    steps: Integers,
-    params: Floats,
-    observer_params: Floats,
-    Y: Floats,
-    record: Floats,
-    out: Floats,
-) -> None:
-    """Take a block through all times; arguments as those of ``integrate_blocks``, without the blocks' axis.
-
-    A step's time is computed from its index, so rounding does not accumulate.
-    """
-    stages = nodes.shape[0]
-    dim, lanes = Y.shape
-    # Each array once as rows for the right-hand side and once flat for the stage sums.
-    K, Z = np.empty((stages, dim, lanes), dtype=Y.dtype), np.empty((dim, lanes), dtype=Y.dtype)
-    k_flat, z, y = K.reshape(stages, dim * lanes), Z.reshape(dim * lanes), Y.reshape(dim * lanes)
-    for j in range(steps.shape[0]):
-        h = (times[j + 1] - times[j]) / max(steps[j], 1)
-        for step in range(steps[j]):
-            t = times[j] + step * h
-            rhs(t, Y, K[0], params)
-            for s in range(1, stages):
-                k = start_stage(z, y, k_flat, h, stage, weight, int(start[s]), int(start[s + 1]))
-                add_stages(z, k_flat, h, stage, weight, k, int(start[s + 1]))
-                rhs(t + nodes[s] * h, Z, K[s], params)
-            add_stages(y, k_flat, h, stage, weight, int(start[stages]), int(start[stages + 1]))
-            observe(times[j] + (step + 1) * h, Y, observer_params, record)
-        out[j] = Y
-
-
 #: Types of a packed tableau: start, stage, weight, nodes.
 TABLEAU = (INTEGERS, INTEGERS, VECTOR, VECTOR)
 
@@ -157,21 +118,26 @@ def integrate_blocks(
     """Take blocks of lanes through all times, one block after the other.
 
     ``start``, ``stage``, ``weight`` and ``nodes`` are a packed tableau; the rest are the fields of
-    :class:`fastmech.integrators.batch.Batch`. ``observe`` is called after every step.
+    :class:`fastmech.integrators.batch.Batch`. ``observe`` is called after every
+    step. A step's time is computed from its index, so rounding does not accumulate.
     """
+    stages, dim, lanes = nodes.shape[0], Y.shape[1], Y.shape[2]
+    n = dim * lanes
+    # Each array once as rows for the right-hand side and once flat for the stage sums.
+    K, Z = np.empty((stages, dim, lanes), dtype=Y.dtype), np.empty((dim, lanes), dtype=Y.dtype)
+    k_flat, z = K.reshape(stages, n), Z.reshape(n)
     for b in range(Y.shape[0]):
-        advance_block(
-            rhs,
-            observe,
-            start,
-            stage,
-            weight,
-            nodes,
-            times,
-            steps,
-            params[b],
-            observer_params,
-            Y[b],
-            record[b],
-            out[b],
-        )
+        state, own, kept = Y[b], params[b], record[b]
+        y = state.reshape(n)
+        for j in range(steps.shape[0]):
+            h = (times[j + 1] - times[j]) / max(steps[j], 1)
+            for step in range(steps[j]):
+                t = times[j] + step * h
+                rhs(t, state, K[0], own)
+                for s in range(1, stages):
+                    k = start_stage(z, y, k_flat, h, stage, weight, int(start[s]), int(start[s + 1]))
+                    add_stages(z, k_flat, h, stage, weight, k, int(start[s + 1]))
+                    rhs(t + nodes[s] * h, Z, K[s], own)
+                add_stages(y, k_flat, h, stage, weight, int(start[stages]), int(start[stages + 1]))
+                observe(times[j] + (step + 1) * h, state, observer_params, kept)
+            out[b, j] = state

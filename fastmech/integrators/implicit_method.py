@@ -10,14 +10,14 @@ import numpy as np
 from fastmech.integrators.batch import Batch, Floats
 from fastmech.integrators.implicit import DIFFERENCES, GENERAL, SECOND_ORDER, integrate_implicit_block
 from fastmech.integrators.implicit_tableau import ImplicitTableau
-from fastmech.integrators.method import Method
+from fastmech.integrators.method import Method, OneStep
 
 #: Newton iterations that a step of ordinary length takes: what ``evaluations`` reckons with.
 TYPICAL_ITERATIONS = 4
 
 
 @dataclass(frozen=True)
-class ImplicitRungeKutta:
+class ImplicitRungeKutta(OneStep):
     """An implicit Runge-Kutta method, and the Jacobian of what it is to integrate.
 
     ``jacobian`` is a block kernel (:data:`fastmech.jit.JACOBIAN`); ``None`` takes forward differences of the
@@ -27,26 +27,6 @@ class ImplicitRungeKutta:
     tableau: ImplicitTableau
     jacobian: Any = None
     second_order: bool = False
-
-    @property
-    def name(self) -> str:
-        """Name in the registry."""
-        return self.tableau.name
-
-    @property
-    def order(self) -> int:
-        """Order of the error in the step's length."""
-        return self.tableau.order
-
-    @property
-    def source(self) -> str:
-        """Where its coefficients come from."""
-        return self.tableau.source
-
-    @property
-    def start_steps(self) -> int:
-        """None: every step stands alone."""
-        return 0
 
     def evaluations(self, steps: int) -> int:
         """Right-hand sides that so many steps take where Newton's iteration converges as usual."""

@@ -55,31 +55,37 @@ def _driver(module: ModuleType, name: str, batch: Batch) -> Any:
     return getattr(module, name)
 
 
-@dataclass(frozen=True)
-class RungeKutta:
-    """An explicit Runge-Kutta method: its tableau."""
+class OneStep:
+    """What a Runge-Kutta method takes from its tableau, explicit or implicit."""
 
-    tableau: Tableau
+    tableau: Any
 
     @property
     def name(self) -> str:
         """Name in the registry."""
-        return self.tableau.name
+        return str(self.tableau.name)
 
     @property
     def order(self) -> int:
         """Order of the error in the step's length."""
-        return self.tableau.order
+        return int(self.tableau.order)
 
     @property
     def source(self) -> str:
         """Where its coefficients come from."""
-        return self.tableau.source
+        return str(self.tableau.source)
 
     @property
     def start_steps(self) -> int:
         """None: every step stands alone."""
         return 0
+
+
+@dataclass(frozen=True)
+class RungeKutta(OneStep):
+    """An explicit Runge-Kutta method: its tableau."""
+
+    tableau: Tableau
 
     def evaluations(self, steps: int) -> int:
         """Right-hand sides that so many steps take."""

@@ -65,65 +65,6 @@ def add_correction(y: Floats, w: Floats, d: Floats, weight: float) -> None:
         y[i] += w[i] + own * d[i]
 
 
-@inlined
-def advance_multistep_block(
-    rhs: BlockRHS,
-    observe: Observer,
-    start: Integers,
-    stage: Integers,
-    weight: Floats,
-    nodes: Floats,
-    predictor: Floats,
-    corrector: Floats,
-    times: Floats,
-    steps: Integers,
-    params: Floats,
-    observer_params: Floats,
-    Y: Floats,
-    record: Floats,
-    out: Floats,
-) -> None:
-    """Take a block through all times; arguments as those of ``integrate_multistep_blocks``."""
-    stages, rows = nodes.shape[0], predictor.shape[0]
-    dim, lanes = Y.shape
-    n = dim * lanes
-    F, K = np.empty((rows, dim, lanes), dtype=Y.dtype), np.empty((stages, dim, lanes), dtype=Y.dtype)
-    Z, w = np.empty((dim, lanes), dtype=Y.dtype), np.empty(n, dtype=Y.dtype)
-    f, k_flat, z, y = F.reshape(rows, n), K.reshape(stages, n), Z.reshape(n), Y.reshape(n)
-    row = np.empty(rows, dtype=np.int64)  # row[a] holds the derivative of a steps ago
-    known, newest, last = 0, 0, 0.0
-    for j in range(steps.shape[0]):
-        if steps[j] == 0:
-            out[j] = Y
-            continue
-        h = (times[j + 1] - times[j]) / steps[j]
-        if abs(h - last) > ROUNDED_TIME * max(abs(times[j]), abs(times[j + 1])):
-            known, last = 0, h
-        for step in range(steps[j]):
-            t = times[j] + step * h
-            newest = (newest + 1) % rows
-            known = min(known + 1, rows)
-            rhs(t, Y, F[newest], params)
-            if known < rows:
-                k_flat[0] = f[newest]
-                for s in range(1, stages):
-                    k = start_stage(z, y, k_flat, h, stage, weight, int(start[s]), int(start[s + 1]))
-                    add_stages(z, k_flat, h, stage, weight, k, int(start[s + 1]))
-                    rhs(t + nodes[s] * h, Z, K[s], params)
-                add_stages(y, k_flat, h, stage, weight, int(start[stages]), int(start[stages + 1]))
-            else:
-                for a in range(rows):
-                    row[a] = (newest - a) % rows
-                if corrector.shape[0]:
-                    predict_and_correct(z, w, y, f, h, row, predictor, corrector[1:])
-                    rhs(t + h, Z, K[0], params)
-                    add_correction(y, w, k_flat[0], h * corrector[0])
-                else:
-                    add_stages(y, f, h, row, predictor, 0, rows)
-            observe(times[j] + (step + 1) * h, Y, observer_params, record)
-        out[j] = Y
-
-
 #: Types of the starter's packed tableau, of the predictor and of the corrector.
 ADAMS = (*TABLEAU, VECTOR, VECTOR)
 
@@ -153,21 +94,44 @@ def integrate_multistep_blocks(
     are the packed tableau of the starter; the rest are the fields of
     :class:`fastmech.integrators.batch.Batch`. The method starts anew wherever the step's length changes.
     """
+    stages, rows = nodes.shape[0], predictor.shape[0]
+    dim, lanes = Y.shape[1], Y.shape[2]
+    n = dim * lanes
+    F, K = np.empty((rows, dim, lanes), dtype=Y.dtype), np.empty((stages, dim, lanes), dtype=Y.dtype)
+    Z, w = np.empty((dim, lanes), dtype=Y.dtype), np.empty(n, dtype=Y.dtype)
+    f, k_flat, z = F.reshape(rows, n), K.reshape(stages, n), Z.reshape(n)
+    row = np.empty(rows, dtype=np.int64)  # row[a] holds the derivative of a steps ago
     for b in range(Y.shape[0]):
-        advance_multistep_block(
-            rhs,
-            observe,
-            start,
-            stage,
-            weight,
-            nodes,
-            predictor,
-            corrector,
-            times,
-            steps,
-            params[b],
-            observer_params,
-            Y[b],
-            record[b],
-            out[b],
-        )
+        state, own, kept = Y[b], params[b], record[b]
+        y = state.reshape(n)
+        known, newest, last = 0, 0, 0.0
+        for j in range(steps.shape[0]):
+            if steps[j] == 0:
+                out[b, j] = state
+                continue
+            h = (times[j + 1] - times[j]) / steps[j]
+            if abs(h - last) > ROUNDED_TIME * max(abs(times[j]), abs(times[j + 1])):
+                known, last = 0, h
+            for step in range(steps[j]):
+                t = times[j] + step * h
+                newest = (newest + 1) % rows
+                known = min(known + 1, rows)
+                rhs(t, state, F[newest], own)
+                if known < rows:
+                    k_flat[0] = f[newest]
+                    for s in range(1, stages):
+                        k = start_stage(z, y, k_flat, h, stage, weight, int(start[s]), int(start[s + 1]))
+                        add_stages(z, k_flat, h, stage, weight, k, int(start[s + 1]))
+                        rhs(t + nodes[s] * h, Z, K[s], own)
+                    add_stages(y, k_flat, h, stage, weight, int(start[stages]), int(start[stages + 1]))
+                else:
+                    for a in range(rows):
+                        row[a] = (newest - a) % rows
+                    if corrector.shape[0]:
+                        predict_and_correct(z, w, y, f, h, row, predictor, corrector[1:])
+                        rhs(t + h, Z, K[0], own)
+                        add_correction(y, w, k_flat[0], h * corrector[0])
+                    else:
+                        add_stages(y, f, h, row, predictor, 0, rows)
+                observe(times[j] + (step + 1) * h, state, observer_params, kept)
+            out[b, j] = state
