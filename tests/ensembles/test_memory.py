@@ -1,0 +1,57 @@
+"""Runs that would not fit into memory are refused before any is taken."""
+
+from __future__ import annotations
+
+import tracemalloc
+from typing import Any
+
+import numpy as np
+import pytest
+from ensembles.starts import random_starts
+
+import fastmech as fm
+from fastmech.ensembles import checks, integrate
+from fastmech.errors import InputError
+from fastmech.scene import Scene
+
+TIMES = np.linspace(0.0, 0.1, 2001)
+STATES = TIMES.size * 20 * 4 * 8  #: bytes of the states of 20 trajectories
+
+
+@pytest.mark.parametrize("arguments", [{}, {"tol": 1e-4}, {"formulation": "hamilton"}])
+def test_too_little_memory_is_refused_before_any_is_taken(
+    arguments: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(checks, "free_memory", lambda: float(STATES))
+    starts = random_starts(20)
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError, match=r"^y0, t_eval: the states would .* are free") as error:
+            fm.integrate(Scene(), starts, t_eval=TIMES, **arguments)
+        assert tracemalloc.get_traced_memory()[1] < STATES / 4
+    finally:
+        tracemalloc.stop()
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("arguments", [{}, {"fit": [0.0, 0.05]}, {"formulation": "hamilton"}, {"tol": 1e-4}])
+def test_no_run_takes_more_than_it_was_checked_for(
+    arguments: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What a run asks for is what Python's own bookkeeping sees it take, but for small change."""
+    asked: list[float] = []
+    original = checks.memory
+
+    def noted(numbers: int, copies: int) -> None:
+        asked.append(8.0 * numbers * copies)
+        original(numbers, copies)
+
+    monkeypatch.setattr(integrate.checks, "memory", noted)
+    starts = random_starts(400)
+    fm.integrate(Scene(), starts, t_eval=TIMES[:3], **arguments)  # whatever is compiled, is by now
+    tracemalloc.start()
+    try:
+        fm.integrate(Scene(), starts, t_eval=TIMES, **arguments)
+        assert tracemalloc.get_traced_memory()[1] < 1.1 * asked[-1]
+    finally:
+        tracemalloc.stop()
