@@ -12,13 +12,8 @@ from fastmech.scan_types.request import RunContext, read_request
 from fastmech.store.read import Results, open_results
 from fastmech.tiles.assemble import CHANGE
 from fastmech.tiles.report import RunReport
-from fastmech.tiles.run import ScanRun
+from fastmech.tiles.run import ScanRun, default_output
 from fastmech.tiles.work import Hiring, ThreadHiring
-
-
-def default_output(path: str | Path) -> Path:
-    """Where the results of a request file go unless told otherwise."""
-    return Path("results") / f"{Path(path).stem}.h5"
 
 
 def run_request(

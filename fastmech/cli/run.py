@@ -57,8 +57,9 @@ def command(
         raise click.UsageError("--workers and --scheduler exclude each other")
     with terminable(), ProgressBars(quiet) as bars:
         with bars.preparing():
-            from fastmech.runner import default_output, run_request
+            from fastmech.runner import run_request
             from fastmech.scan_types.request import RunContext
+            from fastmech.tiles.run import default_output
         context = RunContext(threads, bars.stage)
         target = out or default_output(request_file)
         if tile is not None:

@@ -26,6 +26,9 @@ from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
 
+#: Starts that one stream of random numbers gives; the next ones have a stream of their own.
+STREAM = 65_536
+
 #: Trajectories of the largest ensemble: its results take about 150 bytes each in memory.
 MOST_TRAJECTORIES = 100_000_000
 
@@ -64,14 +67,16 @@ def disturb(
     dt: float = 0.05,
     method: str = "dop853",
     return_radius: float = 0.01,
+    part: slice | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> DisturbedEnsemble:
     """Disturb an equilibrium at random and follow every disturbance.
 
     Starts are uniform in the ball of the given ``radius`` about the equilibrium, in the norm of
-    :class:`fastmech.disturbance.size.Size`, drawn by NumPy's ``default_rng([seed, index])``. Rest is being
-    within ``return_radius`` of a minimum, in its norm, without the energy to leave; see
+    :class:`fastmech.disturbance.size.Size`; the k-th 65,536 of them (k = 0, 1, ...) are drawn by NumPy's
+    ``default_rng([seed, index, 0, k])``, so any part of an ensemble can be had without the rest. Rest is
+    being within ``return_radius`` of a minimum, in its norm, without the energy to leave; see
     :func:`fastmech.disturbance.outcome.resting_place`.
 
     Args:
@@ -84,6 +89,7 @@ def disturb(
         dt: longest step [s].
         method: name of the method.
         return_radius: radius of the ball of return [rad].
+        part: which of the n disturbances to follow, with a step of 1; all by default.
         threads: threads to use; the result does not depend on it.
         progress: is told how many trajectories have finished since its last call.
 
@@ -100,9 +106,8 @@ def disturb(
     index = equilibria.index_of(equilibrium)
     center = np.array([equilibrium.phi, equilibrium.theta, 0.0, 0.0])
     size = size_at(scene, equilibrium.phi, equilibrium.theta)
-    # A stream for each equilibrium, shared with no other seed.
-    rng = np.random.default_rng([seed, index])
-    starts = center + size.from_ball(radius * uniform_ball(rng, n))
+    chosen = range(*(part or slice(None)).indices(n))
+    starts = center + size.from_ball(radius * _starts_in_ball(seed, index, n, chosen))
 
     departure = np.abs(starts - center)
     run = run_ensemble(
@@ -120,7 +125,7 @@ def disturb(
     end_index, turns = resting_place(scene, equilibria, final, return_radius)
     turned = (turns != 0).any(axis=1)
     stable = np.array([e.kind == "minimum" for e in equilibria])
-    outcome = np.full(n, Outcome.UNDECIDED, dtype=np.int8)
+    outcome = np.full(len(starts), Outcome.UNDECIDED, dtype=np.int8)
     outcome[(end_index >= 0) & stable[end_index]] = Outcome.ELSEWHERE
     outcome[(end_index >= 0) & ~stable[end_index]] = Outcome.AT_UNSTABLE
     outcome[(end_index == index) & ~turned & stable[end_index]] = Outcome.RETURNED
@@ -171,6 +176,17 @@ def equilibria_to_disturb(scene: Scene) -> Equilibria:
     if not equilibria:
         raise InputError(f"scene: has no equilibrium to disturb: {equilibria.certificate.sentence}")
     return equilibria
+
+
+def _starts_in_ball(seed: int, index: int, n: int, chosen: range) -> Floats:
+    """Points ``chosen`` of n in the unit ball, from streams that no other seed or equilibrium has."""
+    first, last = chosen.start // STREAM, max(chosen.start, chosen.stop - 1) // STREAM
+    streams = [
+        uniform_ball(np.random.default_rng([seed, index, 0, k]), min(STREAM, n - k * STREAM))
+        for k in range(first, last + 1)
+    ]
+    offset = first * STREAM
+    return np.concatenate(streams)[chosen.start - offset : chosen.stop - offset]
 
 
 def uniform_ball(rng: np.random.Generator, n: int) -> Floats:

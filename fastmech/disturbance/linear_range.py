@@ -41,6 +41,7 @@ def linear_range(
     directions: int = 256,
     seed: int = 0,
     dt: float = 0.02,
+    part: slice | None = None,
     threads: int | None = None,
 ) -> LinearRange:
     """Size of disturbance up to which the linearized motion stays within ``tolerance`` of the nonlinear one.
@@ -49,7 +50,7 @@ def linear_range(
     size(nonlinear), both over 201 evenly spaced times of [0, horizon], in the norm of
     :class:`fastmech.disturbance.size.Size`. Along every direction (uniform on the sphere) sizes from 1e-6 rad
     to pi rad are tried upwards, and the first crossing of the tolerance is refined by bisection to one part
-    in 10,000.
+    in 10,000. ``part`` says which of the directions to try, all by default.
 
     Raises:
         InputError: an argument is wrong, the scene's force decays, or the equilibrium is not the scene's.
@@ -60,7 +61,8 @@ def linear_range(
     seed = checks.whole_number("seed", seed, least=0)
     size = size_at(scene, equilibrium.phi, equilibrium.theta)
     index = equilibria_to_disturb(scene).index_of(equilibrium)
-    rays = size.from_ball(unit_directions(np.random.default_rng([seed, index, 1]), count))
+    rng = np.random.default_rng([seed, index, 1])
+    rays = size.from_ball(unit_directions(rng, count))[part or slice(None)]
     times = np.linspace(0.0, horizon, OUTPUTS + 1)
 
     def deviation(sizes: Floats) -> Floats:
@@ -73,7 +75,7 @@ def linear_range(
 
     grid = np.geomspace(SMALLEST, LARGEST, GRID)
     # What is not finite deviates: the comparison is written so that NaN counts as exceeding.
-    exceeded = ~(deviation(np.broadcast_to(grid, (count, GRID))) <= tolerance)
+    exceeded = ~(deviation(np.broadcast_to(grid, (len(rays), GRID))) <= tolerance)
     first = np.argmax(exceeded, axis=1)
     low, high = grid[np.maximum(first - 1, 0)], grid[first]
     for _ in range(BISECTIONS):

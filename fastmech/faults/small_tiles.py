@@ -1,26 +1,34 @@
-"""Tiles of equilibrium maps so small that a short scan has many of them."""
+"""Tiles so small that a short scan of any kind has many of them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from fastmech.scan_types import map_tiling
+from fastmech.scan_types import basin_tiling, disturbed_tiling, map_tiling
 
-#: Points of a tile.
-POINTS = 20
+#: What decides the size of tiles, and what it is while they are to be small.
+SIZES = (
+    (map_tiling, "TILE_POINTS", 20),
+    (basin_tiling, "TILE_POINTS", 20),
+    (disturbed_tiling, "EVALUATIONS", 1),
+    (disturbed_tiling, "DIRECTIONS", 3),
+)
 
 
 @contextmanager
 def small_tiles() -> Iterator[None]:
     """Small tiles in this process while the block runs."""
-    before, map_tiling.TILE_POINTS = map_tiling.TILE_POINTS, POINTS
+    before = [getattr(module, name) for module, name, _ in SIZES]
+    dask_setup()
     try:
         yield
     finally:
-        map_tiling.TILE_POINTS = before
+        for (module, name, _), size in zip(SIZES, before, strict=True):
+            setattr(module, name, size)
 
 
-def dask_setup(worker: object) -> None:
-    """Small tiles in a Dask worker that is started with this module as its preload."""
-    map_tiling.TILE_POINTS = POINTS
+def dask_setup(worker: object = None) -> None:
+    """Small tiles from now on; so begins a Dask worker that is started with this module as its preload."""
+    for module, name, size in SIZES:
+        setattr(module, name, size)

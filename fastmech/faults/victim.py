@@ -38,6 +38,22 @@ axes.c2 = { start = 1.0, stop = 900.0, num = 4 }
 [scan.line]
 kind = "equilibrium_map"
 axes.c2 = { start = 1.0, stop = 900.0, num = 100 }
+[scan.shocks]
+kind = "disturbed"
+trajectories = 600
+t_end = 1.0
+linear_directions = 6
+[scan.shock]
+kind = "disturbed_motion"
+t_end = 0.1
+outputs = 11
+[scan.snap]
+kind = "snap"
+[scan.basins]
+kind = "basins"
+t_end = 1.0
+axes.phi = { start = -1.0, stop = 1.0, num = 4 }
+axes.theta = { start = -1.0, stop = 1.0, num = 10 }
 """
 
 #: Threads of a run.

@@ -6,20 +6,26 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from fastmech.disturbance.ensemble import equilibria_to_disturb
 from fastmech.disturbance.motion import disturbed_motion
 from fastmech.ensembles.spans import output_steps
+from fastmech.equilibria.find import Equilibria, Equilibrium
 from fastmech.results import Dataset, Variable
-from fastmech.scan_types.request import HALVING, MethodName, RunContext, Scan, failures
+from fastmech.scan_types.each import Each
+from fastmech.scan_types.request import HALVING, MethodName, TiledScan, failures
+from fastmech.scan_types.tiling import Tiling
 from fastmech.scene import Scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+Floats = NDArray[np.float64]
 
-class DisturbedMotionScan(Scan):
+
+class DisturbedMotionScan(TiledScan):
     """The same disturbance of every equilibrium; the default is the paper's: xi1 = 0.1, eta1 = 0.1."""
 
     kind: ClassVar[str] = "disturbed_motion"
@@ -37,44 +43,58 @@ class DisturbedMotionScan(Scan):
         """There must be something to disturb, and a constant force."""
         equilibria_to_disturb(scene)
 
-    def run(self, scene: Scene, context: RunContext) -> Dataset:
-        """Integrate the disturbance of each equilibrium; the linearized motion is a matrix exponential."""
+    def tiling(self, scene: Scene) -> Tiling:
+        """The equilibria one by one."""
         equilibria = equilibria_to_disturb(scene)
-        t = np.linspace(0.0, self.t_end, self.outputs)
+        return Each(
+            "disturbed motions",
+            len(equilibria),
+            lambda index: self._one(scene, equilibria[index]),
+            lambda tiles: self._joined(equilibria, tiles),
+        )
+
+    @property
+    def _times(self) -> Floats:
+        return np.linspace(0.0, self.t_end, self.outputs)
+
+    def _one(self, scene: Scene, equilibrium: Equilibrium) -> Dataset:
+        """Integrate one disturbance; the linearized motion is a matrix exponential."""
+        t = self._times
         disturbance = [self.xi_phi, self.xi_theta, self.eta_phi, self.eta_theta]
-        advance = context.stage("disturbed motion", len(equilibria))
         # The step taken: what divides the intervals between outputs.
         step = t[1] / output_steps(t[:2], self.dt)[0]
-        motions, differences = [], []
-        for equilibrium in equilibria:
-            motion, halved = (
-                disturbed_motion(scene, equilibrium, disturbance, t, dt=dt, method=self.method)
-                for dt in (step, 0.5 * step)
-            )
-            motions.append(motion)
-            differences.append(np.max(np.abs(halved.nonlinear - motion.nonlinear)))
-            advance(1)
+        motion, halved = (
+            disturbed_motion(scene, equilibrium, disturbance, t, dt=dt, method=self.method)
+            for dt in (step, 0.5 * step)
+        )
+        difference = np.max(np.abs(halved.nonlinear - motion.nonlinear))
+        return Dataset(
+            {
+                "nonlinear": Variable(("time", "component"), motion.nonlinear[:, 0]),
+                "linearized": Variable(("time", "component"), motion.linearized[:, 0]),
+                "difference": Variable((), difference),
+            }
+        )
+
+    def _joined(self, equilibria: Equilibria, tiles: list[Dataset]) -> Dataset:
         dims = ("equilibrium", "time", "component")
         variables = {
-            "time": Variable(("time",), t, "s", "time"),
+            "time": Variable(("time",), self._times, "s", "time"),
             "phi": Variable(("equilibrium",), equilibria.phi, "rad", "angle phi of the equilibrium"),
             "theta": Variable(("equilibrium",), equilibria.theta, "rad", "angle theta of the equilibrium"),
-            "nonlinear": Variable(
-                dims,
-                np.stack([m.nonlinear[:, 0] for m in motions]),
-                "rad, rad/s",
-                "disturbance of phi, theta, phi', theta', nonlinear motion",
-            ),
-            "linearized": Variable(
-                dims,
-                np.stack([m.linearized[:, 0] for m in motions]),
-                "rad, rad/s",
-                "disturbance of phi, theta, phi', theta', linearized motion",
-            ),
+            **{
+                kind: Variable(
+                    dims,
+                    np.stack([tile[kind].data for tile in tiles]),
+                    "rad, rad/s",
+                    f"disturbance of phi, theta, phi', theta', {kind} motion",
+                )
+                for kind in ("nonlinear", "linearized")
+            },
         }
-        failed = [not np.isfinite(motion.nonlinear).all() for motion in motions]
+        failed = [not np.isfinite(tile["nonlinear"].data).all() for tile in tiles]
         attrs = self.model_dump(exclude={"scene"}) | {
-            "error_estimate": float(np.max(differences)),
+            "error_estimate": float(np.max([tile["difference"].data for tile in tiles])),
             "error_estimate_is": HALVING,
         }
         return Dataset(variables, attrs | failures(np.array(failed)))

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from fastmech.ensembles.balance import energy_balance
 from fastmech.ensembles.integrate import integrate
+from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.status import Status
 from fastmech.mechanism.coefficients import force
 from fastmech.mechanism.geometry import constraints, positions
 from fastmech.mechanism.hamilton import momenta
 from fastmech.mechanism.reactions import reactions
 from fastmech.results import Dataset, Variable
-from fastmech.scan_types.request import HALVING, MethodName, RunContext, Scan, failures
+from fastmech.scan_types.each import Each
+from fastmech.scan_types.request import HALVING, MethodName, TiledScan, failures
+from fastmech.scan_types.tiling import Tiling
 from fastmech.scene import Scene
 
 if TYPE_CHECKING:
@@ -43,7 +47,7 @@ _BALANCE = {
 }
 
 
-class Motion(Scan):
+class Motion(TiledScan):
     """Motion from one start; the default start is the paper's (Table 1)."""
 
     kind: ClassVar[str] = "motion"
@@ -57,19 +61,53 @@ class Motion(Scan):
     dt: Annotated[float, Field(gt=0)] = 0.01
     method: MethodName = "dop853"
 
-    def run(self, scene: Scene, context: RunContext) -> Dataset:
-        """Integrate in both formulations and derive everything else from the Lagrangian one."""
-        start = [self.phi, self.theta, self.phi_dot, self.theta_dot]
-        t = np.linspace(0.0, self.t_end, self.outputs)
-        advance = context.stage("motion", 4)
-        run = integrate(scene, start, dt=self.dt, method=self.method, t_eval=t)
-        advance(1)
-        canonical = integrate(scene, start, dt=self.dt, method=self.method, t_eval=t, formulation="hamilton")
-        advance(1)
-        balance = energy_balance(scene, start, t, dt=self.dt, method=self.method)
-        advance(1)
-        y = run.y[:, 0]
-        p = momenta(scene, canonical.y[:, 0])
+    def tiling(self, scene: Scene) -> Tiling:
+        """Four integrations of the same motion, none of which needs another."""
+        parts = (self._lagrangian, self._canonical, self._balance, self._halved)
+        return Each(
+            "integrations of the motion",
+            len(parts),
+            lambda index: parts[index](scene),
+            lambda tiles: self._joined(scene, tiles),
+        )
+
+    @property
+    def _start(self) -> list[float]:
+        return [self.phi, self.theta, self.phi_dot, self.theta_dot]
+
+    @property
+    def _times(self) -> NDArray[np.float64]:
+        return np.linspace(0.0, self.t_end, self.outputs)
+
+    def _lagrangian(self, scene: Scene) -> Dataset:
+        run = integrate(scene, self._start, dt=self.dt, method=self.method, t_eval=self._times)
+        return Dataset(_states(run.y), {"steps": run.steps} | failures(run.status != Status.OK))
+
+    def _canonical(self, scene: Scene) -> Dataset:
+        settings: dict[str, Any] = {"dt": self.dt, "method": self.method, "formulation": "hamilton"}
+        return Dataset(_states(integrate(scene, self._start, t_eval=self._times, **settings).y))
+
+    def _balance(self, scene: Scene) -> Dataset:
+        balance = energy_balance(scene, self._start, self._times, dt=self.dt, method=self.method)
+        values = (
+            balance.kinetic,
+            balance.potential,
+            balance.work_damper,
+            balance.work_force,
+            balance.residual,
+        )
+        return Dataset({n: Variable(("time",), v) for n, v in zip(_BALANCE, values, strict=True)})
+
+    def _halved(self, scene: Scene) -> Dataset:
+        t = self._times
+        step = float(np.max(np.diff(t) / output_steps(t, self.dt)))  # the step that the others take
+        return Dataset(_states(integrate(scene, self._start, dt=0.5 * step, method=self.method, t_eval=t).y))
+
+    def _joined(self, scene: Scene, tiles: list[Dataset]) -> Dataset:
+        """Derive everything else from the Lagrangian motion."""
+        lagrangian, _, balance, _ = tiles
+        t, y, canonical, halved = self._times, *(tiles[k]["y"].data for k in (0, 1, 3))
+        p = momenta(scene, canonical)
         points = positions(scene, y)
         along = ("time",)
         variables = {
@@ -81,7 +119,7 @@ class Motion(Scan):
             ),
             "formulation_difference": Variable(
                 ("time", "component"),
-                canonical.y[:, 0] - y,
+                canonical - y,
                 "rad or rad/s",
                 "canonical less Lagrangian phi, theta, phi', theta'",
             ),
@@ -100,29 +138,14 @@ class Motion(Scan):
                 name: Variable(along, value, "N", _REACTIONS[name])
                 for name, value in reactions(scene, y, t)._asdict().items()
             },
-            **{
-                name: Variable(along, value, "J", about)
-                for (name, about), value in zip(
-                    _BALANCE.items(),
-                    (
-                        balance.kinetic,
-                        balance.potential,
-                        balance.work_damper,
-                        balance.work_force,
-                        balance.residual,
-                    ),
-                    strict=True,
-                )
-            },
+            **{name: Variable(along, balance[name].data, "J", about) for name, about in _BALANCE.items()},
         }
-        halved = integrate(scene, start, dt=0.5 * run.dt, method=self.method, t_eval=t)
         attrs = self.model_dump(exclude={"scene"}) | {
-            "steps": run.steps,
-            "error_estimate": float(np.max(np.abs(halved.y[:, 0] - y))),
+            "steps": lagrangian.attrs["steps"],
+            "error_estimate": float(np.max(np.abs(halved - y))),
             "error_estimate_is": HALVING,
+            "failed": lagrangian.attrs["failed"],
         }
-        advance(1)
-        attrs |= failures(run.status != Status.OK)
         return Dataset(variables, attrs)
 
     @staticmethod
@@ -131,3 +154,8 @@ class Motion(Scan):
         from fastmech.plots.motion import draw_motion
 
         return draw_motion(dataset)
+
+
+def _states(y: NDArray[np.float64]) -> dict[str, Variable]:
+    """States of one motion (time, 1, 4) as a tile keeps them."""
+    return {"y": Variable(("time", "component"), y[:, 0])}

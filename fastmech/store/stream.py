@@ -23,7 +23,7 @@ from fastmech.store.schema import DIM_NUMBER, DIM_NUMBERS, DIMENSION_ONLY, LIBRA
 #: Where a part of the streamed variables lies: along the first dimension, or along several from the first on.
 Place: TypeAlias = "slice | tuple[slice, ...]"
 
-#: Part of the streamed variables, or small variables that are known only then.
+#: Part of the streamed variables, or small variables and attributes that are known only then.
 Piece: TypeAlias = "tuple[Place, Mapping[str, NDArray[Any]]] | Dataset"
 
 #: Bytes of a chunk of a streamed variable, about: read as a whole, kept while it is filled.
@@ -60,9 +60,11 @@ def in_memory(stream: Stream) -> Dataset:
         for name, variable in stream.plane.items()
     }
     late: dict[str, Variable] = {}
+    attrs = dict(stream.fixed.attrs)
     for piece in stream.pieces():
         if isinstance(piece, Dataset):
             late |= piece.variables
+            attrs |= piece.attrs
             continue
         place, parts = piece
         for name, part in parts.items():
@@ -71,7 +73,7 @@ def in_memory(stream: Stream) -> Dataset:
         name: Variable(about.dims, arrays[name], about.units, about.long_name, about.attrs)
         for name, about in stream.plane.items()
     }
-    return Dataset({**stream.fixed.variables, **streamed, **late}, stream.fixed.attrs)
+    return Dataset({**stream.fixed.variables, **streamed, **late}, attrs)
 
 
 def write_stream(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import shlex
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -26,6 +27,11 @@ from fastmech.tiles.work import Crash, Hiring, Task, compute_tiles
 
 #: How often a result is assembled anew because a tile was damaged meanwhile.
 ASSEMBLIES = 3
+
+
+def default_output(path: str | Path) -> Path:
+    """Where the results of a request file go unless told otherwise."""
+    return Path("results") / f"{Path(path).stem}.h5"
 
 
 class ScanRun:
@@ -250,8 +256,11 @@ class ScanRun:
 
     def _crash_report(self) -> str:
         first = self.crashes[0]
-        where = f"{first.task.section.name}:{first.task.index}"
+        command = ["fastmech", "run", str(self.request_file)]
+        if self.target != default_output(self.request_file):
+            command += ["--out", str(self.target)]
+        command += ["--tile", f"{first.task.section.name}:{first.task.index}", "--keep", "tile.h5"]
         return self._kept(
             f"{len(self.crashes)} of {len(self.tasks)} tiles failed twice, the first with {first.reason}"
-            f" (alone: fastmech run {self.request_file} --tile {where})"
+            f" (alone: {shlex.join(command)})"
         )

@@ -7,6 +7,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from fastmech.cli import main
+from fastmech.tiles.section import _tiling
 
 TINY = """
 title = "a tiny request"
@@ -30,6 +31,7 @@ Invoke = Callable[..., Result]
 @pytest.fixture(autouse=True)
 def _in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+    _tiling.cache_clear()
 
 
 @pytest.fixture

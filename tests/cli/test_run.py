@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import re
+import shlex
 from pathlib import Path
 
 import pytest
 from cli.refusal import assert_refused
 
 from fastmech import Scene, open_results
+from fastmech.scan_types.disturbed_tiling import DisturbedTiling
 from fastmech.scan_types.motion import Motion
 
 MOTION = '[scan.a]\nkind = "motion"\noutputs = 3\nt_end = 0.1\n'
@@ -123,7 +126,11 @@ def test_output_that_cannot_be_written(invoke, tiny, monkeypatch, fresh):
     assert files() == {"tiny.toml", "file"}
 
 
-def out_of_luck(self, scene, context):
+def interrupt(*arguments, **options):
+    raise KeyboardInterrupt
+
+
+def out_of_luck(self, scene, *context):
     raise RuntimeError("out of luck")
 
 
@@ -134,25 +141,25 @@ def test_a_crash_is_one_line_with_the_command_that_repeats_it(invoke, tiny, monk
         assert result.exit_code == 1
         assert result.stdout == ""
         (line,) = result.stderr.splitlines()
-        assert "1 of 2 tiles failed twice, the first with RuntimeError: out of luck" in line
-        assert "fastmech run tiny.toml --tile rest:0" in line
-        assert "1 of 2 tiles are kept in x.h5.parts; the same command goes on" in line
+        assert "1 of 5 tiles failed twice, the first with RuntimeError: out of luck" in line
+        assert "(alone: fastmech run tiny.toml --out x.h5 --tile rest:0 --keep tile.h5)" in line
+        assert "4 of 5 tiles are kept in x.h5.parts; the same command goes on" in line
         assert not Path("x.h5").exists()
         with pytest.raises(RuntimeError, match="out of luck"):
             invoke("run", tiny, "--tile", "rest:0")
-    monkeypatch.setattr(Motion, "run", out_of_luck)  # this tile is there already
+    monkeypatch.setattr(Motion, "_lagrangian", out_of_luck)  # this tile is there already
     assert invoke("run", tiny, "--out", "x.h5").exit_code == 0
     assert files() == {"tiny.toml", "x.h5"}
 
 
 def test_a_tile_that_crashes_once_is_tried_again(invoke, tiny, monkeypatch):
-    run, calls = Motion.run, []
+    compute, calls = Motion._lagrangian, []
 
-    def fail_once(self, scene, context):
+    def fail_once(self, scene):
         calls.append(scene)
-        return out_of_luck(self, scene, context) if len(calls) == 1 else run(self, scene, context)
+        return out_of_luck(self, scene) if len(calls) == 1 else compute(self, scene)
 
-    monkeypatch.setattr(Motion, "run", fail_once)
+    monkeypatch.setattr(Motion, "_lagrangian", fail_once)
     assert invoke("run", tiny, "--out", "x.h5").exit_code == 0
     assert len(calls) == 2
 
@@ -165,17 +172,13 @@ def test_a_crash_leaves_the_older_file(invoke, tiny, monkeypatch):
     assert Path("x.h5").read_text(encoding="utf-8") == "older"
     result = invoke("run", tiny, "--out", "x.h5")
     assert result.exit_code == 0, "what was begun with --fresh goes on without"
-    assert "1 of 2 tiles are kept from before" in result.stderr
+    assert "4 of 5 tiles are kept from before" in result.stderr
     with open_results("x.h5") as results:
         assert results.sections == ("swing", "rest")
 
 
 def test_interruption_is_one_line_and_writes_nothing(invoke, tiny, monkeypatch):
-    def interrupt(self, scene, context):
-        context.stage("long work", 10)(1)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(Motion, "run", interrupt)
+    monkeypatch.setattr("fastmech.tiles.parts.Parts.store", interrupt)
     result = invoke("run", tiny, "--out", "x.h5")
     assert result.exit_code == 130
     assert result.stderr == "fastmech: interrupted\n"
@@ -190,7 +193,7 @@ def test_the_same_run_again_has_nothing_to_do(invoke, tiny, monkeypatch):
     assert result.exit_code == 0
     summary = json.loads(result.stdout)
     assert summary["was_complete"] is True
-    assert (summary["tiles"], summary["computed"]) == (2, 0)
+    assert (summary["tiles"], summary["computed"]) == (5, 0)
     assert Path("x.h5").read_bytes() == before
     tiny.write_text("# a remark\n" + tiny.read_text(encoding="utf-8"), encoding="utf-8")
     assert "holds this result already" in invoke("run", tiny, "--out", "x.h5").stdout
@@ -206,20 +209,66 @@ def test_a_changed_request_is_refused_with_what_differs(invoke, tiny):
     )
 
 
-@pytest.mark.parametrize("tile", ["swing", "swing:1", "swing:-1", "swing:x", "none:0", "swing:0:0", ":"])
+@pytest.mark.parametrize("tile", ["swing", "swing:4", "swing:-1", "swing:x", "none:0", "swing:0:0", ":"])
 def test_a_tile_that_is_none(invoke, tiny, tile):
     assert_refused(invoke("run", tiny, "--tile", tile), f"--tile {tile}")
 
 
 def test_one_tile_alone(invoke, tiny):
-    result = invoke("run", tiny, "--tile", "swing:0", "--keep", "tile.h5")
+    result = invoke("run", tiny, "--tile", "rest:0", "--keep", "tile.h5")
     assert result.exit_code == 0
     assert "Content: " in result.stdout
     assert invoke("run", tiny, "--out", "x.h5").exit_code == 0
     with open_results("tile.h5") as tile, open_results("x.h5") as whole:
-        assert set(tile["swing"]) == set(whole["swing"])
-        for name in tile["swing"]:
-            assert tile["swing"][name].data.tobytes() == whole["swing"][name].data.tobytes()
+        assert set(tile["rest"]) == set(whole["rest"])
+        for name in tile["rest"]:
+            if tile["rest"][name].data.dtype == object:
+                assert tile["rest"][name].data.tolist() == whole["rest"][name].data.tolist()
+            else:
+                assert tile["rest"][name].data.tobytes() == whole["rest"][name].data.tobytes()
+
+
+MANY = """
+[scene]
+alpha = 0.0
+[scan.shocks]
+kind = "disturbed"
+trajectories = 600
+t_end = 0.5
+linear_directions = 2
+"""
+
+
+def test_the_command_of_a_crash_report_makes_that_tile(invoke, monkeypatch):
+    """One tile of many crashes; the command in the message crashes too, and when it can, makes its bits."""
+    monkeypatch.setattr("fastmech.scan_types.disturbed_tiling.EVALUATIONS", 1)
+    request = Path("my scan.toml")
+    request.write_text(MANY, encoding="utf-8")
+    compute = DisturbedTiling.compute
+
+    def crash(self, index, context):
+        return out_of_luck(self, index) if index == 6 else compute(self, index, context)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(DisturbedTiling, "compute", crash)
+        crashed = invoke("run", request, "--out", "deep/x.h5")
+        assert crashed.exit_code == 1
+        command = shlex.split(re.search(r"\(alone: (.*)\)", crashed.stderr)[1])
+        assert command[:2] == ["fastmech", "run"]
+        with pytest.raises(RuntimeError, match="out of luck"):
+            invoke(*command[1:])
+    alone = invoke(*command[1:])
+    assert alone.exit_code == 0
+    with monkeypatch.context() as patched:
+        patched.setattr("fastmech.tiles.run.write_assembled", interrupt)
+        assert invoke("run", request, "--out", "deep/x.h5").exit_code == 130
+    again = invoke(*command[1:-2])
+    assert "The tile kept beside the result is the same." in again.stdout
+    digest = re.search(r"Content: (\w{64})", alone.stdout)[1]
+    assert digest in again.stdout
+    with open_results("tile.h5") as results:
+        assert results["shocks"].attrs["tile"] == 6
+        assert results["shocks"]["start"].data.shape == (256, 4)
 
 
 def test_workers_and_scheduler_exclude_each_other(invoke, tiny):

@@ -37,9 +37,9 @@ def test_status(invoke, tiny, monkeypatch):
         patch.setattr("fastmech.scan_types.equilibria.EquilibriaScan.run", interrupt)
         stopped = invoke("run", tiny, "--out", "x.h5")
     assert stopped.exit_code == 130
-    assert "interrupted; 1 of 2 tiles are kept in x.h5.parts; the same command goes on" in stopped.stderr
+    assert "interrupted; 4 of 5 tiles are kept in x.h5.parts; the same command goes on" in stopped.stderr
     shown = invoke("status", "x.h5", "--snapshot", "now.h5")
-    assert "1 of 1 tiles  swing" in shown.stdout
+    assert "4 of 4 tiles  swing" in shown.stdout
     assert "0 of 1 tiles  rest" in shown.stdout
     assert "nobody works on it" in shown.stdout
     with open_results("now.h5") as results:

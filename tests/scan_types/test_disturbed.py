@@ -260,7 +260,7 @@ def test_linear_directions_and_limits(run: Run) -> None:
 
 
 def test_attributes(run: Run) -> None:
-    request = run.scan.model_dump(exclude={"scene"})
+    request = run.scan.model_dump(exclude={"scene", "variables"})
     assert {name: run.section.attrs[name] for name in request} == request
     assert "uniform in the ball" in run.section.attrs["distribution"]
 

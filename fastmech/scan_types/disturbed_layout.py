@@ -1,0 +1,113 @@
+"""The variables of disturbed ensembles: names, dimensions, units and meanings, in one place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.disturbance.outcome import Outcome
+from fastmech.results import Variable, flags
+
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
+
+_EACH, _EVERY = ("equilibrium",), ("equilibrium", "trajectory")
+_STATE = "phi, theta, phi', theta'"
+
+#: What is known of every trajectory: dimensions behind ``trajectory`` with their lengths, type, what stands
+#: for one that is not computed yet, unit, meaning.
+_TRAJECTORY: dict[str, tuple[dict[str, int], str, float, str, str]] = {
+    "start": ({"component": 4}, "f8", np.nan, "rad, rad/s", f"start: {_STATE}"),
+    "final": ({"component": 4}, "f8", np.nan, "rad, rad/s", f"end: {_STATE}"),
+    "outcome": ({}, "i1", -1, "1", "where it is at the end"),
+    "end_equilibrium": ({}, "i1", -1, "1", "equilibrium at which it rests at the end, -1: none"),
+    "turns": ({"angle": 2}, "i8", 0, "1", "full turns of phi and theta made until then"),
+    "time_to_return": (
+        {},
+        "f8",
+        np.nan,
+        "s",
+        "end of the first step from which on every step ended in the ball of return",
+    ),
+    "excursion": (
+        {"angle": 2},
+        "f8",
+        np.nan,
+        "rad",
+        "largest departures of phi and theta at the ends of steps",
+    ),
+}
+
+#: Names of what is known of every trajectory.
+TRAJECTORY_VARIABLES = tuple(_TRAJECTORY)
+
+
+def empty_trajectories(names: list[str], count: int) -> dict[str, NDArray[Any]]:
+    """Arrays of so many trajectories that have not been computed."""
+    return {
+        name: np.full((count, *_TRAJECTORY[name][0].values()), _TRAJECTORY[name][2], _TRAJECTORY[name][1])
+        for name in names
+    }
+
+
+def trajectory_variables(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Variable]:
+    """Arrays over (equilibrium, trajectory, ...) as variables."""
+    return {
+        name: Variable((*_EVERY, *dims), arrays[name], unit, about, _flags(name))
+        for name, (dims, _, _, unit, about) in _TRAJECTORY.items()
+        if name in arrays
+    }
+
+
+def _flags(name: str) -> dict[str, Any]:
+    return flags(Outcome) if name == "outcome" else {}
+
+
+def equilibrium_variables(
+    phi: NDArray[np.float64], theta: NDArray[np.float64], omega: NDArray[np.float64]
+) -> dict[str, Variable]:
+    """The disturbed equilibria."""
+    return {
+        "phi": Variable(_EACH, phi, "rad", "angle phi of the disturbed equilibrium"),
+        "theta": Variable(_EACH, theta, "rad", "angle theta of the disturbed equilibrium"),
+        "omega": Variable(_EACH, omega, "rad/s", "frequency in the norm"),
+        "quantile": Variable(("quantile",), np.array(QUANTILES), "1", "quantile"),
+    }
+
+
+def tally_variables(
+    share: NDArray[np.float64], errors: NDArray[np.float64], quantiles: NDArray[np.float64]
+) -> dict[str, Variable]:
+    """What the trajectories of each equilibrium come to."""
+    return {
+        "share_returned": Variable(_EACH, share, "1", "share that returned"),
+        "halving_difference": Variable(
+            ("equilibrium", "sample"),
+            errors,
+            "rad or rad/s",
+            "difference of a final state from the same run with half the step, first trajectories",
+        ),
+        "time_to_return_quantile": Variable(
+            ("equilibrium", "quantile"),
+            quantiles,
+            "s",
+            "quantiles of the time to return over those that returned",
+        ),
+    }
+
+
+def linear_variables(directions: NDArray[np.float64], limit: NDArray[np.float64]) -> dict[str, Variable]:
+    """How far the linearized motion can be trusted."""
+    return {
+        "linear_direction": Variable(
+            ("equilibrium", "direction", "component"), directions, "rad, rad/s", "disturbance of size 1 rad"
+        ),
+        "linear_limit": Variable(
+            ("equilibrium", "direction"),
+            limit,
+            "rad",
+            "size up to which the linearized motion keeps the tolerance, inf: beyond all tried, 0: below",
+        ),
+    }

@@ -1,0 +1,228 @@
+"""Disturbed ensembles in tiles: blocks of directions and blocks of trajectories, of every equilibrium."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.disturbance.ensemble import STREAM, DisturbedEnsemble, disturb, equilibria_to_disturb
+from fastmech.disturbance.linear_range import linear_range
+from fastmech.disturbance.outcome import Outcome
+from fastmech.disturbance.size import size_at
+from fastmech.ensembles.integrate import integrate
+from fastmech.ensembles.spans import output_steps
+from fastmech.integrators.methods import find_method
+from fastmech.results import Dataset, Variable
+from fastmech.scan_types.disturbed_layout import (
+    QUANTILES,
+    empty_trajectories,
+    equilibrium_variables,
+    linear_variables,
+    tally_variables,
+    trajectory_variables,
+)
+from fastmech.scan_types.request import HALVING
+from fastmech.scan_types.tally import Tally
+from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
+from fastmech.scene import Scene
+from fastmech.store.stream import Piece, Stream
+
+Floats = NDArray[np.float64]
+
+#: Trajectories of each ensemble that are integrated again with half the step.
+SAMPLE = 256
+
+#: Right-hand sides that a tile evaluates, about: a second of one thread.
+EVALUATIONS = 1 << 27
+
+#: Directions of a tile: 37 short motions each.
+DIRECTIONS = 256
+
+#: Bytes of what is joined before it is written.
+PIECE_BYTES = 1 << 25
+
+
+class _Request(Protocol):
+    @property
+    def trajectories(self) -> int: ...
+    @property
+    def radius(self) -> float: ...
+    @property
+    def return_radius(self) -> float: ...
+    @property
+    def seed(self) -> int: ...
+    @property
+    def t_end(self) -> float: ...
+    @property
+    def dt(self) -> float: ...
+    @property
+    def method(self) -> str: ...
+    @property
+    def linear_horizon(self) -> float: ...
+    @property
+    def linear_tolerance(self) -> float: ...
+    @property
+    def linear_directions(self) -> int: ...
+    @property
+    def kept(self) -> list[str]: ...
+    @property
+    def settings(self) -> dict[str, Any]: ...
+
+
+class DisturbedTiling(Tiling):
+    """First blocks of directions for the linearized motion, then blocks of trajectories.
+
+    Equilibria alternate, so that a partial result knows something of each.
+
+    Args:
+        request: how to compute and what to keep.
+        scene: the mechanism.
+    """
+
+    what = "disturbed trajectories"
+
+    def __init__(self, request: _Request, scene: Scene) -> None:
+        self.request, self.scene = request, scene
+        self.equilibria = equilibria_to_disturb(scene)
+        self.rays = _blocks(request.linear_directions, DIRECTIONS)
+        self.parts = _blocks(request.trajectories, _tile_length(request))
+        self.count = len(self.equilibria) * (len(self.rays) + len(self.parts))
+
+    def items(self, index: int) -> int:
+        """Trajectories; none for directions."""
+        part = self._part(index)
+        return 0 if part is None else part.stop - part.start
+
+    def compute(self, index: int, context: RunContext) -> Dataset:
+        """Try some directions, or follow some trajectories, of one equilibrium."""
+        part, request = self._part(index), self.request
+        equilibrium = self.equilibria[index % len(self.equilibria)]
+        if part is None:
+            found = linear_range(
+                self.scene,
+                equilibrium,
+                horizon=request.linear_horizon,
+                tolerance=request.linear_tolerance,
+                directions=request.linear_directions,
+                seed=request.seed,
+                part=self.rays[index // len(self.equilibria)],
+                threads=context.threads,
+            )
+            rays = {"directions": Variable(("ray", "component"), found.directions)}
+            return Dataset(rays | {"limit": Variable(("ray",), found.limit)})
+        ensemble = disturb(
+            self.scene,
+            equilibrium,
+            request.trajectories,
+            radius=request.radius,
+            return_radius=request.return_radius,
+            seed=request.seed,
+            t_end=request.t_end,
+            dt=request.dt,
+            method=request.method,
+            part=part,
+            threads=context.threads,
+        )
+        errors = _sampled_errors(self.scene, ensemble, request.method) if part.start == 0 else np.zeros(0)
+        arrays = {name: getattr(ensemble, _FIELDS.get(name, name)) for name in request.kept}
+        tally = Tally.of(ensemble.time_to_return, ensemble.outcome >= Outcome.NOT_FINITE)
+        return self._tile(arrays, errors, tally)
+
+    def assemble(self, tile: Tiles) -> Stream:
+        """Join the blocks and count."""
+        each = list(self.equilibria)
+        omega = np.array([size_at(self.scene, e.phi, e.theta).omega for e in each])
+        fixed = equilibrium_variables(self.equilibria.phi, self.equilibria.theta, omega)
+        count, request = len(each), self.request
+        nothing = empty_trajectories(request.kept, 1)
+        arrays = {n: np.broadcast_to(a, (1, request.trajectories, *a.shape[1:])) for n, a in nothing.items()}
+        sample, rays = min(SAMPLE, request.trajectories), request.linear_directions
+        plane = trajectory_variables(arrays)
+        plane |= tally_variables(np.zeros(1), np.zeros((1, sample)), np.zeros((1, len(QUANTILES))))
+        plane |= linear_variables(np.broadcast_to(0.0, (1, rays, 4)), np.broadcast_to(0.0, (1, rays)))
+        attrs = {
+            **request.settings,
+            "distribution": "uniform in the ball of the given radius, kinetic-energy norm at the equilibrium",
+        }
+        return Stream(Dataset(fixed, attrs), plane, "equilibrium", lambda: self._pieces(tile, count))
+
+    def missing(self, index: int) -> Dataset:
+        """Trajectories and directions that have not been computed."""
+        part = self._part(index)
+        if part is None:
+            block = self.rays[index // len(self.equilibria)]
+            rays = block.stop - block.start
+            arrays = {"directions": Variable(("ray", "component"), np.full((rays, 4), np.nan))}
+            return Dataset(arrays | {"limit": Variable(("ray",), np.full(rays, np.nan))})
+        sample = min(SAMPLE, self.request.trajectories) if part.start == 0 else 0
+        nothing = empty_trajectories(self.request.kept, self.items(index))
+        return self._tile(nothing, np.full(sample, np.nan), Tally())
+
+    def _part(self, index: int) -> slice | None:
+        """The trajectories of a tile; None for a tile of directions."""
+        block = index // len(self.equilibria) - len(self.rays)
+        return None if block < 0 else self.parts[block]
+
+    def _tile(self, arrays: dict[str, NDArray[Any]], errors: Floats, tally: Tally) -> Dataset:
+        columns = {
+            name: Variable(("trajectory", *(f"{name}_entry" for _ in a.shape[1:])), a)
+            for name, a in arrays.items()
+        }
+        return Dataset(columns | {"error": Variable(("sample",), errors)} | tally.variables(), tally.attrs())
+
+    def _pieces(self, tile: Tiles, count: int) -> Iterator[Piece]:
+        for number, block in enumerate(self.rays):
+            found = [tile(number * count + e) for e in range(count)]
+            directions, limit = (np.stack([f[name].data for f in found]) for name in ("directions", "limit"))
+            yield (slice(0, count), block), {"linear_direction": directions, "linear_limit": limit}
+        first = count * len(self.rays)
+        tallies, errors = [Tally() for _ in range(count)], []
+        held: list[dict[str, NDArray[Any]]] = []
+        begun = 0
+        for number, part in enumerate(self.parts):
+            found = [tile(first + number * count + e) for e in range(count)]
+            for e, one in enumerate(found):
+                tallies[e].add(one)
+            if number == 0:
+                errors = [one["error"].data for one in found]
+            held.append({n: np.stack([one[n].data for one in found]) for n in self.request.kept})
+            if part is self.parts[-1] or sum(a.nbytes for h in held for a in h.values()) >= PIECE_BYTES:
+                joined = {n: np.concatenate([h[n] for h in held], axis=1) for n in self.request.kept}
+                yield (slice(0, count), slice(begun, part.stop)), joined
+                begun, held = part.stop, []
+        share = np.array([t.share for t in tallies])
+        quantiles = np.array([t.quantiles(QUANTILES) for t in tallies])
+        tally = tally_variables(share, np.stack(errors), quantiles)
+        yield slice(0, count), {name: variable.data for name, variable in tally.items()}
+        attrs: dict[str, Any] = {
+            "error_estimate": float(np.max(errors)),
+            "error_estimate_median": float(np.median(errors)),
+            "error_estimate_is": f"{HALVING}; final states of the first {len(errors[0])} of each",
+            "failed": sum(t.failed for t in tallies),
+        }
+        yield Dataset({}, attrs)
+
+
+#: Names of variables in `fastmech.disturbance.ensemble.DisturbedEnsemble`, where they are others.
+_FIELDS = {"start": "starts", "end_equilibrium": "end_index"}
+
+
+def _blocks(total: int, length: int) -> list[slice]:
+    return [slice(k, min(k + length, total)) for k in range(0, total, length)]
+
+
+def _tile_length(request: _Request) -> int:
+    """Trajectories of a tile, by what they cost: a power of two, which divides a stream of random numbers."""
+    steps = int(output_steps(np.array([0.0, request.t_end]), request.dt).sum())
+    affordable = EVALUATIONS // find_method(request.method).evaluations(steps)
+    return int(min(STREAM, max(SAMPLE, 1 << max(0, affordable.bit_length() - 1))))
+
+
+def _sampled_errors(scene: Scene, e: DisturbedEnsemble, method: str) -> Floats:
+    """Differences of the first final states from those of half the step, shape (sample,)."""
+    final = e.final[:SAMPLE]
+    finer = integrate(scene, e.starts[: len(final)], e.t_end, 0.5 * e.dt, method).y[-1]
+    return np.asarray(np.abs(finer - final).max(axis=1))
