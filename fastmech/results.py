@@ -148,9 +148,7 @@ class Dataset:
         try:
             import xarray
         except ImportError:
-            raise InputError(
-                "to_xarray: needs xarray; install it with: pip install 'fastmech[xarray]'"
-            ) from None
+            raise no_xarray() from None
         arrays = {
             name: (v.dims, v.data, {"units": v.units, "long_name": v.long_name, **v.attrs})
             for name, v in self.variables.items()
@@ -161,6 +159,11 @@ class Dataset:
             {name: array for name, array in arrays.items() if name in coordinates},
             dict(self.attrs),
         )
+
+
+def no_xarray() -> InputError:
+    """What is raised where xarray is asked for and not there."""
+    return InputError("to_xarray: needs xarray; install it with: pip install 'fastmech[xarray]'")
 
 
 def flags(members: type[IntEnum]) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from fastmech.ensembles.run import Progress
 from fastmech.errors import InputError
 from fastmech.plots.style import save
 from fastmech.scan_types import scan_kinds
@@ -57,12 +58,17 @@ def scene_of_section(results: Results, name: str) -> dict[str, float]:
     return {key: float(attrs.get(f"{CHANGE}{key}", value)) for key, value in results.scene.items()}
 
 
-def draw_results(path: str | Path, out: str | Path | None = None) -> Iterator[Path]:
+def draw_results(
+    path: str | Path,
+    out: str | Path | None = None,
+    stage: Callable[[str, int], Progress] = lambda name, total: lambda finished: None,
+) -> Iterator[Path]:
     """Draw every section of a result file and yield the pictures (PNG) as they are written.
 
     Args:
         path: result file.
         out: folder for the pictures, made if it is missing; by default the file's name without its ending.
+        stage: is told how many pictures have been drawn.
 
     Raises:
         InputError: the file cannot be read, holds a section of unknown kind, or the folder is unwritable.
@@ -78,12 +84,14 @@ def draw_results(path: str | Path, out: str | Path | None = None) -> Iterator[Pa
         for name in results:
             kind, scene = kinds[results[name].attrs["kind"]], scene_of_section(results, name)
             figures = kind.draw(kind.read(results[name], scene), scene)
+            advance = stage(f"{name}: pictures", len(figures))
             for what, figure in figures.items():
                 picture = folder / f"{name}_{what}.png"
                 try:
                     save(figure, picture)
                 except OSError as error:
                     raise InputError(f"{picture}: cannot be written: {error.strerror}") from None
+                advance(1)
                 yield picture
 
 

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from fastmech.cli.reporting import account, reporting_options
+
 
 @click.command(name="bench")
 @click.option(
@@ -17,13 +19,11 @@ import click
     help="Folder for the report.",
 )
 @click.option("--quick", is_flag=True, help="Fewer trajectories and methods.")
-def command(out: Path, quick: bool) -> None:
+@reporting_options
+def command(out: Path, quick: bool, quiet: bool, as_json: bool) -> None:
     """Measure trajectories per second against the error."""
-    from fastmech.cli.progress import ProgressBars
-
-    with ProgressBars() as bars:
-        with bars.preparing():
+    with account("bench", quiet, as_json) as told:
+        with told.bars.preparing():
             from fastmech.bench.report import run_bench
-        written = run_bench(out, quick=quick, stage=bars.stage)
-    for path in written:
-        click.echo(path)
+        for path in run_bench(out, quick=quick, stage=told.bars.stage):
+            told.wrote(path)

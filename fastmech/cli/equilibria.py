@@ -6,13 +6,16 @@ import math
 import shutil
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
+
+from fastmech.cli.reporting import account, reporting_options
 
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from fastmech.atlas.snap import Snap
     from fastmech.equilibria.find import Equilibria
     from fastmech.scene import Scene
     from fastmech.stability.classify import Classification
@@ -47,26 +50,62 @@ class _SceneCommand(click.Command):
     default=math.inf,
     help="Time at which the force is frozen [s; default: after all decay].",
 )
-def command(scene_file: Path | None, at: float, **parameters: float | None) -> None:
+@reporting_options
+def command(
+    scene_file: Path | None, at: float, quiet: bool, as_json: bool, **parameters: float | None
+) -> None:
     """List every equilibrium of a scene and its stability.
 
     For every stable one a sentence tells the constant loads F0 at which it disappears, and one for all says
     whether the list is proved to be complete. The scene is that of SCENE.toml (its table [scene]), else the
     paper's Table 1; the options change it.
     """
-    from rich.console import Console
-
-    from fastmech.cli.progress import ProgressBars
     from fastmech.scene import Scene
 
     scene = Scene.from_toml(scene_file) if scene_file else Scene()
     scene = scene.replace(**{name: value for name, value in parameters.items() if value is not None})
-    with ProgressBars() as bars, bars.preparing():
-        from fastmech.atlas.snap import find_snap
-        from fastmech.equilibria.find import find_equilibria
-        from fastmech.stability.classify import classify
-    found = find_equilibria(scene, at)
-    results = [classify(scene, equilibrium) for equilibrium in found]
+    with account("equilibria", quiet, as_json) as told:
+        with told.bars.preparing():
+            from fastmech.atlas.snap import find_snap
+            from fastmech.equilibria.find import find_equilibria
+            from fastmech.stability.classify import classify
+        found = find_equilibria(scene, at)
+        advance = told.bars.stage("stability of equilibria", len(found))
+        results = []
+        for equilibrium in found:
+            results.append(classify(scene, equilibrium))
+            advance(1)
+        loaded = scene.replace(F0=found.force, alpha=0.0)
+        stable = [k for k, equilibrium in enumerate(found) if equilibrium.morse_index == 0]
+        advance = told.bars.stage("loads at which they disappear", len(stable))
+        snaps = {}
+        for k in stable:
+            snaps[k] = find_snap(loaded, found[k])
+            advance(1)
+        told.facts |= _facts(found, results, snaps)
+    if not as_json:
+        _show(scene, at, found, results, snaps)
+
+
+def _facts(found: Equilibria, results: list[Classification], snaps: dict[int, Snap]) -> dict[str, Any]:
+    """The list for other programs."""
+    equilibria = []
+    for k, (equilibrium, result) in enumerate(zip(found, results, strict=True)):
+        about: dict[str, Any] = {"phi": equilibrium.phi, "theta": equilibrium.theta}
+        about |= {"energy": equilibrium.energy, "kind": equilibrium.kind, "verdict": result.verdict}
+        about["eigenvalues"] = [[value.real, value.imag] for value in map(complex, result.eigenvalues)]
+        if k in snaps:
+            about |= {"snap_below": snaps[k].below, "snap_above": snaps[k].above}
+        equilibria.append(about)
+    return {"force": found.force, "certificate": found.certificate.sentence, "equilibria": equilibria}
+
+
+def _show(
+    scene: Scene, at: float, found: Equilibria, results: list[Classification], snaps: dict[int, Snap]
+) -> None:
+    """The table and the sentences."""
+    from rich.console import Console
+
     terminal = shutil.get_terminal_size().columns if sys.stdout.isatty() else 100
     console = Console(width=max(terminal, LEAST_WIDTH), highlight=False)
     console.print(f"force F = {found.force:g} N on M2{_time(scene, at)}")
@@ -74,10 +113,8 @@ def command(scene_file: Path | None, at: float, **parameters: float | None) -> N
         console.print(_table(found, results))
     for number, result in enumerate(results, start=1):
         console.print(f"{number}: {result.explanation}.")
-    loaded = scene.replace(F0=found.force, alpha=0.0)
-    for number, equilibrium in enumerate(found, start=1):
-        if equilibrium.morse_index == 0:
-            console.print(f"{number}: as the load F0 changes, it {find_snap(loaded, equilibrium).answer}.")
+    for k, snap in snaps.items():
+        console.print(f"{k + 1}: as the load F0 changes, it {snap.answer}.")
     sentence = found.certificate.sentence
     console.print(f"{sentence[0].upper()}{sentence[1:]}.")
 

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from fastmech.cli.reporting import account, reporting_options
+
 
 @click.command(name="export")
 @click.argument("file", metavar="FILE.h5", type=click.Path(path_type=Path))
@@ -28,6 +30,7 @@ import click
     help="Folder for the files [default: FILE without its ending].",
 )
 @click.option("--fresh", is_flag=True, help="Replace files that exist.")
+@reporting_options
 def command(
     file: Path,
     form: str,
@@ -36,6 +39,8 @@ def command(
     selections: tuple[str, ...],
     out: Path | None,
     fresh: bool,
+    quiet: bool,
+    as_json: bool,
 ) -> None:
     """Write a result file in another format.
 
@@ -45,7 +50,15 @@ def command(
     from fastmech.store.export import export_results
 
     folder = out if out is not None else file.with_suffix("")
-    for path in export_results(
-        file, folder, form, section=section, variables=variables, selections=selections, replace=fresh
-    ):
-        click.echo(path)
+    with account("export", quiet, as_json) as told:
+        for path in export_results(
+            file,
+            folder,
+            form,
+            section=section,
+            variables=variables,
+            selections=selections,
+            replace=fresh,
+            stage=told.bars.stage,
+        ):
+            told.wrote(path)

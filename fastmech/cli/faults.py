@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import click
 
+from fastmech.cli.reporting import account, reporting_options
+
 
 @click.command(name="faults")
 @click.option("--kills", metavar="N", type=click.IntRange(min=0), default=200, show_default=True)
@@ -11,17 +13,19 @@ import click
 @click.option("--workers", metavar="N", type=click.IntRange(min=0), default=5, show_default=True)
 @click.option("--mutations", metavar="N", type=click.IntRange(min=0), default=100_000, show_default=True)
 @click.option("--seed", metavar="N", type=click.IntRange(min=0), default=0, show_default=True)
-def command(kills: int, disks: int, workers: int, mutations: int, seed: int) -> None:
+@reporting_options
+def command(
+    kills: int, disks: int, workers: int, mutations: int, seed: int, quiet: bool, as_json: bool
+) -> None:
     """Put runs and files to the test.
 
     Kills runs by SIGKILL at random moments and resumes them, runs on disks that fill up (needs the right to
     mount), kills Dask workers, and reads files with flipped, lost and added bytes. Ends with code 1 if a
     result is not the undisturbed one, or a damaged file is not refused in one line.
     """
-    from fastmech.cli.progress import ProgressBars
     from fastmech.faults.processes import FaultFound
 
-    with ProgressBars() as bars:
+    with account("faults", quiet, as_json) as told:
         from fastmech.faults.disk import can_mount, disk_campaign
         from fastmech.faults.fuzz import fuzz_requests, fuzz_results
         from fastmech.faults.kill import kill_campaign
@@ -32,25 +36,25 @@ def command(kills: int, disks: int, workers: int, mutations: int, seed: int) -> 
             if kills or disks or workers:
                 expected = reference()
             if kills:
-                killed = kill_campaign(kills, expected, seed, bars.stage("kills", kills))
-                click.echo(f"{killed.kills} runs killed, {killed.finished} scans resumed to the same result")
-                click.echo(f"  {killed.again} tiles computed again; killed while " + _counts(killed.stages))
+                killed = kill_campaign(kills, expected, seed, told.bars.stage("kills", kills))
+                told.say(f"{killed.kills} runs killed, {killed.finished} scans resumed to the same result")
+                told.say(f"  {killed.again} tiles computed again; killed while " + _counts(killed.stages))
             if disks and not can_mount():
-                click.echo("no right to mount small disks: full disks are left out")
+                told.say("no right to mount small disks: full disks are left out")
             elif disks:
-                full = disk_campaign(disks, expected, seed, bars.stage("full disks", disks))
-                click.echo(f"{full.full} full disks told, the scans resumed to the same result")
-                click.echo(f"  {full.again} tiles computed again; {full.fitting} disks were large enough")
+                full = disk_campaign(disks, expected, seed, told.bars.stage("full disks", disks))
+                told.say(f"{full.full} full disks told, the scans resumed to the same result")
+                told.say(f"  {full.again} tiles computed again; {full.fitting} disks were large enough")
             if workers:
-                died = worker_campaign(workers, expected, seed, bars.stage("workers", workers))
-                click.echo(f"{died.kills} Dask workers killed, {died.finished} scans with the same result")
+                died = worker_campaign(workers, expected, seed, told.bars.stage("workers", workers))
+                told.say(f"{died.kills} Dask workers killed, {died.finished} scans with the same result")
             if mutations:
                 for what, fuzz in (("requests", fuzz_requests), ("result files", fuzz_results)):
-                    count = fuzz(mutations // 2, seed, bars.stage(what, mutations // 2))
-                    click.echo(f"{count.tried} damaged {what} read: {count.refused} refused, none crashed")
-                    click.echo(f"  slowest {count.slowest:.2f} s, memory grew by {count.grown / 1e6:.0f} MB")
+                    count = fuzz(mutations // 2, seed, told.bars.stage(what, mutations // 2))
+                    told.say(f"{count.tried} damaged {what} read: {count.refused} refused, none crashed")
+                    told.say(f"  slowest {count.slowest:.2f} s, memory grew by {count.grown / 1e6:.0f} MB")
         except FaultFound as fault:
-            click.echo(f"fastmech: fault found: {fault}", err=True)
+            told.say(f"fastmech: fault found: {fault}", err=True)
             raise click.exceptions.Exit(1) from None
 
 

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from fastmech.cli.reporting import account, reporting_options
+
 
 @click.command(name="hardcases")
 @click.option(
@@ -17,19 +19,19 @@ import click
     help="Folder for the report.",
 )
 @click.option("--quick", is_flag=True, help="Shorter runs and fewer methods.")
-def command(out: Path, quick: bool) -> None:
+@reporting_options
+def command(out: Path, quick: bool, quiet: bool, as_json: bool) -> None:
     """Run the gallery of hard cases and write table, result file and pictures.
 
     Ends with code 1 if a case fails.
     """
-    from fastmech.cli.progress import ProgressBars
-
-    with ProgressBars() as bars:
-        with bars.preparing():
+    with account("hardcases", quiet, as_json) as told:
+        with told.bars.preparing():
             from fastmech.hardcases.report import write_hardcases
-        report = write_hardcases(out, quick=quick, stage=bars.stage)
-    for path in report.paths:
-        click.echo(path)
-    click.echo(report.verdict)
-    if not report.passed:
-        raise click.exceptions.Exit(1)
+        report = write_hardcases(out, quick=quick, stage=told.bars.stage)
+        for path in report.paths:
+            told.wrote(path)
+        told.say(report.verdict)
+        told.facts |= {"verdict": report.verdict, "passed": report.passed}
+        if not report.passed:
+            raise click.exceptions.Exit(1)

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from fastmech.cli.reporting import account, reporting_options
+
 
 @click.command(name="paper")
 @click.option(
@@ -16,19 +18,20 @@ import click
     show_default=True,
     help="Folder for the report.",
 )
-def command(out: Path) -> None:
+@reporting_options
+def command(out: Path, quiet: bool, as_json: bool) -> None:
     """Compute the source paper's tables and figures again.
 
     Ends with code 1 if a difference from what the paper prints is no proved misprint, or a check fails.
     """
-    from fastmech.cli.progress import ProgressBars
-
-    with ProgressBars() as bars:
-        with bars.preparing():
+    with account("paper", quiet, as_json) as told:
+        with told.bars.preparing():
             from fastmech.paper.report import write_paper
-        report = write_paper(out, progress=bars.counter("tables and figures"))
-    click.echo(f"Report: {report.paths[0]}")
-    click.echo(f"{report.n_rows} printed values compared, {len(report.misprints)} misprints proved")
-    if not report.as_expected:
-        click.echo("fastmech: some differences or checks are not as expected; see the report", err=True)
-        raise click.exceptions.Exit(1)
+        report = write_paper(out, progress=told.bars.counter("tables and figures"))
+        told.wrote(report.paths[0], "Report: {}")
+        told.say(f"{report.n_rows} printed values compared, {len(report.misprints)} misprints proved")
+        told.facts |= {"compared": report.n_rows, "misprints": len(report.misprints)}
+        told.facts |= {"as_expected": report.as_expected}
+        if not report.as_expected:
+            told.say("fastmech: some differences or checks are not as expected; see the report", err=True)
+            raise click.exceptions.Exit(1)

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from fastmech.cli.reporting import account, reporting_options
+
 
 @click.command(name="plot")
 @click.argument("file", metavar="FILE", type=click.Path(path_type=Path))
@@ -15,12 +17,11 @@ import click
     type=click.Path(path_type=Path),
     help="Folder for the pictures [default: FILE without its ending].",
 )
-def command(file: Path, out: Path | None) -> None:
+@reporting_options
+def command(file: Path, out: Path | None, quiet: bool, as_json: bool) -> None:
     """Draw every section of a result file as PNG pictures."""
-    from fastmech.cli.progress import ProgressBars
-
-    with ProgressBars() as bars, bars.preparing():
-        from fastmech.runner import draw_results
-
-    for picture in draw_results(file, out):
-        click.echo(picture)
+    with account("plot", quiet, as_json) as told:
+        with told.bars.preparing():
+            from fastmech.runner import draw_results
+        for picture in draw_results(file, out, stage=told.bars.stage):
+            told.wrote(picture)

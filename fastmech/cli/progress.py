@@ -55,24 +55,46 @@ class LogLine:
 
     Args:
         name: the piece of work.
-        total: its items.
     """
 
-    def __init__(self, name: str, total: int) -> None:
-        self._name, self._total, self._done = name, total, 0
+    def __init__(self, name: str) -> None:
+        self._name = name
         self._begun = self._told = time.monotonic()
 
-    def advance(self, finished: int) -> None:
-        """Count items, and say so if it is time."""
-        self._done += finished
+    def tell(self, done: int, total: int) -> None:
+        """Say how far it is, if it is time."""
         now = time.monotonic()
         if now - self._told < LOG_PERIOD:
             return
         self._told = now
-        rate = self._done / (now - self._begun)
-        left = timedelta(seconds=int((self._total - self._done) / rate)) if rate else "unknown"
-        share = self._done / self._total if self._total else 1.0
+        rate = done / (now - self._begun)
+        left = timedelta(seconds=int((total - done) / rate)) if rate else "unknown"
+        share = done / total if total else 1.0
         print(f"fastmech: {self._name}: {share:.0%}, {rate:,.3g}/s, {left} left", file=sys.stderr, flush=True)
+
+
+class Stage:
+    """One piece of work: how far it is and how long it has taken.
+
+    Args:
+        name: the piece of work.
+        total: its items; 0 where they are not known yet.
+    """
+
+    def __init__(self, name: str, total: int) -> None:
+        self.name, self.total, self.done = name, total, 0
+        self._begun = self._last = time.monotonic()
+
+    def count(self, done: int, total: int) -> None:
+        """So many items are finished."""
+        self.done, self.total, self._last = done, total, time.monotonic()
+
+    def summary(self) -> dict[str, str | int | float]:
+        """The same for other programs; the rate is in items per second."""
+        seconds = self._last - self._begun
+        rate = self.done / seconds if seconds else 0.0
+        about: dict[str, str | int | float] = {"name": self.name, "done": self.done, "total": self.total}
+        return about | {"seconds": round(seconds, 3), "rate": round(rate, 3)}
 
 
 class ProgressBars:
@@ -81,6 +103,7 @@ class ProgressBars:
     def __init__(self, quiet: bool = False) -> None:
         self._quiet = quiet
         self._logs = not quiet and not sys.stderr.isatty()
+        self._stages: list[Stage] = []
         self._progress = Progress(
             TextColumn(
                 "{task.description}", markup=False, table_column=Column(overflow="ellipsis", no_wrap=True)
@@ -91,6 +114,7 @@ class ProgressBars:
             _Time(Column(min_width=12, no_wrap=True)),
             console=Console(stderr=True),
             disable=quiet or not sys.stderr.isatty(),
+            redirect_stdout=False,
         )
 
     def __enter__(self) -> Self:
@@ -102,30 +126,49 @@ class ProgressBars:
 
     def stage(self, name: str, total: int) -> Callable[[int], None]:
         """Announce a piece of work; the result is told how many items have been finished since."""
-        task = self._progress.add_task(name, total=total)
-
-        log = LogLine(name, total) if self._logs else None
+        tell, done = self._begin(name, total), 0
 
         def advance(finished: int) -> None:
-            self._progress.advance(task, finished)
-            if log is not None:
-                log.advance(finished)
+            nonlocal done
+            done += finished
+            tell(done, total)
 
         return advance
 
     def counter(self, name: str) -> Callable[[int, int], None]:
         """Announce a piece of work; the result is told how many items are finished, and of how many."""
-        task = self._progress.add_task(name, total=None)
+        return self._begin(name, None)
+
+    def stages(self) -> list[dict[str, str | int | float]]:
+        """What has been done so far, piece by piece."""
+        return [stage.summary() for stage in self._stages]
+
+    def _begin(self, name: str, total: int | None) -> Callable[[int, int], None]:
+        task = self._progress.add_task(name, total=total)
+        stage, log = Stage(name, total or 0), LogLine(name) if self._logs else None
+        self._stages.append(stage)
 
         def tell(done: int, total: int) -> None:
             self._progress.update(task, completed=done, total=total)
+            stage.count(done, total)
+            if log is not None:
+                log.tell(done, total)
 
         return tell
+
+    @property
+    def shown(self) -> bool:
+        """Whether there are bars on the terminal."""
+        return not self._progress.disable and self._progress.live.is_started
+
+    def above(self, line: str) -> None:
+        """Put a line above the bars."""
+        self._progress.console.print(line, markup=False, highlight=False, soft_wrap=True)
 
     def tell(self, line: str) -> None:
         """Show a line above the bars."""
         if not self._quiet:
-            self._progress.console.print(f"fastmech: {line}", markup=False, highlight=False, soft_wrap=True)
+            self.above(f"fastmech: {line}")
 
     @contextmanager
     def preparing(self) -> Iterator[None]:

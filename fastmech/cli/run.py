@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+
+from fastmech.cli.reporting import Account, account, reporting_options
 
 if TYPE_CHECKING:
     from fastmech.scan_types.request import RunContext
@@ -30,8 +31,7 @@ if TYPE_CHECKING:
 @click.option("--scheduler", metavar="ADDRESS", help="Compute on a Dask cluster: tcp://HOST:8786.")
 @click.option("--tile", metavar="SECTION:INDEX", help="Compute one tile alone.")
 @click.option("--keep", metavar="FILE.h5", type=click.Path(path_type=Path), help="Keep that tile here.")
-@click.option("--quiet", is_flag=True, help="No progress.")
-@click.option("--json", "as_json", is_flag=True, help="End with a summary in JSON.")
+@reporting_options
 def command(
     request_file: Path,
     out: Path | None,
@@ -48,31 +48,28 @@ def command(
 
     Finished work is kept: after an interruption the same command goes on.
     """
-    from fastmech.cli.progress import ProgressBars
     from fastmech.tiles.ends import terminable
 
     if keep is not None and tile is None:
         raise click.UsageError("--keep needs --tile")
     if workers is not None and scheduler is not None:
         raise click.UsageError("--workers and --scheduler exclude each other")
-    with terminable(), ProgressBars(quiet) as bars:
-        with bars.preparing():
+    with terminable(), account("run", quiet, as_json) as told:
+        with told.bars.preparing():
             from fastmech.runner import run_request
             from fastmech.scan_types.request import RunContext
             from fastmech.tiles.run import default_output
-        context = RunContext(threads, bars.stage)
+        context = RunContext(threads, told.bars.stage)
         target = out or default_output(request_file)
         if tile is not None:
-            _run_tile(request_file, tile, target, keep, context)
+            _run_tile(told, request_file, tile, target, keep, context)
             return
         with _hiring(workers, scheduler) as hire:
             report = run_request(
-                request_file, target, fresh=fresh, context=context, hire=hire, tell=bars.tell
+                request_file, target, fresh=fresh, context=context, hire=hire, tell=told.bars.tell
             )
-    if as_json:
-        click.echo(json.dumps(report.summary()))
-    else:
-        _show(report)
+        told.facts |= report.summary()
+        _show(told, report)
 
 
 @contextmanager
@@ -87,34 +84,37 @@ def _hiring(workers: int | None, scheduler: str | None) -> Iterator[Hiring | Non
         yield hire
 
 
-def _run_tile(request_file: Path, tile: str, target: Path, keep: Path | None, context: RunContext) -> None:
+def _run_tile(
+    told: Account, request_file: Path, tile: str, target: Path, keep: Path | None, context: RunContext
+) -> None:
     from fastmech.tiles.alone import compute_alone
 
     alone = compute_alone(request_file, tile, context, target)
-    click.echo(f"{alone.seconds:9.2f} s  {tile}: {alone.items:,} {alone.what}")
-    click.echo(f"Content: {alone.content}")
+    told.facts |= {"tile": tile, "content": alone.content, "same": alone.same}
+    told.say(f"{alone.seconds:9.2f} s  {tile}: {alone.items:,} {alone.what}")
+    told.say(f"Content: {alone.content}")
     if alone.same is not None:
-        click.echo("The tile kept beside the result is " + ("the same." if alone.same else "ANOTHER ONE."))
+        told.say("The tile kept beside the result is " + ("the same." if alone.same else "ANOTHER ONE."))
     if keep is not None:
         alone.write(keep)
-        click.echo(f"Results: {keep}")
+        told.wrote(keep, "Results: {}")
 
 
-def _show(report: RunReport) -> None:
+def _show(told: Account, report: RunReport) -> None:
     from fastmech.store.read import open_results
 
     target = report.path
     with open_results(target) as results:
         for name in results:
             if not report.was_complete:
-                click.echo(f"{results[name].attrs['wall_time_s']:9.2f} s  {name}")
+                told.say(f"{results[name].attrs['wall_time_s']:9.2f} s  {name}")
             failed = results[name].attrs.get("failed", 0)
             if failed:
-                click.echo(f"{name}: {failed} trajectories failed; use a smaller dt", err=True)
+                told.say(f"{name}: {failed} trajectories failed; use a smaller dt", err=True)
     if report.was_complete:
-        click.echo(f"{target} holds this result already; --fresh computes it again")
+        told.say(f"{target} holds this result already; --fresh computes it again")
     else:
-        click.echo(f"{report.seconds:9.2f} s  in all")
-    click.echo(f"Results: {target}")
-    click.echo(f"Next:    fastmech info {target}")
-    click.echo(f"         fastmech plot {target}")
+        told.say(f"{report.seconds:9.2f} s  in all")
+    told.say(f"Results: {target}")
+    told.say(f"Next:    fastmech info {target}")
+    told.say(f"         fastmech plot {target}")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import h5py
@@ -51,6 +52,42 @@ def dimensions(stored: Iterable[h5py.Dataset]) -> dict[int, str]:
 def own_dimensions(stored: h5py.Dataset, dims: Mapping[int, str]) -> tuple[str, ...]:
     """Names of a variable's dimensions; ``dims`` are the group's."""
     return tuple(dims[number] for number in stored.attrs[DIM_NUMBERS]) if stored.ndim else ()
+
+
+@dataclass(frozen=True)
+class About:
+    """A stored variable without its values.
+
+    Attributes:
+        sizes: length of each of its dimensions.
+        dtype: type of the values, object for texts.
+        units, long_name, attrs: as of `fastmech.results.Variable`.
+    """
+
+    sizes: dict[str, int]
+    dtype: np.dtype[Any]
+    units: str
+    long_name: str
+    attrs: dict[str, Any]
+
+
+def about_variable(stored: h5py.Dataset, dims: Mapping[int, str], where: str) -> About:
+    """What is said of a stored variable; its values are not read.
+
+    Raises:
+        InputError: it is damaged or kept in another way than the store's own.
+    """
+    with named_damage(where):
+        _check_storage(stored)
+        attrs = get_attrs(stored)
+        text = h5py.check_string_dtype(stored.dtype) is not None
+        return About(
+            dict(zip(own_dimensions(stored, dims), stored.shape, strict=True)),
+            np.dtype(object) if text else stored.dtype,
+            attrs.pop("units"),
+            attrs.pop("long_name"),
+            attrs,
+        )
 
 
 #: Bytes of a variable that are in memory at a time when only a part of it is wanted.

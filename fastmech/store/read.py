@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any, Self
 import h5py
 
 from fastmech.errors import InputError
-from fastmech.results import Dataset, Variable
+from fastmech.results import Dataset, Variable, no_xarray
 from fastmech.store.decode import (
+    About,
+    about_variable,
     dimensions,
     get_attrs,
     get_variable,
@@ -147,6 +149,14 @@ class Section:
         """Dimensions of a variable, which is not read."""
         return self._stored.dims(name)
 
+    def about(self, name: str) -> About:
+        """What is said of a variable; its values are not read.
+
+        Raises:
+            InputError: there is no such variable, or it is damaged.
+        """
+        return self._stored.about(name)
+
     def load(self, names: Collection[str] | None = None, part: Mapping[str, slice] | None = None) -> Dataset:
         """Read variables.
 
@@ -174,12 +184,19 @@ class Section:
         return select(self, values, names)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Read all variables as an `xarray.Dataset`.
+        """The section as an `xarray.Dataset` that reads values when they are used, while the file is open.
+
+        ``to_xarray().load()`` reads all; of ``to_xarray().phi.sel(F0=100, method="nearest")`` and the like
+        nothing else is read. A damaged variable is told when it is read.
 
         Raises:
-            InputError: xarray is not installed, or a variable's data are damaged.
+            InputError: xarray is not installed, or a coordinate is damaged.
         """
-        return self.load().to_xarray()
+        try:
+            from fastmech.store.lazy import lazy_dataset
+        except ImportError:
+            raise no_xarray() from None
+        return lazy_dataset(self)
 
 
 class _StoredVariables(Mapping[str, Variable]):
@@ -196,6 +213,10 @@ class _StoredVariables(Mapping[str, Variable]):
     def read(self, name: str, part: Mapping[str, slice] | None) -> Variable:
         """A variable, or a part of it."""
         return get_variable(self._open(name), self._dims, self._called(name), part)
+
+    def about(self, name: str) -> About:
+        """What is said of a variable."""
+        return about_variable(self._open(name), self._dims, self._called(name))
 
     def dims(self, name: str) -> tuple[str, ...]:
         """Dimensions of a variable."""

@@ -214,17 +214,18 @@ class ScanRun:
         def tiles(section: TiledSection) -> Tiles:
             def tile(index: int) -> Dataset:
                 reading[:] = [Task(section, index)]
-                return self.parts.load(section, index)
+                dataset = self.parts.load(section, index)
+                advance(1)
+                return dataset
 
             return tile
 
-        advance = self.context.stage("assembling", len(self.sections))
+        advance = self.context.stage("assembling", len(self.tasks))
         try:
             parts = {}
             for section in self.sections:
                 seconds = sum(s for task, s in self.seconds.items() if task.section == section)
                 parts[section.name] = assembled(section, tiles(section), seconds)
-                advance(1)
             write_assembled(
                 self.parts.target,
                 parts,

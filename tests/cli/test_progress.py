@@ -35,3 +35,21 @@ def test_silence(terminal, quiet, monkeypatch: pytest.MonkeyPatch, capsys: pytes
     monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal)
     use(ProgressBars(quiet))
     assert capsys.readouterr() == ("", "")
+
+
+def test_a_line_every_so_often_in_a_log(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+    clock = iter(float(second) for second in range(0, 1000, 10))
+    monkeypatch.setattr("fastmech.cli.progress.time.monotonic", lambda: next(clock))
+    monkeypatch.setattr("fastmech.cli.progress.LOG_PERIOD", 50.0)
+    use(ProgressBars())
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == []
+    with ProgressBars() as bars:
+        advance, tell = bars.stage("map: points", 8), bars.counter("pictures")
+        for done in range(8):
+            advance(1)
+            tell(done + 1, 8)
+    lines = capsys.readouterr().err.splitlines()
+    assert any(line.startswith("fastmech: map: points: ") and line.endswith(" left") for line in lines)
+    assert any(line.startswith("fastmech: pictures: ") and "/s, " in line for line in lines)
+    assert 2 <= len(lines) <= 8

@@ -1,0 +1,75 @@
+"""``--quiet`` and ``--json`` of every long command."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import click
+import pytest
+
+from fastmech.cli import COMMANDS, main
+from fastmech.cli.reporting import account
+
+#: Commands that end at once whatever they are given.
+SHORT = {"status", "info"}
+
+
+def test_every_long_command_has_both_options():
+    for name in set(COMMANDS) - SHORT:
+        command = main.get_command(click.Context(main), name)
+        options = {option for parameter in command.params for option in parameter.opts}
+        assert {"--quiet", "--json"} <= options, name
+
+
+def test_run_plot_and_export_end_with_json(invoke, tiny):
+    told = json.loads(invoke("run", tiny, "--out", "x.h5", "--json").stdout)
+    assert (told["command"], told["result"], told["computed"]) == ("run", "x.h5", 5)
+    stages = {stage["name"]: stage for stage in told["stages"]}
+    assert stages["swing: integrations of the motion"]["done"] == 4
+    assert stages["assembling"]["done"] == stages["assembling"]["total"] == 5
+    told = json.loads(invoke("export", "x.h5", "--to", "npz", "--json").stdout)
+    assert told["files"] == ["x/swing.npz", "x/rest.npz"]
+    assert all(Path(path).is_file() for path in told["files"])
+    told = json.loads(invoke("plot", "x.h5", "--json", "--quiet").stdout)
+    assert told["files"]
+    assert all(Path(path).is_file() for path in told["files"])
+    assert sum(stage["done"] for stage in told["stages"]) == len(told["files"])
+
+
+def test_equilibria_end_with_json(invoke):
+    told = json.loads(invoke("equilibria", "--alpha", "0", "--json").stdout)
+    assert [e["kind"] for e in told["equilibria"]] == ["minimum", "saddle", "saddle", "maximum"]
+    assert told["force"] == 100.0
+    assert told["equilibria"][0]["snap_above"] is None
+
+
+def test_the_json_comes_also_where_a_command_ends_with_a_code(capsys: pytest.CaptureFixture[str]):
+    def command():
+        with account("try", quiet=True, as_json=True) as told:
+            told.say("not shown")
+            told.wrote(Path("a.png"))
+            told.facts["passed"] = False
+            told.bars.stage("work", 3)(2)
+            raise click.exceptions.Exit(1)
+
+    with pytest.raises(click.exceptions.Exit) as end:
+        command()
+    assert end.value.exit_code == 1
+    summary = json.loads(capsys.readouterr().out)
+    assert (summary["passed"], summary["files"]) == (False, ["a.png"])
+    (stage,) = summary["stages"]
+    assert (stage["name"], stage["done"], stage["total"]) == ("work", 2, 3)
+
+
+def test_lines_stand_above_the_bars(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+    """On a terminal the bars' own console writes them; what is piped gets plain lines."""
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    with account("try", quiet=False, as_json=False) as told:
+        told.say("piped")
+        monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+        told.say("on the terminal")
+    shown = capsys.readouterr()
+    assert shown.out == "piped\n"
+    assert "on the terminal" in shown.err
