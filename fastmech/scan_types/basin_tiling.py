@@ -16,8 +16,9 @@ from fastmech.scan_types.basin_layout import basin_variables
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
 from fastmech.scene import Scene
 
-#: Starts of a tile, about.
+#: Starts of a tile, about, and of one whose motions may be longer the fewer: a second or two of one thread.
 TILE_POINTS = 1 << 14
+USUAL_END = 60.0
 
 #: What a tile knows of every start, by the names in `fastmech.basins.map.BasinMap`.
 _ARRAYS = ("well", "turns", "time", "settle_time", "status", "computed")
@@ -54,7 +55,8 @@ class BasinTiling(Tiling):
         self.first, *others = axes
         self.others = tuple(len(axes[other]) for other in others)
         length = len(axes[self.first])
-        planes = max(1, TILE_POINTS // math.prod(self.others)) if request.refine is None else length
+        points = int(TILE_POINTS * min(1.0, USUAL_END / request.t_end))
+        planes = max(1, points // math.prod(self.others)) if request.refine is None else length
         self.parts = [slice(k, min(k + planes, length)) for k in range(0, length, planes)]
         self.count = len(self.parts)
 
@@ -64,7 +66,13 @@ class BasinTiling(Tiling):
 
     def compute(self, index: int, context: RunContext) -> Dataset:
         """Label some planes."""
-        alone = self.count == 1
+        advance = context.stage(self.what, self.items(index)) if self.count == 1 else None
+
+        def told(finished: int) -> None:
+            context.check()
+            if advance is not None:
+                advance(finished)
+
         found = map_basins(
             self.scene,
             {**self.axes, self.first: self.axes[self.first][self.parts[index]]},
@@ -75,7 +83,7 @@ class BasinTiling(Tiling):
             method=self.request.method,
             settle_radius=self.request.settle_radius,
             threads=context.threads,
-            progress=context.stage(self.what, self.items(index)) if alone else None,
+            progress=told,
         )
         return self._tile({name: getattr(found, name) for name in _ARRAYS}, found.steps)
 

@@ -125,6 +125,7 @@ class DisturbedTiling(Tiling):
             method=request.method,
             part=part,
             threads=context.threads,
+            progress=lambda finished: context.check(),
         )
         errors = _sampled_errors(self.scene, ensemble, request.method) if part.start == 0 else np.zeros(0)
         arrays = {name: getattr(ensemble, _FIELDS.get(name, name)) for name in request.kept}

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.atlas.axes import grid_coefficients
-from fastmech.atlas.map import BLOCK, SLAB, Slab, solve_block
+from fastmech.atlas.map import BLOCK, Slab, solve_block
 from fastmech.atlas.sheets import SheetBuilder
 from fastmech.ensembles.threads import thread_count
 from fastmech.results import Dataset, Variable
@@ -21,8 +21,8 @@ from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
 from fastmech.scene import Scene
 from fastmech.store.stream import Piece, Stream
 
-#: Points of a tile, about.
-TILE_POINTS = SLAB
+#: Points of a tile, about: a second of one thread where all is asked for.
+TILE_POINTS = 1 << 15
 
 #: What the sheets are found from.
 _FOR_SHEETS = ("phi", "theta", "morse_index", "count")
@@ -71,6 +71,7 @@ class MapTiling(Tiling):
         slab = Slab.empty(len(coefficients))
 
         def solve(start: int) -> None:
+            context.check()
             rows = slice(start, start + BLOCK)
             solve_block(
                 coefficients[rows],
@@ -100,7 +101,8 @@ class MapTiling(Tiling):
         one |= sheet_variables(tuple(self.axes), np.zeros((1, *self.others, 6), dtype=np.int32))
         slots = slot_variables(self.request.variables)
         fixed = Dataset({**about, **tile(0).variables, **slots}, attrs)
-        return Stream(fixed, one, self.first, lambda: self._pieces(tile))
+        rows = min(8, self.parts[0].stop)
+        return Stream(fixed, one, self.first, lambda: self._pieces(tile), rows)
 
     def missing(self, index: int) -> Dataset:
         """No curves; no equilibria at the points."""

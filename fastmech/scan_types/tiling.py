@@ -22,6 +22,8 @@ class RunContext:
     threads: int | None = None  #: threads to use, all processors by default
     stage: Callable[[str, int], Progress] = lambda name, total: lambda finished: None
     """``stage(name, total)`` announces a piece of work; its result is told what has been finished since."""
+    check: Callable[[], None] = lambda: None
+    """Called now and then within a tile: raises KeyboardInterrupt where the work is to end."""
 
 
 class Tiling(ABC):

@@ -6,6 +6,7 @@ import contextlib
 import itertools
 import os
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from fastmech.results import Dataset, Variable
 from fastmech.store import write
+from fastmech.store.chunks import LEVEL, ChunkWriter
 from fastmech.store.encode import put_attrs, put_dataset
 from fastmech.store.guarded import GuardedFile
 from fastmech.store.schema import DIM_NUMBER, DIM_NUMBERS, DIMENSION_ONLY, LIBRARY_VERSIONS
@@ -39,12 +41,14 @@ class Stream:
         plane: the streamed variables with one entry along their first dimension: types, units, meanings.
         along: the streamed variables' first dimension, one of ``fixed``.
         pieces: computes the content.
+        rows: entries along the first dimension that pieces have, about; a chunk has as many.
     """
 
     fixed: Dataset
     plane: Mapping[str, Variable]
     along: str
     pieces: Callable[[], Iterator[Piece]]
+    rows: int = 8
 
     @property
     def nbytes(self) -> int:
@@ -84,6 +88,8 @@ def write_stream(
     attrs: Callable[[], Mapping[str, Any]],
     replace: bool = False,
     aside: Path | None = None,
+    threads: int = 1,
+    deflate: bool = True,
 ) -> None:
     """Like `fastmech.store.write.write_results`, for sections of which some are streams.
 
@@ -94,6 +100,8 @@ def write_stream(
         sections: one dataset or stream for each section of the request.
         attrs: gives the attributes of the whole, asked for in the end.
         aside: folder on the same file system in which it is composed, by default that of the file.
+        threads: threads that compress; the file does not depend on it.
+        deflate: whether streams are compressed, which takes most of the time.
 
     Raises:
         InputError: as there.
@@ -104,7 +112,7 @@ def write_stream(
         target = write._target(path, replace)
         temporary = write._aside(aside / target.name if aside is not None else target)
         try:
-            with temporary.open("xb+", buffering=0) as disk:
+            with temporary.open("xb+", buffering=0) as disk, ThreadPoolExecutor(threads) as pool:
                 guarded = GuardedFile(disk)
                 try:
                     with h5py.File(guarded, "w", libver=LIBRARY_VERSIONS, track_order=True) as file:
@@ -113,7 +121,8 @@ def write_stream(
                         for name, section in sections.items():
                             group = file.create_group(name, track_order=True)
                             if isinstance(section, Stream):
-                                _put_stream(group, section, numbers, guarded)
+                                chunks = ChunkWriter(pool, threads, deflate)
+                                _put_stream(group, section, numbers, guarded, chunks, deflate)
                             else:
                                 put_dataset(group, section, numbers)
                                 guarded.check()
@@ -129,19 +138,29 @@ def write_stream(
                 temporary.unlink(missing_ok=True)
 
 
-def _put_stream(group: h5py.Group, stream: Stream, numbers: Iterator[int], guarded: GuardedFile) -> None:
+def _put_stream(
+    group: h5py.Group,
+    stream: Stream,
+    numbers: Iterator[int],
+    guarded: GuardedFile,
+    chunks: ChunkWriter,
+    deflate: bool,
+) -> None:
     put_dataset(group, stream.fixed, numbers)
     length = stream.fixed.sizes[stream.along]
     _put_missing_dimensions(group, stream, numbers)
-    stored = {name: _create(group, name, variable, length) for name, variable in stream.plane.items()}
+    rows = min(length, stream.rows)
+    stored = {name: _create(group, name, v, length, rows, deflate) for name, v in stream.plane.items()}
     for piece in stream.pieces():
         if isinstance(piece, Dataset):
             put_dataset(group, piece, numbers)
             continue
         place, arrays = piece
         for name, array in arrays.items():
-            stored[name][place] = array
+            chunks.write(stored[name], place if isinstance(place, tuple) else (place,), array)
         guarded.check()
+    chunks.finish()
+    guarded.check()
 
 
 def _put_missing_dimensions(group: h5py.Group, stream: Stream, numbers: Iterator[int]) -> None:
@@ -152,17 +171,18 @@ def _put_missing_dimensions(group: h5py.Group, stream: Stream, numbers: Iterator
             scale.attrs[DIM_NUMBER] = np.int32(next(numbers))
 
 
-def _create(group: h5py.Group, name: str, variable: Variable, length: int) -> h5py.Dataset:
+def _create(
+    group: h5py.Group, name: str, variable: Variable, length: int, rows: int, deflate: bool
+) -> h5py.Dataset:
     data = variable.data
+    packing = {"compression": "gzip", "compression_opts": LEVEL, "shuffle": True} if deflate else {}
     stored = group.create_dataset(
         name,
         shape=(length, *data.shape[1:]),
         dtype=data.dtype,
-        chunks=_chunk(length, data),
-        compression="gzip",
-        compression_opts=1,
-        shuffle=True,
+        chunks=_chunk(rows, data),
         fletcher32=True,
+        **packing,
     )
     for axis, dim in enumerate(variable.dims):
         stored.dims[axis].attach_scale(group[dim])
@@ -171,9 +191,8 @@ def _create(group: h5py.Group, name: str, variable: Variable, length: int) -> h5
     return stored
 
 
-def _chunk(length: int, plane: NDArray[Any]) -> tuple[int, ...]:
+def _chunk(rows: int, plane: NDArray[Any]) -> tuple[int, ...]:
     """Shape of chunks: a few rows of the first dimension by as much of the second as fits."""
-    rows = min(length, 8)
     second = plane.shape[1] if plane.ndim > 1 else 1
     share = max(1, min(second, CHUNK_BYTES * second // max(1, rows * plane.nbytes)))
     return (rows, *((share, *plane.shape[2:]) if plane.ndim > 1 else ()))

@@ -50,6 +50,8 @@ def write_assembled(
     attrs: Callable[[], Mapping[str, Any]],
     replace: bool,
     aside: Path | None = None,
+    threads: int = 1,
+    deflate: bool = True,
 ) -> None:
     """Write a result file of sections, of which large ones are streams.
 
@@ -65,6 +67,8 @@ def write_assembled(
             attrs=attrs,
             replace=replace,
             aside=aside,
+            threads=threads,
+            deflate=deflate,
         )
     else:
         write_results(

@@ -144,6 +144,7 @@ class ScanLook:
             parameters=self.request.parameters,
             attrs=lambda: {**provenance(1), **notes},
             replace=replace,
+            deflate=False,  # which takes minutes where the rest takes seconds
         )
 
     def _tiles(self, section: TiledSection) -> Tiles:

@@ -23,7 +23,10 @@ from fastmech.tiles.parts import Manifest, Parts
 from fastmech.tiles.report import RunReport
 from fastmech.tiles.section import TiledSection, sections_of
 from fastmech.tiles.tile_file import DamagedTileError, Tile
-from fastmech.tiles.work import Crash, Hiring, Task, compute_tiles
+from fastmech.tiles.work import Crash, Hiring, Task, compute_tiles, still_computing
+
+#: Seconds for tiles in hand to notice an interrupt before the user is told that they do not.
+PATIENCE = 0.3
 
 #: How often a result is assembled anew because a tile was damaged meanwhile.
 ASSEMBLIES = 3
@@ -97,7 +100,10 @@ class ScanRun:
                     raise InputError(f"{self.parts.folder}: tiles are damaged time and again; check the disk")
                 self.parts.remove()
             except KeyboardInterrupt as interrupt:
-                raise Stopped(self._kept("interrupted"), signal_of(interrupt)) from None
+                message = self._kept("interrupted")
+                if still_computing(PATIENCE):
+                    message += "; this process ends with the tiles in hand, which are not kept"
+                raise Stopped(message, signal_of(interrupt)) from None
             except InputError as error:
                 raise InputError(self._kept(str(error))) from None
             except OSError as error:
@@ -233,6 +239,7 @@ class ScanRun:
                 attrs=self._attrs,
                 replace=self.replace,
                 aside=self.parts.folder,
+                threads=thread_count(self.context.threads),
             )
         except DamagedTileError as error:
             self._damaged(reading[0], error)

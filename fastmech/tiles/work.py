@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, contextmanager
@@ -18,6 +19,9 @@ from fastmech.tiles.tile_file import Tile
 
 #: How often a tile is tried before it is given up.
 TRIES = 2
+
+#: How the threads that compute tiles are called.
+THREADS = "fastmech-tile"
 
 #: Seconds that tiles in hand have to end in after an interrupt.
 GRACE = 0.7
@@ -82,17 +86,20 @@ class ThreadWorkers:
     def submit(self, task: Task) -> Future[Tile]:
         """Queue the tile."""
 
+        def check() -> None:
+            if self._stopping.is_set():
+                raise KeyboardInterrupt
+
         def stage(name: str, total: int) -> Progress:
             tell = self._context.stage(f"{task.section.name}: {name}", total)
 
             def advance(finished: int) -> None:
-                if self._stopping.is_set():
-                    raise KeyboardInterrupt
+                check()
                 tell(finished)
 
             return advance
 
-        context = replace(self._context, stage=stage)
+        context = replace(self._context, stage=stage, check=check)
         return self._pool.submit(task.section.compute, task.index, context, self._share)
 
 
@@ -106,7 +113,7 @@ class ThreadHiring:
         """As many as the context allows."""
         side = max(1, min(thread_count(context.threads), len(tasks)))
         stopping = threading.Event()
-        pool = ThreadPoolExecutor(side)
+        pool = ThreadPoolExecutor(side, thread_name_prefix=THREADS)
         try:
             yield ThreadWorkers(pool, side, context, stopping)
         finally:
@@ -164,6 +171,18 @@ def compute_tiles(
     finally:
         for future in running:
             future.cancel()
+
+
+def still_computing(patience: float) -> int:
+    """How many threads are still at tiles that nobody waits for any more, after some seconds of patience.
+
+    The process ends when they do: Python cannot stop a thread.
+    """
+    threads = [thread for thread in threading.enumerate() if thread.name.startswith(THREADS)]
+    until = time.monotonic() + patience
+    for thread in threads:
+        thread.join(max(0.0, until - time.monotonic()))
+    return sum(thread.is_alive() for thread in threads)
 
 
 def _keep_what_ends(running: dict[Future[Tile], Task], keep: Callable[[Task, Tile], None]) -> None:
