@@ -12,10 +12,24 @@ from fastmech.cli.reporting import account, reporting_options
 @click.option("--disks", metavar="N", type=click.IntRange(min=0), default=20, show_default=True)
 @click.option("--workers", metavar="N", type=click.IntRange(min=0), default=5, show_default=True)
 @click.option("--mutations", metavar="N", type=click.IntRange(min=0), default=100_000, show_default=True)
+@click.option(
+    "--overhead",
+    metavar="SECONDS",
+    type=click.IntRange(min=0),
+    default=0,
+    help="Also measure what durability and Dask cost, in scans of so many seconds.",
+)
 @click.option("--seed", metavar="N", type=click.IntRange(min=0), default=0, show_default=True)
 @reporting_options
 def command(
-    kills: int, disks: int, workers: int, mutations: int, seed: int, quiet: bool, as_json: bool
+    kills: int,
+    disks: int,
+    workers: int,
+    mutations: int,
+    overhead: int,
+    seed: int,
+    quiet: bool,
+    as_json: bool,
 ) -> None:
     """Put runs and files to the test.
 
@@ -53,6 +67,12 @@ def command(
                     count = fuzz(mutations // 2, seed, told.bars.stage(what, mutations // 2))
                     told.say(f"{count.tried} damaged {what} read: {count.refused} refused, none crashed")
                     told.say(f"  slowest {count.slowest:.2f} s, memory grew by {count.grown / 1e6:.0f} MB")
+            if overhead:
+                from fastmech.faults.overhead import REPEATS, overheads
+
+                for ratio in overheads(overhead, told.bars.stage("scans both ways", 4 * REPEATS)):
+                    told.say(str(ratio))
+                    told.facts[ratio.what] = [ratio.value, ratio.error]
         except FaultFound as fault:
             told.say(f"fastmech: fault found: {fault}", err=True)
             raise click.exceptions.Exit(1) from None

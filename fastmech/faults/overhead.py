@@ -1,0 +1,131 @@
+"""What durability and Dask cost: the same scan both ways, in turn, as ratios of wall times."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from fastmech.results import Dataset
+from fastmech.runner import run_request
+from fastmech.scan_types import scan_kinds
+from fastmech.scan_types.request import RunContext, read_request
+from fastmech.store.provenance import provenance
+from fastmech.tiles.assemble import assembled, write_assembled
+from fastmech.tiles.cluster import cluster
+from fastmech.tiles.identity import asked_for, identity_of
+from fastmech.tiles.section import sections_of
+
+#: Threads, and workers of the cluster.
+WORKERS = 2
+
+#: Times that each way is taken.
+REPEATS = 3
+
+#: A map, whose tiles are large for the time they take: durability costs most there.
+_REQUEST = """
+[scene]
+alpha = 0.0
+[scan.map]
+kind = "equilibrium_map"
+axes.F0 = {{ start = -400.0, stop = 400.0, num = {num} }}
+axes.c1 = {{ start = 0.0, stop = 400.0, num = 500 }}
+variables = ["count", "count_stable", "outcome", "coincidence", "phi", "theta", "morse_index", "energy",
+             "decay_time", "depth"]
+"""
+
+_CALIBRATION = 400
+
+Run = Callable[[], object]
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """One way's wall time over another's.
+
+    Attributes:
+        what: which ways.
+        value: mean of the ratios of runs that followed one another.
+        error: its standard error.
+        seconds: mean wall time of the other way [s].
+    """
+
+    what: str
+    value: float
+    error: float
+    seconds: float
+
+    def __str__(self) -> str:
+        return f"{self.what}: {self.value:.3f} ± {self.error:.3f} (of {self.seconds:.0f} s, {REPEATS} pairs)"
+
+
+def overheads(seconds: float, tell: Callable[[int], None] = lambda n: None) -> list[Ratio]:
+    """Measure both, in scans of about so many seconds; ``tell`` is told of each of the ``4 * REPEATS`` runs.
+
+    The scan without durability computes the same tiles in as many threads, holds them in memory and writes
+    the same file.
+    """
+    with TemporaryDirectory(prefix="fastmech-overhead-") as folder, cluster(WORKERS, None) as hire:
+        request, out = Path(folder) / "scan.toml", Path(folder) / "scan.h5"
+
+        def durably() -> None:
+            run_request(request, out, fresh=True, context=RunContext(WORKERS))
+
+        def by_dask() -> None:
+            run_request(request, out, fresh=True, context=RunContext(WORKERS), hire=hire)
+
+        num = _CALIBRATION
+        for _ in range(2):  # the first time also warms up
+            request.write_text(_REQUEST.format(num=num), encoding="utf-8")
+            by_dask()
+            num = max(_CALIBRATION, round(num * seconds / _seconds(durably)))
+        return [
+            _ratio("durable over in memory", durably, lambda: _in_memory(request, out), tell),
+            _ratio(f"{WORKERS} Dask workers over {WORKERS} threads", by_dask, durably, tell),
+        ]
+
+
+def _in_memory(path: Path, out: Path) -> None:
+    """The scan without durability."""
+    request = read_request(path, scan_kinds())
+    sections = {}
+    for section in sections_of(request, identity_of(asked_for(request))):
+        tiling = section.tiling
+
+        def compute(index: int) -> Dataset:
+            return tiling.compute(index, RunContext(1))  # noqa: B023 - used up within the loop
+
+        with ThreadPoolExecutor(WORKERS) as pool:
+            tiles = list(pool.map(compute, range(tiling.count)))
+        sections[section.name] = assembled(section, tiles.__getitem__, 0.0)
+    write_assembled(
+        out,
+        sections,
+        parameters=request.parameters,
+        attrs=lambda: {**provenance(WORKERS), "title": request.title},
+        replace=True,
+        threads=WORKERS,
+    )
+
+
+def _ratio(what: str, one: Run, other: Run, tell: Callable[[int], None]) -> Ratio:
+    ratios, seconds = [], []
+    for repeat in range(REPEATS):
+        taken = {}
+        for way in (one, other) if repeat % 2 else (other, one):
+            taken[way] = _seconds(way)
+            tell(1)
+        ratios.append(taken[one] / taken[other])
+        seconds.append(taken[other])
+    error = statistics.stdev(ratios) / REPEATS**0.5
+    return Ratio(what, statistics.mean(ratios), error, statistics.mean(seconds))
+
+
+def _seconds(run: Run) -> float:
+    started = time.perf_counter()
+    run()
+    return time.perf_counter() - started
