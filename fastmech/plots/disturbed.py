@@ -32,16 +32,17 @@ POINTS = 1001
 
 
 def draw_disturbed(dataset: Dataset) -> dict[str, Figure]:
-    """Pictures of a dataset of the scan type ``disturbed``; none where there is no equilibrium."""
+    """Pictures of a dataset of the scan type ``disturbed``, of what was kept of the trajectories."""
     if not dataset.sizes["equilibrium"]:
         return {}
+    pictures = {
+        "outcomes": (_outcomes, {"outcome", "end_equilibrium", "turns"}),
+        "time_to_return": (_time_to_return, {"time_to_return"}),
+        "excursions": (_excursions, {"excursion"}),
+        "linear_range": (_linear_range, {"linear_limit"}),
+    }
     with style():
-        return {
-            "outcomes": _outcomes(dataset),
-            "time_to_return": _time_to_return(dataset),
-            "excursions": _excursions(dataset),
-            "linear_range": _linear_range(dataset),
-        }
+        return {name: draw(dataset) for name, (draw, needed) in pictures.items() if needed <= set(dataset)}
 
 
 def _outcomes(dataset: Dataset) -> Figure:

@@ -59,3 +59,16 @@ def test_starts_of_a_last_block_with_a_single_lane() -> None:
     (e,) = equilibria("table_1", 0)
     run = disturb(SCENE, e, 257, radius=0.3, **SHORT)
     np.testing.assert_array_equal(integrate(SCENE, run.starts, 0.2, dt=0.05, method="dop853").y[0], run.final)
+
+
+@pytest.mark.nojit
+def test_a_part_is_that_part_of_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Parts within and across streams of random numbers, of which an ensemble of 20 has three here."""
+    monkeypatch.setattr("fastmech.disturbance.ensemble.STREAM", 8)
+    (e,) = equilibria("table_1", 0)
+    whole = disturb(SCENE, e, 20, **SHORT)
+    assert len(np.unique(whole.starts, axis=0)) == 20
+    for part in (slice(0, 8), slice(3, 5), slice(6, 18), slice(19, 20), slice(None)):
+        found = disturb(SCENE, e, 20, part=part, **SHORT)
+        for name in ("starts", "final", "outcome", "turns", "time_to_return", "excursion"):
+            np.testing.assert_array_equal(getattr(found, name), getattr(whole, name)[part])

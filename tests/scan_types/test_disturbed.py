@@ -30,6 +30,7 @@ from scan_types.values import (
 
 from fastmech.results import Dataset
 from fastmech.scan_types.disturbed import Disturbed
+from fastmech.scan_types.request import RunContext
 from fastmech.scene import Scene
 
 UNITS = {
@@ -274,3 +275,32 @@ def test_failures_are_counted(tmp_path: Path) -> None:
     assert {"not_finite", "step_too_large"} <= set(outcomes)
     finite = np.isfinite(section["final"].data).all(axis=-1)
     assert ((np.array(decoded(section["outcome"])) == "not_finite") == ~finite).all()
+
+
+def test_less_may_be_kept(tmp_path: Path) -> None:
+    """Labels only: nothing else of the trajectories, what is counted is the same."""
+    fields = {"trajectories": 600, "t_end": 1.0, "return_radius": 0.3, "linear_directions": 1}
+    scene = deepest_first("bistable")[0]
+    whole = stored(Disturbed(**fields), scene, tmp_path)
+    less = stored(Disturbed(**fields, variables=["outcome"]), scene, tmp_path)
+    gone = set(whole) - set(less)
+    assert gone == {"start", "final", "end_equilibrium", "turns", "time_to_return", "excursion"}
+    for name in less:
+        np.testing.assert_array_equal(less[name].data, whole[name].data)
+    assert np.isfinite(less["time_to_return_quantile"].data).any()
+    assert set(Disturbed.draw(less, {})) == {"linear_range"}
+    with pytest.raises(ValueError, match="unknown variable 'finl'; did you mean 'final'"):
+        Disturbed(variables=["finl"])
+
+
+def test_blocks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tiles of 256 trajectories and 5 directions: the same bits as one tile of each equilibrium."""
+    scan = Disturbed(trajectories=700, t_end=0.5, linear_directions=12)
+    scene = deepest_first("table_1")[0]
+    whole = scan.run(scene, RunContext(threads=2))
+    monkeypatch.setattr("fastmech.scan_types.disturbed_tiling.EVALUATIONS", 1)
+    monkeypatch.setattr("fastmech.scan_types.disturbed_tiling.DIRECTIONS", 5)
+    assert scan.tiling(scene).count == len(whole["phi"].data) * 6
+    small = scan.run(scene, RunContext(threads=1))
+    for name in whole:
+        assert whole[name].data.tobytes() == small[name].data.tobytes(), name
