@@ -52,20 +52,24 @@ def command(
             if kills:
                 killed = kill_campaign(kills, expected, seed, told.bars.stage("kills", kills))
                 told.say(f"{killed.kills} runs killed, {killed.finished} scans resumed to the same result")
+                told.facts["killed"] = {"runs": killed.kills, "tiles_again": killed.again, **killed.stages}
                 told.say(f"  {killed.again} tiles computed again; killed while " + _counts(killed.stages))
             if disks and not can_mount():
                 told.say("no right to mount small disks: full disks are left out")
             elif disks:
                 full = disk_campaign(disks, expected, seed, told.bars.stage("full disks", disks))
                 told.say(f"{full.full} full disks told, the scans resumed to the same result")
+                told.facts["full_disks"] = {"runs": full.full, "tiles_again": full.again}
                 told.say(f"  {full.again} tiles computed again; {full.fitting} disks were large enough")
             if workers:
                 died = worker_campaign(workers, expected, seed, told.bars.stage("workers", workers))
+                told.facts["workers_killed"] = died.kills
                 told.say(f"{died.kills} Dask workers killed, {died.finished} scans with the same result")
             if mutations:
                 for what, fuzz in (("requests", fuzz_requests), ("result files", fuzz_results)):
                     count = fuzz(mutations // 2, seed, told.bars.stage(what, mutations // 2))
                     told.say(f"{count.tried} damaged {what} read: {count.refused} refused, none crashed")
+                    told.facts[what] = {"tried": count.tried, "refused": count.refused}
                     told.say(f"  slowest {count.slowest:.2f} s, memory grew by {count.grown / 1e6:.0f} MB")
             if overhead:
                 from fastmech.faults.overhead import REPEATS, overheads
