@@ -107,9 +107,9 @@ def _show(report: RunReport) -> None:
         for name in results:
             if not report.was_complete:
                 click.echo(f"{results[name].attrs['wall_time_s']:9.2f} s  {name}")
-            failed = results[name].attrs.get("failed", 0)
-            if failed:
-                click.echo(f"{name}: {failed} trajectories failed; use a smaller dt", err=True)
+            failures = results[name].attrs.get("failures")
+            if failures:
+                click.echo(f"fastmech: {name}: {failures}", err=True)
     if report.was_complete:
         click.echo(f"{target} holds this result already; --fresh computes it again")
     else:

@@ -11,11 +11,12 @@ from pydantic import Field
 
 from fastmech.disturbance.ensemble import DisturbedEnsemble, disturb, equilibria_to_disturb
 from fastmech.disturbance.linear_range import linear_range
-from fastmech.disturbance.outcome import Outcome
+from fastmech.disturbance.outcome import FAILURES, Outcome
 from fastmech.ensembles.integrate import integrate
 from fastmech.results import Dataset, Variable, flags
 from fastmech.scan_types.request import HALVING, MethodName, RunContext, Scan, failures
 from fastmech.scene import Scene
+from fastmech.step_limits.warning import step_warning
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,6 +46,10 @@ class Disturbed(Scan):
     def check(self, scene: Scene) -> None:
         """There must be something to disturb, and a constant force."""
         equilibria_to_disturb(scene)
+
+    def step_warning(self, scene: Scene) -> str | None:
+        """By the scene's limit and the decaying force."""
+        return step_warning(scene, self.dt, self.method)
 
     def run(self, scene: Scene, context: RunContext) -> Dataset:
         """Disturb one equilibrium after the other; each has its own stream of random numbers."""
@@ -94,7 +99,16 @@ class Disturbed(Scan):
                 (*every, "component"), _stack(ensembles, "starts"), "rad, rad/s", f"start: {state}"
             ),
             "final": Variable(
-                (*every, "component"), _stack(ensembles, "final"), "rad, rad/s", f"end: {state}"
+                (*every, "component"),
+                _stack(ensembles, "final"),
+                "rad, rad/s",
+                f"end, or last finite state: {state}",
+            ),
+            "failed": Variable(
+                every,
+                _stack(ensembles, "failed"),
+                "s",
+                "time of the last finite state where it failed on the way",
             ),
             "outcome": Variable(
                 every, _stack(ensembles, "outcome"), "1", "where it is at the end", flags(Outcome)
@@ -130,7 +144,7 @@ class Disturbed(Scan):
                 ("equilibrium", "sample"),
                 errors,
                 "rad or rad/s",
-                "difference of a final state from the same run with half the step, first trajectories",
+                "difference of a final state from the same run with half the step, first trajectories; NaN: failed",
             ),
             "quantile": Variable(("quantile",), np.array(QUANTILES), "1", "quantile"),
             "time_to_return_quantile": Variable(
@@ -160,7 +174,7 @@ class Disturbed(Scan):
             "error_estimate_median": float(np.median(errors)),
             "error_estimate_is": f"{HALVING}; final states of the first {errors.shape[1]} of each",
         }
-        attrs |= failures(variables["outcome"].data >= Outcome.NOT_FINITE)
+        attrs |= failures(variables["outcome"].data, FAILURES)
         return Dataset(variables, attrs)
 
     @staticmethod
@@ -175,7 +189,7 @@ def sampled_errors(scene: Scene, e: DisturbedEnsemble, dt: float, method: str) -
     """Differences of the first final states from those of the step ``dt`` [s], shape (sample,)."""
     final = e.final[:SAMPLE]
     finer = integrate(scene, e.starts[: len(final)], e.t_end, dt, method).y[-1]
-    return np.asarray(np.abs(finer - final).max(axis=1))
+    return np.where(np.isnan(e.failed[:SAMPLE]), np.abs(finer - final).max(axis=1), np.nan)
 
 
 def return_quantiles(ensemble: DisturbedEnsemble) -> NDArray[np.float64]:

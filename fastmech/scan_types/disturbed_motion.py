@@ -10,10 +10,12 @@ from pydantic import Field
 
 from fastmech.disturbance.ensemble import equilibria_to_disturb
 from fastmech.disturbance.motion import disturbed_motion
+from fastmech.ensembles.integrate import FAILURES
 from fastmech.ensembles.spans import output_steps
 from fastmech.results import Dataset, Variable
 from fastmech.scan_types.request import HALVING, MethodName, RunContext, Scan, failures
 from fastmech.scene import Scene
+from fastmech.step_limits.warning import step_warning
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,6 +38,10 @@ class DisturbedMotionScan(Scan):
     def check(self, scene: Scene) -> None:
         """There must be something to disturb, and a constant force."""
         equilibria_to_disturb(scene)
+
+    def step_warning(self, scene: Scene) -> str | None:
+        """By the scene's limit and the decaying force."""
+        return step_warning(scene, self.dt, self.method)
 
     def run(self, scene: Scene, context: RunContext) -> Dataset:
         """Integrate the disturbance of each equilibrium; the linearized motion is a matrix exponential."""
@@ -72,12 +78,11 @@ class DisturbedMotionScan(Scan):
                 "disturbance of phi, theta, phi', theta', linearized motion",
             ),
         }
-        failed = [not np.isfinite(motion.nonlinear).all() for motion in motions]
         attrs = self.model_dump(exclude={"scene"}) | {
             "error_estimate": float(np.max(differences)),
             "error_estimate_is": HALVING,
         }
-        return Dataset(variables, attrs | failures(np.array(failed)))
+        return Dataset(variables, attrs | failures([motion.status[0] for motion in motions], FAILURES))
 
     @staticmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:

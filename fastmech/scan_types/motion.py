@@ -9,8 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from fastmech.ensembles.balance import energy_balance
-from fastmech.ensembles.integrate import integrate
-from fastmech.ensembles.status import Status
+from fastmech.ensembles.integrate import FAILURES, integrate
 from fastmech.mechanism.coefficients import force
 from fastmech.mechanism.geometry import constraints, positions
 from fastmech.mechanism.hamilton import momenta
@@ -18,6 +17,7 @@ from fastmech.mechanism.reactions import reactions
 from fastmech.results import Dataset, Variable
 from fastmech.scan_types.request import HALVING, MethodName, RunContext, Scan, failures
 from fastmech.scene import Scene
+from fastmech.step_limits.warning import step_warning
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -56,6 +56,11 @@ class Motion(Scan):
     outputs: Annotated[int, Field(ge=2, le=10_000_000)] = 2001
     dt: Annotated[float, Field(gt=0)] = 0.01
     method: MethodName = "dop853"
+
+    def step_warning(self, scene: Scene) -> str | None:
+        """By the scene's limit, the decaying force and the rates of the start."""
+        start = [self.phi, self.theta, self.phi_dot, self.theta_dot]
+        return step_warning(scene, self.dt, self.method, start)
 
     def run(self, scene: Scene, context: RunContext) -> Dataset:
         """Integrate in both formulations and derive everything else from the Lagrangian one."""
@@ -122,7 +127,7 @@ class Motion(Scan):
             "error_estimate_is": HALVING,
         }
         advance(1)
-        attrs |= failures(run.status != Status.OK)
+        attrs |= failures(run.status, FAILURES)
         return Dataset(variables, attrs)
 
     @staticmethod
