@@ -19,6 +19,7 @@ from fastmech.hardcases.cases.conservative import (
     STEPS,
     energy_history,
 )
+from fastmech.hardcases.containment import CONTAINED, containment, containment_markdown
 from fastmech.hardcases.gallery import gallery_dataset, gallery_markdown, run_gallery, verdict
 from fastmech.hardcases.registry import CASES
 from fastmech.integrators.methods import METHODS
@@ -68,7 +69,9 @@ def write_hardcases(
     advance = stage("step limits", len(METHODS))
     limits = _limits(scene, advance)
     table, store = out / "hardcases.md", out / "hardcases.h5"
-    table.write_text(gallery_markdown(results, _limits_markdown(limits)), encoding="utf-8")
+    shares = containment(quick, stage("failing neighbours", len(CONTAINED)))
+    tables = f"{_limits_markdown(limits)}\n\n{containment_markdown(shares)}"
+    table.write_text(gallery_markdown(results, tables), encoding="utf-8")
     parameters = {
         name: Variable((), np.array(value), unit, about)
         for name, (value, unit, about) in scene.described().items()
@@ -82,7 +85,7 @@ def write_hardcases(
     write_results(
         store,
         scene_parameters=parameters,
-        sections={"gallery": gallery_dataset(results), "step_limits": limits},
+        sections={"gallery": gallery_dataset(results), "step_limits": limits, "containment": shares},
         attrs=attrs,
         replace=True,
     )
