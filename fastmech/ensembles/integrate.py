@@ -119,9 +119,9 @@ def integrate(
         states at the output times and the status of every trajectory: a start that is not finite, a motion
         that became so, and a scene's motion that ends with an energy it cannot have (the step is too large)
         are told apart and leave the others as they are. One that fails has NaN from the next output on, and
-        its last finite state and time in ``last`` and ``failed``. With ``tol`` also an estimate of the error; with
-        ``dt`` there is none. A trajectory that a system's stopping condition ends keeps the state in which
-        it stopped.
+        its last finite state and time in ``last`` and ``failed``. With ``tol`` also an estimate of the
+        error; with ``dt`` there is none. A trajectory that a system's stopping condition ends keeps the state
+        in which it stopped.
 
     Raises:
         InputError: an argument is wrong, or the states would not fit into memory.

@@ -35,7 +35,7 @@ def motion(name: str) -> Motion:
 
 
 class Boundary(NamedTuple):
-    """Where a line of starts at rest, theta = 0, crosses a basin boundary, and where motions beside it end."""
+    """Where a line of starts at rest, theta = 0, crosses a basin boundary, and where motions end."""
 
     scene: Scene
     phi: float  #: rad, rounded; to 1e-16

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
@@ -11,7 +12,7 @@ import numpy as np
 
 from fastmech.ensembles.threads import thread_count
 from fastmech.equilibria.find import find_equilibria
-from fastmech.errors import InputError
+from fastmech.errors import InputError, StepWarning
 from fastmech.hardcases.cases.conservative import (
     ENERGETIC_START,
     PAPER_START,
@@ -64,6 +65,12 @@ def write_hardcases(
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{out}: cannot be made: {error.strerror}") from None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", StepWarning)  # steps that are too long are what some cases are about
+        return _write(out, quick, stage, started)
+
+
+def _write(out: Path, quick: bool, stage: Stage, started: float) -> Report:
     results = run_gallery(quick, stage("hard cases", len(CASES)))
     scene = Scene(c2=1100 / 3, alpha=0.0)
     advance = stage("step limits", len(METHODS))

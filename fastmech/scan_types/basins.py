@@ -79,7 +79,7 @@ class Basins(TiledScan):
                 )
 
     def step_warning(self, scene: Scene) -> str | None:
-        """By the scene's limit and the decaying force; without ``dt`` each start's step is chosen by itself."""
+        """By the scene's limit and the decaying force; without ``dt`` each start's step is chosen."""
         return None if self.dt is None else step_warning(scene, self.dt, self.method)
 
     def tiling(self, scene: Scene) -> Tiling:

@@ -144,7 +144,7 @@ class Disturbed(Scan):
                 ("equilibrium", "sample"),
                 errors,
                 "rad or rad/s",
-                "difference of a final state from the same run with half the step, first trajectories; NaN: failed",
+                "difference of a final state from that with half the step, first trajectories; NaN: failed",
             ),
             "quantile": Variable(("quantile",), np.array(QUANTILES), "1", "quantile"),
             "time_to_return_quantile": Variable(

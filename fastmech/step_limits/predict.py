@@ -27,7 +27,7 @@ SHORTER = 0.8 ** np.arange(8.0)
 
 
 def stable_step(method: Method, eigenvalues: ArrayLike, growth: float = 0.0) -> float:
-    """Largest step [s] up to which no decaying mode grows by more than ``growth``; inf for an A-stable method.
+    """Largest step [s] up to which no decaying mode grows by more than ``growth``; inf if A-stable.
 
     Growing modes set no limit. A mode without damping may also grow by :data:`GROWTH_PER_RADIAN`.
     """
@@ -43,7 +43,7 @@ def stable_step(method: Method, eigenvalues: ArrayLike, growth: float = 0.0) -> 
 
 
 def is_stable(method: Method, eigenvalues: ArrayLike, h: float, growth: float = 0.0) -> bool:
-    """Whether no decaying mode grows with a step h [s], nor with some shorter ones: quicker than the limit."""
+    """Whether no decaying mode grows with a step h [s], nor with some shorter ones: quicker to tell."""
     values, slack = _decaying(eigenvalues)
     if not values.size or isinstance(method, ImplicitRungeKutta):
         return True

@@ -93,7 +93,7 @@ def resting_eigenvalues(scene: Scene, force: float) -> NDArray[np.complex128]:
 def step_limit(scene: Scene, method: str) -> float:
     """Largest step [s] that is stable wherever a scene can rest, and nearly so at every configuration.
 
-    At the minima no motion may grow that should die out; elsewhere, where a motion only passes, by 1 % a step.
+    At the minima no motion may grow that should die out; elsewhere, where it only passes, by 1 % a step.
     Both with the force at full strength and with the force gone.
 
     Raises:

@@ -19,8 +19,8 @@ DISTANCES = 10.0 ** -np.arange(3.0, 15.0)
 
 DT, T_END = 0.01, 60.0
 
-#: Distance from which on every label must be right: rounding, once at the start (phi is near 1) and grown some
-#: hundredfold until the motion is at the saddle.
+#: Distance from which on every end must be right: a thousand roundings of phi, which is near 1; they grow on
+#: the way to the saddle.
 RIGHT_FROM = {"float64": 1e-12, "float32": 1e-4}
 
 
@@ -65,9 +65,7 @@ def _certified(
     wrong = proved & (np.abs(ends - right).max(axis=1) > 0.1)
     nearest = float(distance[proved].min(initial=np.inf))
     others = ", ".join(sorted({BasinStatus(s).name.lower() for s in found.status[~proved]}))
-    remark = (
-        f"fm.labels_of: {proved.sum()} of {above.size} proved, down to {nearest:.0e} rad; nearer: {others}"
-    )
+    remark = f"fm.labels_of: {proved.sum()} of {above.size} proved, to {nearest:.0e} rad; nearer: {others}"
     status = Status.OK.name.lower()
     return Row("dop853", np.nan, found.steps, float(wrong.sum()), 0.0, np.nan, status, True, remark)
 
@@ -76,8 +74,8 @@ CASES = (
     HardCase(
         "float32_at_a_boundary",
         "starts 1e-3 to 1e-14 rad from a basin boundary, in lanes of float32 and of float64",
-        "the boundary by bisection with heyoka in 80-bit arithmetic; error: distance from it at which an end is "
-        "wrong; of fm.labels_of, the number of wrong proofs",
+        "the boundary by bisection with heyoka in 80-bit arithmetic; error: distance from it at which an end "
+        "is wrong; of fm.labels_of, the number of wrong proofs",
         "wrong ends only within the grown rounding of the precision; fm.labels_of proves none: nearer to the "
         "boundary it gives a status",
         _run,
