@@ -12,16 +12,23 @@ from fastmech.ensembles.status import Status
 from fastmech.results import Dataset, Variable
 from fastmech.scene import Scene
 
-#: Methods that are measured, with their steps [s]: explicit, multistep and implicit ones.
-CONTAINED = {"rk4": 0.01, "dop853": 0.02, "abm8": 0.01, "gauss6": 0.05, "radau5": 0.05, "sdirk4": 0.02}
+#: Methods that are measured: explicit, multistep and implicit ones, with step and length of the run [s].
+CONTAINED = {
+    "rk4": (0.01, 100.0),
+    "dop853": (0.02, 100.0),
+    "abm8": (0.01, 100.0),
+    "gauss6": (0.05, 20.0),
+    "radau5": (0.05, 20.0),
+    "sdirk4": (0.02, 10.0),
+}
 
 SCENE = Scene(c2=1100 / 3, alpha=0.0)
 
-#: Trajectories, one in how many fails in its first step, and how long the others go on [s].
-NUMBER, ONE_IN, T_END, QUICK_T_END = 1024, 16, 20.0, 1.0
+#: Trajectories, one in how many fails in its first step, and the share of the run's length if it is quick.
+NUMBER, ONE_IN, QUICK = 1024, 16, 0.05
 
 #: Runs of each kind, in turn; the fastest counts, because others share the machine.
-REPETITIONS = 5
+REPETITIONS = 3
 
 
 def containment(quick: bool, progress: Callable[[int], None]) -> Dataset:
@@ -30,9 +37,9 @@ def containment(quick: bool, progress: Callable[[int], None]) -> Dataset:
     mixed, failing = starts.copy(), np.arange(0, NUMBER, ONE_IN)
     mixed[failing, 2] = 1e200
     healthy = np.setdiff1d(np.arange(NUMBER), failing)
-    t_end = QUICK_T_END if quick else T_END
     shares, flagged, same = [], [], []
-    for method, dt in CONTAINED.items():
+    for method, (dt, length) in CONTAINED.items():
+        t_end = QUICK * length if quick else length
         seconds = np.empty((REPETITIONS + 1, 2))
         for repetition in range(REPETITIONS + 1):
             runs = []
@@ -64,7 +71,7 @@ def containment_markdown(shares: Dataset) -> str:
         "",
         f"{shares.attrs['failing']} of {shares.attrs['trajectories']} trajectories fail in their first step; "
         "trajectories per second of the rest beside them, over those of a run without failures. At least "
-        "0.9 is wanted; one thread, fastest of five runs each, in turn.",
+        "0.9 is wanted; one thread, fastest of three runs each, in turn.",
         "",
         "| method | throughput of the rest | failed | rest the same to the bit |",
         "|---|---:|---:|---|",
