@@ -39,6 +39,11 @@ MOTIONS: dict[str, tuple[dict[str, float], list[float], float]] = {
     "chaos": ({"F0": 0.0, "beta": 0.0}, [2.5, 2.0, 0.0, 0.0], 20.0),
 }
 
+#: A line of starts at rest, theta = 0, that crosses a basin boundary between these values of phi; and the
+#: time [s] after which a motion that started 1e-18 rad from it has come to rest.
+BOUNDARY_SCENE = {"c1": 294.9, "c2": 92.85, "F0": 85.3, "alpha": 0.0}
+BOUNDARY_BETWEEN, BOUNDARY_TIME = (-1.0, -0.975), 60.0
+
 PRECISION = np.longdouble
 
 TARGET = Path(__file__).parents[1] / "fastmech" / "hardcases" / "references.toml"
@@ -94,6 +99,33 @@ def final(p: dict[str, float], start: list[float], t: float, tolerance: float) -
     return integrator.state.copy()
 
 
+def boundary() -> tuple[np.longdouble, list[list[float]]]:
+    """The boundary's phi to 80 bits, and the angles in which motions from below and above it end."""
+    integrator = hy.taylor_adaptive(
+        equations(TABLE_1 | BOUNDARY_SCENE),
+        [PRECISION(0)] * 4,
+        fp_type=PRECISION,
+        tol=PRECISION(1e-19),
+        compact_mode=True,
+    )
+
+    def end(phi: np.longdouble) -> np.ndarray:
+        integrator.time, integrator.state[:] = PRECISION(0), [phi, PRECISION(0), PRECISION(0), PRECISION(0)]
+        outcome = integrator.propagate_until(PRECISION(BOUNDARY_TIME))[0]
+        assert outcome == hy.taylor_outcome.time_limit, outcome
+        return integrator.state[:2].copy()
+
+    low, high = (PRECISION(phi) for phi in BOUNDARY_BETWEEN)
+    below, above = end(low), end(high)
+    while low < (middle := (low + high) / 2) < high:
+        here = end(middle)
+        if np.abs(here - below).max() < np.abs(here - above).max():
+            low = middle
+        else:
+            high = middle
+    return low, [[float(x) for x in place] for place in (below, above)]
+
+
 def main() -> None:
     lines = [
         "# Made by make_hardcases.py: final states of hard motions, heyoka in 80-bit arithmetic. SI units.",
@@ -110,6 +142,10 @@ def main() -> None:
         lines.append("scene = { " + ", ".join(f"{k} = {v!r}" for k, v in changes.items()) + " }")
         print(f"{name}: {uncertainty:.1e}, {time.time() - began:.1f} s", flush=True)
         TARGET.write_text("\n".join([*lines, ""]), encoding="utf-8")
+    phi, ends = boundary()
+    lines += ["", "[boundary]", f'phi = "{phi:.20f}"', f"ends = {ends}"]
+    lines.append("scene = { " + ", ".join(f"{k} = {v!r}" for k, v in BOUNDARY_SCENE.items()) + " }")
+    TARGET.write_text("\n".join([*lines, ""]), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from fastmech.ensembles.run import Progress
-from fastmech.errors import InputError
+from fastmech.errors import InputError, StepWarning
 from fastmech.plots.style import save
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import RunContext, read_request
@@ -49,7 +50,11 @@ def run_request(
     request = read_request(path, scan_kinds())
     target = Path(out) if out is not None else default_output(path)
     run = ScanRun(request, Path(path), target, context or RunContext(), hire or ThreadHiring(), tell)
-    return run.run(fresh)
+    for line in request.step_warnings:
+        warnings.warn(line, StepWarning, stacklevel=2)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", StepWarning)  # told above, once a scan
+        return run.run(fresh)
 
 
 def scene_of_section(results: Results, name: str) -> dict[str, float]:

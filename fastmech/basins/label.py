@@ -30,6 +30,7 @@ from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.mechanism.lagrange import unit
 from fastmech.mechanism.reduced import metric_11, slider_ratio
 from fastmech.scene import Scene
+from fastmech.step_limits.warning import warn_of_step
 
 Floats = NDArray[np.float64]
 
@@ -96,6 +97,7 @@ def labels_of(
     formula, certificate = find_method(method), certificate_of(scene)
     if dt is not None:
         dt = checks.number("dt", dt, "s", above=0.0)
+        warn_of_step([scene], dt, method)
     if settle_radius is not None:
         settle_radius = checks.number("settle_radius", settle_radius, "rad", above=0.0)
     finite = np.isfinite(begin).all(axis=1)

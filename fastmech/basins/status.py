@@ -24,6 +24,9 @@ class BasinStatus(IntEnum):
         return _ADVICE[self]
 
 
+#: Statuses of starts whose motion has failed.
+FAILURES = (BasinStatus.NOT_FINITE, BasinStatus.STEP_TOO_LARGE, BasinStatus.START_NOT_FINITE)
+
 _ADVICE = {
     BasinStatus.CAPTURED: "proved to end in its well: energy and position leave no other way",
     BasinStatus.UNDECIDED: "not captured by t_end, or the finest steps disagree; use a larger t_end",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import IO, Any
@@ -46,7 +47,11 @@ class Crashed(Failure):
 
 @contextmanager
 def one_line() -> Iterator[None]:
-    """Turn what a user causes (a wrong command line, wrong input, an interruption) into a `Failure`."""
+    """Turn what a user causes (a wrong command line, wrong input, an interruption) into a `Failure`.
+
+    Warnings are lines of the same form.
+    """
+    shown, warnings.showwarning = warnings.showwarning, _show_warning
     try:
         yield
     except click.UsageError as error:
@@ -63,3 +68,9 @@ def one_line() -> Iterator[None]:
         raise kind(str(stopped)) from None
     except KeyboardInterrupt:
         raise Interrupted("interrupted") from None
+    finally:
+        warnings.showwarning = shown
+
+
+def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
+    click.echo(f"fastmech: {message}", err=True)

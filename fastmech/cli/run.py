@@ -108,9 +108,9 @@ def _show(told: Account, report: RunReport) -> None:
         for name in results:
             if not report.was_complete:
                 told.say(f"{results[name].attrs['wall_time_s']:9.2f} s  {name}")
-            failed = results[name].attrs.get("failed", 0)
-            if failed:
-                told.say(f"{name}: {failed} trajectories failed; use a smaller dt", err=True)
+            failures = results[name].attrs.get("failures")
+            if failures:
+                told.say(f"fastmech: {name}: {failures}", err=True)
     if report.was_complete:
         told.say(f"{target} holds this result already; --fresh computes it again")
     else:

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.disturbance.observe import EXCURSION_PHI, EXCURSION_THETA, LAST_OUTSIDE, observe_departure
-from fastmech.disturbance.outcome import Outcome, resting_place
+from fastmech.disturbance.outcome import FAILURES, Outcome, resting_place
 from fastmech.disturbance.size import Size, size_at
 from fastmech.ensembles import checks
 from fastmech.ensembles.plausible import judge
 from fastmech.ensembles.run import Observation, Progress, run_ensemble
 from fastmech.ensembles.spans import output_steps
-from fastmech.ensembles.status import Status
+from fastmech.ensembles.status import Status, failure_counts, failure_line
 from fastmech.equilibria.find import Equilibria, Equilibrium, find_equilibria
 from fastmech.errors import InputError
 from fastmech.integrators.implicit_method import with_jacobian
@@ -23,6 +23,7 @@ from fastmech.kernels.jacobians import lagrange_jacobian
 from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
+from fastmech.step_limits.warning import beyond_stability, warn_of_step
 
 Floats = NDArray[np.float64]
 
@@ -43,12 +44,18 @@ class DisturbedEnsemble:
     t_end: float  #: s
     dt: float  #: step taken [s]
     starts: Floats  #: states at t = 0, shape (n, 4)
-    final: Floats  #: states at t_end, shape (n, 4)
+    final: Floats  #: states at t_end, of those that failed the last finite ones, shape (n, 4)
+    failed: Floats  #: time of the last finite state of those that failed on the way [s], else NaN; shape (n,)
     outcome: NDArray[np.int8]  #: :class:`Outcome`, shape (n,)
     end_index: NDArray[np.int8]  #: equilibrium in whose ball it ended, -1: none; shape (n,)
     turns: NDArray[np.int64]  #: full turns of phi and theta on the way there, 0 where none; shape (n, 2)
     time_to_return: Floats  #: s, first step from which on it was in the ball; NaN unless returned; (n,)
     excursion: Floats  #: largest departures of phi and theta from the equilibrium [rad], shape (n, 2)
+
+    @property
+    def failures(self) -> str:
+        """One line: how many trajectories have failed, and how; empty where none has."""
+        return failure_line(failure_counts(self.outcome, FAILURES), self.outcome.size)
 
     @property
     def share_returned(self) -> float:
@@ -103,6 +110,7 @@ def disturb(
     return_radius = checks.number("return_radius", return_radius, "rad", above=0.0)
     times = np.array([0.0, checks.number("t_end", t_end, "s", above=0.0)])
     dt = checks.number("dt", dt, "s", above=0.0)
+    warn_of_step([scene], dt, method)
     index = equilibria.index_of(equilibrium)
     center = np.array([equilibrium.phi, equilibrium.theta, 0.0, 0.0])
     size = size_at(scene, equilibrium.phi, equilibrium.theta)
@@ -121,7 +129,7 @@ def disturb(
         threads=threads,
         progress=progress,
     )
-    final = run.states[-1]
+    final, step = run.states[-1], float(times[-1] / output_steps(times, dt)[0])
     end_index, turns = resting_place(scene, equilibria, final, return_radius)
     turned = (turns != 0).any(axis=1)
     stable = np.array([e.kind == "minimum" for e in equilibria])
@@ -130,10 +138,14 @@ def disturb(
     outcome[(end_index >= 0) & ~stable[end_index]] = Outcome.AT_UNSTABLE
     outcome[(end_index == index) & ~turned & stable[end_index]] = Outcome.RETURNED
     status = judge(run.status, starts, final, reduce(scene))
+    if beyond_stability(scene, step, method):  # where it came to rest is no matter of the mechanism
+        outcome[outcome != Outcome.UNDECIDED] = Outcome.STEP_TOO_LARGE
     outcome[status == Status.STEP_TOO_LARGE] = Outcome.STEP_TOO_LARGE
     outcome[status == Status.NOT_FINITE] = Outcome.NOT_FINITE
     outcome[status == Status.NOT_CONVERGED] = Outcome.NOT_CONVERGED
-    last_outside, step = run.records[LAST_OUTSIDE], times[-1] / output_steps(times, dt)[0]
+    failing = np.isin(outcome, FAILURES)
+    end_index[failing], turns[failing] = -1, 0
+    last_outside = run.records[LAST_OUTSIDE]
     left = (size(starts - center) > return_radius) | (last_outside > 0.0)
     inside_since = np.where(left, last_outside + step, 0.0)
     return DisturbedEnsemble(
@@ -141,9 +153,10 @@ def disturb(
         index=index,
         size=size,
         t_end=float(times[-1]),
-        dt=float(step),
+        dt=step,
         starts=starts,
-        final=final,
+        final=run.last,
+        failed=run.failed,
         outcome=outcome,
         end_index=end_index,
         turns=turns,

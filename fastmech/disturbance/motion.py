@@ -29,6 +29,9 @@ class DisturbedMotion:
     t: Floats  #: s, shape (times,)
     nonlinear: Floats  #: shape (times, n, 4)
     linearized: Floats  #: shape (times, n, 4)
+    status: NDArray[
+        np.int8
+    ]  #: :class:`fastmech.ensembles.status.Status` of the nonlinear motions, shape (n,)
 
 
 def disturbed_motion(
@@ -54,7 +57,8 @@ def disturbed_motion(
     t = checks.rising_times("times", times)
     center = np.array([equilibrium.phi, equilibrium.theta, 0.0, 0.0])
     run = integrate(scene, center + start, dt=dt, method=method, t_eval=t, threads=threads)
-    return DisturbedMotion(t, run.y - center, start @ propagators(jacobian(scene, equilibrium), t).mT)
+    linearized = start @ propagators(jacobian(scene, equilibrium), t).mT
+    return DisturbedMotion(t, run.y - center, linearized, run.status)
 
 
 def propagators(matrix: Floats, times: Floats) -> Floats:

@@ -35,6 +35,9 @@ class Outcome(IntEnum):
         return _ADVICE[self]
 
 
+#: Outcomes of trajectories that have failed.
+FAILURES = (Outcome.NOT_FINITE, Outcome.STEP_TOO_LARGE, Outcome.NOT_CONVERGED)
+
 _ADVICE = {
     Outcome.RETURNED: "in the ball of return and without the energy to leave it again, no turns made",
     Outcome.ELSEWHERE: "the same at another stable equilibrium, or at this one some turns further",
@@ -42,7 +45,7 @@ _ADVICE = {
     Outcome.UNDECIDED: "still moving at t_end; use a larger t_end",
     Outcome.NOT_FINITE: "became NaN or infinite on the way; use a smaller dt",
     Outcome.NOT_CONVERGED: "Newton's iteration found no solution of a step; use a smaller dt",
-    Outcome.STEP_TOO_LARGE: "has energy at the end that the motion cannot have; use a smaller dt",
+    Outcome.STEP_TOO_LARGE: "has energy that it cannot have, or dt is beyond the limit; use a smaller dt",
 }
 
 

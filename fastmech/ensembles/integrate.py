@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -10,27 +9,31 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.ensembles import checks
-from fastmech.ensembles.problem import Problem, scene_problem, system_problem
+from fastmech.ensembles.problem import Problem, extreme_scenes, scene_problem, system_problem
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.solve import Precision, Settings, Solution, solve
+from fastmech.ensembles.status import Status, failure_counts, failure_line
 from fastmech.ensembles.stopping import STOP_CODE, STOP_TIME
 from fastmech.ensembles.system import System
 from fastmech.ensembles.tolerance import solve_to_tolerance
-from fastmech.errors import InputError, StepWarning
+from fastmech.errors import InputError
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Method
 from fastmech.integrators.methods import find_method
 from fastmech.kernels.select import FORMULATIONS
 from fastmech.scene import Scene, nearest
-from fastmech.step_limits.warning import step_warning
+from fastmech.step_limits.warning import warn_of_step
 
 #: Longest step [s] where neither a step nor a tolerance is given.
 DEFAULT_DT = 0.01
 
+#: Statuses of trajectories that have failed.
+FAILURES = [status for status in Status if status != Status.OK]
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Trajectories:
-    """States of an ensemble at its output times."""
+    """States of an ensemble at its output times; printed, it says how many trajectories have failed."""
 
     t: NDArray[np.float64]  #: output times [s], shape (times,)
     y: NDArray[
@@ -50,8 +53,21 @@ class Trajectories:
     failed: NDArray[np.float64] | None = (
         None  #: when each that failed was last finite [s], NaN: did not; (n,)
     )
+    last: NDArray[np.float64] | None = None  #: last finite state of each, whether it failed or not; (n, dim)
     error: NDArray[np.float64] | None = None  #: estimate for each trajectory (n,), of runs to a tolerance
     error_estimate: float | None = None  #: estimate of the quantile asked for, of runs to a tolerance
+
+    @property
+    def failures(self) -> str:
+        """One line: how many trajectories have failed, and with which status; empty where none has."""
+        return failure_line(failure_counts(self.status, FAILURES), self.status.size)
+
+    def __repr__(self) -> str:
+        n, dim = self.y.shape[1:]
+        what = (
+            f"{n:,} trajectories of {dim} states at {self.t.size:,} times, {self.method}, dt = {self.dt:g} s"
+        )
+        return f"Trajectories({what}; {self.failures or 'none failed'})"
 
 
 def integrate(
@@ -102,9 +118,10 @@ def integrate(
     Returns:
         states at the output times and the status of every trajectory: a start that is not finite, a motion
         that became so, and a scene's motion that ends with an energy it cannot have (the step is too large)
-        are told apart and leave the others as they are. With ``tol`` also an estimate of the error; with
-        ``dt`` there is none. A trajectory that a system's stopping condition ends keeps the state in which
-        it stopped.
+        are told apart and leave the others as they are. One that fails has NaN from the next output on, and
+        its last finite state and time in ``last`` and ``failed``. With ``tol`` also an estimate of the
+        error; with ``dt`` there is none. A trajectory that a system's stopping condition ends keeps the state
+        in which it stopped.
 
     Raises:
         InputError: an argument is wrong, or the states would not fit into memory.
@@ -127,10 +144,8 @@ def integrate(
         return _trajectories(problem, outputs, found.solution, found.settings, found.error, found.estimate)
     formula = find_method(method or "rk4")
     step = checks.number("dt", DEFAULT_DT if dt is None else dt, "s", above=0.0)
-    if isinstance(scene, Scene) and not parameters:
-        told = step_warning(scene, step, formula.name, starts)
-        if told:
-            warnings.warn(told, StepWarning, stacklevel=2)
+    if isinstance(scene, Scene):
+        warn_of_step(extreme_scenes(scene, parameters or {}), step, formula.name, starts)
     settings = Settings(formula, step, _fit_times(fit, scene), _precision(dtype, problem, formula))
     solution = solve(problem, starts, outputs, settings, threads, progress)
     return _trajectories(problem, outputs, solution, settings)
@@ -161,6 +176,7 @@ def _trajectories(
         stop_code=code,
         stop_time=time,
         failed=solution.failed,
+        last=solution.y[-1] if solution.last is None else solution.last,
         error=error,
         error_estimate=estimate,
     )

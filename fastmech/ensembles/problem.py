@@ -80,6 +80,18 @@ def scene_problem(scene: Scene, n: int, parameters: Mapping[str, ArrayLike], for
     return Problem(rhs, params, coefficients=coefficients, canonical=True, jacobian=canonical_jacobian)
 
 
+def extreme_scenes(scene: Scene, parameters: Mapping[str, ArrayLike]) -> list[Scene]:
+    """The scene, or those of the trajectories in which a parameter that differs is least or greatest."""
+    columns = {name: np.asarray(values, dtype=np.float64) for name, values in parameters.items()}
+    rows = {
+        int(pick(column)) for column in columns.values() if column.size for pick in (np.argmin, np.argmax)
+    }
+    return [
+        scene.replace(**{name: float(column[row]) for name, column in columns.items()})
+        for row in sorted(rows)
+    ] or [scene]
+
+
 def system_problem(system: System, n: int, parameters: Mapping[str, ArrayLike]) -> Problem:
     """A system whose ``parameters`` differ between the n trajectories.
 

@@ -31,7 +31,7 @@ class Settings:
     precision: Precision = np.float64
 
 
-@dataclass(frozen=True)
+@dataclass
 class Solution:
     """What a run gives."""
 
@@ -41,6 +41,7 @@ class Solution:
     steps: NDArray[np.int64]  #: steps of each trajectory that runs to the end, shape (n,)
     dt: Floats  #: longest step of each [s], shape (pieces, n): a piece ends where steps are fitted again
     failed: Floats  #: time of the last finite state of a trajectory that failed [s], else NaN, shape (n,)
+    last: Floats | None  #: last finite states, shape (n, dim); None: none failed, they are the final ones
 
 
 def solve(
@@ -64,6 +65,7 @@ def solve(
     exponent = EXPONENT_AGAIN if cuts else EXPONENT_ONCE
     pieces: list[Floats] = []
     status, failed = np.full(n, Status.OK, dtype=np.int8), np.full(n, np.nan)
+    lost: list[tuple[NDArray[np.bool_], Floats]] = []
     steps, taken = np.zeros(n, dtype=np.int64), np.empty((len(ends), n))
     begin, now, shares = 0.0, problem.inward(starts), np.zeros(n)
     method = with_jacobian(settings.method, problem.jacobian, problem.second_order)
@@ -92,7 +94,10 @@ def solve(
         pieces.append(run.states[: np.count_nonzero(inside)])
         worse = run.status != Status.OK
         status[worse & (status == Status.OK)] = run.status[worse & (status == Status.OK)]
-        failed = np.where(np.isnan(failed), run.failed, failed)
+        first = np.isnan(failed) & ~np.isnan(run.failed)
+        failed[first] = run.failed[first]
+        if first.any():
+            lost.append((first, problem.outward(run.last)[first]))
         for length in np.unique(dt):
             number = output_steps(times, float(length))
             steps[dt == length] += number.sum()
@@ -103,4 +108,9 @@ def solve(
         for output in y:  # one at a time: what is computed on the way takes little memory
             output[:] = problem.outward(output)
     judged = judge(status, starts, y[-1], problem.coefficients)
-    return Solution(y, run.records, judged, steps, taken, failed)
+    last = None
+    if lost:
+        last = y[-1].copy()
+        for members, states in lost:
+            last[members] = states
+    return Solution(y, run.records, judged, steps, taken, failed, last)

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from enum import IntEnum
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 
 class Status(IntEnum):
@@ -27,3 +31,22 @@ _ADVICE = {
     Status.NOT_CONVERGED: "Newton's iteration found no solution of a step; use a smaller dt",
     Status.START_NOT_FINITE: "the start is NaN or infinite",
 }
+
+
+def failure_counts(status: ArrayLike, failing: Iterable[IntEnum]) -> dict[str, int]:
+    """How many trajectories have which of the ``failing`` statuses, by name; what none has is left out."""
+    values = np.asarray(status)
+    found = {kind.name.lower(): int(np.count_nonzero(values == kind)) for kind in failing}
+    return {name: count for name, count in found.items() if count}
+
+
+def failure_line(counts: Mapping[str, int], total: int) -> str:
+    """For example ``3 of 4,096 trajectories failed: 2 not_finite, 1 step_too_large; use a smaller dt``.
+
+    Empty where ``counts`` is.
+    """
+    if not counts:
+        return ""
+    each = ", ".join(f"{count:,} {name}" for name, count in counts.items())
+    advice = "" if set(counts) == {Status.START_NOT_FINITE.name.lower()} else "; use a smaller dt"
+    return f"{sum(counts.values()):,} of {total:,} trajectories failed: {each}{advice}"

@@ -282,6 +282,10 @@ def _replace(best: Solution, which: NDArray[np.int64], run: Solution, part: NDAr
     for old, new in ((best.y, run.y), (best.records, run.records), (best.dt, run.dt)):
         old[:, which] = new[:, part]
     best.status[which], best.steps[which] = run.status[part], run.steps[part]
+    best.failed[which] = run.failed[part]
+    if best.last is not None or run.last is not None:
+        best.last = best.y[-1].copy() if best.last is None else best.last
+        best.last[which] = (run.y[-1] if run.last is None else run.last)[part]
 
 
 def _distance(a: Floats, b: Floats) -> Floats:

@@ -71,8 +71,8 @@ def verdict(results: Sequence[Result]) -> str:
     return f"{len(failed)} of {len(results)} cases failed: {', '.join(failed)}"
 
 
-def gallery_markdown(results: Sequence[Result], limits: str) -> str:
-    """The report's text; ``limits`` is the table of step limits."""
+def gallery_markdown(results: Sequence[Result], tables: str) -> str:
+    """The report's text; ``tables`` are those that follow the cases."""
     lines = ["# Hard cases", "", f"{verdict(results).capitalize()}.", ""]
     lines += ["A method that does not claim a case must end with a status, not with a number.", ""]
     for result in results:
@@ -90,7 +90,7 @@ def gallery_markdown(results: Sequence[Result], limits: str) -> str:
             for row in result.rows
         ]
         lines.append("")
-    return "\n".join([*lines, limits, ""])
+    return "\n".join([*lines, tables, ""])
 
 
 def _number(value: float) -> str:

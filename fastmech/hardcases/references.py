@@ -32,3 +32,19 @@ def motion(name: str) -> Motion:
     entry = _content()[name]
     scene = Scene(c2=1100 / 3).replace(**entry["scene"])
     return Motion(scene, np.array(entry["start"]), entry["t"], np.array([float(x) for x in entry["state"]]))
+
+
+class Boundary(NamedTuple):
+    """Where a line of starts at rest, theta = 0, crosses a basin boundary, and where motions end."""
+
+    scene: Scene
+    phi: float  #: rad, rounded; to 1e-16
+    below: NDArray[np.float64]  #: phi, theta [rad] at the end of motions that start at smaller phi, (2,)
+    above: NDArray[np.float64]  #: the same for greater phi
+
+
+def boundary() -> Boundary:
+    """The crossing found by bisection in extended precision."""
+    entry = _content()["boundary"]
+    below, above = (np.array(end) for end in entry["ends"])
+    return Boundary(Scene(c2=1100 / 3).replace(**entry["scene"]), float(entry["phi"]), below, above)

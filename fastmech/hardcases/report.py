@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
@@ -11,7 +12,7 @@ import numpy as np
 
 from fastmech.ensembles.threads import thread_count
 from fastmech.equilibria.find import find_equilibria
-from fastmech.errors import InputError
+from fastmech.errors import InputError, StepWarning
 from fastmech.hardcases.cases.conservative import (
     ENERGETIC_START,
     PAPER_START,
@@ -19,6 +20,7 @@ from fastmech.hardcases.cases.conservative import (
     STEPS,
     energy_history,
 )
+from fastmech.hardcases.containment import CONTAINED, containment, containment_markdown
 from fastmech.hardcases.gallery import gallery_dataset, gallery_markdown, run_gallery, verdict
 from fastmech.hardcases.registry import CASES
 from fastmech.integrators.methods import METHODS
@@ -63,12 +65,20 @@ def write_hardcases(
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{out}: cannot be made: {error.strerror}") from None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", StepWarning)  # steps that are too long are what some cases are about
+        return _write(out, quick, stage, started)
+
+
+def _write(out: Path, quick: bool, stage: Stage, started: float) -> Report:
     results = run_gallery(quick, stage("hard cases", len(CASES)))
     scene = Scene(c2=1100 / 3, alpha=0.0)
     advance = stage("step limits", len(METHODS))
     limits = _limits(scene, advance)
     table, store = out / "hardcases.md", out / "hardcases.h5"
-    table.write_text(gallery_markdown(results, _limits_markdown(limits)), encoding="utf-8")
+    shares = containment(quick, stage("failing neighbours", len(CONTAINED)))
+    tables = f"{_limits_markdown(limits)}\n\n{containment_markdown(shares)}"
+    table.write_text(gallery_markdown(results, tables), encoding="utf-8")
     parameters = {
         name: Variable((), np.array(value), unit, about)
         for name, (value, unit, about) in scene.described().items()
@@ -82,7 +92,7 @@ def write_hardcases(
     write_results(
         store,
         scene_parameters=parameters,
-        sections={"gallery": gallery_dataset(results), "step_limits": limits},
+        sections={"gallery": gallery_dataset(results), "step_limits": limits, "containment": shares},
         attrs=attrs,
         replace=True,
     )

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.basins.map import STATE, BasinMap, map_basins
-from fastmech.basins.status import BasinStatus
+from fastmech.basins.status import FAILURES, BasinStatus
 from fastmech.capture.certificate import certificate_of
 from fastmech.results import Dataset, Variable
 from fastmech.scan_types.basin_layout import basin_variables
+from fastmech.scan_types.request import failures
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
 from fastmech.scene import Scene
 
@@ -105,7 +106,7 @@ class BasinTiling(Tiling):
         }
         attrs |= {"steps": found.steps, "refine": self.request.refine or 0}
         attrs |= {f"fixed_{name}": value for name, value in found.fixed.items()}
-        return Dataset(basin_variables(found), attrs | found.counts)
+        return Dataset(basin_variables(found), attrs | found.counts | failures(found.status, FAILURES))
 
     def missing(self, index: int) -> Dataset:
         """Starts that have not been computed."""

@@ -23,6 +23,7 @@ from fastmech.scan_types.equilibrium_map import Axis
 from fastmech.scan_types.request import MethodName, TiledScan
 from fastmech.scan_types.tiling import Tiling
 from fastmech.scene import Scene, nearest
+from fastmech.step_limits.warning import step_warning
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -76,6 +77,10 @@ class Basins(TiledScan):
                 raise InputError(
                     f"axes.{name}.stop = {axis.stop:g}: must be greater than start = {axis.start:g}"
                 )
+
+    def step_warning(self, scene: Scene) -> str | None:
+        """By the scene's limit and the decaying force; without ``dt`` each start's step is chosen."""
+        return None if self.dt is None else step_warning(scene, self.dt, self.method)
 
     def tiling(self, scene: Scene) -> Tiling:
         """Planes of the first axis; a refined map is one tile, because it follows boundaries anywhere."""

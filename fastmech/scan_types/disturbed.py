@@ -14,6 +14,7 @@ from fastmech.scan_types.disturbed_tiling import DisturbedTiling
 from fastmech.scan_types.request import MethodName, TiledScan
 from fastmech.scan_types.tiling import Tiling
 from fastmech.scene import Scene, nearest
+from fastmech.step_limits.warning import step_warning
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,6 +55,10 @@ class Disturbed(TiledScan):
     def check(self, scene: Scene) -> None:
         """There must be something to disturb, and a constant force."""
         equilibria_to_disturb(scene)
+
+    def step_warning(self, scene: Scene) -> str | None:
+        """By the scene's limit and the decaying force."""
+        return step_warning(scene, self.dt, self.method)
 
     def tiling(self, scene: Scene) -> Tiling:
         """Blocks of directions and of trajectories."""

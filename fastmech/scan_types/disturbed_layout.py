@@ -20,7 +20,8 @@ _STATE = "phi, theta, phi', theta'"
 #: for one that is not computed yet, unit, meaning.
 _TRAJECTORY: dict[str, tuple[dict[str, int], str, float, str, str]] = {
     "start": ({"component": 4}, "f8", np.nan, "rad, rad/s", f"start: {_STATE}"),
-    "final": ({"component": 4}, "f8", np.nan, "rad, rad/s", f"end: {_STATE}"),
+    "final": ({"component": 4}, "f8", np.nan, "rad, rad/s", f"end, or last finite state: {_STATE}"),
+    "failed": ({}, "f8", np.nan, "s", "time of the last finite state where it failed on the way"),
     "outcome": ({}, "i1", -1, "1", "where it is at the end"),
     "end_equilibrium": ({}, "i1", -1, "1", "equilibrium at which it rests at the end, -1: none"),
     "turns": ({"angle": 2}, "i8", 0, "1", "full turns of phi and theta made until then"),
@@ -87,7 +88,7 @@ def tally_variables(
             ("equilibrium", "sample"),
             errors,
             "rad or rad/s",
-            "difference of a final state from the same run with half the step, first trajectories",
+            "difference of a final state from that with half the step, first trajectories; NaN: failed",
         ),
         "time_to_return_quantile": Variable(
             ("equilibrium", "quantile"),

@@ -11,6 +11,7 @@ from pydantic import Field
 
 from fastmech.disturbance.ensemble import equilibria_to_disturb
 from fastmech.disturbance.motion import disturbed_motion
+from fastmech.ensembles.integrate import FAILURES
 from fastmech.ensembles.spans import output_steps
 from fastmech.equilibria.find import Equilibria, Equilibrium
 from fastmech.results import Dataset, Variable
@@ -18,6 +19,7 @@ from fastmech.scan_types.each import Each
 from fastmech.scan_types.request import HALVING, MethodName, TiledScan, failures
 from fastmech.scan_types.tiling import Tiling
 from fastmech.scene import Scene
+from fastmech.step_limits.warning import step_warning
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,6 +44,10 @@ class DisturbedMotionScan(TiledScan):
     def check(self, scene: Scene) -> None:
         """There must be something to disturb, and a constant force."""
         equilibria_to_disturb(scene)
+
+    def step_warning(self, scene: Scene) -> str | None:
+        """By the scene's limit and the decaying force."""
+        return step_warning(scene, self.dt, self.method)
 
     def tiling(self, scene: Scene) -> Tiling:
         """The equilibria one by one."""
@@ -73,6 +79,7 @@ class DisturbedMotionScan(TiledScan):
                 "nonlinear": Variable(("time", "component"), motion.nonlinear[:, 0]),
                 "linearized": Variable(("time", "component"), motion.linearized[:, 0]),
                 "difference": Variable((), difference),
+                "status": Variable((), motion.status[0]),
             }
         )
 
@@ -92,12 +99,11 @@ class DisturbedMotionScan(TiledScan):
                 for kind in ("nonlinear", "linearized")
             },
         }
-        failed = [not np.isfinite(tile["nonlinear"].data).all() for tile in tiles]
         attrs = self.model_dump(exclude={"scene"}) | {
             "error_estimate": float(np.max([tile["difference"].data for tile in tiles])),
             "error_estimate_is": HALVING,
         }
-        return Dataset(variables, attrs | failures(np.array(failed)))
+        return Dataset(variables, attrs | failures([tile["status"].data for tile in tiles], FAILURES))
 
     @staticmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from typing import Any, Protocol
 
@@ -10,10 +11,11 @@ from numpy.typing import NDArray
 
 from fastmech.disturbance.ensemble import STREAM, DisturbedEnsemble, disturb, equilibria_to_disturb
 from fastmech.disturbance.linear_range import linear_range
-from fastmech.disturbance.outcome import Outcome
+from fastmech.disturbance.outcome import FAILURES
 from fastmech.disturbance.size import size_at
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.spans import output_steps
+from fastmech.ensembles.status import failure_counts
 from fastmech.integrators.methods import find_method
 from fastmech.results import Dataset, Variable
 from fastmech.scan_types.disturbed_layout import (
@@ -24,7 +26,7 @@ from fastmech.scan_types.disturbed_layout import (
     tally_variables,
     trajectory_variables,
 )
-from fastmech.scan_types.request import HALVING
+from fastmech.scan_types.request import HALVING, counted_failures
 from fastmech.scan_types.tally import Tally
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
 from fastmech.scene import Scene
@@ -129,7 +131,7 @@ class DisturbedTiling(Tiling):
         )
         errors = _sampled_errors(self.scene, ensemble, request.method) if part.start == 0 else np.zeros(0)
         arrays = {name: getattr(ensemble, _FIELDS.get(name, name)) for name in request.kept}
-        tally = Tally.of(ensemble.time_to_return, ensemble.outcome >= Outcome.NOT_FINITE)
+        tally = Tally.of(ensemble.time_to_return, failure_counts(ensemble.outcome, FAILURES))
         return self._tile(arrays, errors, tally)
 
     def assemble(self, tile: Tiles) -> Stream:
@@ -202,9 +204,9 @@ class DisturbedTiling(Tiling):
             "error_estimate": float(np.max(errors)),
             "error_estimate_median": float(np.median(errors)),
             "error_estimate_is": f"{HALVING}; final states of the first {len(errors[0])} of each",
-            "failed": sum(t.failed for t in tallies),
         }
-        yield Dataset({}, attrs)
+        failed = sum((t.failed for t in tallies), Counter[str]())
+        yield Dataset({}, attrs | counted_failures(failed, sum(t.total for t in tallies)))
 
 
 #: Names of variables in `fastmech.disturbance.ensemble.DisturbedEnsemble`, where they are others.
@@ -226,4 +228,4 @@ def _sampled_errors(scene: Scene, e: DisturbedEnsemble, method: str) -> Floats:
     """Differences of the first final states from those of half the step, shape (sample,)."""
     final = e.final[:SAMPLE]
     finer = integrate(scene, e.starts[: len(final)], e.t_end, 0.5 * e.dt, method).y[-1]
-    return np.asarray(np.abs(finer - final).max(axis=1))
+    return np.where(np.isnan(e.failed[:SAMPLE]), np.abs(finer - final).max(axis=1), np.nan)

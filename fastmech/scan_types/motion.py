@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from fastmech.ensembles.balance import energy_balance
-from fastmech.ensembles.integrate import integrate
+from fastmech.ensembles.integrate import FAILURES, integrate
 from fastmech.ensembles.spans import output_steps
-from fastmech.ensembles.status import Status
 from fastmech.mechanism.coefficients import force
 from fastmech.mechanism.geometry import constraints, positions
 from fastmech.mechanism.hamilton import momenta
@@ -22,6 +21,7 @@ from fastmech.scan_types.each import Each
 from fastmech.scan_types.request import HALVING, MethodName, TiledScan, failures
 from fastmech.scan_types.tiling import Tiling
 from fastmech.scene import Scene
+from fastmech.step_limits.warning import step_warning
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -61,6 +61,10 @@ class Motion(TiledScan):
     dt: Annotated[float, Field(gt=0)] = 0.01
     method: MethodName = "dop853"
 
+    def step_warning(self, scene: Scene) -> str | None:
+        """By the scene's limit, the decaying force and the rates of the start."""
+        return step_warning(scene, self.dt, self.method, self._start)
+
     def tiling(self, scene: Scene) -> Tiling:
         """Four integrations of the same motion, none of which needs another."""
         parts = (self._lagrangian, self._canonical, self._balance, self._halved)
@@ -81,7 +85,7 @@ class Motion(TiledScan):
 
     def _lagrangian(self, scene: Scene) -> Dataset:
         run = integrate(scene, self._start, dt=self.dt, method=self.method, t_eval=self._times)
-        return Dataset(_states(run.y), {"steps": run.steps} | failures(run.status != Status.OK))
+        return Dataset(_states(run.y), {"steps": run.steps} | failures(run.status, FAILURES))
 
     def _canonical(self, scene: Scene) -> Dataset:
         settings: dict[str, Any] = {"dt": self.dt, "method": self.method, "formulation": "hamilton"}
@@ -141,10 +145,9 @@ class Motion(TiledScan):
             **{name: Variable(along, balance[name].data, "J", about) for name, about in _BALANCE.items()},
         }
         attrs = self.model_dump(exclude={"scene"}) | {
-            "steps": lagrangian.attrs["steps"],
+            **lagrangian.attrs,
             "error_estimate": float(np.max(np.abs(halved - y))),
             "error_estimate_is": HALVING,
-            "failed": lagrangian.attrs["failed"],
         }
         return Dataset(variables, attrs)
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
+from fastmech.ensembles.status import failure_counts, failure_line
 from fastmech.errors import InputError
 from fastmech.integrators.methods import find_method
 from fastmech.results import Dataset, Variable, check_name
@@ -55,6 +57,10 @@ class Scan(BaseModel, ABC):
         Raises:
             InputError: the scene is none for this scan.
         """
+
+    def step_warning(self, scene: Scene) -> str | None:
+        """One line if the step that is asked for cannot be right for the scene; see ``fm.step_warning``."""
+        return None
 
     @abstractmethod
     def run(self, scene: Scene, context: RunContext) -> Dataset:
@@ -120,9 +126,15 @@ class Whole(Tiling):
 HALVING = "largest difference of a state [rad or rad/s] from the same run with half the step"
 
 
-def failures(failed: NDArray[np.bool_]) -> dict[str, int]:
-    """The attribute of a section that tells how many of its trajectories have failed."""
-    return {"failed": int(np.count_nonzero(failed))}
+def failures(status: ArrayLike, failing: Iterable[IntEnum]) -> dict[str, int | str]:
+    """The attributes of a section that tell how many of its trajectories have failed, and how."""
+    return counted_failures(failure_counts(status, failing), np.size(status))
+
+
+def counted_failures(counts: Mapping[str, int], total: int) -> dict[str, int | str]:
+    """The same where failures have been counted by name."""
+    line = failure_line(counts, total)
+    return {"failed": sum(counts.values())} | ({"failures": line} if line else {})
 
 
 @dataclass(frozen=True)
@@ -145,6 +157,12 @@ class Request:
     def scene_of(self, name: str) -> Scene:
         """The scene of one scan: the file's with the scan's own changes."""
         return self.scene.replace(**self.scans[name].scene)
+
+    @property
+    def step_warnings(self) -> list[str]:
+        """One line for each scan whose step cannot be right for its scene."""
+        told = {name: scan.step_warning(self.scene_of(name)) for name, scan in self.scans.items()}
+        return [f"scan.{name}: {line}" for name, line in told.items() if line is not None]
 
 
 def read_request(path: str | Path, kinds: Mapping[str, type[Scan]]) -> Request:

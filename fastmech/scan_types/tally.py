@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,26 +13,29 @@ from fastmech.results import Dataset, Variable
 
 Floats = NDArray[np.float64]
 
+_FAILED = "failed_"
+
 
 @dataclass
 class Tally:
     """How many trajectories have returned, and when: times are ends of steps, so few differ.
 
     Attributes:
-        total, failed: trajectories, and those that failed.
+        total: trajectories.
+        failed: those that failed, by the name of their outcome.
         times, counts: the times to return that occur [s], rising, and how often.
     """
 
     total: int = 0
-    failed: int = 0
+    failed: Counter[str] = field(default_factory=Counter)
     times: Floats = field(default_factory=lambda: np.zeros(0))
     counts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     @classmethod
-    def of(cls, time_to_return: Floats, failed: NDArray[np.bool_]) -> Tally:
+    def of(cls, time_to_return: Floats, failed: Mapping[str, int]) -> Tally:
         """The tally of a block; NaN stands for no return."""
         times, counts = np.unique(time_to_return[np.isfinite(time_to_return)], return_counts=True)
-        return cls(len(time_to_return), int(np.count_nonzero(failed)), times, counts.astype(np.int64))
+        return cls(len(time_to_return), Counter(failed), times, counts.astype(np.int64))
 
     def variables(self) -> dict[str, Variable]:
         """The times and counts as a tile keeps them."""
@@ -40,12 +44,14 @@ class Tally:
 
     def attrs(self) -> dict[str, int]:
         """The rest of what a tile keeps."""
-        return {"total": self.total, "failed": self.failed}
+        return {"total": self.total} | {f"{_FAILED}{name}": count for name, count in self.failed.items()}
 
     def add(self, tile: Dataset) -> None:
         """Count a tile's trajectories too."""
         self.total += int(tile.attrs["total"])
-        self.failed += int(tile.attrs["failed"])
+        for name, count in tile.attrs.items():
+            if name.startswith(_FAILED):
+                self.failed[name.removeprefix(_FAILED)] += int(count)
         both = np.concatenate([self.times, tile["returned_time"].data])
         counts = np.concatenate([self.counts, tile["returned_count"].data])
         self.times, place = np.unique(both, return_inverse=True)

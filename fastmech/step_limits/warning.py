@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Sequence
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import minimize
 
+from fastmech.errors import StepWarning
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
+from fastmech.mechanism.lagrange import potential_energy
 from fastmech.scene import Scene
 from fastmech.stability.linearize import SmallMotion, fill_state_matrix, small_motion
 from fastmech.step_limits.impulse import impulse_limit, impulse_ratio
-from fastmech.step_limits.predict import stable_step
+from fastmech.step_limits.predict import is_stable, stable_step
 
 Floats = NDArray[np.float64]
 
@@ -23,9 +28,8 @@ SIDE = 24
 #: Angle [rad] within which eigenvalues of the same direction are told by their largest alone.
 DIRECTION = 0.03
 
-#: Steps up to this many times the scene's limit are let pass: a motion crosses the few configurations that
-#: set the limit, and what grows there for a moment dies out again.
-CROSSED = 3.0
+#: Growth a step that is let pass where a motion only crosses the configurations that set the limit.
+PASSING = 0.01
 
 #: Angle [rad] by which a body may turn in one step.
 TURN = 1.0
@@ -37,11 +41,17 @@ def configuration_eigenvalues(scene: Scene, force: float) -> NDArray[np.complex1
     Away from an equilibrium they are what a motion that passes sees for a moment. Where the stiffness pushes
     (eigenvalues with positive real part) there is nothing for a step to keep stable.
     """
-    c = reduce(scene)._replace(force=force / (scene.m2 * scene.l))
+    phi, theta = (grid.ravel() for grid in _grid())
+    return _eigenvalues(scene, force, phi, theta)
+
+
+def _grid() -> list[Any]:
     angles = np.linspace(-np.pi, np.pi, SIDE, endpoint=False) + np.pi / SIDE
-    phi: Any
-    theta: Any
-    phi, theta = (grid.ravel() for grid in np.meshgrid(angles, angles))
+    return list(np.meshgrid(angles, angles, indexing="ij"))
+
+
+def _eigenvalues(scene: Scene, force: float, phi: Any, theta: Any) -> NDArray[np.complex128]:
+    c = reduce(scene)._replace(force=force / (scene.m2 * scene.l))
     motions = small_motion(
         phi,
         theta,
@@ -60,15 +70,46 @@ def configuration_eigenvalues(scene: Scene, force: float) -> NDArray[np.complex1
     return np.asarray(np.linalg.eigvals(matrices), dtype=np.complex128)
 
 
+def resting_eigenvalues(scene: Scene, force: float) -> NDArray[np.complex128]:
+    """Eigenvalues [1/s] at the minima of the potential energy under a constant force, shape (4 minima,).
+
+    A minimum is looked for from every configuration of the grid that lies lower than its neighbours: quick,
+    and enough for a warning; :func:`fastmech.equilibria.find.find_equilibria` proves that none is missing.
+    """
+    grid = _grid()
+    energy = potential_energy(scene, np.stack(grid, axis=-1), force)
+    shifts = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
+    lowest = energy <= np.min([np.roll(energy, shift, (0, 1)) for shift in shifts], axis=0)
+    scale = max(float(np.ptp(energy)), np.finfo(float).tiny)
+    found = [
+        minimize(lambda q: float(potential_energy(scene, q, force)) / scale, [grid[0][at], grid[1][at]]).x
+        for at in zip(*np.nonzero(lowest), strict=True)
+    ]
+    phi, theta = np.array(found).reshape(-1, 2).T
+    return _eigenvalues(scene, force, phi, theta).ravel()
+
+
 @cache
 def step_limit(scene: Scene, method: str) -> float:
-    """Largest step [s] that is stable at every configuration of a scene, force at full strength and gone.
+    """Largest step [s] that is stable wherever a scene can rest, and nearly so at every configuration.
+
+    At the minima no motion may grow that should die out; elsewhere, where it only passes, by 1 % a step.
+    Both with the force at full strength and with the force gone.
 
     Raises:
         InputError: no such method.
     """
-    forces = {scene.F0, 0.0 if scene.alpha > 0.0 else scene.F0}
-    values = np.concatenate([configuration_eigenvalues(scene, force).ravel() for force in sorted(forces)])
+    formula = find_method(method)
+    resting, passing = _scene_eigenvalues(scene)
+    return min(stable_step(formula, resting), stable_step(formula, passing, PASSING))
+
+
+@cache
+def _scene_eigenvalues(scene: Scene) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    """Those at minima, and of those elsewhere what sets the limit."""
+    forces = sorted({scene.F0, 0.0 if scene.alpha > 0.0 else scene.F0})
+    resting = np.concatenate([resting_eigenvalues(scene, force) for force in forces])
+    values = np.concatenate([configuration_eigenvalues(scene, force).ravel() for force in forces])
     # The region is star-shaped enough: of eigenvalues with a common direction the largest sets the limit.
     # Conjugate eigenvalues say the same.
     values = np.where(values.imag < 0.0, values.conj(), values)
@@ -76,7 +117,19 @@ def step_limit(scene: Scene, method: str) -> float:
     largest = [
         values[directions == d][np.argmax(np.abs(values[directions == d]))] for d in np.unique(directions)
     ]
-    return stable_step(find_method(method), np.array(largest))
+    return resting, np.array(largest)
+
+
+@cache
+def beyond_stability(scene: Scene, dt: float, method: str) -> bool:
+    """Whether a step [s] is longer than :func:`step_limit`, which takes longer to find.
+
+    Raises:
+        InputError: no such method.
+    """
+    formula = find_method(method)
+    resting, passing = _scene_eigenvalues(scene)
+    return not (is_stable(formula, resting, dt) and is_stable(formula, passing, dt, PASSING))
 
 
 def step_warning(scene: Scene, dt: float, method: str, starts: ArrayLike | None = None) -> str | None:
@@ -94,29 +147,57 @@ def step_warning(scene: Scene, dt: float, method: str, starts: ArrayLike | None 
     Raises:
         InputError: no such method.
     """
+    limit = _first_limit(scene, dt, method, starts)
+    if dt <= limit.step:
+        return None
+    if limit.step == 0.0:
+        return f"dt = {dt:g} s: no step will do for {method} here, undamped motions grow with every one"
+    return (
+        f"dt = {dt:g} s: too long for {method} here, {limit.reason}; dt = {_below(limit.step):g} s would do"
+    )
+
+
+def warn_of_step(
+    scenes: Sequence[Scene], dt: float, method: str, starts: ArrayLike | None = None, stacklevel: int = 2
+) -> None:
+    """Warn, in the caller's caller, if a step cannot be right for one of some scenes.
+
+    Raises:
+        InputError: no such method.
+    """
+    limits = [(_first_limit(scene, dt, method, starts).step, k) for k, scene in enumerate(scenes)]
+    for _, k in sorted(limits):
+        told = step_warning(scenes[k], dt, method, starts)
+        if told:
+            warnings.warn(told, StepWarning, stacklevel=stacklevel + 1)
+            return
+
+
+class _Limit(NamedTuple):
+    """The longest step that is fine [s], and what is wrong with a longer one."""
+
+    step: float
+    reason: str
+
+
+def _first_limit(scene: Scene, dt: float, method: str, starts: ArrayLike | None) -> _Limit:
     formula = find_method(method)
-    stable = step_limit(scene, method)
-    limits = [(CROSSED * stable, stable, "motions that die out would grow")]
+    limits = [_Limit(np.inf, "")]
+    if beyond_stability(scene, dt, method):
+        limits.append(_Limit(step_limit(scene, method), "motions that die out would grow"))
     if scene.alpha > 0.0 and scene.F0 != 0.0:
         ratio = impulse_ratio(formula, dt * scene.alpha)
         reason = f"the decaying force would give {ratio:.3g} times its impulse"
         decay = impulse_limit(formula) / scene.alpha
-        limits.append((decay, decay, reason))
+        limits.append(_Limit(decay, reason))
     if starts is not None:
         rates = np.abs(np.asarray(starts, dtype=np.float64)[..., 2:])
         fastest = float(np.max(rates[np.isfinite(rates)], initial=0.0))
         if fastest > 0.0:
-            limits.append(
-                (
-                    TURN / fastest,
-                    TURN / fastest,
-                    f"at {fastest:.3g} rad/s it would turn {dt * fastest:.3g} rad a step",
-                )
-            )
-    limit, good, reason = min(limits)
-    if dt <= limit:
-        return None
-    return f"dt = {dt:g} s: too long for {method} here, {reason}; dt = {_below(good):g} s would do"
+            turn = TURN / fastest
+            reason = f"at {fastest:.3g} rad/s it would turn {dt * fastest:.3g} rad a step"
+            limits.append(_Limit(turn, reason))
+    return min(limits)
 
 
 def _below(limit: float) -> float:

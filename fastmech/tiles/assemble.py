@@ -36,6 +36,9 @@ def assembled(
         result = in_memory(result)
     changes = {f"{CHANGE}{key}": float(value) for key, value in section.scan.scene.items()}
     own = {"kind": section.scan.kind, **changes, **(notes or {})}
+    told = section.scan.step_warning(section.scene)
+    if told is not None:
+        own["step_warning"] = told
     if isinstance(result, Stream):
         attrs = {**own, **result.fixed.attrs, "wall_time_s": seconds}
         return replace(result, fixed=Dataset(result.fixed.variables, attrs))

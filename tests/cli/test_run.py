@@ -273,3 +273,20 @@ def test_the_command_of_a_crash_report_makes_that_tile(invoke, monkeypatch):
 
 def test_workers_and_scheduler_exclude_each_other(invoke, tiny):
     assert_refused(invoke("run", tiny, "--workers", "2", "--scheduler", "tcp://a:1"), "exclude")
+
+
+@pytest.mark.filterwarnings("always::fastmech.errors.StepWarning")
+def test_a_step_too_long_is_told_before_and_failures_after(invoke):
+    """One line each, on the terminal and in the file."""
+    request = MOTION.replace("0.1", "200.0") + 'dt = 1.0\nmethod = "rk4"\nphi_dot = 20.0\n'
+    Path("hard.toml").write_text(request, encoding="utf-8")
+    result = invoke("run", "hard.toml", "--quiet")
+    assert result.exit_code == 0
+    told = [line for line in result.stderr.splitlines() if line]
+    assert told[0].startswith("fastmech: scan.a: dt = 1 s: too long for rk4 here, ")
+    assert told[0].endswith(" s would do")
+    assert told[1] == "fastmech: a: 1 of 1 trajectories failed: 1 not_finite; use a smaller dt"
+    assert len(told) == 2
+    with open_results("results/hard.h5") as results:
+        assert f"fastmech: scan.a: {results['a'].attrs['step_warning']}" == told[0]
+        assert f"fastmech: a: {results['a'].attrs['failures']}" == told[1]

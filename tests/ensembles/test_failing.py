@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -54,3 +56,34 @@ def test_a_stop_before_the_end_is_no_failure() -> None:
     assert np.isnan(run.failed).all()
     assert 1e3 < run.last[0, 0] < np.inf
     assert run.states[0, 0, 0] == run.last[0, 0]
+
+
+@pytest.mark.parametrize("options", [{}, {"fit": [0.0, 1.0]}, {"formulation": "hamilton"}])
+def test_a_result_tells_of_its_failures(options: dict[str, Any]) -> None:
+    """At 1e200 rad/s the squares overflow in the first step: the start is the last finite state."""
+    starts = np.random.default_rng(0).normal(size=(8, 4))
+    starts[3, 0], starts[5, 2:] = np.nan, [1e200, 0.0]
+    with pytest.warns(fm.StepWarning, match="rad/s"):
+        run = fm.integrate(fm.Scene(), starts, 2.0, 0.01, **options)
+    assert run.failures == "2 of 8 trajectories failed: 1 not_finite, 1 start_not_finite; use a smaller dt"
+    assert run.failures in repr(run)
+    assert run.failed is not None
+    assert run.last is not None
+    healthy = [0, 1, 2, 4, 6, 7]
+    np.testing.assert_array_equal(run.last[healthy], run.y[-1, healthy])
+    assert np.isnan(run.failed[healthy]).all()
+    assert run.failed[5] == 0.0
+    np.testing.assert_allclose(run.last[5, :3], starts[5, :3], rtol=1e-15)
+    assert "none failed" in repr(fm.integrate(fm.Scene(), starts[:3], 0.1))
+
+
+def test_runs_to_a_tolerance_keep_last_finite_states() -> None:
+    starts = np.random.default_rng(0).normal(size=(8, 4))
+    starts[5, 2] = 1e200
+    run = fm.integrate(fm.Scene(), starts, 0.5, tol=1e-6)
+    assert run.status.tolist() == [0, 0, 0, 0, 0, 1, 0, 0]
+    assert run.failed is not None
+    assert run.last is not None
+    assert run.failed[5] == 0.0
+    np.testing.assert_array_equal(run.last[5], starts[5])
+    np.testing.assert_array_equal(run.last[:5], run.y[-1, :5])

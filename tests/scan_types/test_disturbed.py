@@ -35,6 +35,7 @@ from fastmech.scene import Scene
 
 UNITS = {
     "phi": "rad", "theta": "rad", "omega": "rad/s", "start": "rad, rad/s", "final": "rad, rad/s",
+    "failed": "s",
     "outcome": "1", "end_equilibrium": "1", "turns": "1", "time_to_return": "s", "excursion": "rad",
     "share_returned": "1", "halving_difference": "rad or rad/s", "quantile": "1",
     "time_to_return_quantile": "s", "linear_direction": "rad, rad/s", "linear_limit": "rad",
@@ -273,8 +274,11 @@ def test_failures_are_counted(tmp_path: Path) -> None:
     failed = outcomes.count("not_finite") + outcomes.count("step_too_large")
     assert section.attrs["failed"] == failed
     assert {"not_finite", "step_too_large"} <= set(outcomes)
-    finite = np.isfinite(section["final"].data).all(axis=-1)
-    assert ((np.array(decoded(section["outcome"])) == "not_finite") == ~finite).all()
+    assert np.isfinite(section["final"].data).all()  # the last finite states of those that failed
+    on_the_way = ~np.isnan(section["failed"].data)
+    assert ((np.array(decoded(section["outcome"])) == "not_finite") == on_the_way).all()
+    assert (section["failed"].data[on_the_way] < 2.0).all()
+    assert section.attrs["failures"].startswith(f"{failed} of {len(outcomes)} trajectories failed: ")
 
 
 def test_less_may_be_kept(tmp_path: Path) -> None:
@@ -284,7 +288,7 @@ def test_less_may_be_kept(tmp_path: Path) -> None:
     whole = stored(Disturbed(**fields), scene, tmp_path)
     less = stored(Disturbed(**fields, variables=["outcome"]), scene, tmp_path)
     gone = set(whole) - set(less)
-    assert gone == {"start", "final", "end_equilibrium", "turns", "time_to_return", "excursion"}
+    assert gone == {"start", "final", "end_equilibrium", "failed", "turns", "time_to_return", "excursion"}
     for name in less:
         np.testing.assert_array_equal(less[name].data, whole[name].data)
     assert np.isfinite(less["time_to_return_quantile"].data).any()

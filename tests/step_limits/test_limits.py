@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 import sympy
 
 import fastmech as fm
+from fastmech.disturbance.outcome import Outcome
 from fastmech.equilibria.find import find_equilibria
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import RungeKutta
@@ -150,3 +153,40 @@ def test_the_scene_s_limit_holds_at_every_equilibrium(method: str) -> None:
         for e in find_equilibria(scene):
             if e.morse_index == 0:
                 assert step_limit(scene, method) <= 1.05 * largest_stable_step(scene, e, method)
+
+
+@pytest.mark.parametrize("call", ["integrate", "parameters", "disturb", "labels_of"])
+def test_a_step_beyond_the_limit_is_told_before_the_run(call: str) -> None:
+    scene = fm.Scene(alpha=0.0, beta=1e5)
+    minimum = next(e for e in find_equilibria(scene) if e.morse_index == 0)
+    runs: dict[str, Callable[[], object]] = {
+        "integrate": lambda: fm.integrate(scene, [0, 0, 0, 0], 0.1, 0.01),
+        "parameters": lambda: fm.integrate(
+            fm.Scene(), np.zeros((3, 4)), 0.1, 0.01, parameters={"beta": [1.0, 1e5, 10.0]}
+        ),
+        "disturb": lambda: fm.disturb(scene, minimum, 4, t_end=0.1, dt=0.01, method="rk4"),
+        "labels_of": lambda: fm.labels_of(scene, [0, 0, 0, 0], 0.1, dt=0.01, method="rk4"),
+    }
+    with pytest.warns(
+        fm.StepWarning, match=r"^dt = 0.01 s: too long for rk4 here, .*; dt = 0.00\d+ s would do"
+    ):
+        runs[call]()
+
+
+def test_no_label_comes_out_beyond_the_limit() -> None:
+    """Within the limit every motion returns; beyond it none is said to, though many look like it."""
+    minimum = next(e for e in find_equilibria(SCENE) if e.morse_index == 0)
+    limit = step_limit(SCENE, "rk4")
+    within = fm.disturb(SCENE, minimum, 64, dt=0.5 * limit, method="rk4")
+    assert within.share_returned == 1.0
+    with pytest.warns(fm.StepWarning):
+        beyond = fm.disturb(SCENE, minimum, 64, dt=1.2 * limit, method="rk4")
+    assert set(beyond.outcome) == {Outcome.STEP_TOO_LARGE}
+    assert (beyond.end_index == -1).all()
+    assert beyond.failures.startswith("64 of 64 trajectories failed: 64 step_too_large")
+
+
+def test_no_step_will_do() -> None:
+    told = step_warning(SCENE.replace(beta=0.0, F0=0.0), 0.01, "euler")
+    assert told is not None
+    assert "no step will do" in told

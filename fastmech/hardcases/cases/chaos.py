@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from fastmech.ensembles.integrate import integrate
+from fastmech.ensembles.status import Status
+from fastmech.ensembles.system import System
 from fastmech.hardcases.case import HardCase, Row, energy, row_of
 from fastmech.hardcases.references import motion
 from fastmech.scene import Scene
@@ -19,6 +21,13 @@ START = np.array([0.3, 2.5, 3.0, -4.0])
 SEED, LOST = 1e-12, 1e-2
 
 REVERSE = 20.0
+
+#: Largest exponent of the Henon-Heiles system at E = 1/8, of the chaotic motion through x = 0, y = -0.25 with
+#: y' = 0: Skokos, Bountis, Antonopoulos, Physica D 231 (2007), 30-54. Printed to two digits.
+PUBLISHED, LAST_DIGIT = 0.047, 5e-4
+
+#: Motions that start together and average over the chaotic sea, and their length [s].
+MEAN_OF, FULL, QUICK = 32, 30_000.0, 3000.0
 
 
 def _predictability(quick: bool) -> Sequence[Row]:
@@ -53,6 +62,24 @@ def _reverse(quick: bool) -> Sequence[Row]:
     return rows
 
 
+def henon_heiles(t: float, x: float, y: float, u: float, v: float) -> tuple[float, float, float, float]:
+    """Motion in the potential (x^2 + y^2)/2 + x^2 y - y^3/3 (Henon, Heiles, Astron. J. 69 (1964), 73)."""
+    return u, v, -x - 2.0 * x * y, -y - x * x + y * y
+
+
+def _published(quick: bool) -> Sequence[Row]:
+    system, dt = System(henon_heiles, ["x", "y", "u", "v"], {}), 0.1
+    y = -0.25 + 1e-5 * np.random.default_rng(1).normal(size=MEAN_OF)
+    u = np.sqrt(2.0 / 8.0 - y**2 + 2.0 * y**3 / 3.0)  # so that E = 1/8
+    length = QUICK if quick else FULL
+    found = largest_lyapunov(system, np.stack([0.0 * y, y, u, 0.0 * y], axis=1), length, dt).largest
+    mean, uncertain = float(found.mean()), float(found.std(ddof=1)) / np.sqrt(MEAN_OF)
+    steps, status = round(length / dt), Status.OK.name.lower()
+    remark = f"{mean:.4f} +- {uncertain:.4f} 1/s, published {PUBLISHED} 1/s"
+    error = abs(mean - PUBLISHED)
+    return [Row("dop853", dt, steps, error, LAST_DIGIT + 3.0 * uncertain, np.nan, status, True, remark)]
+
+
 def _reference(quick: bool) -> Sequence[Row]:
     m = motion("chaos")
     rows = []
@@ -76,6 +103,13 @@ CASES = (
         "the start itself; error: distance from it",
         "the motion returns, but for rounding and truncation that grew on the way",
         _reverse,
+    ),
+    HardCase(
+        "chaos_published",
+        "the tangent flow of a system of one's own, Henon-Heiles at E = 1/8, whose Jacobian is differences",
+        "0.047 1/s, Skokos, Bountis, Antonopoulos, Physica D 231 (2007); error: distance from it [1/s]",
+        "the mean of 32 chaotic motions agrees within the last digit printed and 3 standard errors",
+        _published,
     ),
     HardCase(
         "chaos_reference",

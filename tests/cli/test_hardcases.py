@@ -1,0 +1,68 @@
+"""``fastmech hardcases``: what it writes and how it ends; the cases themselves are walked elsewhere."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fastmech import open_results
+from fastmech.hardcases import gallery, report
+from fastmech.hardcases.case import HardCase, Row
+from fastmech.hardcases.containment import CONTAINED
+from fastmech.integrators.methods import METHODS
+
+
+@pytest.fixture
+def one_case(monkeypatch: pytest.MonkeyPatch):
+    """A gallery of one quick case whose error is given, and the step limits of few methods."""
+
+    def gallery_of(error: float) -> None:
+        row = Row("rk4", 0.1, 3, error, 1e-8, np.nan, "ok", True)
+        cases = {"easy": HardCase("easy", "nothing", "a closed form", "pass", lambda quick: [row])}
+        monkeypatch.setattr(gallery, "CASES", cases)
+        monkeypatch.setattr(report, "CASES", cases)
+        monkeypatch.setattr(report, "METHODS", {name: METHODS[name] for name in ("rk4", "dop853", "gauss6")})
+        monkeypatch.setattr(report, "REGIONS", ("rk4", "dop853"))
+
+    return gallery_of
+
+
+def test_table_result_file_and_pictures(invoke, one_case):
+    one_case(1e-9)
+    result = invoke("hardcases", "--quick", "--out", "hard")
+    assert result.exit_code == 0
+    assert result.stdout.splitlines()[-1] == "all 1 cases passed (1 rows)"
+    names = {"hardcases.md", "hardcases.h5", "stability_regions.png"}
+    names |= {"energy_paper_start.png", "energy_energetic_start.png"}
+    assert {path.name for path in Path("hard").iterdir()} == names
+    text = Path("hard/hardcases.md").read_text(encoding="utf-8")
+    assert "## easy: passed" in text
+    assert "## Step limits" in text
+    assert "## Failing neighbours" in text
+    with open_results("hard/hardcases.h5") as results:
+        assert results.sections == ("gallery", "step_limits", "containment")
+        assert results.attrs["verdict"] == "all 1 cases passed (1 rows)"
+        limits = results["step_limits"]
+        np.testing.assert_allclose(
+            limits["measured_step"].data[:2], limits["predicted_step"].data[:2], rtol=0.02
+        )
+        beside = results["containment"]
+        assert beside["method"].data.tolist() == list(CONTAINED)
+        assert beside["failed"].data.tolist() == [64] * len(CONTAINED)
+        assert beside["same"].data.all()
+
+
+def test_a_case_that_fails_ends_with_code_1(invoke, one_case):
+    one_case(1e-7)
+    result = invoke("hardcases", "--quick", "--out", "hard")
+    assert result.exit_code == 1
+    assert result.stdout.splitlines()[-1] == "1 of 1 cases failed: easy"
+
+
+def test_a_folder_that_cannot_be_made(invoke):
+    Path("file").write_text("", encoding="utf-8")
+    result = invoke("hardcases", "--out", "file/hard")
+    assert result.exit_code == 2
+    assert result.stderr.startswith("fastmech: file/hard: cannot be made")
