@@ -17,13 +17,25 @@ import click
     help="Folder for the report.",
 )
 @click.option("--quick", is_flag=True, help="Fewer trajectories and methods.")
-def command(out: Path, quick: bool) -> None:
+@click.option(
+    "--only",
+    type=click.Choice(["atlas", "basins", "stiff", "tolerances", "vectors"]),
+    help="One study alone.",
+)
+@click.option("--scenes", metavar="N", type=click.IntRange(min=1), help="Random scenes of `tolerances`.")
+def command(out: Path, quick: bool, only: str | None, scenes: int | None) -> None:
     """Measure trajectories per second against the error."""
+    if scenes is not None and only != "tolerances":
+        raise click.UsageError("--scenes: goes with --only tolerances")
     from fastmech.cli.progress import ProgressBars
 
     with ProgressBars() as bars:
         with bars.preparing():
-            from fastmech.bench.report import run_bench
-        written = run_bench(out, quick=quick, stage=bars.stage)
+            from fastmech.bench.report import STUDIES, run_bench
+        if only is None:
+            written = run_bench(out, quick=quick, stage=bars.stage)
+        else:
+            chosen = {} if scenes is None else {"scenes": scenes}
+            written = STUDIES[only](out, quick=quick, stage=bars.stage, **chosen)
     for path in written:
         click.echo(path)

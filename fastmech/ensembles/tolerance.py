@@ -9,6 +9,7 @@ those whose own estimate is above the tolerance run again with shorter steps.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -40,6 +41,9 @@ TYPICAL = 0.9
 
 #: Repetitions of trajectories at most.
 ROUNDS = 6
+
+#: Errors below this that two shorter steps do not halve are rounding, magnified by the motion.
+MAGNIFIED = 1e-3
 
 #: Trajectories of the largest estimates whose errors are measured by runs of half the step, at the end.
 AUDITED = 64
@@ -129,6 +133,7 @@ def _double(
     error, margin = distances(best.y, coarse.y) * found.median, found.cover / found.median
     order, dt = settings.method.order, np.full(len(starts), float(settings.dt))
     again = np.flatnonzero(~(margin * error <= tol) & np.isfinite(starts).all(axis=1))
+    vain, settled = np.zeros(len(starts), dtype=np.int64), np.zeros(len(starts), dtype=np.bool_)
     for _ in range(ROUNDS):
         if not again.size:
             break
@@ -145,12 +150,19 @@ def _double(
             coarser = replace(settings, dt=own[far] * RATIO)
             before[:, far] = solve(part.part(far), starts[again[far]], outputs, coarser, threads).y
         after = distances(run.y, before) * found.median
-        # Where a shorter step has brought nothing to a small error, rounding rules and none will.
-        hopeless = known & (after > 0.5 * error[again]) & (after < ROUNDING)
-        dt[again], error[again] = own, after
-        _replace(best, again, run, np.ones(again.size, dtype=np.bool_))
-        again = again[~(margin * after <= tol) & ~hopeless]
-    _audit(problem, starts, outputs, settings, dt, best, error, tol, threads)
+        # Where shorter steps bring nothing to a small error, rounding rules, magnified by the motion, and
+        # none will. The run with the longer step stays; its error lies between what two runs tell where
+        # truncation rules, their distance times the ratio, and where rounding does, the distance itself.
+        in_vain = known & (after > 0.5 * error[again])
+        vain[again[in_vain]] += 1
+        rounded = in_vain & ((after < ROUNDING) | ((vain[again] > 1) & (after < MAGNIFIED)))
+        better = ~(after > error[again])
+        _replace(best, again[better], run, better)
+        dt[again[better]] = own[better]
+        error[again] = np.where(rounded, np.minimum(error[again], after) / math.sqrt(found.median), after)
+        settled[again[rounded]] = True
+        again = again[~(margin * after <= tol) & ~rounded]
+    _audit(problem, starts, outputs, settings, dt, best, error, settled, tol, threads)
     return best, error
 
 
@@ -162,23 +174,25 @@ def _audit(
     dt: Floats,
     best: Solution,
     error: Floats,
+    settled: NDArray[np.bool_],
     tol: float,
     threads: int | None,
 ) -> None:
-    """Measure the errors of the worst trajectories by runs of half the step.
+    """Measure the errors of the worst trajectories by runs of half the step, but of settled ones.
 
-    Where one is above the tolerance the finer run is kept, and measured in its turn.
+    Where one is above the tolerance the finer run is kept, and measured in its turn while that helps.
     """
-    finite = np.flatnonzero(np.isfinite(starts).all(axis=1))
+    finite = np.flatnonzero(np.isfinite(starts).all(axis=1) & ~settled)
     worst = finite[np.argsort(-error[finite], kind="stable")[:AUDITED]]
+    last = np.full(worst.size, np.inf)
     for _ in range(ROUNDS):
         if not worst.size:
             return
         dt[worst] = dt[worst] / 2.0
         run = solve(problem.part(worst), starts[worst], outputs, replace(settings, dt=dt[worst]), threads)
         error[worst] = distances(run.y, best.y[:, worst])
-        bad = ~(error[worst] <= tol)
-        worst = worst[bad]
+        bad = ~(error[worst] <= tol) & ~((error[worst] > 0.5 * last) & (error[worst] < MAGNIFIED))
+        worst, last = worst[bad], error[worst[bad]]
         _replace(best, worst, run, bad)
 
 
