@@ -9,7 +9,6 @@ those whose own estimate is above the tolerance run again with shorter steps.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,6 +28,7 @@ from fastmech.ensembles.problem import Problem
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.solve import Settings, Solution, solve
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
+from fastmech.integrators.methods import find_method
 
 Floats = NDArray[np.float64]
 
@@ -44,6 +44,9 @@ ROUNDS = 6
 
 #: Errors below this that two shorter steps do not halve are rounding, magnified by the motion.
 MAGNIFIED = 1e-3
+
+#: What such trajectories run with in the end, and its steps in those of a multistep method.
+CALM, LONGER = "dop853", 4.0
 
 #: Trajectories of the largest estimates whose errors are measured by runs of half the step, at the end.
 AUDITED = 64
@@ -151,19 +154,45 @@ def _double(
             before[:, far] = solve(part.part(far), starts[again[far]], outputs, coarser, threads).y
         after = distances(run.y, before) * found.median
         # Where shorter steps bring nothing to a small error, rounding rules, magnified by the motion, and
-        # none will. The run with the longer step stays; its error lies between what two runs tell where
-        # truncation rules, their distance times the ratio, and where rounding does, the distance itself.
+        # none will: see _resettle.
         in_vain = known & (after > 0.5 * error[again])
         vain[again[in_vain]] += 1
         rounded = in_vain & ((after < ROUNDING) | ((vain[again] > 1) & (after < MAGNIFIED)))
         better = ~(after > error[again])
         _replace(best, again[better], run, better)
         dt[again[better]] = own[better]
-        error[again] = np.where(rounded, np.minimum(error[again], after) / math.sqrt(found.median), after)
+        error[again] = after
         settled[again[rounded]] = True
         again = again[~(margin * after <= tol) & ~rounded]
+    _resettle(problem, starts, outputs, settings, dt, best, error, np.flatnonzero(settled), threads)
     _audit(problem, starts, outputs, settings, dt, best, error, settled, tol, threads)
     return best, error
+
+
+def _resettle(
+    problem: Problem,
+    starts: Floats,
+    outputs: Floats,
+    settings: Settings,
+    dt: Floats,
+    best: Solution,
+    error: Floats,
+    which: NDArray[np.int64],
+    threads: int | None,
+) -> None:
+    """Run trajectories that rounding rules with the longer steps of a one-step method, which round less.
+
+    A run of half the step tells the error: where rounding rules, the two differ by about as much as each does
+    from the truth.
+    """
+    if not which.size or isinstance(settings.method, ImplicitRungeKutta):
+        return
+    part, longer = problem.part(which), LONGER if settings.method.start_steps else 1.0
+    calm = replace(settings, method=find_method(CALM), dt=dt[which] * longer)
+    run = solve(part, starts[which], outputs, calm, threads)
+    finer = solve(part, starts[which], outputs, replace(calm, dt=dt[which] * longer / 2.0), threads)
+    error[which] = distances(run.y, finer.y)
+    _replace(best, which, run, np.ones(which.size, dtype=np.bool_))
 
 
 def _audit(
