@@ -84,6 +84,7 @@ class Calibrated:
     median: float  #: error of the finer of two runs over their distance
     cover: float  #: the same for most trajectories
     truth: Floats  #: states of the sample (outputs, n, dim) by steps half as long
+    distance: Floats  #: between the sample's run and the one with longer steps, shape (n,)
     error: float  #: the sample's quantile of the errors
 
 
@@ -271,10 +272,12 @@ class _Ladder:
         settings = replace(self.base, dt=self.dt(k))
         known = (distance > 0.0) & np.isfinite(distance) & np.isfinite(error)
         if not known.any():
-            return Calibrated(settings, reason, 1.0, 1.0, truth, math.inf if len(error) else 0.0)
+            return Calibrated(settings, reason, 1.0, 1.0, truth, distance, math.inf if len(error) else 0.0)
         ratios = error[known] / distance[known]
         median, cover = float(np.median(ratios)), float(np.quantile(ratios, COVERED))
-        return Calibrated(settings, reason, median, cover, truth, order_statistic(error, self.trial.aim))
+        return Calibrated(
+            settings, reason, median, cover, truth, distance, order_statistic(error, self.trial.aim)
+        )
 
 
 def distances(a: Floats, b: Floats) -> Floats:
