@@ -24,6 +24,8 @@ from fastmech.bench.problem import PROBLEMS, Problem
 from fastmech.bench.startup import STARTED, Start, started
 from fastmech.bench.stiff import run_stiff
 from fastmech.bench.terms import TURNS, Cost, costs
+from fastmech.bench.tolerances import run_tolerances
+from fastmech.bench.vectors import run_vectors
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.threads import thread_count
 from fastmech.results import Dataset, Variable
@@ -37,6 +39,16 @@ QUICK_STARTS = 8
 QUICK_BUDGET = 0.05
 
 LIBRARIES = ("numba", "scipy", "heyoka", "torch", "jax", "diffrax", "numbalsoda", "CyRK", "pynamicalsys")
+
+
+#: Studies with a file of their own, by name.
+STUDIES: dict[str, Callable[..., list[Path]]] = {
+    "atlas": run_atlas,
+    "basins": run_basins,
+    "stiff": run_stiff,
+    "tolerances": run_tolerances,
+    "vectors": run_vectors,
+}
 
 
 def run_bench(
@@ -68,9 +80,7 @@ def run_bench(
     peak, rhs = throughputs(problems[0], stage("right-hand sides", PEAK_TURNS))
     prices = costs(problems[0], stage("terms", TURNS))
     starts = [] if quick else list(started(stage("cold starts", len(STARTED))))
-    others: list[Path] = []
-    for study in (run_atlas, run_basins, run_stiff):
-        others += study(out, quick=quick, stage=stage)
+    others = [path for study in STUDIES.values() for path in study(out, quick=quick, stage=stage)]
     table, picture = out / "bench.md", out / "bench.png"
     lines = _preamble(quick, failures)
     for problem in problems:

@@ -13,6 +13,7 @@ import click
 
 from fastmech import __version__
 from fastmech.cli.failure import Failure, one_line
+from fastmech.cli.vectors import ask_for_wide_vectors
 
 COMMANDS = (
     "run",
@@ -76,3 +77,5 @@ def main(ctx: click.Context) -> None:
     """
     if ctx.invoked_subcommand is None:
         click.echo(ctx.get_help())
+    else:
+        ask_for_wide_vectors()

@@ -8,6 +8,7 @@ from importlib import metadata
 import numba
 from rich.table import Table
 
+from fastmech.cli.vectors import reason
 from fastmech.ensembles.threads import thread_count
 from fastmech.jit import FLAGS
 from fastmech.kernel_cache import cache_directory
@@ -28,9 +29,10 @@ def vector_bits() -> int:
 
 def describe_system() -> Table:
     """A table of what results and speed depend on."""
+    from llvmlite import binding
     from numba.core import config
 
-    target = getattr(config, "CPU_NAME", None) or "the processor's own"
+    target = getattr(config, "CPU_NAME", None) or binding.get_host_cpu_name()
     table = Table(show_header=False, box=None)
     table.add_column(style="bold")
     table.add_column(overflow="fold")
@@ -39,7 +41,8 @@ def describe_system() -> Table:
         ("fastmech", metadata.version("fastmech")),
         ("processor", processor_name()),
         ("threads", str(thread_count(None))),
-        ("vectors", f"{bits} bit, {bits // 64} float64 or {bits // 32} float32 lanes, compiled for {target}"),
+        ("vectors", f"{bits} bit, {bits // 64} float64 or {bits // 32} float32 lanes ({reason(bits)})"),
+        ("compiled for", target),
         ("kernel cache", str(cache_directory())),
         *((library, metadata.version(library)) for library in LIBRARIES),
     ):

@@ -21,6 +21,12 @@ Floats = NDArray[np.float64]
 #: their errors. Measured on ensembles from rest and with rates up to 10 rad/s.
 EXPONENT_ONCE, EXPONENT_AGAIN = 1.0, 1.5
 
+#: A force that decays by a factor e in this time over the vibrations' is a motion of its own.
+QUICK = 3.0
+
+#: Decay times after which a force is gone: exp(-40) is less than a double's rounding.
+GONE = 40.0
+
 #: Steps of a factor 2 between the longest and the next: trajectories of equal step run in common blocks.
 RUNGS = 4
 
@@ -55,3 +61,16 @@ def vibration_frequency(c: Coefficients) -> Floats:
     phi = (np.hypot(c.lift, c.force) + np.abs(c.spring)) / (c.mass + 1.0)
     theta = np.hypot(c.gravity, c.force) + np.abs(c.spring)
     return np.asarray(np.sqrt(np.maximum(np.maximum(phi, theta), np.finfo(np.float64).tiny)))
+
+
+def fading_force(c: Coefficients, t_end: float) -> tuple[float, float] | None:
+    """Where a force decays far faster than vibrations: until when [s], and what share of the step.
+
+    Until then steps are as short for the decay as they are for the vibrations later. ``None`` where no force
+    does so before ``t_end``.
+    """
+    slowest, rate = vibration_frequency(c), np.where(np.asarray(c.force) != 0.0, c.decay, 0.0)
+    quick = rate[rate > QUICK * slowest] if np.ndim(rate) else rate[None][rate > QUICK * np.max(slowest)]
+    if not quick.size or GONE / quick.min() >= t_end:
+        return None
+    return GONE / float(quick.min()), float(np.min(slowest) / quick.max())

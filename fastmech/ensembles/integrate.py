@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -56,6 +56,7 @@ class Trajectories:
     last: NDArray[np.float64] | None = None  #: last finite state of each, whether it failed or not; (n, dim)
     error: NDArray[np.float64] | None = None  #: estimate for each trajectory (n,), of runs to a tolerance
     error_estimate: float | None = None  #: estimate of the quantile asked for, of runs to a tolerance
+    reason: str | None = None  #: why this method, one line, of runs to a tolerance
 
     @property
     def failures(self) -> str:
@@ -99,7 +100,8 @@ def integrate(
         method: a name from :data:`fastmech.integrators.methods.METHODS`; "rk4" by default, or the tolerance's
             choice.
         tol: in place of ``dt``: the error to be kept, absolute, in the state's units, of the worst component
-            at the worst output time. Method, step and precision are chosen by a calibration on a sample.
+            at the worst output time. Method, step and precision are chosen by a calibration on a sample:
+            an implicit method where stability, not accuracy, would set an explicit one's step.
         quantile: whose error ``tol`` is: 1.0 the largest of all trajectories, for which every one runs twice
             and bad ones again; less: that quantile of the trajectories, estimated from a sample.
         fit: whether each trajectory's step is fitted to its energy: ``dt`` then belongs to slow motions, and
@@ -141,7 +143,12 @@ def integrate(
         if method is not None:
             find_method(method)
         found = solve_to_tolerance(problem, starts, outputs, tol, quantile, method, threads, progress)
-        return _trajectories(problem, outputs, found.solution, found.settings, found.error, found.estimate)
+        return replace(
+            _trajectories(problem, outputs, found.solution, found.settings),
+            error=found.error,
+            error_estimate=found.estimate,
+            reason=found.reason,
+        )
     formula = find_method(method or "rk4")
     step = checks.number("dt", DEFAULT_DT if dt is None else dt, "s", above=0.0)
     if isinstance(scene, Scene):
@@ -156,8 +163,6 @@ def _trajectories(
     outputs: NDArray[np.float64],
     solution: Solution,
     settings: Settings,
-    error: NDArray[np.float64] | None = None,
-    estimate: float | None = None,
 ) -> Trajectories:
     code = time = None
     if problem.observation.stops:
@@ -177,8 +182,6 @@ def _trajectories(
         stop_time=time,
         failed=solution.failed,
         last=solution.y[-1] if solution.last is None else solution.last,
-        error=error,
-        error_estimate=estimate,
     )
 
 

@@ -2,6 +2,12 @@
 
 A lane's result depends on nothing but its own start and parameters, so it is the same, bit for bit, for any
 number of threads and any block size.
+
+Trajectories that have stopped or failed make room: the others of a task move up into full blocks, and a
+task's end, when few are left, runs in narrow ones. New trajectories join with the next task, not in the
+middle of one, because lanes of a block share their time. What lanes that have ended still cost is small: for
+10,000 starts of the Lorenz case, of which 82 % stop at times all over the run, 92 % of all lane steps are
+wanted ones, so a queue that refilled every lane at once could save 8 % at most, less the time of its copies.
 """
 
 from __future__ import annotations

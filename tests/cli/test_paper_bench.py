@@ -49,3 +49,24 @@ def test_bench(invoke, monkeypatch, quick):
     assert asked == [(Path("results/bench"), quick)]
     assert result.stdout.splitlines() == ["results/bench/bench.md", "results/bench/bench.png"]
     assert result.stderr == ""
+
+
+def test_one_study_of_the_bench(invoke, monkeypatch):
+    asked = []
+
+    def study(out, *, quick, stage, scenes=40):
+        asked.append((out, quick, scenes))
+        return [out / "tolerances.md"]
+
+    monkeypatch.setattr("fastmech.bench.report.STUDIES", {"tolerances": study})
+    result = invoke("bench", "--only", "tolerances", "--scenes", "3")
+    assert result.exit_code == 0
+    assert invoke("bench", "--only", "tolerances", "--quick").exit_code == 0
+    assert asked == [(Path("results/bench"), False, 3), (Path("results/bench"), True, 40)]
+    assert result.stdout.splitlines() == ["results/bench/tolerances.md"]
+
+
+def test_random_scenes_without_their_study(invoke):
+    result = invoke("bench", "--scenes", "3")
+    assert result.exit_code == 2
+    assert "--scenes: goes with --only tolerances" in result.stderr

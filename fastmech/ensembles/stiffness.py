@@ -1,0 +1,74 @@
+"""Where an explicit method's stability, and not accuracy, would set the step.
+
+A damper that acts on light bodies stops them at a rate far above the frequencies of the motion that remains.
+An explicit method must then step with that rate although nothing moves so fast; an L-stable one need not
+(Hairer, Wanner, *Solving ODEs II*, section IV.1).
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.ensembles.fitting import vibration_frequency
+from fastmech.integrators.implicit_method import ImplicitRungeKutta
+from fastmech.integrators.method import Method
+from fastmech.integrators.methods import find_method
+from fastmech.mechanism.coefficients import Coefficients
+from fastmech.mechanism.reduced import slider_ratio
+from fastmech.step_limits.amplification import amplification
+from fastmech.step_limits.crossing import first_crossing
+
+Floats = NDArray[np.float64]
+
+#: Directions of damped motion: from almost undamped to overdamped.
+DIRECTIONS = np.exp(1j * np.linspace(0.5 * np.pi + 0.1, np.pi, 12))
+
+#: Growth a step that rounding explains.
+ROUNDED = 1e-11
+
+#: Time of an implicit step of the mechanism in right-hand sides of an explicit one: its iterations with their
+#: Jacobians and small linear systems. Measured for ``radau5`` at steps that suit 1e-4 to 1e-8.
+IMPLICIT_STEP = 75
+
+_PHI = np.linspace(0.0, np.pi, 1001)
+
+#: Largest square of the slider's speed over the crank's, in units of l.
+_SLIDER_RATIO = float(np.max(np.asarray(slider_ratio(np.sin(_PHI), np.cos(_PHI))[0]) ** 2))
+
+
+@cache
+def stability_radius(name: str) -> float:
+    """Largest r such that damped modes with step times eigenvalue of size r die out; inf if implicit."""
+    method = find_method(name)
+    if isinstance(method, ImplicitRungeKutta):
+        return math.inf
+    return first_crossing(
+        lambda r: float(amplification(method, r * DIRECTIONS).max()) - 1.0 - ROUNDED, 1e-3, 1e3
+    )
+
+
+def damping_rate(c: Coefficients) -> Floats:
+    """Bound [1/s] on the rate at which the damper stops motion, over all configurations; 0 without damper."""
+    square = _SLIDER_RATIO
+    return np.asarray(c.damping * square / (c.mass + c.slider * square))
+
+
+def explicit_limit(method: Method, c: Coefficients) -> float:
+    """Step [s] at which every mode of every trajectory is stable."""
+    rate = np.maximum(damping_rate(c), vibration_frequency(c))
+    return stability_radius(method.name) / float(np.max(rate))
+
+
+def work(method: Method, dt: float, outputs: Floats) -> float:
+    """Cost of a trajectory that passes the outputs [s], in right-hand sides of an explicit method."""
+    intervals = np.diff(outputs, prepend=0.0)
+    steps = np.maximum(np.ceil(intervals[intervals > 0.0] / dt), 1.0)
+    if isinstance(method, ImplicitRungeKutta):
+        return float(steps.sum()) * IMPLICIT_STEP
+    if method.start_steps == 0:
+        return float(method.evaluations(1) * steps.sum())
+    return float(sum(method.evaluations(int(number)) for number in steps))
