@@ -30,6 +30,20 @@ def slider_ratio(s1: Values, c1: Values) -> tuple[Values, Values]:
 
 
 @inlined
+def slider_products(s1: Values, c1: Values) -> tuple[Values, Values, Values]:
+    """w^2, w k and w^4 k dk/dphi with w = sqrt(4 - sin^2 phi), of the k of :func:`slider_ratio`.
+
+    Free of divisions: k = sin phi (w + cos phi) / w, and dk/dphi = (w^3 cos phi + 4 - 8 sin^2 phi + sin^4 phi) / w^3.
+    """
+    four, eight = rounded_to(s1, 4.0), rounded_to(s1, 8.0)
+    square = s1 * s1
+    ww = four - square
+    w = np.sqrt(ww)
+    wk = s1 * (w + c1)
+    return ww, wk, wk * (c1 * w * ww + (four - square * (eight - square)))
+
+
+@inlined
 def slider_curvature(s1: Values, c1: Values) -> Values:
     """d2k/dphi2, of the k of :func:`slider_ratio`; only tangents need it."""
     inverse_root = 1.0 / np.sqrt(4.0 - s1 * s1)
