@@ -8,6 +8,7 @@ the compiled code.
 from __future__ import annotations
 
 from fastmech.jit import inlined
+from fastmech.jit import multiply_add
 from fastmech.mechanism.reduced import (
     Values,
     metric_11,
@@ -62,9 +63,9 @@ def lagrange_accelerations(
     r2 = -u2 - c12 * phi_dot_2
     r1 = ww * (-u1 - c12 * (theta_dot * theta_dot) - s12 * r2)
     if damping is not None:
-        r1 = r1 - damping * (wk * wk) * phi_dot
-    determinant = ww * (ww * (mass + c12 * c12) + slider * (wk * wk))
-    phi_dot_dot = (ww * r1 - slider * wwww_kdk * phi_dot_2) / determinant
+        r1 = multiply_add(-damping * (wk * wk), phi_dot, r1)
+    determinant = ww * multiply_add(ww, mass + c12 * c12, slider * (wk * wk))
+    phi_dot_dot = multiply_add(-slider * wwww_kdk, phi_dot_2, ww * r1) / determinant
     return phi_dot_dot, r2 - s12 * phi_dot_dot
 
 

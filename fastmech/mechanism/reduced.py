@@ -33,14 +33,12 @@ def slider_ratio(s1: Values, c1: Values) -> tuple[Values, Values]:
 def slider_products(s1: Values, c1: Values) -> tuple[Values, Values, Values]:
     """w^2, w k and w^4 k dk/dphi with w = sqrt(4 - sin^2 phi), of the k of :func:`slider_ratio`.
 
-    Free of divisions: k = sin phi (w + cos phi) / w, and dk/dphi = (w^3 cos phi + 4 - 8 sin^2 phi + sin^4 phi) / w^3.
+    Free of divisions: k = sin phi (w + cos phi) / w, and dk/dphi = (w^3 cos phi + w^4 - 12) / w^3.
     """
-    four, eight = rounded_to(s1, 4.0), rounded_to(s1, 8.0)
-    square = s1 * s1
-    ww = four - square
+    ww = rounded_to(s1, 4.0) - s1 * s1
     w = np.sqrt(ww)
     wk = s1 * (w + c1)
-    return ww, wk, wk * (c1 * w * ww + (four - square * (eight - square)))
+    return ww, wk, wk * (ww * (c1 * w + ww) - rounded_to(s1, 12.0))
 
 
 @inlined
