@@ -113,8 +113,7 @@ def inlined(function: F) -> F:
     return jitable
 
 
-@intrinsic
-def _fused(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
+def _fuse(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         number = args[0].type
         function = builder.module.declare_intrinsic(
@@ -123,6 +122,9 @@ def _fused(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
         return builder.call(function, args)
 
     return c(c, c, c), generate
+
+
+_fused: Any = intrinsic(_fuse)
 
 
 def multiply_add(a: Any, b: Any, c: Any) -> Any:

@@ -64,7 +64,10 @@ def integrate_multistep_blocks(
     stages, rows = nodes.shape[0], predictor.shape[0]
     dim, lanes = Y.shape[1], Y.shape[2]
     n = dim * lanes
-    F, K = rows_of(Y[0], rows).reshape((rows, dim, lanes)), rows_of(Y[0], stages).reshape((stages, dim, lanes))
+    F, K = (
+        rows_of(Y[0], rows).reshape((rows, dim, lanes)),
+        rows_of(Y[0], stages).reshape((stages, dim, lanes)),
+    )
     Z, w = rows_of(Y[0], 1).reshape((dim, lanes)), rows_of(Y[0], 1)
     f, k_flat, z = F.reshape(rows, n), K.reshape(stages, n), Z.reshape(n)
     row = np.empty(rows, dtype=np.int64)  # row[a] holds the derivative of a steps ago

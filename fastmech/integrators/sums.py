@@ -51,7 +51,7 @@ def taken(values: Any, first: int, terms: Any) -> Any:
 def _taken(values: Any, first: Any, terms: Any) -> Any:
     if len(terms) == 1:
         return lambda values, first, terms: (values[first],)
-    return lambda values, first, terms: taken(values, first, terms[:-1]) + (values[first + terms[-1]],)
+    return lambda values, first, terms: taken(values, first, terms[:-1]) + (values[first + terms[-1]],)  # noqa: RUF005
 
 
 def scaled(z: Floats, h: float, values: Any) -> Any:
@@ -63,7 +63,7 @@ def scaled(z: Floats, h: float, values: Any) -> Any:
 def _scaled(z: Any, h: Any, values: Any) -> Any:
     if len(values) == 1:
         return lambda z, h, values: (rounded_to(z, h * values[0]),)
-    return lambda z, h, values: scaled(z, h, values[:-1]) + (rounded_to(z, h * values[-1]),)
+    return lambda z, h, values: scaled(z, h, values[:-1]) + (rounded_to(z, h * values[-1]),)  # noqa: RUF005
 
 
 def weighted(weights: Any, K: Floats, rows: Any, i: int) -> Any:
@@ -75,9 +75,7 @@ def weighted(weights: Any, K: Floats, rows: Any, i: int) -> Any:
 def _weighted(weights: Any, K: Any, rows: Any, i: Any) -> Any:
     if len(weights) == 1:
         return lambda weights, K, rows, i: weights[0] * K[rows[0], i]
-    return lambda weights, K, rows, i: (
-        weighted(weights[:-1], K, rows[:-1], i) + weights[-1] * K[rows[-1], i]
-    )
+    return lambda weights, K, rows, i: weighted(weights[:-1], K, rows[:-1], i) + weights[-1] * K[rows[-1], i]
 
 
 @inlined

@@ -1,4 +1,4 @@
-"""The bits of a double as an integer and back: no instruction, so that lanes are selected by integer masks."""
+"""The bits of a double as an integer and back: no instruction, so that integer masks select lanes."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ def _recast(returned: Any, code: Any) -> Any:
 _integer, _double = _recast(types.int64, ir.IntType(64)), _recast(types.float64, ir.DoubleType())
 
 
-def to_bits(x: float) -> int:
+def to_bits(x: float) -> Any:
     """The 64 bits of a double."""
-    return np.float64(x).view(np.int64)  # type: ignore[return-value]
+    return np.float64(x).view(np.int64)
 
 
-def from_bits(bits: int) -> float:
+def from_bits(bits: Any) -> Any:
     """The double of 64 bits."""
-    return np.int64(bits).view(np.float64)  # type: ignore[return-value]
+    return np.int64(bits).view(np.float64)
 
 
 @overload(to_bits, jit_options=INLINED, strict=False)

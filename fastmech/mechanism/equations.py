@@ -7,8 +7,7 @@ the compiled code.
 
 from __future__ import annotations
 
-from fastmech.jit import inlined
-from fastmech.jit import multiply_add
+from fastmech.jit import inlined, multiply_add
 from fastmech.mechanism.reduced import (
     Values,
     metric_11,

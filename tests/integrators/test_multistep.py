@@ -16,8 +16,8 @@ from numba import float64
 
 from fastmech.integrators.method import Adams
 from fastmech.integrators.methods import METHODS
-from fastmech.integrators.sums import TERMS_OF_TWO, add_two_sums
 from fastmech.integrators.multistep_weights import bashforth, moulton
+from fastmech.integrators.sums import TERMS_OF_TWO, add_two_sums
 from fastmech.jit import FLAGS, INTEGERS, MATRIX, RHS_SIGNATURE, VECTOR, kernel
 
 ADAMS = {name: method for name, method in METHODS.items() if isinstance(method, Adams)}
