@@ -17,7 +17,6 @@ from numba import njit
 from fastmech.bench.entrant import Entrant, Prepare, Solve
 from fastmech.bench.package import STEPS
 from fastmech.bench.problem import Problem
-from fastmech.ensembles.run import BLOCK_LANES
 from fastmech.integrators.tableau import Tableau
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import FLAGS
@@ -26,6 +25,9 @@ from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.equations import lagrange_accelerations
 
 METHODS = ("rk4", "dop853")
+
+#: Lanes of a block: all of it is in the first cache at any width, so the engine's widest serves both methods.
+LANES = 256
 
 _HEAD = """
 def integrate(starts, final, width, h, steps, mass, slider, lift, spring, gravity, force, damping):
@@ -80,7 +82,7 @@ def entrants(problem: Problem) -> Iterator[Entrant]:
 
 
 def prepared(method: str, h: float) -> Prepare:
-    """A method at a fixed step, in the engine's blocks."""
+    """A method at a fixed step, in blocks of lanes."""
 
     def prepare(problem: Problem, threads: int) -> Solve:
         kernel, p = compiled(method), reduce(problem.scene)
@@ -88,7 +90,7 @@ def prepared(method: str, h: float) -> Prepare:
 
         def solve(starts: Any) -> Any:
             final = np.empty_like(starts)
-            kernel(starts, final, BLOCK_LANES, problem.t_end / steps, steps, *p[:7])
+            kernel(starts, final, LANES, problem.t_end / steps, steps, *p[:7])
             return final
 
         return solve

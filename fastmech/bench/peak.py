@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from fastmech.bench.problem import Problem
 from fastmech.ensembles.integrate import integrate
-from fastmech.ensembles.run import BLOCK_LANES
 from fastmech.integrators.methods import find_method
 from fastmech.jit import FLAGS
 from fastmech.kernels.select import right_hand_side
@@ -28,6 +27,9 @@ Floats = NDArray[np.float64]
 CHAINS, LENGTH = 8, 32
 
 TURNS = 7
+
+#: Lanes of the block that the right-hand side alone is given.
+LANES = 256
 
 #: Packed fused multiply-adds of doubles in x86 (AVX2, AVX-512) and Arm code.
 PACKED = re.compile(r"vfn?madd\d+pd|\bfmla\s+v")
@@ -79,15 +81,15 @@ def evaluations() -> Any:
 
 def throughputs(problem: Problem, advance: Callable[[int], None]) -> tuple[float, list[Throughput]]:
     """The measured peak [multiply-adds/s], and right-hand sides alone and inside of methods."""
-    x, turns = np.ones(BLOCK_LANES), 2000
-    Y = np.ascontiguousarray(np.resize(problem.starts, (BLOCK_LANES, 4)).T)
+    x, turns = np.ones(LANES), 2000
+    Y = np.ascontiguousarray(np.resize(problem.starts, (LANES, 4)).T)
     coefficients = reduce(problem.scene)
-    p = np.repeat(np.array(coefficients)[:, None], BLOCK_LANES, axis=1)
+    p = np.repeat(np.array(coefficients)[:, None], LANES, axis=1)
     rhs, dY = right_hand_side(coefficients), np.empty_like(Y)
     many = np.tile(problem.starts, (max(1, 4096 // len(problem.starts)), 1))
     works: dict[str, tuple[Callable[[], Any], int]] = {
         "peak": (lambda: multiply_adds()(x, turns, 0.5), turns * x.size * CHAINS * LENGTH),
-        "kernel alone": (lambda: evaluations()(rhs, 0.0, Y, dY, p, turns), turns * BLOCK_LANES),
+        "kernel alone": (lambda: evaluations()(rhs, 0.0, Y, dY, p, turns), turns * LANES),
     }
     for method, dt in (("rk4", 0.02), ("dop853", 0.05), ("abm12", 0.0125)):
         steps = int(np.ceil(problem.t_end / dt * (1.0 - 1e-12)))

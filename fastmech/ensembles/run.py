@@ -36,15 +36,19 @@ from fastmech.kernels.single import in_single
 Floats = NDArray[np.float64]
 Progress = Callable[[int], None]
 
-#: Lanes a block: large enough that calls cost little, small enough that all stages stay in the caches.
-BLOCK_LANES = 256
+#: Lanes a block: at least as many as make calls cost little, at most as many as keep a block of all methods
+#: in the caches.
+BLOCK_LANES = (64, 256)
+
+#: Bytes of a processor's first cache that a block may fill: all stages, state, their sum and parameters.
+BLOCK_BYTES = 32768
 
 #: Blocks that a task holds at most: one call runs them all, and where trajectories may stop, those still
 #: running move up into full blocks.
-TASK_BLOCKS = 16
+TASK_BLOCKS = 32
 
 #: Numbers that the output of one call holds at most.
-CALL_OUTPUT = 2**22
+CALL_OUTPUT = 2**21
 
 #: Steps a call: between calls an interrupt is heard, and where trajectories may stop they make room.
 CALL_STEPS = 2048
@@ -95,6 +99,13 @@ class Ensemble:
         return last
 
 
+def block_width(method: Method, dim: int, precision: type[np.floating[Any]] = np.float64) -> int:
+    """Lanes of a block of ``dim`` states whose step stays in the first cache."""
+    row = dim * np.dtype(precision).itemsize
+    least, most = BLOCK_LANES
+    return int(np.clip(BLOCK_BYTES // (row * (method.rows + 4)) // VECTOR_LANES * VECTOR_LANES, least, most))
+
+
 def run_ensemble(
     rhs: Any,
     params: ArrayLike,
@@ -105,7 +116,7 @@ def run_ensemble(
     observation: Observation = NOTHING,
     *,
     threads: int | None = None,
-    block_lanes: int = BLOCK_LANES,
+    block_lanes: int | None = None,
     precision: type[np.floating[Any]] = np.float64,
     progress: Progress | None = None,
 ) -> Ensemble:
@@ -114,7 +125,7 @@ def run_ensemble(
     ``params`` are the parameters of all trajectories (count,) or of each (n, count); ``dt`` is the longest
     step of all trajectories or of each (n,). A trajectory that has stopped keeps the state in which it did.
     ``progress`` is told the number of trajectories finished since its last call. In float32 nothing can be
-    observed.
+    observed. ``block_lanes`` is :func:`block_width` by default.
 
     Raises:
         InputError: the step, the times or the number of threads are wrong.
@@ -137,6 +148,9 @@ def run_ensemble(
     if precision is np.float32:
         rhs, observe = in_single(rhs), import_module("fastmech.integrators.single").observe_nothing
         begin, own = begin.astype(precision), own.astype(precision)
+
+    if block_lanes is None:
+        block_lanes = block_width(method, begin.shape[1], precision)
 
     def run_task(task: _Task) -> int:
         members = task.members

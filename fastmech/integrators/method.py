@@ -36,6 +36,10 @@ class Method(Protocol):
     def start_steps(self) -> int:
         """Steps after each call, or change of the step's length, that a starter takes; 0 for most methods."""
 
+    @property
+    def rows(self) -> int:
+        """Derivatives of a block that a step works on: stages or history."""
+
     def evaluations(self, steps: int) -> int:
         """Right-hand sides that so many steps of equal length take, the starter's included."""
 
@@ -79,6 +83,11 @@ class OneStep:
     def start_steps(self) -> int:
         """None: every step stands alone."""
         return 0
+
+    @property
+    def rows(self) -> int:
+        """Stages."""
+        return int(self.tableau.stages)
 
 
 @dataclass(frozen=True)
@@ -146,6 +155,11 @@ class Adams:
     def start_steps(self) -> int:
         """Steps that the history is short of."""
         return self.predictor.size - 1
+
+    @property
+    def rows(self) -> int:
+        """History."""
+        return self.predictor.size
 
     def evaluations(self, steps: int) -> int:
         """Right-hand sides that so many steps of equal length take, the starter's included."""

@@ -16,45 +16,12 @@ from fastmech.integrators.explicit import (
     Floats,
     Integers,
     Observer,
-    add_stages,
-    start_stage,
 )
+from fastmech.integrators.sums import add_stages, add_two_sums, rows_of
 from fastmech.jit import VECTOR, driver_signature, inlined, kernel, rounded_to
 
 #: Step lengths that differ by less than this share of the time are the same: outputs were rounded.
 ROUNDED_TIME = 4 * 2.0**-52
-
-
-@inlined
-def predict_and_correct(
-    z: Floats, w: Floats, y: Floats, F: Floats, h: float, row: Integers, p: Floats, c: Floats
-) -> None:
-    """z = y + h sum_a p[a] F[row[a]] and w = h sum_a c[a] F[row[a]] in common passes over the history.
-
-    Each pass takes three or four rows, of which any number from six on is a sum.
-    """
-    n, rows = z.shape[0], p.shape[0]
-    for i in range(n):
-        z[i] = y[i]
-        w[i] = 0
-    a = 0
-    while a < rows:
-        p0, c0 = rounded_to(z, h * p[a]), rounded_to(z, h * c[a])
-        p1, c1 = rounded_to(z, h * p[a + 1]), rounded_to(z, h * c[a + 1])
-        p2, c2 = rounded_to(z, h * p[a + 2]), rounded_to(z, h * c[a + 2])
-        F0, F1, F2 = F[row[a]], F[row[a + 1]], F[row[a + 2]]
-        if (rows - a) % 4:
-            for i in range(n):
-                z[i] += p0 * F0[i] + p1 * F1[i] + p2 * F2[i]
-                w[i] += c0 * F0[i] + c1 * F1[i] + c2 * F2[i]
-            a += 3
-        else:
-            p3, c3 = rounded_to(z, h * p[a + 3]), rounded_to(z, h * c[a + 3])
-            F3 = F[row[a + 3]]
-            for i in range(n):
-                z[i] += p0 * F0[i] + p1 * F1[i] + p2 * F2[i] + p3 * F3[i]
-                w[i] += c0 * F0[i] + c1 * F1[i] + c2 * F2[i] + c3 * F3[i]
-            a += 4
 
 
 @inlined
@@ -97,8 +64,11 @@ def integrate_multistep_blocks(
     stages, rows = nodes.shape[0], predictor.shape[0]
     dim, lanes = Y.shape[1], Y.shape[2]
     n = dim * lanes
-    F, K = np.empty((rows, dim, lanes), dtype=Y.dtype), np.empty((stages, dim, lanes), dtype=Y.dtype)
-    Z, w = np.empty((dim, lanes), dtype=Y.dtype), np.empty(n, dtype=Y.dtype)
+    F, K = (
+        rows_of(Y[0], rows).reshape((rows, dim, lanes)),
+        rows_of(Y[0], stages).reshape((stages, dim, lanes)),
+    )
+    Z, w = rows_of(Y[0], 1).reshape((dim, lanes)), rows_of(Y[0], 1)
     f, k_flat, z = F.reshape(rows, n), K.reshape(stages, n), Z.reshape(n)
     row = np.empty(rows, dtype=np.int64)  # row[a] holds the derivative of a steps ago
     for b in range(Y.shape[0]):
@@ -120,18 +90,17 @@ def integrate_multistep_blocks(
                 if known < rows:
                     k_flat[0] = f[newest]
                     for s in range(1, stages):
-                        k = start_stage(z, y, k_flat, h, stage, weight, int(start[s]), int(start[s + 1]))
-                        add_stages(z, k_flat, h, stage, weight, k, int(start[s + 1]))
+                        add_stages(z, y, k_flat, h, stage, weight, int(start[s]), int(start[s + 1]))
                         rhs(t + nodes[s] * h, Z, K[s], own)
-                    add_stages(y, k_flat, h, stage, weight, int(start[stages]), int(start[stages + 1]))
+                    add_stages(y, None, k_flat, h, stage, weight, int(start[stages]), int(start[stages + 1]))
                 else:
                     for a in range(rows):
                         row[a] = (newest - a) % rows
                     if corrector.shape[0]:
-                        predict_and_correct(z, w, y, f, h, row, predictor, corrector[1:])
+                        add_two_sums(z, w, y, f, h, row, predictor, corrector[1:])
                         rhs(t + h, Z, K[0], own)
                         add_correction(y, w, k_flat[0], h * corrector[0])
                     else:
-                        add_stages(y, f, h, row, predictor, 0, rows)
+                        add_stages(y, None, f, h, row, predictor, 0, rows)
                 observe(times[j] + (step + 1) * h, state, observer_params, kept)
             out[b, j] = state

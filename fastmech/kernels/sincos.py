@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from fastmech.jit import by_precision, inlined, rounded_to
+from fastmech.kernels.bits import from_bits, to_bits
 
 #: Largest angle [rad] for which the reduction is used: multiples up to 2**20 keep its first products exact.
 REDUCTION_LIMIT = 1.0e6
@@ -24,6 +25,10 @@ _TWO_OVER_PI = 0.6366197723675814
 _HALF_PI_1 = 1.57079632673412561417e00  # first 33 bits of pi/2
 _HALF_PI_2 = 6.07710050630396597660e-11  # next 33 bits
 _HALF_PI_3 = 2.02226624879595063154e-21  # the rest, rounded
+
+#: Doubles of this size are the integers: adding it rounds to one, whose two's complement ends the bits.
+_INTEGERS = 1.5 * 2.0**52
+_SIGN = np.int64(-(2**63))  # the bit of a double's sign
 
 _S1, _S2, _S3 = -1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04
 _S4, _S5, _S6 = 2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10
@@ -44,16 +49,17 @@ def sincos_double(x: float) -> tuple[float, float]:
     Beyond the limit the result is inaccurate: block kernels compute such lanes again with the library's
     functions.
     """
-    n = np.floor(x * _TWO_OVER_PI + 0.5)
+    shifted = x * _TWO_OVER_PI + _INTEGERS
+    n = shifted - _INTEGERS
     r = ((x - n * _HALF_PI_1) - n * _HALF_PI_2) - n * _HALF_PI_3
-    half = np.floor(0.5 * n)
-    odd = n - 2.0 * half  # 1.0 where the quadrant swaps sine and cosine
-    sign = 1.0 - 2.0 * (half - 2.0 * np.floor(0.5 * half))
+    quadrant = to_bits(shifted)  # its last two bits
+    odd = (quadrant & 1) != 0  # swaps sine and cosine
     z = r * r
     s = r + r * z * (_S1 + z * (_S2 + z * (_S3 + z * (_S4 + z * (_S5 + z * _S6)))))
     c = 1.0 - 0.5 * z + z * z * (_C1 + z * (_C2 + z * (_C3 + z * (_C4 + z * (_C5 + z * _C6)))))
-    sine = sign * (c if odd > 0.5 else s)
-    cosine = sign * (-s if odd > 0.5 else c)
+    sine, cosine = (c if odd else s), (s if odd else c)
+    sine = from_bits(to_bits(sine) ^ ((quadrant << 62) & _SIGN))
+    cosine = from_bits(to_bits(cosine) ^ (((quadrant + 1) << 62) & _SIGN))
     return sine, cosine
 
 

@@ -7,13 +7,13 @@ the compiled code.
 
 from __future__ import annotations
 
-from fastmech.jit import inlined
+from fastmech.jit import inlined, multiply_add
 from fastmech.mechanism.reduced import (
     Values,
-    christoffel,
     metric_11,
     metric_determinant,
     potential_gradient,
+    slider_products,
     slider_ratio,
 )
 
@@ -49,17 +49,23 @@ def lagrange_accelerations(
     force: Values | None,
     damping: Values | None,
 ) -> tuple[Values, Values]:
-    """(phi'', theta'') [rad/s^2] from Lagrange's equations in covariant form, paper (13)."""
+    """(phi'', theta'') [rad/s^2] from Lagrange's equations in covariant form, paper (13).
+
+    The equation of phi is multiplied by w^4 = (4 - sin^2 phi)^2: one division is left where slider ratio,
+    its derivative and determinant have three, and none waits for another.
+    """
     s12 = s1 * c2 + c1 * s2
     c12 = c1 * c2 - s1 * s2
-    k, dk = slider_ratio(s1, c1)
-    gamma_111, gamma_221, gamma_112 = christoffel(slider, k, dk, c12)
+    ww, wk, wwww_kdk = slider_products(s1, c1)
     u1, u2 = potential_gradient(s1, c1, s2, c2, c12, lift, spring, gravity, force)
-    r1 = -u1 - gamma_111 * phi_dot * phi_dot - gamma_221 * theta_dot * theta_dot
+    phi_dot_2 = phi_dot * phi_dot
+    r2 = -u2 - c12 * phi_dot_2
+    r1 = ww * (-u1 - c12 * (theta_dot * theta_dot) - s12 * r2)
     if damping is not None:
-        r1 = r1 - damping * k * k * phi_dot
-    r2 = -u2 - gamma_112 * phi_dot * phi_dot
-    return rates_from_momenta(r1, r2, s12, metric_determinant(mass, slider, k, c12))
+        r1 = multiply_add(-damping * (wk * wk), phi_dot, r1)
+    determinant = ww * multiply_add(ww, mass + c12 * c12, slider * (wk * wk))
+    phi_dot_dot = multiply_add(-slider * wwww_kdk, phi_dot_2, ww * r1) / determinant
+    return phi_dot_dot, r2 - s12 * phi_dot_dot
 
 
 @inlined

@@ -30,6 +30,18 @@ def slider_ratio(s1: Values, c1: Values) -> tuple[Values, Values]:
 
 
 @inlined
+def slider_products(s1: Values, c1: Values) -> tuple[Values, Values, Values]:
+    """w^2, w k and w^4 k dk/dphi with w = sqrt(4 - sin^2 phi), of the k of :func:`slider_ratio`.
+
+    Free of divisions: k = sin phi (w + cos phi) / w, and dk/dphi = (w^3 cos phi + w^4 - 12) / w^3.
+    """
+    ww = rounded_to(s1, 4.0) - s1 * s1
+    w = np.sqrt(ww)
+    wk = s1 * (w + c1)
+    return ww, wk, wk * (ww * (c1 * w + ww) - rounded_to(s1, 12.0))
+
+
+@inlined
 def slider_curvature(s1: Values, c1: Values) -> Values:
     """d2k/dphi2, of the k of :func:`slider_ratio`; only tangents need it."""
     inverse_root = 1.0 / np.sqrt(4.0 - s1 * s1)

@@ -14,9 +14,9 @@ import numba
 import numpy as np
 import pytest
 from kernels.blocks_of_lanes import COMBINATIONS, MODULES, kernel, lanes
-from numba import float64, int64
+from numba import float64, int64, none
 
-from fastmech.integrators.explicit import add_stages, start_stage
+from fastmech.integrators.sums import TERMS, add_stages
 from fastmech.jit import FLAGS, INTEGERS, MATRIX, VECTOR
 from fastmech.kernels.blocks import DAMPING, DECAY, FORCE
 from fastmech.kernels.work import lagrange_work
@@ -33,7 +33,7 @@ SHIPPED = {**KERNELS, "work": lagrange_work}
 
 PACKED = re.compile(r"\bv(?:f?n?m(?:add|sub)\d*|mul)\w*pd\s.*%[yz]mm")
 VECTOR_ARITHMETIC = re.compile(r"= f(?:add|sub|mul|div) .*<[48] x double>")
-PACKED_FLOOR = re.compile(r"= .*call .*@llvm\.floor\.v[48]f64")
+PACKED_QUADRANT = re.compile(r"= shl .*<[48] x i64>")
 PACKED_ROOT = re.compile(r"= .*call .*@llvm\.sqrt\.v[48]f64")
 LIBRARY = re.compile(r"@(?:llvm\.)?(?:sin|cos|sincos|tan|exp|pow)\b")
 
@@ -59,9 +59,9 @@ def basic_blocks(code: str) -> list[str]:
 
 
 def main_loop(shipped: Any) -> str:
-    """The vector loop over lanes: the blocks of LLVM's code that take packed square roots and floors."""
+    """The vector loop over lanes: the blocks of LLVM's code with packed square roots and quadrants."""
     blocks = basic_blocks(intermediate(shipped))
-    return "\n".join(b for b in blocks if all(re.search(call, b) for call in (PACKED_FLOOR, PACKED_ROOT)))
+    return "\n".join(b for b in blocks if all(re.search(c, b) for c in (PACKED_QUADRANT, PACKED_ROOT)))
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -73,9 +73,9 @@ def test_lanes_are_packed_without_library_calls(name: str) -> None:
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_machine_code_of_the_loop(name: str) -> None:
-    """The same in machine code: one stretch between labels that rounds packed numbers (the reduction)."""
+    """The same in machine code: one stretch between labels with packed quadrants and square roots."""
     blocks = basic_blocks(machine_code(SHIPPED[name]))
-    loops = [b for b in blocks if re.search(r"\bv(?:round|rndscale)pd\s.*%[yz]mm", b)]
+    loops = [b for b in blocks if re.search(r"\bvpsllq\s.*%[yz]mm", b)]
     loops = [b for b in loops if re.search(r"\bvsqrtpd\s.*%[yz]mm", b)]
     assert loops
     for loop in loops:
@@ -83,13 +83,12 @@ def test_machine_code_of_the_loop(name: str) -> None:
         assert not re.search(r"\bcall", loop)
 
 
-@pytest.mark.parametrize("stage_sum", [add_stages, start_stage])
-def test_stage_sums_are_packed(stage_sum: Any) -> None:
-    """Ten products a lane: passes of one, two, three and four terms."""
-    n_arrays = stage_sum.__code__.co_argcount - 6
-    arguments = (*[VECTOR] * n_arrays, MATRIX, float64, INTEGERS, VECTOR, int64, int64)
-    compiled = numba.njit(arguments, nogil=True, **FLAGS)(stage_sum)
-    assert len(PACKED.findall("".join(compiled.inspect_asm().values()))) >= 10
+@pytest.mark.parametrize("start", [VECTOR, none])
+def test_stage_sums_are_packed(start: Any) -> None:
+    """A pass of one term, of two and so on to the widest; the second pass of a wide sum adds to the first."""
+    arguments = (VECTOR, start, MATRIX, float64, INTEGERS, VECTOR, int64, int64)
+    compiled = numba.njit(arguments, nogil=True, **FLAGS)(add_stages)
+    assert len(PACKED.findall("".join(compiled.inspect_asm().values()))) >= sum(range(1, len(TERMS) + 1))
 
 
 @pytest.mark.parametrize(("formulation", "terms"), COMBINATIONS)

@@ -162,9 +162,9 @@ def magnification() -> NDArray[np.float64]:
 @pytest.mark.parametrize("method", ["tsit5", "ab6"])
 @pytest.mark.parametrize("formulation", ["lagrange", "hamilton"])
 def test_motions_are_those_of_float64(method: str, formulation: str) -> None:
-    """100 starts from rest, 5 s: 1e-4 rad and rad/s, but for the one that passes a saddle's edge.
+    """100 starts from rest, 5 s: 1e-4 rad and rad/s, more where a motion magnifies errors over 100 times.
 
-    Its motion magnifies every error 3,000 times; no precision of the lanes is blamed for that.
+    One passes a saddle's edge and magnifies every error 3,000 times, whatever the precision of the lanes.
     """
     starts = rest_starts(100)
     arguments: dict[str, Any] = {"dt": 0.01, "method": method, "formulation": formulation}
@@ -173,11 +173,9 @@ def test_motions_are_those_of_float64(method: str, formulation: str) -> None:
     assert (double.precision, single.precision) == ("float64", "float32")
     assert single.y.dtype == np.float64
     assert not single.status.any()
-    ordinary = magnification() < 1000.0
-    assert np.count_nonzero(ordinary) == 99
     found = errors(single.y, double.y)
-    assert 0.0 < found[ordinary].max() <= 1e-4
-    assert found[~ordinary].max() <= 1e-5 * magnification().max()
+    assert found.max() > 0.0
+    assert (found <= 1e-4 * np.maximum(magnification() / 100.0, 1.0)).all()
 
 
 @pytest.mark.parametrize("method", ["rk4", "ab6"])
