@@ -8,6 +8,7 @@ unwrapped angles (``barriers``). The certificate is about the path as it was com
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -87,6 +88,10 @@ class Certificate:
         fill_cells(params)
         return params
 
+    @cached_property
+    def _own_params(self) -> Floats:
+        return self.params(self.levels)
+
     def observation(
         self, params: Floats, interval: float, call_steps: int = CALL_STEPS_WITH_STOPS
     ) -> Observation:
@@ -104,7 +109,7 @@ class Certificate:
 
     def captured(self, states: Floats) -> Captured:
         """Which states (n, 4) at t = 0 are captured already."""
-        observation = self.observation(self.params(self.levels), 1.0)
+        observation = self.observation(self._own_params, 1.0)
         record = np.repeat(observation.record[:, None], len(states), axis=1)
         observation.observe(0.0, np.ascontiguousarray(states.T), observation.params, record)
         return self.decode(record)
