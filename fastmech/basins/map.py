@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.basins.label import Labels, labels_of
+from fastmech.basins.measures.norm import STATE as STATE
 from fastmech.basins.refine import refine_grid
 from fastmech.basins.status import BasinStatus, counts
 from fastmech.basins.system import system_labels_of
@@ -21,9 +22,6 @@ from fastmech.errors import InputError
 from fastmech.scene import Scene, nearest
 
 Floats = NDArray[np.float64]
-
-#: Coordinates of a scene's state space.
-STATE = ("phi", "theta", "phi_dot", "theta_dot")
 
 #: Points of the largest map: its arrays take some 150 bytes a point in memory.
 MOST_POINTS = 50_000_000
