@@ -30,6 +30,9 @@ from fastmech.equilibria.find import Equilibria, find_equilibria
 from fastmech.errors import InputError
 from fastmech.scene import Scene
 
+#: Relative tolerance of shocks: what a profile shows.
+TOLERANCE = 1e-3
+
 
 class Ends(Protocol):
     """Where n starts end."""
@@ -128,6 +131,7 @@ class Survey:
             norm,
             most=self.most_shock,
             directions=self.directions,
+            tolerance=TOLERANCE,
             seed=self.seed,
         )
         kick = search(coordinates=(2, 3))
@@ -228,10 +232,11 @@ def survey_of(
     *,
     most_shock: float,
     t_end: float,
-    labels_of: LabelsOf | None,
+    labels_of: LabelsOf | None = None,
     n: int,
     directions: int,
     seed: int,
+    threads: int | None = None,
 ) -> Survey:
     """What to measure, checked; arguments and errors as for :func:`erosion`."""
     states = tuple(state_index(name) for name in axes)
@@ -246,7 +251,7 @@ def survey_of(
         states,
         lines,
         low + (high - low) * rng.random((n, len(lines))),
-        labels_of or partial(labels_by_capture, t_end=t_end),
+        labels_of or partial(labels_by_capture, t_end=t_end, threads=threads),
         most_shock,
         directions,
         seed,

@@ -146,7 +146,7 @@ class Ladder:
 
     def __post_init__(self) -> None:
         self.rounds = rounds_until(self.t_end, SUBSTEPS[0] * self.coarse)
-        self.observer = self.certificate.params(self.certificate.levels)
+        self.observer = self.certificate.packed
 
     def follow(self, starts: Floats, substeps: int, observer: Floats) -> Paths:
         """One computation."""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.mechanism.lagrange import kinetic_energy, potential_energy
+from fastmech.plots.basin_names import basin_name
 from fastmech.plots.labels import flag_codes
 from fastmech.plots.style import FIELD, PALETTE, new_figure, style
 from fastmech.results import Dataset
@@ -165,12 +166,8 @@ def _labels(view: _Slice) -> Figure:
 def _name(view: _Slice, basin: int) -> str:
     """A basin's well and turns in words."""
     data = view.dataset
-    well = int(data["basin_well"].data[basin])
     turns = [int(data[f"basin_turns_{angle}"].data[basin]) for angle in ("phi", "theta")]
-    wells = np.flatnonzero(data["equilibrium_morse_index"].data == 0)
-    text = f"well {int(np.flatnonzero(wells == well)[0]) + 1}" if wells.size > 1 else "the well"
-    made = [f"{t:+d} {symbol}" for t, symbol in zip(turns, ("φ", "θ"), strict=True) if t]
-    return f"{text}, {', '.join(made)} turn{'s' * (len(made) > 1 or abs(sum(turns)) > 1)}" if made else text
+    return basin_name(data, int(data["basin_well"].data[basin]), (turns[0], turns[1]))
 
 
 def _share(where: NDArray[np.bool_]) -> str:
