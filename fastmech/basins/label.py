@@ -32,8 +32,9 @@ from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
 
-#: Starts that are followed together.
-BATCH = 1 << 16
+#: Starts that are followed together, at most; and so many pieces, if they are not smaller than the least.
+#: Every piece takes something of everywhere, so that all take about as long and progress tells the time left.
+BATCH, PIECES, LEAST = 1 << 16, 16, 1 << 11
 
 
 @dataclass(frozen=True)
@@ -90,24 +91,23 @@ def labels_of(
         dt = checks.number("dt", dt, "s", above=0.0)
     if settle_radius is not None:
         settle_radius = checks.number("settle_radius", settle_radius, "rad", above=0.0)
-    finite = np.isfinite(begin).all(axis=1)
+    finite = np.asarray(np.isfinite(begin)).all(axis=1).reshape(-1)
     coarse = coarse_steps(reduce(scene), begin) if dt is None else np.full(len(begin), dt)
     found = Paths.empty(len(begin))
     status = np.where(finite, BasinStatus.UNDECIDED, BasinStatus.START_NOT_FINITE).astype(np.int8)
     settle = None if settle_radius is None else np.full(len(begin), np.nan)
-    for step in np.unique(coarse[finite]):
-        same = np.flatnonzero(finite & (coarse == step))
-        for first in range(0, same.size, BATCH):
-            members = same[first : first + BATCH]
+    pieces = max(-(-len(begin) // BATCH), min(PIECES, len(begin) // LEAST), 1)
+    for piece in range(pieces):
+        some = np.arange(piece, len(begin), pieces)
+        for step in np.unique(coarse[some[finite[some]]]):
+            members = some[finite[some] & (coarse[some] == step)]
             ladder = Ladder(certificate, t_end, float(step), formula, threads)
             ladder.label(begin, members, found, status)
             if settle is not None and settle_radius is not None:
                 settle[members] = ladder.settle_times(begin, members, found, status, settle_radius)
             found.steps += ladder.steps
-            if progress is not None:
-                progress(members.size)
-    if progress is not None and not finite.all():
-        progress(int(np.count_nonzero(~finite)))
+        if progress is not None:
+            progress(some.size)
     captured = status == BasinStatus.CAPTURED
     return Labels(
         certificate.tree,

@@ -75,17 +75,17 @@ def _name(dataset: Dataset, well: int) -> str:
 
 def _stability(axes: Axes, dataset: Dataset, well: int, color: str) -> None:
     x = dataset[str(dataset.attrs["along"])].data
-    share = dataset["well_stability"].data[:, well]
+    share = 100.0 * dataset["well_stability"].data[:, well]
     axes.fill_between(
         x,
-        dataset["well_lower"].data[:, well],
-        dataset["well_upper"].data[:, well],
+        100.0 * dataset["well_lower"].data[:, well],
+        100.0 * dataset["well_upper"].data[:, well],
         color=color,
         alpha=0.3,
         lw=0,
     )
     axes.plot(x, share, color=color, marker="o", ms=4)
-    axes.plot(x, share + dataset["well_undecided"].data[:, well], color=color, lw=1.0, ls=":")
+    axes.plot(x, share + 100.0 * dataset["well_undecided"].data[:, well], color=color, lw=1.0, ls=":")
 
 
 def _lines(axes: Axes, dataset: Dataset, well: int, color: str, looks: Mapping[str, tuple[str, str]]) -> None:
@@ -104,7 +104,7 @@ def _lines(axes: Axes, dataset: Dataset, well: int, color: str, looks: Mapping[s
 
 def _axes(panels: np.ndarray, dataset: Dataset, name: str) -> None:
     titles = (
-        ("share of the starts", "Basin stability: random starts in the window"),
+        ("share of the starts [%]", "Basin stability: random starts in the window"),
         ("radius [rad]", "Integrity: largest ball in the basin"),
         ("size [rad]", "Smallest shock that makes it end elsewhere"),
     )
@@ -112,7 +112,7 @@ def _axes(panels: np.ndarray, dataset: Dataset, name: str) -> None:
         axes.set_ylabel(label)
         axes.set_title(title)
         axes.set_ylim(bottom=0.0)
-    panels[0].set_ylim(0.0, 1.02)
+    panels[0].set_ylim(0.0, 102.0)
     symbol = {"alpha": "α", "beta": "β"}.get(name, name)
     panels[-1].set_xlabel(f"{dataset[name].long_name}, {symbol} [{dataset[name].units}]")
 

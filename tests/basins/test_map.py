@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import fastmech as fm
+from fastmech.basins import label
 from fastmech.basins.refine import refine_grid
 from fastmech.basins.status import BasinStatus
 
@@ -76,7 +77,7 @@ def test_refinement_follows_a_boundary_that_it_has_seen_once() -> None:
     picture[20:60:, 9:57:6] = 1
     asked: list[int] = []
 
-    def compute(points: np.ndarray) -> np.ndarray:
+    def compute(points: np.ndarray, stride: int) -> np.ndarray:
         asked.extend(points.tolist())
         return picture.ravel()[points]
 
@@ -85,8 +86,46 @@ def test_refinement_follows_a_boundary_that_it_has_seen_once() -> None:
     assert len(set(asked)) == len(asked) < picture.size
     island = np.zeros((33, 33), dtype=np.int64)
     island[4:6, 4:6] = 1  # between the nodes of the first level: missed, as the documentation says
-    source = refine_grid(island.shape, 8, lambda points: island.ravel()[points])
+    source = refine_grid(island.shape, 8, lambda points, stride: island.ravel()[points])
     assert (island.ravel()[source] == 0).all()
+
+
+@pytest.mark.parametrize(
+    ("scene", "axes", "t_end", "refine"),
+    [
+        (BISTABLE, {"phi": (-3.2, 3.2, 92), "theta": (-3.2, 3.2, 92)}, 30.0, None),
+        (BISTABLE, {"phi": (-3.2, 3.2, 40), "theta": (-3.2, 3.2, 50)}, 30.0, None),
+        (CONSTANT, {"phi_dot": (-20.0, 20.0, 92), "theta_dot": (-20.0, 20.0, 92)}, 40.0, None),
+        (CONSTANT, {"phi": (-3.2, 3.2, 161), "theta": (-3.2, 3.2, 161)}, 40.0, 16),
+    ],
+)
+def test_progress_tells_the_time_left_within_a_factor_of_two(
+    scene: fm.Scene, axes: dict[str, Any], t_end: float, refine: int | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By a clock that runs with the integration steps, which is what takes the time."""
+    clock, seen = [0.0], []
+    follow = label.Ladder.follow
+
+    def timed(ladder: label.Ladder, *args: Any) -> Any:
+        before = ladder.steps
+        paths = follow(ladder, *args)
+        clock[0] += ladder.steps - before
+        return paths
+
+    monkeypatch.setattr(label.Ladder, "follow", timed)
+    values = {name: np.linspace(*span) for name, span in axes.items()}
+    fm.map_basins(scene, values, t_end, refine=refine, progress=lambda done: seen.append((done, clock[0])))
+    done = np.cumsum([number for number, _ in seen])
+    total = np.prod([v.size for v in values.values()])
+    assert done[-1] == total
+    assert (np.diff(done, prepend=0) > 0).all()
+    if total < 4096:  # seconds: one word at the end is all that it says
+        assert len(seen) == 1
+    else:
+        assert len(seen) >= 4
+    for points, moment in zip(done[:-1], [time for _, time in seen][:-1], strict=True):
+        left = moment * (total - points) / points
+        assert 0.5 < left / (clock[0] - moment) < 2.0
 
 
 def test_labels_number_wells_and_turns() -> None:
