@@ -183,14 +183,15 @@ class _Collected:
         self.steps = 0
 
     def put(self, points: NDArray[np.intp], part: Labels) -> NDArray[np.int64]:
-        """Fill some points; one integer for each that tells labels and statuses apart."""
+        """Fill some points; one integer for each that tells labels apart, negative without a label."""
         self.tree, self.steps = part.tree, self.steps + part.steps
         self.well[points], self.turns[points] = part.well, part.turns
         self.time[points], self.status[points] = part.time, part.status
         if part.settle_time is not None:
             self.settle[points] = part.settle_time
         turns = part.turns.astype(np.int64) + (1 << 20)
-        return ((part.status.astype(np.int64) << 8) + part.well << 44) + (turns[:, 0] << 22) + turns[:, 1]
+        number = (part.well.astype(np.int64) << 44) + (turns[:, 0] << 22) + turns[:, 1]
+        return np.where(part.well < 0, -1, number)
 
 
 def _checked_axes(axes: Mapping[str, ArrayLike], names: tuple[str, ...], least: int) -> dict[str, Floats]:

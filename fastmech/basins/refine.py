@@ -1,10 +1,11 @@
 """Grids computed near boundaries only: from coarse to fine, following every boundary that has been seen.
 
-At each level, grid points a stride apart bound blocks. A block whose corners differ, and every block beside
-one, is marked; all corners of marked blocks are computed, which may mark more, until nothing is new. Marked
-blocks are divided at the next level; any other block takes the label of its corners. So a boundary that is
-seen anywhere is followed to its end. What no corner of the first level sees is missed: an island or a tongue
-thinner than the first stride that does not touch a boundary that has been seen. The result is no proof.
+At each level, grid points a stride apart bound blocks. A block whose corners differ, or one of which has no
+label (which tells nothing of its surroundings), and every block beside such a one, is marked; all corners of
+marked blocks are computed, which may mark more, until nothing is new. Marked blocks are divided at the next
+level; any other block takes the label of its corners. So a boundary that is seen anywhere is followed to its
+end. What no corner of the first level sees is missed: an island or a tongue thinner than the first stride
+that does not touch a boundary that has been seen. The result is no proof.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ def refine_grid(
     Args:
         shape: points along each axis.
         stride: points between neighbours at the first level, a power of two.
-        compute: gives labels of points by their flat indices; it is told the stride of their level.
+        compute: gives labels of points by their flat indices and their level's stride; negative: no label.
 
     Returns:
         for every point the flat index of the computed point whose label it has, its own where computed.
@@ -108,7 +109,7 @@ class LevelProgress:
 
 
 def _marked(corner: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Blocks whose corners differ and all blocks beside one; ``corner`` are the labels of the nodes."""
+    """Blocks whose corners differ or lack a label, and all beside one; ``corner``: labels of the nodes."""
     differs = np.zeros(tuple(max(n - 1, 1) for n in corner.shape), dtype=np.bool_)
     for axis in range(corner.ndim):
         if corner.shape[axis] > 1:
@@ -118,6 +119,9 @@ def _marked(corner: NDArray[np.int64]) -> NDArray[np.bool_]:
                     low = step.take(range(step.shape[other] - 1), axis=other)
                     step = low | step.take(range(1, step.shape[other]), axis=other)
             differs |= step
+    for offset in np.ndindex(*(min(2, n) for n in corner.shape)):
+        nodes = tuple(slice(o, o + n) for o, n in zip(offset, differs.shape, strict=True))
+        differs |= corner[nodes] < 0
     return np.asarray(ndimage.binary_dilation(differs, np.ones((3,) * corner.ndim)))
 
 

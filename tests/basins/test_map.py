@@ -91,6 +91,7 @@ def test_a_pendulum_rests_as_often_as_published() -> None:
         (fm.Scene(), {"phi": FULL, "theta": FULL}, 60.0),
         (CONSTANT, {"theta": FULL, "theta_dot": np.linspace(-9.0, 9.0, 37)}, 60.0),
         (BISTABLE, {"phi": np.linspace(0.0, 1.4, 33), "theta": np.linspace(0.0, 1.0, 33)}, 60.0),
+        (BISTABLE.replace(beta=300.0), {"phi": FULL, "theta": FULL}, 150.0),
         (CONSTANT, {"phi": FULL[::3], "theta": FULL[::3], "phi_dot": np.linspace(-3.0, 3.0, 7)}, 60.0),
     ],
 )
