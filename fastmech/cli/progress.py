@@ -62,8 +62,10 @@ class LogLine:
         self._name, self._total, self._done = name, total, 0
         self._begun = self._told = time.monotonic()
 
-    def advance(self, finished: int) -> None:
-        """Count items, and say so if it is time."""
+    def advance(self, finished: int, before: float = 0.0) -> None:
+        """Count items, and say so if it is time; ``before``: when other work that comes first moved last."""
+        if not self._done:
+            self._begun = max(self._begun, before)
         self._done += finished
         now = time.monotonic()
         if now - self._told < LOG_PERIOD:
@@ -79,7 +81,7 @@ class ProgressBars:
     """Bars with percentage, rate and time left; without a terminal, a line every so often."""
 
     def __init__(self, quiet: bool = False) -> None:
-        self._quiet = quiet
+        self._quiet, self._moved = quiet, 0.0
         self._logs = not quiet and not sys.stderr.isatty()
         self._progress = Progress(
             TextColumn(
@@ -109,7 +111,8 @@ class ProgressBars:
         def advance(finished: int) -> None:
             self._progress.advance(task, finished)
             if log is not None:
-                log.advance(finished)
+                log.advance(finished, self._moved)
+                self._moved = time.monotonic()
 
         return advance
 
