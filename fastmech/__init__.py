@@ -13,8 +13,27 @@ if TYPE_CHECKING:
     from fastmech.atlas.folds import trace_folds
     from fastmech.atlas.map import map_equilibria
     from fastmech.atlas.snap import find_snap
+    from fastmech.basins.copies import copy_labels, copy_of_label
+    from fastmech.basins.critical import critical_forces, critical_impulse, impulse_start
+    from fastmech.basins.edge import saddle_at, track_edge
+    from fastmech.basins.erosion import erosion
     from fastmech.basins.label import labels_of
     from fastmech.basins.map import map_basins
+    from fastmech.basins.measures.dimension import boundary_dimension
+    from fastmech.basins.measures.entropy import basin_entropy, fractal_boundary_test
+    from fastmech.basins.measures.fractions import (
+        basin_fractions,
+        basin_stability,
+        finite_time_basin_stability,
+        wilson,
+    )
+    from fastmech.basins.measures.integrity import integrity
+    from fastmech.basins.measures.labels import number_turns
+    from fastmech.basins.measures.norm import kinetic_norm
+    from fastmech.basins.measures.uncertainty import uncertainty_exponent
+    from fastmech.basins.measures.wada import wada_merge_test
+    from fastmech.basins.shock import brute_force_shock, minimal_shock
+    from fastmech.basins.snapping import map_snapping
     from fastmech.basins.status import BasinStatus
     from fastmech.capture.barriers import barrier_tree
     from fastmech.capture.certificate import trapped
@@ -51,28 +70,51 @@ _MODULES = {
     "StepWarning": "fastmech.errors",
     "System": "fastmech.ensembles.system",
     "barrier_tree": "fastmech.capture.barriers",
+    "basin_entropy": "fastmech.basins.measures.entropy",
+    "basin_fractions": "fastmech.basins.measures.fractions",
+    "basin_stability": "fastmech.basins.measures.fractions",
+    "boundary_dimension": "fastmech.basins.measures.dimension",
+    "brute_force_shock": "fastmech.basins.shock",
     "classify": "fastmech.stability.classify",
+    "copy_labels": "fastmech.basins.copies",
+    "copy_of_label": "fastmech.basins.copies",
     "cos": "fastmech.kernels.sincos",
+    "critical_forces": "fastmech.basins.critical",
+    "critical_impulse": "fastmech.basins.critical",
     "disturb": "fastmech.disturbance.ensemble",
     "disturbed_motion": "fastmech.disturbance.motion",
+    "erosion": "fastmech.basins.erosion",
     "find_equilibria": "fastmech.equilibria.find",
     "find_folds": "fastmech.atlas.fold_points",
     "find_snap": "fastmech.atlas.snap",
+    "finite_time_basin_stability": "fastmech.basins.measures.fractions",
+    "fractal_boundary_test": "fastmech.basins.measures.entropy",
+    "impulse_start": "fastmech.basins.critical",
     "integrate": "fastmech.ensembles.integrate",
+    "integrity": "fastmech.basins.measures.integrity",
+    "kinetic_norm": "fastmech.basins.measures.norm",
     "labels_of": "fastmech.basins.label",
     "largest_lyapunov": "fastmech.transients.lyapunov",
     "largest_stable_step": "fastmech.step_limits.predict",
     "linear_range": "fastmech.disturbance.linear_range",
     "map_basins": "fastmech.basins.map",
     "map_equilibria": "fastmech.atlas.map",
+    "map_snapping": "fastmech.basins.snapping",
+    "minimal_shock": "fastmech.basins.shock",
+    "number_turns": "fastmech.basins.measures.labels",
     "open_results": "fastmech.store.read",
     "reactions": "fastmech.mechanism.reactions",
+    "saddle_at": "fastmech.basins.edge",
     "sin": "fastmech.kernels.sincos",
     "step_warning": "fastmech.step_limits.warning",
     "trace_folds": "fastmech.atlas.folds",
     "trace_unreached": "fastmech.atlas.damping",
+    "track_edge": "fastmech.basins.edge",
     "transient_growth": "fastmech.transients.growth",
     "trapped": "fastmech.capture.certificate",
+    "uncertainty_exponent": "fastmech.basins.measures.uncertainty",
+    "wada_merge_test": "fastmech.basins.measures.wada",
+    "wilson": "fastmech.basins.measures.fractions",
 }
 
 __all__ = [
@@ -84,28 +126,51 @@ __all__ = [
     "StepWarning",
     "System",
     "barrier_tree",
+    "basin_entropy",
+    "basin_fractions",
+    "basin_stability",
+    "boundary_dimension",
+    "brute_force_shock",
     "classify",
+    "copy_labels",
+    "copy_of_label",
     "cos",
+    "critical_forces",
+    "critical_impulse",
     "disturb",
     "disturbed_motion",
+    "erosion",
     "find_equilibria",
     "find_folds",
     "find_snap",
+    "finite_time_basin_stability",
+    "fractal_boundary_test",
+    "impulse_start",
     "integrate",
+    "integrity",
+    "kinetic_norm",
     "labels_of",
     "largest_lyapunov",
     "largest_stable_step",
     "linear_range",
     "map_basins",
     "map_equilibria",
+    "map_snapping",
+    "minimal_shock",
+    "number_turns",
     "open_results",
     "reactions",
+    "saddle_at",
     "sin",
     "step_warning",
     "trace_folds",
     "trace_unreached",
+    "track_edge",
     "transient_growth",
     "trapped",
+    "uncertainty_exponent",
+    "wada_merge_test",
+    "wilson",
 ]
 
 

@@ -50,7 +50,7 @@ from fastmech.kernel_cache import cache_directory
 from fastmech.kernels.lagrange import lagrange_free as rhs
 sys.path.insert(0, sys.argv[1])
 import users_module
-Y = np.array([[0.7], [0.3], [1.0], [2.0]])
+Y = np.array([[0.7], [0.3], [0.0], [0.0]])
 dY = np.zeros((4, 1))
 rhs(0.0, Y, dY, np.array([[0.8], [0.6], [-9.0], [13.0], [8.0], [0.0], [0.0], [0.0]]))
 print(json.dumps({
@@ -124,14 +124,14 @@ def test_an_edited_source_gives_a_new_directory_and_the_new_answer(
 
     source = copy / "fastmech" / "mechanism" / "reduced.py"
     text = source.read_text()
-    old = "return mass + c12 * c12 + slider * k * k"
-    assert old in text
-    source.write_text(text.replace(old, f"return 2.0 * ({old.removeprefix('return ')})"))
+    old = "    return u1, u2\n"  # of potential_gradient
+    assert text.count(old) == 1
+    source.write_text(text.replace(old, "    return 2.0 * u1, 2.0 * u2\n"))
     edited = run(ONE_KERNEL, users_folder, **place)
     assert edited["directory"] != first["directory"]
     assert edited["hits"] == 0
-    # phi'' = (...) / determinant, the determinant is now twice as large.
-    assert edited["answer"][2] == pytest.approx(first["answer"][2] / 2, rel=1e-14)
+    # From rest the accelerations are linear in the gradient, which is now twice as large.
+    assert edited["answer"][2] == pytest.approx(2 * first["answer"][2], rel=1e-14)
 
 
 def test_the_user_s_cache_directory_is_respected(tmp_path: Path, users_folder: Path) -> None:

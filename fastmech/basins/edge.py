@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fastmech.basins.copies import copy_labels
 from fastmech.basins.measures.labels import Floats, LabelOf, ask, check_point
-from fastmech.basins.measures.norm import norm_on
+from fastmech.basins.measures.norm import kinetic_norm, norm_on
 from fastmech.disturbance.ensemble import require_constant_force
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
@@ -49,10 +50,10 @@ class EdgeTrack:
 
 def track_edge(
     scene: Scene | System,
-    label_of: LabelOf,
     inside: ArrayLike,
     outside: ArrayLike,
-    norm: ArrayLike,
+    label_of: LabelOf | None = None,
+    norm: ArrayLike | None = None,
     *,
     t_end: float,
     near: float = 1e-10,
@@ -66,11 +67,13 @@ def track_edge(
 
     Args:
         scene: a scene with a constant force, or a system of your own whose right-hand side has no time in it.
-        label_of: labels (n,) of starts (n, dim), negative: none. Starts without a label count to neither
-            side; a bisection ends where there are no others.
         inside: a start in the first basin (dim,).
         outside: one in another basin (dim,).
-        norm: matrix N (dim, dim): ``|d @ N|`` is a distance.
+        label_of: labels (n,) of starts (n, dim), negative: none. Starts without a label count to neither
+            side; a bisection ends where there are no others. By default, of a scene, which copy of which
+            well captures them within 60 s, see :func:`fastmech.basins.copies.copy_labels`.
+        norm: matrix N (dim, dim): ``|d @ N|`` is a distance. By default, of a scene, the kinetic-energy norm
+            at its deepest well.
         t_end: longest time to follow the boundary [s].
         near: distance that a bisection stops at. Below the error of ``label_of`` the two may come to be on
             one side; they are then drawn apart along their difference.
@@ -85,6 +88,10 @@ def track_edge(
     """
     if isinstance(scene, Scene):
         require_constant_force(scene)
+        label_of = label_of or copy_labels(scene)
+        norm = kinetic_norm(scene, find_equilibria(scene)[0]) if norm is None else norm
+    if label_of is None or norm is None:
+        raise InputError("label_of, norm: missing; only a scene has them by default")
     a = check_point("inside", inside)
     b = check_point("outside", outside, a.size)
     matrix = norm_on(norm, a.size)

@@ -2,11 +2,12 @@
 
 After Soliman and Thompson, J. Sound Vib. 135 (1989) 453, and Rega and Lenci, Nonlinear Analysis 63 (2005)
 902. A well keeps its identity along the parameter: its sheet in :func:`fastmech.atlas.map.map_equilibria`.
+Every value is measured by itself, so that it does not matter which others are asked for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import partial
 from typing import Any, Protocol
@@ -15,19 +16,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.atlas.map import map_equilibria
+from fastmech.basins.label import labels_of as labels_by_capture
+from fastmech.basins.label import require_damper
 from fastmech.basins.measures.fractions import basin_stability
 from fastmech.basins.measures.integrity import integrity
 from fastmech.basins.measures.labels import Floats, Integers, check_point
-from fastmech.basins.measures.norm import kinetic_norm, norm_on
+from fastmech.basins.measures.norm import kinetic_norm, norm_on, state_index
 from fastmech.basins.shock import minimal_shock
 from fastmech.disturbance.ensemble import require_constant_force
 from fastmech.ensembles import checks
+from fastmech.ensembles.run import Progress
 from fastmech.equilibria.find import Equilibria, find_equilibria
 from fastmech.errors import InputError
-from fastmech.scene import Scene, nearest
+from fastmech.scene import Scene
 
-#: States of the mechanism by the names of a map's axes.
-STATES = ("phi", "theta", "phi_dot", "theta_dot")
+#: Relative tolerance of shocks: what a profile shows.
+TOLERANCE = 1e-3
 
 
 class Ends(Protocol):
@@ -69,20 +73,124 @@ class ErosionProfile:
     factor_at_window: NDArray[np.bool_]  #: the same for the factor
     shock: Floats  #: minimal critical shock of all four states [rad]; NaN also: none up to the largest
     kick: Floats  #: the same for a kick of the rates alone [rad]
+    shock_undecided: Floats  #: smallest shock tried whose end is not known [rad]; NaN: none
+    kick_undecided: Floats  #: the same of the kicks
     undecided: Floats  #: share of the random starts without a label
+
+
+#: Names of an :class:`ErosionProfile`'s arrays over values and wells.
+MEASURES = tuple(field.name for field in fields(ErosionProfile)[3:])
+
+#: Those that are yes or no.
+FLAGS = ("lim_at_window", "factor_at_window")
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """What is measured of every well, and how; see :func:`erosion`."""
+
+    states: tuple[int, ...]  #: axes of the window
+    lines: tuple[Floats, ...]  #: coordinates along them
+    random: Floats  #: random points in it (n, axes)
+    labels_of: LabelsOf
+    most_shock: float  #: rad
+    directions: int
+    seed: int
+
+    def of_wells(self, scene: Scene, places: Floats) -> dict[str, NDArray[Any]]:
+        """Every measure of wells at ``places`` (wells, 2) [rad], arrays (wells,); NaN where that is NaN."""
+        measured: dict[str, NDArray[Any]] = {
+            name: np.zeros(len(places), dtype=bool) if name in FLAGS else np.full(len(places), np.nan)
+            for name in MEASURES
+        }
+        equilibria = find_equilibria(scene)
+        for w in np.flatnonzero(np.isfinite(places[:, 0])):
+            apart = np.hypot(
+                np.sin((equilibria.phi - places[w, 0]) / 2.0), np.sin((equilibria.theta - places[w, 1]) / 2.0)
+            )
+            for name, number in self._of_well(scene, equilibria, int(apart.argmin())).items():
+                measured[name][w] = number
+        return measured
+
+    def _of_well(self, scene: Scene, equilibria: Equilibria, own: int) -> dict[str, float]:
+        e = equilibria[own]
+        place = np.array([e.phi, e.theta, 0.0, 0.0])
+
+        def copy_of(y: Floats) -> Integers:
+            """0: this copy of the well, 1: elsewhere, -1: not known."""
+            ends = self.labels_of(scene, y)
+            elsewhere = (ends.well != own) | (ends.turns != 0).any(axis=1)
+            return np.where(ends.well < 0, -1, elsewhere).astype(np.int64)
+
+        share = basin_stability(self.labels_of(scene, self._starts(self.random, place)).well, own)
+        norm = kinetic_norm(scene, e)
+        search = partial(
+            minimal_shock,
+            copy_of,
+            place,
+            norm,
+            most=self.most_shock,
+            directions=self.directions,
+            tolerance=TOLERANCE,
+            seed=self.seed,
+        )
+        kick = search(coordinates=(2, 3))
+        # A kick of the rates is a shock too, and so is a push onto a saddle.
+        guess = np.concatenate([kick.shock[None], _saddles_from(equilibria, place)])
+        shock = search(guess=guess[np.isfinite(guess).all(axis=1)])
+        return {
+            "phi": e.phi,
+            "theta": e.theta,
+            "stability": float(share.fraction),
+            "lower": float(share.lower),
+            "upper": float(share.upper),
+            "undecided": share.missing / share.n,
+            "shock": shock.size,
+            "shock_undecided": shock.undecided_from,
+            "kick": kick.size,
+            "kick_undecided": kick.undecided_from,
+            **self._integrity(copy_of, place, norm),
+        }
+
+    def _integrity(
+        self, copy_of: Callable[[Floats], Integers], place: Floats, norm: Floats
+    ) -> dict[str, float]:
+        grid = np.stack(np.meshgrid(*self.lines, indexing="ij"), axis=-1).reshape(-1, len(self.lines))
+        labels = copy_of(self._starts(grid, place)).reshape([line.size for line in self.lines])
+        window = np.array([[line[0], line[-1]] for line in self.lines])
+        own = place[list(self.states)]
+        within = bool(((own >= window[:, 0]) & (own <= window[:, 1])).all())
+        # Outside the window there is no largest ball round the well; the other measures need no centre.
+        centre = own if within else window.mean(axis=1)
+        result = integrity(labels, self.lines, 0, centre, norm_on(norm, 4, self.states))
+        return {
+            "gim": result.gim,
+            "lim": result.lim if within else np.nan,
+            "lim_at_window": within and result.lim_at_window,
+            "factor": result.factor,
+            "factor_at_window": result.factor_at_window,
+        }
+
+    def _starts(self, points: Floats, place: Floats) -> Floats:
+        """States (n, 4) at points (n, axes), the other ones those of ``place`` (4,)."""
+        full = np.tile(place, (len(points), 1))
+        full[:, list(self.states)] = points
+        return full
 
 
 def erosion(
     scene: Scene,
     parameter: str,
     values: ArrayLike,
-    labels_of: LabelsOf,
     axes: Mapping[str, ArrayLike],
     *,
     most_shock: float,
+    t_end: float = 60.0,
+    labels_of: LabelsOf | None = None,
     n: int = 2048,
     directions: int = 64,
     seed: int = 0,
+    progress: Progress | None = None,
 ) -> ErosionProfile:
     """Erosion profiles of all wells along one parameter, in the kinetic-energy norm at each well.
 
@@ -90,117 +198,80 @@ def erosion(
         scene: with a constant force; gives every other parameter.
         parameter: name of a parameter, such as "F0", "c1" or "c2".
         values: of it, rising.
-        labels_of: where starts of a scene end.
         axes: the map and its window: names among phi, theta [rad], phi_dot, theta_dot [rad/s] with their
             coordinates, rising in equal steps. States that are no axis are the well's own.
         most_shock: largest shock to look for [rad].
+        t_end: end of the runs [s]; what is not captured by then has no label.
+        labels_of: where starts of a scene end, if not :func:`fastmech.basins.label.labels_of` shall tell.
         n: random starts, uniform in the window, the same for all values.
         directions: random directions of the search for a shock. It also begins with those to the saddles,
-            with the smallest kick, and with the shock found at the value before.
+            and with the smallest kick.
         seed: of the starts and the search.
+        progress: is told how many values are done since its last call.
 
     Raises:
-        InputError: an argument is wrong, or the force decays.
+        InputError: an argument is wrong, the force decays, there is no damper, or wells are not certain.
     """
     require_constant_force(scene)
     along = check_point("values", values)
-    window = _window(axes, n, seed)
-    atlas = map_equilibria(scene, {parameter: along})
-    wells = np.flatnonzero(atlas.sheet_morse_index == 0)
-    arrays = [field.name for field in fields(ErosionProfile)][3:]
-    flags = ("lim_at_window", "factor_at_window")
-    shape = along.size, wells.size
-    profile: dict[str, Any] = {
-        name: np.zeros(shape, dtype=bool) if name in flags else np.full(shape, np.nan) for name in arrays
-    }
-    guesses: list[dict[str, Floats]] = [{} for _ in wells]
-    for v, value in enumerate(along):
-        now = scene.replace(**{parameter: float(value)})
-        equilibria = find_equilibria(now)
-        for w, sheet in enumerate(wells):
-            for slot in np.flatnonzero(atlas.sheet[v] == sheet):
-                own = _index_at(equilibria, float(atlas.phi[v, slot]), float(atlas.theta[v, slot]))
-                shocks, measured = _measure(
-                    now, equilibria, own, labels_of, window, guesses[w], most_shock, directions, seed
-                )
-                guesses[w] |= shocks
-                for name, number in measured.items():
-                    profile[name][v, w] = number
-    return ErosionProfile(parameter, along, wells.astype(np.int64), **profile)
+    survey = survey_of(
+        axes, most_shock=most_shock, t_end=t_end, labels_of=labels_of, n=n, directions=directions, seed=seed
+    )
+    sheets, places = wells_along(scene, parameter, along)
+    rows = []
+    for value, place in zip(along, places, strict=True):
+        rows.append(survey.of_wells(scene.replace(**{parameter: float(value)}), place))
+        if progress is not None:
+            progress(1)
+    profile: Any = {name: np.stack([row[name] for row in rows]) for name in MEASURES}
+    return ErosionProfile(parameter, along, sheets, **profile)
 
 
-@dataclass(frozen=True, eq=False)
-class _Window:
-    """A slice of the state space."""
-
-    states: list[int]  #: its axes
-    lines: list[Floats]  #: coordinates along them
-    random: Floats  #: random points in it (n, axes)
-
-    def grid(self) -> Floats:
-        """All points of the map (points, axes)."""
-        return np.stack(np.meshgrid(*self.lines, indexing="ij"), axis=-1).reshape(-1, len(self.lines))
-
-    def starts(self, points: Floats, place: Floats) -> Floats:
-        """States (n, 4) at points (n, axes), the other ones those of ``place`` (4,)."""
-        full = np.tile(place, (len(points), 1))
-        full[:, self.states] = points
-        return full
-
-
-def _window(axes: Mapping[str, ArrayLike], n: int, seed: int) -> _Window:
-    states = [_state(name) for name in axes]
+def survey_of(
+    axes: Mapping[str, ArrayLike],
+    *,
+    most_shock: float,
+    t_end: float,
+    labels_of: LabelsOf | None = None,
+    n: int,
+    directions: int,
+    seed: int,
+    threads: int | None = None,
+) -> Survey:
+    """What to measure, checked; arguments and errors as for :func:`erosion`."""
+    states = tuple(state_index(name) for name in axes)
     if not states:
         raise InputError("axes: must name at least one state")
-    lines = [check_point(f"axes.{name}", line) for name, line in axes.items()]
+    lines = tuple(check_point(f"axes.{name}", line) for name, line in axes.items())
     rng = np.random.default_rng(checks.whole_number("seed", seed, least=0))
     low, high = np.array([[line.min(), line.max()] for line in lines]).T
     n = checks.whole_number("n", n, least=1)
-    return _Window(states, lines, low + (high - low) * rng.random((n, len(lines))))
+    t_end = checks.number("t_end", t_end, "s", above=0.0)
+    return Survey(
+        states,
+        lines,
+        low + (high - low) * rng.random((n, len(lines))),
+        labels_of or partial(labels_by_capture, t_end=t_end, threads=threads),
+        most_shock,
+        directions,
+        seed,
+    )
 
 
-def _measure(
-    scene: Scene,
-    equilibria: Equilibria,
-    own: int,
-    labels_of: LabelsOf,
-    window: _Window,
-    guesses: Mapping[str, Floats],
-    most_shock: float,
-    directions: int,
-    seed: int,
-) -> tuple[dict[str, Floats], dict[str, float]]:
-    """Shocks found and all measures of one well of one scene."""
-    e = equilibria[own]
-    place = np.array([e.phi, e.theta, 0.0, 0.0])
+def wells_along(scene: Scene, parameter: str, values: Floats) -> tuple[Integers, Floats]:
+    """Sheets of all wells along a parameter (wells,), and where they are [rad] (values, wells, 2), or NaN.
 
-    def copy_of(y: Floats) -> Integers:
-        """0: this copy of the well, 1: elsewhere, -1: not known."""
-        ends = labels_of(scene, y)
-        elsewhere = (ends.well != own) | (ends.turns != 0).any(axis=1)
-        return np.where(ends.well < 0, -1, elsewhere).astype(np.int64)
-
-    share = basin_stability(labels_of(scene, window.starts(window.random, place)).well, own)
-    norm = kinetic_norm(scene, e)
-    labels = copy_of(window.starts(window.grid(), place)).reshape([line.size for line in window.lines])
-    measured = {
-        "phi": e.phi,
-        "theta": e.theta,
-        "stability": float(share.fraction),
-        "lower": float(share.lower),
-        "upper": float(share.upper),
-        "undecided": share.missing / share.n,
-        **_integrity(labels, window.lines, place[window.states], norm_on(norm, 4, window.states)),
-    }
-    search = partial(minimal_shock, copy_of, place, norm, most=most_shock, directions=directions, seed=seed)
-    kick = search(coordinates=(2, 3), guess=guesses.get("kick"))
-    # A kick of the rates is a shock too, and so is a push onto a saddle.
-    known = [guesses.get("shock", np.zeros((0, 4))), kick.shock[None], _saddles_from(equilibria, place)]
-    guess = np.concatenate(known)
-    shocks = {"kick": kick, "shock": search(guess=guess[np.isfinite(guess).all(axis=1)])}
-    measured |= {name: result.size for name, result in shocks.items()}
-    found = {name: result.shock[None] for name, result in shocks.items() if np.isfinite(result.size)}
-    return found, measured
+    Raises:
+        InputError: the parameter or a value of it is none, or the scene has no damper.
+    """
+    require_damper(scene)
+    atlas = map_equilibria(scene, {parameter: values})
+    wells = np.flatnonzero(atlas.sheet_morse_index == 0)
+    places = np.full((values.size, wells.size, 2), np.nan)
+    for w, sheet in enumerate(wells):
+        at, slot = np.nonzero(atlas.sheet == sheet)
+        places[at, w] = np.column_stack([atlas.phi[at, slot], atlas.theta[at, slot]])
+    return wells.astype(np.int64), places
 
 
 def _saddles_from(equilibria: Equilibria, place: Floats) -> Floats:
@@ -209,29 +280,3 @@ def _saddles_from(equilibria: Equilibria, place: Floats) -> Floats:
     angles = np.column_stack([equilibria.phi, equilibria.theta])[saddles] - place[:2]
     angles -= 2.0 * np.pi * np.round(angles / (2.0 * np.pi))
     return np.concatenate([angles, np.zeros_like(angles)], axis=1)
-
-
-def _integrity(labels: Integers, lines: Sequence[Floats], place: Floats, norm: Floats) -> dict[str, float]:
-    window = np.array([[line[0], line[-1]] for line in lines])
-    within = bool(((place >= window[:, 0]) & (place <= window[:, 1])).all())
-    # Outside the window there is no largest ball round the well; the other measures need no centre.
-    centre = place if within else window.mean(axis=1)
-    result = integrity(labels, lines, 0, centre, norm)
-    return {
-        "gim": result.gim,
-        "lim": result.lim if within else np.nan,
-        "lim_at_window": within and result.lim_at_window,
-        "factor": result.factor,
-        "factor_at_window": result.factor_at_window,
-    }
-
-
-def _index_at(equilibria: Equilibria, phi: float, theta: float) -> int:
-    apart = np.hypot(np.sin((equilibria.phi - phi) / 2.0), np.sin((equilibria.theta - theta) / 2.0))
-    return int(apart.argmin())
-
-
-def _state(name: str) -> int:
-    if name not in STATES:
-        raise InputError(f"axes.{name}: unknown name; {nearest(name, list(STATES))}")
-    return STATES.index(name)

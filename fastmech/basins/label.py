@@ -13,36 +13,29 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.basins.ladder import SUBSTEPS, climb, tell_the_same
 from fastmech.basins.runs import Paths, follow, rounds_until
 from fastmech.basins.status import BasinStatus, counts
 from fastmech.basins.steps import coarse_steps
 from fastmech.capture.barriers import BarrierTree
 from fastmech.capture.certificate import Certificate, certificate_of
 from fastmech.disturbance.outcome import confining_energy
-from fastmech.disturbance.size import size_at
 from fastmech.ensembles import checks
 from fastmech.ensembles.plausible import breaks_energy_bounds
 from fastmech.ensembles.run import Progress
 from fastmech.errors import InputError
 from fastmech.integrators.method import Method
 from fastmech.integrators.methods import find_method
-from fastmech.mechanism.coefficients import Coefficients, reduce
+from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import unit
-from fastmech.mechanism.reduced import metric_11, slider_ratio
 from fastmech.scene import Scene
 from fastmech.step_limits.warning import warn_of_step
 
 Floats = NDArray[np.float64]
 
-#: Steps a round of one computation after the other, a round being two of the coarsest steps. With the default
-#: method each makes the error some 25, 60 and then 256 times smaller, down to rounding.
-SUBSTEPS = (2, 3, 5, 10, 20, 40)
-
-#: A path that has not been captured is at a saddle when it is so near to it [rad], in its norm.
-AT_SADDLE = 1e-3
-
-#: Starts that are followed together.
-BATCH = 1 << 16
+#: Starts that are followed together, at most; and so many pieces, if they are not smaller than the least.
+#: Every piece takes something of everywhere, so that all take about as long and progress tells the time left.
+BATCH, PIECES, LEAST = 1 << 16, 16, 1 << 11
 
 
 @dataclass(frozen=True)
@@ -100,24 +93,23 @@ def labels_of(
         warn_of_step([scene], dt, method)
     if settle_radius is not None:
         settle_radius = checks.number("settle_radius", settle_radius, "rad", above=0.0)
-    finite = np.isfinite(begin).all(axis=1)
+    finite = np.asarray(np.isfinite(begin)).all(axis=1).reshape(-1)
     coarse = coarse_steps(reduce(scene), begin) if dt is None else np.full(len(begin), dt)
     found = Paths.empty(len(begin))
     status = np.where(finite, BasinStatus.UNDECIDED, BasinStatus.START_NOT_FINITE).astype(np.int8)
     settle = None if settle_radius is None else np.full(len(begin), np.nan)
-    for step in np.unique(coarse[finite]):
-        same = np.flatnonzero(finite & (coarse == step))
-        for first in range(0, same.size, BATCH):
-            members = same[first : first + BATCH]
+    pieces = max(-(-len(begin) // BATCH), min(PIECES, len(begin) // LEAST), 1)
+    for piece in range(pieces):
+        some = np.arange(piece, len(begin), pieces)
+        for step in np.unique(coarse[some[finite[some]]]):
+            members = some[finite[some] & (coarse[some] == step)]
             ladder = Ladder(certificate, t_end, float(step), formula, threads)
             ladder.label(begin, members, found, status)
             if settle is not None and settle_radius is not None:
                 settle[members] = ladder.settle_times(begin, members, found, status, settle_radius)
             found.steps += ladder.steps
-            if progress is not None:
-                progress(members.size)
-    if progress is not None and not finite.all():
-        progress(int(np.count_nonzero(~finite)))
+        if progress is not None:
+            progress(some.size)
     captured = status == BasinStatus.CAPTURED
     return Labels(
         certificate.tree,
@@ -156,7 +148,7 @@ class Ladder:
 
     def __post_init__(self) -> None:
         self.rounds = rounds_until(self.t_end, SUBSTEPS[0] * self.coarse)
-        self.observer = self.certificate.params(self.certificate.levels)
+        self.observer = self.certificate.packed
 
     def follow(self, starts: Floats, substeps: int, observer: Floats) -> Paths:
         """One computation."""
@@ -168,61 +160,17 @@ class Ladder:
 
     def label(self, begin: Floats, members: NDArray[np.intp], found: Paths, status: NDArray[np.int8]) -> None:
         """Find labels and statuses of some starts."""
-        coarse = self.follow(begin[members], SUBSTEPS[0], self.observer)
-        for substeps in SUBSTEPS[1:]:
-            fine = self.follow(begin[members], substeps, self.observer)
-            settled = self.agree(coarse, fine)
-            last = substeps == SUBSTEPS[-1]
-            done = np.flatnonzero(settled | last)
-            found.put(members[done], fine.take(done))
-            status[members[done]] = self.verdicts(
-                begin[members[done]], coarse.take(done), fine.take(done), settled[done]
-            )
-            rest = np.flatnonzero(~settled)
-            members, coarse = members[rest], fine.take(rest)
-            if not members.size:
-                break
-
-    def agree(self, coarse: Paths, fine: Paths) -> NDArray[np.bool_]:
-        """Which paths tell the same with both steps: not captured, or captured beyond their difference."""
-        finite = np.asarray(np.isfinite(coarse.state) & np.isfinite(fine.state)).all(axis=1)
-        same = (coarse.code == fine.code) & (coarse.turns == fine.turns).all(axis=1) & finite
-        same &= np.abs(coarse.stop - fine.stop) < 0.5 * self.coarse
-        apart = np.abs(np.where(finite.reshape(-1, 1), coarse.state - fine.state, np.inf))
-        level = np.append(np.inf, self.certificate.levels)[fine.code]
-        with np.errstate(invalid="ignore"):
-            room = energy_change(self.certificate, fine.state, level, apart)
-            proved = room < level - fine.energy
-        return np.asarray(same & (proved | (fine.code == 0)))
-
-    def verdicts(
-        self, starts: Floats, coarse: Paths, fine: Paths, settled: NDArray[np.bool_]
-    ) -> NDArray[np.int8]:
-        """Statuses of paths whose computation ends here."""
-        status = np.full(len(starts), BasinStatus.UNDECIDED, dtype=np.int8)
-        status[settled & (fine.code > 0)] = BasinStatus.CAPTURED
-        other = (coarse.code != fine.code) | (coarse.turns != fine.turns).any(axis=1)
-        status[~settled & (coarse.code > 0) & (fine.code > 0) & other] = BasinStatus.AT_SADDLE
-        free = np.flatnonzero(fine.code == 0)
-        start, state = starts[free], fine.state[free]
-        status[free[self.near_saddle(state)]] = BasinStatus.AT_SADDLE
-        impossible = breaks_energy_bounds(reduce(self.certificate.scene), start, state)
-        status[free[impossible]] = BasinStatus.STEP_TOO_LARGE
-        status[free[~np.isfinite(state).all(axis=1)]] = BasinStatus.NOT_FINITE
-        return status
-
-    def near_saddle(self, states: Floats) -> NDArray[np.bool_]:
-        """Which states (n, 4) rest at an unstable equilibrium."""
-        scene, equilibria = self.certificate.scene, self.certificate.tree.equilibria
-        held = scene.replace(F0=equilibria.force, alpha=0.0)
-        near = np.zeros(len(states), dtype=np.bool_)
-        for e in equilibria:
-            if e.kind != "minimum":
-                away = states - np.array([e.phi, e.theta, 0.0, 0.0])
-                with np.errstate(invalid="ignore"):
-                    away[:, :2] -= 2.0 * np.pi * np.round(away[:, :2] / (2.0 * np.pi))
-                    near |= size_at(held, e.phi, e.theta)(away) < AT_SADDLE
-        return near
+        c = reduce(self.certificate.scene)
+        push = c.force if self.certificate.decays else 0.0
+        climb(
+            self.certificate,
+            members,
+            lambda some, substeps: self.follow(begin[some], substeps, self.observer),
+            lambda _, coarse, fine: tell_the_same(self.certificate, coarse, fine, 0.5 * self.coarse, push),
+            lambda some, states: breaks_energy_bounds(c, begin[some], states),
+            found,
+            status,
+        )
 
     def settle_times(
         self, begin: Floats, members: NDArray[np.intp], found: Paths, status: NDArray[np.int8], radius: float
@@ -240,24 +188,3 @@ class Ladder:
         same = paths.code == found.code[members[captured]]
         times[captured[same]] = paths.time[same]
         return times
-
-
-def energy_change(certificate: Certificate, states: Floats, level: Floats, apart: Floats) -> Floats:
-    """Bound on how much the bounding energy of states (n, 4) changes over the box of half-widths ``apart``.
-
-    Over m2 l^2 [1/s^2]. The change of U is at most its largest slope times the way; T is quadratic in the
-    rates with coefficients whose slopes are at most ``slider max|k k'|`` and 1.
-    """
-    c: Coefficients = reduce(certificate.scene)
-    dphi, dtheta, du, dv = apart.T
-    slope = (
-        np.hypot(c.lift, c.force) * dphi + np.hypot(c.gravity, c.force) * dtheta + c.spring * (dphi + dtheta)
-    )
-    if certificate.decays:
-        slope = slope + abs(c.force) * (dphi + dtheta)
-    angles = np.linspace(-np.pi, np.pi, 721)
-    k, dk = slider_ratio(np.sin(angles), np.cos(angles))
-    a11 = metric_11(c.mass, c.slider, float(np.abs(k).max()))
-    u, v = np.abs(states[:, 2]) + du, np.abs(states[:, 3]) + dv
-    kinetic = (c.slider * float(np.abs(k * dk).max()) * u * u + u * v) * dphi + u * v * dtheta
-    return np.asarray(slope + kinetic + (a11 * u + v) * du + (u + v) * dv)

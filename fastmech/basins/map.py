@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.basins.label import Labels, labels_of
-from fastmech.basins.refine import refine_grid
+from fastmech.basins.measures.norm import STATE as STATE
+from fastmech.basins.refine import LevelProgress, refine_grid
 from fastmech.basins.status import BasinStatus, counts
 from fastmech.basins.system import system_labels_of
 from fastmech.capture.barriers import BarrierTree
@@ -21,9 +22,6 @@ from fastmech.errors import InputError
 from fastmech.scene import Scene, nearest
 
 Floats = NDArray[np.float64]
-
-#: Coordinates of a scene's state space.
-STATE = ("phi", "theta", "phi_dot", "theta_dot")
 
 #: Points of the largest map: its arrays take some 150 bytes a point in memory.
 MOST_POINTS = 50_000_000
@@ -94,7 +92,8 @@ def map_basins(
         method: name of the integration method.
         settle_radius: see there; a scene's only.
         threads: threads to use, all processors by default. The result does not depend on it.
-        progress: is told how many starts are done since its last call.
+        progress: is told how many starts are done since its last call; of a refined map its share of the work
+            as far as that can be foreseen, as so many starts.
 
     Raises:
         InputError: an argument is wrong, the scene has no damper, or its wells are not certain.
@@ -108,7 +107,7 @@ def map_basins(
         raise InputError(f"axes: ask for {size:.3g} starts, at most {MOST_POINTS:.0e} are allowed")
     collected = _Collected(size)
 
-    def compute(points: NDArray[np.intp]) -> NDArray[np.int64]:
+    def compute(points: NDArray[np.intp], tell: Progress | None) -> NDArray[np.int64]:
         starts = grid_starts(values, held, names, points)
         if isinstance(scene, Scene):
             part = labels_of(
@@ -119,25 +118,32 @@ def map_basins(
                 method=method,
                 settle_radius=settle_radius,
                 threads=threads,
-                progress=progress,
+                progress=tell,
             )
         else:
             part = system_labels_of(
-                scene, starts, t_end, dt=dt, method=method, threads=threads, progress=progress
+                scene, starts, t_end, dt=dt, method=method, threads=threads, progress=tell
             )
         return collected.put(points, part)
 
     if refine is None:
         source = np.arange(size)
-        compute(source)
+        compute(source, progress)
     else:
         refine = checks.whole_number("refine", refine, least=2, most=1 << 20)
         if refine & (refine - 1):
             raise InputError(f"refine = {refine}: must be a power of two")
-        source = refine_grid(shape, refine, compute)
+        levels = LevelProgress(shape, refine, progress)
+
+        def level(points: NDArray[np.intp], stride: int) -> NDArray[np.int64]:
+            before = collected.steps
+            labels = compute(points, None)
+            levels.computed(collected.steps - before, stride)
+            return labels
+
+        source = refine_grid(shape, refine, level)
+        levels.finish()
     computed = source == np.arange(size)
-    if progress is not None and not computed.all():
-        progress(int(np.count_nonzero(~computed)))
     settle = collected.settle if settle_radius is not None else None
     return BasinMap(
         axes=values,
@@ -177,14 +183,15 @@ class _Collected:
         self.steps = 0
 
     def put(self, points: NDArray[np.intp], part: Labels) -> NDArray[np.int64]:
-        """Fill some points; one integer for each that tells labels and statuses apart."""
+        """Fill some points; one integer for each that tells labels apart, negative without a label."""
         self.tree, self.steps = part.tree, self.steps + part.steps
         self.well[points], self.turns[points] = part.well, part.turns
         self.time[points], self.status[points] = part.time, part.status
         if part.settle_time is not None:
             self.settle[points] = part.settle_time
         turns = part.turns.astype(np.int64) + (1 << 20)
-        return ((part.status.astype(np.int64) << 8) + part.well << 44) + (turns[:, 0] << 22) + turns[:, 1]
+        number = (part.well.astype(np.int64) << 44) + (turns[:, 0] << 22) + turns[:, 1]
+        return np.where(part.well < 0, -1, number)
 
 
 def _checked_axes(axes: Mapping[str, ArrayLike], names: tuple[str, ...], least: int) -> dict[str, Floats]:

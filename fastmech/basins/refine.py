@@ -1,32 +1,36 @@
 """Grids computed near boundaries only: from coarse to fine, following every boundary that has been seen.
 
-At each level, grid points a stride apart bound blocks. A block whose corners differ, and every block beside
-one, is marked; all corners of marked blocks are computed, which may mark more, until nothing is new. Marked
-blocks are divided at the next level; any other block takes the label of its corners. So a boundary that is
-seen anywhere is followed to its end. What no corner of the first level sees is missed: an island or a tongue
-thinner than the first stride that does not touch a boundary that has been seen. The result is no proof.
+At each level, grid points a stride apart bound blocks. A block whose corners differ, or one of which has no
+label (which tells nothing of its surroundings), and every block beside such a one, is marked; all corners of
+marked blocks are computed, which may mark more, until nothing is new. Marked blocks are divided at the next
+level; any other block takes the label of its corners. So a boundary that is seen anywhere is followed to its
+end. What no corner of the first level sees is missed: an island or a tongue thinner than the first stride
+that does not touch a boundary that has been seen. The result is no proof.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from fastmech.ensembles.run import Progress
+
 Indices = NDArray[np.intp]
 
 
 def refine_grid(
-    shape: tuple[int, ...], stride: int, compute: Callable[[Indices], NDArray[np.int64]]
+    shape: tuple[int, ...], stride: int, compute: Callable[[Indices, int], NDArray[np.int64]]
 ) -> Indices:
     """Compute what is needed of a grid.
 
     Args:
         shape: points along each axis.
         stride: points between neighbours at the first level, a power of two.
-        compute: gives labels of points by their flat indices.
+        compute: gives labels of points by their flat indices and their level's stride; negative: no label.
 
     Returns:
         for every point the flat index of the computed point whose label it has, its own where computed.
@@ -42,7 +46,7 @@ def refine_grid(
         while True:
             todo = todo.ravel()[~computed[todo.ravel()]]
             if todo.size:
-                labels[todo] = compute(todo)
+                labels[todo] = compute(todo, stride)
                 computed[todo], source[todo] = True, todo
             marked = _marked(labels[nodes])
             corners = _corners(marked, nodes.shape)
@@ -67,8 +71,45 @@ def refine_grid(
         stride //= 2
 
 
+#: How much longer a point takes at a level than at the one before.
+LONGER = 1.25
+
+
+class LevelProgress:
+    """How much of a refined grid's work is done, told as so many of all points.
+
+    What is computed follows boundaries, which have one dimension less than the grid: a level has about
+    2^(d - 1) times as many points as the one before, each of which takes somewhat longer, being nearer to a
+    boundary. Nothing is told of the first level alone, which has seen no boundary yet.
+    """
+
+    def __init__(self, shape: tuple[int, ...], stride: int, progress: Progress | None) -> None:
+        self.size, self.first, self.progress = math.prod(shape), stride, progress
+        self.growth = LONGER * 2.0 ** (sum(n > 1 for n in shape) - 1)
+        self.done, self.told, self.level, self.stride = 0, 0, 0, stride
+
+    def computed(self, steps: int, stride: int) -> None:
+        """Count integration steps of the level with this stride."""
+        if stride != self.stride:
+            self.level, self.stride = 0, stride
+        self.level, self.done = self.level + steps, self.done + steps
+        if stride != self.first:
+            levels = stride.bit_length() - 1  # still to come
+            ahead = self.level * sum(self.growth**k for k in range(1, levels + 1))
+            self._tell(int(self.size * self.done / (self.done + ahead)))
+
+    def finish(self) -> None:
+        """All is done."""
+        self._tell(self.size)
+
+    def _tell(self, points: int) -> None:
+        if self.progress is not None and points > self.told:
+            self.progress(points - self.told)
+            self.told = points
+
+
 def _marked(corner: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Blocks whose corners differ and all blocks beside one; ``corner`` are the labels of the nodes."""
+    """Blocks whose corners differ or lack a label, and all beside one; ``corner``: labels of the nodes."""
     differs = np.zeros(tuple(max(n - 1, 1) for n in corner.shape), dtype=np.bool_)
     for axis in range(corner.ndim):
         if corner.shape[axis] > 1:
@@ -78,6 +119,9 @@ def _marked(corner: NDArray[np.int64]) -> NDArray[np.bool_]:
                     low = step.take(range(step.shape[other] - 1), axis=other)
                     step = low | step.take(range(1, step.shape[other]), axis=other)
             differs |= step
+    for offset in np.ndindex(*(min(2, n) for n in corner.shape)):
+        nodes = tuple(slice(o, o + n) for o, n in zip(offset, differs.shape, strict=True))
+        differs |= corner[nodes] < 0
     return np.asarray(ndimage.binary_dilation(differs, np.ones((3,) * corner.ndim)))
 
 

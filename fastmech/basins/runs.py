@@ -26,6 +26,9 @@ LATE = (32, 8)
 #: Lanes a block where calls are short, and where they are long.
 BLOCK, LATE_BLOCK = 1024, 256
 
+#: Lanes up to which a second thread takes longer to start than it saves.
+ONE_THREAD = 128
+
 
 @dataclass
 class Paths:
@@ -103,7 +106,7 @@ def follow(
             interval / substeps,
             method,
             certificate.observation(observer, stop_rounds * interval, call_rounds * substeps),
-            threads=threads,
+            threads=1 if running.size <= ONE_THREAD else threads,
             block_lanes=LATE_BLOCK if until == rounds else BLOCK,
         )
         code = run.records[STOP_CODE].astype(np.int8)

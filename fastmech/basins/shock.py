@@ -13,10 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastmech.basins.measures.labels import Floats, Integers, LabelOf, ask, check_point
+from fastmech.basins.copies import with_defaults
+from fastmech.basins.measures.labels import Floats, Integers, LabelOf, ask
 from fastmech.basins.measures.norm import norm_on
 from fastmech.ensembles import checks
+from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError
+from fastmech.scene import Scene
 
 #: Radii at which a ray is looked at before its first way out is narrowed down: at first, and once turned.
 LEVELS, TURNED_LEVELS = 24, 8
@@ -43,9 +46,9 @@ class Shock:
 
 
 def minimal_shock(
-    label_of: LabelOf,
-    attractor: ArrayLike,
-    norm: ArrayLike,
+    label_of: LabelOf | Scene,
+    attractor: ArrayLike | Equilibrium,
+    norm: ArrayLike | None = None,
     *,
     most: float,
     coordinates: Sequence[int] | None = None,
@@ -63,10 +66,11 @@ def minimal_shock(
 
     Args:
         label_of: labels (n,) of starts (n, dim), negative: none. A start without a label is not taken to have
-            left the basin; ``undecided_from`` tells of it.
-        attractor: the resting state (dim,); its own label must be known.
-        norm: matrix N (dim, dim): ``|d @ N|`` is the size of a disturbance d;
-            :func:`fastmech.basins.measures.norm.kinetic_norm` for the mechanism.
+            left the basin; ``undecided_from`` tells of it. Of a scene: which copy of which well captures
+            them within 60 s, see :func:`fastmech.basins.copies.copy_labels`.
+        attractor: the resting state (dim,), or a scene's equilibrium; its own label must be known.
+        norm: matrix N (dim, dim): ``|d @ N|`` is the size of a disturbance d. By default, for a scene's
+            equilibrium, the kinetic-energy norm there (:func:`fastmech.basins.measures.norm.kinetic_norm`).
         most: largest size to look at.
         coordinates: states that the shock may change, all by default; (2, 3) is a velocity kick.
         guess: disturbances (n, dim) whose directions are tried too.
@@ -75,7 +79,7 @@ def minimal_shock(
         seed: of NumPy's ``default_rng``.
 
     Raises:
-        InputError: an argument is wrong, or the attractor itself has no label.
+        InputError: an argument is wrong or missing, or the attractor itself has no label.
     """
     search = _Search(label_of, attractor, norm, coordinates, most, tolerance)
     rng = np.random.default_rng(checks.whole_number("seed", seed, least=0))
@@ -103,9 +107,9 @@ def minimal_shock(
 
 
 def brute_force_shock(
-    label_of: LabelOf,
-    attractor: ArrayLike,
-    norm: ArrayLike,
+    label_of: LabelOf | Scene,
+    attractor: ArrayLike | Equilibrium,
+    norm: ArrayLike | None = None,
     *,
     most: float,
     coordinates: Sequence[int] | None = None,
@@ -130,21 +134,20 @@ class _Search:
 
     def __init__(
         self,
-        label_of: LabelOf,
-        attractor: ArrayLike,
-        norm: ArrayLike,
+        label_of: LabelOf | Scene,
+        attractor: ArrayLike | Equilibrium,
+        norm: ArrayLike | None,
         coordinates: Sequence[int] | None,
         most: float,
         tolerance: float,
     ) -> None:
-        self.label_of = label_of
-        self.attractor = check_point("attractor", attractor)
+        self.label_of, self.attractor, norm = with_defaults(label_of, attractor, norm)
         self.dim = self.attractor.size
         self.matrix = norm_on(norm, self.dim, coordinates)
         self.chosen = list(range(self.dim) if coordinates is None else coordinates)
         self.most = checks.number("most", most, "", above=0.0)
         self.tolerance = checks.number("tolerance", tolerance, "", above=0.0)
-        self.label = int(ask(label_of, self.attractor[None])[0])
+        self.label = int(ask(self.label_of, self.attractor[None])[0])
         if self.label < 0:
             raise InputError("attractor: has no label itself; it must be in a basin")
         self.trajectories, self.undecided = 1, np.inf

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.basins.label import SUBSTEPS, Labels
+from fastmech.basins.label import Labels
+from fastmech.basins.ladder import SUBSTEPS
 from fastmech.basins.status import BasinStatus
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate

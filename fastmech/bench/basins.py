@@ -10,6 +10,7 @@ import statistics
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,9 @@ Floats = NDArray[np.float64]
 
 SCENE = Scene(alpha=0.0)
 REST, T_END, REPEATS = 1e-3, 300.0, 3
+
+#: Step that pynamicalsys is given [s].
+PEER_STEP = 0.02
 
 
 @dataclass(frozen=True)
@@ -65,6 +69,8 @@ def run_basins(
     advance(1)
     rows.append(lsoda(starts[:few]))
     advance(1)
+    if find_spec("pynamicalsys") is not None:
+        rows.append(pynamicalsys(starts[:few]))
     out.mkdir(parents=True, exist_ok=True)
     table = out / "basins.md"
     table.write_text(markdown(rows), encoding="utf-8")
@@ -146,6 +152,36 @@ def lsoda(starts: Floats) -> BasinRow:
     )
 
 
+def pynamicalsys(starts: Floats) -> BasinRow:
+    """pynamicalsys' RK4 with a step of 0.02 s, one start after the other, for as long as the slowest takes.
+
+    It cannot stop when a start has come to rest.
+    """
+    from pynamicalsys import ContinuousDynamicalSystem
+
+    labels = labels_of(SCENE, starts, T_END, settle_radius=REST)
+    assert labels.settle_time is not None
+    t_end, p = float(np.nanmax(labels.settle_time)), np.array(reduce(SCENE))
+    system = ContinuousDynamicalSystem(
+        equations_of_motion=scalar_rhs, system_dimension=4, parameters=p, number_of_parameters=p.size
+    )
+    system.integrator("rk4", time_step=PEER_STEP)
+    system.evolve_system(starts[0], PEER_STEP)
+    began = time.perf_counter()
+    ends = np.array([system.evolve_system(start, t_end) for start in starts])
+    seconds = time.perf_counter() - began
+    well = find_equilibria(SCENE)[0]
+    turns = np.round((ends[:, :2] - [well.phi, well.theta]) / (2.0 * np.pi))
+    return BasinRow(
+        f"pynamicalsys RK4 to {t_end:.0f} s, dt = {PEER_STEP:g} s",
+        1,
+        len(starts),
+        len(starts) / seconds,
+        t_end / PEER_STEP,
+        _differ(labels, turns),
+    )
+
+
 def _differ(labels: Labels, turns: Floats) -> int:
     return int(np.count_nonzero((labels.turns != turns).any(axis=1)))
 
@@ -166,13 +202,15 @@ def markdown(rows: list[BasinRow]) -> str:
             f"| {row.wrong} |"
         )
     first = rows[0]
+    others = [row for row in rows if row.name.startswith("pynamicalsys")]
+    also = "".join(f" and {first.rate / row.rate:,.0f} times as many as pynamicalsys" for row in others)
     rest = next(row for row in rows if row.name.startswith("until"))
     peer = next(row for row in rows if row.name.startswith("SciPy"))
     lines += [
         "",
         f"The certificate takes 1/{rest.steps / first.steps:.0f} of the steps to rest, both of its "
         f"computations counted, and labels {first.rate / peer.rate:,.0f} times as many starts a second "
-        "on one core as SciPy.",
+        f"on one core as SciPy{also}.",
         "",
     ]
     return "\n".join(lines)

@@ -8,6 +8,7 @@ unwrapped angles (``barriers``). The certificate is about the path as it was com
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -87,6 +88,11 @@ class Certificate:
         fill_cells(params)
         return params
 
+    @cached_property
+    def packed(self) -> Floats:
+        """The observers' vector of the wells' own levels."""
+        return self.params(self.levels)
+
     def observation(
         self, params: Floats, interval: float, call_steps: int = CALL_STEPS_WITH_STOPS
     ) -> Observation:
@@ -104,7 +110,7 @@ class Certificate:
 
     def captured(self, states: Floats) -> Captured:
         """Which states (n, 4) at t = 0 are captured already."""
-        observation = self.observation(self.params(self.levels), 1.0)
+        observation = self.observation(self.packed, 1.0)
         record = np.repeat(observation.record[:, None], len(states), axis=1)
         observation.observe(0.0, np.ascontiguousarray(states.T), observation.params, record)
         return self.decode(record)
@@ -116,8 +122,9 @@ class Certificate:
         return Captured(well, record[[TURNS_PHI, TURNS_THETA]].T.astype(np.int32))
 
 
+@lru_cache(maxsize=16)
 def certificate_of(scene: Scene) -> Certificate:
-    """The capture certificate of a scene.
+    """The capture certificate of a scene, kept for the next starts of the same scene.
 
     Raises:
         InputError: the scene's wells are not certain (see :func:`fastmech.capture.barriers.barrier_tree`).

@@ -50,29 +50,6 @@ class _Time(ProgressColumn):
 LOG_PERIOD = 30.0
 
 
-class LogLine:
-    """One piece of work in a log file: how far it is, at most once every `LOG_PERIOD` seconds.
-
-    Args:
-        name: the piece of work.
-    """
-
-    def __init__(self, name: str) -> None:
-        self._name = name
-        self._begun = self._told = time.monotonic()
-
-    def tell(self, done: int, total: int) -> None:
-        """Say how far it is, if it is time."""
-        now = time.monotonic()
-        if now - self._told < LOG_PERIOD:
-            return
-        self._told = now
-        rate = done / (now - self._begun)
-        left = timedelta(seconds=int((total - done) / rate)) if rate else "unknown"
-        share = done / total if total else 1.0
-        print(f"fastmech: {self._name}: {share:.0%}, {rate:,.3g}/s, {left} left", file=sys.stderr, flush=True)
-
-
 class Stage:
     """One piece of work: how far it is and how long it has taken.
 
@@ -83,25 +60,57 @@ class Stage:
 
     def __init__(self, name: str, total: int) -> None:
         self.name, self.total, self.done = name, total, 0
-        self._begun = self._last = time.monotonic()
+        self._begun = self.last = time.monotonic()
 
-    def count(self, done: int, total: int) -> None:
-        """So many items are finished."""
-        self.done, self.total, self._last = done, total, time.monotonic()
+    def count(self, done: int, total: int, free: float) -> None:
+        """So many items are finished; ``free`` [s]: when other work moved last, which may have come first."""
+        if not self.done:
+            self._begun = max(self._begun, free)
+        self.done, self.total, self.last = done, total, time.monotonic()
+
+    @property
+    def seconds(self) -> float:
+        """From when it could begin to its last finished item."""
+        return self.last - self._begun
+
+    @property
+    def rate(self) -> float:
+        """Items per second."""
+        return self.done / self.seconds if self.seconds else 0.0
 
     def summary(self) -> dict[str, str | int | float]:
-        """The same for other programs; the rate is in items per second."""
-        seconds = self._last - self._begun
-        rate = self.done / seconds if seconds else 0.0
+        """The same for other programs."""
         about: dict[str, str | int | float] = {"name": self.name, "done": self.done, "total": self.total}
-        return about | {"seconds": round(seconds, 3), "rate": round(rate, 3)}
+        return about | {"seconds": round(self.seconds, 3), "rate": round(self.rate, 3)}
+
+
+class LogLine:
+    """One piece of work in a log file: how far it is, at most once every `LOG_PERIOD` seconds.
+
+    Args:
+        stage: the piece of work.
+    """
+
+    def __init__(self, stage: Stage) -> None:
+        self._stage, self._told = stage, stage.last
+
+    def tell(self) -> None:
+        """Say how far it is, if it is time."""
+        now, stage = self._stage.last, self._stage
+        if now - self._told < LOG_PERIOD:
+            return
+        self._told = now
+        left = timedelta(seconds=int((stage.total - stage.done) / stage.rate)) if stage.rate else "unknown"
+        share = stage.done / stage.total if stage.total else 1.0
+        line = f"fastmech: {stage.name}: {share:.0%}, {stage.rate:,.3g}/s, {left} left"
+        print(line, file=sys.stderr, flush=True)
 
 
 class ProgressBars:
     """Bars with percentage, rate and time left; without a terminal, a line every so often."""
 
     def __init__(self, quiet: bool = False) -> None:
-        self._quiet = quiet
+        self._quiet, self._moved = quiet, 0.0
         self._logs = not quiet and not sys.stderr.isatty()
         self._stages: list[Stage] = []
         self._progress = Progress(
@@ -145,14 +154,16 @@ class ProgressBars:
 
     def _begin(self, name: str, total: int | None) -> Callable[[int, int], None]:
         task = self._progress.add_task(name, total=total)
-        stage, log = Stage(name, total or 0), LogLine(name) if self._logs else None
+        stage = Stage(name, total or 0)
+        log = LogLine(stage) if self._logs else None
         self._stages.append(stage)
 
         def tell(done: int, total: int) -> None:
             self._progress.update(task, completed=done, total=total)
-            stage.count(done, total)
+            stage.count(done, total, self._moved)
+            self._moved = stage.last
             if log is not None:
-                log.tell(done, total)
+                log.tell()
 
         return tell
 

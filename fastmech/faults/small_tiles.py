@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from fastmech.scan_types import basin_tiling, disturbed_tiling, map_tiling
+from fastmech.scan_types import basin_tiling, disturbed_tiling, map_tiling, snapping
 
 #: What decides the size of tiles, and what it is while they are to be small.
 SIZES = (
@@ -13,6 +13,7 @@ SIZES = (
     (basin_tiling, "TILE_POINTS", 20),
     (disturbed_tiling, "EVALUATIONS", 1),
     (disturbed_tiling, "DIRECTIONS", 3),
+    (snapping, "TILE_POINTS", 6),
 )
 
 

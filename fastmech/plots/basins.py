@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.mechanism.lagrange import kinetic_energy, potential_energy
+from fastmech.plots.basin_marks import SYMBOLS, Slice, decisive, mark
+from fastmech.plots.basin_names import basin_name
 from fastmech.plots.labels import flag_codes
 from fastmech.plots.style import FIELD, PALETTE, new_figure, style
 from fastmech.results import Dataset
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-Floats = NDArray[np.float64]
 
 #: Colours of the largest basins, pale enough for black marks on top; all further ones share a grey.
 COLORS = [
@@ -47,18 +46,11 @@ UNLABELLED = {
 #: Starts without label up to which each is marked.
 FEW = 400
 
-#: Points along each side on which energies are evaluated for their contours.
-GRID = 401
-
-MARKERS = {0: ("o", "well"), 1: ("D", "saddle"), 2: ("^", "maximum")}
-SYMBOLS = {"phi": "φ", "theta": "θ", "phi_dot": "φ'", "theta_dot": "θ'"}
-DASHES = ["-", "--", ":"]
-
 
 def draw_basins(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
     """Pictures of a dataset of the scan type ``basins`` about the scene with these parameters."""
     with style():
-        slice_ = _Slice(dataset, Scene(**scene))
+        slice_ = Slice(dataset, Scene(**scene))
         figures = {"labels": _labels(slice_)}
         for name, title in (
             ("capture_time", "Time until capture is proved"),
@@ -69,48 +61,7 @@ def draw_basins(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figur
         return figures
 
 
-class _Slice:
-    """The first two axes that vary; further ones are held at their middle value."""
-
-    def __init__(self, dataset: Dataset, scene: Scene) -> None:
-        self.dataset, self.scene = dataset, scene
-        names = tuple(dataset.attrs["axes"])
-        self.axes = (*[n for n in names if dataset.sizes[n] > 1], *names)[:2]
-        if self.axes[0] == self.axes[1]:
-            self.axes = (self.axes[0], next(n for n in names if n != self.axes[0]))
-        self.index = tuple(slice(None) if n in self.axes else dataset.sizes[n] // 2 for n in names)
-        self.swapped = names.index(self.axes[0]) > names.index(self.axes[1])
-        self.held = {
-            name: float(dataset.attrs[f"fixed_{name}"])
-            for name in SYMBOLS
-            if f"fixed_{name}" in dataset.attrs
-        }
-        self.held |= {
-            n: float(dataset[n].data[i]) for n, i in zip(names, self.index, strict=True) if n not in self.axes
-        }
-
-    def data(self, name: str) -> NDArray[np.generic]:
-        """A variable over the two axes, the first one first."""
-        values = np.asarray(self.dataset[name].data[self.index])
-        return values.T if self.swapped else values
-
-    def axis(self, number: int) -> Floats:
-        """Values along one of the two axes."""
-        return np.asarray(self.dataset[self.axes[number]].data, dtype=np.float64)
-
-    @property
-    def energy(self) -> tuple[Floats, Floats, Floats]:
-        """Values along both axes and T + U over them [J], U with the force that the wells hold for."""
-        x, y = (np.linspace(self.axis(k)[0], self.axis(k)[-1], GRID) for k in (0, 1))
-        grids = dict(zip(self.axes, np.meshgrid(x, y, indexing="ij"), strict=True))
-        states = np.stack(
-            [grids[n] if n in grids else np.full((GRID, GRID), self.held[n]) for n in SYMBOLS], axis=-1
-        )
-        force = float(self.dataset["force"].data)
-        return x, y, kinetic_energy(self.scene, states) + potential_energy(self.scene, states[..., :2], force)
-
-
-def _labels(view: _Slice) -> Figure:
+def _labels(view: Slice) -> Figure:
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
@@ -144,7 +95,7 @@ def _labels(view: _Slice) -> Figure:
                 axes.plot(x[where], y[where], marker, color="black", ms=5, ls="none", zorder=4)
             text = f"{meaning}: {np.count_nonzero(where)} ({_share(where)})"
             handles.append(
-                _mark(marker, text) if few else Patch(facecolor=color, edgecolor="black", label=text)
+                mark(marker, text) if few else Patch(facecolor=color, edgecolor="black", label=text)
             )
     axes.pcolormesh(
         view.axis(0),
@@ -156,91 +107,24 @@ def _labels(view: _Slice) -> Figure:
         shading="nearest",
         rasterized=True,
     )
-    handles += _decisive(axes, view)
+    handles += decisive(axes, view)
     figure.legend(handles=handles, loc="outside lower center", ncols=2)
     _describe(axes, view, "Where starts come to rest")
     return figure
 
 
-def _name(view: _Slice, basin: int) -> str:
+def _name(view: Slice, basin: int) -> str:
     """A basin's well and turns in words."""
     data = view.dataset
-    well = int(data["basin_well"].data[basin])
     turns = [int(data[f"basin_turns_{angle}"].data[basin]) for angle in ("phi", "theta")]
-    wells = np.flatnonzero(data["equilibrium_morse_index"].data == 0)
-    text = f"well {int(np.flatnonzero(wells == well)[0]) + 1}" if wells.size > 1 else "the well"
-    made = [f"{t:+d} {symbol}" for t, symbol in zip(turns, ("φ", "θ"), strict=True) if t]
-    return f"{text}, {', '.join(made)} turn{'s' * (len(made) > 1 or abs(sum(turns)) > 1)}" if made else text
+    return basin_name(data, int(data["basin_well"].data[basin]), (turns[0], turns[1]))
 
 
 def _share(where: NDArray[np.bool_]) -> str:
     return f"{100.0 * np.mean(where):.3g} %"
 
 
-def _mark(marker: str, text: str) -> Artist:
-    from matplotlib.lines import Line2D
-
-    return Line2D([], [], marker=marker, color="black", mfc="white", ms=8, ls="none", label=text)
-
-
-def _decisive(axes: Axes, view: _Slice) -> list[Artist]:
-    """Equilibria in the slice, and where the energy is that of each well's barrier."""
-    from matplotlib.lines import Line2D
-
-    handles: list[Artist] = []
-    data = view.dataset
-    x, y, energy = view.energy
-    wells = np.flatnonzero(data["equilibrium_morse_index"].data == 0)
-    barriers = data["barrier"].data[wells]
-    for number, level in enumerate(np.unique(barriers)):
-        if energy.min() < level < energy.max():
-            look = DASHES[number % len(DASHES)]
-            axes.contour(x, y, energy.T, levels=[level], colors="black", linewidths=1.6, linestyles=look)
-            which = " and ".join(str(i + 1) for i in np.flatnonzero(barriers == level))
-            of = f" of well{'s' * (' ' in which)} {which}" if wells.size > 1 else ""
-            handles.append(
-                Line2D([], [], color="black", lw=1.6, ls=look, label=f"barrier energy{of}, {level:.4g} J")
-            )
-    for index, (marker, name) in MARKERS.items():
-        places = _places(view, index)
-        if len(places):
-            axes.plot(*places.T, marker, color="white", mec="black", mew=1.4, ms=8, ls="none", zorder=5)
-            handles.append(_mark(marker, name))
-    if wells.size > 1:
-        for number, well in enumerate(wells):
-            for place in _places(view, 0, int(well)):
-                axes.annotate(
-                    str(number + 1), place, xytext=(6, 5), textcoords="offset points", weight="bold", zorder=6
-                )
-    return handles
-
-
-def _places(view: _Slice, index: int, only: int | None = None) -> Floats:
-    """Copies of equilibria of a Morse index inside the picture, shape (n, 2), if the slice holds them."""
-    data, found = view.dataset, []
-    reach = [(view.axis(k)[0], view.axis(k)[-1]) for k in (0, 1)]
-    for i in np.flatnonzero(data["equilibrium_morse_index"].data == index):
-        if only is not None and i != only:
-            continue
-        place = {"phi": data["equilibrium_phi"].data[i], "theta": data["equilibrium_theta"].data[i]}
-        away = [
-            (held - place.get(n, 0.0) + np.pi) % (2.0 * np.pi) - np.pi if n in place else held
-            for n, held in view.held.items()
-        ]
-        if np.abs(away).max(initial=0.0) > 1e-6:
-            continue
-        copies = []
-        for name, (low, high) in zip(view.axes, reach, strict=True):
-            at = place.get(name, 0.0)
-            turns = np.arange(
-                np.ceil((low - at) / (2.0 * np.pi)), np.floor((high - at) / (2.0 * np.pi)) + 1.0
-            )
-            copies.append(at + 2.0 * np.pi * turns if name in place else np.array([at] * (low <= at <= high)))
-        found += [(a, b) for a in copies[0] for b in copies[1]]
-    return np.array(found).reshape(-1, 2)
-
-
-def _times(view: _Slice, name: str, title: str) -> Figure:
+def _times(view: Slice, name: str, title: str) -> Figure:
     from matplotlib.colors import LogNorm, Normalize
     from matplotlib.patches import Patch
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
@@ -267,7 +151,7 @@ def _times(view: _Slice, name: str, title: str) -> Figure:
         bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         bar.ax.yaxis.set_minor_formatter(NullFormatter())
-    handles = _decisive(axes, view)
+    handles = decisive(axes, view)
     if known.size < times.size:
         handles.insert(0, Patch(facecolor="#d9d9d9", label="no time: not captured, or not computed"))
     figure.legend(handles=handles, loc="outside lower center", ncols=2)
@@ -277,7 +161,7 @@ def _times(view: _Slice, name: str, title: str) -> Figure:
     return figure
 
 
-def _describe(axes: Axes, view: _Slice, title: str) -> None:
+def _describe(axes: Axes, view: Slice, title: str) -> None:
     """Labels with units, the scene's decisive parameters, and what is held."""
     scene = view.scene
     force = f"F0 = {scene.F0:g} N" + (f" exp(-{scene.alpha:g} t)" if scene.F0 and scene.alpha else "")
@@ -295,5 +179,5 @@ def _describe(axes: Axes, view: _Slice, title: str) -> None:
     axes.grid(visible=False)
 
 
-def _held(view: _Slice) -> str:
+def _held(view: Slice) -> str:
     return "starts with " + ", ".join(f"{SYMBOLS[n]} = {v:.4g}" for n, v in view.held.items())

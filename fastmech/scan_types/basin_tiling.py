@@ -1,4 +1,4 @@
-"""A basin map in tiles: planes of its first axis, or the whole of it where it is refined."""
+"""A basin map in tiles: planes of its first axis from all over, or the whole of it where it is refined."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class _Request(Protocol):
 
 
 class BasinTiling(Tiling):
-    """Every tile holds some planes of the first axis.
+    """Every tile holds some planes of the first axis, each so many apart.
 
     Args:
         request: how to compute.
@@ -58,8 +58,9 @@ class BasinTiling(Tiling):
         length = len(axes[self.first])
         points = int(TILE_POINTS * min(1.0, USUAL_END / request.t_end))
         planes = max(1, points // math.prod(self.others)) if request.refine is None else length
-        self.parts = [slice(k, min(k + planes, length)) for k in range(0, length, planes)]
-        self.count = len(self.parts)
+        self.count = -(-length // planes)
+        # Planes from all over: tiles take about as long as each other, so that progress tells the time left.
+        self.parts = [slice(k, length, self.count) for k in range(self.count)]
 
     def items(self, index: int) -> int:
         """Starts."""
@@ -97,7 +98,7 @@ class BasinTiling(Tiling):
             tree=certificate_of(self.scene).tree,
             t_end=self.request.t_end,
             steps=sum(int(part.attrs["steps"]) for part in tiles),
-            **{name: _joined(tiles, name) for name in _ARRAYS},
+            **{name: self._joined(tiles, name) for name in _ARRAYS},
         )
         attrs: dict[str, Any] = {
             "axes": tuple(self.axes),
@@ -124,7 +125,18 @@ class BasinTiling(Tiling):
 
     def _grid(self, index: int) -> tuple[int, ...]:
         part = self.parts[index]
-        return (part.stop - part.start, *self.others)
+        return (len(range(part.start, part.stop, part.step)), *self.others)
+
+    def _joined(self, tiles: list[Dataset], name: str) -> Any:
+        """An array of all tiles, every plane in its place; None where they have none."""
+        if name not in tiles[0]:
+            return None
+        first = tiles[0][name].data
+        length = len(self.axes[self.first])
+        array = np.empty((length, *first.shape[1:]), np.bool_ if name == "computed" else first.dtype)
+        for part, tile in zip(self.parts, tiles, strict=True):
+            array[part] = tile[name].data
+        return array
 
     def _tile(self, arrays: dict[str, NDArray[Any] | None], steps: int) -> Dataset:
         dims = (*self.axes, "angle")
@@ -132,11 +144,3 @@ class BasinTiling(Tiling):
         return Dataset(
             {name: Variable(dims[: array.ndim], array) for name, array in there.items()}, {"steps": steps}
         )
-
-
-def _joined(tiles: list[Dataset], name: str) -> Any:
-    """An array of all tiles one after the other; None where they have none."""
-    if name not in tiles[0]:
-        return None
-    array = np.concatenate([part[name].data for part in tiles])
-    return array.astype(np.bool_) if name == "computed" else array

@@ -7,6 +7,7 @@ import pytest
 from own_ends import ends
 
 import fastmech as fm
+from fastmech.basins.copies import copy_of_label
 from fastmech.basins.edge import saddle_at, track_edge
 from fastmech.basins.measures.norm import kinetic_norm
 
@@ -27,7 +28,7 @@ def ring(t, x, y):
 
 def test_the_edge_of_two_wells_is_the_saddle_between() -> None:
     track = track_edge(
-        fm.System(two_wells, ["x", "y"], {}), lambda y: (y[:, 0] > 0.0).astype(int), [-0.7, -1.0], [1.6, 0.3],
+        fm.System(two_wells, ["x", "y"], {}), [-0.7, -1.0], [1.6, 0.3], lambda y: (y[:, 0] > 0.0).astype(int),
         np.eye(2), t_end=60.0, tolerance=1e-4,
     )  # fmt: skip
     assert track.settled
@@ -41,7 +42,7 @@ def test_the_edge_of_two_wells_is_the_saddle_between() -> None:
 
 def test_an_orbit_on_the_edge_never_settles() -> None:
     track = track_edge(
-        fm.System(ring, ["x", "y"], {}), lambda y: (np.hypot(*y.T) > 1.0).astype(int), [0.1, 0.0], [1.9, 0.0],
+        fm.System(ring, ["x", "y"], {}), [0.1, 0.0], [1.9, 0.0], lambda y: (np.hypot(*y.T) > 1.0).astype(int),
         np.eye(2), t_end=30.0,
     )  # fmt: skip
     assert not track.settled
@@ -57,7 +58,7 @@ def test_the_bistable_mechanism_s_edge_lands_on_a_saddle(from_well: int, energy:
     # From the one well straight to the other; from the other one to the first's copy a turn of phi further.
     outside = places[1 - from_well] + (0.0 if from_well == 0 else np.array([-2.0 * np.pi, 0.0, 0.0, 0.0]))
     track = track_edge(
-        BISTABLE, lambda y: ends(BISTABLE, y, 60.0)[0], inside, outside, kinetic_norm(BISTABLE, wells[0]),
+        BISTABLE, inside, outside, lambda y: ends(BISTABLE, y, 60.0)[0], kinetic_norm(BISTABLE, wells[0]),
         t_end=400.0, dt=0.05,
     )  # fmt: skip
     assert track.settled
@@ -65,6 +66,22 @@ def test_the_bistable_mechanism_s_edge_lands_on_a_saddle(from_well: int, energy:
     assert saddle.morse_index == 1
     assert away < 1e-3
     assert saddle.energy == pytest.approx(energy, abs=1e-5)
+
+
+def test_the_default_labels_and_norm_lead_to_the_same_saddle() -> None:
+    """Of two copies of one well: between them is the saddle that the barrier tree names."""
+    scene = fm.Scene(alpha=0.0)
+    tree = fm.barrier_tree(scene)
+    well = tree.equilibria[0]
+    rest = np.array([well.phi, well.theta, 0.0, 0.0])
+    track = track_edge(scene, rest, rest + np.array([0.0, 2.0 * np.pi, 0.0, 0.0]), t_end=60.0, dt=0.05)
+    assert track.settled
+    assert [copy_of_label(label) for label in track.labels] == [(0, (0, 0)), (0, (0, 1))]
+    saddle, away = saddle_at(scene, track.state)
+    assert away < 1e-3
+    assert saddle.energy == pytest.approx(tree.barrier[0], abs=1e-9)
+    with pytest.raises(fm.InputError, match=r"^label_of, norm: missing; only a scene has them"):
+        track_edge(fm.System(two_wells, ["x", "y"], {}), [-1.0, 0.0], [1.0, 0.0], t_end=1.0)
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,11 @@
 from __future__ import annotations
 
-from functools import cache, partial
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from own_ends import depths, ends
+from own_ends import depths
 
 import fastmech as fm
 from fastmech.basins.erosion import erosion
@@ -44,7 +44,7 @@ def balls(scene: fm.Scene, y: np.ndarray) -> Ends:
 
 def test_measures_of_known_basins() -> None:
     """Each well's own copy has a ball as its basin: all radii are the ball's."""
-    profile = erosion(BISTABLE, "F0", [85.3], balls, GRID, most_shock=1.0, n=4000, directions=16)
+    profile = erosion(BISTABLE, "F0", [85.3], GRID, labels_of=balls, most_shock=1.0, n=4000, directions=16)
     scene = BISTABLE.replace(F0=85.3)
     wells = [e for e in fm.find_equilibria(scene) if e.kind == "minimum"]
     np.testing.assert_allclose(profile.shock, RADIUS, rtol=1e-3)
@@ -68,7 +68,7 @@ def test_wells_keep_their_identity_where_their_order_changes() -> None:
     """At F0 = 0 the two wells are mirror images: which is the deeper one changes there."""
     values = np.linspace(-40.0, 40.0, 5)
     small = {name: line[::10] for name, line in GRID.items()}
-    profile = erosion(BISTABLE, "F0", values, balls, small, most_shock=1.0, n=500, directions=4)
+    profile = erosion(BISTABLE, "F0", values, small, labels_of=balls, most_shock=1.0, n=500, directions=4)
     deepest = [fm.find_equilibria(BISTABLE.replace(F0=float(v)))[0].phi for v in values]
     assert deepest[0] > 2.0
     assert deepest[-1] < 1.0
@@ -82,7 +82,7 @@ def test_wells_keep_their_identity_where_their_order_changes() -> None:
 
 def test_a_slice_of_rates_goes_through_the_well() -> None:
     rates = {"theta_dot": np.linspace(-4, 4, 41), "phi_dot": np.linspace(-4, 4, 41)}
-    profile = erosion(BISTABLE, "c1", [290.0], balls, rates, most_shock=1.0, n=200, directions=4)
+    profile = erosion(BISTABLE, "c1", [290.0], rates, labels_of=balls, most_shock=1.0, n=200, directions=4)
     scene = BISTABLE.replace(c1=290.0)
     e = fm.find_equilibria(scene)[0]
     step = np.abs(np.array([0.2, 0.2]) @ norm_on(kinetic_norm(scene, e), 4, (3, 2))).sum()
@@ -92,13 +92,9 @@ def test_a_slice_of_rates_goes_through_the_well() -> None:
 
 def test_a_well_erodes_towards_its_fold() -> None:
     """The shallow well vanishes at c2 = 98.59 N/m: shock and stability fall, NaN behind it."""
-
-    def real(scene: fm.Scene, y: np.ndarray) -> Ends:
-        return Ends(*ends(scene, y, 10.0)[:2])
-
     scene, values = BISTABLE.replace(F0=85.3), [95.0, 98.0, 100.0]
     axes = {"phi": np.linspace(-3.1, -2.2, 7), "theta": np.linspace(-2.1, -1.3, 7)}
-    profile = erosion(scene, "c2", values, real, axes, most_shock=0.3, n=100, directions=4)
+    profile = erosion(scene, "c2", values, axes, most_shock=0.3, t_end=10.0, n=100, directions=4)
     shallow = int(np.flatnonzero(np.isnan(profile.phi[-1]))[0])
     deep = 1 - shallow
     assert not np.isnan(profile.phi[:, deep]).any()
@@ -123,12 +119,13 @@ def test_a_well_erodes_towards_its_fold() -> None:
         ({"axes": {"ph": [0.0, 1.0]}}, "axes.ph: unknown name; did you mean 'phi'?"),
         ({"axes": {}}, "axes: must name at least one state"),
         ({"n": 0}, "n = 0: must be an integer not less than 1"),
+        ({"scene": BISTABLE.replace(beta=0.0)}, "scene.beta = 0: must be greater than 0"),
         ({"parameter": "F1"}, "axes.F1: unknown parameter"),
     ],
 )
 def test_wrong_arguments_are_refused(changes: dict[str, Any], message: str) -> None:
     arguments: dict[str, Any] = {
-        "scene": BISTABLE, "parameter": "F0", "values": [1.0, 2.0], "labels_of": partial(balls), "axes": GRID,
+        "scene": BISTABLE, "parameter": "F0", "values": [1.0, 2.0], "labels_of": balls, "axes": GRID,
         "most_shock": 1.0,
     }  # fmt: skip
     with pytest.raises(fm.InputError) as refusal:

@@ -1,12 +1,14 @@
 from __future__ import annotations
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from own_ends import depths, ends
 
 import fastmech as fm
+from fastmech.basins.copies import copy_labels, copy_of_label
 from fastmech.basins.measures.norm import kinetic_norm
 from fastmech.basins.shock import Shock, brute_force_shock, minimal_shock
 from fastmech.mechanism.lagrange import kinetic_energy
@@ -99,6 +101,38 @@ def test_wrong_arguments_are_refused() -> None:
         minimal_shock(lambda y: np.full(len(y), -1), [0.0], [[1.0]], most=1.0)
     with pytest.raises(fm.InputError, match=r"^guess: must be finite and differ from 0"):
         minimal_shock(ellipsoid, PLACE, np.eye(3), most=1.0, coordinates=(0,), guess=[[0.0, 1.0, 0.0]])
+
+
+def test_an_equilibrium_of_a_scene_needs_neither_labels_nor_norm() -> None:
+    """They are those of the copies, in the kinetic-energy norm: the same search, step by step."""
+    scene = fm.Scene(alpha=0.0)
+    well = fm.find_equilibria(scene)[0]
+    place, norm = [well.phi, well.theta, 0.0, 0.0], kinetic_norm(scene, well)
+    few = {"most": 3.0, "coordinates": (2, 3), "directions": 8, "tolerance": 1e-2}
+    found = minimal_shock(scene, well, **few)
+    told = minimal_shock(copy_labels(scene), place, norm, **few)
+    assert (found.size, found.label) == (told.size, told.label)
+    np.testing.assert_array_equal(found.shock, told.shock)
+    index, turns = copy_of_label(found.label)
+    assert index == 0
+    assert turns != (0, 0)
+    end = fm.labels_of(scene, place + found.shock)
+    assert tuple(end.turns[0]) == turns
+    with pytest.raises(fm.InputError, match=r"^norm: missing; only an equilibrium of a scene"):
+        minimal_shock(scene, place, most=1.0)
+
+
+@pytest.mark.nojit
+def test_copies_have_numbers_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    ends = SimpleNamespace(
+        well=np.array([0, 5, -1, 3]), turns=np.array([[0, 0], [-7, 300], [0, 0], [4000, -1]], dtype=np.int32)
+    )
+    monkeypatch.setattr("fastmech.basins.copies.labels_of", lambda *_, **__: ends)
+    numbers = copy_labels(fm.Scene())(np.zeros((4, 4)))
+    assert numbers[2] == -1
+    assert [copy_of_label(int(k)) for k in numbers[[0, 1, 3]]] == [
+        (0, (0, 0)), (5, (-7, 300)), (3, (4000, -1)),
+    ]  # fmt: skip
 
 
 @cache

@@ -7,13 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import fastmech as fm
-from fastmech.basins.snapping import (
-    SnappingMap,
-    Window,
-    critical_forces,
-    impulse_start,
-    map_snapping,
-)
+from fastmech.basins.critical import critical_forces, critical_impulse, impulse_start
+from fastmech.basins.snapping import SnappingMap, Window, map_snapping
+from fastmech.basins.status import BasinStatus
 from fastmech.ensembles.integrate import integrate
 from fastmech.mechanism.lagrange import angular_accelerations, kinetic_energy, metric, potential_energy
 
@@ -44,7 +40,7 @@ def scipy_turns(scene: fm.Scene, start: np.ndarray) -> np.ndarray:
 
 def test_table_1_leaves_where_it_is_known_to() -> None:
     snapping = map_snapping(fm.Scene(), FORCES, [0.05, 0.7, 5.0])
-    assert snapping.undecided == 0
+    assert snapping.counts["captured"] == 27
     np.testing.assert_array_equal(snapping.left, [[False] * 9, [False] * 9, LEAVES])
     np.testing.assert_array_equal(snapping.smallest, [np.nan, np.nan, 1550.0])
     windows = snapping.windows(2)
@@ -114,7 +110,7 @@ def test_windows_are_runs_of_equal_ends() -> None:
     turns[0, 2] = [0, -1]
     snapping = SnappingMap(
         np.arange(1.0, 6.0), np.array([2.0]), fm.find_equilibria(fm.Scene()), 0,
-        np.array([[0, 0, 0, 0, -1]]), turns, np.full((1, 5), 3.0),
+        np.array([[0, 0, 0, 0, -1]]), turns, np.full((1, 5), 3.0), np.array([[0, 0, 0, 0, 1]], dtype=np.int8),
     )  # fmt: skip
     assert snapping.windows(0) == [
         Window(1.0, 2.0, 0, (0, 0), False),
@@ -123,14 +119,57 @@ def test_windows_are_runs_of_equal_ends() -> None:
         Window(5.0, 5.0, -1, (0, 0), False),
     ]
     assert snapping.smallest.tolist() == [3.0]
-    assert snapping.undecided == 1
+    assert snapping.counts["undecided"] == 1
 
 
-def test_what_is_not_at_rest_by_the_end_has_no_label() -> None:
-    snapping = map_snapping(fm.Scene(), [1000.0, 2000.0], [5.0], t_end=1.0)
-    assert snapping.undecided == 2
+def test_what_is_not_captured_by_the_end_has_no_label() -> None:
+    """A force that still pushes with 6 kN may do any work; one of 1 N may not."""
+    snapping = map_snapping(fm.Scene(), [1.0, 6000.0], [0.001], t_end=0.5)
+    assert snapping.status.tolist() == [[BasinStatus.CAPTURED, BasinStatus.UNDECIDED]]
+    assert snapping.label.tolist() == [[0, -1]]
     assert not snapping.left.any()
-    assert np.isnan(snapping.time).all()
+    assert snapping.time.tolist()[0] == [0.5, pytest.approx(np.nan, nan_ok=True)]
+
+
+def test_labels_are_those_of_a_map_s_starts() -> None:
+    """The same motions by the observer that looks at every step and stops as soon as it can."""
+    forces, rates = [1545.0, 2500.0, 4300.0], [0.7, 5.0]
+    snapping = map_snapping(fm.Scene(), forces, rates)
+    rest = snapping.equilibria[0]
+    for k, rate in enumerate(rates):
+        for j, force in enumerate(forces):
+            own = fm.labels_of(fm.Scene(F0=force, alpha=rate), [rest.phi, rest.theta, 0.0, 0.0])
+            assert own.well[0] == snapping.label[k, j]
+            np.testing.assert_array_equal(own.turns[0], snapping.turns[k, j])
+            assert own.time[0] <= snapping.time[k, j]  # it looks every second only
+
+
+def test_a_force_that_drives_onto_a_saddle_is_not_given_a_label() -> None:
+    """Between neighbouring floating-point forces on both sides of the critical one no step can decide."""
+    low, high = 1545.0, 1547.0
+    while np.nextafter(low, high) < high:
+        middle = 0.5 * (low + high)
+        if not low < middle < high:
+            break
+        at = map_snapping(fm.Scene(), [middle], [5.0], t_end=30.0)
+        if at.label[0, 0] < 0:
+            assert BasinStatus(at.status[0, 0]) in (BasinStatus.AT_SADDLE, BasinStatus.UNDECIDED)
+            return
+        low, high = (low, middle) if at.left[0, 0] else (middle, high)
+    pytest.fail("every force has a label")
+
+
+def test_the_critical_impulse_is_that_of_brute_force() -> None:
+    """The first of evenly spaced impulses that leaves, by SciPy."""
+    scene = fm.Scene(F0=0.0, alpha=0.0)
+    found = critical_impulse(scene, 400.0, n=40, tolerance=0.5)
+    rest = fm.find_equilibria(scene)[0]
+    for impulse, leaves in [(found - 0.5, False), (found, True)]:
+        assert scipy_turns(scene, impulse_start(scene, rest, impulse)).any() == leaves
+    assert np.isnan(critical_impulse(scene, 0.9 * found, n=40))
+    assert critical_impulse(scene, -400.0, n=40) < 0.0
+    with pytest.raises(fm.InputError, match=r"^most = 0\.0: must not be 0 N s"):
+        critical_impulse(scene, 0.0)
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,11 @@ FIELDS = {
     "disturbed_motion": "t_end = 0.1\noutputs = 11",
     "equilibria": "",
     "equilibrium_map": "axes.c2 = { start = 1.0, stop = 900.0, num = 59 }",
+    "erosion": "along.F0 = { start = 100.0, stop = 200.0, num = 2 }\nt_end = 5.0\nstarts = 20\ndirections = 4"
+    "\naxes.phi = { start = -3.0, stop = 3.0, num = 4 }\naxes.theta = { start = -3.0, stop = 3.0, num = 4 }",
     "motion": "t_end = 1.0\noutputs = 11",
+    "snapping": "F0 = { start = 200.0, stop = 2000.0, num = 6 }"
+    "\nalpha = { start = 2.0, stop = 5.0, num = 3 }",
     "snap": "scene = { F0 = 85.3, c1 = 294.9, c2 = 92.85 }",
 }
 

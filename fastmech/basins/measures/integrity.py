@@ -12,7 +12,7 @@ They use them relative to a reference (the basin without excitation); divide two
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,9 +20,11 @@ from numpy.typing import ArrayLike
 from scipy.spatial import KDTree
 
 from fastmech.basins.measures.labels import Floats, check_axes, check_map, check_point
-from fastmech.basins.measures.norm import norm_on
+from fastmech.basins.measures.norm import kinetic_norm, norm_on, state_index
 from fastmech.ensembles import checks
+from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError
+from fastmech.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,13 @@ class Integrity:
 
 
 def integrity(
-    labels: ArrayLike, axes: Sequence[ArrayLike], label: int, attractor: ArrayLike, norm: ArrayLike
+    labels: ArrayLike,
+    axes: Sequence[ArrayLike] | Mapping[str, ArrayLike],
+    label: int,
+    attractor: ArrayLike | Equilibrium,
+    norm: ArrayLike | None = None,
+    *,
+    scene: Scene | None = None,
 ) -> Integrity:
     """GIM, LIM and IF of the basin ``label`` on a map.
 
@@ -50,17 +58,27 @@ def integrity(
 
     Args:
         labels: on the grid, any number of axes; negative: no label, which does not belong to the basin.
-        axes: coordinates along every axis, rising in equal steps.
+        axes: coordinates along every axis, rising in equal steps; of a scene by the names of its states, as
+            :class:`fastmech.basins.map.BasinMap` has them.
         label: of the basin.
-        attractor: its coordinates on the map's axes (axes,), within the window.
-        norm: matrix N (axes, axes): ``|d @ N|`` is the length of a departure d along the axes. For a slice of
-            the mechanism's state space: ``norm_on(kinetic_norm(scene, equilibrium), 4, coordinates)``.
+        attractor: its coordinates on the map's axes (axes,), within the window; of a scene an equilibrium.
+        norm: matrix N (axes, axes): ``|d @ N|`` is the length of a departure d along the axes. By default,
+            for an equilibrium of ``scene``, the kinetic-energy norm there, on the axes.
+        scene: the mechanism, for the default norm.
 
     Raises:
         InputError: an argument is wrong, or the attractor lies outside the window.
     """
     array = check_map(labels)
-    lines = check_axes(axes, array.shape)
+    names = list(axes) if isinstance(axes, Mapping) else []
+    if isinstance(attractor, Equilibrium):
+        chosen = [state_index(name) for name in names]
+        if norm is None and scene is not None:
+            norm = norm_on(kinetic_norm(scene, attractor), 4, chosen)
+        attractor = np.array([attractor.phi, attractor.theta, 0.0, 0.0])[chosen]
+    if norm is None:
+        raise InputError("norm: missing; by default it is that of an equilibrium and a scene")
+    lines = check_axes(list(axes.values()) if isinstance(axes, Mapping) else axes, array.shape)
     label = checks.whole_number("label", label, least=0)
     place = check_point("attractor", attractor, array.ndim)
     first, last = np.array([line[0] for line in lines]), np.array([line[-1] for line in lines])

@@ -17,7 +17,21 @@ from fastmech.disturbance.size import size_at
 from fastmech.ensembles import checks
 from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError
-from fastmech.scene import Scene
+from fastmech.scene import Scene, nearest
+
+#: States of the mechanism by the names of a map's axes.
+STATE = ("phi", "theta", "phi_dot", "theta_dot")
+
+
+def state_index(name: str) -> int:
+    """Which state of the mechanism an axis of this name is.
+
+    Raises:
+        InputError: it is none.
+    """
+    if name not in STATE:
+        raise InputError(f"axes.{name}: unknown name; {nearest(name, list(STATE))}")
+    return STATE.index(name)
 
 
 def kinetic_norm(scene: Scene, equilibrium: Equilibrium) -> Floats:

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.distance import cdist
 
+import fastmech as fm
 from fastmech.basins.measures.integrity import integrity
+from fastmech.disturbance.size import size_at
 from fastmech.errors import InputError
 
 pytestmark = pytest.mark.nojit
@@ -87,3 +89,21 @@ def test_an_empty_basin_has_no_integrity() -> None:
 def test_an_attractor_outside_the_window_is_refused() -> None:
     with pytest.raises(InputError, match=r"^attractor = \[2\.0, 0\.0\]: must lie within"):
         integrity([[0, 0], [0, 0]], [[0, 1], [0, 1]], 0, [2.0, 0.0], np.eye(2))
+
+
+def test_the_default_metric_is_the_kinetic_norm_at_the_well() -> None:
+    """On axes by their names, in any order; the distances by the norm's own formula."""
+    scene = fm.Scene(alpha=0.0)
+    well = fm.find_equilibria(scene)[0]
+    axes = {"theta_dot": np.linspace(-3.0, 3.0, 11), "phi": np.linspace(1.0, 2.0, 11)}
+    labels = np.zeros((11, 11), dtype=int)
+    labels[6, 6] = 1
+    result = integrity(labels, axes, 0, well, scene=scene)
+    size = size_at(scene, well.phi, well.theta)
+    away = float(size(np.array([axes["phi"][6] - well.phi, 0.0, 0.0, axes["theta_dot"][6]])))
+    assert result.lim == pytest.approx(away, rel=1e-12)
+    assert not result.lim_at_window
+    with pytest.raises(fm.InputError, match=r"^norm: missing; by default it is that of an equilibrium"):
+        integrity(labels, axes, 0, well)
+    with pytest.raises(fm.InputError, match=r"^axes.ph: unknown name; did you mean 'phi'"):
+        integrity(labels, {"phi": [0.0, 1.0], "ph": [0.0, 1.0]}, 0, well, scene=scene)

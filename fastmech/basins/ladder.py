@@ -1,0 +1,129 @@
+"""Computations of the same starts with ever smaller steps, until two in a row tell the same."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.basins.runs import Paths
+from fastmech.basins.status import BasinStatus
+from fastmech.capture.certificate import Certificate
+from fastmech.disturbance.size import size_at
+from fastmech.mechanism.coefficients import Coefficients, reduce
+from fastmech.mechanism.reduced import metric_11, slider_ratio
+
+Floats = NDArray[np.float64]
+Indices: TypeAlias = NDArray[np.intp]
+
+#: Steps a round of one computation after the other, a round being two of the coarsest steps. With the default
+#: method each makes the error some 25, 60 and then 256 times smaller, down to rounding.
+SUBSTEPS = (2, 3, 5, 10, 20, 40)
+
+#: A path that has not been captured is at a saddle when it is so near to it [rad], in its norm.
+AT_SADDLE = 1e-3
+
+#: ``compute(members, substeps)``: one computation of some of the starts.
+Compute: TypeAlias = Callable[[Indices, int], Paths]
+#: ``agree(members, coarse, fine)``: which of them tell the same with both steps.
+Agree: TypeAlias = Callable[[Indices, Paths, Paths], NDArray[np.bool_]]
+#: ``impossible(members, states)``: which have come to states that their motion cannot have.
+Impossible: TypeAlias = Callable[[Indices, Floats], NDArray[np.bool_]]
+
+
+def climb(
+    certificate: Certificate,
+    members: Indices,
+    compute: Compute,
+    agree: Agree,
+    impossible: Impossible,
+    found: Paths,
+    status: NDArray[np.int8],
+) -> None:
+    """Find labels and statuses of some starts, and write them where ``members`` says."""
+    coarse = compute(members, SUBSTEPS[0])
+    for substeps in SUBSTEPS[1:]:
+        fine = compute(members, substeps)
+        settled = agree(members, coarse, fine)
+        done = np.flatnonzero(settled | (substeps == SUBSTEPS[-1]))
+        ends, last = members[done], fine.take(done)
+        found.put(ends, last)
+        status[ends] = _verdicts(certificate, coarse.take(done), last, settled[done])
+        free = np.flatnonzero(last.code == 0)
+        bad = free[impossible(ends[free], last.state[free])]
+        status[ends[bad]] = BasinStatus.STEP_TOO_LARGE
+        status[ends[free[~np.isfinite(last.state[free]).all(axis=1)]]] = BasinStatus.NOT_FINITE
+        rest = np.flatnonzero(~settled)
+        members, coarse = members[rest], fine.take(rest)
+        if not members.size:
+            break
+
+
+def tell_the_same(
+    certificate: Certificate, coarse: Paths, fine: Paths, longest: float, push: Floats | float
+) -> NDArray[np.bool_]:
+    """Which paths are not captured either time, or captured both times beyond their difference.
+
+    Args:
+        certificate: of the scene.
+        coarse, fine: the two computations.
+        longest: by how much the times at which they stop may differ [s].
+        push: decaying force over m2 l that the bounding energies count with, 0 where there is none [1/s^2].
+    """
+    finite = np.asarray(np.isfinite(coarse.state) & np.isfinite(fine.state)).all(axis=1)
+    same = (coarse.code == fine.code) & (coarse.turns == fine.turns).all(axis=1) & finite
+    same &= np.abs(coarse.stop - fine.stop) < longest
+    apart = np.abs(np.where(finite.reshape(-1, 1), coarse.state - fine.state, np.inf))
+    level = np.append(np.inf, certificate.levels)[fine.code]
+    with np.errstate(invalid="ignore"):
+        room = energy_change(reduce(certificate.scene), np.abs(push), fine.state, apart)
+        proved = room < level - fine.energy
+    return np.asarray(same & (proved | (fine.code == 0)))
+
+
+def energy_change(c: Coefficients, push: Floats | float, states: Floats, apart: Floats) -> Floats:
+    """Bound on how much the bounding energy of states (n, 4) changes over the box of half-widths ``apart``.
+
+    Over m2 l^2 [1/s^2]. The change of U is at most its largest slope times the way; T is quadratic in the
+    rates with coefficients whose slopes are at most ``slider max|k k'|`` and 1.
+    """
+    dphi, dtheta, du, dv = apart.T
+    slope = (
+        np.hypot(c.lift, c.force) * dphi + np.hypot(c.gravity, c.force) * dtheta + c.spring * (dphi + dtheta)
+    )
+    slope = slope + push * (dphi + dtheta)
+    angles = np.linspace(-np.pi, np.pi, 721)
+    k, dk = slider_ratio(np.sin(angles), np.cos(angles))
+    a11 = metric_11(c.mass, c.slider, float(np.abs(k).max()))
+    u, v = np.abs(states[:, 2]) + du, np.abs(states[:, 3]) + dv
+    kinetic = (c.slider * float(np.abs(k * dk).max()) * u * u + u * v) * dphi + u * v * dtheta
+    return np.asarray(slope + kinetic + (a11 * u + v) * du + (u + v) * dv)
+
+
+def near_saddle(certificate: Certificate, states: Floats) -> NDArray[np.bool_]:
+    """Which states (n, 4) rest at an unstable equilibrium."""
+    scene, equilibria = certificate.scene, certificate.tree.equilibria
+    held = scene.replace(F0=equilibria.force, alpha=0.0)
+    near = np.zeros(len(states), dtype=np.bool_)
+    for e in equilibria:
+        if e.kind != "minimum":
+            away = states - np.array([e.phi, e.theta, 0.0, 0.0])
+            with np.errstate(invalid="ignore"):
+                away[:, :2] -= 2.0 * np.pi * np.round(away[:, :2] / (2.0 * np.pi))
+                near |= size_at(held, e.phi, e.theta)(away) < AT_SADDLE
+    return near
+
+
+def _verdicts(
+    certificate: Certificate, coarse: Paths, fine: Paths, settled: NDArray[np.bool_]
+) -> NDArray[np.int8]:
+    """Statuses of paths whose computation ends here."""
+    status = np.full(len(settled), BasinStatus.UNDECIDED, dtype=np.int8)
+    status[settled & (fine.code > 0)] = BasinStatus.CAPTURED
+    other = (coarse.code != fine.code) | (coarse.turns != fine.turns).any(axis=1)
+    status[~settled & (coarse.code > 0) & (fine.code > 0) & other] = BasinStatus.AT_SADDLE
+    free = np.flatnonzero(fine.code == 0)
+    status[free[near_saddle(certificate, fine.state[free])]] = BasinStatus.AT_SADDLE
+    return status

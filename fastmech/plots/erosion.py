@@ -1,0 +1,128 @@
+"""Erosion profiles: stability, integrity and smallest shocks of every well over a parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fastmech.plots.style import LINES, new_figure, style
+from fastmech.results import Dataset
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_UNITS = {"phi": "rad", "theta": "rad", "phi_dot": "rad/s", "theta_dot": "rad/s"}
+_SYMBOLS = {"phi": "φ", "theta": "θ", "phi_dot": "φ'", "theta_dot": "θ'"}
+
+
+def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
+    """Picture of a dataset of the scan type ``erosion`` about the scene with these parameters."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    name = str(dataset.attrs["along"])
+    with style():
+        figure = new_figure(8.2, 10.0)
+        panels = figure.subplots(3, 1, sharex=True)
+        handles: list[Artist] = []
+        for well in range(dataset.sizes["well"]):
+            color = LINES[well % len(LINES)]
+            _stability(panels[0], dataset, well, color)
+            _lines(panels[1], dataset, well, color, {"lim": ("-", "o"), "factor": ("--", "s")})
+            _lines(panels[2], dataset, well, color, {"shock": ("-", "o"), "kick": ("--", "s")})
+            handles.append(Line2D([], [], color=color, lw=3.0, label=_name(dataset, well)))
+        _axes(panels, dataset, name)
+        handles += [
+            Patch(facecolor="#bdbdbd", label="95 % Wilson interval (of the stability)"),
+            Line2D([], [], color="black", lw=1.0, ls=":", label="if all undecided starts ended there"),
+            Line2D(
+                [], [], color="black", marker="o", ms=5, label="about the well: LIM; shock of all four states"
+            ),
+            Line2D(
+                [],
+                [],
+                color="black",
+                ls="--",
+                marker="s",
+                ms=5,
+                label="anywhere: IF; kick of the rates alone",
+            ),
+            Line2D(
+                [], [], color="black", marker="o", mfc="white", ms=5, ls="none", label="limited by the window"
+            ),
+            Line2D(
+                [], [], color="black", marker="x", ms=6, ls="none", label="smaller one tried is undecided"
+            ),
+        ]
+        figure.legend(handles=handles, loc="outside lower center", ncols=2)
+        figure.suptitle(_title(dataset, scene, name))
+        return {"profile": figure}
+
+
+def _name(dataset: Dataset, well: int) -> str:
+    """A well's number, and the range over which it exists."""
+    name = str(dataset.attrs["along"])
+    there = np.isfinite(dataset["well_phi"].data[:, well])
+    values = dataset[name].data[there]
+    if not values.size:
+        return f"well {well + 1}: not at these values"
+    return f"well {well + 1}, seen from {values[0]:g} to {values[-1]:g} {dataset[name].units}"
+
+
+def _stability(axes: Axes, dataset: Dataset, well: int, color: str) -> None:
+    x = dataset[str(dataset.attrs["along"])].data
+    share = 100.0 * dataset["well_stability"].data[:, well]
+    axes.fill_between(
+        x,
+        100.0 * dataset["well_lower"].data[:, well],
+        100.0 * dataset["well_upper"].data[:, well],
+        color=color,
+        alpha=0.3,
+        lw=0,
+    )
+    axes.plot(x, share, color=color, marker="o", ms=4)
+    axes.plot(x, share + 100.0 * dataset["well_undecided"].data[:, well], color=color, lw=1.0, ls=":")
+
+
+def _lines(axes: Axes, dataset: Dataset, well: int, color: str, looks: Mapping[str, tuple[str, str]]) -> None:
+    x = dataset[str(dataset.attrs["along"])].data
+    for measure, (dashes, marker) in looks.items():
+        y = dataset[f"well_{measure}"].data[:, well]
+        axes.plot(x, y, color=color, ls=dashes, marker=marker, ms=5)
+        if f"well_{measure}_at_window" in dataset:
+            cut = dataset[f"well_{measure}_at_window"].data[:, well].astype(np.bool_)
+            axes.plot(x[cut], y[cut], marker, color=color, mfc="white", ms=5, ls="none")
+        if f"well_{measure}_undecided" in dataset:
+            first = dataset[f"well_{measure}_undecided"].data[:, well]
+            early = np.isfinite(first) & ~(first >= y)
+            axes.plot(x[early], first[early], "x", color=color, ms=6)
+
+
+def _axes(panels: np.ndarray, dataset: Dataset, name: str) -> None:
+    titles = (
+        ("share of the starts [%]", "Basin stability: random starts in the window"),
+        ("radius [rad]", "Integrity: largest ball in the basin"),
+        ("size [rad]", "Smallest shock that makes it end elsewhere"),
+    )
+    for axes, (label, title) in zip(panels, titles, strict=True):
+        axes.set_ylabel(label)
+        axes.set_title(title)
+        axes.set_ylim(bottom=0.0)
+    panels[0].set_ylim(0.0, 102.0)
+    symbol = {"alpha": "α", "beta": "β"}.get(name, name)
+    panels[-1].set_xlabel(f"{dataset[name].long_name}, {symbol} [{dataset[name].units}]")
+
+
+def _title(dataset: Dataset, scene: Mapping[str, float], name: str) -> str:
+    units = {"F0": "N", "c1": "N/m", "c2": "N/m", "beta": "N s/m"}
+    held = ", ".join(f"{key} = {scene[key]:g} {unit}" for key, unit in units.items() if key != name)
+    spans = []
+    for axis in dataset.attrs["axes"]:
+        low, high = dataset.attrs[f"window_{axis}"]
+        spans.append(f"{_SYMBOLS[axis]} from {low:.3g} to {high:.3g} {_UNITS[axis]}")
+    window = f"window: {', '.join(spans)}; runs to {dataset.attrs['t_end']:g} s"
+    return f"Erosion of the wells along {name}; {held}\n{window}"

@@ -1,0 +1,182 @@
+"""Erosion profiles: stability, integrity and the smallest shock of every well along one parameter.
+
+Layout: arrays over the parameter's values and ``well``, NaN where a well does not exist; ``sheet`` is the
+well's identity in the atlas of these values. Integrity and shocks are lengths in the kinetic-energy norm at
+the well; starts are uniform in the window that ``axes`` span, the other states being the well's own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import AfterValidator, Field
+
+from fastmech.basins.erosion import FLAGS, MEASURES, survey_of, wells_along
+from fastmech.basins.label import require_damper
+from fastmech.basins.measures.norm import STATE
+from fastmech.disturbance.ensemble import require_constant_force
+from fastmech.errors import InputError
+from fastmech.results import Dataset, Variable
+from fastmech.scan_types.equilibrium_map import Axis
+from fastmech.scan_types.request import TiledScan
+from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
+from fastmech.scene import Scene, nearest
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Points of the largest map of a value.
+MOST_POINTS = 1_000_000
+
+_ABOUT = {
+    "phi": ("rad", "angle phi of the well"),
+    "theta": ("rad", "angle theta of the well"),
+    "stability": ("1", "basin stability: share of random starts in the window that end in the well"),
+    "lower": ("1", "lower end of its 95 % Wilson interval"),
+    "upper": ("1", "upper end of its 95 % Wilson interval"),
+    "gim": ("1", "global integrity measure: share of the window that ends there without a turn"),
+    "lim": ("rad", "local integrity measure: largest ball about the well in its basin on the map"),
+    "lim_at_window": ("1", "the window's edge limits the local measure: it is larger"),
+    "factor": ("rad", "integrity factor: largest ball in the basin on the map"),
+    "factor_at_window": ("1", "the window's edge limits the integrity factor: it is larger"),
+    "shock": ("rad", "smallest shock that makes it end elsewhere, NaN: none up to the largest"),
+    "kick": ("rad", "smallest kick of the rates that does, NaN: none up to the largest"),
+    "shock_undecided": ("rad", "smallest shock tried whose end is not known, NaN: none"),
+    "kick_undecided": ("rad", "smallest kick tried whose end is not known, NaN: none"),
+    "undecided": ("1", "share of the random starts whose end is not known"),
+}
+
+
+def _known_states(axes: dict[str, Axis]) -> dict[str, Axis]:
+    for name, axis in axes.items():
+        if name not in STATE:
+            raise ValueError(f"unknown coordinate {name!r}; {nearest(name, list(STATE))}")
+        if axis.num < 2 or axis.stop <= axis.start:
+            raise ValueError(f"axis {name!r} must rise and have at least 2 points")
+    return axes
+
+
+class Erosion(TiledScan):
+    """How much room each well has, along one parameter."""
+
+    kind: ClassVar[str] = "erosion"
+
+    along: Annotated[dict[str, Axis], Field(min_length=1, max_length=1)] = Field(
+        description="the parameter and its values"
+    )
+    axes: Annotated[dict[str, Axis], Field(min_length=1, max_length=4), AfterValidator(_known_states)] = (
+        Field(description="the window and the map in it")
+    )
+    most_shock: Annotated[float, Field(gt=0)] = Field(2.0, description="largest shock to look for [rad]")
+    t_end: Annotated[float, Field(gt=0)] = 60.0
+    starts: Annotated[int, Field(ge=1, le=1_000_000)] = 2048
+    directions: Annotated[int, Field(ge=1, le=100_000)] = 64
+    seed: Annotated[int, Field(ge=0)] = 0
+
+    @property
+    def parameter(self) -> str:
+        """Name of the parameter."""
+        return next(iter(self.along))
+
+    @property
+    def values(self) -> np.ndarray:
+        """Its values."""
+        axis = self.along[self.parameter]
+        return np.linspace(axis.start, axis.stop, axis.num)
+
+    def check(self, scene: Scene) -> None:
+        """The scene needs a constant force and a damper, the parameter must rise to values it accepts."""
+        require_constant_force(scene)
+        require_damper(scene)
+        name, axis = next(iter(self.along.items()))
+        if name not in Scene.model_fields or name == "alpha":
+            allowed = [field for field in Scene.model_fields if field != "alpha"]
+            raise InputError(f"along.{name}: unknown parameter; {nearest(name, allowed)}")
+        if axis.num > 1 and axis.stop <= axis.start:
+            raise InputError(
+                f"along.{name}.stop = {axis.stop:g}: must be greater than start = {axis.start:g}"
+            )
+        for value in (axis.start, axis.stop):
+            require_damper(scene.replace(**{name: value}))
+        total = math.prod(axis.num for axis in self.axes.values())
+        if total > MOST_POINTS:
+            raise InputError(f"axes: ask for {total:.3g} starts, at most {MOST_POINTS:.0e} are allowed")
+
+    def tiling(self, scene: Scene) -> Tiling:
+        """Every value is a tile."""
+        return ErosionTiling(self, scene)
+
+    @staticmethod
+    def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
+        """Stability, integrity and shocks of every well over the parameter."""
+        from fastmech.plots.erosion import draw_erosion
+
+        return draw_erosion(dataset, scene)
+
+
+class ErosionTiling(Tiling):
+    """A tile a value: no value needs another."""
+
+    what = "values of the erosion profile"
+
+    def __init__(self, request: Erosion, scene: Scene) -> None:
+        self.request, self.scene, self.values = request, scene, request.values
+        self.count = self.values.size
+        self.window = {
+            name: np.linspace(axis.start, axis.stop, axis.num) for name, axis in request.axes.items()
+        }
+
+    def items(self, index: int) -> int:
+        """One value."""
+        return 1
+
+    def compute(self, index: int, context: RunContext) -> Dataset:
+        """Measure every well at one value."""
+        name = self.request.parameter
+        survey = survey_of(
+            self.window,
+            most_shock=self.request.most_shock,
+            t_end=self.request.t_end,
+            n=self.request.starts,
+            directions=self.request.directions,
+            seed=self.request.seed,
+            threads=context.threads,
+        )
+        _, places = wells_along(self.scene, name, self.values)
+        value = float(self.values[index])
+        found = survey.of_wells(self.scene.replace(**{name: value}), places[index])
+        return Dataset({key: Variable(("well",), array) for key, array in found.items()})
+
+    def assemble(self, tile: Tiles) -> Dataset:
+        """Join the values."""
+        name = self.request.parameter
+        tiles = [tile(index) for index in range(self.count)]
+        sheets, _ = wells_along(self.scene, name, self.values)
+        unit, about = self.scene.described()[name][1:]
+        variables = {
+            name: Variable((name,), self.values, unit, about),
+            "sheet": Variable(("well",), sheets.astype(np.int32), "1", "identity of the well in the atlas"),
+        }
+        for key in MEASURES:
+            array = np.stack([part[key].data for part in tiles])
+            variables[f"well_{key}"] = Variable(
+                (name, "well"), array.astype(np.bool_) if key in FLAGS else array, *_ABOUT[key]
+            )
+        attrs: dict[str, Any] = {"along": name, "axes": tuple(self.window), "t_end": self.request.t_end}
+        attrs |= {"starts": self.request.starts, "most_shock": self.request.most_shock}
+        for axis, line in self.window.items():
+            attrs[f"window_{axis}"] = np.array([line[0], line[-1]])
+        return Dataset(variables, attrs)
+
+    def missing(self, index: int) -> Dataset:
+        """A value that has not been measured."""
+        wells = len(wells_along(self.scene, self.request.parameter, self.values)[0])
+        return Dataset(
+            {
+                key: Variable(("well",), np.zeros(wells, bool) if key in FLAGS else np.full(wells, np.nan))
+                for key in MEASURES
+            }
+        )

@@ -1,0 +1,234 @@
+"""Dynamic snapping: which suddenly applied, fading force throws the mechanism out of its force-free well.
+
+Layout: ends over ``alpha`` and ``F0``; the smallest force that leaves for each alpha; along ``window`` the
+runs of neighbouring forces that end alike, with the alpha they belong to; what is known about the force-free
+scene's equilibria along ``equilibrium``; and the critical impulse, the limit of F0/alpha as alpha grows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from fastmech.basins.critical import critical_forces, critical_impulse
+from fastmech.basins.label import require_damper
+from fastmech.basins.snapping import SnappingMap, force_free, map_snapping
+from fastmech.basins.status import FAILURES, BasinStatus
+from fastmech.errors import InputError
+from fastmech.results import Dataset, Variable, flags
+from fastmech.scan_types.equilibrium_map import Axis
+from fastmech.scan_types.request import MethodName, TiledScan, failures
+from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
+from fastmech.scene import Scene
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Motions of the largest map.
+MOST_POINTS = 5_000_000
+
+#: The critical impulse is looked for up to so many times the smallest F0/alpha of the largest force.
+IMPULSES = 4.0
+
+#: Motions of a tile, about.
+TILE_POINTS = 1 << 12
+
+
+class Rates(BaseModel):
+    """Values evenly spaced in their logarithm, ends included."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    start: Annotated[float, Field(gt=0)]
+    stop: Annotated[float, Field(gt=0)]
+    num: Annotated[int, Field(ge=1, le=100_000)]
+
+
+class Snapping(TiledScan):
+    """The (F0, alpha) map of dynamic snapping, with the critical curve and its limit."""
+
+    kind: ClassVar[str] = "snapping"
+
+    F0: Axis = Field(description="forces, of one sign [N]")
+    alpha: Rates = Field(description="decay rates, evenly spaced in their logarithm [1/s]")
+    tolerance: Annotated[float, Field(gt=0)] = Field(0.1, description="of the critical forces [N]")
+    t_end: Annotated[float, Field(gt=0)] | None = Field(
+        None, description="end of the runs [s]; by default 200 s after a millionth of the force is left"
+    )
+    method: MethodName = "dop853"
+
+    @property
+    def forces(self) -> np.ndarray:
+        """Values of F0 [N]."""
+        return np.linspace(self.F0.start, self.F0.stop, self.F0.num)
+
+    @property
+    def rates(self) -> np.ndarray:
+        """Values of alpha [1/s]."""
+        return np.geomspace(self.alpha.start, self.alpha.stop, self.alpha.num)
+
+    def check(self, scene: Scene) -> None:
+        """Forces of one sign, rising axes, a damper."""
+        require_damper(scene)
+        for name, axis in (("F0", self.F0), ("alpha", self.alpha)):
+            if axis.num > 1 and axis.stop <= axis.start:
+                raise InputError(f"{name}.stop = {axis.stop:g}: must be greater than start = {axis.start:g}")
+        if self.F0.start * self.F0.stop <= 0.0:
+            raise InputError(f"F0.start = {self.F0.start:g}: must have the sign of stop and not be 0 N")
+        total = self.F0.num * self.alpha.num
+        if total > MOST_POINTS:
+            raise InputError(f"F0, alpha: ask for {total:.3g} motions, at most {MOST_POINTS:.0e} are allowed")
+
+    def tiling(self, scene: Scene) -> Tiling:
+        """Some decay rates a tile."""
+        return SnappingTiling(self, scene)
+
+    @staticmethod
+    def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
+        """The map with the critical curve."""
+        from fastmech.plots.snapping import draw_snapping
+
+        return draw_snapping(dataset, scene)
+
+
+class SnappingTiling(Tiling):
+    """Every tile holds some decay rates with all their forces."""
+
+    what = "motions under a fading force"
+
+    def __init__(self, request: Snapping, scene: Scene) -> None:
+        self.request, self.scene = request, scene
+        self.forces, self.rates = request.forces, request.rates
+        rows = max(1, TILE_POINTS // self.forces.size)
+        self.count = -(-self.rates.size // rows)
+        # Slow decay takes longer: each tile has rates from all over.
+        self.parts = [np.arange(k, self.rates.size, self.count) for k in range(self.count)]
+
+    def items(self, index: int) -> int:
+        """Motions."""
+        return self.parts[index].size * self.forces.size
+
+    def compute(self, index: int, context: RunContext) -> Dataset:
+        """Ends and critical forces of some rates."""
+        settings: dict[str, Any] = {"t_end": self.request.t_end, "method": self.request.method}
+        found = map_snapping(
+            self.scene,
+            self.forces,
+            self.rates[self.parts[index]],
+            threads=context.threads,
+            progress=context.stage(self.what, self.items(index)) if self.count == 1 else None,
+            **settings,
+        )
+        critical = critical_forces(
+            found, self.scene, tolerance=self.request.tolerance, threads=context.threads, **settings
+        )
+        grid = ("alpha", "F0")
+        return Dataset(
+            {
+                "label": Variable(grid, found.label),
+                "turns": Variable((*grid, "angle"), found.turns),
+                "time": Variable(grid, found.time),
+                "status": Variable(grid, found.status),
+                "critical": Variable(("alpha",), critical),
+            }
+        )
+
+    def assemble(self, tile: Tiles) -> Dataset:
+        """Join the rates, in their order."""
+        tiles = [tile(index) for index in range(self.count)]
+        order = np.argsort(np.concatenate(self.parts), kind="stable")
+        joined = {name: np.concatenate([part[name].data for part in tiles])[order] for name in tiles[0]}
+        _, equilibria, start = force_free(self.scene, None)
+        found = SnappingMap(
+            self.forces,
+            self.rates,
+            equilibria,
+            start,
+            joined["label"],
+            joined["turns"],
+            joined["time"],
+            joined["status"],
+        )
+        largest = float(self.forces[np.abs(self.forces).argmax()])
+        limit = critical_impulse(self.scene, IMPULSES * largest / float(self.rates[-1]))
+        variables = _ends(found) | _windows(found) | _equilibria(found)
+        variables["critical_F0"] = Variable(
+            ("alpha",),
+            joined["critical"],
+            "N",
+            "force of least magnitude that leaves, NaN: none of those tried",
+        )
+        variables["critical_impulse"] = Variable(
+            (), np.array(limit), "N s", "limit of the critical F0/alpha for fast decay, NaN: none in range"
+        )
+        attrs = {"start": start, "tolerance": self.request.tolerance, "method": self.request.method}
+        return Dataset(variables, attrs | found.counts | failures(found.status, FAILURES))
+
+    def missing(self, index: int) -> Dataset:
+        """Rates that have not been computed."""
+        shape = (self.parts[index].size, self.forces.size)
+        grid = ("alpha", "F0")
+        return Dataset(
+            {
+                "label": Variable(grid, np.full(shape, -1)),
+                "turns": Variable((*grid, "angle"), np.zeros((*shape, 2), dtype=np.int64)),
+                "time": Variable(grid, np.full(shape, np.nan)),
+                "status": Variable(grid, np.full(shape, BasinStatus.UNDECIDED, dtype=np.int8)),
+                "critical": Variable(("alpha",), np.full(shape[0], np.nan)),
+            }
+        )
+
+
+def _ends(found: SnappingMap) -> dict[str, Variable]:
+    grid = ("alpha", "F0")
+    return {
+        "F0": Variable(("F0",), found.F0, "N", "force on M2 along +x when it is switched on"),
+        "alpha": Variable(("alpha",), found.alpha, "1/s", "rate at which the force decays"),
+        "well": Variable(
+            grid, found.label.astype(np.int8), "1", "equilibrium that captures the motion, -1: none"
+        ),
+        "turns_phi": Variable(grid, found.turns[..., 0].astype(np.int32), "1", "full turns of phi"),
+        "turns_theta": Variable(grid, found.turns[..., 1].astype(np.int32), "1", "full turns of theta"),
+        "left": Variable(grid, found.left, "1", "ends in another well or with another number of turns"),
+        "capture_time": Variable(
+            grid, found.time, "s", "time at which its capture was found, NaN: not captured"
+        ),
+        "status": Variable(grid, found.status, "1", "what is known of the motion", flags(BasinStatus)),
+    }
+
+
+def _windows(found: SnappingMap) -> dict[str, Variable]:
+    rows = [(k, window) for k in range(found.alpha.size) for window in found.windows(k)]
+    each = ("window",)
+
+    def column(values: list[Any], kind: type, unit: str, about: str) -> Variable:
+        return Variable(each, np.array(values, dtype=kind), unit, about)
+
+    return {
+        "window_alpha": column([found.alpha[k] for k, _ in rows], np.float64, "1/s", "alpha of the window"),
+        "window_first": column([w.first for _, w in rows], np.float64, "N", "least F0 of the window"),
+        "window_last": column([w.last for _, w in rows], np.float64, "N", "largest F0 of the window"),
+        "window_well": column([w.label for _, w in rows], np.int8, "1", "where the window's motions end"),
+        "window_turns_phi": column([w.turns[0] for _, w in rows], np.int32, "1", "turns of phi they make"),
+        "window_turns_theta": column(
+            [w.turns[1] for _, w in rows], np.int32, "1", "turns of theta they make"
+        ),
+        "window_left": column([w.left for _, w in rows], np.bool_, "1", "whether they have left"),
+    }
+
+
+def _equilibria(found: SnappingMap) -> dict[str, Variable]:
+    each, equilibria = ("equilibrium",), found.equilibria
+    return {
+        "equilibrium_phi": Variable(each, equilibria.phi, "rad", "angle phi of the force-free equilibrium"),
+        "equilibrium_theta": Variable(
+            each, equilibria.theta, "rad", "angle theta of the force-free equilibrium"
+        ),
+        "equilibrium_energy": Variable(each, equilibria.energy, "J", "its potential energy"),
+        "equilibrium_morse_index": Variable(
+            each, equilibria.morse_index, "1", "its unstable directions, 0: a well"
+        ),
+    }

@@ -1,0 +1,93 @@
+"""Erosion profiles as a scan: the function's numbers through a file, any tile by itself, pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from plots.legibility import assert_legible
+from scan_types.values import check_labels, stored
+
+import fastmech as fm
+from fastmech.results import Dataset
+from fastmech.scan_types import scan_kinds
+from fastmech.scan_types.erosion import Erosion
+from fastmech.scan_types.request import RunContext, read_request
+
+BISTABLE = fm.Scene(F0=85.3, c1=294.9, c2=92.85, alpha=0.0)
+#: Up to the fold at c2 = 98.59 N/m, where the shallow well ends; a small window about that well.
+ALONG = {"c2": {"start": 96.0, "stop": 100.0, "num": 3}}
+AXES = {
+    "phi": {"start": -3.1, "stop": -2.2, "num": 6},
+    "theta": {"start": -2.1, "stop": -1.3, "num": 5},
+}
+SMALL: dict[str, Any] = {"most_shock": 0.3, "t_end": 10.0, "starts": 40, "directions": 2}
+
+
+@pytest.fixture(scope="module")
+def section(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    return stored(Erosion(along=ALONG, axes=AXES, **SMALL), BISTABLE, tmp_path_factory.mktemp("erosion"))
+
+
+def test_a_file_holds_what_the_function_gives(section: Dataset) -> None:
+    axes = {name: np.linspace(a["start"], a["stop"], a["num"]) for name, a in AXES.items()}
+    own = fm.erosion(
+        BISTABLE, "c2", [96.0, 98.0, 100.0], axes, most_shock=0.3, t_end=10.0, n=40, directions=2
+    )
+    units = dict.fromkeys(("phi", "theta", "lim", "factor", "shock", "kick"), "rad")
+    units |= dict.fromkeys(("shock_undecided", "kick_undecided"), "rad")
+    units |= dict.fromkeys(("stability", "lower", "upper", "gim", "undecided"), "1")
+    units |= dict.fromkeys(("lim_at_window", "factor_at_window"), "1")
+    check_labels(section, {f"well_{k}": u for k, u in units.items()} | {"c2": "N/m", "sheet": "1"})
+    for name in units:
+        np.testing.assert_array_equal(section[f"well_{name}"].data, getattr(own, name), err_msg=name)
+    np.testing.assert_array_equal(section["sheet"].data, own.sheet)
+    shallow = int(np.flatnonzero(np.isnan(own.phi[-1]))[0])
+    assert own.shock[1, shallow] > 0.0
+
+
+def test_a_tile_needs_no_other_one() -> None:
+    tiling = Erosion(along=ALONG, axes=AXES, **SMALL).tiling(BISTABLE)
+    assert tiling.count == 3
+    alone = tiling.compute(2, RunContext(threads=1))
+    assert np.isnan(alone["phi"].data).sum() == 1
+    look = tiling.assemble(lambda index: alone if index == 2 else tiling.missing(index))
+    assert isinstance(look, Dataset)
+    assert np.isnan(look["well_stability"].data[:2]).all()
+    np.testing.assert_array_equal(look["well_stability"].data[2], alone["stability"].data)
+
+
+def test_picture(section: Dataset) -> None:
+    figures = Erosion.draw(section, BISTABLE.model_dump())
+    assert set(figures) == {"profile"}
+    assert_legible(figures["profile"])
+    labels = [text.get_text() for text in figures["profile"].legends[0].get_texts()]
+    assert any("seen from 96 to 98 N/m" in label for label in labels)
+    assert any("seen from 96 to 100 N/m" in label for label in labels)
+
+
+@pytest.mark.nojit
+def test_the_request_in_the_repository_is_valid() -> None:
+    request = read_request(Path(__file__).parents[2] / "scans" / "basins_erosion.toml", scan_kinds())
+    assert {scan.parameter for scan in request.scans.values()} == {"F0", "c1", "c2"}
+
+
+@pytest.mark.nojit
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ("along.c4 = {start=1.0, stop=2.0, num=3}", r"scan.b.along.c4: unknown parameter; did you mean"),
+        ("along.alpha = {start=1.0, stop=2.0, num=3}", r"scan.b.along.alpha: unknown parameter"),
+        ("along.c1 = {start=2.0, stop=1.0, num=3}", r"scan.b.along.c1.stop = 1: must be greater than start"),
+        ("along.beta = {start=0.0, stop=1.0, num=3}", r"beta = 0"),
+        ("along.c1 = {start=1.0, stop=2.0, num=3}\nscene = {alpha = 0.5}", r"alpha = 0.5: must be 0"),
+    ],
+)
+def test_wrong_requests(changes: str, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "r.toml"
+    axes = "axes.phi = {start=0.0, stop=1.0, num=3}"
+    path.write_text(f'[scene]\nalpha = 0.0\n[scan.b]\nkind = "erosion"\n{axes}\n{changes}\n')
+    with pytest.raises(fm.InputError, match=message):
+        read_request(path, scan_kinds())
