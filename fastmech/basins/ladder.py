@@ -103,17 +103,30 @@ def energy_change(c: Coefficients, push: Floats | float, states: Floats, apart: 
 
 
 def near_saddle(certificate: Certificate, states: Floats) -> NDArray[np.bool_]:
-    """Which states (n, 4) rest at an unstable equilibrium."""
+    """Which states (n, 4) rest at an unstable equilibrium.
+
+    Beside a fold, a motion that creeps between two equilibria is near both: near is a tenth of the way to
+    the next one.
+    """
     scene, equilibria = certificate.scene, certificate.tree.equilibria
     held = scene.replace(F0=equilibria.force, alpha=0.0)
     near = np.zeros(len(states), dtype=np.bool_)
-    for e in equilibria:
+    places = np.zeros((len(equilibria), 4))
+    places[:, 0], places[:, 1] = equilibria.phi, equilibria.theta
+    for place, e in zip(places, equilibria, strict=True):
         if e.kind != "minimum":
-            away = states - np.array([e.phi, e.theta, 0.0, 0.0])
-            with np.errstate(invalid="ignore"):
-                away[:, :2] -= 2.0 * np.pi * np.round(away[:, :2] / (2.0 * np.pi))
-                near |= size_at(held, e.phi, e.theta)(away) < AT_SADDLE
+            size = size_at(held, e.phi, e.theta)
+            others = np.sort(size(_away(places, place)))[1:]
+            near |= size(_away(states, place)) < min(AT_SADDLE, 0.1 * float(others.min(initial=np.inf)))
     return near
+
+
+def _away(states: Floats, place: Floats) -> Floats:
+    """Departures (n, 4) from the copy of a place that is nearest."""
+    away = states - place
+    with np.errstate(invalid="ignore"):
+        away[:, :2] -= 2.0 * np.pi * np.round(away[:, :2] / (2.0 * np.pi))
+    return away
 
 
 def _verdicts(

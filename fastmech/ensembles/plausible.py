@@ -57,7 +57,8 @@ def breaks_energy_bounds(c: Coefficients, start: Floats, final: Floats) -> NDArr
         back = np.where(constant, 0.0, np.abs(c.force) * (4.0 - reach))
         before, scale = energy(c, start, force)
         after, _ = energy(c, final, force)
-        gained = after - before - allowance > SLACK * scale
+        # An energy beyond a double's range is none that a motion can have.
+        gained = ~np.isfinite(after) | (after - before - allowance > SLACK * scale)
         undamped = np.asarray(c.damping) == 0.0
         lost = undamped & (before - after - back > SLACK * scale)
     return np.asarray(gained | lost)

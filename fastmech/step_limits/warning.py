@@ -5,13 +5,14 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from functools import cache
+from numbers import Real
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize
 
-from fastmech.errors import StepWarning
+from fastmech.errors import InputError, StepWarning
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import potential_energy
@@ -145,8 +146,10 @@ def step_warning(scene: Scene, dt: float, method: str, starts: ArrayLike | None 
         starts: states phi, theta [rad], phi', theta' [rad/s], shape (n, 4); their rates count if given.
 
     Raises:
-        InputError: no such method.
+        InputError: an argument is wrong.
     """
+    if not isinstance(dt, Real) or not 0.0 < dt < np.inf:
+        raise InputError(f"dt = {dt!r}: must be a finite number of s greater than 0")
     limit = _first_limit(scene, dt, method, starts)
     if dt <= limit.step:
         return None

@@ -14,6 +14,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
+from fastmech.ensembles import checks
 from fastmech.scene import Scene
 from fastmech.stability.linearize import Rest, jacobian, linearized
 
@@ -37,7 +38,11 @@ def transient_growth(scene: Scene, equilibrium: Rest, until: float = 10.0) -> Tr
 
     The force is the equilibrium's, frozen. At a saddle or maximum disturbances grow for ever, so that the
     amplification is that at ``until`` [s].
+
+    Raises:
+        InputError: ``until`` is no positive number.
     """
+    until = checks.number("until", until, "s", above=0.0)
     _, s = linearized(scene, equilibrium)
     M = np.array([[s.m11, s.s12], [s.s12, 1.0]])
     K = np.array([[s.k11, s.k12], [s.k12, s.k22]])

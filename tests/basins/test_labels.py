@@ -7,6 +7,7 @@ import pytest
 from scan_types.values import scipy_motion
 
 import fastmech as fm
+from fastmech.atlas.fold_points import find_folds
 from fastmech.basins.status import BasinStatus
 
 TURN = 2.0 * np.pi
@@ -117,6 +118,16 @@ def test_statuses() -> None:
     undecided = fm.labels_of(BISTABLE, random_starts(50), 2.0)
     assert undecided.counts["undecided"] > 25
     assert (undecided.well[undecided.status == BasinStatus.UNDECIDED] == -1).all()
+
+
+def test_a_slow_passage_beside_a_fold_is_at_no_saddle() -> None:
+    """A millionth of a newton before it minimum and saddle are 1e-4 rad apart; the start is between them."""
+    scene = BISTABLE
+    fold = find_folds(scene, "F0", np.linspace(600.0, 750.0, 16))[0]
+    ghost = np.array([fold.phi, fold.theta, 0.0, 0.0])
+    starts = ghost + np.array([[0.0], [1e-5], [-1e-5]]) * [1.0, 0.0, 0.0, 0.0]
+    before = fm.labels_of(scene.replace(F0=fold.value - 1e-6), starts, 60.0)
+    assert (before.status == BasinStatus.UNDECIDED).all()
 
 
 def test_without_damper_there_are_no_basins() -> None:

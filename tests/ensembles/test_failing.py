@@ -58,6 +58,16 @@ def test_a_stop_before_the_end_is_no_failure() -> None:
     assert run.states[0, 0, 0] == run.last[0, 0]
 
 
+@pytest.mark.parametrize(("method", "dt", "steps"), [("rk4", 5.0, 2), ("rk4", 10.0, 2), ("euler", 6.0, 8)])
+def test_no_energy_beyond_a_double_s_range_is_right(method: str, dt: float, steps: int) -> None:
+    """So few steps that states are still finite, and their energies are not."""
+    starts = np.random.default_rng(1).uniform([0.5, -1.0, 0.0, 0.0], [2.5, 1.0, 0.0, 0.0], (1000, 4))
+    run = fm.integrate(fm.Scene(c2=1100 / 3, alpha=0.0), starts, steps * dt, dt, method)
+    right = run.status == 0
+    # Rods 1 m long, some 10 kg and 1 kN: no motion from rest is faster than 100 rad/s.
+    assert np.abs(run.y[-1, right, 2:]).max(initial=0.0) < 100.0
+
+
 @pytest.mark.parametrize("options", [{}, {"fit": [0.0, 1.0]}, {"formulation": "hamilton"}])
 def test_a_result_tells_of_its_failures(options: dict[str, Any]) -> None:
     """At 1e200 rad/s the squares overflow in the first step: the start is the last finite state."""

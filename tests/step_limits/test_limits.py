@@ -11,6 +11,7 @@ import sympy
 import fastmech as fm
 from fastmech.disturbance.outcome import Outcome
 from fastmech.equilibria.find import find_equilibria
+from fastmech.errors import InputError
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import RungeKutta
 from fastmech.integrators.methods import METHODS
@@ -190,3 +191,9 @@ def test_no_step_will_do() -> None:
     told = step_warning(SCENE.replace(beta=0.0, F0=0.0), 0.01, "euler")
     assert told is not None
     assert "no step will do" in told
+
+
+@pytest.mark.parametrize("dt", [0.0, -1.0, float("nan"), float("inf"), "0.1", None])
+def test_a_step_must_be_a_positive_number(dt: object) -> None:
+    with pytest.raises(InputError, match=r"^dt = .*: must be a finite number of s greater than 0$"):
+        step_warning(SCENE, dt, "rk4")  # type: ignore[arg-type]

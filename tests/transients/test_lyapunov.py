@@ -97,3 +97,10 @@ def test_transient_growth(change: dict[str, float]) -> None:
             flow = scipy.linalg.expm(2.0 * jacobian(scene, e))
             assert growth.amplification <= np.linalg.cond(flow) * np.exp(2.0 * growth.reactivity)
     assert {"minimum", "saddle"} <= kinds
+
+
+@pytest.mark.parametrize("until", [0.0, -1.0, np.nan, np.inf, "a"])
+def test_growth_has_an_end(until: object) -> None:
+    scene = fm.Scene(alpha=0.0)
+    with pytest.raises(fm.InputError, match=r"^until = .* s greater than 0$"):
+        transient_growth(scene, fm.find_equilibria(scene)[0], until)  # type: ignore[arg-type]
