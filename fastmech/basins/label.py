@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.basins.ladder import SUBSTEPS, climb, tell_the_same
+from fastmech.basins.ladder import SUBSTEPS, climb, lingering, tell_the_same
 from fastmech.basins.runs import Paths, follow, rounds_until
 from fastmech.basins.status import BasinStatus, counts
 from fastmech.basins.steps import coarse_steps
@@ -23,6 +23,7 @@ from fastmech.disturbance.outcome import confining_energy
 from fastmech.ensembles import checks
 from fastmech.ensembles.plausible import breaks_energy_bounds
 from fastmech.ensembles.run import Progress
+from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError
 from fastmech.integrators.method import Method
 from fastmech.integrators.methods import find_method
@@ -86,6 +87,7 @@ def labels_of(
     """
     require_damper(scene)
     begin = checks.states("starts", starts, 4)
+    thread_count(threads)
     t_end = checks.number("t_end", t_end, "s", above=0.0)
     formula, certificate = find_method(method), certificate_of(scene)
     if dt is not None:
@@ -168,6 +170,14 @@ class Ladder:
             lambda some, substeps: self.follow(begin[some], substeps, self.observer),
             lambda _, coarse, fine: tell_the_same(self.certificate, coarse, fine, 0.5 * self.coarse, push),
             lambda some, states: breaks_energy_bounds(c, begin[some], states),
+            lambda some: lingering(
+                self.certificate,
+                begin[some],
+                self.t_end,
+                self.coarse * SUBSTEPS[0] / SUBSTEPS[-1],
+                self.method.name,
+                self.threads,
+            ),
             found,
             status,
         )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import warnings
 from collections.abc import Callable
 from typing import TypeAlias
 
@@ -12,6 +14,8 @@ from fastmech.basins.runs import Paths
 from fastmech.basins.status import BasinStatus
 from fastmech.capture.certificate import Certificate
 from fastmech.disturbance.size import size_at
+from fastmech.ensembles.integrate import integrate
+from fastmech.errors import StepWarning
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.mechanism.reduced import metric_11, slider_ratio
 
@@ -25,12 +29,17 @@ SUBSTEPS = (2, 3, 5, 10, 20, 40)
 #: A path that has not been captured is at a saddle when it is so near to it [rad], in its norm.
 AT_SADDLE = 1e-3
 
+#: Seconds between looks at whether a path is there, and how many are kept at a time.
+LOOK, MOST_LOOKS = 0.25, 1 << 20
+
 #: ``compute(members, substeps)``: one computation of some of the starts.
 Compute: TypeAlias = Callable[[Indices, int], Paths]
 #: ``agree(members, coarse, fine)``: which of them tell the same with both steps.
 Agree: TypeAlias = Callable[[Indices, Paths, Paths], NDArray[np.bool_]]
 #: ``impossible(members, states)``: which have come to states that their motion cannot have.
 Impossible: TypeAlias = Callable[[Indices, Floats], NDArray[np.bool_]]
+#: ``lingers(members)``: which come to an unstable equilibrium on their way.
+Lingers: TypeAlias = Callable[[Indices], NDArray[np.bool_]]
 
 
 def climb(
@@ -39,6 +48,7 @@ def climb(
     compute: Compute,
     agree: Agree,
     impossible: Impossible,
+    lingers: Lingers,
     found: Paths,
     status: NDArray[np.int8],
 ) -> None:
@@ -50,8 +60,14 @@ def climb(
         done = np.flatnonzero(settled | (substeps == SUBSTEPS[-1]))
         ends, last = members[done], fine.take(done)
         found.put(ends, last)
-        status[ends] = _verdicts(certificate, coarse.take(done), last, settled[done])
+        captured = settled[done] & (last.code > 0)
+        status[ends] = np.where(captured, BasinStatus.CAPTURED, BasinStatus.UNDECIDED)
         free = np.flatnonzero(last.code == 0)
+        status[ends[free[near_saddle(certificate, last.state[free])]]] = BasinStatus.AT_SADDLE
+        # Steps that do not agree: a stable manifold between the paths leads them to its equilibrium first.
+        torn = ends[~settled[done]]
+        if torn.size:
+            status[torn[lingers(torn)]] = BasinStatus.AT_SADDLE
         bad = free[impossible(ends[free], last.state[free])]
         status[ends[bad]] = BasinStatus.STEP_TOO_LARGE
         status[ends[free[~np.isfinite(last.state[free]).all(axis=1)]]] = BasinStatus.NOT_FINITE
@@ -129,14 +145,30 @@ def _away(states: Floats, place: Floats) -> Floats:
     return away
 
 
-def _verdicts(
-    certificate: Certificate, coarse: Paths, fine: Paths, settled: NDArray[np.bool_]
-) -> NDArray[np.int8]:
-    """Statuses of paths whose computation ends here."""
-    status = np.full(len(settled), BasinStatus.UNDECIDED, dtype=np.int8)
-    status[settled & (fine.code > 0)] = BasinStatus.CAPTURED
-    other = (coarse.code != fine.code) | (coarse.turns != fine.turns).any(axis=1)
-    status[~settled & (coarse.code > 0) & (fine.code > 0) & other] = BasinStatus.AT_SADDLE
-    free = np.flatnonzero(fine.code == 0)
-    status[free[near_saddle(certificate, fine.state[free])]] = BasinStatus.AT_SADDLE
-    return status
+def lingering(
+    certificate: Certificate,
+    starts: Floats,
+    t_end: float,
+    dt: float,
+    method: str,
+    threads: int | None,
+) -> NDArray[np.bool_]:
+    """Which motions from ``starts`` (n, 4) come to an unstable equilibrium by ``t_end`` [s]."""
+    times = np.linspace(0.0, t_end, math.ceil(t_end / LOOK) + 1)
+    together = max(1, MOST_LOOKS // times.size)
+    found = np.zeros(len(starts), dtype=np.bool_)
+    for first in range(0, len(starts), together):
+        some = slice(first, first + together)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", StepWarning)
+            run = integrate(
+                certificate.scene,
+                starts[some],
+                dt=dt,
+                method=method,
+                t_eval=times,
+                threads=threads,
+            )
+        near = near_saddle(certificate, run.y.reshape(-1, 4)).reshape(times.size, -1)
+        found[some] = near.any(axis=0)
+    return found

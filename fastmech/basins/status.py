@@ -29,8 +29,8 @@ FAILURES = (BasinStatus.NOT_FINITE, BasinStatus.STEP_TOO_LARGE, BasinStatus.STAR
 
 _ADVICE = {
     BasinStatus.CAPTURED: "proved to end in its well: energy and position leave no other way",
-    BasinStatus.UNDECIDED: "not captured by t_end, or the finest steps disagree; use a larger t_end",
-    BasinStatus.AT_SADDLE: "on an unstable equilibrium's stable manifold, as far as the finest steps tell",
+    BasinStatus.UNDECIDED: "not captured by t_end (use a larger one), or the finest steps disagree",
+    BasinStatus.AT_SADDLE: "comes to an unstable equilibrium, and the finest steps disagree on what follows",
     BasinStatus.NOT_FINITE: "became NaN or infinite with every step tried; use a smaller dt",
     BasinStatus.STEP_TOO_LARGE: "has energy that it cannot have, with every step tried; use a smaller dt",
     BasinStatus.START_NOT_FINITE: "the start is NaN or infinite",

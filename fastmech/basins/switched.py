@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.basins.ladder import SUBSTEPS, Indices, climb, tell_the_same
+from fastmech.basins.ladder import SUBSTEPS, Indices, climb, near_saddle, tell_the_same
 from fastmech.basins.runs import Paths
 from fastmech.basins.status import BasinStatus
 from fastmech.basins.steps import coarse_steps
@@ -45,6 +45,7 @@ class Switched:
     step: Floats  #: coarsest [s]
     method: str
     threads: int | None
+    near: NDArray[np.bool_]  #: which have been seen at an unstable equilibrium, with the finest step
 
     @classmethod
     def of(
@@ -69,7 +70,9 @@ class Switched:
                 needed = float(coarse_steps(free._replace(force=force / unit), start[None])[0])
                 octaves = np.ceil(np.log2(slowest / needed) - 1e-9)
                 own[force == F0] = slowest * 0.5 ** max(octaves, 0.0)
-        return cls(certificate, start, F0, alpha, end, own, method, threads)
+        return cls(
+            certificate, start, F0, alpha, end, own, method, threads, np.zeros(F0.size, dtype=np.bool_)
+        )
 
     def label(self, progress: Progress | None) -> tuple[Paths, NDArray[np.int8]]:
         """Ends and statuses of all of them."""
@@ -79,7 +82,16 @@ class Switched:
         for first in range(pieces):
             # Each piece takes something of everywhere, so that all take about as long.
             members = np.arange(first, self.F0.size, pieces)
-            climb(self.certificate, members, self.follow, self.agree, self.impossible, found, status)
+            climb(
+                self.certificate,
+                members,
+                self.follow,
+                self.agree,
+                self.impossible,
+                self.lingers,
+                found,
+                status,
+            )
             if progress is not None:
                 progress(members.size)
         return found, status
@@ -109,6 +121,8 @@ class Switched:
                 group = running[(step == h) & (span == length)]
                 self._advance(paths, clock, members, group, float(length), float(h))
             self._look(paths, clock, members, running)
+            if substeps == SUBSTEPS[-1]:
+                self.near[members[running]] |= near_saddle(self.certificate, paths.state[running])
             alive = (paths.code[running] == 0) & np.isfinite(paths.state[running]).all(axis=1)
             running = running[alive & (clock[running] < self.end[members[running]])]
         return paths
@@ -160,3 +174,7 @@ class Switched:
             decay=self.alpha[members],  # type: ignore[arg-type]
         )
         return breaks_energy_bounds(own, np.tile(self.start, (members.size, 1)), states)
+
+    def lingers(self, members: Indices) -> NDArray[np.bool_]:
+        """Which came to an unstable equilibrium of the force-free scene in the finest computation."""
+        return self.near[members]

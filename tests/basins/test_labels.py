@@ -130,6 +130,19 @@ def test_a_slow_passage_beside_a_fold_is_at_no_saddle() -> None:
     assert (before.status == BasinStatus.UNDECIDED).all()
 
 
+@pytest.mark.parametrize("scene", [CONSTANT, fm.Scene(F0=300.0, alpha=0.0), fm.Scene(F0=0.0, alpha=0.0)])
+def test_saddles_are_at_a_saddle(scene: fm.Scene) -> None:
+    saddles = [e for e in fm.find_equilibria(scene) if e.kind == "saddle"]
+    starts = [[e.phi, e.theta, 0.0, 0.0] for e in saddles]
+    assert (fm.labels_of(scene, starts).status == BasinStatus.AT_SADDLE).all()
+
+
+def test_motions_too_fast_to_tell_are_at_no_saddle() -> None:
+    starts = np.random.default_rng(3).uniform(-1000.0, 1000.0, (10, 4)) * [0.0, 0.0, 1.0, 1.0]
+    found = fm.labels_of(CONSTANT, starts)
+    assert set(found.status.tolist()) <= {BasinStatus.CAPTURED, BasinStatus.UNDECIDED}
+
+
 def test_without_damper_there_are_no_basins() -> None:
     scene = fm.Scene(beta=0.0, alpha=0.0)
     with pytest.raises(fm.InputError, match=r"scene.beta = 0: .*no attractor; fastmech.trapped"):
