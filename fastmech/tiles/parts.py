@@ -4,7 +4,7 @@
 
     FILE.parts/
       lock               held by the process that works on it
-      manifest.json      what was asked for; written once
+      manifest.json      what was asked for, with its own checksum; written when a run begins
       run.json           which process works on it since when; for `fastmech status`
       000_SECTION/       one folder a section
         000042.tile      one file a finished tile
@@ -19,7 +19,8 @@ import contextlib
 import json
 import os
 import shutil
-from collections.abc import Iterator, Sequence
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -57,6 +58,18 @@ class Manifest:
     replace: bool
     tiles: dict[str, int]
     items: dict[str, int]
+
+
+class DamagedManifestError(InputError):
+    """A manifest is not what was written."""
+
+
+#: Name of the manifest's checksum, and the checksum of its other fields.
+_CHECKSUM = "crc32"
+
+
+def _checksum(fields: Mapping[str, Any]) -> int:
+    return zlib.crc32(json.dumps(fields, sort_keys=True).encode())
 
 
 class Parts:
@@ -135,22 +148,29 @@ class Parts:
         """What was asked for, or None where there is no scan in progress.
 
         Raises:
-            InputError: the manifest is damaged.
+            DamagedManifestError: its checksum says so.
+            InputError: it cannot be read.
         """
         path = self.folder / "manifest.json"
         try:
-            return Manifest(**json.loads(path.read_text(encoding="utf-8")))
+            fields = json.loads(path.read_bytes())
+            if fields.pop(_CHECKSUM) != _checksum(fields):
+                raise ValueError("its checksum is another")
+            return Manifest(**fields)
         except FileNotFoundError:
             return None
-        except (OSError, ValueError, TypeError, RecursionError) as error:
-            raise InputError(f"{path}: is damaged; start anew with --fresh: {error}") from None
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+            raise DamagedManifestError(f"{path}: is damaged; run the scan again, which goes on") from None
 
     def begin(self, manifest: Manifest, sections: Sequence[TiledSection]) -> None:
-        """Write the manifest, unless it is there, and make the sections' folders."""
+        """Write the manifest, and make the sections' folders."""
         self._places = {section.name: f"{k:03d}_{section.name}" for k, section in enumerate(sections)}
         for place in self._places.values():
             self._make(self.folder / place)
-        text = json.dumps(asdict(manifest), indent=1) + "\n"
+        fields = asdict(manifest)
+        text = json.dumps({**fields, _CHECKSUM: _checksum(fields)}, indent=1) + "\n"
         write_durably(self.folder / "manifest.json", [text.encode()])
 
     def look(self, sections: Sequence[TiledSection]) -> None:
@@ -162,8 +182,12 @@ class Parts:
         return self.folder / self._places[section.name] / f"{index:06d}.tile"
 
     def names(self, section: TiledSection) -> list[Path]:
-        """The files of finished tiles."""
-        return sorted((self.folder / self._places[section.name]).glob("*.tile"))
+        """The files of finished tiles; none while it is not known where they are."""
+        if section.name not in self._places:
+            return []
+        there = {path.name: path for path in (self.folder / self._places[section.name]).glob("*.tile")}
+        mine = (self.path(section, index) for index in range(section.tiling.count))
+        return [path for path in mine if path.name in there]
 
     def store(self, section: TiledSection, tile: Tile) -> None:
         """Keep a finished tile for good."""

@@ -7,6 +7,7 @@ import platform
 import shlex
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from fastmech.ensembles.run import Progress
@@ -19,7 +20,7 @@ from fastmech.store.provenance import provenance
 from fastmech.tiles.assemble import assembled, write_assembled
 from fastmech.tiles.ends import CrashedTilesError, Stopped, signal_of
 from fastmech.tiles.identity import asked_for, asked_of_result, differences, identity_of
-from fastmech.tiles.parts import Manifest, Parts
+from fastmech.tiles.parts import DamagedManifestError, Manifest, Parts
 from fastmech.tiles.report import RunReport
 from fastmech.tiles.section import TiledSection, sections_of
 from fastmech.tiles.tile_file import DamagedTileError, Tile
@@ -129,7 +130,10 @@ class ScanRun:
         if fresh:
             self.parts.remove()
         else:
-            manifest = self.parts.manifest()
+            try:
+                manifest = self.parts.manifest()
+            except DamagedManifestError:  # every tile says itself what it belongs to
+                self.tell(f"{self.parts.folder}: its manifest is damaged and written anew")
         if not fresh and target.exists():
             there = asked_of_result(target)
             if there == self.asked:
@@ -190,7 +194,7 @@ class ScanRun:
         stages: dict[str, Progress] = {}
         for section in self.sections:
             total = sum(section.tiling.items(task.index) for task in missing if task.section == section)
-            if total and section.tiling.count > 1:
+            if total and (section.tiling.count > 1 or self.hire.together):
                 stages[section.name] = self.context.stage(f"{section.name}: {section.tiling.what}", total)
 
         def keep(task: Task, tile: Tile) -> None:
@@ -257,9 +261,12 @@ class ScanRun:
         }
 
     def _kept(self, what: str) -> str:
-        if not self.seconds:
+        count = len(self.seconds)
+        with suppress(OSError):  # an interrupt may come between a tile and its being counted
+            count = max(count, sum(len(self.parts.names(section)) for section in self.sections))
+        if not count:
             return what
-        kept = f"{len(self.seconds)} of {len(self.tasks)} tiles are kept in {self.parts.folder.name}"
+        kept = f"{count} of {len(self.tasks)} tiles are kept in {self.parts.folder.name}"
         return f"{what}; {kept}; the same command goes on"
 
     def _crash_report(self) -> str:

@@ -19,6 +19,7 @@ from fastmech.scan_types.map_tiling import MapTiling
 from fastmech.store.read import open_results
 from fastmech.tiles import identity
 from fastmech.tiles.ends import CrashedTilesError, Stopped
+from fastmech.tiles.look import ScanLook
 from fastmech.tiles.parts import Parts
 from fastmech.tiles.tile_file import DamagedTileError, check_tile
 from fastmech.tiles.work import ThreadHiring
@@ -162,14 +163,33 @@ def test_other_sources_are_another_request(run: Run, monkeypatch: pytest.MonkeyP
         run()
 
 
-def test_a_damaged_manifest_is_told(run: Run, tmp_path: Path) -> None:
+@pytest.mark.parametrize("flipped", [None, *range(5, 400, 40)])
+def test_a_damaged_manifest_costs_no_tile(run: Run, tmp_path: Path, flipped: int | None) -> None:
+    """Cut off, or one letter changed, wherever that is."""
     with stopped_after(3, KeyboardInterrupt()), pytest.raises(Stopped):
         run()
     manifest = tmp_path / "scan.h5.parts" / "manifest.json"
-    manifest.write_bytes(manifest.read_bytes()[:-40])
-    with pytest.raises(InputError, match=r"manifest\.json: is damaged; start anew with --fresh"):
+    written = bytearray(manifest.read_bytes())
+    if flipped is None:
+        del written[-40:]
+    else:
+        written[flipped] ^= 2
+    manifest.write_bytes(written)
+    with pytest.raises(InputError, match=r"manifest\.json: is damaged; run the scan again, which goes on$"):
+        ScanLook(tmp_path / "scan.h5")
+    told: list[str] = []
+    assert run(tell=told.append).computed == TILES - 3
+    assert any(line.endswith("its manifest is damaged and written anew") for line in told)
+
+
+def test_files_of_others_are_no_tiles(run: Run, tmp_path: Path) -> None:
+    with stopped_after(3, KeyboardInterrupt()), pytest.raises(Stopped):
         run()
-    assert run(fresh=True).computed == TILES
+    for folder in (tmp_path / "scan.h5.parts").glob("0*"):
+        for name in ("foo.tile", "999999.tile"):
+            (folder / name).write_bytes(b"")
+    assert sum(section.done for section in ScanLook(tmp_path / "scan.h5").progress().sections) == 3
+    assert run().computed == TILES - 3
 
 
 def test_a_second_process_is_told(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
