@@ -163,6 +163,32 @@ def test_shares_of_the_bars_sum_up():
     assert widths == pytest.approx(dict.fromkeys(range(6), 100.0))
 
 
+@pytest.mark.parametrize(
+    ("kept", "told"),
+    [
+        ({"outcome", "end_equilibrium"}, "full turns on the way"),
+        ({"outcome"}, "which other equilibrium"),
+        ({"outcome", "turns"}, "which other equilibrium"),
+    ],
+)
+def test_outcomes_are_drawn_from_what_was_kept(kept: set[str], told: str):
+    dataset = run("disturbed", BISTABLE, **SMALL | {"radius": 1.0})
+    left_out = {"outcome", "end_equilibrium", "turns", "time_to_return", "excursion"} - kept
+    part = Dataset({n: v for n, v in dataset.variables.items() if n not in left_out}, dataset.attrs)
+    figures = scan_kinds()["disturbed"].draw(part, BISTABLE.model_dump())
+    assert set(figures) == {"outcomes", "linear_range"}
+    figure = figures["outcomes"]
+    assert_legible(figure)
+    assert told in figure.axes[0].get_title()
+    codes = flag_codes(dataset["outcome"])
+    for row, outcome in enumerate(dataset["outcome"].data):
+        bars = [bar for bar in figure.axes[0].patches if round(bar.get_y() + bar.get_height() / 2) == row]
+        assert sum(bar.get_width() for bar in bars) == pytest.approx(100.0)
+        if (outcome == codes["returned"]).any():
+            returned = 100.0 * np.mean(outcome == codes["returned"])
+            assert bars[0].get_width() == pytest.approx(returned)
+
+
 def test_counts_have_their_legend_and_the_scene_its_star():
     figure = draw("equilibrium_map", CONSTANT, axes={"F0": axis(-100.0, 100.0, 3), "c2": axis(0.0, 400.0, 5)})
     counts = panel(figure["count"], "Number of equilibria")
