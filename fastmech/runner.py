@@ -76,7 +76,7 @@ def draw_results(
         stage: is told how many pictures have been drawn.
 
     Raises:
-        InputError: the file cannot be read, holds a section of unknown kind or a tile, or the folder is unwritable.
+        InputError: the file cannot be read, has a section of unknown kind or a tile, or the folder is bad.
     """
     kinds = scan_kinds()
     with open_results(path) as results:

@@ -77,7 +77,8 @@ def _outcomes(dataset: Dataset) -> Figure:
             left += share
     axes.set(xlim=(0.0, 100.0), xlabel="share of the disturbed trajectories [%]")
     axes.grid(visible=False)
-    unknown = [text for name, text in NOT_KEPT.items() if name not in dataset]
+    elsewhere = (dataset["outcome"].data == flag_codes(dataset["outcome"])["elsewhere"]).any()
+    unknown = [text for name, text in NOT_KEPT.items() if elsewhere and name not in dataset]
     axes.set_title("\n".join(["Where disturbances of each equilibrium end", *unknown[:1]]))
     labelled = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
     order = sorted(labelled, key=lambda label: (not label.startswith("rest"), label))
