@@ -62,7 +62,7 @@ def _outcomes(dataset: Dataset) -> Figure:
             known = label in axes.get_legend_handles_labels()[1]
             look = {"height": 0.62, "edgecolor": "white", **look}
             axes.barh(row, share, left=left, label=None if known else label, **look)
-            if share >= 6.0:
+            if share >= 8.0:
                 dark = look["color"] in (LINES[0], LINES[1], LINES[2], "#000000")
                 box = {"facecolor": look["color"], "edgecolor": "none", "pad": 1.5}
                 axes.text(
