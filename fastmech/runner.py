@@ -76,11 +76,16 @@ def draw_results(
         stage: is told how many pictures have been drawn.
 
     Raises:
-        InputError: the file cannot be read, holds a section of unknown kind, or the folder is unwritable.
+        InputError: the file cannot be read, has a section of unknown kind or a tile, or the folder is bad.
     """
     kinds = scan_kinds()
     with open_results(path) as results:
         for name in results:
+            if "tile" in results[name].attrs:
+                raise InputError(
+                    f"{path}: {name}: is a tile, which holds a piece of a section; plot the result, or a"
+                    " snapshot of a scan in progress (fastmech status FILE.h5 --snapshot NOW.h5)"
+                )
             if results[name].attrs.get("kind") not in kinds:
                 kind = results[name].attrs.get("kind")
                 raise InputError(f"{path}: {name}: kind = {kind!r} is unknown; known: {', '.join(kinds)}")

@@ -19,9 +19,9 @@ from fastmech.cli.reporting import account, reporting_options
 @click.option(
     "--select",
     "selections",
-    metavar="NAME=VALUE",
+    metavar="NAME=VALUE|LOW:HIGH",
     multiple=True,
-    help="The nearest point along a coordinate, or the number of a place along a dimension; repeatable.",
+    help="The nearest point along a coordinate, or a range (--select F0=-10:10); repeatable.",
 )
 @click.option(
     "--out",
@@ -44,13 +44,23 @@ def command(
 ) -> None:
     """Write a result file in another format.
 
+    Selected values must lie within their coordinate's range; along a dimension without coordinate they are
+    places counted from 0. What was taken is told.
+
     csv: one table for each set of dimensions of a section; nc: netCDF-4, one file for each section (needs
     xarray); npz: one file for each section.
     """
     from fastmech.store.export import export_results
 
+    selected: list[str] = []
     folder = out if out is not None else file.with_suffix("")
     with account("export", quiet, as_json) as told:
+        told.facts["selected"] = selected
+
+        def tell(line: str) -> None:
+            selected.append(line)
+            told.say(line)
+
         for path in export_results(
             file,
             folder,
@@ -60,5 +70,6 @@ def command(
             selections=selections,
             replace=fresh,
             stage=told.bars.stage,
+            tell=tell,
         ):
             told.wrote(path)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.plots.labels import equilibrium_names, flag_codes, logarithmic
-from fastmech.plots.style import LINES, legend_below, new_figure, style
+from fastmech.plots.style import LINES, PALETTE, legend_below, new_figure, style
 from fastmech.results import Dataset
 
 if TYPE_CHECKING:
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 LEFT_OVER = {
     "at_unstable": ("still at an unstable one", "#8c8c8c"),
@@ -24,6 +25,13 @@ LEFT_OVER = {
     "step_too_large": ("step too large", "#5a5a5a"),
     "not_converged": ("not converged", "#8c6d46"),
 }
+#: What a picture of outcomes cannot show without a variable, the one that leaves out most first.
+NOT_KEPT = {
+    "end_equilibrium": "(which other equilibrium was not kept)",
+    "turns": "(full turns on the way to another equilibrium were not kept)",
+}
+#: Without ``end_equilibrium``; yellow is no equilibrium's colour.
+ANOTHER = ("rest at another, or full turns further", {"color": PALETTE["yellow"]})
 BOX = (0.05, 0.25, 0.5, 0.75, 0.95)
 SHOWN_QUANTILES = (0.5, 0.95, 0.99)
 
@@ -36,7 +44,7 @@ def draw_disturbed(dataset: Dataset) -> dict[str, Figure]:
     if not dataset.sizes["equilibrium"]:
         return {}
     pictures = {
-        "outcomes": (_outcomes, {"outcome", "end_equilibrium", "turns"}),
+        "outcomes": (_outcomes, {"outcome"}),
         "time_to_return": (_time_to_return, {"time_to_return"}),
         "excursions": (_excursions, {"excursion"}),
         "linear_range": (_linear_range, {"linear_limit"}),
@@ -54,7 +62,7 @@ def _outcomes(dataset: Dataset) -> Figure:
             known = label in axes.get_legend_handles_labels()[1]
             look = {"height": 0.62, "edgecolor": "white", **look}
             axes.barh(row, share, left=left, label=None if known else label, **look)
-            if share >= 6.0:
+            if share >= 8.0:
                 dark = look["color"] in (LINES[0], LINES[1], LINES[2], "#000000")
                 box = {"facecolor": look["color"], "edgecolor": "none", "pad": 1.5}
                 axes.text(
@@ -69,7 +77,9 @@ def _outcomes(dataset: Dataset) -> Figure:
             left += share
     axes.set(xlim=(0.0, 100.0), xlabel="share of the disturbed trajectories [%]")
     axes.grid(visible=False)
-    axes.set_title("Where disturbances of each equilibrium end")
+    elsewhere = (dataset["outcome"].data == flag_codes(dataset["outcome"])["elsewhere"]).any()
+    unknown = [text for name, text in NOT_KEPT.items() if elsewhere and name not in dataset]
+    axes.set_title("\n".join(["Where disturbances of each equilibrium end", *unknown[:1]]))
     labelled = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
     order = sorted(labelled, key=lambda label: (not label.startswith("rest"), label))
     figure.legend([labelled[label] for label in order], order, loc="outside lower center", ncols=3)
@@ -79,17 +89,31 @@ def _outcomes(dataset: Dataset) -> Figure:
 def _segments(dataset: Dataset, row: int) -> list[tuple[float, str, dict[str, Any]]]:
     """Share [%], label and look of each part of an equilibrium's bar."""
     codes = flag_codes(dataset["outcome"])
-    outcome, end = dataset["outcome"].data[row], dataset["end_equilibrium"].data[row]
+    outcome = dataset["outcome"].data[row]
     elsewhere = outcome == codes["elsewhere"]
     parts = [(outcome == codes["returned"], f"rest at {row + 1}", {"color": LINES[row]})]
-    turned = (dataset["turns"].data[row] != 0).any(axis=1)
+    if "end_equilibrium" in dataset:
+        parts += _resting_elsewhere(dataset, row, elsewhere)
+    else:
+        parts.append((elsewhere, *ANOTHER))
+    parts += [(outcome == codes[name], label, {"color": grey}) for name, (label, grey) in LEFT_OVER.items()]
+    return [(100.0 * float(np.mean(where)), label, look) for where, label, look in parts if where.any()]
+
+
+def _resting_elsewhere(
+    dataset: Dataset, row: int, elsewhere: Flags
+) -> list[tuple[Flags, str, dict[str, Any]]]:
+    """Those at rest at each other equilibrium, or at their own some turns further."""
+    end = dataset["end_equilibrium"].data[row]
+    # Elsewhere and yet at its own equilibrium is full turns further, known without the turns themselves.
+    turned = (dataset["turns"].data[row] != 0).any(axis=1) if "turns" in dataset else end == row
+    parts: list[tuple[Flags, str, dict[str, Any]]] = []
     for other in range(dataset.sizes["equilibrium"]):
         there = elsewhere & (end == other)
         further = {"color": LINES[other], "hatch": "//"}
         parts.append((there & ~turned, f"rest at {other + 1}", {"color": LINES[other]}))
         parts.append((there & turned, f"rest at {other + 1}, full turns further", further))
-    parts += [(outcome == codes[name], label, {"color": grey}) for name, (label, grey) in LEFT_OVER.items()]
-    return [(100.0 * float(np.mean(where)), label, look) for where, label, look in parts if where.any()]
+    return parts
 
 
 def _time_to_return(dataset: Dataset) -> Figure:

@@ -14,7 +14,7 @@ import numpy as np
 from fastmech.errors import InputError
 from fastmech.results import Dataset, Variable
 from fastmech.store.read import open_results
-from fastmech.store.select import parse_selections, select
+from fastmech.store.select import choose, parse_selections, take
 from fastmech.store.write import _aside, _readable_reasons
 
 #: Announces a piece of work with its items and gives who is told of finished ones.
@@ -34,6 +34,7 @@ def export_results(
     selections: Sequence[str] = (),
     replace: bool = False,
     stage: Stages = lambda name, total: lambda done: None,
+    tell: Callable[[str], None] = lambda line: None,
 ) -> Iterator[Path]:
     """Write sections of a result file into a folder and yield the files as they are written.
 
@@ -43,18 +44,23 @@ def export_results(
         form: "csv", "nc" or "npz".
         section: only this one.
         variables: only these.
-        selections: ``NAME=VALUE``, see `fastmech.store.select.select`.
+        selections: ``NAME=VALUE`` or ``NAME=LOW:HIGH``, see `fastmech.store.read.Section.select`.
         replace: whether files of these names may be replaced.
         stage: is told how many rows or files have been written, see `fastmech.cli.progress`.
+        tell: is given a line for each coordinate of a section on what was selected.
 
     Raises:
         InputError: the file or a name in it is wrong, or something cannot be written.
     """
-    places = parse_selections(selections)
+    wanted = parse_selections(selections)
     with open_results(path) as results:
         names = [section] if section is not None else list(results)
+        # All before the first file is written: what one section refuses leaves no other behind.
+        chosen = {name: choose(results[name], wanted) for name in names}
         for name in names:
-            dataset = select(results[name], places, variables or None)
+            dataset = take(results[name], chosen[name], variables or None)
+            for one in chosen[name].values():
+                tell(f"{name}: {one.told}")
             for target, write in _WRITERS[form](dataset, folder / name, stage):
                 _publish(target, write, replace)
                 yield target

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
@@ -23,7 +24,7 @@ from fastmech.store.decode import (
     own_dimensions,
 )
 from fastmech.store.schema import FORMAT, SCHEMA_VERSION
-from fastmech.store.select import select
+from fastmech.store.select import Wanted, choose, take
 
 if TYPE_CHECKING:
     import xarray
@@ -33,8 +34,8 @@ def open_results(path: str | Path) -> Results:
     """Open a result file; use it in a `with` statement or close it when done.
 
     Raises:
-        InputError: there is no such file, it is not a result file of fastmech, its schema is newer than this
-            version knows, or it is damaged.
+        InputError: it is no path, there is no such file, it is not a result file of fastmech, its schema is
+            newer than this version knows, or it is damaged.
     """
     return Results(path)
 
@@ -52,6 +53,8 @@ class Results:
     """
 
     def __init__(self, path: str | Path) -> None:
+        if not isinstance(path, str | os.PathLike):
+            raise InputError(f"open_results: path = {path!r}: must be the path of a result file")
         self.path = Path(path)
         self._file = _open_file(self.path)
         try:
@@ -170,18 +173,22 @@ class Section:
         chosen = [name for name in self.variables if names is None or name in names]
         return Dataset({name: self._stored.read(name, part) for name in chosen}, self.attrs)
 
-    def select(self, names: Collection[str] | None = None, **values: float) -> Dataset:
-        """The section at one value of some coordinates: ``results["map"].select(F0=100.0)``.
+    def select(self, names: Collection[str] | None = None, **values: Wanted) -> Dataset:
+        """The section at one value, or in a range, of some coordinates: ``results["map"].select(F0=100.0)``.
 
         Args:
             names: variables to read; None: all. The coordinates of their dimensions come too.
-            values: the nearest point along each coordinate or, along a dimension without coordinate, a place
-                counted from 0. The dimension is dropped; its coordinate stays as a scalar.
+            values: a number: the nearest point along the coordinate, in its unit; it may lie beyond either
+                end by at most half the spacing there (of a coordinate with one value: not at all). The
+                dimension is dropped; its coordinate stays as a scalar. Or ``slice(low, high)``: all points
+                from low to high, both included, None for an open end; the dimension stays. Along a dimension
+                without coordinate these are places counted from 0.
 
         Raises:
-            InputError: an unknown dimension or variable, a place that is none, or damaged data.
+            InputError: an unknown dimension or variable, a value beyond the coordinate's range, a range that
+                holds no point, what is neither a finite number nor a range, or damaged data.
         """
-        return select(self, values, names)
+        return take(self, choose(self, values), names)
 
     def to_xarray(self) -> xarray.Dataset:
         """The section as an `xarray.Dataset` that reads values when they are used, while the file is open.

@@ -57,6 +57,12 @@ def test_what_is_no_result_file(invoke, command):
     assert not Path("text").exists()
 
 
+def test_plot_of_a_tile(invoke, done, tiny):
+    assert invoke("run", tiny, "--tile", "swing:1", "--keep", "t1.h5").exit_code == 0
+    assert_refused(invoke("plot", "t1.h5"), "t1.h5: swing: is a tile", "plot the result", "snapshot")
+    assert not Path("t1").exists()
+
+
 def test_plot_of_an_unknown_kind(invoke, done):
     with h5py.File(done, "r+") as file:
         file["rest"].attrs["kind"] = "later"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from pathlib import Path
 
 import numpy as np
@@ -91,12 +92,33 @@ def test_selection(invoke, result):
         assert set(whole) == set(section)
 
 
+def test_selection_is_told(invoke, result):
+    done = invoke("export", result, "--to", "npz", "--out", "x", "--select", "F0=-140", "--select", "c1=200")
+    assert done.exit_code == 0
+    assert "map: F0 = -150 N (nearest to -140)\nmap: c1 = 200 N/m\n" in done.stdout
+    again = invoke("export", result, "--to", "npz", "--out", "y", "--select", "F0=-149", "--json")
+    assert json.loads(again.stdout)["selected"] == ["map: F0 = -150 N (nearest to -149)"]
+
+
+def test_a_range(invoke, result):
+    done = invoke("export", result, "--to", "npz", "--out", "x", "--select", "F0=-10:150")
+    assert done.exit_code == 0
+    assert "map: F0 = 0 to 150 N (2 of 5 values)" in done.stdout
+    with open_results(result) as results, np.load("x/map.npz") as arrays:
+        np.testing.assert_array_equal(arrays["F0"], [0.0, 150.0])
+        np.testing.assert_array_equal(arrays["phi"], results["map"]["phi"].data[2:4])
+
+
 @pytest.mark.parametrize(
     ("arguments", "fragment"),
     [
         (["--select", "F0"], "NAME=VALUE"),
         (["--select", "F0=x"], "NAME=VALUE"),
         (["--select", "F0=nan"], "NAME=VALUE"),
+        (["--select", "F0=1:2:3"], "NAME=LOW:HIGH"),
+        (["--select", "F0=1e9"], "F0 = 1000000000: must be within -300 to 300 N"),
+        (["--select", "F0=10:20"], "F0 = 10 to 20: must be within -300 to 300 N and hold at least one value"),
+        (["--select", "F0=20:10"], "must not be above"),
         (["--select", "F0=1", "--select", "F0=2"], "twice"),
         (["--select", "F1=1"], "F1"),
         (["--select", "cusp=99"], "cusp = 99"),

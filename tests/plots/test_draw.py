@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -161,6 +162,39 @@ def test_shares_of_the_bars_sum_up():
         row = round(bar.get_y() + bar.get_height() / 2)
         widths[row] = widths.get(row, 0.0) + bar.get_width()
     assert widths == pytest.approx(dict.fromkeys(range(6), 100.0))
+
+
+@pytest.mark.parametrize(
+    ("kept", "told"),
+    [
+        ({"outcome", "end_equilibrium"}, "full turns on the way"),
+        ({"outcome"}, "which other equilibrium"),
+        ({"outcome", "turns"}, "which other equilibrium"),
+    ],
+)
+def test_outcomes_are_drawn_from_what_was_kept(kept: set[str], told: str):
+    dataset = run("disturbed", BISTABLE, **SMALL | {"t_end": 0.5})
+    codes = flag_codes(dataset["outcome"])
+    # Of every 8: 4 returned, 1 at its own some turns further, 2 at the next, 1 still moving.
+    row = np.arange(6)[:, None]
+    outcome = np.repeat([codes["returned"], codes["elsewhere"], codes["undecided"]], [12, 9, 3])
+    end = np.where(np.arange(24) < 15, row, np.where(np.arange(24) < 21, (row + 1) % 6, -1))
+    changed = {
+        "outcome": replace(dataset["outcome"], data=np.tile(outcome, (6, 1)).astype(np.int8)),
+        "end_equilibrium": replace(dataset["end_equilibrium"], data=end.astype(np.int8)),
+    }
+    left_out = {"outcome", "end_equilibrium", "turns", "time_to_return", "excursion"} - kept
+    variables = {n: v for n, v in {**dataset.variables, **changed}.items() if n not in left_out}
+    figures = scan_kinds()["disturbed"].draw(Dataset(variables, dataset.attrs), BISTABLE.model_dump())
+    assert set(figures) == {"outcomes", "linear_range"}
+    figure = figures["outcomes"]
+    assert_legible(figure)
+    assert told in figure.axes[0].get_title()
+    apart = [50.0, 12.5, 25.0, 12.5] if "end_equilibrium" in kept else [50.0, 37.5, 12.5]
+    for place in range(6):
+        bars = [b for b in figure.axes[0].patches if round(b.get_y() + b.get_height() / 2) == place]
+        assert sorted(b.get_width() for b in bars) == pytest.approx(sorted(apart))
+        assert sum(b.get_width() for b in bars if b.get_hatch()) == (12.5 if len(apart) == 4 else 0.0)
 
 
 def test_counts_have_their_legend_and_the_scene_its_star():

@@ -47,6 +47,12 @@ def test_a_part_of_a_section(write: Write, content: dict[str, Any]) -> None:
     assert part["phi"].units == whole["phi"].units
 
 
+@pytest.mark.parametrize("path", [3, None, b"result.h5", ["result.h5"]])
+def test_what_is_no_path(path: Any) -> None:
+    with pytest.raises(InputError, match=r"^open_results: path = .*: must be the path of a result file$"):
+        open_results(path)
+
+
 def test_unknown_names_list_the_known(write: Write) -> None:
     with open_results(write()) as results:
         with pytest.raises(InputError, match=r"'basins'.*equilibria, atlas"):
