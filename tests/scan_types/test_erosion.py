@@ -38,7 +38,8 @@ def test_a_file_holds_what_the_function_gives(section: Dataset) -> None:
     )
     units = dict.fromkeys(("phi", "theta", "lim", "factor", "shock", "kick"), "rad")
     units |= dict.fromkeys(("shock_undecided", "kick_undecided"), "rad")
-    units |= dict.fromkeys(("stability", "lower", "upper", "gim", "undecided"), "1")
+    units |= dict.fromkeys(("lim_at_most", "factor_at_most"), "rad")
+    units |= dict.fromkeys(("stability", "lower", "upper", "gim", "gim_at_most", "undecided"), "1")
     units |= dict.fromkeys(("lim_at_window", "factor_at_window"), "1")
     check_labels(section, {f"well_{k}": u for k, u in units.items()} | {"c2": "N/m", "sheet": "1"})
     for name in units:
