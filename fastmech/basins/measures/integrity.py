@@ -7,8 +7,8 @@ Measures by Soliman and Thompson, J. Sound Vib. 135 (1989) 453, and Rega and Len
 - LIM, local integrity measure: the radius of the largest ball round the attractor that lies in the basin.
 - IF, integrity factor: the radius of the largest ball in the basin, wherever its centre.
 
-A point without a label is not taken for the basin's, so that all three are too small by what such points take
-away; ``gim_at_most``, ``lim_at_most`` and ``factor_at_most`` are what they would be, were all of them in the basin.
+A point without a label is not taken for the basin's, which can make all three too small; ``gim_at_most``,
+``lim_at_most`` and ``factor_at_most`` are what they would be, were all such points in the basin.
 
 They use them relative to a reference (the basin without excitation); divide two results for that.
 """
@@ -39,7 +39,9 @@ class Integrity:
     gim_at_most: float  #: if all points without a label belong to the basin
     lim: float  #: radius round the attractor; 0: the map's nearest point does not belong to the basin
     lim_at_window: bool  #: the window's edge limits it, not the basin's boundary: the true one is larger
-    lim_at_most: float  #: if all points without a label belong to the basin; greater than ``lim``: they limit it
+    lim_at_most: (
+        float  #: if all points without a label belong to the basin; greater than ``lim``: they limit it
+    )
     factor: float  #: IF
     factor_at_window: bool  #: the same for IF
     factor_at_most: float  #: the same for IF
@@ -64,7 +66,8 @@ def integrity(
     ``resolution``, and filaments of another basin thinner than a cell are not seen.
 
     Args:
-        labels: on the grid, any number of axes; negative: no label, counted for the basin only in ``..._at_most``.
+        labels: on the grid, any number of axes; negative: no label, in the basin only for what
+            ends in ``_at_most``.
         axes: coordinates along every axis, rising in equal steps; of a scene by the names of its states, as
             :class:`fastmech.basins.map.BasinMap` has them.
         label: of the basin.
@@ -121,7 +124,7 @@ class _Ball(NamedTuple):
 def _balls(
     points: Floats, inside: NDArray[np.bool_], place: Floats, nearest: tuple[int, ...], matrix: Floats
 ) -> tuple[_Ball, _Ball, Floats]:
-    """Largest ball round ``place`` in the points ``inside``, largest one anywhere, and the latter's centre."""
+    """The largest ball round ``place`` in the points ``inside``, the largest anywhere, and its centre."""
     others = points[~inside] @ matrix
     tree = KDTree(others) if len(others) else None
     corners = points.reshape(-1, place.size)
