@@ -88,7 +88,7 @@ def _labels(view: Slice) -> Figure:
         text = f"{smaller.size} smaller basins, in colours of their own: {_share(np.isin(label, smaller))}"
         handles.append(Patch(facecolor="none", label=text))
     if grey.any():
-        text = f"{np.count_nonzero(grey)} basins further away: {_share(np.isin(label, order[grey]))}"
+        text = f"{np.count_nonzero(grey)} further basins: {_share(np.isin(label, order[grey]))}"
         handles.append(Patch(facecolor=FURTHER, label=text))
     for name, (color, marker, meaning) in UNLABELLED.items():
         where = status == codes[name]

@@ -69,6 +69,31 @@ def test_picture(section: Dataset) -> None:
     assert any("seen from 96 to 100 N/m" in label for label in labels)
 
 
+def test_picture_marks_radii_that_undecided_starts_limit(section: Dataset) -> None:
+    """Of this short section one start of the map is undecided, next to the shallow well."""
+
+    def drawn(shown: Dataset) -> tuple[bool, list[float]]:
+        figure = Erosion.draw(shown, BISTABLE.model_dump())["profile"]
+        assert_legible(figure)
+        texts = [text.get_text() for text in figure.legends[0].get_texts()]
+        marks = [line for line in figure.axes[1].lines if line.get_marker() == "^"]
+        heights = [float(y) for line in marks for y in np.asarray(line.get_ydata())]
+        return "radius, if all undecided starts ended there" in texts, heights
+
+    names = ("well_lim", "well_factor")
+    most = {name: section[f"{name}_at_most"] for name in names}
+    limited = [most[name].data[most[name].data > section[name].data] for name in names]
+    assert limited[0].size
+    marked, heights = drawn(section)
+    assert marked
+    assert sorted(heights) == sorted(np.concatenate(limited).tolist())
+    decided = {f"{name}_at_most": section[name] for name in names}
+    assert drawn(Dataset({**{name: section[name] for name in section}, **decided}, section.attrs)) == (
+        False,
+        [],
+    )
+
+
 @pytest.mark.nojit
 def test_the_request_in_the_repository_is_valid() -> None:
     request = read_request(Path(__file__).parents[2] / "scans" / "basins_erosion.toml", scan_kinds())
