@@ -67,10 +67,13 @@ class ErosionProfile:
     lower: Floats  #: lower end of its 95 % Wilson interval
     upper: Floats  #: upper end
     gim: Floats  #: global integrity measure: share of the map
+    gim_at_most: Floats  #: the same if all starts of the map without a label ended in the well
     lim: Floats  #: local integrity measure on the map [rad]; NaN also where the well is outside the window
     lim_at_window: NDArray[np.bool_]  #: the window's edge limits it, not the basin
+    lim_at_most: Floats  #: as for the GIM [rad]; greater than ``lim``: starts without a label limit it
     factor: Floats  #: integrity factor on the map [rad]
     factor_at_window: NDArray[np.bool_]  #: the same for the factor
+    factor_at_most: Floats  #: the same for the factor [rad]
     shock: Floats  #: minimal critical shock of all four states [rad]; NaN also: none up to the largest
     kick: Floats  #: the same for a kick of the rates alone [rad]
     shock_undecided: Floats  #: smallest shock tried whose end is not known [rad]; NaN: none
@@ -165,10 +168,13 @@ class Survey:
         result = integrity(labels, self.lines, 0, centre, norm_on(norm, 4, self.states))
         return {
             "gim": result.gim,
+            "gim_at_most": result.gim_at_most,
             "lim": result.lim if within else np.nan,
             "lim_at_window": within and result.lim_at_window,
+            "lim_at_most": result.lim_at_most if within else np.nan,
             "factor": result.factor,
             "factor_at_window": result.factor_at_window,
+            "factor_at_most": result.factor_at_most,
         }
 
     def _starts(self, points: Floats, place: Floats) -> Floats:

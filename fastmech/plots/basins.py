@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.plots.basin_colors import FURTHER, basin_color
 from fastmech.plots.basin_marks import SYMBOLS, Slice, decisive, mark
 from fastmech.plots.basin_names import basin_name
 from fastmech.plots.labels import flag_codes
-from fastmech.plots.style import FIELD, PALETTE, new_figure, style
+from fastmech.plots.style import FIELD, new_figure, style
 from fastmech.results import Dataset
 from fastmech.scene import Scene
 
@@ -20,19 +21,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Colours of the largest basins, pale enough for black marks on top; all further ones share a grey.
-COLORS = [
-    PALETTE["sky"],
-    PALETTE["orange"],
-    PALETTE["green"],
-    PALETTE["yellow"],
-    PALETTE["purple"],
-    PALETTE["blue"],
-    PALETTE["vermillion"],
-    "#bcd7ea",
-    "#8c6d31",
-]
-FURTHER = "#9a9a9a"
+#: Basins that a legend names, the largest ones.
+NAMED = 10
 
 #: Looks of starts without a label: colour, and the marker that keeps single ones visible.
 UNLABELLED = {
@@ -42,6 +32,12 @@ UNLABELLED = {
     "step_too_large": ("#4d4d4d", "1", "step too large"),
     "start_not_finite": ("#4d4d4d", "2", "start not finite"),
 }
+
+#: Why a computed start has no time.
+WITHOUT_TIME = {"capture_time": "not captured", "settle_time": "not settled"}
+
+#: Colour of starts of a refined map that have not been computed.
+SKIPPED = "#d9d9d9"
 
 #: Starts without label up to which each is marked.
 FEW = 400
@@ -71,19 +67,29 @@ def _labels(view: Slice) -> Figure:
     codes = flag_codes(view.dataset["status"])
     present, number = np.unique(label[label >= 0], return_counts=True)
     order = present[np.argsort(-number, kind="stable")]
-    shown, rest = order[: len(COLORS)], order[len(COLORS) :]
     colors: list[str] = []
     handles: list[Artist] = []
     picture = np.full(label.shape, -1)
-    for basin, color in zip(shown, COLORS, strict=False):
+    own = [basin_color(view.dataset, *_copy(view, basin)) for basin in order]
+    named = [(basin, color) for basin, color in zip(order, own, strict=True) if color != FURTHER][:NAMED]
+    for basin, color in zip(order, own, strict=True):
         picture[label == basin] = len(colors)
-        handles.append(Patch(facecolor=color, label=f"{_name(view, basin)}: {_share(label == basin)}"))
         colors.append(color)
-    if rest.size:
-        further = np.isin(label, rest)
-        picture[further] = len(colors)
-        handles.append(Patch(facecolor=FURTHER, label=f"{rest.size} further basins: {_share(further)}"))
-        colors.append(FURTHER)
+    handles += [
+        Patch(
+            facecolor=color,
+            label=f"{basin_name(view.dataset, *_copy(view, basin))}: {_share(label == basin)}",
+        )
+        for basin, color in named
+    ]
+    grey = np.array([color == FURTHER for color in own], dtype=np.bool_)
+    smaller = np.setdiff1d(order[~grey], [basin for basin, _ in named])
+    if smaller.size:
+        text = f"{smaller.size} smaller basins, in colours of their own: {_share(np.isin(label, smaller))}"
+        handles.append(Patch(facecolor="none", label=text))
+    if grey.any():
+        text = f"{np.count_nonzero(grey)} further basins: {_share(np.isin(label, order[grey]))}"
+        handles.append(Patch(facecolor=FURTHER, label=text))
     for name, (color, marker, meaning) in UNLABELLED.items():
         where = status == codes[name]
         if where.any():
@@ -113,11 +119,11 @@ def _labels(view: Slice) -> Figure:
     return figure
 
 
-def _name(view: Slice, basin: int) -> str:
-    """A basin's well and turns in words."""
+def _copy(view: Slice, basin: int) -> tuple[int, tuple[int, int]]:
+    """A basin's well and turns."""
     data = view.dataset
-    turns = [int(data[f"basin_turns_{angle}"].data[basin]) for angle in ("phi", "theta")]
-    return basin_name(data, int(data["basin_well"].data[basin]), (turns[0], turns[1]))
+    phi, theta = (int(data[f"basin_turns_{angle}"].data[basin]) for angle in ("phi", "theta"))
+    return int(data["basin_well"].data[basin]), (phi, theta)
 
 
 def _share(where: NDArray[np.bool_]) -> str:
@@ -125,7 +131,7 @@ def _share(where: NDArray[np.bool_]) -> str:
 
 
 def _times(view: Slice, name: str, title: str) -> Figure:
-    from matplotlib.colors import LogNorm, Normalize
+    from matplotlib.colors import ListedColormap, LogNorm, Normalize
     from matplotlib.patches import Patch
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
@@ -136,7 +142,18 @@ def _times(view: Slice, name: str, title: str) -> Figure:
     positive = known[known > 0.0]
     low, high = (float(positive.min()), float(positive.max())) if positive.size else (0.1, 1.0)
     norm = LogNorm(low, high) if high > 20.0 * low else Normalize(low, max(high, low * 1.01))
-    axes.set_facecolor("#d9d9d9")
+    # A start that has been computed and has no time is white, as an undecided one among the labels.
+    computed = view.data("computed").astype(np.bool_)
+    without = {"white": computed & ~np.isfinite(times), SKIPPED: ~computed & ~np.isfinite(times)}
+    axes.set_facecolor("white")
+    axes.pcolormesh(
+        view.axis(0),
+        view.axis(1),
+        np.where(without[SKIPPED], 0.0, np.nan).T,
+        cmap=ListedColormap([SKIPPED]),
+        shading="nearest",
+        rasterized=True,
+    )
     mesh = axes.pcolormesh(
         view.axis(0),
         view.axis(1),
@@ -152,8 +169,12 @@ def _times(view: Slice, name: str, title: str) -> Figure:
         bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         bar.ax.yaxis.set_minor_formatter(NullFormatter())
     handles = decisive(axes, view)
-    if known.size < times.size:
-        handles.insert(0, Patch(facecolor="#d9d9d9", label="no time: not captured, or not computed"))
+    meanings = {"white": WITHOUT_TIME[name], SKIPPED: "not computed: filled in between equal labels"}
+    handles[:0] = [
+        Patch(facecolor=color, edgecolor="black", label=f"{meanings[color]}: {_share(where)}")
+        for color, where in without.items()
+        if where.any()
+    ]
     figure.legend(handles=handles, loc="outside lower center", ncols=2)
     if view.data("computed").all():  # else those near boundaries are over-represented
         title += f" (median {np.median(known):.3g} s, 99 % within {np.quantile(known, 0.99):.3g} s)"

@@ -58,6 +58,20 @@ def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figu
                 [], [], color="black", marker="x", ms=6, ls="none", label="smaller one tried is undecided"
             ),
         ]
+        if _limited(dataset):
+            handles.append(
+                Line2D(
+                    [],
+                    [],
+                    color="black",
+                    marker="^",
+                    mfc="white",
+                    ms=6,
+                    lw=1.0,
+                    ls=":",
+                    label="radius, if all undecided starts ended there",
+                )
+            )
         figure.legend(handles=handles, loc="outside lower center", ncols=2)
         figure.suptitle(_title(dataset, scene, name))
         return {"profile": figure}
@@ -96,10 +110,21 @@ def _lines(axes: Axes, dataset: Dataset, well: int, color: str, looks: Mapping[s
         if f"well_{measure}_at_window" in dataset:
             cut = dataset[f"well_{measure}_at_window"].data[:, well].astype(np.bool_)
             axes.plot(x[cut], y[cut], marker, color=color, mfc="white", ms=5, ls="none")
+        if f"well_{measure}_at_most" in dataset:
+            most = dataset[f"well_{measure}_at_most"].data[:, well]
+            more = most > y
+            axes.vlines(x[more], y[more], most[more], color=color, lw=1.0, ls=":")
+            axes.plot(x[more], most[more], "^", color=color, mfc="white", ms=6, ls="none")
         if f"well_{measure}_undecided" in dataset:
             first = dataset[f"well_{measure}_undecided"].data[:, well]
             early = np.isfinite(first) & ~(first >= y)
             axes.plot(x[early], first[early], "x", color=color, ms=6)
+
+
+def _limited(dataset: Dataset) -> bool:
+    """Whether starts of the map without a label limit a radius."""
+    names = [name for name in ("well_lim", "well_factor") if f"{name}_at_most" in dataset]
+    return any(bool((dataset[f"{name}_at_most"].data > dataset[name].data).any()) for name in names)
 
 
 def _axes(panels: np.ndarray, dataset: Dataset, name: str) -> None:

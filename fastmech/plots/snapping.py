@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fastmech.plots.basin_colors import FURTHER, basin_color
 from fastmech.plots.basin_names import basin_name
-from fastmech.plots.basins import COLORS, FEW, FURTHER, UNLABELLED
+from fastmech.plots.basins import FEW, NAMED, UNLABELLED
 from fastmech.plots.labels import flag_codes
 from fastmech.plots.style import new_figure, style
 from fastmech.results import Dataset
@@ -73,19 +74,22 @@ def _ends(dataset: Dataset) -> tuple[np.ndarray, list[str], list[Artist]]:
     back = np.mean((well >= 0) & ~left)
     handles: list[Artist] = [Patch(facecolor=BACK, label=f"comes back to its well: {100.0 * back:.3g} %")]
     flat = picture[left]
-    for end in order[: len(COLORS)]:
+    named, others, other_share = 0, 0, 0.0
+    for end in order:
+        copy = int(gone[end, 0]), (int(gone[end, 1]), int(gone[end, 2]))
+        color, share = basin_color(dataset, *copy), 100.0 * number[end] / well.size
         flat[inverse.ravel() == end] = len(colors)
-        name = basin_name(dataset, int(gone[end, 0]), (int(gone[end, 1]), int(gone[end, 2])))
-        share = 100.0 * number[end] / well.size
-        handles.append(Patch(facecolor=COLORS[len(colors) - 1], label=f"leaves to {name}: {share:.3g} %"))
-        colors.append(COLORS[len(colors) - 1])
-    if order.size > len(COLORS):
-        rest = np.isin(inverse.ravel(), order[len(COLORS) :])
-        flat[rest] = len(colors)
-        share = 100.0 * np.count_nonzero(rest) / well.size
-        text = f"leaves to {order.size - len(COLORS)} further ends: {share:.3g} %"
+        colors.append(color)
+        if color != FURTHER and named < NAMED:
+            named += 1
+            handles.append(
+                Patch(facecolor=color, label=f"leaves to {basin_name(dataset, *copy)}: {share:.3g} %")
+            )
+        else:
+            others, other_share = others + 1, other_share + share
+    if others:
+        text = f"leaves to {others} further ends, grey or small: {other_share:.3g} %"
         handles.append(Patch(facecolor=FURTHER, label=text))
-        colors.append(FURTHER)
     picture[left] = flat
     if (well < 0).any():
         picture[well < 0] = len(colors)

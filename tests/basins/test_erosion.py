@@ -80,6 +80,27 @@ def test_wells_keep_their_identity_where_their_order_changes() -> None:
     np.testing.assert_allclose(profile.theta[::-1, 1], -profile.theta[:, 0], atol=1e-9)
 
 
+def test_starts_without_a_label_leave_room_above_the_measures() -> None:
+    """A ring of the true ball is not decided: what it could add is told, and it is the whole ball."""
+
+    def undecided_ring(scene: fm.Scene, y: np.ndarray) -> Ends:
+        ends = balls(scene, y)
+        _, places, norms = wells_of(scene)
+        sizes = np.linalg.norm((y - places[:, None]) @ norms, axis=2).min(axis=0)
+        return Ends(np.where((sizes > RADIUS / 2) & (sizes <= RADIUS), -1, ends.well), ends.turns)
+
+    options: dict[str, Any] = {"most_shock": 1.0, "n": 200, "directions": 4}
+    whole = erosion(BISTABLE, "F0", [85.3], GRID, labels_of=balls, **options)
+    ring = erosion(BISTABLE, "F0", [85.3], GRID, labels_of=undecided_ring, **options)
+    for name in ("gim", "lim"):
+        assert (getattr(ring, name) < 0.8 * getattr(whole, name)).all()
+    for name in ("gim", "lim", "factor"):
+        most = getattr(ring, f"{name}_at_most")
+        assert (most >= getattr(whole, name)).all()
+        np.testing.assert_array_equal(getattr(whole, f"{name}_at_most"), getattr(whole, name))
+    np.testing.assert_array_equal(ring.lim_at_most, whole.lim)
+
+
 def test_a_slice_of_rates_goes_through_the_well() -> None:
     rates = {"theta_dot": np.linspace(-4, 4, 41), "phi_dot": np.linspace(-4, 4, 41)}
     profile = erosion(BISTABLE, "c1", [290.0], rates, labels_of=balls, most_shock=1.0, n=200, directions=4)

@@ -38,7 +38,8 @@ def test_a_file_holds_what_the_function_gives(section: Dataset) -> None:
     )
     units = dict.fromkeys(("phi", "theta", "lim", "factor", "shock", "kick"), "rad")
     units |= dict.fromkeys(("shock_undecided", "kick_undecided"), "rad")
-    units |= dict.fromkeys(("stability", "lower", "upper", "gim", "undecided"), "1")
+    units |= dict.fromkeys(("lim_at_most", "factor_at_most"), "rad")
+    units |= dict.fromkeys(("stability", "lower", "upper", "gim", "gim_at_most", "undecided"), "1")
     units |= dict.fromkeys(("lim_at_window", "factor_at_window"), "1")
     check_labels(section, {f"well_{k}": u for k, u in units.items()} | {"c2": "N/m", "sheet": "1"})
     for name in units:
@@ -66,6 +67,31 @@ def test_picture(section: Dataset) -> None:
     labels = [text.get_text() for text in figures["profile"].legends[0].get_texts()]
     assert any("seen from 96 to 98 N/m" in label for label in labels)
     assert any("seen from 96 to 100 N/m" in label for label in labels)
+
+
+def test_picture_marks_radii_that_undecided_starts_limit(section: Dataset) -> None:
+    """Of this short section one start of the map is undecided, next to the shallow well."""
+
+    def drawn(shown: Dataset) -> tuple[bool, list[float]]:
+        figure = Erosion.draw(shown, BISTABLE.model_dump())["profile"]
+        assert_legible(figure)
+        texts = [text.get_text() for text in figure.legends[0].get_texts()]
+        marks = [line for line in figure.axes[1].lines if line.get_marker() == "^"]
+        heights = [float(y) for line in marks for y in np.asarray(line.get_ydata())]
+        return "radius, if all undecided starts ended there" in texts, heights
+
+    names = ("well_lim", "well_factor")
+    most = {name: section[f"{name}_at_most"] for name in names}
+    limited = [most[name].data[most[name].data > section[name].data] for name in names]
+    assert limited[0].size
+    marked, heights = drawn(section)
+    assert marked
+    assert sorted(heights) == sorted(np.concatenate(limited).tolist())
+    decided = {f"{name}_at_most": section[name] for name in names}
+    assert drawn(Dataset({**{name: section[name] for name in section}, **decided}, section.attrs)) == (
+        False,
+        [],
+    )
 
 
 @pytest.mark.nojit

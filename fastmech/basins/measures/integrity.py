@@ -7,6 +7,9 @@ Measures by Soliman and Thompson, J. Sound Vib. 135 (1989) 453, and Rega and Len
 - LIM, local integrity measure: the radius of the largest ball round the attractor that lies in the basin.
 - IF, integrity factor: the radius of the largest ball in the basin, wherever its centre.
 
+A point without a label is not taken for the basin's, which can make all three too small; ``gim_at_most``,
+``lim_at_most`` and ``factor_at_most`` are what they would be, were all such points in the basin.
+
 They use them relative to a reference (the basin without excitation); divide two results for that.
 """
 
@@ -14,9 +17,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import KDTree
 
 from fastmech.basins.measures.labels import Floats, check_axes, check_map, check_point
@@ -32,10 +36,15 @@ class Integrity:
     """Integrity of one basin on one map. Radii are lengths in the stated norm."""
 
     gim: float  #: share of the map's points: the basin's volume over the window's
+    gim_at_most: float  #: if all points without a label belong to the basin
     lim: float  #: radius round the attractor; 0: the map's nearest point does not belong to the basin
     lim_at_window: bool  #: the window's edge limits it, not the basin's boundary: the true one is larger
+    lim_at_most: (
+        float  #: if all points without a label belong to the basin; greater than ``lim``: they limit it
+    )
     factor: float  #: IF
     factor_at_window: bool  #: the same for IF
+    factor_at_most: float  #: the same for IF
     centre: Floats  #: of the largest ball, a point of the map or the attractor, (axes,); NaN: no basin
     resolution: float  #: length of a cell's longest diagonal
 
@@ -49,7 +58,7 @@ def integrity(
     *,
     scene: Scene | None = None,
 ) -> Integrity:
-    """GIM, LIM and IF of the basin ``label`` on a map.
+    """GIM, LIM and IF of the basin ``label`` on a map, and how large points without a label leave them.
 
     A ball lies in the basin if no point of the map in its inside has another label or none, and its inside is
     within the window (the span of the axes: nothing is known beyond). So a radius is the distance from the
@@ -57,7 +66,8 @@ def integrity(
     ``resolution``, and filaments of another basin thinner than a cell are not seen.
 
     Args:
-        labels: on the grid, any number of axes; negative: no label, which does not belong to the basin.
+        labels: on the grid, any number of axes; negative: no label, in the basin only for what
+            ends in ``_at_most``.
         axes: coordinates along every axis, rising in equal steps; of a scene by the names of its states, as
             :class:`fastmech.basins.map.BasinMap` has them.
         label: of the basin.
@@ -85,40 +95,57 @@ def integrity(
     if (place < first).any() or (place > last).any():
         raise InputError(f"attractor = {place.tolist()}: must lie within the map's window")
     matrix = norm_on(norm, array.ndim)
-    inside = array == label
     points = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
-    others = points[~inside] @ matrix
-    tree = KDTree(others) if len(others) else None
-
-    def room(centres: Floats) -> tuple[Floats, Floats]:
-        """Distances (n,) to the nearest point outside the basin and to the window's edge."""
-        # The distance to a face of the box is measured along the norm's own normal.
-        reach = np.sqrt(np.diag(np.linalg.inv(matrix @ matrix.T)))
-        edge = (np.minimum(centres - first, last - centres) / reach).min(axis=1)
-        boundary = tree.query(centres @ matrix)[0] if tree else np.full(len(centres), np.inf)
-        return np.asarray(boundary), edge
-
     nearest = tuple(int(np.abs(line - x).argmin()) for line, x in zip(lines, place, strict=True))
-    boundary, edge = room(place[None]) if inside[nearest] else (np.zeros(1), np.ones(1))
-    lim, lim_at_window = float(min(boundary[0], edge[0])), bool(edge[0] < boundary[0])
-    factor, factor_at_window, centre = 0.0, False, np.full(array.ndim, np.nan)
-    if inside.any():
-        centres = points[inside]
-        if lim > 0.0:  # so that IF is never less than LIM
-            centres = np.concatenate([centres, place[None]])
-        boundary, edge = room(centres)
-        best = int(np.argmax(np.minimum(boundary, edge)))
-        factor, factor_at_window = float(min(boundary[best], edge[best])), bool(edge[best] < boundary[best])
-        centre = centres[best]
+    own, possible = array == label, (array == label) | (array < 0)
+    about, largest, centre = _balls(points, own, place, nearest, matrix)
+    most_about, most = about, largest
+    if (array < 0).any():
+        most_about, most, _ = _balls(points, possible, place, nearest, matrix)
     return Integrity(
-        gim=float(inside.mean()),
-        lim=lim,
-        lim_at_window=lim_at_window,
-        factor=factor,
-        factor_at_window=factor_at_window,
+        gim=float(own.mean()),
+        gim_at_most=float(possible.mean()),
+        lim=about.radius,
+        lim_at_window=about.at_window,
+        lim_at_most=most_about.radius,
+        factor=largest.radius,
+        factor_at_window=largest.at_window,
+        factor_at_most=most.radius,
         centre=centre,
         resolution=_longest_diagonal(lines, matrix),
     )
+
+
+class _Ball(NamedTuple):
+    radius: float
+    at_window: bool  # the window's edge is nearer than any point outside the basin
+
+
+def _balls(
+    points: Floats, inside: NDArray[np.bool_], place: Floats, nearest: tuple[int, ...], matrix: Floats
+) -> tuple[_Ball, _Ball, Floats]:
+    """The largest ball round ``place`` in the points ``inside``, the largest anywhere, and its centre."""
+    others = points[~inside] @ matrix
+    tree = KDTree(others) if len(others) else None
+    corners = points.reshape(-1, place.size)
+    first, last = corners[0], corners[-1]
+    # The distance to a face of the box is measured along the norm's own normal.
+    reach = np.sqrt(np.diag(np.linalg.inv(matrix @ matrix.T)))
+
+    def balls(centres: Floats) -> list[_Ball]:
+        edge = (np.minimum(centres - first, last - centres) / reach).min(axis=1)
+        boundary = tree.query(centres @ matrix)[0] if tree else np.full(len(centres), np.inf)
+        return [_Ball(float(min(b, e)), bool(e < b)) for b, e in zip(boundary, edge, strict=True)]
+
+    about = balls(place[None])[0] if inside[nearest] else _Ball(0.0, False)
+    if not inside.any():
+        return about, _Ball(0.0, False), np.full(place.size, np.nan)
+    centres = points[inside]
+    if about.radius > 0.0:  # so that IF is never less than LIM
+        centres = np.concatenate([centres, place[None]])
+    found = balls(centres)
+    best = int(np.argmax([ball.radius for ball in found]))
+    return about, found[best], centres[best]
 
 
 def _longest_diagonal(lines: list[Floats], matrix: Floats) -> float:

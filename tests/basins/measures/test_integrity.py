@@ -33,6 +33,45 @@ def test_a_map_done_by_hand() -> None:
     assert result.resolution == pytest.approx(np.sqrt(2.0))
 
 
+def test_points_without_a_label_limit_what_they_could_add() -> None:
+    labels = [
+        [0, 0, 0, 0, 0, 1, 1],
+        [0, 0, 0, 0, 0, 0, 1],
+        [0, 0, 0, 0, 0, 0, 0],
+        [0, 0, 0, 0, 0, 0, 0],
+        [0, 0, 0, 0, 0, -1, 0],
+        [2, 0, 0, 0, 0, -3, 0],
+        [0, 0, 0, 0, 0, 0, 0],
+    ]
+    axes = [range(7), range(7)]
+    result = integrity(labels, axes, 0, [4.0, 4.0], np.eye(2))
+    assert (result.gim, result.gim_at_most) == (43 / 49, 45 / 49)
+    # With the gaps filled the edges are 2 from (4, 4). They are 3 from (3, 3), the nearest labels to that,
+    # (0, 5) and (5, 0), sqrt(13).
+    assert (result.lim, result.lim_at_most) == (1.0, 2.0)
+    assert result.factor == pytest.approx(np.sqrt(5.0))
+    assert result.factor_at_most == 3.0
+    # About a corner of the window there is no ball; a gap that belonged to the basin 1 would hold one.
+    corner = integrity(labels, axes, 1, [0.0, 6.0], np.eye(2))
+    assert (corner.lim, corner.lim_at_most, corner.factor, corner.factor_at_most) == (0.0, 0.0, 0.0, 1.0)
+
+
+def test_a_gap_behind_another_basin_limits_nothing() -> None:
+    labels = [[0, 0, 0, 0, 0, 1, -1]] * 5
+    result = integrity(labels, [range(5), range(7)], 0, [2.0, 4.0], np.eye(2))
+    assert result.gim_at_most > result.gim
+    assert (result.lim, result.lim_at_most) == (1.0, 1.0)
+    assert (result.factor, result.factor_at_most) == (2.0, 2.0)
+
+
+def test_an_attractor_in_a_gap_may_have_room() -> None:
+    labels = [[1] * 5, [1, -1, -1, -1, 1], [1, -1, -1, -1, 1], [1, -1, -1, -1, 1], [1] * 5]
+    result = integrity(labels, [range(5), range(5)], 0, [2.0, 2.0], np.eye(2))
+    assert (result.gim, result.lim, result.factor) == (0.0, 0.0, 0.0)
+    assert np.isnan(result.centre).all()
+    assert (result.gim_at_most, result.lim_at_most, result.factor_at_most) == (9 / 25, 2.0, 2.0)
+
+
 def test_a_basin_that_fills_the_window_ends_at_its_edge() -> None:
     result = integrity(np.zeros((5, 9), int), [np.linspace(0, 1, 5), np.linspace(0, 2, 9)], 0, [0.5, 0.25],
                        np.eye(2))  # fmt: skip

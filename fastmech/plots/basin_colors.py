@@ -1,0 +1,50 @@
+"""The colour of a basin: the same label has the same colour in every picture, whatever else is in it."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+
+from fastmech.plots.style import PALETTE
+from fastmech.results import Dataset
+
+#: Wells and turns of each angle, either way, whose basins have a colour of their own.
+WELLS, TURNS = 2, 2
+
+#: Colours by how usual a label is. After Okabe and Ito's each next one was chosen as far as possible from all
+#: before it in OKLab (Ottosson 2020), and from white, black and the greys of :mod:`fastmech.plots.basins`, as
+#: seen by normal, protanopic and deuteranopic eyes (Machado, Oliveira, Fernandes, IEEE Trans. Visualization
+#: and Computer Graphics 15 (2009) 1291); none too dark for black marks on top.
+COLORS = [PALETTE[name] for name in ("sky", "orange", "green", "yellow", "purple", "blue", "vermillion")]
+COLORS += [
+    "#a7d8ba", "#6200ff", "#4e89ff", "#3b766c", "#a7ffb1", "#62d8ff", "#a7450a", "#76c480", "#ce00a7",
+    "#c4d880", "#62c4c4", "#4e6ce2", "#009dd8", "#baebeb", "#ebc400", "#eb763b", "#6c5889", "#ce3b45",
+    "#c414ce", "#62b16c", "#00a7ff", "#3b8980", "#3b804e", "#ffb1eb", "#eb9db1", "#ceeb80", "#e258ce",
+    "#b16c9d", "#b1ebc4", "#ebb14e", "#00a74e", "#d8ff80", "#76ba9d", "#4ed8d8", "#624eff", "#b1ffd8",
+    "#9300c4", "#b1ce93", "#a79dc4", "#586c31", "#d831ba", "#e2ff00", "#89ce6c",
+]  # fmt: skip
+
+#: Colour of all other basins.
+FURTHER = "#9a9a9a"
+
+
+def _how_usual(label: tuple[int, int, int]) -> tuple[int, ...]:
+    """Smaller: more usual. A turn of phi mostly comes with one back of theta: the second rod turns little."""
+    well, phi, theta = label
+    return abs(phi) + abs(theta) + abs(phi + theta), well, abs(phi), phi, theta
+
+
+_LABELS = sorted(product(range(WELLS), range(-TURNS, TURNS + 1), range(-TURNS, TURNS + 1)), key=_how_usual)
+_COLOR_OF = dict(zip(_LABELS, COLORS, strict=True))
+
+
+def well_number(dataset: Dataset, well: int) -> int:
+    """Place from 0 of a well among the wells; ``well`` is an index among the dataset's equilibria."""
+    wells = np.flatnonzero(dataset["equilibrium_morse_index"].data == 0)
+    return int(np.flatnonzero(wells == well)[0])
+
+
+def basin_color(dataset: Dataset, well: int, turns: tuple[int, int]) -> str:
+    """Colour of a copy of a well; ``well`` is an index among the dataset's equilibria."""
+    return _COLOR_OF.get((well_number(dataset, well), *turns), FURTHER)
