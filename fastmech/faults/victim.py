@@ -109,6 +109,8 @@ class _NotedHiring:
 
 
 class _NotedWorkers:
+    deaths = ()
+
     def __init__(self, workers: ThreadWorkers, note: Callable[[str], None]) -> None:
         self._workers, self._note = workers, note
 

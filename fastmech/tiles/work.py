@@ -20,11 +20,18 @@ from fastmech.tiles.tile_file import Tile
 #: How often a tile is tried before it is given up.
 TRIES = 2
 
+#: Seconds after which workers are counted again although no tile is back.
+PERIOD = 2.0
+
 #: How the threads that compute tiles are called.
 THREADS = "fastmech-tile"
 
 #: Seconds that tiles in hand have to end in after an interrupt.
 GRACE = 0.7
+
+
+#: What is said when Dask cancels what nobody has cancelled here, or cannot be reached.
+LOST = "the connection to the Dask scheduler is lost"
 
 
 @dataclass(frozen=True)
@@ -44,11 +51,21 @@ class Crash:
 
 
 class Workers(Protocol):
-    """Who computes tiles."""
+    """Who computes tiles.
+
+    Attributes:
+        deaths: exceptions that say that a whole worker died, with every tile it had.
+    """
+
+    deaths: tuple[type[Exception], ...]
 
     @property
     def slots(self) -> int:
-        """How many tiles to hand out at a time."""
+        """How many tiles to hand out at a time.
+
+        Raises:
+            InputError: there is nobody any more.
+        """
 
     def submit(self, task: Task) -> Future[Tile]:
         """Have a tile computed."""
@@ -77,6 +94,8 @@ class ThreadWorkers:
         context: threads in all and where progress within a tile is told.
         stopping: set when tiles in hand are to end.
     """
+
+    deaths = ()
 
     def __init__(self, pool: Executor, side: int, context: RunContext, stopping: threading.Event) -> None:
         self.slots = side + 1  # one more, so that none waits while a tile is written
@@ -129,6 +148,9 @@ def compute_tiles(
 ) -> None:
     """Compute tiles and keep each as soon as it is finished, in this thread.
 
+    Tiles whose worker died are tried again when all others are done, one at a time: the next death is then the
+    fault of the only tile in hand.
+
     Args:
         tasks: which, in the order in which they are handed out.
         workers: who computes.
@@ -136,19 +158,23 @@ def compute_tiles(
         crashed: is told of every tile that failed `TRIES` times; the others go on.
 
     Raises:
-        InputError: a scan refuses.
+        InputError: a scan refuses, or the workers are lost.
         OSError: ``keep`` failed.
         KeyboardInterrupt: the user stops it; what ends within `GRACE` seconds is kept.
     """
-    waiting = list(reversed(tasks))
+    waiting, suspects = list(reversed(tasks)), list[Task]()
     tries: dict[Task, int] = {}
     running: dict[Future[Tile], Task] = {}
     try:
-        while waiting or running:
-            while waiting and len(running) < workers.slots:
+        while waiting or suspects or running:
+            slots = workers.slots
+            while waiting and len(running) < slots:
                 task = waiting.pop()
                 running[workers.submit(task)] = task
-            done, _ = wait(running, return_when=FIRST_COMPLETED)
+            if not running:
+                task = suspects.pop()
+                running[workers.submit(task)] = task
+            done, _ = wait(running, PERIOD, FIRST_COMPLETED)
             for future in done:
                 task = running.pop(future)
                 try:
@@ -156,13 +182,15 @@ def compute_tiles(
                 except InputError:
                     raise
                 except CancelledError:
-                    raise InputError("the connection to the Dask scheduler is lost") from None
+                    raise InputError(LOST) from None
                 except Exception as error:
                     tries[task] = tries.get(task, 1) + 1
+                    died = isinstance(error, workers.deaths)
                     if tries[task] <= TRIES:
-                        waiting.append(task)
+                        (suspects if died else waiting).append(task)
                     else:
-                        crashed(Crash(task, f"{type(error).__name__}: {error}"))
+                        reason = "its worker process died" if died else str(error)
+                        crashed(Crash(task, f"{type(error).__name__}: {reason}"))
                     continue
                 keep(task, tile)
     except KeyboardInterrupt:

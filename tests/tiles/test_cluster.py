@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import signal
+import subprocess
+import sys
 import threading
+import time
+from pathlib import Path
 
 import pytest
 from tiles.conftest import Run, content
 
 from fastmech.errors import InputError
 from fastmech.tiles.cluster import ClusterHiring, cluster
+from fastmech.tiles.ends import CrashedTilesError
 
+dask = pytest.importorskip("dask")
 distributed = pytest.importorskip("distributed")
 
 # Dask's own warnings about its surroundings, such as few file descriptors, are no fault here.
@@ -33,6 +41,64 @@ def test_a_worker_dies_and_the_result_is_the_same(run: Run, monkeypatch: pytest.
         killer.join()
     assert content(report.path) == whole
     assert report.computed == report.tiles
+
+
+#: A Dask worker that is started with this dies of the line's third tile.
+ABORTS = """
+import os
+from fastmech.scan_types import map_tiling
+
+def dask_setup(worker):
+    compute = map_tiling.MapTiling.compute
+    def aborting(self, index, context):
+        if index == 2:
+            os.abort()
+        return compute(self, index, context)
+    map_tiling.MapTiling.compute = aborting
+"""
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_tile_kills_its_worker_and_the_others_are_kept(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, workers: int
+) -> None:
+    monkeypatch.setattr("fastmech.scan_types.map_tiling.TILE_POINTS", 20)  # as on the workers
+    (tmp_path / "aborts.py").write_text(ABORTS, encoding="utf-8")
+    preload = ["fastmech.faults.small_tiles", str(tmp_path / "aborts.py")]
+    with (
+        dask.config.set({"distributed.worker.preload": preload}),
+        cluster(workers, None) as hire,
+        pytest.raises(CrashedTilesError) as crashed,
+    ):
+        run("a.h5", hire=hire)
+    found = re.fullmatch(
+        r"1 of (\d+) tiles failed twice, the first with KilledWorker: its worker process died "
+        r"\(alone: fastmech run \S+ --out \S+ --tile line:2 --keep tile\.h5\); (\d+) of \1 tiles are kept .*",
+        str(crashed.value),
+    )
+    assert found is not None, crashed.value
+    assert int(found[2]) == int(found[1]) - 1
+
+
+def test_the_scheduler_dies_before_the_first_tile_is_back(
+    run: Run, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0"]
+    where = tmp_path / "scheduler.json"
+    command += ["--no-dashboard", "--scheduler-file", str(where)]
+    with subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as process:
+        try:
+            while not where.exists() or not where.read_text(encoding="utf-8"):
+                time.sleep(0.1)
+            address = json.loads(where.read_text(encoding="utf-8"))["address"]
+            killer = threading.Timer(1.0, process.kill)
+            with cluster(None, address) as hire, pytest.raises(InputError) as lost:
+                killer.start()  # no worker is there, so that no tile comes back
+                run("a.h5", hire=hire)
+        finally:
+            process.kill()
+    assert str(lost.value) == "the connection to the Dask scheduler is lost"
+    assert "Traceback" not in capfd.readouterr().err
 
 
 def test_no_scheduler_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
