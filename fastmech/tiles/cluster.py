@@ -34,7 +34,7 @@ _ENVIRONMENT = "distributed.nanny.pre-spawn-environ"
 _ALLOCATION = {"MALLOC_TRIM_THRESHOLD_": 1 << 25, "MALLOC_MMAP_THRESHOLD_": 1 << 25}
 
 #: How this machine's own workers may die: at the first death their tiles come back as failed (otherwise at
-#: the fourth), and a worker is started again however often it dies (otherwise Dask gives it up for good where,
+#: the fourth), and a worker is started again however often it dies (otherwise Dask gives it up for good if,
 #: 15 s after one death, it is just starting again after another).
 _DEATHS = {"distributed.scheduler.allowed-failures": 0, "distributed.deploy.lost-worker-timeout": "1000 days"}
 
