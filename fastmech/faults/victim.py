@@ -109,7 +109,7 @@ class _NotedHiring:
 
 
 class _NotedWorkers:
-    deaths = ()
+    deaths: tuple[type[Exception], ...] = ()
 
     def __init__(self, workers: ThreadWorkers, note: Callable[[str], None]) -> None:
         self._workers, self._note = workers, note

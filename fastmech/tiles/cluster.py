@@ -33,13 +33,13 @@ WITHOUT = 60.0
 _ENVIRONMENT = "distributed.nanny.pre-spawn-environ"
 _ALLOCATION = {"MALLOC_TRIM_THRESHOLD_": 1 << 25, "MALLOC_MMAP_THRESHOLD_": 1 << 25}
 
-#: How this machine's own workers may die: at the first death their tiles come back as failed (otherwise at the
-#: fourth), and a worker is started again however often it dies (otherwise Dask gives it up for good where, 15 s
-#: after one death, it is just starting again after another).
+#: How this machine's own workers may die: at the first death their tiles come back as failed (otherwise at
+#: the fourth), and a worker is started again however often it dies (otherwise Dask gives it up for good if,
+#: 15 s after one death, it is just starting again after another).
 _DEATHS = {"distributed.scheduler.allowed-failures": 0, "distributed.deploy.lost-worker-timeout": "1000 days"}
 
 #: Loggers of Dask, of which some have handlers and levels of their own.
-_LOGGERS = ("distributed", "distributed.client", "distributed.core", "distributed.comm", "tornado.application")
+_LOGGERS = ("distributed", "distributed.client", "distributed.core", "tornado.application")
 
 
 class ClusterWorkers:
@@ -49,6 +49,8 @@ class ClusterWorkers:
         client: connected to the scheduler.
         executor: the client's.
     """
+
+    deaths: tuple[type[Exception], ...]
 
     def __init__(self, client: Client, executor: Executor) -> None:
         from distributed import KilledWorker

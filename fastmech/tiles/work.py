@@ -95,7 +95,7 @@ class ThreadWorkers:
         stopping: set when tiles in hand are to end.
     """
 
-    deaths = ()
+    deaths: tuple[type[Exception], ...] = ()
 
     def __init__(self, pool: Executor, side: int, context: RunContext, stopping: threading.Event) -> None:
         self.slots = side + 1  # one more, so that none waits while a tile is written
@@ -148,8 +148,8 @@ def compute_tiles(
 ) -> None:
     """Compute tiles and keep each as soon as it is finished, in this thread.
 
-    Tiles whose worker died are tried again when all others are done, one at a time: the next death is then the
-    fault of the only tile in hand.
+    Tiles whose worker died are tried again when all others are done, one at a time: the next death is then
+    the fault of the only tile in hand.
 
     Args:
         tasks: which, in the order in which they are handed out.

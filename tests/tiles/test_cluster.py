@@ -92,9 +92,10 @@ def test_the_scheduler_dies_before_the_first_tile_is_back(
                 time.sleep(0.1)
             address = json.loads(where.read_text(encoding="utf-8"))["address"]
             killer = threading.Timer(1.0, process.kill)
-            with cluster(None, address) as hire, pytest.raises(InputError) as lost:
+            with cluster(None, address) as hire:
                 killer.start()  # no worker is there, so that no tile comes back
-                run("a.h5", hire=hire)
+                with pytest.raises(InputError) as lost:
+                    run("a.h5", hire=hire)
         finally:
             process.kill()
     assert str(lost.value) == "the connection to the Dask scheduler is lost"
