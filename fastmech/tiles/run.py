@@ -108,7 +108,9 @@ class ScanRun:
             except InputError as error:
                 raise InputError(self._kept(str(error))) from None
             except OSError as error:
-                raise InputError(self._kept(f"{self.target}: cannot be written: {error.strerror}")) from None
+                raise InputError(
+                    self._kept(f"{self.target}: cannot be written: {error.strerror or error}")
+                ) from None
         self.report.seconds = time.perf_counter() - self.started
         return self.report
 

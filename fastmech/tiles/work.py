@@ -175,7 +175,7 @@ def compute_tiles(
                 task = suspects.pop()
                 running[workers.submit(task)] = task
             done, _ = wait(running, PERIOD, FIRST_COMPLETED)
-            for future in done:
+            for future in sorted(done, key=_failed):  # what is finished is kept before a failure ends the run
                 task = running.pop(future)
                 try:
                     tile = future.result()
@@ -190,7 +190,7 @@ def compute_tiles(
                         (suspects if died else waiting).append(task)
                     else:
                         reason = "its worker process died" if died else str(error)
-                        crashed(Crash(task, f"{type(error).__name__}: {reason}"))
+                        crashed(Crash(task, f"{type(error).__name__}: {reason}".removesuffix(": ")))
                     continue
                 keep(task, tile)
     except KeyboardInterrupt:
@@ -199,6 +199,10 @@ def compute_tiles(
     finally:
         for future in running:
             future.cancel()
+
+
+def _failed(future: Future[Tile]) -> bool:
+    return future.cancelled() or future.exception() is not None
 
 
 def still_computing(patience: float) -> int:
