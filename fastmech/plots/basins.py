@@ -85,10 +85,10 @@ def _labels(view: Slice) -> Figure:
     grey = np.array([color == FURTHER for color in own], dtype=np.bool_)
     smaller = np.setdiff1d(order[~grey], [basin for basin, _ in named])
     if smaller.size:
-        text = f"{smaller.size} smaller basins, in colours of their own: {_share(np.isin(label, smaller))}"
+        text = f"smaller, in own colours (basins: {smaller.size}): {_share(np.isin(label, smaller))}"
         handles.append(Patch(facecolor="none", label=text))
     if grey.any():
-        text = f"{np.count_nonzero(grey)} further basins: {_share(np.isin(label, order[grey]))}"
+        text = f"further away (basins: {np.count_nonzero(grey)}): {_share(np.isin(label, order[grey]))}"
         handles.append(Patch(facecolor=FURTHER, label=text))
     for name, (color, marker, meaning) in UNLABELLED.items():
         where = status == codes[name]

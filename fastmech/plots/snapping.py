@@ -88,7 +88,7 @@ def _ends(dataset: Dataset) -> tuple[np.ndarray, list[str], list[Artist]]:
         else:
             others, other_share = others + 1, other_share + share
     if others:
-        text = f"leaves to {others} further ends, grey or small: {other_share:.3g} %"
+        text = f"leaves elsewhere, grey or small ({others} ends): {other_share:.3g} %"
         handles.append(Patch(facecolor=FURTHER, label=text))
     picture[left] = flat
     if (well < 0).any():
