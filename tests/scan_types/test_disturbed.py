@@ -292,7 +292,7 @@ def test_less_may_be_kept(tmp_path: Path) -> None:
     for name in less:
         np.testing.assert_array_equal(less[name].data, whole[name].data)
     assert np.isfinite(less["time_to_return_quantile"].data).any()
-    assert set(Disturbed.draw(less, {})) == {"linear_range"}
+    assert set(Disturbed.draw(less, {})) == {"linear_range", "outcomes"}
     with pytest.raises(ValueError, match="unknown variable 'finl'; did you mean 'final'"):
         Disturbed(variables=["finl"])
 
