@@ -220,3 +220,13 @@ def test_published_shares_of_the_pendulum_and_the_lorenz_system() -> None:
     starts = rng.uniform([-10.0, -20.0, 0.0], [10.0, 20.0, 0.0], (2000, 3))
     escaped = fm.integrate(lorenz.system, starts, 300.0, 0.02).stop_code == 1
     assert abs(escaped.mean() - 0.820) < 3 * np.sqrt(0.820 * 0.180 * (1 / 2000 + 1 / 4000))
+
+
+def test_published_shares_of_the_duffing_oscillator() -> None:
+    """All five within three standard errors, both samples' errors counted; the two smallest are alike."""
+    duffing = shipped("duffing")
+    n, published = 3000, np.array(duffing.PUBLISHED)
+    _, shares = duffing.attractors(np.random.default_rng(5).uniform([-1.0, -0.5], [1.0, 1.0], (n, 2)))
+    assert shares.shape == (5,)
+    error = np.sqrt(published * (1.0 - published) * (1 / n + 1 / 4000))
+    assert (np.abs(shares - published) < 3 * error).all()
