@@ -8,6 +8,8 @@ from __future__ import annotations
 from importlib import import_module, metadata
 from typing import TYPE_CHECKING, Any
 
+from fastmech import kernel_cache as _kernel_cache  # noqa: F401  first: it notes what the sources are
+
 if TYPE_CHECKING:
     from fastmech.atlas.fold_points import find_folds
     from fastmech.atlas.folds import trace_folds

@@ -17,9 +17,10 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import config as numba_config
+from numba.core.caching import FunctionCache
 from numba.extending import intrinsic, overload, register_jitable
 
-from fastmech.kernel_cache import cache_directory
+from fastmech.kernel_cache import cache_directory, sources_unchanged
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -84,6 +85,14 @@ def driver_signature(precision: Any, *method: Any) -> Any:
     )
 
 
+class _Kept(FunctionCache):
+    """Numba's disk cache of a kernel, which keeps nothing once the package's sources have been edited."""
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        if sources_unchanged():
+            super().save_overload(sig, data)  # type: ignore[no-untyped-call]
+
+
 def kernel(signature: Any, **options: Any) -> Callable[[F], Any]:
     """Compile a function for one explicit signature, without the interpreter's lock, kept on disk.
 
@@ -97,7 +106,12 @@ def kernel(signature: Any, **options: Any) -> Callable[[F], Any]:
         previous = settings.CACHE_DIR
         settings.CACHE_DIR = str(cache_directory())
         try:
-            return numba.njit(signature, cache=True, nogil=True, **FLAGS, **options)(function)
+            dispatcher = numba.njit(nogil=True, **FLAGS, **options)(function)
+            if not settings.DISABLE_JIT:
+                dispatcher._cache = _Kept(function)  # type: ignore[no-untyped-call]
+                dispatcher.compile(signature)
+                dispatcher.disable_compile()
+            return dispatcher
         finally:
             settings.CACHE_DIR = previous
 

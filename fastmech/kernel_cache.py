@@ -4,6 +4,10 @@ Numba re-uses a kernel's disk entry as long as the kernel's *own* file is unchan
 that the kernel imports goes unnoticed and the old machine code answers (numba's documented limitation).
 fastmech therefore keeps its entries in a directory whose name is a hash of every source file that a
 kernel can reach: a changed source means another directory, hence a fresh compilation.
+
+Python reads a module's source when it is first imported, which may be long after the process began. The hash
+is therefore taken as the package is imported, before any of those modules, and once more before a kernel is
+saved: where the two differ, nobody knows which text the kernel was made from, and it is not kept.
 """
 
 from __future__ import annotations
@@ -15,8 +19,6 @@ import shutil
 import tempfile
 from functools import cache
 from pathlib import Path
-
-import platformdirs
 
 PACKAGE = Path(__file__).resolve().parent
 
@@ -52,6 +54,18 @@ def source_hash(files: list[Path]) -> str:
     return digest.hexdigest()[:16]
 
 
+#: Hash of the sources as this process began to read them: the package imports this module before any other.
+SOURCES = source_hash(compiled_sources())
+
+
+def sources_unchanged() -> bool:
+    """Whether the sources still are what this process began with, so that its kernels are theirs."""
+    try:
+        return source_hash(compiled_sources()) == SOURCES
+    except OSError:  # a file vanished between listing and reading: somebody is at work
+        return False
+
+
 @cache
 def cache_directory() -> Path:
     """Directory of this version's compiled kernels.
@@ -60,10 +74,12 @@ def cache_directory() -> Path:
     their array bounds have a directory of their own. Where the folder cannot be written, a temporary one
     serves this process: numba's own fallback beside the sources is not named by their hash.
     """
+    import platformdirs  # only here: this module is imported with the package
+
     root = os.environ.get("NUMBA_CACHE_DIR")
     base = Path(root) if root else platformdirs.user_cache_path("fastmech", appauthor=False)
     checked = "-boundscheck" if os.environ.get("NUMBA_BOUNDSCHECK", "0") not in ("", "0") else ""
-    directory = base / f"fastmech-{source_hash(compiled_sources())}{checked}"
+    directory = base / f"fastmech-{SOURCES}{checked}"
     try:
         directory.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=directory):

@@ -11,9 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import numba
+import numpy as np
 import pytest
 
 from fastmech import kernel_cache
+from fastmech.kernels.lagrange import lagrange_free
 
 pytestmark = pytest.mark.skipif(
     numba.config.DISABLE_JIT, reason="nothing is compiled where the just-in-time compiler is off"
@@ -60,6 +62,24 @@ print(json.dumps({
 }))
 """
 
+#: The same kernel's answer, after the first argument has been loaded and the file of the second been given
+#: the text of the third. Tells too whether the cache has kept the kernel.
+EDITED_MEANWHILE = """
+import importlib, json, shutil, sys
+import numpy as np
+import fastmech
+from fastmech import kernel_cache
+kernel_cache.cache_directory()
+importlib.import_module(sys.argv[1])
+shutil.copyfile(sys.argv[3], sys.argv[2])
+from fastmech.kernels.lagrange import lagrange_free as rhs
+Y = np.array([[0.7], [0.3], [0.0], [0.0]])
+dY = np.zeros((4, 1))
+rhs(0.0, Y, dY, np.array([[0.8], [0.6], [-9.0], [13.0], [8.0], [0.0], [0.0], [0.0]]))
+kept = [str(file) for file in kernel_cache.cache_directory().parent.rglob("*.nbc")]
+print(json.dumps({"answer": dY[:, 0].tolist(), "kept": kept}))
+"""
+
 USERS_MODULE = """
 import numba
 from fastmech.kernels import lagrange
@@ -72,7 +92,7 @@ assert twice(2.0) == 4.0
 """
 
 
-def run(script: str, *arguments: Path, **environment: str) -> Any:
+def run(script: str, *arguments: Path | str, **environment: str) -> Any:
     """What a script prints as JSON, in a process of its own; an empty value removes a variable."""
     given = {**os.environ, **environment}
     result = subprocess.run(
@@ -94,6 +114,26 @@ def users_folder(tmp_path: Path) -> Path:
     return folder
 
 
+def copied(folder: Path) -> tuple[Path, dict[str, str]]:
+    """A copy of the package's sources, and the environment of a process that works with it."""
+    copy = folder / "copy"
+    shutil.copytree(kernel_cache.PACKAGE, copy / "fastmech", ignore=shutil.ignore_patterns("__pycache__"))
+    return copy, {
+        "PYTHONPATH": str(copy),
+        "NUMBA_CACHE_DIR": str(folder / "cache"),
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
+
+
+def reduced(copy: Path) -> tuple[Path, str]:
+    """A file that kernels reach through imports, and its text with the potential's gradient doubled."""
+    source = copy / "fastmech" / "mechanism" / "reduced.py"
+    text = source.read_text()
+    old = "    return u1, u2\n"  # of potential_gradient
+    assert text.count(old) == 1
+    return source, text.replace(old, "    return 2.0 * u1, 2.0 * u2\n")
+
+
 def test_a_second_process_loads_every_kernel() -> None:
     """The first one may have to compile; the second finds all, those that take functions as arguments too."""
     run(LOAD_ALL)
@@ -109,29 +149,38 @@ def test_an_edited_source_gives_a_new_directory_and_the_new_answer(
     tmp_path: Path, users_folder: Path
 ) -> None:
     """The edit is in a file that the kernel's module imports: numba alone would not notice it."""
-    copy = tmp_path / "copy"
-    shutil.copytree(kernel_cache.PACKAGE, copy / "fastmech", ignore=shutil.ignore_patterns("__pycache__"))
-    place = {
-        "PYTHONPATH": str(copy),
-        "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
-        "PYTHONDONTWRITEBYTECODE": "1",
-    }
+    copy, place = copied(tmp_path)
     first = run(ONE_KERNEL, users_folder, **place)
     assert Path(first["package"]).is_relative_to(copy)
     again = run(ONE_KERNEL, users_folder, **place)
     assert (first["hits"], again["hits"]) == (0, 1)
     assert again["answer"] == first["answer"]
 
-    source = copy / "fastmech" / "mechanism" / "reduced.py"
-    text = source.read_text()
-    old = "    return u1, u2\n"  # of potential_gradient
-    assert text.count(old) == 1
-    source.write_text(text.replace(old, "    return 2.0 * u1, 2.0 * u2\n"))
+    source, changed = reduced(copy)
+    source.write_text(changed)
     edited = run(ONE_KERNEL, users_folder, **place)
     assert edited["directory"] != first["directory"]
     assert edited["hits"] == 0
     # From rest the accelerations are linear in the gradient, which is now twice as large.
     assert edited["answer"][2] == pytest.approx(2 * first["answer"][2], rel=1e-14)
+
+
+@pytest.mark.parametrize("loaded", ["fastmech.mechanism.reduced", "fastmech.jit"])
+def test_an_edit_while_a_process_compiles_spoils_nothing(loaded: str, tmp_path: Path) -> None:
+    """Whether the process has read the edited file before the edit or reads it after it.
+
+    Its kernel is made from the old text in the first case and from the new one in the second. It works, and
+    is kept in neither: under the new text's name the first would be wrong, under the old one's the second.
+    """
+    copy, place = copied(tmp_path)
+    source, changed = reduced(copy)
+    (tmp_path / "new.py").write_text(changed)
+    seen = run(EDITED_MEANWHILE, loaded, source, tmp_path / "new.py", **place)
+    Y, dY = np.array([[0.7], [0.3], [0.0], [0.0]]), np.zeros((4, 1))
+    lagrange_free(0.0, Y, dY, np.array([[0.8], [0.6], [-9.0], [13.0], [8.0], [0.0], [0.0], [0.0]]))
+    made_from = 1.0 if loaded.endswith("reduced") else 2.0
+    assert seen["answer"][2] == pytest.approx(made_from * dY[2, 0], rel=1e-14)
+    assert seen["kept"] == []
 
 
 def test_the_user_s_cache_directory_is_respected(tmp_path: Path, users_folder: Path) -> None:
