@@ -43,18 +43,30 @@ def whole_number(name: str, value: Any, *, least: int, most: int | None = None) 
     return int(value)
 
 
-def states(name: str, values: ArrayLike, columns: int) -> NDArray[np.float64]:
-    """An array of shape (n, columns); a single state becomes one row. Values need not be finite.
+def reals(name: str, values: ArrayLike, what: str, least_dimensions: int = 0) -> NDArray[np.float64]:
+    """An array of doubles from numbers; texts, complex numbers, objects and hidden entries are no numbers.
 
     Not copied where it is one already: ten million states take 320 MB.
 
     Raises:
-        InputError: not numbers, or another shape.
+        InputError: they are not ``what`` they must be.
     """
     try:
-        array = np.array(values, dtype=np.float64, order="C", ndmin=2, copy=None)
+        given = np.asarray(values)
+        if (given.dtype.kind not in "iuf" and given.size) or np.ma.is_masked(values):
+            raise TypeError
+        return np.array(given, dtype=np.float64, order="C", ndmin=least_dimensions, copy=None)
     except (TypeError, ValueError):
-        raise InputError(f"{name}: must be numbers of shape (n, {columns})") from None
+        raise InputError(f"{name}: must be {what}") from None
+
+
+def states(name: str, values: ArrayLike, columns: int) -> NDArray[np.float64]:
+    """An array of shape (n, columns); a single state becomes one row. Values need not be finite.
+
+    Raises:
+        InputError: not numbers, or another shape.
+    """
+    array = reals(name, values, f"real numbers of shape (n, {columns})", 2)
     if array.ndim != 2 or array.shape[1] != columns:
         raise InputError(f"{name}: has shape {np.shape(values)}, must be (n, {columns})")
     return array
@@ -89,10 +101,7 @@ def rising_times(name: str, values: ArrayLike) -> NDArray[np.float64]:
     Raises:
         InputError: they are not.
     """
-    try:
-        times = np.array(values, dtype=np.float64, ndmin=1)
-    except (TypeError, ValueError):
-        raise InputError(f"{name}: must be times in s") from None
+    times = reals(name, values, "times in s", 1)
     if times.ndim != 1 or not times.size:
         raise InputError(f"{name}: has shape {times.shape}, must be a row of at least one time")
     if not np.isfinite(times).all() or times[0] < 0 or (np.diff(times) <= 0).any():

@@ -13,8 +13,8 @@ from fastmech.ensembles.problem import Problem, extreme_scenes, scene_problem, s
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.solve import Precision, Settings, Solution, solve
 from fastmech.ensembles.status import Status, failure_counts, failure_line
-from fastmech.ensembles.stopping import STOP_CODE, STOP_TIME
-from fastmech.ensembles.system import System
+from fastmech.ensembles.stopping import STOP_TIME
+from fastmech.ensembles.system import System, stop_codes
 from fastmech.ensembles.tolerance import solve_to_tolerance
 from fastmech.errors import InputError
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
@@ -79,11 +79,11 @@ def integrate(
     method: str | None = None,
     *,
     tol: float | None = None,
-    quantile: float = 1.0,
+    quantile: float | None = None,
     fit: bool | ArrayLike = False,
     t_eval: ArrayLike | None = None,
     parameters: Mapping[str, ArrayLike] | None = None,
-    formulation: str = "lagrange",
+    formulation: str | None = None,
     dtype: str = "float64",
     threads: int | None = None,
     progress: Progress | None = None,
@@ -102,8 +102,9 @@ def integrate(
         tol: in place of ``dt``: the error to be kept, absolute, in the state's units, of the worst component
             at the worst output time. Method, step and precision are chosen by a calibration on a sample:
             an implicit method where stability, not accuracy, would set an explicit one's step.
-        quantile: whose error ``tol`` is: 1.0 the largest of all trajectories, for which every one runs twice
-            and bad ones again; less: that quantile of the trajectories, estimated from a sample.
+        quantile: whose error ``tol`` is: 1.0, the default, the largest of all trajectories, for which every
+            one runs twice and bad ones again; less: that quantile of the trajectories, estimated from a
+            sample.
         fit: whether each trajectory's step is fitted to its energy: ``dt`` then belongs to slow motions, and
             the faster a trajectory can become, the shorter its own step, see
             :mod:`fastmech.ensembles.fitting`. True: once, so that a trajectory's step is the same all along;
@@ -111,8 +112,8 @@ def integrate(
             Scenes only.
         t_eval: output times [s], rising, not negative; only ``t_end`` by default.
         parameters: values of parameters, by name, that differ between trajectories, each of shape (n,).
-        formulation: of a scene: "lagrange" integrates angles and rates (paper (13)), "hamilton" angles and
-            generalized momenta (paper (14)); both take and give angles and rates.
+        formulation: of a scene: "lagrange", the default, integrates angles and rates (paper (13)), "hamilton"
+            angles and generalized momenta (paper (14)); both take and give angles and rates.
         dtype: precision of the lanes, "float64" or "float32": about twice as fast, for errors down to 1e-4.
         threads: threads to use, all processors by default. The result does not depend on it.
         progress: is told how many trajectories have finished since its last call.
@@ -137,7 +138,7 @@ def integrate(
                 "tol: chooses the step and the precision itself; give no dt, fit or dtype with it"
             )
         tol = checks.number("tol", tol, "", above=0.0)
-        quantile = checks.number("quantile", quantile, "", above=0.0)
+        quantile = checks.number("quantile", 1.0 if quantile is None else quantile, "", above=0.0)
         if quantile > 1.0:
             raise InputError(f"quantile = {quantile:g}: must not be greater than 1")
         if method is not None:
@@ -149,6 +150,8 @@ def integrate(
             error_estimate=found.estimate,
             reason=found.reason,
         )
+    if quantile is not None:
+        raise InputError(f"quantile = {quantile!r}: tells whose error tol is; give tol with it")
     formula = find_method(method or "rk4")
     step = checks.number("dt", DEFAULT_DT if dt is None else dt, "s", above=0.0)
     if isinstance(scene, Scene):
@@ -166,7 +169,7 @@ def _trajectories(
 ) -> Trajectories:
     code = time = None
     if problem.observation.stops:
-        code = solution.records[STOP_CODE].astype(np.int64)
+        code = stop_codes(solution.records)
         time = np.where(code != 0, solution.records[STOP_TIME], np.nan)
     return Trajectories(
         t=outputs,
@@ -220,9 +223,12 @@ def _output_times(t_end: float | None, t_eval: ArrayLike | None) -> NDArray[np.f
 
 
 def _problem(
-    scene: Scene | System, y0: ArrayLike, parameters: Mapping[str, ArrayLike], formulation: str
+    scene: Scene | System, y0: ArrayLike, parameters: Mapping[str, ArrayLike], formulation: str | None
 ) -> tuple[NDArray[np.float64], Problem]:
     """Checked starts, and what to integrate from them."""
+    if isinstance(scene, System) and formulation is not None:
+        raise InputError(f"formulation = {formulation!r}: only for a scene")
+    formulation = "lagrange" if formulation is None else formulation
     if formulation not in FORMULATIONS:
         raise InputError(
             f"formulation = {formulation!r}: unknown; {nearest(formulation, list(FORMULATIONS))}"

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.ensembles import checks
 from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError
@@ -110,14 +111,13 @@ def own_values(parameters: Mapping[str, ArrayLike], known: Mapping[str, float], 
     Raises:
         InputError: an unknown name, not n values, or values that are not finite.
     """
+    if not isinstance(parameters, Mapping):
+        raise InputError(f"parameters = {parameters!r}: must be a mapping of names to values")
     own = {}
     for name, values in parameters.items():
         if name not in known:
-            raise InputError(f"parameters.{name}: unknown name; {nearest(name, list(known))}")
-        try:
-            array = np.array(values, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise InputError(f"parameters.{name}: must be numbers") from None
+            raise InputError(f"parameters.{name}: unknown name; {nearest(str(name), list(known))}")
+        array = checks.reals(f"parameters.{name}", values, "real numbers")
         if array.shape != (n,):
             raise InputError(f"parameters.{name}: has shape {array.shape}, must be ({n},), one value a start")
         if not np.isfinite(array).all():

@@ -13,7 +13,14 @@ STOP_CODE, STOP_TIME, STOP_STATE = 0, 1, 2
 
 @inlined
 def note_stop(code: float, t: float, Y: NDArray[np.float64], record: NDArray[np.float64], i: int) -> None:
-    """Keep code, time and state of lane ``i`` when its code is not zero for the first time."""
+    """Keep code, time and state of lane ``i`` when its code is not zero for the first time.
+
+    A code that is NaN because the state is not finite stops nothing.
+    """
+    if np.isnan(code):
+        for d in range(Y.shape[0]):
+            if not np.isfinite(Y[d, i]):
+                return
     if code != 0.0 and record[STOP_CODE, i] == 0.0:
         record[STOP_CODE, i], record[STOP_TIME, i] = code, t
         for d in range(Y.shape[0]):

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import dis
 import hashlib
 import inspect
 import os
 import sys
 import types
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,25 +16,57 @@ from typing import Any
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
+from fastmech.ensembles import checks
 from fastmech.ensembles.fingerprint import fingerprint
+from fastmech.ensembles.rebuilding import reaches, rebuilt
+from fastmech.ensembles.refusals import explain, reason
 from fastmech.ensembles.run import NOTHING, Observation
+from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
 from fastmech.errors import InputError
 from fastmech.jit import inlined
 from fastmech.kernel_cache import cache_directory
+from fastmech.kernels.attempt import attempted
+from fastmech.kernels.sincos import WITHIN
 
-_TEMPLATE = '''"""Made by fastmech: block kernels of {name!r}, whose functions are ``rhs`` and ``stop``."""
+_HEAD = '''"""Made by fastmech: block kernels of {name!r}, whose functions are ``rhs`` and ``stop``.
+
+``rhs_within`` and ``stop_within`` are the same with trigonometry that raises beyond its range.
+"""
 
 from fastmech.ensembles.stopping import note_stop
 from fastmech.jit import OBSERVER_SIGNATURE, RHS_SIGNATURE, kernel
+from fastmech.kernels.attempt import attempt
 
+'''
 
+#: ``+ ()``: only tuples have that, whose length is known before anything runs.
+_TEMPLATE = """
 @kernel(RHS_SIGNATURE)
 def block(t, Y, dY, p):
     for i in range(Y.shape[1]):
-        derivatives = rhs({arguments})
+        ({rates},) = rhs({arguments}) + ()
 {stores}
-'''
+"""
+
+#: Lanes whose angles lie beyond the range of the packed trigonometry are done again, one by one: a lane's
+#: result never depends on its neighbours.
+_TEMPLATE_WITHIN = """
+@kernel(RHS_SIGNATURE)
+def block(t, Y, dY, p):
+    beyond = 0
+    for i in range(Y.shape[1]):
+        raised, ({rates},) = attempt(rhs_within, ({arguments},))
+        beyond |= raised
+{stores}
+    if beyond:
+        for i in range(Y.shape[1]):
+            raised, ({rates},) = attempt(rhs_within, ({arguments},))
+            if raised:
+                ({rates},) = rhs({arguments}) + ()
+{more_stores}
+"""
 
 _STOP_TEMPLATE = """
 
@@ -41,10 +74,11 @@ _STOP_TEMPLATE = """
 def observe(t, Y, params, record):
     fresh = 0
     for i in range(Y.shape[1]):
-        fresh |= (float(stop({arguments})) != 0.0) & (record[0, i] == 0.0)
+        raised, code = attempt(stop_within, ({arguments},))
+        fresh |= raised | ((code + 0.0 != 0.0) & (record[0, i] == 0.0))
     if fresh:
         for i in range(Y.shape[1]):
-            note_stop(float(stop({arguments})), t, Y, record, i)
+            note_stop(stop({arguments}) + 0.0, t, Y, record, i)
 """
 
 
@@ -59,11 +93,13 @@ class System:
             instructions.
         state: names of the states.
         parameters: the parameters' values by name; ``rhs`` takes arguments of these names after the states.
-        stop: ``stop(t, *state)`` gives 0 while the trajectory runs on, any other number as the code of why it
-            stops; it is looked at after every step. A trajectory that has stopped costs nothing any more.
+        stop: ``stop(t, *state)`` gives 0 while the trajectory runs on, any other whole number as the code of
+            why it stops (True is 1); it is looked at after every step. A trajectory that has stopped costs
+            nothing any more.
 
     Raises:
-        InputError: names do not match the functions' arguments, or a function cannot be compiled.
+        InputError: names do not match the functions' arguments, or values are no finite numbers. A function
+            that cannot be compiled is refused when the system first runs.
     """
 
     rhs: Callable[..., tuple[float, ...]]
@@ -72,11 +108,16 @@ class System:
     stop: Callable[..., float] | None = None
 
     def __post_init__(self) -> None:
-        _check_names("state", list(self.state), least=1)
-        _check_names("parameters", list(self.parameters), least=0)
-        _check_arguments("rhs", self.rhs, list(self.state), list(self.parameters))
+        state = _names("state", self.state, least=1)
+        if not isinstance(self.parameters, Mapping):
+            raise InputError(f"parameters = {self.parameters!r}: must be a mapping of names to numbers")
+        names = _names("parameters", self.parameters, least=0)
+        values = [checks.number(f"parameters.{k}", v, "") for k, v in self.parameters.items()]
+        object.__setattr__(self, "state", state)
+        object.__setattr__(self, "parameters", dict(zip(names, values, strict=True)))
+        _check_function("rhs", self.rhs, state, names)
         if self.stop is not None:
-            _check_arguments("stop", self.stop, list(self.state), [])
+            _check_function("stop", self.stop, state, [])
 
     @property
     def kernel(self) -> Any:
@@ -98,64 +139,92 @@ class System:
         Numba keeps on disk only what comes from a file, so the kernels' source is written into the cache
         directory under a name made from everything that the user's functions depend on.
         """
-        source = self._source()
-        functions: list[Any] = [self.rhs] if self.stop is None else [self.rhs, self.stop]
-        prints = [source, *(fingerprint(function) for function in functions)]
+        functions: dict[str, Any] = {"rhs": self.rhs} | ({"stop": self.stop} if self.stop else {})
+        swaps = {} if numba.config.DISABLE_JIT else WITHIN  # type: ignore[attr-defined]
+        source = self._source(reaches(functions["rhs"], swaps))
+        prints = [source, *(fingerprint(function) for function in functions.values())]
         digest = hashlib.sha256("\0".join(prints).encode()).hexdigest()[:16]
         path = cache_directory() / "systems" / f"system_{digest}.py"
         _write_once(path, source)
         module = types.ModuleType(f"fastmech_{path.stem}")
-        compilable = [inlined(_copy(function, module.__name__)) for function in functions]
-        vars(module).update(zip(("rhs", "stop"), compilable, strict=False), __file__=str(path))
+        for field, function in functions.items():
+            whole = rebuilt(function, module.__name__, {})
+            within = rebuilt(function, module.__name__, swaps)
+            vars(module).update({field: inlined(whole), f"{field}_within": attempted(within)})
+        vars(module)["__file__"] = str(path)
         sys.modules[module.__name__] = module  # where numba looks when it loads a kernel from the disk
         try:
             exec(compile(source, path, "exec"), vars(module))
-        except numba.core.errors.NumbaError as error:
-            reason = " ".join(str(error).split())
-            raise InputError(
-                "rhs or stop: cannot be compiled (arithmetic, numpy and math only; functions that it "
-                f"calls need numba.njit): {reason[:200]}"
-            ) from None
+        except Exception as error:  # numba lets those of the code it looks at pass
+            state, count = list(self.state), 1 + len(self.state)
+            explain(
+                "rhs", rebuilt(functions["rhs"], module.__name__, {}), count + len(self.parameters), state
+            )
+            if self.stop is not None:
+                explain("stop", rebuilt(functions["stop"], module.__name__, {}), count, None)
+            raise InputError(f"rhs or stop: cannot be compiled: {reason(error)}") from None
         return module
 
-    def _source(self) -> str:
-        states = [f"Y[{d}, i]" for d in range(len(self.state))]
-        order = list(inspect.signature(self.rhs).parameters)[1 + len(self.state) :]
+    def _source(self, trigonometry: bool) -> str:
+        """The kernels' text; ``trigonometry``: whether the right-hand side has any that may raise."""
+        dim = len(self.state)
+        states = [f"Y[{d}, i]" for d in range(dim)]
+        order = list(inspect.signature(self.rhs).parameters)[1 + dim :]
         given = [f"p[{list(self.parameters).index(name)}, i]" for name in order]
-        stores = [f"        dY[{d}, i] = derivatives[{d}]" for d in range(len(self.state))]
-        text = _TEMPLATE.format(
+        stores = [f"        dY[{d}, i] = rate{d}" for d in range(dim)]
+        text = (_HEAD + (_TEMPLATE_WITHIN if trigonometry else _TEMPLATE)).format(
             name=getattr(self.rhs, "__name__", "rhs"),
             arguments=", ".join(["t", *states, *given]),
+            rates=", ".join(f"rate{d}" for d in range(dim)),
             stores="\n".join(stores),
+            more_stores="\n".join(f"        {line}" for line in stores),
         )
         return text + (_STOP_TEMPLATE.format(arguments=", ".join(["t", *states])) if self.stop else "")
 
 
-def _check_names(field: str, names: list[str], least: int) -> None:
-    if len(names) < least or len(set(names)) < len(names) or not all(str(n).isidentifier() for n in names):
-        raise InputError(f"{field} = {names}: must be different Python names, at least {least}")
+def stop_codes(records: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Codes (n,) of the records (rows, n) of a run whose system may stop, 0: it did not.
+
+    Raises:
+        InputError: a code is no whole number.
+    """
+    codes = records[STOP_CODE]
+    wrong = np.flatnonzero(~((np.abs(codes) < 2.0**53) & (codes == np.rint(codes))))
+    if wrong.size:
+        state = ", ".join(f"{x:g}" for x in records[STOP_STATE:, wrong[0]])
+        code, t = codes[wrong[0]], records[STOP_TIME, wrong[0]]
+        raise InputError(
+            f"stop: gave {code:g} at t = {t:g} in state ({state}), must give 0 while a trajectory runs on, "
+            "another whole number where it stops"
+        )
+    return codes.astype(np.int64)
 
 
-def _check_arguments(field: str, function: Any, state: list[str], parameters: list[str]) -> None:
+def _names(field: str, given: Any, least: int) -> list[str]:
+    names = list(given) if isinstance(given, Iterable) and not isinstance(given, str) else None
+    if (
+        names is None
+        or len(names) < least
+        or not all(isinstance(name, str) and name.isidentifier() for name in names)
+        or len(set(names)) < len(names)
+    ):
+        told = given if names is None else names
+        raise InputError(f"{field} = {told!r}: must be different Python names, at least {least}")
+    return names
+
+
+def _check_function(field: str, function: Any, state: list[str], parameters: list[str]) -> None:
     """Arguments are matched by name: a value never lands in the wrong place silently."""
     if not isinstance(function, types.FunctionType):
         raise InputError(f"{field} = {function!r}: must be a plain Python function")
-    taken = list(inspect.signature(function).parameters)
-    if taken[1 : 1 + len(state)] != state or sorted(taken[1 + len(state) :]) != sorted(parameters):
-        wanted = ", ".join(["t", *state, *parameters])
-        raise InputError(f"{field}: takes ({', '.join(taken)}), must take ({wanted})")
-
-
-def _copy(function: types.FunctionType, module: str) -> types.FunctionType:
-    """A function object of its own, said to be of ``module``.
-
-    Numba compiles one object once, whatever becomes of its globals; and a kernel from the disk wants to
-    import the module of every function in it, which for the user's may be a notebook.
-    """
-    code, known = function.__code__, function.__globals__
-    copy = types.FunctionType(code, known, function.__name__, function.__defaults__, function.__closure__)
-    copy.__module__ = module
-    return copy
+    given = inspect.signature(function).parameters
+    taken, wanted = list(given), ", ".join(["t", *state, *parameters])
+    fits = taken[1 : 1 + len(state)] == state and sorted(taken[1 + len(state) :]) == sorted(parameters)
+    if not fits or any(one.kind is not one.POSITIONAL_OR_KEYWORD for one in given.values()):
+        told = inspect.Signature([one.replace(annotation=one.empty) for one in given.values()])
+        raise InputError(f"{field}: takes {told}, must take ({wanted})")
+    if any(instruction.opname == "RAISE_VARARGS" for instruction in dis.get_instructions(function)):
+        raise InputError(f"{field}: must not raise or assert; nan as a result ends a trajectory")
 
 
 def _write_once(path: Path, source: str) -> None:

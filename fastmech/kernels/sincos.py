@@ -10,6 +10,8 @@ the Cephes library (``sinf.c``; Moshier 1992).
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from fastmech.jit import by_precision, inlined, rounded_to
@@ -103,11 +105,38 @@ reduction_limit = by_precision(limit_double, limit_single)
 
 @inlined
 def sin(x: float) -> float:
-    """Sine of ``x`` [rad] for right-hand sides: packed instructions; NaN beyond ``REDUCTION_LIMIT``."""
-    return sincos(x)[0] if abs(x) <= reduction_limit(x) else np.nan
+    """Sine of ``x`` [rad] for right-hand sides, whatever its size.
+
+    Up to 1e6 rad (in float32 1e4) own arithmetic that becomes packed instructions, beyond it the library's.
+    """
+    return sincos(x)[0] if abs(x) <= reduction_limit(x) else np.sin(x)
 
 
 @inlined
 def cos(x: float) -> float:
-    """Cosine of ``x`` [rad] for right-hand sides: packed instructions; NaN beyond ``REDUCTION_LIMIT``."""
-    return sincos(x)[1] if abs(x) <= reduction_limit(x) else np.nan
+    """Cosine of ``x`` [rad] for right-hand sides, whatever its size, see :func:`sin`."""
+    return sincos(x)[1] if abs(x) <= reduction_limit(x) else np.cos(x)
+
+
+@inlined
+def sin_within(x: float) -> float:
+    """What :func:`sin` gives, without the call that keeps a loop from being packed.
+
+    Raises:
+        OverflowError: ``x`` lies beyond the reduction's limit. NaN gives NaN.
+    """
+    if abs(x) > reduction_limit(x):
+        raise OverflowError
+    return sincos(x)[0]
+
+
+@inlined
+def cos_within(x: float) -> float:
+    """What :func:`cos` gives, see :func:`sin_within`."""
+    if abs(x) > reduction_limit(x):
+        raise OverflowError
+    return sincos(x)[1]
+
+
+#: For the loop over lanes: what may be called in the place of what.
+WITHIN: dict[Callable[[float], float], Callable[[float], float]] = {sin: sin_within, cos: cos_within}

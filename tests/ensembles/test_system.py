@@ -122,6 +122,100 @@ def test_parameters_go_by_name() -> None:
     np.testing.assert_array_equal(*runs)
 
 
+def asserting(t: float, x: float) -> tuple[float]:
+    assert x > 0.0
+    return (x,)
+
+
+def keyword(t: float, x: float, *, a: float) -> tuple[float]:
+    return (a * x,)
+
+
+RATES = "must return a tuple of 2, the rates of x, v"
+COMPILED = "cannot be compiled (arithmetic, numpy and math only; functions that it calls need numba.njit)"
+HEAD = "def rhs(t, x, v):\n    "
+REFUSED = {
+    f"{HEAD}return v, -x, 0.0": f"rhs: returns a tuple of 3, {RATES}",
+    f"{HEAD}return (v,)": f"rhs: returns a tuple of 1, {RATES}",
+    f"{HEAD}return v": f"rhs: returns float64, {RATES}",
+    f"{HEAD}return [v, x]": f"rhs: returns list(float64)<iv=None>, {RATES}",
+    f"{HEAD}pass": f"rhs: returns none, {RATES}",
+    f"{HEAD}return v, 1j * x": "rhs: returns complex128 as the rate of v, must be a real number",
+    f"{HEAD}return v, unknown * x": f"rhs: {COMPILED}: NameError: name 'unknown' is not defined",
+    f"f = print\n{HEAD}return v, len(x)": f"rhs: {COMPILED}: line 3: nothing known for len(float64)",
+    f"def f(x):\n    return x\n\n{HEAD}return v, f(x)": f"rhs: {COMPILED}: line 5: "
+    "Untyped global name 'f': Cannot determine Numba type of <class 'function'>",
+    f"{HEAD}return v, x['a']": f"rhs: {COMPILED}: line 2: "
+    "nothing known for getitem(float64, Literal[str](a))",
+    f"{HEAD}return v, -x\n\ndef stop(t, x, v):\n    pass": "stop: returns none, must return a real number, "
+    "0 while it runs on",
+}
+
+
+@pytest.mark.parametrize("code", REFUSED)
+def test_functions_that_cannot_be_run_are_refused_in_one_line(code: str, tmp_path: Path) -> None:
+    """Told again in the next process's place: nothing of what was refused is kept."""
+    (tmp_path / "users.py").write_text(code)
+    names: dict[str, Any] = {}
+    exec(compile(code, tmp_path / "users.py", "exec"), names)
+    for _ in range(2):
+        system = System(names["rhs"], ["x", "v"], {}, stop=names.get("stop"))
+        with pytest.raises(fm.InputError) as refusal:
+            fm.integrate(system, [[1.0, 0.0]], 1.0)
+        assert str(refusal.value) == REFUSED[code]
+
+
+@pytest.mark.parametrize(
+    ("stop", "told"),
+    [
+        (lambda t, x, v: math.nan * x, "stop: gave nan at t = 0.5 in state (1.5, 1), "),
+        (lambda t, x, v: 0.5 * (t > 1.2), "stop: gave 0.5 at t = 1.5 in state (2.5, 1), "),
+        (lambda t, x, v: 1e300, "stop: gave 1e+300 at t = 0.5 in state (1.5, 1), "),
+    ],
+)
+def test_codes_that_are_no_whole_numbers_are_refused(stop: Any, told: str) -> None:
+    system = System(lambda t, x, v: (v, 0.0), ["x", "v"], {}, stop=stop)
+    with pytest.raises(fm.InputError) as refusal:
+        fm.integrate(system, [[1.0, 1.0]], 3.0, 0.5)
+    wanted = "must give 0 while a trajectory runs on, another whole number where it stops"
+    assert str(refusal.value) == told + wanted
+
+
+def test_a_code_that_is_nan_because_the_state_is_stops_nothing() -> None:
+    system = System(lambda t, x: (x * x,), ["x"], {}, stop=lambda t, x: x - x)
+    run = fm.integrate(system, [[1.0], [-1.0]], 3.0, 0.1)
+    assert run.status.tolist() == [fm.Status.NOT_FINITE, fm.Status.OK]
+    assert run.stop_code is not None
+    assert run.stop_code.tolist() == [0, 0]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"y0": [1j, 0.0]}, "y0: must be real numbers of shape (n, 2)"),
+        ({"y0": ["1", "2"]}, "y0: must be real numbers of shape (n, 2)"),
+        ({"y0": [None, 1.0]}, "y0: must be real numbers of shape (n, 2)"),
+        ({"y0": np.ma.array([1.0, 2.0], mask=[0, 1])}, "y0: must be real numbers of shape (n, 2)"),
+        ({"y0": [1.0, 2.0, 3.0]}, "y0: has shape (3,), must be (n, 2)"),
+        ({"t_eval": ["0.1"], "t_end": None}, "t_eval: must be times in s"),
+        ({"formulation": "lagrange"}, "formulation = 'lagrange': only for a scene"),
+        ({"quantile": 0.5}, "quantile = 0.5: tells whose error tol is; give tol with it"),
+        ({"fit": True}, "fit: only for a scene, whose energy bounds its speed"),
+    ],
+)
+def test_wrong_arguments_of_a_run_are_refused(wrong: dict[str, Any], message: str) -> None:
+    system = System(oscillator, ["x", "v"], {"omega": 1.0})
+    with pytest.raises(fm.InputError) as refusal:
+        fm.integrate(system, **({"y0": [1.0, 0.0], "t_end": 1.0} | wrong))
+    assert str(refusal.value) == message
+
+
+def test_whole_numbers_are_starts() -> None:
+    system = System(oscillator, ["x", "v"], {"omega": 1.0})
+    whole, real = (fm.integrate(system, y0, 1.0).y for y0 in ([1, 0], [1.0, 0.0]))
+    np.testing.assert_array_equal(whole, real)
+
+
 CONSTANT_IN = {
     "a global number": "K = {k}\ndef rhs(t, x):\n    return (K * x,)\n",
     "a compiled helper": (
@@ -168,6 +262,16 @@ def test_a_second_process_loads_the_kernels_from_the_disk(tmp_path: Path) -> Non
         ((oscillator, ["v", "x"], {"omega": 1.0}), "rhs: takes (t, x, v, omega), must take (t, v, x, omega)"),
         ((oscillator, ["x", "v"], {"k": 1.0}), "rhs: takes (t, x, v, omega), must take (t, x, v, k)"),
         (("x", ["x", "v"], {"omega": 1.0}), "rhs = 'x': must be a plain Python function"),
+        ((oscillator, "xv", {"omega": 1.0}), "state = 'xv': must be different Python names, at least 1"),
+        ((oscillator, None, {"omega": 1.0}), "state = None: must be different Python names, at least 1"),
+        ((oscillator, ["x", 3], {"omega": 1.0}), "state = ['x', 3]: must be different Python names"),
+        ((oscillator, ["x", "v"], {"omega": math.nan}), "parameters.omega = nan: must be a finite number"),
+        ((oscillator, ["x", "v"], {"omega": "1"}), "parameters.omega = '1': must be a finite number"),
+        ((oscillator, ["x", "v"], {"omega": 1j}), "parameters.omega = 1j: must be a finite number"),
+        ((oscillator, ["x", "v"], [1.0]), "parameters = [1.0]: must be a mapping of names to numbers"),
+        ((oscillator, ["x", "v"], {"omega": 1.0}, 5), "stop = 5: must be a plain Python function"),
+        ((asserting, ["x"], {}), "rhs: must not raise or assert; nan as a result ends a trajectory"),
+        ((keyword, ["x"], {"a": 1.0}), "rhs: takes (t, x, *, a), must take (t, x, a)"),
     ],
 )
 def test_wrong_systems_are_refused(arguments: Any, message: str) -> None:
@@ -182,7 +286,10 @@ def test_wrong_systems_are_refused(arguments: Any, message: str) -> None:
         ({"omge": [1.0]}, "parameters.omge: unknown name; did you mean 'omega'?"),
         ({"omega": 1.0}, "parameters.omega: has shape (), must be (1,), one value a start"),
         ({"omega": [np.nan]}, "parameters.omega: must be finite"),
-        ({"omega": ["x"]}, "parameters.omega: must be numbers"),
+        ({"omega": ["1.0"]}, "parameters.omega: must be real numbers"),
+        ({"omega": [1j]}, "parameters.omega: must be real numbers"),
+        ({3: [1.0]}, "parameters.3: unknown name; allowed: omega"),
+        ([1.0], "parameters = [1.0]: must be a mapping of names to values"),
     ],
 )
 def test_wrong_parameters_are_refused(own: dict[str, Any], message: str) -> None:

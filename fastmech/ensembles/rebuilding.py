@@ -1,0 +1,109 @@
+"""Copies of a user's functions, for kernels that must not depend on where the functions come from."""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numba
+from numba.core.registry import CPUDispatcher
+
+#: Functions to be called in the place of others.
+Swaps = dict[Callable[[float], float], Callable[[float], float]]
+
+
+def rebuilt(function: types.FunctionType, module: str, swaps: Swaps) -> types.FunctionType:
+    """A function object of its own, said to be of ``module``, that calls others where ``swaps`` tells.
+
+    Numba compiles one object once, whatever becomes of its globals; and a kernel from the disk wants to
+    import the module of every function in it, which for the user's may be a notebook. Compiled functions
+    that the function calls are rebuilt with it where they reach a swapped one; those given types of their
+    own stay as they are.
+    """
+    return _copy(function, module, swaps, ())
+
+
+def reaches(function: types.FunctionType, swaps: Swaps) -> bool:
+    """Whether a copy calls anything in the place of something else."""
+    return _reaches(function, swaps, ())
+
+
+def _reaches(function: Any, swaps: Swaps, above: tuple[Any, ...]) -> bool:
+    return bool(_changes(function, "", swaps, above) or _cell_changes(function, "", swaps, above))
+
+
+def _copy(function: Any, module: str, swaps: Swaps, above: tuple[Any, ...]) -> types.FunctionType:
+    known, cells = function.__globals__, function.__closure__
+    changed = _changes(function, module, swaps, above)
+    if changed:
+        known = {**known, **changed}
+    exchanged = _cell_changes(function, module, swaps, above)
+    if exchanged:
+        cells = tuple(exchanged.get(number, cell) for number, cell in enumerate(cells))
+    copy = types.FunctionType(function.__code__, known, function.__name__, function.__defaults__, cells)
+    copy.__module__ = module
+    return copy
+
+
+def _changes(function: Any, module: str, swaps: Swaps, above: tuple[Any, ...]) -> dict[str, Any]:
+    """Globals that a copy sees otherwise."""
+    names = set(_names(function.__code__))
+    found = {}
+    for name in names & function.__globals__.keys():
+        value = function.__globals__[name]
+        other = _instead(value, names, module, swaps, above)
+        if other is not value:
+            found[name] = other
+    return found
+
+
+def _cell_changes(function: Any, module: str, swaps: Swaps, above: tuple[Any, ...]) -> dict[int, Any]:
+    """Variables of enclosing functions that a copy sees otherwise."""
+    names = set(_names(function.__code__))
+    found = {}
+    for number, cell in enumerate(function.__closure__ or ()):
+        other = _instead(cell.cell_contents, names, module, swaps, above)
+        if other is not cell.cell_contents:
+            found[number] = types.CellType(other)
+    return found
+
+
+def _names(code: types.CodeType) -> Iterator[str]:
+    """Globals and attributes that code mentions, nested functions' too."""
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, types.CodeType):
+            yield from _names(constant)
+
+
+def _instead(value: Any, names: set[str], module: str, swaps: Swaps, above: tuple[Any, ...]) -> Any:
+    """What a copy sees in the place of ``value``: the same, unless it reaches a swapped function."""
+    for old, new in swaps.items():
+        if value is old:
+            return new
+    if isinstance(value, CPUDispatcher):
+        helper: Any = value
+        function = helper.py_func
+        if value in above or not helper._can_compile or not _reaches(function, swaps, (*above, value)):
+            return value
+        return numba.jit(**helper.targetoptions)(_copy(function, module, swaps, (*above, value)))
+    if isinstance(value, types.ModuleType):
+        return _module_instead(value, names, module, swaps, above)
+    return value
+
+
+def _module_instead(
+    value: types.ModuleType, names: set[str], module: str, swaps: Swaps, above: tuple[Any, ...]
+) -> types.ModuleType:
+    changed = {}
+    for name in names & vars(value).keys() | ({old.__name__ for old in swaps} & names):
+        item = getattr(value, name, None)
+        other = item if isinstance(item, types.ModuleType) else _instead(item, names, module, swaps, above)
+        if other is not item:
+            changed[name] = other
+    if not changed:
+        return value
+    copy = types.ModuleType(value.__name__)
+    vars(copy).update(vars(value) | changed)
+    return copy
