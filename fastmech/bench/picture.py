@@ -6,8 +6,6 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from fastmech.bench.precision import frontier
 from fastmech.bench.problem import PROBLEMS
 from fastmech.plots.style import LINES, new_figure, save, style
@@ -19,9 +17,6 @@ if TYPE_CHECKING:
 
 #: Errors [rad, rad/s] that the picture shows: larger ones answer nothing.
 LARGEST, SMALLEST = 3e-2, 3e-15
-
-#: Where the axis ends, so that the names fit beside the curves.
-NAMES_END = 1e-18
 
 GREY = "0.35"
 
@@ -47,36 +42,30 @@ def draw_bench(rows: list[Row], path: Path) -> None:
             problem = make(1)
             mine = [row for row in rows if (row.problem, row.threads) == (name, 1)]
             _draw(axes, mine)
-            axes.set(xscale="log", yscale="log", xlim=(LARGEST, NAMES_END))
+            axes.set(xscale="log", yscale="log", xlim=(LARGEST, SMALLEST))
             axes.set_title(f"{problem.description}, to {problem.t_end:g} s")
             axes.set_xlabel("largest error of a final state [rad, rad/s], smaller to the right")
         panels[0].set_ylabel("trajectories per second of one core")
+        named = {}
+        for axes in panels:
+            for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+                named.setdefault(label, handle)
+        figure.legend(list(named.values()), list(named), loc="outside lower center", ncols=5, frameon=False)
         save(figure, path)
 
 
 def _draw(axes: Axes, rows: list[Row]) -> None:
     for family in dict.fromkeys(row.family for row in rows if row.family.startswith("fastmech")):
         own = sorted(_shown(row for row in rows if row.family == family), key=lambda row: row.max_error())
-        axes.plot([row.max_error() for row in own], [row.rate for row in own], color="0.75", linewidth=0.8)
-    ends: list[tuple[float, float, str, str]] = []
+        errors, rates = [row.max_error() for row in own], [row.rate for row in own]
+        axes.plot(errors, rates, color="0.75", linewidth=0.8, label="fastmech, each method")
     for (prefix, label, marker), color in zip(CURVES, [*LINES, GREY], strict=True):
         best = frontier(_shown(row for row in rows if row.family.startswith(prefix)))
         if best:
             errors, rates = [row.max_error() for row in best], [row.rate for row in best]
-            axes.plot(
-                errors, rates, marker=marker, color=color, linewidth=2.4 if prefix == "fastmech" else 1.4
-            )
-            ends.append((errors[0], rates[0], label, color))
-    _label(axes, ends)
+            width = 2.4 if prefix == "fastmech" else 1.4
+            axes.plot(errors, rates, marker=marker, color=color, linewidth=width, label=label)
 
 
 def _shown(rows: Iterable[Row]) -> list[Row]:
     return [row for row in rows if SMALLEST < row.max_error() < LARGEST]
-
-
-def _label(axes: Axes, ends: list[tuple[float, float, str, str]]) -> None:
-    """Names right of the accurate end of the curves, moved apart where they would touch."""
-    last = np.inf
-    for error, rate, label, color in sorted(ends, key=lambda end: -end[1]):
-        last = min(rate, last / 1.2)
-        axes.text(error / 1.8, last, label, color=color, ha="left", va="center", fontsize=9)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from fastmech.bench.atlas import run_atlas
 from fastmech.bench.basins import run_basins
 from fastmech.bench.entrant import Entrant
 from fastmech.bench.entrants import entrants, missing
+from fastmech.bench.fused import METHODS
 from fastmech.bench.measure import BUDGET, Row, measure
 from fastmech.bench.peak import TURNS as PEAK_TURNS
 from fastmech.bench.peak import Throughput, throughputs
@@ -37,6 +39,10 @@ QUICK_STARTS = 8
 
 #: What ``--quick`` gives each entrant [s].
 QUICK_BUDGET = 0.05
+
+#: Trajectories a call of the engine and its yardstick with ``--quick``: they take milliseconds, and on fewer
+#: not the loops but what stands around a call would be compared.
+QUICK_LEAST = 8192
 
 LIBRARIES = ("numba", "scipy", "heyoka", "torch", "jax", "diffrax", "numbalsoda", "CyRK", "pynamicalsys")
 
@@ -69,7 +75,8 @@ def run_bench(
     rows: list[Row] = []
     failures: list[str] = []
     for problem in problems:
-        everyone = [(entrant, n) for entrant in entrants(problem, quick) for n in _threads(entrant)]
+        found = [enlarged(entrant) if quick else entrant for entrant in entrants(problem, quick)]
+        everyone = [(entrant, n) for entrant in found for n in _threads(entrant)]
         advance = stage(f"{problem.name}: prepare and time", 2 * len(everyone))
 
         def failed(entrant: Entrant, error: Exception, advance: Progress = advance) -> None:
@@ -105,6 +112,13 @@ def run_bench(
         replace=True,
     )
     return [table, picture, data, *others]
+
+
+def enlarged(entrant: Entrant) -> Entrant:
+    """An entrant of ``--quick``, with enough trajectories where its loop is compared with another's."""
+    engine = {f"{tables.OWN} {method}" for method in METHODS}
+    compared = entrant.family in engine or entrant.family.startswith(tables.FUSED)
+    return replace(entrant, least=max(entrant.least, QUICK_LEAST)) if compared else entrant
 
 
 def _threads(entrant: Entrant) -> list[int]:

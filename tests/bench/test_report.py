@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from fastmech.bench import entrants as everyone
-from fastmech.bench import report
+from fastmech.bench import report, tables
 from fastmech.bench.entrant import Entrant
-from fastmech.bench.measure import measure
+from fastmech.bench.measure import Row, measure
 from fastmech.bench.peak import packed_multiply_adds
 from fastmech.bench.problem import rest_starts
 
@@ -98,3 +98,16 @@ def test_a_tiny_run(tmp_path, monkeypatch):
         assert np.nanmax(errors[0]) == speed["max_error"][0]
         assert (speed["processor"][:] > 0.0).all()
         assert file["rhs"]["peak"][()] > 1e8
+
+
+@pytest.mark.nojit
+@pytest.mark.parametrize(("seconds", "shown"), [(0.02, True), (0.001, False)])
+def test_a_loop_is_not_compared_with_the_engine_by_calls_that_are_too_short(seconds, shown):
+    """What stands around a call would be compared; the report says how many it leaves out."""
+    rows = [
+        Row("rest", family, "dt = 0.08 s", 1, 48, seconds, seconds, 1.0, np.zeros(8))
+        for family in ("fastmech rk4", "hand-fused rk4")
+    ]
+    text = "\n".join(tables.same_step(rows))
+    assert ("| hand-fused rk4, dt = 0.08 s |" in text) == shown
+    assert ("Left out: 1 whose calls are shorter than 0.01 s." in text) != shown
