@@ -66,7 +66,7 @@ def states(name: str, values: ArrayLike, columns: int) -> NDArray[np.float64]:
     Raises:
         InputError: not numbers, or another shape.
     """
-    array = reals(name, values, f"real numbers of shape (n, {columns})", 2)
+    array = reals(name, values, f"numbers of shape (n, {columns})", 2)
     if array.ndim != 2 or array.shape[1] != columns:
         raise InputError(f"{name}: has shape {np.shape(values)}, must be (n, {columns})")
     return array
@@ -101,7 +101,7 @@ def rising_times(name: str, values: ArrayLike) -> NDArray[np.float64]:
     Raises:
         InputError: they are not.
     """
-    times = reals(name, values, "times in s", 1)
+    times = reals(name, values, "times in s", 1).copy()  # results keep it
     if times.ndim != 1 or not times.size:
         raise InputError(f"{name}: has shape {times.shape}, must be a row of at least one time")
     if not np.isfinite(times).all() or times[0] < 0 or (np.diff(times) <= 0).any():
