@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from fastmech.bench.precision import frontier
 from fastmech.bench.problem import PROBLEMS
@@ -46,11 +46,12 @@ def draw_bench(rows: list[Row], path: Path) -> None:
             axes.set_title(f"{problem.description}, to {problem.t_end:g} s")
             axes.set_xlabel("largest error of a final state [rad, rad/s], smaller to the right")
         panels[0].set_ylabel("trajectories per second of one core")
-        named = {}
+        named: dict[str, Any] = {}
         for axes in panels:
             for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
                 named.setdefault(label, handle)
-        figure.legend(list(named.values()), list(named), loc="outside lower center", ncols=5, frameon=False)
+        place: Any = "outside lower center"
+        figure.legend(list(named.values()), list(named), loc=place, ncols=5, frameon=False)
         save(figure, path)
 
 
