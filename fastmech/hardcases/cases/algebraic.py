@@ -17,7 +17,7 @@ from fastmech.integrators.methods import find_method
 from fastmech.scene import Scene
 from fastmech.stability.linearize import Rest, jacobian
 from fastmech.step_limits.amplification import amplification
-from fastmech.step_limits.warning import step_limit
+from fastmech.step_limits.warning import beyond_stability, step_limit
 
 #: name -> (changes to Table 1, equilibrium [rad], power p of the decay E ~ t^-p, what vanishes).
 _SETS: dict[str, tuple[dict[str, float], tuple[float, float], float, str]] = {
@@ -41,7 +41,7 @@ _SETS: dict[str, tuple[dict[str, float], tuple[float, float], float, str]] = {
 }  # fmt: skip
 
 #: Size of the disturbance [rad] and length of the runs [s].
-SIZE, FULL, QUICK = 0.4, 4000.0, 1000.0
+SIZE, FULL, QUICK = 0.4, 4000.0, 500.0
 
 #: Longest step of methods, one that no method without a claim survives, and steps that are too many [s].
 DT, TOO_LONG, MOST_STEPS = 0.05, 0.5, 2_000_000
@@ -79,8 +79,9 @@ def _kept_step(method: str, scene: Scene, frequency: float, length: float) -> fl
     while length <= MOST_STEPS * dt:
         own = abs(np.log(amplification(formula, 1j * frequency * dt))) / dt
         if 2.0 * float(own) * length <= KEPT:
-            admitted = step_limit(scene, method)
-            return min(dt, WITHIN * admitted) if length <= MOST_STEPS * WITHIN * admitted else 0.0
+            if beyond_stability(scene, dt, method):
+                dt = WITHIN * step_limit(scene, method)
+            return dt if length <= MOST_STEPS * dt else 0.0
         dt *= 0.5
     return 0.0
 

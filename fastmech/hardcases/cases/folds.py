@@ -113,9 +113,8 @@ def _labels(passage: _Passage, side: float, method: str) -> Row:
     ]
     deep = next(k for k, is_well in enumerate(wells) if is_well and k not in shallow)
     starts = np.zeros((OUTWARDS.size, 4))
-    starts[:, :2] = passage.middle + (-side * passage.half + OUTWARDS[:, None]) * passage.way
-    if side < 0.0:
-        starts[:, :2] = passage.middle + (passage.half + OUTWARDS[:, None]) * passage.way
+    saddle = passage.half if side < 0.0 else 0.0
+    starts[:, :2] = passage.middle + (saddle + OUTWARDS[:, None]) * passage.way
     found = labels_of(scene, starts, LABELLED, method=method, settle_radius=SETTLED)
     assert found.settle_time is not None
     captured = found.status == BasinStatus.CAPTURED
