@@ -1,22 +1,20 @@
-"""How many right-hand sides an implicit method really takes, and RK4 at its stability limit beside it.
-
-The implicit driver is run as plain Python, where right-hand sides and Jacobians are functions that count.
-"""
+"""How many right-hand sides an implicit method really takes, and RK4 at its stability limit beside it."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from fastmech.hardcases.case import Floats
 from fastmech.hardcases.walk import Goal
+from fastmech.integrators.batch import Batch
 from fastmech.integrators.explicit import observe_nothing
-from fastmech.integrators.implicit import SECOND_ORDER, integrate_implicit_block
+from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.methods import METHODS
 from fastmech.integrators.tableaus.implicit import IMPLICIT_TABLEAUS
+from fastmech.kernels.counting import CALLS, JACOBIANS, counting_jacobian, counting_lagrange
 from fastmech.kernels.jacobians import lagrange_jacobian
-from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import reduce
 from fastmech.step_limits.predict import stable_step
 
@@ -32,45 +30,21 @@ class Work(NamedTuple):
 
 def counted(goal: Goal, method: str, steps: int) -> Work:
     """A run of an implicit method in equal steps with every call counted."""
-    prepared = IMPLICIT_TABLEAUS[method].prepared
-    c = reduce(goal.scene)
-    rhs, calls = right_hand_side(c), [0, 0]
-
-    def counting_rhs(t: float, Y: Floats, dY: Floats, params: Floats) -> None:
-        calls[0] += 1
-        rhs(t, Y, dY, params)
-
-    def counting_jacobian(t: float, Y: Floats, J: Floats, params: Floats) -> None:
-        calls[1] += 1
-        lagrange_jacobian(t, Y, J, params)
-
-    driver: Any = integrate_implicit_block
-    Y, out = goal.start[:, None].copy(), np.empty((steps, 4, 1))
-    with np.errstate(all="ignore"):
-        getattr(driver, "py_func", driver)(
-            counting_rhs,
-            counting_jacobian,
-            observe_nothing,
-            SECOND_ORDER,
-            prepared.a,
-            prepared.nodes,
-            prepared.final,
-            prepared.back,
-            prepared.forth,
-            prepared.eigenvalues,
-            prepared.extrapolation,
-            prepared.remainder,
-            np.linspace(0.0, goal.t_end, steps + 1),
-            np.ones(steps, dtype=np.int64),
-            Y,
-            np.array(c, dtype=np.float64)[:, None],
-            np.zeros(0),
-            np.zeros((0, 1)),
-            out,
-            np.full(1, np.nan),
-        )
-    path = np.concatenate([goal.start[None], out[:, :, 0]])
-    return Work(Y[:, 0], calls[0], calls[1], path)
+    params = np.concatenate([np.array(reduce(goal.scene), dtype=np.float64), np.zeros(2)])
+    batch = Batch(
+        times=np.linspace(0.0, goal.t_end, steps + 1),
+        steps=np.ones(steps, dtype=np.int64),
+        params=params[None, :, None].copy(),
+        observer_params=np.zeros(0),
+        Y=goal.start[None, :, None].copy(),
+        record=np.zeros((1, 0, 1)),
+        out=np.empty((1, steps, 4, 1)),
+    )
+    formula = ImplicitRungeKutta(IMPLICIT_TABLEAUS[method], counting_jacobian, True)
+    formula.run(counting_lagrange, observe_nothing, batch)
+    calls, jacobians = (int(batch.params[0, row, 0]) for row in (CALLS, JACOBIANS))
+    path = np.concatenate([goal.start[None], batch.out[0, :, :, 0]])
+    return Work(path[-1], calls, jacobians, path)
 
 
 def path_eigenvalues(goal: Goal, path: Floats) -> Floats:

@@ -25,6 +25,9 @@ from fastmech.step_limits.warning import step_limit, step_warning
 #: One method of each family: what quick versions walk.
 FAMILIES = ("euler", "rk4", "dop853", "abm8", "gauss6", "radau5", "sdirk4")
 
+#: Those whose labels quick versions look at.
+LABELLERS = ("rk4", "dop853", "radau5")
+
 #: Share of the step limit that is taken where the limit is shorter than the motion's step.
 WITHIN = 0.9
 
@@ -55,6 +58,16 @@ class Goal(NamedTuple):
 def walked(quick: bool) -> tuple[str, ...]:
     """Names of the methods that a case tries."""
     return FAMILIES if quick else tuple(METHODS)
+
+
+def labellers(quick: bool) -> tuple[str, ...]:
+    """Names of the methods by which a case looks for labels."""
+    return LABELLERS if quick else tuple(METHODS)
+
+
+def without_euler(quick: bool) -> tuple[str, ...]:
+    """The methods of a case in which Euler's needs steps of 1e-4 s: it only goes through the full version."""
+    return tuple(method for method in walked(quick) if not (quick and method == "euler"))
 
 
 def admitted_step(scene: Scene, method: str, longest: float, starts: ArrayLike | None = None) -> float:

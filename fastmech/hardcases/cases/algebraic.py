@@ -12,7 +12,7 @@ from fastmech.basins.status import BasinStatus
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.equilibria.find import find_equilibria
 from fastmech.hardcases.case import HardCase, Row, energy, row_of
-from fastmech.hardcases.walk import WITHIN, admitted_step, walked
+from fastmech.hardcases.walk import WITHIN, admitted_step, labellers, walked
 from fastmech.integrators.methods import find_method
 from fastmech.scene import Scene
 from fastmech.stability.linearize import Rest, jacobian
@@ -45,6 +45,7 @@ SIZE, FULL, QUICK = 0.4, 4000.0, 500.0
 
 #: Longest step of methods, one that no method without a claim survives, and steps that are too many [s].
 DT, TOO_LONG, MOST_STEPS = 0.05, 0.5, 2_000_000
+QUICK_MOST_STEPS = 200_000
 
 #: Exponent by which a method itself may change the energy of an undamped mode, and error of the power.
 KEPT, ALLOWED = 0.05, 0.1
@@ -68,20 +69,20 @@ def decay_power(t: NDArray[np.float64], level: NDArray[np.float64]) -> float:
     return 1.0 / float(np.polyfit(middle, 1.0 / rate, 1)[0])
 
 
-def _kept_step(method: str, scene: Scene, frequency: float, length: float) -> float:
+def _kept_step(method: str, scene: Scene, frequency: float, length: float, most: int) -> float:
     """Longest step [s] with which a method itself damps or drives an undamped mode by no more than KEPT.
 
-    Over the whole run, as the exponent of its energy: 2 ln|R(i omega h)| / h times the length. 0: too many
-    steps.
+    Over the whole run, as the exponent of its energy: 2 ln|R(i omega h)| / h times the length. 0: more than
+    ``most`` steps.
     """
     formula = find_method(method)
     dt = DT
-    while length <= MOST_STEPS * dt:
+    while length <= most * dt:
         own = abs(np.log(amplification(formula, 1j * frequency * dt))) / dt
         if 2.0 * float(own) * length <= KEPT:
             if beyond_stability(scene, dt, method):
                 dt = WITHIN * step_limit(scene, method)
-            return dt if length <= MOST_STEPS * dt else 0.0
+            return dt if length <= most * dt else 0.0
         dt *= 0.5
     return 0.0
 
@@ -97,11 +98,11 @@ def _missed(name: str) -> Callable[[bool], Sequence[Row]]:
         return [_decay(near, method, frequency, quick) for method in walked(quick)]
 
     def _decay(near: Rest, method: str, frequency: float, quick: bool) -> Row:
-        length = QUICK if quick else FULL
-        dt = _kept_step(method, scene, frequency, length)
+        length, most = (QUICK, QUICK_MOST_STEPS) if quick else (FULL, MOST_STEPS)
+        dt = _kept_step(method, scene, frequency, length, most)
         if dt == 0.0 and not quick:  # the shorter run asks for less
             length = QUICK
-            dt = _kept_step(method, scene, frequency, length)
+            dt = _kept_step(method, scene, frequency, length, most)
         times = np.linspace(0.0, length, OUTPUTS + 1)[1:]
         start = [near.phi, near.theta + SIZE, 0.0, 0.0]
         result = integrate(scene, start, t_eval=times, dt=dt or DT, method=method)
@@ -132,19 +133,20 @@ def _circled(method: str, dt: float, length: float) -> tuple[Trajectories, float
 
 def _circling(quick: bool) -> Sequence[Row]:
     length = QUICK if quick else FULL
+    most = QUICK_MOST_STEPS if quick else MOST_STEPS
     turning = np.sqrt(_CIRCLING.c1 / _CIRCLING.m2)
     rows = []
     for method in walked(quick):
         dt = admitted_step(_CIRCLING, method, DT)
         run, power, turns = _circled(method, dt, length)
-        while 2.0 * length <= MOST_STEPS * dt:
+        while 2.0 * length <= most * dt:
             finer, again, more = _circled(method, 0.5 * dt, length)
             if abs(power - again) <= 0.5 * ALLOWED:
                 break
             dt, run, power, turns = 0.5 * dt, finer, again, more
         else:
             run = integrate(_CIRCLING, _CIRCLING_START, length, TOO_LONG, method)
-            why = f"half the step tells otherwise, to {MOST_STEPS:,} steps"
+            why = f"half the step tells otherwise, to {most:,} steps"
             rows.append(row_of(run, np.nan, np.nan, claimed=False, why=why))
             continue
         # M2 has turned at the orbit's rate all the time.
@@ -152,7 +154,7 @@ def _circling(quick: bool) -> Sequence[Row]:
         error = abs(power - 1.0) if still else np.inf
         remark, why = f"E ~ t^-{power:.3f}, {turns:.0f} turns", "half the step tells the same"
         rows.append(row_of(run, error, ALLOWED, remark=remark, why=why))
-    return [*rows, *(_undecided(method) for method in walked(quick))]
+    return [*rows, *(_undecided(method) for method in labellers(quick))]
 
 
 def _undecided(method: str) -> Row:
@@ -169,7 +171,9 @@ def _undecided(method: str) -> Row:
 
 def _failed(kind: BasinStatus) -> str:
     """The integration's status of a label's, "ok" for labels: none is right here."""
-    return {BasinStatus.NOT_FINITE: "not_finite", BasinStatus.STEP_TOO_LARGE: "step_too_large"}.get(kind, "ok")
+    return {BasinStatus.NOT_FINITE: "not_finite", BasinStatus.STEP_TOO_LARGE: "step_too_large"}.get(
+        kind, "ok"
+    )
 
 
 CASES = (

@@ -63,9 +63,10 @@ def _walked(start: Sequence[float], method: str, steps: int) -> Row:
         _, error, run = energy_history(start, method, "lagrange", steps)
         why = "undamped motions grow with every step"
         return row_of(run, float(np.abs(error).max()), np.nan, claimed=False, why=why)
-    length = steps * DT
-    _, error, run = energy_history(start, method, "lagrange", round(length / dt), length / round(length / dt))
-    half = energy_history(start, method, "lagrange", 2 * round(length / dt), 0.5 * length / round(length / dt))
+    count = round(steps * DT / dt)
+    fitted = steps * DT / count
+    _, error, run = energy_history(start, method, "lagrange", count, fitted)
+    half = energy_history(start, method, "lagrange", 2 * count, 0.5 * fitted)
     estimate = float(np.abs(error - half[1]).max()) / (1.0 - 0.5 ** find_method(method).order)
     drift = float(np.abs(error).max())
     why = "twice what halving the step tells"
@@ -84,7 +85,7 @@ def _case(name: str, start: Sequence[float], entries: Sequence[tuple[str, str, f
     return HardCase(
         name,
         f"beta = 0 for a million steps from {start}: whatever a step loses adds up",
-        "energy is conserved; the error is the trend of E over E - U_min during the whole run; of the shorter "
+        "energy is conserved; the error is the trend of E over E - U_min during the whole run; of shorter "
         "runs of all methods, the largest error of E",
         "Gauss 6 on the canonical equations keeps the energy to 1e-10 and shows no trend; the others drift "
         "slowly, by what their order lets them; Euler's method ends with a status",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from fastmech.ensembles.integrate import integrate
 from fastmech.hardcases.case import HardCase, Row, row_of
 from fastmech.hardcases.cases.references import ORACLE, goal_of
 from fastmech.hardcases.counts import counted, explicit_calls
@@ -11,7 +12,6 @@ from fastmech.hardcases.walk import Goal, claimed_row, fixed_row, status_row, wa
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.methods import find_method
 from fastmech.step_limits.warning import step_warning
-from fastmech.ensembles.integrate import integrate
 
 #: name -> (what is hard, step of the walk [s], (method, steps) that must keep 1e-8).
 _CASES: dict[str, tuple[str, float, tuple[tuple[str, int], ...]]] = {
@@ -49,11 +49,12 @@ def _runner(name: str) -> Callable[[bool], Sequence[Row]]:
     def run(quick: bool) -> Sequence[Row]:
         _, dt, claims = _CASES[name]
         goal = goal_of(name)
-        if name == "damping_1e6":
-            rows = [_counted_row(goal, method, steps, FEWER if method == "radau5" else 0.0)
-                    for method, steps in claims]  # fmt: skip
-        else:
-            rows = [fixed_row(goal, method, goal.t_end / steps, ACCURACY, "declared") for method, steps in claims]
+        rows = []
+        for method, steps in claims:
+            if name == "damping_1e6":
+                rows.append(_counted_row(goal, method, steps, FEWER if method == "radau5" else 0.0))
+            else:
+                rows.append(fixed_row(goal, method, goal.t_end / steps, ACCURACY, "declared"))
         for method in walked(quick):
             implicit = isinstance(find_method(method), ImplicitRungeKutta)
             if implicit or step_warning(goal.scene, dt, method, goal.start) is None:

@@ -19,7 +19,7 @@ from fastmech.basins.status import BasinStatus
 from fastmech.ensembles.integrate import integrate
 from fastmech.equilibria.find import Equilibria, find_equilibria
 from fastmech.hardcases.case import Floats, HardCase, Row, row_of
-from fastmech.hardcases.walk import admitted_step, walked
+from fastmech.hardcases.walk import admitted_step, labellers, walked
 from fastmech.scene import Scene
 from fastmech.stability.linearize import jacobian
 
@@ -132,8 +132,10 @@ def _beside(side: float) -> Callable[[bool], Sequence[Row]]:
         passage = _passage()
         rows = [_creeping(passage, side, method) for method in walked(quick)]
         if not quick:
-            rows += [_whole(passage, side, row.method) for row in rows if row.claimed and row.dt >= AFFORDABLE]
-        return [*rows, *(_labels(passage, side, method) for method in walked(quick))]
+            rows += [
+                _whole(passage, side, row.method) for row in rows if row.claimed and row.dt >= AFFORDABLE
+            ]
+        return [*rows, *(_labels(passage, side, method) for method in labellers(quick))]
 
     return run
 
@@ -155,8 +157,8 @@ CASES = tuple(
         ),
         (
             "behind_a_fold", 1.0, "behind the merging",
-            "it passes the ghost in the time of the normal form; the ghost is never taken for rest, and every "
-            "label is the well that remains",
+            "it passes the ghost in the time of the normal form; the ghost is never taken for rest, and "
+            "every label is the well that remains",
         ),
     )
 )  # fmt: skip

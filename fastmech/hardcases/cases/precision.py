@@ -13,7 +13,7 @@ from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.errors import InputError
 from fastmech.hardcases.case import REFUSED, Floats, HardCase, Row, row_of
 from fastmech.hardcases.references import Boundary, boundary
-from fastmech.hardcases.walk import admitted_step, walked
+from fastmech.hardcases.walk import admitted_step, labellers, without_euler
 from fastmech.integrators.methods import find_method
 
 #: Distances from the boundary [rad], on both sides.
@@ -47,11 +47,11 @@ def _run(quick: bool) -> Sequence[Row]:
     edge = boundary()
     starts, above, distance = _starts(edge)
     rows = []
-    for method in walked(quick):
+    for method in without_euler(quick):
         dt = admitted_step(edge.scene, method, DT)
         for dtype, allowed in RIGHT_FROM.items():
             rows.append(_ends(edge, starts, above, distance, method, dt, dtype, allowed))
-    return [*rows, *(_certified(edge, starts, above, distance, method) for method in walked(quick))]
+    return [*rows, *(_certified(edge, starts, above, distance, method) for method in labellers(quick))]
 
 
 def _ends(

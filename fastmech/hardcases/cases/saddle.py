@@ -13,7 +13,7 @@ from fastmech.basins.status import BasinStatus
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.equilibria.find import find_equilibria
 from fastmech.hardcases.case import Floats, HardCase, Row, row_of
-from fastmech.hardcases.walk import admitted_step, walked
+from fastmech.hardcases.walk import admitted_step, labellers, without_euler
 from fastmech.scene import Scene
 from fastmech.stability.linearize import jacobian
 
@@ -113,11 +113,9 @@ def _labels(saddle: _Saddle, root: float, method: str) -> Row:
 
 def _run(quick: bool) -> Sequence[Row]:
     saddle = _saddle()
-    # Euler's method needs steps of 3e-4 s here: only in the full version.
-    methods = [method for method in walked(quick) if not (quick and method == "euler")]
-    rows = [_manifold(saddle, method) for method in methods]
+    rows = [_manifold(saddle, method) for method in without_euler(quick)]
     root = _root(saddle, "dop853", 0.25 * DT)
-    return [*rows, *(_labels(saddle, root, method) for method in walked(quick))]
+    return [*rows, *(_labels(saddle, root, method) for method in labellers(quick))]
 
 
 def _basis(values: NDArray[np.complex128]) -> list[int]:
