@@ -27,7 +27,7 @@ START = np.array([1.0, 0.5, 0.0, 0.0])
 
 
 def goal(scene: Scene = SCENE, t_end: float = 1.0) -> Goal:
-    """The end by DOP853's formula at a fine step stands in for the truth of these tests of the claims alone."""
+    """The end by DOP853's formula at a fine step stands in for the truth where claims alone are tested."""
     return Goal(scene, START, t_end, integrate(scene, START, t_end, 1e-3, "dop853").y[-1, 0])
 
 

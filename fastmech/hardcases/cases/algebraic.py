@@ -12,7 +12,7 @@ from fastmech.basins.status import BasinStatus
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.equilibria.find import find_equilibria
 from fastmech.hardcases.case import HardCase, Row, energy, row_of
-from fastmech.hardcases.walk import WITHIN, admitted_step, labellers, walked
+from fastmech.hardcases.walk import WITHIN, labellers, walked
 from fastmech.integrators.methods import find_method
 from fastmech.scene import Scene
 from fastmech.stability.linearize import Rest, jacobian
@@ -105,9 +105,10 @@ def _missed(name: str) -> Callable[[bool], Sequence[Row]]:
             dt = _kept_step(method, scene, frequency, length, most)
         times = np.linspace(0.0, length, OUTPUTS + 1)[1:]
         start = [near.phi, near.theta + SIZE, 0.0, 0.0]
-        result = integrate(scene, start, t_eval=times, dt=dt or DT, method=method)
         if dt == 0.0:
+            result = integrate(scene, start, length, TOO_LONG, method)
             return row_of(result, np.nan, np.nan, claimed=False, why="drives the mode that nothing damps")
+        result = integrate(scene, start, t_eval=times, dt=dt, method=method)
         level = energy(scene, result.y[:, 0]) - energy(scene, np.array([near.phi, near.theta, 0.0, 0.0]))
         power = decay_power(times, level)
         why = "its own damping of the mode is far less"
@@ -134,19 +135,20 @@ def _circled(method: str, dt: float, length: float) -> tuple[Trajectories, float
 def _circling(quick: bool) -> Sequence[Row]:
     length = QUICK if quick else FULL
     most = QUICK_MOST_STEPS if quick else MOST_STEPS
-    turning = np.sqrt(_CIRCLING.c1 / _CIRCLING.m2)
+    turning = float(np.sqrt(_CIRCLING.c1 / _CIRCLING.m2))
     rows = []
     for method in walked(quick):
-        dt = admitted_step(_CIRCLING, method, DT)
-        run, power, turns = _circled(method, dt, length)
-        while 2.0 * length <= most * dt:
-            finer, again, more = _circled(method, 0.5 * dt, length)
-            if abs(power - again) <= 0.5 * ALLOWED:
+        dt = _kept_step(method, _CIRCLING, turning, length, most)
+        found = None
+        while dt > 0.0 and 2.0 * length <= most * dt:
+            run, power, turns = found or _circled(method, dt, length)
+            found = _circled(method, 0.5 * dt, length)
+            if abs(power - found[1]) <= 0.5 * ALLOWED:
                 break
-            dt, run, power, turns = 0.5 * dt, finer, again, more
+            dt *= 0.5
         else:
             run = integrate(_CIRCLING, _CIRCLING_START, length, TOO_LONG, method)
-            why = f"half the step tells otherwise, to {most:,} steps"
+            why = f"drives the turning, or half the step tells otherwise, to {most:,} steps"
             rows.append(row_of(run, np.nan, np.nan, claimed=False, why=why))
             continue
         # M2 has turned at the orbit's rate all the time.
