@@ -8,33 +8,48 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.ensembles.integrate import Trajectories, integrate
+from fastmech.ensembles.integrate import Trajectories
 from fastmech.ensembles.status import Status
 from fastmech.mechanism.lagrange import kinetic_energy, potential_energy
 from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
 
+#: In place of a status: the request was refused before the run.
+REFUSED = "refused"
+
 
 @dataclass(frozen=True)
 class Row:
-    """What one method did in a case."""
+    """What one method did in a case.
+
+    A method claims a case to an error, at a step; one that claims nothing must end with a status (or be
+    refused), not with a number.
+    """
 
     method: str
     dt: float  #: step [s]
     steps: int
     error: float  #: against the oracle, see the case; NaN where there is none
-    allowed: float  #: largest error at which the case passes
+    allowed: float  #: error to which the method claims the case; NaN where it does not
     drift: float  #: largest change of energy over the energy above the lowest; NaN where energy is not kept
-    status: str  #: worst status of the trajectories
-    claimed: bool  #: whether the method claims the case; one that does not must end with a status
+    status: str  #: worst status of the trajectories, or REFUSED
+    claimed: bool  #: whether the method claims the case
     remark: str = ""
+    why: str = ""  #: why it claims the case so far and no further, or not
 
     @property
     def passed(self) -> bool:
         """A claimed case within its error and without failures; a case not claimed with a status."""
         fine = self.status == Status.OK.name.lower()
         return fine and self.error <= self.allowed if self.claimed else not fine
+
+    @property
+    def verdict(self) -> str:
+        """What a reader must know: whether the number may be taken, and to how many digits."""
+        if self.claimed:
+            return "passed" if self.passed else f"FAILED: claimed to {self.allowed:.0e}"
+        return "a status, as it must" if self.passed else f"FAILED: not claimed, error {self.error:.1e}"
 
 
 @dataclass(frozen=True)
@@ -60,25 +75,6 @@ def energy(scene: Scene, y: Floats) -> Floats:
     return kinetic_energy(scene, y) + potential_energy(scene, y[..., :2], force)
 
 
-def final_row(
-    scene: Scene,
-    start: ArrayLike,
-    t_end: float,
-    expected: Floats,
-    method: str,
-    dt: float,
-    allowed: float,
-    *,
-    formulation: str = "lagrange",
-    claimed: bool = True,
-) -> Row:
-    """One trajectory whose final state is known; the error is relative to the largest entry, 1 at least."""
-    run = integrate(scene, start, t_end, dt, method, formulation=formulation)
-    scale = np.maximum(1.0, np.abs(expected).max())
-    error = float(np.abs(run.y[-1, 0] - expected).max() / scale)
-    return row_of(run, error, allowed, claimed=claimed)
-
-
 def row_of(
     run: Trajectories,
     error: float,
@@ -87,6 +83,7 @@ def row_of(
     *,
     claimed: bool = True,
     remark: str = "",
+    why: str = "",
 ) -> Row:
     """A row of what ``integrate`` gave."""
-    return Row(run.method, run.dt, run.steps, error, allowed, drift, worst(run.status), claimed, remark)
+    return Row(run.method, run.dt, run.steps, error, allowed, drift, worst(run.status), claimed, remark, why)

@@ -10,6 +10,7 @@ from fastmech.hardcases.cases import (
     algebraic,
     chaos,
     conservative,
+    damping,
     folds,
     precision,
     references,
@@ -20,6 +21,6 @@ from fastmech.hardcases.cases import (
 #: Every case by its name.
 CASES: dict[str, HardCase] = {
     case.name: case
-    for module in (references, conservative, algebraic, folds, saddle, chaos, precision, starts)
+    for module in (damping, references, conservative, algebraic, folds, saddle, chaos, precision, starts)
     for case in module.CASES
 }

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from fastmech.ensembles.threads import thread_count
 from fastmech.equilibria.find import find_equilibria
 from fastmech.errors import InputError, StepWarning
 from fastmech.hardcases.cases.conservative import (
+    DT,
     ENERGETIC_START,
     PAPER_START,
     QUICK_STEPS,
@@ -23,6 +24,8 @@ from fastmech.hardcases.cases.conservative import (
 from fastmech.hardcases.containment import CONTAINED, containment, containment_markdown
 from fastmech.hardcases.gallery import gallery_dataset, gallery_markdown, run_gallery, verdict
 from fastmech.hardcases.registry import CASES
+from fastmech.integrators.implicit_method import ImplicitRungeKutta
+from fastmech.integrators.method import Adams, RungeKutta
 from fastmech.integrators.methods import METHODS
 from fastmech.plots.energy_drift import draw_energy_drift
 from fastmech.plots.stability_region import draw_stability_regions
@@ -35,11 +38,18 @@ from fastmech.step_limits.predict import largest_stable_step, limiting_eigenvalu
 from fastmech.store.provenance import provenance
 from fastmech.store.write import write_results
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 #: Methods and formulations whose energy is drawn.
 DRIFTS = (("rk4", "lagrange"), ("dop853", "lagrange"), ("gauss6", "lagrange"), ("gauss6", "hamilton"))
 
-#: Methods whose regions are drawn.
-REGIONS = ("rk4", "tsit5", "dop853", "ab6", "abm8", "abm12")
+#: Pages of stability regions: name, methods on it, title.
+REGIONS = (
+    ("explicit", RungeKutta, "Stability regions |R(z)| ≤ 1 of the explicit Runge-Kutta methods"),
+    ("adams", Adams, "Stability regions of the Adams methods, by the roots of the history's map"),
+    ("implicit", ImplicitRungeKutta, "Stability regions |R(z)| ≤ 1 of the implicit Runge-Kutta methods"),
+)
 
 Stage = Callable[[str, int], Callable[[int], None]]
 
@@ -97,24 +107,44 @@ def _write(out: Path, quick: bool, stage: Stage, started: float) -> Report:
         replace=True,
     )
     paths = [table, store]
-    minimum = next(e for e in find_equilibria(scene) if e.morse_index == 0)
-    pictures = {
-        "stability_regions": draw_stability_regions(
-            {name: METHODS[name] for name in REGIONS}, limiting_eigenvalues(scene, minimum), limits
-        )
-    }
-    for name, start in (("paper_start", PAPER_START), ("energetic_start", ENERGETIC_START)):
-        histories = {
-            f"{method}, {'(q, p)' if formulation == 'hamilton' else '(q, q′)'}": energy_history(
-                start, method, formulation, QUICK_STEPS if quick else STEPS
-            )[:2]
-            for method, formulation in DRIFTS
-        }
-        pictures[f"energy_{name}"] = draw_energy_drift(histories)
+    pictures = _region_pictures(scene, limits)
+    steps = QUICK_STEPS if quick else STEPS
+    pictures["energy_paper_start"] = _energy_picture("the paper's start", PAPER_START, steps)
+    pictures["energy_energetic_start"] = _energy_picture("an energetic start", ENERGETIC_START, steps)
     for name, figure in pictures.items():
         paths.append(out / f"{name}.png")
         save(figure, paths[-1])
     return Report(paths, verdict(results), all(result.passed for result in results))
+
+
+def _region_pictures(scene: Scene, limits: Dataset) -> dict[str, Figure]:
+    """A page a family: regions, the scene's eigenvalues at the limits, limits on the axes."""
+    minimum = next(e for e in find_equilibria(scene) if e.morse_index == 0)
+    eigenvalues = limiting_eigenvalues(scene, minimum)
+    pages = {}
+    for name, family, title in REGIONS:
+        members = {key: method for key, method in METHODS.items() if isinstance(method, family)}
+        if members:
+            full = f"{title}\nλ: eigenvalues at the minimum of Table 1 under the constant force"
+            pages[f"stability_{name}"] = draw_stability_regions(members, eigenvalues, limits, full)
+    return pages
+
+
+def _energy_picture(label: str, start: Sequence[float], steps: int) -> Figure:
+    """Energy errors from one start by a few methods."""
+    histories = {
+        f"{method}, {'(q, p)' if formulation == 'hamilton' else '(q, q′)'}": energy_history(
+            start, method, formulation, steps
+        )[:2]
+        for method, formulation in DRIFTS
+    }
+    phi, theta, u, v = start
+    return draw_energy_drift(
+        histories,
+        f"Energy error of an undamped motion from {label}",
+        f"φ = {phi:.4g} rad, θ = {theta:.4g} rad, φ′ = {u:g} rad/s, θ′ = {v:g} rad/s; "
+        f"{steps:,} steps of h = {DT:g} s",
+    )
 
 
 def _limits(scene: Scene, advance: Callable[[int], None]) -> Dataset:

@@ -19,8 +19,11 @@ Floats = NDArray[np.float64]
 FLOOR = 1e-17
 
 
-def draw_energy_drift(histories: Mapping[str, tuple[Floats, Floats]]) -> Figure:
-    """``histories``: label -> (times [s], relative energy error), on two logarithmic axes."""
+def draw_energy_drift(histories: Mapping[str, tuple[Floats, Floats]], title: str, subtitle: str) -> Figure:
+    """``histories``: label -> (times [s], relative energy error), on two logarithmic axes.
+
+    ``title`` says whose error it is, ``subtitle`` start and step.
+    """
     with style():
         figure = new_figure(7.6, 4.6)
         axes = figure.subplots()
@@ -28,6 +31,7 @@ def draw_energy_drift(histories: Mapping[str, tuple[Floats, Floats]]) -> Figure:
             axes.loglog(times, np.maximum(np.abs(error), FLOOR), lw=1.1, label=label)
         axes.set_xlabel("time t [s]")
         axes.set_ylabel("|E − E(0)| / (E(0) − min U)")
-        axes.set_title("Energy error of an undamped motion", loc="left")
+        axes.set_title(subtitle, loc="left", fontsize=9)
+        figure.suptitle(title, x=0.01, ha="left")
         legend_below(figure, axes, 2)
     return figure

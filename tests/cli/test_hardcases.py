@@ -24,7 +24,6 @@ def one_case(monkeypatch: pytest.MonkeyPatch):
         monkeypatch.setattr(gallery, "CASES", cases)
         monkeypatch.setattr(report, "CASES", cases)
         monkeypatch.setattr(report, "METHODS", {name: METHODS[name] for name in ("rk4", "dop853", "gauss6")})
-        monkeypatch.setattr(report, "REGIONS", ("rk4", "dop853"))
 
     return gallery_of
 
@@ -33,8 +32,8 @@ def test_table_result_file_and_pictures(invoke, one_case):
     one_case(1e-9)
     result = invoke("hardcases", "--quick", "--out", "hard")
     assert result.exit_code == 0
-    assert result.stdout.splitlines()[-1] == "all 1 cases passed (1 rows)"
-    names = {"hardcases.md", "hardcases.h5", "stability_regions.png"}
+    assert result.stdout.splitlines()[-1] == "all 1 cases passed (1 row)"
+    names = {"hardcases.md", "hardcases.h5", "stability_explicit.png", "stability_implicit.png"}
     names |= {"energy_paper_start.png", "energy_energetic_start.png"}
     assert {path.name for path in Path("hard").iterdir()} == names
     text = Path("hard/hardcases.md").read_text(encoding="utf-8")
@@ -43,7 +42,7 @@ def test_table_result_file_and_pictures(invoke, one_case):
     assert "## Failing neighbours" in text
     with open_results("hard/hardcases.h5") as results:
         assert results.sections == ("gallery", "step_limits", "containment")
-        assert results.attrs["verdict"] == "all 1 cases passed (1 rows)"
+        assert results.attrs["verdict"] == "all 1 cases passed (1 row)"
         limits = results["step_limits"]
         np.testing.assert_allclose(
             limits["measured_step"].data[:2], limits["predicted_step"].data[:2], rtol=0.02

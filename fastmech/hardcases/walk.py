@@ -1,0 +1,128 @@
+"""Every method through the same motion: which step it takes, to what error it claims the end, and whether so.
+
+A method claims an end to twice what halving its own step tells (Richardson; Hairer, Norsett, Wanner, *Solving
+ODEs I*, section II.4): no knowledge of the true motion goes into a claim, the oracle then judges it. The step
+is the motion's, or a shorter one where the package would warn of that; it is halved until the claim is worth
+something. A method that would need too many steps claims nothing and must end with a status at a step that is
+far too long.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fastmech.ensembles.integrate import Trajectories, integrate
+from fastmech.errors import InputError
+from fastmech.hardcases.case import REFUSED, Floats, Row, row_of, worst
+from fastmech.integrators.method import Adams
+from fastmech.integrators.methods import METHODS, find_method
+from fastmech.scene import Scene
+from fastmech.step_limits.warning import step_limit, step_warning
+
+#: One method of each family: what quick versions walk.
+FAMILIES = ("euler", "rk4", "dop853", "abm8", "gauss6", "radau5", "sdirk4")
+
+#: Those whose labels quick versions look at.
+LABELLERS = ("rk4", "dop853", "radau5")
+
+#: Share of the step limit that is taken where the limit is shorter than the motion's step.
+WITHIN = 0.9
+
+#: An Adams method's history is this much shorter than the step of a method without memory.
+SHORTER = 4.0
+
+#: Relative error beyond which a number is worth nothing, and steps that are too many to get one.
+WORTHLESS, MOST_STEPS = 0.1, 200_000
+
+#: Relative error that rounding explains, of motions that are not chaotic.
+ROUNDED = 1e-10
+
+
+class Goal(NamedTuple):
+    """A motion with a known end."""
+
+    scene: Scene
+    start: Floats  #: (4,)
+    t_end: float  #: s
+    expected: Floats  #: (4,), state at that time
+    rounded: float = ROUNDED  #: error that rounding explains, of the largest entry
+
+    def error(self, state: Floats) -> float:
+        """Largest difference from the known end, relative to its largest entry, 1 at least."""
+        return _distance(state, self.expected)
+
+
+def walked(quick: bool) -> tuple[str, ...]:
+    """Names of the methods that a case tries."""
+    return FAMILIES if quick else tuple(METHODS)
+
+
+def labellers(quick: bool) -> tuple[str, ...]:
+    """Names of the methods by which a case looks for labels."""
+    return LABELLERS if quick else tuple(METHODS)
+
+
+def without_euler(quick: bool) -> tuple[str, ...]:
+    """The methods of a case in which Euler's needs steps of 1e-4 s: it only goes through the full version."""
+    return tuple(method for method in walked(quick) if not (quick and method == "euler"))
+
+
+def admitted_step(scene: Scene, method: str, longest: float, starts: ArrayLike | None = None) -> float:
+    """The longest step [s], ``longest`` at most, that the package lets pass without a warning; 0: none."""
+    dt = longest / (SHORTER if isinstance(find_method(method), Adams) else 1.0)
+    if step_warning(scene, dt, method, starts) is None:
+        return dt
+    return min(dt, WITHIN * step_limit(scene, method))
+
+
+def claimed_row(goal: Goal, method: str, longest: float, refused: float) -> Row:
+    """The end by one method, to the error that it claims itself, or the status that it must end with.
+
+    Args:
+        goal: the motion.
+        method: its name.
+        longest: longest step [s].
+        refused: step [s] that is far too long for a method that claims nothing.
+    """
+    scene, start, t_end, _, rounded = goal
+    dt = admitted_step(scene, method, longest, start)
+    while 0.0 < t_end <= MOST_STEPS * dt:
+        run, claim = _own_claim(goal, method, dt)
+        if worst(run.status) == "ok" and claim <= WORTHLESS:
+            why = "twice what halving the step tells" if claim > 2.0 * rounded else "rounding"
+            return row_of(run, goal.error(run.y[-1, 0]), claim, why=why)
+        dt /= 2.0
+    why = f"no claim with {MOST_STEPS:,} steps"
+    return status_row(goal, method, refused, why)
+
+
+def status_row(goal: Goal, method: str, dt: float, why: str, dtype: str = "float64") -> Row:
+    """A row of a method that claims nothing with this step."""
+    try:
+        run = integrate(goal.scene, goal.start, goal.t_end, dt, method, dtype=dtype)
+    except InputError as error:
+        return Row(method, dt, 0, np.nan, np.nan, np.nan, REFUSED, False, str(error), why)
+    return row_of(run, goal.error(run.y[-1, 0]), np.nan, claimed=False, why=why)
+
+
+def fixed_row(goal: Goal, method: str, dt: float, allowed: float, why: str, dtype: str = "float64") -> Row:
+    """A row of a method that claims the end to an error that is known beforehand."""
+    run = integrate(goal.scene, goal.start, goal.t_end, dt, method, dtype=dtype)
+    remark = "" if dtype == "float64" else dtype
+    return row_of(run, goal.error(run.y[-1, 0]), allowed, why=why, remark=remark)
+
+
+def _own_claim(goal: Goal, method: str, dt: float) -> tuple[Trajectories, float]:
+    """A run and the error that it claims: twice Richardson's estimate, rounding added."""
+    run, half = (integrate(goal.scene, goal.start, goal.t_end, h, method) for h in (dt, 0.5 * dt))
+    order = find_method(method).order
+    estimate = _distance(run.y[-1, 0], half.y[-1, 0]) / (1.0 - 0.5**order)
+    claim = 2.0 * estimate + goal.rounded
+    return run, claim if np.isfinite(claim) else np.inf
+
+
+def _distance(state: Floats, expected: Floats) -> float:
+    return float(np.abs(state - expected).max() / max(1.0, np.abs(expected).max()))
