@@ -60,6 +60,11 @@ RHS = types.FunctionType(RHS_SIGNATURE)
 OBSERVER_SIGNATURE = observer_signature(types.float64)
 OBSERVER = types.FunctionType(OBSERVER_SIGNATURE)
 
+#: ``step(t, h, Y, Z, params, work)``: a whole step of a block from ``Y`` to ``Z``, see
+#: :mod:`fastmech.kernels.whole_steps`.
+STEP_SIGNATURE = types.int64(types.float64, types.float64, MATRIX, MATRIX, MATRIX, MATRIX)
+STEP = types.FunctionType(STEP_SIGNATURE)
+
 #: ``jacobian(t, Y, J, params)``: row ``r * dim + c`` of ``J`` (dim * dim, lanes) is the derivative of the
 #: rate of state ``r`` by state ``c``.
 JACOBIAN_SIGNATURE = types.void(types.float64, MATRIX, MATRIX, MATRIX)

@@ -26,6 +26,7 @@ PACKAGE = Path(__file__).resolve().parent
 #: the package (``tests/test_layout.py`` keeps it so), hence these decide every kernel.
 COMPILED = (
     "jit.py",
+    "generated.py",
     "mechanism",
     "kernels",
     "integrators",

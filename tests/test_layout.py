@@ -18,6 +18,7 @@ pytestmark = pytest.mark.nojit
 LAYERS = (
     "errors",
     "kernel_cache",
+    "generated",
     "jit",
     "scene",
     "mechanism",

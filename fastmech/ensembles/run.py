@@ -31,6 +31,7 @@ from fastmech.ensembles.threads import thread_count
 from fastmech.integrators.batch import Batch
 from fastmech.integrators.explicit import observe_nothing
 from fastmech.integrators.method import Method
+from fastmech.integrators.whole import in_whole_steps
 from fastmech.kernels.single import in_single
 
 Floats = NDArray[np.float64]
@@ -149,6 +150,8 @@ def run_ensemble(
         rhs, observe = in_single(rhs), import_module("fastmech.integrators.single").observe_nothing
         begin, own = begin.astype(precision), own.astype(precision)
 
+    else:
+        method = in_whole_steps(method, rhs)
     if block_lanes is None:
         block_lanes = block_width(method, begin.shape[1], precision)
 

@@ -18,6 +18,7 @@ from fastmech.jit import (
     OBSERVER_SIGNATURE,
     VECTOR,
     driver_signature,
+    inlined,
     kernel,
 )
 
@@ -30,6 +31,33 @@ Observer = Callable[[float, Floats, Floats, Floats], None]
 @kernel(OBSERVER_SIGNATURE)
 def observe_nothing(t: float, Y: Floats, params: Floats, record: Floats) -> None:
     """The observer of runs that keep nothing but states."""
+
+
+@inlined
+def one_step(
+    rhs: BlockRHS,
+    t: float,
+    h: float,
+    start: Integers,
+    stage: Integers,
+    weight: Floats,
+    nodes: Floats,
+    state: Floats,
+    own: Floats,
+    K: Floats,
+    Z: Floats,
+) -> None:
+    """A step of a block ``state`` (dim, lanes) in place; ``K`` (stages, dim, lanes) and ``Z`` are scratch.
+
+    The right-hand side takes the arrays as rows, the stage sums take them flat.
+    """
+    stages, n = nodes.shape[0], state.size
+    y, k_flat, z = state.reshape(n), K.reshape((stages, n)), Z.reshape(n)
+    rhs(t, state, K[0], own)
+    for s in range(1, stages):
+        add_stages(z, y, k_flat, h, stage, weight, int(start[s]), int(start[s + 1]))
+        rhs(t + nodes[s] * h, Z, K[s], own)
+    add_stages(y, None, k_flat, h, stage, weight, int(start[stages]), int(start[stages + 1]))
 
 
 #: Types of a packed tableau: start, stage, weight, nodes.
@@ -59,21 +87,12 @@ def integrate_blocks(
     step. A step's time is computed from its index, so rounding does not accumulate.
     """
     stages, dim, lanes = nodes.shape[0], Y.shape[1], Y.shape[2]
-    n = dim * lanes
-    # Each array once as rows for the right-hand side and once flat for the stage sums.
     K, Z = rows_of(Y[0], stages).reshape((stages, dim, lanes)), rows_of(Y[0], 1).reshape((dim, lanes))
-    k_flat, z = K.reshape(stages, n), Z.reshape(n)
     for b in range(Y.shape[0]):
         state, own, kept = Y[b], params[b], record[b]
-        y = state.reshape(n)
         for j in range(steps.shape[0]):
             h = (times[j + 1] - times[j]) / max(steps[j], 1)
             for step in range(steps[j]):
-                t = times[j] + step * h
-                rhs(t, state, K[0], own)
-                for s in range(1, stages):
-                    add_stages(z, y, k_flat, h, stage, weight, int(start[s]), int(start[s + 1]))
-                    rhs(t + nodes[s] * h, Z, K[s], own)
-                add_stages(y, None, k_flat, h, stage, weight, int(start[stages]), int(start[stages + 1]))
+                one_step(rhs, times[j] + step * h, h, start, stage, weight, nodes, state, own, K, Z)
                 observe(times[j] + (step + 1) * h, state, observer_params, kept)
             out[b, j] = state

@@ -17,8 +17,10 @@ from kernels.blocks_of_lanes import COMBINATIONS, MODULES, kernel, lanes
 from numba import float64, int64, none
 
 from fastmech.integrators.sums import TERMS, add_stages
+from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import FLAGS, INTEGERS, MATRIX, VECTOR
 from fastmech.kernels.blocks import DAMPING, DECAY, FORCE
+from fastmech.kernels.whole_steps import METHODS, whole_step
 from fastmech.kernels.work import lagrange_work
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
@@ -29,7 +31,12 @@ pytestmark = pytest.mark.skipif(
 )
 
 KERNELS = {f"{formulation}-{terms}": kernel(formulation, terms) for formulation, terms in COMBINATIONS}
-SHIPPED = {**KERNELS, "work": lagrange_work}
+STEPS = {
+    f"{method}-{terms}": whole_step(kernel("lagrange", terms), TABLEAUS[method])
+    for method in METHODS
+    for terms in ("free", "damped_constant", "damped_decaying")
+}
+SHIPPED = {**KERNELS, "work": lagrange_work, **STEPS}
 
 PACKED = re.compile(r"\bv(?:f?n?m(?:add|sub)\d*|mul)\w*pd\s.*%[yz]mm")
 VECTOR_ARITHMETIC = re.compile(r"= f(?:add|sub|mul|div) .*<[48] x double>")

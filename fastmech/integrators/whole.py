@@ -1,0 +1,128 @@
+"""Driver of Runge-Kutta methods whose steps are compiled whole, see :mod:`fastmech.kernels.whole_steps`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from fastmech.integrators.batch import Batch
+from fastmech.integrators.explicit import TABLEAU, BlockRHS, Observer, one_step
+from fastmech.integrators.method import Method, RungeKutta
+from fastmech.integrators.sums import rows_of
+from fastmech.jit import STEP, driver_signature, inlined, kernel
+from fastmech.kernels.whole_steps import whole_step
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+BlockStep = Callable[[float, float, Floats, Floats, Floats, Floats], int]
+
+
+@inlined
+def redo(
+    rhs: BlockRHS,
+    t: float,
+    h: float,
+    start: Integers,
+    stage: Integers,
+    weight: Floats,
+    nodes: Floats,
+    now: Floats,
+    then: Floats,
+    params: Floats,
+    far: Floats,
+) -> None:
+    """The step once more, stage by stage, for lanes that are ``far`` out: one by one."""
+    dim, stages = now.shape[0], nodes.shape[0]
+    y, own = np.empty((dim, 1)), np.empty((params.shape[0], 1))
+    K, Z = np.empty((stages, dim, 1)), np.empty((dim, 1))
+    for i in range(now.shape[1]):
+        if far[i] != 0.0:
+            y[:, 0], own[:, 0] = now[:, i], params[:, i]
+            one_step(rhs, t, h, start, stage, weight, nodes, y, own, K, Z)
+            then[:, i] = y[:, 0]
+
+
+@kernel(driver_signature(types.float64, STEP, *TABLEAU))
+def integrate_whole_steps(
+    rhs: BlockRHS,
+    observe: Observer,
+    step: BlockStep,
+    start: Integers,
+    stage: Integers,
+    weight: Floats,
+    nodes: Floats,
+    times: Floats,
+    steps: Integers,
+    params: Floats,
+    observer_params: Floats,
+    Y: Floats,
+    record: Floats,
+    out: Floats,
+) -> None:
+    """Take blocks of lanes through all times, as :func:`fastmech.integrators.explicit.integrate_blocks` does.
+
+    ``step`` does the work; ``rhs`` and the packed tableau serve lanes that it cannot do. States go to and fro
+    between the block and a second one: a copy would cost as much as a stage.
+    """
+    dim, lanes = Y.shape[1], Y.shape[2]
+    work = np.empty((nodes.shape[0] + 1, lanes))
+    other = rows_of(Y[0], 1).reshape((dim, lanes))
+    for b in range(Y.shape[0]):
+        now, then, own, kept = Y[b], other, params[b], record[b]
+        for j in range(steps.shape[0]):
+            h = (times[j + 1] - times[j]) / max(steps[j], 1)
+            for k in range(steps[j]):
+                t = times[j] + k * h
+                if step(t, h, now, then, own, work):
+                    redo(rhs, t, h, start, stage, weight, nodes, now, then, own, work[-1])
+                now, then = then, now
+                observe(times[j] + (k + 1) * h, now, observer_params, kept)
+            out[b, j] = now
+        if steps.sum() % 2:
+            Y[b] = other
+
+
+@dataclass(frozen=True)
+class WholeSteps(RungeKutta):
+    """An explicit Runge-Kutta method with a compiled step for one right-hand side."""
+
+    step: Any
+
+    @property
+    def rows(self) -> int:
+        """None: stages are local numbers."""
+        return 0
+
+    def run(self, rhs: Any, observe: Any, batch: Batch) -> None:
+        """Take a batch through its times."""
+        packed = self.tableau.packed
+        integrate_whole_steps(
+            rhs,
+            observe,
+            self.step,
+            packed.start,
+            packed.stage,
+            packed.weight,
+            packed.nodes,
+            batch.times,
+            batch.steps,
+            batch.params,
+            batch.observer_params,
+            batch.Y,
+            batch.record,
+            batch.out,
+        )
+
+
+def in_whole_steps(method: Method, rhs: Any) -> Method:
+    """The same method with a compiled step for this right-hand side, where there is one."""
+    if isinstance(method, RungeKutta):
+        step = whole_step(rhs, method.tableau)
+        if step is not None:
+            return WholeSteps(method.tableau, step)
+    return method

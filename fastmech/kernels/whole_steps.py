@@ -1,0 +1,121 @@
+"""Whole steps of a Runge-Kutta method in one loop over lanes, for the methods that run most.
+
+Stage by stage, a step reads and writes its stages' derivatives in memory, a fifth of its time. Here all
+stages of a lane are local numbers: the loop's source is made from the tableau, once for each combination of
+terms, and compiled when a run first asks for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from typing import Any, Protocol
+
+from fastmech.generated import load_generated
+from fastmech.kernels import lagrange
+
+#: Methods that have whole steps: the fourth order that everybody knows and the best of order 8. Each costs a
+#: second or three of compilation for each combination of terms, on first use.
+METHODS = ("rk4", "dop853")
+
+
+class Formula(Protocol):
+    """What a loop is made from: the tableau of an explicit method."""
+
+    @property
+    def name(self) -> str:
+        """Name of the method."""
+
+    @property
+    def a(self) -> Sequence[Sequence[float]]:
+        """Rows of the lower triangle."""
+
+    @property
+    def b(self) -> Sequence[float]:
+        """Weights."""
+
+    @property
+    def c(self) -> Sequence[float]:
+        """Nodes."""
+
+
+_HEAD = '''"""Made by fastmech: a step of {name} of Lagrange's equations, all stages in one loop."""
+
+from fastmech.jit import STEP_SIGNATURE, kernel
+from fastmech.kernels.blocks import DAMPING, DECAY, FORCE, write_decay
+from fastmech.kernels.sincos import REDUCTION_LIMIT, sincos
+from fastmech.mechanism.equations import lagrange_accelerations
+
+
+@kernel(STEP_SIGNATURE)
+def step(t, h, Y, Z, p, work):
+    beyond = 0
+{decay}    for i in range(Y.shape[1]):
+        phi0, theta0, phi_dot0, theta_dot0 = Y[0, i], Y[1, i], Y[2, i], Y[3, i]
+        mass, slider, lift, spring, gravity = p[0, i], p[1, i], p[2, i], p[3, i], p[4, i]
+        force, damping = {force}, {damping}
+        reach = 0.0
+'''
+
+_DECAY = """    write_decay(t + {c!r} * h, p, DECAY, work[{s}:])
+"""
+
+_STAGE = """
+        s1, c1 = sincos(phi{s})
+        s2, c2 = sincos(theta{s})
+        reach += phi{s} * phi{s}
+        reach += theta{s} * theta{s}
+        a{s}, b{s} = lagrange_accelerations(
+            s1, c1, s2, c2, phi_dot{s}, theta_dot{s}, mass, slider, lift, spring, gravity, {push}, damping
+        )
+"""
+
+_TAIL = """
+        Z[0, i], Z[1, i], Z[2, i], Z[3, i] = phi{s}, theta{s}, phi_dot{s}, theta_dot{s}
+        far = reach > REDUCTION_LIMIT * REDUCTION_LIMIT
+        work[{s}, i] = far
+        beyond |= far
+    return beyond
+"""
+
+#: A state, and what its rate is called.
+_RATES = (("phi", "phi_dot"), ("theta", "theta_dot"), ("phi_dot", "a"), ("theta_dot", "b"))
+
+
+def source(tableau: Formula, terms: str) -> str:
+    """The loop of a method for a combination of terms (:func:`~fastmech.kernels.select.terms`): a module."""
+    decays = "decaying" in terms
+    text = _HEAD.format(
+        name=tableau.name,
+        decay="".join(_DECAY.format(s=s, c=float(c)) for s, c in enumerate(tableau.c)) if decays else "",
+        force="p[FORCE, i]" if decays or "constant" in terms else None,
+        damping="p[DAMPING, i]" if "damped" in terms else None,
+    )
+    for s, row in enumerate([*tableau.a[1:], tableau.b], start=1):
+        text += _STAGE.format(s=s - 1, push=f"force * work[{s - 1}, i]" if decays else "force")
+        for state, rate in _RATES:
+            text += f"        {state}{s} = {state}0 + h * ({_sum(row, rate)})\n"
+    return text + _TAIL.format(s=len(tableau.b))
+
+
+def _sum(row: Sequence[float], rate: str) -> str:
+    return " + ".join(f"{float(weight)!r} * {rate}{s}" for s, weight in enumerate(row) if weight)
+
+
+def whole_step(rhs: Any, tableau: Formula) -> Any:
+    """``step(t, h, Y, Z, p, work)`` of a block right-hand side and a method, ``None`` where there is none.
+
+    It writes the states (dim, lanes) after a step from ``Y`` into ``Z``, with ``work`` (stages + 1, lanes) as
+    scratch. Where an angle at any stage may have left the range of the fast trigonometry (the squares of all
+    of them are summed: one instruction an angle) it says so: by a result that is not 0, and by the last row
+    of ``work`` for the lanes concerned, whose new states are not to be used.
+    """
+    name = getattr(rhs, "__name__", "")
+    if tableau.name not in METHODS or rhs is not getattr(lagrange, name, None):
+        return None
+    return _compiled(source(tableau, name.removeprefix("lagrange_")))
+
+
+@cache
+def _compiled(text: str) -> Any:
+    return load_generated("step", text).step
