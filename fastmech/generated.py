@@ -5,19 +5,19 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 from fastmech.errors import InputError
 from fastmech.kernel_cache import cache_directory
 
 
-def load_generated(kind: str, source: str, prints: tuple[str, ...] = (), **names: Any) -> ModuleType:
-    """Run ``source`` as a module in which ``names`` are known.
+def new_module(kind: str, source: str, prints: Iterable[str] = ()) -> ModuleType:
+    """A module for ``source``, not run yet: what the source needs to know is put in first.
 
     Numba keeps on disk only what comes from a file, so the source is written into the cache directory under
-    a name made from it and from ``prints``, the fingerprints of what it is given.
+    a name made from it and from ``prints``, the fingerprints of what it will be given.
 
     Raises:
         InputError: the file cannot be written.
@@ -25,16 +25,16 @@ def load_generated(kind: str, source: str, prints: tuple[str, ...] = (), **names
     digest = hashlib.sha256("\0".join([source, *prints]).encode()).hexdigest()[:16]
     path = cache_directory() / f"{kind}s" / f"{kind}_{digest}.py"
     _write_once(path, source)
-    module = ModuleType(module_name(path.stem))
-    vars(module).update(names, __file__=str(path))
+    module = ModuleType(f"fastmech_{path.stem}")
+    module.__file__ = str(path)
     sys.modules[module.__name__] = module  # where numba looks when it loads a kernel from the disk
-    exec(compile(source, path, "exec"), vars(module))
     return module
 
 
-def module_name(stem: str) -> str:
-    """Name of a generated module."""
-    return f"fastmech_{stem}"
+def run_module(module: ModuleType, source: str) -> ModuleType:
+    """Run the source of a module; whatever that raises passes."""
+    exec(compile(source, str(module.__file__), "exec"), vars(module))
+    return module
 
 
 def _write_once(path: Path, source: str) -> None:

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import dis
-import hashlib
 import inspect
-import os
-import sys
 import types
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numba
@@ -25,8 +21,8 @@ from fastmech.ensembles.refusals import explain, reason
 from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
 from fastmech.errors import InputError
+from fastmech.generated import new_module, run_module
 from fastmech.jit import inlined
-from fastmech.kernel_cache import cache_directory
 from fastmech.kernels.attempt import attempted
 from fastmech.kernels.sincos import WITHIN
 
@@ -134,27 +130,17 @@ class System:
 
     @cached_property
     def _compiled(self) -> types.ModuleType:
-        """The system's kernels, loaded from the disk cache where they are there.
-
-        Numba keeps on disk only what comes from a file, so the kernels' source is written into the cache
-        directory under a name made from everything that the user's functions depend on.
-        """
+        """The system's kernels, loaded from the disk cache where they are there."""
         functions: dict[str, Any] = {"rhs": self.rhs} | ({"stop": self.stop} if self.stop else {})
         swaps = {} if numba.config.DISABLE_JIT else WITHIN  # type: ignore[attr-defined]
         source = self._source(reaches(functions["rhs"], swaps))
-        prints = [source, *(fingerprint(function) for function in functions.values())]
-        digest = hashlib.sha256("\0".join(prints).encode()).hexdigest()[:16]
-        path = cache_directory() / "systems" / f"system_{digest}.py"
-        _write_once(path, source)
-        module = types.ModuleType(f"fastmech_{path.stem}")
+        module = new_module("system", source, [fingerprint(function) for function in functions.values()])
         for field, function in functions.items():
             whole = rebuilt(function, module.__name__, {})
             within = rebuilt(function, module.__name__, swaps)
             vars(module).update({field: inlined(whole), f"{field}_within": attempted(within)})
-        vars(module)["__file__"] = str(path)
-        sys.modules[module.__name__] = module  # where numba looks when it loads a kernel from the disk
         try:
-            exec(compile(source, path, "exec"), vars(module))
+            run_module(module, source)
         except Exception as error:  # numba lets those of the code it looks at pass
             state, count = list(self.state), 1 + len(self.state)
             explain(
@@ -225,16 +211,3 @@ def _check_function(field: str, function: Any, state: list[str], parameters: lis
         raise InputError(f"{field}: takes {told}, must take ({wanted})")
     if any(instruction.opname == "RAISE_VARARGS" for instruction in dis.get_instructions(function)):
         raise InputError(f"{field}: must not raise or assert; nan as a result ends a trajectory")
-
-
-def _write_once(path: Path, source: str) -> None:
-    """The file keeps its first time stamp: numba takes a newer one for a changed source."""
-    if path.exists():
-        return
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        aside = path.with_suffix(f".{os.getpid()}.tmp")
-        aside.write_text(source, encoding="utf-8")
-        os.replace(aside, path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}") from None

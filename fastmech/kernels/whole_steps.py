@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from functools import cache
 from typing import Any, Protocol
 
-from fastmech.generated import load_generated
+from fastmech.generated import new_module, run_module
 from fastmech.kernels import lagrange
 
 #: Methods that have whole steps: the fourth order that everybody knows and the best of order 8. Each costs a
@@ -118,4 +118,4 @@ def whole_step(rhs: Any, tableau: Formula) -> Any:
 
 @cache
 def _compiled(text: str) -> Any:
-    return load_generated("step", text).step
+    return run_module(new_module("step", text), text).step
