@@ -72,7 +72,11 @@ def climb(
         bad = free[impossible(ends[free], last.state[free])]
         status[ends[bad]] = BasinStatus.STEP_TOO_LARGE
         status[ends[free[~np.isfinite(last.state[free]).all(axis=1)]]] = BasinStatus.NOT_FINITE
-        status[ends[free[last.status[free] == Status.NOT_CONVERGED]]] = BasinStatus.NOT_CONVERGED
+        for kind in (Status.NOT_CONVERGED, Status.STEP_TOO_LARGE):
+            status[ends[free[last.status[free] == kind]]] = BasinStatus[kind.name]
+        # The finest step alone is within the limit: nothing bears it out.
+        alone = ~settled[done] & (coarse.status[done] == Status.STEP_TOO_LARGE) & (last.status == Status.OK)
+        status[ends[alone]] = BasinStatus.STEP_TOO_LARGE
         rest = np.flatnonzero(~settled)
         members, coarse = members[rest], fine.take(rest)
         if not members.size:

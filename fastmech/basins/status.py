@@ -38,7 +38,8 @@ _ADVICE = {
     BasinStatus.UNDECIDED: "not captured by t_end (use a larger one), or the finest steps disagree",
     BasinStatus.AT_SADDLE: "comes to an unstable equilibrium, and the finest steps disagree on what follows",
     BasinStatus.NOT_FINITE: "became NaN or infinite with every step tried; use a smaller dt",
-    BasinStatus.STEP_TOO_LARGE: "has energy that it cannot have, with every step tried; use a smaller dt",
+    BasinStatus.STEP_TOO_LARGE: "every step tried is beyond the method's limit, or brings the motion to an "
+    "energy that it cannot have; use a smaller dt",
     BasinStatus.NOT_CONVERGED: "Newton's iteration found no solution of a step, with every step tried; "
     "use a smaller dt",
     BasinStatus.START_NOT_FINITE: "the start is NaN or infinite",

@@ -110,6 +110,8 @@ def own_values(parameters: Mapping[str, ArrayLike], known: Mapping[str, float], 
     Raises:
         InputError: an unknown name, not n values, or values that are not finite.
     """
+    if not isinstance(parameters, Mapping):
+        raise InputError(f"parameters = {parameters!r}: must map names to values, one a start")
     own = {}
     for name, values in parameters.items():
         if name not in known:

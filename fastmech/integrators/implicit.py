@@ -2,9 +2,9 @@
 
 The stages' increments Z solve Z_i = h sum_j a_ij f(y + Z_j) by a simplified Newton iteration (Hairer, Wanner,
 *Solving ODEs II*, section IV.8): one Jacobian a step, the system of all stages split by the eigenvalues of
-A^-1 into one real and one complex system of the size of the state. The Jacobian is that of the stages' mean as
-the last step foretells it. Stages of a diagonally implicit method are solved one after another by the same
-code. The iteration ends, lane by lane, when rounding is all that is left, so that a lane's result never
+A^-1 into one real and one complex system of the size of the state. The Jacobian is that of the stages' mean
+as the last step foretells it. Stages of a diagonally implicit method are solved one after another by the
+same code. The iteration ends, lane by lane, when rounding is all that is left, so that a lane's result never
 depends on its neighbours.
 """
 
