@@ -128,11 +128,11 @@ def integrate(
         states at the output times and the status of every trajectory: a start that is not finite, a motion
         that became so, and a step too large for a scene are told apart and leave the others as they are. A
         step is too large where the motion ends with an energy it cannot have, and where ``dt`` is beyond the
-        limit that the warning before the run names: such a trajectory keeps its states, but they are not to
-        be trusted. Of a system nothing is known beforehand. One that fails on the way has NaN from the next
-        output on, and its last finite state and time in ``last`` and ``failed``. With ``tol`` also an
-        estimate of the error; with ``dt`` there is none. A trajectory that a system's stopping condition ends
-        keeps the state in which it stopped.
+        limit that the warning before the run names, for motion about the trajectory's start or its end: it
+        keeps its states, but they are not to be trusted. Of a system nothing is known beforehand. One that
+        fails on the way has NaN from the next output on, and its last finite state and time in ``last`` and
+        ``failed``. With ``tol`` also an estimate of the error; with ``dt`` there is none. A trajectory that a
+        system's stopping condition ends keeps the state in which it stopped.
 
     Raises:
         InputError: an argument is wrong, or the states would not fit into memory.
@@ -170,7 +170,8 @@ def integrate(
     solution = solve(problem, starts, outputs, settings, threads, progress)
     own = own_values(parameters or {}, scene.model_dump(), len(starts))
     first, longest = solution.dt[0], solution.dt.max(axis=0)
-    beyond = steps_beyond(scene, extremes, own, starts, first, longest, formula.name)
+    ends = solution.y[-1] if solution.last is None else solution.last
+    beyond = steps_beyond(scene, extremes, own, starts, ends, first, longest, formula.name)
     solution.status[beyond & (solution.status == Status.OK)] = Status.STEP_TOO_LARGE
     return _trajectories(problem, outputs, solution, settings)
 

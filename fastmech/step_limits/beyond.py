@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 
 from fastmech.integrators.methods import find_method
 from fastmech.scene import Scene
+from fastmech.step_limits.amplification import amplification
 from fastmech.step_limits.impulse import impulse_limit
-from fastmech.step_limits.warning import TURN, beyond_stability, step_limit
+from fastmech.step_limits.predict import UNDAMPED
+from fastmech.step_limits.warning import TURN, beyond_stability, local_eigenvalues, step_limit
 
 Floats = NDArray[np.float64]
 
@@ -37,6 +39,7 @@ def steps_beyond(
     extremes: Sequence[Scene],
     own: Mapping[str, Floats],
     starts: Floats,
+    ends: Floats,
     first: Floats,
     longest: Floats,
     method: str,
@@ -49,6 +52,8 @@ def steps_beyond(
             is stable for these, it is for all.
         own: values (n,) of parameters that differ between trajectories.
         starts: states (n, 4).
+        ends: last finite states (n, 4). A step that is too long for places where a motion never is does it no
+            harm: it must be so at the start or where the motion has come to.
         first: step of each [s] at the start, where the force is great and the start's rates count, (n,).
         longest: longest step of each [s], (n,).
         method: a name from :data:`fastmech.integrators.methods.METHODS`.
@@ -63,11 +68,25 @@ def steps_beyond(
     if not any(is_beyond(each, float(longest.max(initial=0.0)), method) for each in extremes):
         return beyond
     rows, which = _distinct(longest, own)
-    grown = [
-        is_beyond(scene.replace(**dict(zip(own, values, strict=True))), dt, method)
-        for dt, *values in rows.tolist()
-    ]
-    return np.asarray(beyond | np.array(grown)[which])
+    for row, (dt, *values) in enumerate(rows.tolist()):
+        each = scene.replace(**dict(zip(own, values, strict=True)))
+        if is_beyond(each, dt, method):
+            members = np.flatnonzero(which == row)
+            beyond[members] |= _grows_there(each, dt, method, starts[members])
+            beyond[members] |= _grows_there(each, dt, method, ends[members])
+    return beyond
+
+
+def _grows_there(scene: Scene, dt: float, method: str, states: Floats) -> NDArray[np.bool_]:
+    """Whether damped small motion about each configuration (n,) grows, with the force or without."""
+    finite = np.isfinite(states).all(axis=1)
+    phi, theta = states[finite, :2].T
+    grows = np.zeros(len(states), dtype=np.bool_)
+    for force in {scene.F0, scene.F0 if scene.alpha == 0.0 else 0.0}:
+        values = local_eigenvalues(scene, force, phi, theta)
+        decays = values.real < -UNDAMPED * np.abs(values)
+        grows[finite] |= (decays & (amplification(find_method(method), dt * values) > 1.0)).any(axis=1)
+    return grows
 
 
 def _turns_too_far(rates: Floats, first: Floats) -> NDArray[np.bool_]:

@@ -44,7 +44,7 @@ def configuration_eigenvalues(scene: Scene, force: float) -> NDArray[np.complex1
     (eigenvalues with positive real part) there is nothing for a step to keep stable.
     """
     phi, theta = (grid.ravel() for grid in _grid())
-    return _eigenvalues(scene, force, phi, theta)
+    return local_eigenvalues(scene, force, phi, theta)
 
 
 def _grid() -> list[Any]:
@@ -52,7 +52,8 @@ def _grid() -> list[Any]:
     return list(np.meshgrid(angles, angles, indexing="ij"))
 
 
-def _eigenvalues(scene: Scene, force: float, phi: Any, theta: Any) -> NDArray[np.complex128]:
+def local_eigenvalues(scene: Scene, force: float, phi: Any, theta: Any) -> NDArray[np.complex128]:
+    """Eigenvalues [1/s] of the motion linearized at rest in configurations (n,), shape (n, 4)."""
     c = reduce(scene)._replace(force=force / (scene.m2 * scene.l))
     motions = small_motion(
         phi,
@@ -88,7 +89,7 @@ def resting_eigenvalues(scene: Scene, force: float) -> NDArray[np.complex128]:
         for at in zip(*np.nonzero(lowest), strict=True)
     ]
     phi, theta = np.array(found).reshape(-1, 2).T
-    return _eigenvalues(scene, force, phi, theta).ravel()
+    return local_eigenvalues(scene, force, phi, theta).ravel()
 
 
 @cache

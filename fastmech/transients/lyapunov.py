@@ -128,6 +128,6 @@ def largest_lyapunov(
     status = judge(reached.astype(np.int8), starts, np.ascontiguousarray(Y.T), problem.coefficients)
     if isinstance(scene, Scene):
         taken, values = np.full(len(starts), h), own_values(parameters or {}, scene.model_dump(), len(starts))
-        beyond = steps_beyond(scene, extremes, values, starts, taken, taken, METHOD)
+        beyond = steps_beyond(scene, extremes, values, starts, Y.T, taken, taken, METHOD)
         status[beyond & (status == Status.OK)] = Status.STEP_TOO_LARGE
     return LyapunovExponents(times[1:], exponents, status)
