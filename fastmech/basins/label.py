@@ -23,6 +23,7 @@ from fastmech.disturbance.outcome import confining_energy
 from fastmech.ensembles import checks
 from fastmech.ensembles.plausible import breaks_energy_bounds
 from fastmech.ensembles.run import Progress
+from fastmech.ensembles.status import Status
 from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError
 from fastmech.integrators.method import Method
@@ -30,6 +31,7 @@ from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import unit
 from fastmech.scene import Scene
+from fastmech.step_limits.beyond import is_beyond
 from fastmech.step_limits.warning import warn_of_step
 
 Floats = NDArray[np.float64]
@@ -153,7 +155,11 @@ class Ladder:
         self.observer = self.certificate.packed
 
     def follow(self, starts: Floats, substeps: int, observer: Floats) -> Paths:
-        """One computation."""
+        """One computation; none where its step lets damped motion grow."""
+        if is_beyond(self.certificate.scene, SUBSTEPS[0] * self.coarse / substeps, self.method.name):
+            paths = Paths.empty(len(starts))
+            paths.status[:] = Status.STEP_TOO_LARGE
+            return paths
         paths = follow(
             self.certificate, observer, starts, self.t_end, self.rounds, substeps, self.method, self.threads
         )
@@ -170,17 +176,17 @@ class Ladder:
             lambda some, substeps: self.follow(begin[some], substeps, self.observer),
             lambda _, coarse, fine: tell_the_same(self.certificate, coarse, fine, 0.5 * self.coarse, push),
             lambda some, states: breaks_energy_bounds(c, begin[some], states),
-            lambda some: lingering(
-                self.certificate,
-                begin[some],
-                self.t_end,
-                self.coarse * SUBSTEPS[0] / SUBSTEPS[-1],
-                self.method.name,
-                self.threads,
-            ),
+            lambda some: self.lingers(begin[some]),
             found,
             status,
         )
+
+    def lingers(self, starts: Floats) -> NDArray[np.bool_]:
+        """Which motions come to an unstable equilibrium, with the finest step."""
+        finest = self.coarse * SUBSTEPS[0] / SUBSTEPS[-1]
+        if is_beyond(self.certificate.scene, finest, self.method.name):
+            return np.zeros(len(starts), dtype=np.bool_)
+        return lingering(self.certificate, starts, self.t_end, finest, self.method.name, self.threads)
 
     def settle_times(
         self, begin: Floats, members: NDArray[np.intp], found: Paths, status: NDArray[np.int8], radius: float

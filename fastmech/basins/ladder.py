@@ -15,6 +15,7 @@ from fastmech.basins.status import BasinStatus
 from fastmech.capture.certificate import Certificate
 from fastmech.disturbance.size import size_at
 from fastmech.ensembles.integrate import integrate
+from fastmech.ensembles.status import Status
 from fastmech.errors import StepWarning
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.mechanism.reduced import metric_11, slider_ratio
@@ -71,6 +72,11 @@ def climb(
         bad = free[impossible(ends[free], last.state[free])]
         status[ends[bad]] = BasinStatus.STEP_TOO_LARGE
         status[ends[free[~np.isfinite(last.state[free]).all(axis=1)]]] = BasinStatus.NOT_FINITE
+        for kind in (Status.NOT_CONVERGED, Status.STEP_TOO_LARGE):
+            status[ends[free[last.status[free] == kind]]] = BasinStatus[kind.name]
+        # The finest step alone is within the limit: nothing bears it out.
+        alone = ~settled[done] & (coarse.status[done] == Status.STEP_TOO_LARGE) & (last.status == Status.OK)
+        status[ends[alone]] = BasinStatus.STEP_TOO_LARGE
         rest = np.flatnonzero(~settled)
         members, coarse = members[rest], fine.take(rest)
         if not members.size:

@@ -40,6 +40,7 @@ class Paths:
     stop: Floats  #: end of the computation [s]
     energy: Floats  #: bounding energy there, over m2 l^2
     state: Floats  #: state there, (n, 4)
+    status: NDArray[np.int8]  #: :class:`fastmech.ensembles.status.Status` of the run, (n,)
     steps: int = 0  #: of all lanes together
 
     @classmethod
@@ -52,6 +53,7 @@ class Paths:
             np.full(n, np.nan),
             np.full(n, np.nan),
             np.full((n, 4), np.nan),
+            np.zeros(n, dtype=np.int8),
         )
 
     def put(self, where: NDArray[np.intp], other: Paths) -> None:
@@ -64,7 +66,7 @@ class Paths:
         return Paths(*(getattr(self, name)[which] for name in ARRAYS))
 
 
-ARRAYS = ("code", "turns", "time", "stop", "energy", "state")
+ARRAYS = ("code", "turns", "time", "stop", "energy", "state", "status")
 
 
 def rounds_until(t_end: float, longest: float) -> int:
@@ -119,6 +121,7 @@ def follow(
             end,
             run.records[STOP_ENERGY],
             run.states[-1],
+            run.status,
         )
         paths.put(running, reached)
         paths.steps += int(np.rint(end / interval - passed).sum()) * substeps

@@ -17,6 +17,7 @@ class BasinStatus(IntEnum):
     NOT_FINITE = 3
     STEP_TOO_LARGE = 4
     START_NOT_FINITE = 5
+    NOT_CONVERGED = 6
 
     @property
     def advice(self) -> str:
@@ -25,14 +26,22 @@ class BasinStatus(IntEnum):
 
 
 #: Statuses of starts whose motion has failed.
-FAILURES = (BasinStatus.NOT_FINITE, BasinStatus.STEP_TOO_LARGE, BasinStatus.START_NOT_FINITE)
+FAILURES = (
+    BasinStatus.NOT_FINITE,
+    BasinStatus.STEP_TOO_LARGE,
+    BasinStatus.NOT_CONVERGED,
+    BasinStatus.START_NOT_FINITE,
+)
 
 _ADVICE = {
     BasinStatus.CAPTURED: "proved to end in its well: energy and position leave no other way",
     BasinStatus.UNDECIDED: "not captured by t_end (use a larger one), or the finest steps disagree",
     BasinStatus.AT_SADDLE: "comes to an unstable equilibrium, and the finest steps disagree on what follows",
     BasinStatus.NOT_FINITE: "became NaN or infinite with every step tried; use a smaller dt",
-    BasinStatus.STEP_TOO_LARGE: "has energy that it cannot have, with every step tried; use a smaller dt",
+    BasinStatus.STEP_TOO_LARGE: "every step tried is beyond the method's limit, or brings the motion to an "
+    "energy that it cannot have; use a smaller dt",
+    BasinStatus.NOT_CONVERGED: "Newton's iteration found no solution of a step, with every step tried; "
+    "use a smaller dt",
     BasinStatus.START_NOT_FINITE: "the start is NaN or infinite",
 }
 

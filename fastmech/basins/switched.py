@@ -142,7 +142,7 @@ class Switched:
             parameters={"F0": now, "alpha": self.alpha[lanes]},
             threads=self.threads,
         )
-        paths.state[group] = run.y[-1]
+        paths.state[group], paths.status[group] = run.y[-1], run.status
         clock[group] += span
         paths.stop[group] = clock[group]
 

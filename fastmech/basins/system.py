@@ -60,6 +60,7 @@ def system_labels_of(
         failed = run.status != Status.OK
         status[members] = np.where(agrees & (run.stop_code != 0), BasinStatus.CAPTURED, BasinStatus.UNDECIDED)
         status[members[failed]] = BasinStatus.NOT_FINITE
+        status[members[run.status == Status.NOT_CONVERGED]] = BasinStatus.NOT_CONVERGED
         status[members[run.status == Status.START_NOT_FINITE]] = BasinStatus.START_NOT_FINITE
         if before is not None and substeps == SUBSTEPS[-1]:
             split = ~agrees & (before[0] != run.stop_code) & (before[0] != 0) & (run.stop_code != 0)

@@ -23,6 +23,7 @@ from fastmech.kernels.jacobians import lagrange_jacobian
 from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
+from fastmech.step_limits.beyond import is_beyond
 from fastmech.step_limits.warning import beyond_stability, warn_of_step
 
 Floats = NDArray[np.float64]
@@ -139,7 +140,7 @@ def disturb(
     outcome[(end_index == index) & ~turned & stable[end_index]] = Outcome.RETURNED
     status = judge(run.status, starts, final, reduce(scene))
     if beyond_stability(scene, step, method):  # where it came to rest is no matter of the mechanism
-        outcome[outcome != Outcome.UNDECIDED] = Outcome.STEP_TOO_LARGE
+        outcome[(outcome != Outcome.UNDECIDED) | is_beyond(scene, step, method)] = Outcome.STEP_TOO_LARGE
     outcome[status == Status.STEP_TOO_LARGE] = Outcome.STEP_TOO_LARGE
     outcome[status == Status.NOT_FINITE] = Outcome.NOT_FINITE
     outcome[status == Status.NOT_CONVERGED] = Outcome.NOT_CONVERGED

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from fastmech.ensembles.fitting import fading_force, speed_bound, vibration_frequency
 from fastmech.ensembles.problem import Problem
 from fastmech.ensembles.solve import Settings, solve
-from fastmech.ensembles.stiffness import damping_rate, explicit_limit, work
+from fastmech.ensembles.stiffness import damping_rate, explicit_limit, explicit_reason, work
 from fastmech.integrators.method import Method
 from fastmech.integrators.methods import find_method
 
@@ -161,7 +161,13 @@ class _Trial:
                 f"stability keeps {ladder.method.name} to {ladder.dt(ladder.rung):.1g} s, accuracy allows "
                 f"{implicit.dt(implicit.rung):.1g} s"
             )
-        return ladder.calibrated("least work at this tolerance and these output times")
+        beside = None
+        if implicit is not None and implicit.good:
+            beside = implicit.method.name, implicit.dt(implicit.rung), self.cost(implicit) / self.cost(ladder)
+        dt, share = ladder.dt(ladder.rung), ladder.estimate(ladder.rung) / self.tol
+        return ladder.calibrated(
+            explicit_reason(ladder.method, dt, share, RATIO, self.problem.coefficients, beside)
+        )
 
     def cost(self, ladder: _Ladder) -> float:
         """Work of a trajectory with the step found."""

@@ -9,7 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.ensembles import checks
-from fastmech.ensembles.problem import Problem, extreme_scenes, scene_problem, system_problem
+from fastmech.ensembles.problem import (
+    Problem,
+    extreme_scenes,
+    own_values,
+    scene_problem,
+    system_problem,
+)
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.solve import Precision, Settings, Solution, solve
 from fastmech.ensembles.status import Status, failure_counts, failure_line
@@ -22,6 +28,7 @@ from fastmech.integrators.method import Method
 from fastmech.integrators.methods import find_method
 from fastmech.kernels.select import FORMULATIONS
 from fastmech.scene import Scene, nearest
+from fastmech.step_limits.beyond import steps_beyond
 from fastmech.step_limits.warning import warn_of_step
 
 #: Longest step [s] where neither a step nor a tolerance is given.
@@ -120,11 +127,13 @@ def integrate(
 
     Returns:
         states at the output times and the status of every trajectory: a start that is not finite, a motion
-        that became so, and a scene's motion that ends with an energy it cannot have (the step is too large)
-        are told apart and leave the others as they are. One that fails has NaN from the next output on, and
-        its last finite state and time in ``last`` and ``failed``. With ``tol`` also an estimate of the
-        error; with ``dt`` there is none. A trajectory that a system's stopping condition ends keeps the state
-        in which it stopped.
+        that became so, and a step too large for a scene are told apart and leave the others as they are. A
+        step is too large where the motion ends with an energy it cannot have, and where ``dt`` is beyond the
+        limit that the warning before the run names, for motion about the trajectory's start or its end: it
+        keeps its states, but they are not to be trusted. Of a system nothing is known beforehand. One that
+        fails on the way has NaN from the next output on, and its last finite state and time in ``last`` and
+        ``failed``. With ``tol`` also an estimate of the error; with ``dt`` there is none. A trajectory that a
+        system's stopping condition ends keeps the state in which it stopped.
 
     Raises:
         InputError: an argument is wrong, or the states would not fit into memory.
@@ -154,10 +163,19 @@ def integrate(
         raise InputError(f"quantile = {quantile!r}: tells whose error tol is; give tol with it")
     formula = find_method(method or "rk4")
     step = checks.number("dt", DEFAULT_DT if dt is None else dt, "s", above=0.0)
-    if isinstance(scene, Scene):
-        warn_of_step(extreme_scenes(scene, parameters or {}), step, formula.name, starts)
     settings = Settings(formula, step, _fit_times(fit, scene), _precision(dtype, problem, formula))
+    if not isinstance(scene, Scene):
+        return _trajectories(
+            problem, outputs, solve(problem, starts, outputs, settings, threads, progress), settings
+        )
+    extremes = extreme_scenes(scene, parameters or {})
+    warn_of_step(extremes, step, formula.name, starts)
     solution = solve(problem, starts, outputs, settings, threads, progress)
+    own = own_values(parameters or {}, scene.model_dump(), len(starts))
+    first, longest = solution.dt[0], solution.dt.max(axis=0)
+    ends = solution.y[-1] if solution.last is None else solution.last
+    beyond = steps_beyond(scene, extremes, own, starts, ends, first, longest, formula.name)
+    solution.status[beyond & (solution.status == Status.OK)] = Status.STEP_TOO_LARGE
     return _trajectories(problem, outputs, solution, settings)
 
 

@@ -112,7 +112,7 @@ def own_values(parameters: Mapping[str, ArrayLike], known: Mapping[str, float], 
         InputError: an unknown name, not n values, or values that are not finite.
     """
     if not isinstance(parameters, Mapping):
-        raise InputError(f"parameters = {parameters!r}: must be a mapping of names to values")
+        raise InputError(f"parameters = {parameters!r}: must map names to values, one a start")
     own = {}
     for name, values in parameters.items():
         if name not in known:

@@ -34,6 +34,9 @@ ROUNDED = 1e-11
 #: Jacobians and small linear systems. Measured for ``radau5`` at steps that suit 1e-4 to 1e-8.
 IMPLICIT_STEP = 75
 
+#: Why an explicit method was chosen whose step accuracy sets.
+LEAST_WORK = "least work at this tolerance and these output times"
+
 _PHI = np.linspace(0.0, np.pi, 1001)
 
 #: Largest square of the slider's speed over the crank's, in units of l.
@@ -72,3 +75,33 @@ def work(method: Method, dt: float, outputs: Floats) -> float:
     if method.start_steps == 0:
         return float(method.evaluations(1) * steps.sum())
     return float(sum(method.evaluations(int(number)) for number in steps))
+
+
+def explicit_reason(
+    method: Method,
+    dt: float,
+    share: float,
+    rung: float,
+    c: Coefficients | None,
+    beside: tuple[str, float, float] | None,
+) -> str:
+    """Why an explicit method was chosen, in one line; where stability sets its step ``dt`` [s], that too.
+
+    ``share`` is its error over the tolerance, ``rung`` the ratio of two steps that were compared, ``c`` a
+    scene's coefficients. ``beside`` is the implicit method that was tried because stability sets the step:
+    its name, its step [s] and its work over the explicit method's.
+    """
+    kept = f"least work, though stability keeps {method.name} to {dt:.2g} s"
+    if beside is not None:
+        name, step, ratio = beside
+        return f"{kept}: accuracy allows {name} {step:.2g} s, at {ratio:.2g} times the work"
+    allowed = dt * max(share, 1e-30) ** (-1.0 / method.order)
+    # A rung was compared with one longer step: where that was beyond the limit, no error is known.
+    if (
+        c is None
+        or share == 0.0
+        or allowed <= rung * dt
+        or rung**2 * dt < (1.0 - 1e-9) * explicit_limit(method, c)
+    ):
+        return LEAST_WORK
+    return f"{kept}: accuracy would allow {allowed:.2g} s"

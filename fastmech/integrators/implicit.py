@@ -2,9 +2,10 @@
 
 The stages' increments Z solve Z_i = h sum_j a_ij f(y + Z_j) by a simplified Newton iteration (Hairer, Wanner,
 *Solving ODEs II*, section IV.8): one Jacobian a step, the system of all stages split by the eigenvalues of
-A^-1 into one real and one complex system of the size of the state. Stages of a diagonally implicit method are
-solved one after another by the same code. The iteration ends, lane by lane, when rounding is all that is
-left, so that a lane's result never depends on its neighbours.
+A^-1 into one real and one complex system of the size of the state. The Jacobian is that of the stages' mean
+as the last step foretells it. Stages of a diagonally implicit method are solved one after another by the
+same code. The iteration ends, lane by lane, when rounding is all that is left, so that a lane's result never
+depends on its neighbours.
 """
 
 from __future__ import annotations
@@ -13,21 +14,11 @@ import numpy as np
 from numba import types
 
 from fastmech.integrators.explicit import BlockRHS, Floats, Integers, Observer
-from fastmech.integrators.newton import (
-    apply_complex,
-    apply_real,
-    combine,
-    difference_jacobian,
-    general_complex,
-    general_real,
-    second_order_inverse,
-)
+from fastmech.integrators.newton import apply_complex, apply_real, combine, newton_inverses
 from fastmech.jit import CUBE, INTEGERS, JACOBIAN, MATRIX, OBSERVER, RHS, VECTOR, inlined, kernel
 
-#: Where the Jacobian comes from.
-DIFFERENCES, GENERAL, SECOND_ORDER = 0, 1, 2
-
-#: Iterations before a lane is started again without extrapolation, and before it is given up.
+#: Iterations before a lane is started again, without extrapolation and with the Jacobian at the step's
+#: start, and before it is given up.
 FIRST_ATTEMPT, MOST_ITERATIONS = 16, 40
 
 #: What rounding may leave where nothing improves any more, relative to the lane's largest state or increment.
@@ -146,20 +137,6 @@ def integrate_implicit_block(
         own, within, scaled = h * a, h * a[:group, :group], forth / h
         for step in range(steps[j]):
             t = times[j] + step * h
-            if kind == DIFFERENCES:
-                difference_jacobian(rhs, t, Y, J, params, work)
-            else:
-                jacobian(t, Y, J, params)
-            if kind == SECOND_ORDER:
-                if pair:
-                    second_order_inverse(J, eigenvalues[0] / h, 0.0, X, V)
-                if eigenvalues[2] != 0.0:
-                    second_order_inverse(J, eigenvalues[1] / h, eigenvalues[2] / h, U, V)
-            else:
-                if pair:
-                    general_real(J, eigenvalues[0] / h, G, X)
-                if eigenvalues[2] != 0.0:
-                    general_complex(J, eigenvalues[1] / h, eigenvalues[2] / h, G, U, V)
             for i in range(lanes):
                 base[i] = 0.0
             for x in range(dim):
@@ -171,6 +148,18 @@ def integrate_implicit_block(
             else:
                 z[:] = 0.0
             previous = h
+            # The Jacobian of the mean of the guessed stages errs by half of what that of the start does.
+            middle = 0.0
+            point[:] = Y
+            if group == stages:
+                for k in range(stages):
+                    middle += nodes[k] * h / stages
+                    for x in range(dim):
+                        for i in range(lanes):
+                            point[x, i] += Z[k, x, i] / stages
+            newton_inverses(
+                rhs, jacobian, kind, t + middle, point, params, eigenvalues, h, J, X, U, V, G, work
+            )
             for first in range(0, stages, group):
                 for k in range(first, first + group):
                     e[k] = 0.0
@@ -192,6 +181,9 @@ def integrate_implicit_block(
                                     Z[k, x, i] = E[k, x, i] if active[i] > 0.0 else Z[k, x, i]
                         for i in range(lanes):
                             last[i] = np.inf
+                        newton_inverses(
+                            rhs, jacobian, kind, t, Y, params, eigenvalues, h, J, X, U, V, G, work
+                        )
                     for k in range(first, first + group):
                         for x in range(dim):
                             for i in range(lanes):

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from fastmech.integrators.batch import Batch, Floats
-from fastmech.integrators.implicit import DIFFERENCES, GENERAL, SECOND_ORDER, integrate_implicit_block
+from fastmech.integrators.implicit import integrate_implicit_block
 from fastmech.integrators.implicit_tableau import ImplicitTableau
 from fastmech.integrators.method import Method, OneStep
+from fastmech.integrators.newton import DIFFERENCES, GENERAL, SECOND_ORDER
 
 #: Newton iterations that a step of ordinary length takes: what ``evaluations`` reckons with.
 TYPICAL_ITERATIONS = 4

@@ -58,6 +58,6 @@ def find_method(name: str) -> Method:
     Raises:
         InputError: no such method; the message lists the known ones.
     """
-    if name not in METHODS:
+    if not isinstance(name, str) or name not in METHODS:
         raise InputError(f"method = {name!r}: unknown; known: {', '.join(METHODS)}")
     return METHODS[name]

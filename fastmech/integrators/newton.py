@@ -8,7 +8,10 @@ from __future__ import annotations
 from numba import types
 
 from fastmech.integrators.explicit import BlockRHS, Floats
-from fastmech.jit import CUBE, MATRIX, RHS, kernel
+from fastmech.jit import CUBE, JACOBIAN, MATRIX, RHS, VECTOR, kernel
+
+#: Where the Jacobian comes from.
+DIFFERENCES, GENERAL, SECOND_ORDER = 0, 1, 2
 
 #: Relative increment of forward differences: root of the rounding unit.
 INCREMENT = 2.0**-26
@@ -154,6 +157,62 @@ def second_order_inverse(J: Floats, re: float, im: float, X: Floats, V: Floats) 
             V[10, i], V[11, i] = re * b00 + im * a00, re * b01 + im * a01
             V[12, i], V[13, i] = re * f10 + im * c10, re * f11 + im * c11
             V[14, i], V[15, i] = re * b10 + im * a10, re * b11 + im * a11
+
+
+@kernel(
+    types.void(
+        RHS,
+        JACOBIAN,
+        types.int64,
+        types.float64,
+        MATRIX,
+        MATRIX,
+        VECTOR,
+        types.float64,
+        MATRIX,
+        MATRIX,
+        MATRIX,
+        MATRIX,
+        MATRIX,
+        CUBE,
+    )
+)
+def newton_inverses(
+    rhs: BlockRHS,
+    jacobian: BlockRHS,
+    kind: int,
+    t: float,
+    Y: Floats,
+    params: Floats,
+    eigenvalues: Floats,
+    h: float,
+    J: Floats,
+    X: Floats,
+    U: Floats,
+    V: Floats,
+    G: Floats,
+    work: Floats,
+) -> None:
+    """The Jacobian J at (t, Y), X = (mu - J)^-1 for the real mu h of ``eigenvalues``, U + i V for the pair's.
+
+    ``kind`` says where the Jacobian comes from; ``G`` (8 dim^2 + 1 rows) and ``work`` (3, dim, lanes) are
+    scratch.
+    """
+    if kind == DIFFERENCES:
+        difference_jacobian(rhs, t, Y, J, params, work)
+    else:
+        jacobian(t, Y, J, params)
+    real, re, im = eigenvalues[0] / h, eigenvalues[1] / h, eigenvalues[2] / h
+    if kind == SECOND_ORDER:
+        if real != 0.0:
+            second_order_inverse(J, real, 0.0, X, V)
+        if im != 0.0:
+            second_order_inverse(J, re, im, U, V)
+    else:
+        if real != 0.0:
+            general_real(J, real, G, X)
+        if im != 0.0:
+            general_complex(J, re, im, G, U, V)
 
 
 @kernel(types.void(MATRIX, MATRIX, MATRIX))

@@ -30,6 +30,7 @@ UNLABELLED = {
     "at_saddle": ("#000000", "s", "on a saddle's stable manifold"),
     "not_finite": ("#4d4d4d", "+", "not finite"),
     "step_too_large": ("#4d4d4d", "1", "step too large"),
+    "not_converged": ("#4d4d4d", "3", "Newton's iteration failed"),
     "start_not_finite": ("#4d4d4d", "2", "start not finite"),
 }
 

@@ -11,6 +11,7 @@ from fastmech.errors import InputError
 from fastmech.mechanism.coefficients import Coefficients
 from fastmech.mechanism.lagrange import potential_gradient, unit
 from fastmech.scene import Scene
+from fastmech.stability.arguments import require_rest
 from fastmech.stability.criteria import (
     ROUNDING,
     Finding,
@@ -76,8 +77,10 @@ def classify(scene: Scene, equilibrium: Rest) -> Classification:
     minimum keeps the slider at rest, so by LaSalle's principle all come to rest, only slowly.
 
     Raises:
-        InputError: the scene is not at rest there, for example because the equilibrium is another scene's.
+        InputError: an argument is wrong, or the scene is not at rest there, for example because the
+            equilibrium is another scene's.
     """
+    require_rest(scene, equilibrium)
     c, s = linearized(scene, equilibrium)
     loads = abs(c.lift) + (c.mass + 2.0) * c.gravity + 2.0 * c.spring + 2.0 * abs(c.force)
     gradient = potential_gradient(scene, (equilibrium.phi, equilibrium.theta), equilibrium.force)

@@ -22,6 +22,7 @@ from fastmech.kernels.jacobians import lagrange_jacobian
 from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
+from fastmech.stability.arguments import require_rest
 from fastmech.stability.linearize import Rest, jacobian
 from fastmech.step_limits.crossing import first_crossing
 
@@ -35,8 +36,9 @@ def measured_stable_step(scene: Scene, equilibrium: Rest, method: str) -> float:
     """Least step [s] at which the spectral radius of the differenced one-step map crosses 1; inf if none.
 
     Raises:
-        InputError: no such method.
+        InputError: an argument is wrong.
     """
+    require_rest(scene, equilibrium)
     formula = with_jacobian(find_method(method), lagrange_jacobian, True)
     frozen = scene.replace(F0=equilibrium.force, alpha=0.0)
     fastest = float(np.abs(np.linalg.eigvals(jacobian(scene, equilibrium))).max())

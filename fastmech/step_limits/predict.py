@@ -9,6 +9,7 @@ from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Method
 from fastmech.integrators.methods import find_method
 from fastmech.scene import Scene
+from fastmech.stability.arguments import require_rest
 from fastmech.stability.linearize import Rest, jacobian
 from fastmech.step_limits.amplification import amplification
 from fastmech.step_limits.crossing import first_crossing
@@ -73,8 +74,9 @@ def largest_stable_step(scene: Scene, equilibrium: Rest, method: str) -> float:
         inf for an A-stable method.
 
     Raises:
-        InputError: no such method.
+        InputError: an argument is wrong.
     """
+    require_rest(scene, equilibrium)
     return stable_step(find_method(method), np.linalg.eigvals(jacobian(scene, equilibrium)))
 
 

@@ -17,6 +17,7 @@ from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import potential_energy
 from fastmech.scene import Scene
+from fastmech.stability.arguments import require_scene
 from fastmech.stability.linearize import SmallMotion, fill_state_matrix, small_motion
 from fastmech.step_limits.impulse import impulse_limit, impulse_ratio
 from fastmech.step_limits.predict import is_stable, stable_step
@@ -43,7 +44,7 @@ def configuration_eigenvalues(scene: Scene, force: float) -> NDArray[np.complex1
     (eigenvalues with positive real part) there is nothing for a step to keep stable.
     """
     phi, theta = (grid.ravel() for grid in _grid())
-    return _eigenvalues(scene, force, phi, theta)
+    return local_eigenvalues(scene, force, phi, theta)
 
 
 def _grid() -> list[Any]:
@@ -51,7 +52,8 @@ def _grid() -> list[Any]:
     return list(np.meshgrid(angles, angles, indexing="ij"))
 
 
-def _eigenvalues(scene: Scene, force: float, phi: Any, theta: Any) -> NDArray[np.complex128]:
+def local_eigenvalues(scene: Scene, force: float, phi: Any, theta: Any) -> NDArray[np.complex128]:
+    """Eigenvalues [1/s] of the motion linearized at rest in configurations (n,), shape (n, 4)."""
     c = reduce(scene)._replace(force=force / (scene.m2 * scene.l))
     motions = small_motion(
         phi,
@@ -87,7 +89,7 @@ def resting_eigenvalues(scene: Scene, force: float) -> NDArray[np.complex128]:
         for at in zip(*np.nonzero(lowest), strict=True)
     ]
     phi, theta = np.array(found).reshape(-1, 2).T
-    return _eigenvalues(scene, force, phi, theta).ravel()
+    return local_eigenvalues(scene, force, phi, theta).ravel()
 
 
 @cache
@@ -148,9 +150,11 @@ def step_warning(scene: Scene, dt: float, method: str, starts: ArrayLike | None 
     Raises:
         InputError: an argument is wrong.
     """
-    if not isinstance(dt, Real) or not 0.0 < dt < np.inf:
+    require_scene(scene)
+    rates = None if starts is None else _rates(starts)
+    if not isinstance(dt, Real) or isinstance(dt, bool) or not 0.0 < dt < np.inf:
         raise InputError(f"dt = {dt!r}: must be a finite number of s greater than 0")
-    limit = _first_limit(scene, dt, method, starts)
+    limit = _first_limit(scene, dt, method, rates)
     if dt <= limit.step:
         return None
     if limit.step == 0.0:
@@ -168,7 +172,8 @@ def warn_of_step(
     Raises:
         InputError: no such method.
     """
-    limits = [(_first_limit(scene, dt, method, starts).step, k) for k, scene in enumerate(scenes)]
+    rates = None if starts is None else _rates(starts)
+    limits = [(_first_limit(scene, dt, method, rates).step, k) for k, scene in enumerate(scenes)]
     for _, k in sorted(limits):
         told = step_warning(scenes[k], dt, method, starts)
         if told:
@@ -183,19 +188,30 @@ class _Limit(NamedTuple):
     reason: str
 
 
-def _first_limit(scene: Scene, dt: float, method: str, starts: ArrayLike | None) -> _Limit:
+def _rates(starts: ArrayLike) -> Floats:
+    """The rates of states (n, 4) or (4,)."""
+    try:
+        states = np.asarray(starts, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError("starts: must be numbers of shape (n, 4)") from None
+    if states.ndim not in (1, 2) or states.shape[-1] != 4:
+        raise InputError(f"starts: has shape {states.shape}, must be (n, 4)")
+    return states[..., 2:]
+
+
+def _first_limit(scene: Scene, dt: float, method: str, rates: Floats | None) -> _Limit:
     formula = find_method(method)
     limits = [_Limit(np.inf, "")]
     if beyond_stability(scene, dt, method):
-        limits.append(_Limit(step_limit(scene, method), "motions that die out would grow"))
+        grows = "motions that die out would grow" if scene.beta > 0.0 else "undamped motions would grow"
+        limits.append(_Limit(step_limit(scene, method), grows))
     if scene.alpha > 0.0 and scene.F0 != 0.0:
         ratio = impulse_ratio(formula, dt * scene.alpha)
         reason = f"the decaying force would give {ratio:.3g} times its impulse"
         decay = impulse_limit(formula) / scene.alpha
         limits.append(_Limit(decay, reason))
-    if starts is not None:
-        rates = np.abs(np.asarray(starts, dtype=np.float64)[..., 2:])
-        fastest = float(np.max(rates[np.isfinite(rates)], initial=0.0))
+    if rates is not None:
+        fastest = float(np.max(np.abs(rates[np.isfinite(rates)]), initial=0.0))
         if fastest > 0.0:
             turn = TURN / fastest
             reason = f"at {fastest:.3g} rad/s it would turn {dt * fastest:.3g} rad a step"

@@ -9,33 +9,52 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.ensembles import checks
-from fastmech.ensembles.problem import scene_problem, system_problem
+from fastmech.ensembles.integrate import FAILURES
+from fastmech.ensembles.plausible import judge
+from fastmech.ensembles.problem import extreme_scenes, own_values, scene_problem, system_problem
+from fastmech.ensembles.status import Status, failure_counts, failure_line
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.scene import Scene
+from fastmech.step_limits.beyond import steps_beyond
+from fastmech.step_limits.warning import warn_of_step
 from fastmech.transients.tangent import advance_tangents
 
 Floats = NDArray[np.float64]
 
 #: Method of motion and tangents.
-TABLEAU = TABLEAUS["dop853"]
+METHOD = "dop853"
+TABLEAU = TABLEAUS[METHOD]
+
+#: Steps that a run may take: a year's.
+MOST_STEPS = 1e13
 
 #: Estimates kept along the way.
 PIECES = 20
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class LyapunovExponents:
     """Estimates at :data:`PIECES` times: the mean growth rate of a disturbance from the start to each."""
 
     t: Floats  #: s, shape (times,)
-    exponents: Floats  #: 1/s, shape (times, n)
+    exponents: Floats  #: 1/s, shape (times, n); NaN once a motion is not finite
+    status: NDArray[np.int8]  #: :class:`fastmech.ensembles.status.Status` of each motion, shape (n,)
 
     @property
     def largest(self) -> Floats:
         """The last estimates (n,) [1/s]; regular motion gives values that fall like log(t)/t."""
         return np.asarray(self.exponents[-1])
+
+    @property
+    def failures(self) -> str:
+        """One line: how many motions have failed, and with which status; empty where none has."""
+        return failure_line(failure_counts(self.status, FAILURES), self.status.size)
+
+    def __repr__(self) -> str:
+        what = f"{self.status.size:,} motions to t = {self.t[-1]:g} s"
+        return f"LyapunovExponents({what}; {self.failures or 'none failed'})"
 
 
 def largest_lyapunov(
@@ -55,6 +74,10 @@ def largest_lyapunov(
         dt: longest step [s] of ``dop853``.
         parameters: as in :func:`fastmech.ensembles.integrate.integrate`.
 
+    Returns:
+        estimates, and the status of every motion as ``integrate`` gives it: exponents of one that failed are
+        none of the mechanism's. A step beyond a limit is warned of before the run.
+
     Raises:
         InputError: an argument is wrong.
     """
@@ -66,6 +89,8 @@ def largest_lyapunov(
     elif isinstance(scene, Scene):
         starts = checks.states("y0", y0, 4)
         problem = scene_problem(scene, len(starts), parameters or {}, "lagrange")
+        extremes = extreme_scenes(scene, parameters or {})
+        warn_of_step(extremes, dt, METHOD, starts)
     else:
         raise InputError(f"scene = {scene!r}: must be a Scene or a System")
     Y = np.array(starts.T, order="C")
@@ -75,6 +100,8 @@ def largest_lyapunov(
     D = np.repeat(1.0 / np.sqrt(np.arange(2.0, 2.0 + len(Y)))[:, None], Y.shape[1], axis=1)
     D /= np.linalg.norm(D, axis=0)
     growth = np.zeros(len(starts))
+    if t_end / dt > MOST_STEPS:
+        raise InputError(f"dt = {dt:g}: t_end = {t_end:g} s would take more than {MOST_STEPS:g} steps")
     steps = max(1, int(np.ceil(t_end / PIECES / dt)))
     h = t_end / PIECES / steps
     times = np.linspace(0.0, t_end, PIECES + 1)
@@ -97,4 +124,10 @@ def largest_lyapunov(
             growth,
         )
         exponents[piece] = growth / times[piece + 1]
-    return LyapunovExponents(times[1:], exponents)
+    reached = np.where(np.isfinite(Y).all(axis=0) & np.isfinite(growth), Status.OK, Status.NOT_FINITE)
+    status = judge(reached.astype(np.int8), starts, np.ascontiguousarray(Y.T), problem.coefficients)
+    if isinstance(scene, Scene):
+        taken, values = np.full(len(starts), h), own_values(parameters or {}, scene.model_dump(), len(starts))
+        beyond = steps_beyond(scene, extremes, values, starts, Y.T, taken, taken, METHOD)
+        status[beyond & (status == Status.OK)] = Status.STEP_TOO_LARGE
+    return LyapunovExponents(times[1:], exponents, status)

@@ -115,6 +115,8 @@ def test_statuses() -> None:
     assert kinds[:3] == ["CAPTURED", "AT_SADDLE", "START_NOT_FINITE"]
     assert kinds[3] in ("NOT_FINITE", "STEP_TOO_LARGE")
     assert sum(found.counts.values()) == 4
+    implicit = fm.labels_of(fm.Scene(F0=0.0, alpha=0.0), starts[[0, 3]], 4.0, method="radau5")
+    assert implicit.status.tolist() == [BasinStatus.CAPTURED, BasinStatus.NOT_CONVERGED]
     undecided = fm.labels_of(BISTABLE, random_starts(50), 2.0)
     assert undecided.counts["undecided"] > 25
     assert (undecided.well[undecided.status == BasinStatus.UNDECIDED] == -1).all()

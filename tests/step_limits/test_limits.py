@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -187,6 +189,68 @@ def test_no_label_comes_out_beyond_the_limit() -> None:
     assert beyond.failures.startswith("64 of 64 trajectories failed: 64 step_too_large")
 
 
+@pytest.mark.parametrize(
+    ("change", "start", "dt", "method"),
+    [
+        ({"beta": 2e3}, [1.4, -0.2, 0.0, 0.0], 0.025, "rk4"),
+        ({"alpha": 1e6}, [1.4, -0.2, 0.0, 0.0], 0.01, "rk4"),
+        ({}, [0.0, 0.0, 40.0, 0.0], 0.03, "dop853"),
+    ],
+    ids=["stability", "impulse", "turn"],
+)
+def test_what_is_warned_of_has_a_status_beside_its_states(
+    change: dict[str, float], start: list[float], dt: float, method: str
+) -> None:
+    """With the number that the warning names both are gone."""
+    scene, starts = SCENE.replace(**change), np.array([start, [np.nan, 0.0, 0.0, 0.0]])
+    with pytest.warns(fm.StepWarning, match="would do$") as told:
+        run = fm.integrate(scene, starts, 0.3, dt, method)
+    assert run.status.tolist() == [fm.Status.STEP_TOO_LARGE, fm.Status.START_NOT_FINITE]
+    assert np.isfinite(run.y[:, 0]).all()
+    assert run.failures == (
+        "2 of 2 trajectories failed: 1 step_too_large, 1 start_not_finite; use a smaller dt"
+    )
+    would_do = float(str(told[0].message).split("dt = ")[2].split(" s")[0])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert fm.integrate(scene, starts[:1], 0.3, would_do, method).status.tolist() == [fm.Status.OK]
+
+
+def test_the_step_taken_decides() -> None:
+    """A run shorter than dt takes a shorter step; without damper and number energy alone is judge."""
+    heavy = SCENE.replace(beta=1e5)
+    start = [1.4, -0.2, 0.0, 0.0]
+    assert fm.integrate(heavy, start, 1e-4, 0.01).status.tolist() == [fm.Status.OK]
+    assert fm.integrate(heavy, start, t_eval=[0.0], dt=0.01).status.tolist() == [fm.Status.OK]
+    still = SCENE.replace(beta=0.0, F0=0.0)
+    assert fm.integrate(still, start, 0.1, 1e-4, "euler").status.tolist() == [fm.Status.OK]
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_each_trajectory_s_own_scene_decides(threads: int) -> None:
+    """Rising damping: the first have a status of their own only beyond the limit of their own scene."""
+    betas = np.array([1.0, 100.0, 1e3, 3e3, 1.0])
+    starts = np.tile([1.4, -0.2, 0.0, 0.0], (betas.size, 1))
+    run = fm.integrate(SCENE, starts, 0.2, 0.04, parameters={"beta": betas}, threads=threads)
+    alone = [
+        fm.integrate(SCENE.replace(beta=float(b)), starts[:1], 0.2, 0.04).status[0] == fm.Status.OK
+        for b in betas
+    ]
+    assert (run.status == fm.Status.OK).tolist() == alone
+    limits = np.array([step_limit(SCENE.replace(beta=float(b)), "rk4") for b in betas])
+    assert alone == (limits >= 0.04).tolist()
+    assert 0 < sum(alone) < betas.size
+
+
+def test_no_label_from_steps_beyond_the_limit() -> None:
+    scene, starts = SCENE.replace(beta=1e5), [[0.9, 0.4, 0.0, 0.0], [0.1, 0.2, 0.0, 0.0]]
+    with pytest.warns(fm.StepWarning):
+        beyond = fm.labels_of(scene, starts, 20.0, dt=0.05, method="rk4")
+    assert set(beyond.status) == {fm.BasinStatus.STEP_TOO_LARGE}
+    assert (beyond.well == -1).all()
+    assert set(fm.labels_of(scene, starts, 20.0, method="radau5").status) == {fm.BasinStatus.CAPTURED}
+
+
 def test_no_step_will_do() -> None:
     told = step_warning(SCENE.replace(beta=0.0, F0=0.0), 0.01, "euler")
     assert told is not None
@@ -197,3 +261,26 @@ def test_no_step_will_do() -> None:
 def test_a_step_must_be_a_positive_number(dt: object) -> None:
     with pytest.raises(InputError, match=r"^dt = .*: must be a finite number of s greater than 0$"):
         step_warning(SCENE, dt, "rk4")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("starts", "said"),
+    [("abc", "must be numbers"), ([1.0, 2.0], r"has shape \(2,\)"), (np.zeros((2, 2, 4)), "has shape")],
+)
+def test_starts_must_be_states(starts: object, said: str) -> None:
+    with pytest.raises(InputError, match=f"^starts: {said}"):
+        step_warning(SCENE, 0.01, "rk4", starts)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("limit", [largest_stable_step, measured_stable_step])
+def test_limits_refuse_what_is_no_equilibrium_of_a_scene(limit: Callable[..., float]) -> None:
+    with pytest.raises(InputError, match=r"^scene = None: must be a Scene$"):
+        limit(None, MINIMUM, "rk4")
+    for wrong in (None, (0.0, 0.0), "minimum"):
+        with pytest.raises(InputError, match=r"^equilibrium = .*: must be one of fastmech.find_equilibria$"):
+            limit(SCENE, wrong, "rk4")
+    with pytest.raises(InputError, match=r"^equilibrium.phi = nan: must be finite$"):
+        limit(SCENE, replace(MINIMUM, phi=np.nan), "rk4")
+    for method in (None, 3, ["rk4"], "rk9"):
+        with pytest.raises(InputError, match=r"^method = .*: unknown; known: "):
+            limit(SCENE, MINIMUM, method)

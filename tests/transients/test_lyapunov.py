@@ -75,8 +75,25 @@ def test_the_mechanism() -> None:
 def test_wrong_arguments() -> None:
     with pytest.raises(InputError, match=r"^dt = 0: "):
         largest_lyapunov(CONSERVATIVE, [0, 0, 0, 0], 1.0, 0)
+    with pytest.raises(InputError, match=r"^parameters = 3: must map names to values"):
+        largest_lyapunov(CONSERVATIVE, [0, 0, 0, 0], 1.0, parameters=3)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"^dt = 1e-300: .* more than 1e\+13 steps"):
+        largest_lyapunov(CONSERVATIVE, [0, 0, 0, 0], 1e300, 1e-300)
     with pytest.raises(InputError, match=r"^scene = 3: must be a Scene or a System"):
         largest_lyapunov(3, [0, 0, 0, 0], 1.0)  # type: ignore[arg-type]
+
+
+def test_motions_that_fail_have_a_status() -> None:
+    """Two fail, one of them at the start; a step beyond the limit is warned of and has a status."""
+    starts = [[0.9, 0.4, 0.0, 0.0], [np.nan, 0.0, 0.0, 0.0], [0.0, 0.0, 1e200, 0.0]]
+    found = largest_lyapunov(CONSERVATIVE, starts, 1.0)
+    assert found.status.tolist() == [fm.Status.OK, fm.Status.START_NOT_FINITE, fm.Status.NOT_FINITE]
+    assert np.isfinite(found.largest).tolist() == [True, False, False]
+    assert "2 of 3 trajectories failed: 1 not_finite, 1 start_not_finite" in repr(found)
+    with pytest.warns(fm.StepWarning, match=r"too long for dop853 here"):
+        beyond = largest_lyapunov(fm.Scene(alpha=0.0, beta=1e4), starts[0], 0.5, 0.02)
+    assert beyond.status[0] in (fm.Status.STEP_TOO_LARGE, fm.Status.NOT_FINITE)
+    assert beyond.failures
 
 
 @pytest.mark.parametrize("change", [{}, {"beta": 0.0}, {"c1": 294.9, "c2": 92.85, "F0": 85.3}])
