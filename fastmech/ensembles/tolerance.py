@@ -82,6 +82,8 @@ def solve_to_tolerance(
     A trajectory's error is that of its worst component at its worst output time, in the units of the state.
     The estimate says what was reached: rounding may keep it above the tolerance.
     """
+    if problem.observation.stops:
+        problem = replace(problem, observation=replace(problem.observation, locate=True))
     usable = np.flatnonzero(np.isfinite(starts).all(axis=1))
     sample = _sample(problem, starts, usable, SAMPLE_MAXIMUM if quantile == 1.0 else SAMPLE_QUANTILE)
     aim = quantile if quantile < 1.0 else TYPICAL
