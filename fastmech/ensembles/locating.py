@@ -23,7 +23,7 @@ from fastmech.integrators.explicit import TABLEAU, integrate_blocks
 from fastmech.integrators.implicit import DIFFERENCES, integrate_implicit_block
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Adams, Method
-from fastmech.jit import INTEGERS, MATRIX, OBSERVER, OBSERVER_SIGNATURE, RHS, VECTOR, kernel
+from fastmech.jit import MATRIX, OBSERVER, OBSERVER_SIGNATURE, RHS, VECTOR, kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -92,9 +92,7 @@ def halve_steps(
 
 
 @kernel(
-    types.void(
-        RHS, OBSERVER, MATRIX, VECTOR, VECTOR, MATRIX, MATRIX, VECTOR, MATRIX, types.float64, *_SEARCH
-    )
+    types.void(RHS, OBSERVER, MATRIX, VECTOR, VECTOR, MATRIX, MATRIX, VECTOR, MATRIX, types.float64, *_SEARCH)
 )
 def halve_implicit_steps(
     rhs: Any,
@@ -172,8 +170,8 @@ def locate_stops(
                 p.remainder, *search,
             )  # fmt: skip
         else:
-            tableau: Any = method.starter if isinstance(method, Adams) else getattr(method, "tableau")
-            packed = tableau.packed
+            one_step: Any = method
+            packed = (method.starter if isinstance(method, Adams) else one_step.tableau).packed
             halve_steps(rhs, observe, packed.start, packed.stage, packed.weight, packed.nodes, *search)
     return located
 
@@ -181,7 +179,7 @@ def locate_stops(
 def _step_begins(
     rhs: Any, method: Method, span: Span, begun: Floats, params: Floats, stop_time: Floats
 ) -> tuple[Floats, Floats]:
-    """Times (n,) and states (n, dim) before the steps that end at ``stop_time``; the same arithmetic again."""
+    """Times (n,) and states (n, dim) before the steps that end at ``stop_time``; by the same arithmetic."""
     n, dim = begun.shape
     lanes = Lanes(np.arange(n), begun, params, np.zeros(2 + dim), n)
     lanes.record[:, 0, :n], lanes.record[:, 1] = stop_time, span.times[0]

@@ -61,8 +61,8 @@ class Observation:
 
     ``record`` holds the start value of every row of a lane's record. Where ``stops`` is set, the rows begin
     with those of :mod:`fastmech.ensembles.stopping` (its own may follow), and a lane whose code is not zero
-    is taken out after at most ``call_steps`` steps. With ``locate`` a stop is looked for inside the step after
-    which it was seen.
+    is taken out after at most ``call_steps`` steps. With ``locate`` a stop is looked for inside the step
+    after which it was seen.
     """
 
     observe: Any
