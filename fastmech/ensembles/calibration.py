@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.ensembles.fitting import fading_force, speed_bound, vibration_frequency
-from fastmech.ensembles.ladder import LEAP, Calibrated, Ladder, Sample
+from fastmech.ensembles.ladder import CHEAP, LEAP, Calibrated, Ladder, Sample
 from fastmech.ensembles.problem import Problem
 from fastmech.ensembles.richardson import RATIO
 from fastmech.ensembles.solve import Settings
@@ -118,16 +118,21 @@ class _Trial(Sample):
 
     def choose_blindly(self, few: Method, single_step: Method, implicit: Method) -> Calibrated:
         """The cheapest method for a user's system, of which only runs tell."""
-        ladder = self.ladder(few)
+        calm = find_method(CALM)
+        ladder = self.ladder(few, CHEAP)
+        if ladder.good and ladder.right_hand_sides(ladder.rung) > CHEAP / 4.0 and few is not calm:
+            # Of how fast it is nothing is known: perhaps too fast for so low an order.
+            rival = self.ladder(calm, ladder.right_hand_sides(ladder.rung))
+            ladder = rival if rival.good and self.cost(rival) < self.cost(ladder) else ladder
         at_once = few.evaluations(math.ceil(self.outputs[-1] / ladder.dt(ladder.rung)))
-        if few is not single_step and self.cost(ladder) >= 2 * at_once:
+        if ladder.method is few and few is not single_step and self.cost(ladder) >= 2 * at_once:
             ladder = self.ladder(single_step)
         ladder = self.calmed(ladder)
         return self.cheaper(ladder, self.ladder(implicit) if ladder.unstable() else None)
 
     def calmed(self, ladder: Ladder) -> Ladder:
-        """The ladder, or that of :data:`CALM` where an Adams method misses the tolerance by more."""
-        if ladder.good or not ladder.method.start_steps:
+        """The ladder, or that of :data:`CALM` where another method misses the tolerance by more."""
+        if ladder.good or ladder.method.name == CALM:
             return ladder
         other = self.ladder(find_method(CALM))
         return other if other.score(other.rung) < ladder.score(ladder.rung) else ladder
@@ -161,8 +166,8 @@ class _Trial(Sample):
     def guess_blindly(self) -> float:
         """The time [s] in which a user's system would move as far as its starts are from zero, or less."""
         t_end, p = float(self.outputs[-1]), np.atleast_2d(self.problem.params)
-        Y = np.ascontiguousarray(self.starts.T)
-        own = np.ascontiguousarray(np.broadcast_to(p, (Y.shape[1], p.shape[1])).T)
+        Y = self.starts.T.copy()
+        own = np.broadcast_to(p, (Y.shape[1], p.shape[1])).T.copy()
         rates = np.zeros_like(Y)
         self.problem.rhs(0.0, Y, rates, own)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -179,7 +184,7 @@ class _Trial(Sample):
         fast = np.median(speed_bound(c, self.starts) / vibration_frequency(c)) > 2.0
         return tuple(share * float(self.outputs[-1]) for share in (AGAIN if fast else AGAIN[:1]))
 
-    def ladder(self, method: Method) -> Ladder:
+    def ladder(self, method: Method, affordable: float = math.inf) -> Ladder:
         """Steps of a method, climbed to the one that suits."""
         c = self.problem.coefficients
         longest = float(np.max(np.diff(self.outputs, prepend=0.0))) / FEWEST or 1.0  # s; any step ends at 0 s
@@ -189,5 +194,6 @@ class _Trial(Sample):
             dt, stable = min(dt, limit), limit < dt
         fade = fading_force(c, float(self.outputs[-1])) if c is not None else None
         ladder = Ladder(self, Settings(method, dt, self.fit(), fade=fade), longest)
+        ladder.affordable = affordable
         ladder.climb(1 if stable else LEAP)
         return ladder

@@ -17,7 +17,7 @@ from fastmech.ensembles.calibration import CALM
 from fastmech.ensembles.ladder import AIM, CHEAP, Calibrated
 from fastmech.ensembles.lanes import VECTOR_LANES
 from fastmech.ensembles.problem import Problem
-from fastmech.ensembles.richardson import RATIO, ROUNDING, distances, error_beyond, order_seen
+from fastmech.ensembles.richardson import LEAST_ORDER, RATIO, ROUNDING, distances, error_beyond, order_seen
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.solve import Settings, Solution, solve
 from fastmech.ensembles.stiffness import work
@@ -37,14 +37,14 @@ PATIENCE = 3
 #: Errors below this that two shorter steps do not halve are rounding, magnified by the motion.
 MAGNIFIED = 1e-3
 
-#: Steps of :data:`fastmech.ensembles.calibration.CALM` in those of a multistep method.
-LONGER = 4.0
+#: Steps of :data:`fastmech.ensembles.calibration.CALM` in those of the first runs; the best is kept.
+LONGER = (4.0, 2.0, 1.0)
 
 #: Trajectories of the largest estimates whose errors are measured by runs of half the step, at the end.
 AUDITED = 64
 
 #: Right-hand sides that repetitions may take in those of the two first runs; CHEAP more are always allowed.
-BUDGET = 8.0
+BUDGET = 4.0
 
 
 @dataclass
@@ -68,6 +68,7 @@ class Doubling:
         coarse = self.solve(everyone, self.dt * RATIO)
         self.distance = self.apart(self.best, coarse)
         self.error = self.distance * self.found.median
+        self.rough = np.zeros(n, dtype=np.bool_)
         if self.problem.coefficients is None:
             # Nobody knows whether a user's right-hand side has jumps: a third run tells each one's order.
             third = self.apart(coarse, self.solve(everyone, self.dt * RATIO**2))
@@ -82,7 +83,7 @@ class Doubling:
             if not again.size:
                 break
             self._repeat(again)
-        self._resettle(np.flatnonzero(self.rounded | self.given_up))
+        self._resettle(np.flatnonzero(self.rounded | (self.given_up & ~self.rough & ~self.unpaid)))
         self._audit()
         return self.best, self.error, self.remark()
 
@@ -126,11 +127,20 @@ class Doubling:
         return np.sort(who)
 
     def _reckon(self, who: Members, before: Floats, after: Floats, shorter: Floats) -> None:
-        """Errors from the last two distances, with the order that they show where it is not the method's."""
+        """Errors from the last two distances, with the order that they show where it is not the method's.
+
+        Where a jump lies in its step is a matter of luck, and so is a single distance: from then on a rough
+        trajectory's error is the largest that its distances tell at order 1.
+        """
         p = self.settings.method.order
         seen = order_seen(before, after, shorter, p)
-        low = seen < p
-        self.error[who] = np.where(low, error_beyond(after, seen), after * self.found.median)
+        self.rough[who] |= seen < p
+        rough = self.rough[who]
+        lasting = np.fmax(after, np.where(np.isfinite(before), before / shorter, 0.0))
+        after = np.where(rough, lasting, after)
+        at_order = error_beyond(after, np.where(seen < LEAST_ORDER, 0.0, 1.0))
+        self.distance[who] = after
+        self.error[who] = np.where(rough, at_order, after * self.found.median)
 
     def _repeat(self, again: Members) -> None:
         """Run trajectories with the shorter steps that their errors ask for."""
@@ -151,13 +161,13 @@ class Doubling:
             self.left -= self.work(again[far], own[far] * RATIO)
             apart[far] = self.apart(_part(run, far), self.solve(again[far], own[far] * RATIO))
         self._reckon(again, self.distance[again], apart, self.dt[again] / own)
-        self.distance[again] = apart
         after = self.error[again]
         in_vain = ~(after <= 0.5 * error) | np.isinf(after)
         self.vain[again[in_vain]] += 1
         # Where shorter steps bring nothing to a small error, rounding rules, magnified by the motion.
         rounded = in_vain & ((after < ROUNDING) | ((self.vain[again] > 1) & (after < MAGNIFIED)))
-        better = ~(after > error)
+        # A rough one's earlier error may have been small by luck: the finer run has the better odds.
+        better = ~(after > error) | (self.rough[again] & np.isfinite(run.y[-1]).all(axis=1))
         _replace(self.best, again[better], run, better)
         self.dt[again] = own
         self.rounded[again[rounded]] = True
@@ -166,26 +176,27 @@ class Doubling:
     def _resettle(self, which: Members) -> None:
         """Give trajectories that shorter steps do not help the longer ones of a one-step method.
 
-        Such a method rounds less. A run of a shorter step tells the error: where rounding rules, the two differ by about as much as each
-        does from the truth.
+        Such a method rounds less. A run of a shorter step tells the error: where rounding rules, the two
+        differ by about as much as each does from the truth.
         """
         method = self.settings.method
         if not which.size or isinstance(method, ImplicitRungeKutta):
             return
         calm = replace(self.settings, method=find_method(CALM))
-        own = self.dt[which] * (LONGER if method.start_steps else 1.0)
-        run = self.solve(which, own, calm)
-        error = self.apart(run, self.solve(which, own / RATIO, calm))
-        better = error < self.error[which]
-        self.error[which[better]] = error[better]
-        _replace(self.best, which[better], run, better)
+        for longer in LONGER:
+            own = np.full(which.size, float(self.settings.dt) * longer)
+            run = self.solve(which, own, calm)
+            error = self.apart(run, self.solve(which, own / RATIO, calm))
+            better = error < self.error[which]
+            self.error[which[better]] = error[better]
+            _replace(self.best, which[better], run, better)
 
     def _audit(self) -> None:
         """Measure the errors of the worst trajectories by runs of half the step.
 
         Where one is above the tolerance the finer run is kept, and measured in its turn while that helps.
         """
-        settled = self.rounded | self.given_up
+        settled = self.rounded | self.given_up | self.rough
         open_ = np.flatnonzero(self.finite & ~settled)
         worst = open_[np.argsort(-self.error[open_], kind="stable")[:AUDITED]]
         last = np.full(worst.size, np.inf)

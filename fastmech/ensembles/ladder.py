@@ -29,6 +29,7 @@ from fastmech.ensembles.richardson import (
 )
 from fastmech.ensembles.solve import Settings, solve
 from fastmech.ensembles.stiffness import work
+from fastmech.ensembles.stopping import STOP_CODE
 from fastmech.integrators.method import Method
 
 Floats = NDArray[np.float64]
@@ -40,8 +41,11 @@ AIM = 0.5
 CALIBRATIONS, LEAP = 10, 4
 
 #: Rungs tried in vain (the error fell less than the order asks for) before the next one must cost less than
-#: CHEAP right-hand sides: a few seconds of one core.
-PATIENCE, CHEAP = 3, 5e7
+#: CHEAP right-hand sides: a second or two of one core.
+PATIENCE, CHEAP = 3, 1e7
+
+#: Of the trajectories that need not keep the tolerance, the share that may differ in their stops.
+UNSEEN = 0.25
 
 #: Share of the sample's errors that the ratio used for the largest error covers.
 COVERED = 0.95
@@ -84,6 +88,8 @@ class Ladder:
     longest: float  #: step [s] at most
     runs: dict[int, Floats] = field(default_factory=dict)
     tried: dict[int, float] = field(default_factory=dict)  #: estimates by rung
+    codes: dict[int, NDArray[np.int64]] = field(default_factory=dict)  #: of stops, by rung
+    affordable: float = math.inf  #: right-hand sides of a run at most
     rung: int = 0  #: the one found
     good: bool = False  #: whether it keeps the tolerance
 
@@ -101,7 +107,10 @@ class Ladder:
         if rung not in self.runs:
             t = self.sample
             settings = replace(self.base, dt=self.dt(rung))
-            self.runs[rung] = solve(t.problem, t.starts, t.outputs, settings, t.threads).y
+            run = solve(t.problem, t.starts, t.outputs, settings, t.threads)
+            self.runs[rung] = run.y
+            if t.problem.observation.stops:
+                self.codes[rung] = run.records[STOP_CODE].astype(np.int64)
         return self.runs[rung]
 
     def errors(self, rung: int) -> Floats:
@@ -118,6 +127,11 @@ class Ladder:
     def estimate(self, rung: int) -> float:
         """The sample's quantile of the errors, from two runs."""
         found = order_statistic(self.errors(rung), self.sample.aim)
+        if self.codes:
+            # Where steps pass over stops unseen, some trajectories see them at one resolution only.
+            differ = np.count_nonzero(self.codes[rung] != self.codes[rung - 1])
+            if differ > UNSEEN * (1.0 - self.sample.aim) * len(self.sample.starts):
+                found = math.inf
         self.tried[rung] = found
         return found
 
@@ -156,7 +170,7 @@ class Ladder:
                     asked = last * RATIO ** (SHARE * self.method.order * (above - rung))
                     vain = vain + 1 if not found < asked else 0
                     after, above, last = rung + min(max(math.ceil(wanted), 1), LEAP), rung, found
-                    if vain >= PATIENCE and self.right_hand_sides(after) > CHEAP:
+                    if self.right_hand_sides(after) > (CHEAP if vain >= PATIENCE else self.affordable):
                         break
             rung = after
         self.good = good is not None

@@ -19,7 +19,7 @@ from fastmech.ensembles.doubling import Doubling
 from fastmech.ensembles.fitting import speed_bound
 from fastmech.ensembles.ladder import Calibrated
 from fastmech.ensembles.problem import Problem
-from fastmech.ensembles.richardson import RATIO, distances, order_statistic, unseen
+from fastmech.ensembles.richardson import RATIO, ROUNDING, distances, order_statistic, unseen
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.solve import Settings, Solution, solve
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
@@ -123,7 +123,8 @@ def _sampled_errors(
     error = distances(solution.y[:, sample], truth)
     if settings.precision is np.float64:
         # Where rounding rules, the run with longer steps is the nearer one: it rounds less.
-        error = np.minimum(unseen(error, distance, settings.method.order), distance)
+        rounded = np.minimum(error, distance)
+        error = np.where(error < ROUNDING, rounded, unseen(error, distance, settings.method.order))
     return error
 
 
