@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 COLUMNS = 7
 
 #: Errors a step, relative to 1 and the largest state, of the two runs.
-TOLERANCES = (1e-13, 1e-12)
+TOLERANCES = (5e-15, 1e-13)
 
 #: How a step may change from one to the next, and the share of the step that the error allows.
 LEAST, MOST, SAFETY = 0.2, 2.0, 0.8

@@ -43,6 +43,9 @@ LONGER = (4.0, 2.0, 1.0)
 #: Trajectories of the largest estimates whose errors are measured by runs of half the step, at the end.
 AUDITED = 64
 
+#: Share of the method's order that a trajectory must show to be taken for smooth again.
+SMOOTH = 2.0 / 3.0
+
 #: Right-hand sides that repetitions may take in those of the two first runs; CHEAP more are always allowed.
 BUDGET = 4.0
 
@@ -134,7 +137,10 @@ class Doubling:
         """
         p = self.settings.method.order
         seen = order_seen(before, after, shorter, p)
-        self.rough[who] |= seen < p
+        with np.errstate(divide="ignore", invalid="ignore"):
+            smooth = np.log(before / after) / np.log(shorter) >= SMOOTH * p
+        # Steps that were too long to show any order may become short enough.
+        self.rough[who] = (self.rough[who] & ~smooth) | (seen < p)
         rough = self.rough[who]
         lasting = np.fmax(after, np.where(np.isfinite(before), before / shorter, 0.0))
         after = np.where(rough, lasting, after)
@@ -183,7 +189,7 @@ class Doubling:
         if not which.size or isinstance(method, ImplicitRungeKutta):
             return
         calm = replace(self.settings, method=find_method(CALM))
-        for longer in LONGER:
+        for longer in LONGER if method.start_steps else (1.0,):
             own = np.full(which.size, float(self.settings.dt) * longer)
             run = self.solve(which, own, calm)
             error = self.apart(run, self.solve(which, own / RATIO, calm))
