@@ -71,7 +71,7 @@ class Doubling:
         coarse = self.solve(everyone, self.dt * RATIO)
         self.distance = self.apart(self.best, coarse)
         self.error = self.distance * self.found.median
-        self.rough = np.zeros(n, dtype=np.bool_)
+        self.rough, self.once_rough = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
         if self.problem.coefficients is None:
             # Nobody knows whether a user's right-hand side has jumps: a third run tells each one's order.
             third = self.apart(coarse, self.solve(everyone, self.dt * RATIO**2))
@@ -86,7 +86,7 @@ class Doubling:
             if not again.size:
                 break
             self._repeat(again)
-        self._resettle(np.flatnonzero(self.rounded | (self.given_up & ~self.rough & ~self.unpaid)))
+        self._resettle(np.flatnonzero(self.rounded | (self.given_up & ~self.once_rough & ~self.unpaid)))
         self._audit()
         return self.best, self.error, self.remark()
 
@@ -141,6 +141,7 @@ class Doubling:
             smooth = np.log(before / after) / np.log(shorter) >= SMOOTH * p
         # Steps that were too long to show any order may become short enough.
         self.rough[who] = (self.rough[who] & ~smooth) | (seen < p)
+        self.once_rough |= self.rough
         rough = self.rough[who]
         lasting = np.fmax(after, np.where(np.isfinite(before), before / shorter, 0.0))
         after = np.where(rough, lasting, after)
@@ -176,6 +177,7 @@ class Doubling:
         better = ~(after > error) | (self.rough[again] & np.isfinite(run.y[-1]).all(axis=1))
         _replace(self.best, again[better], run, better)
         self.dt[again] = own
+        rounded &= ~self.rough[again]
         self.rounded[again[rounded]] = True
         self.given_up[again[(self.vain[again] >= PATIENCE) & ~rounded]] = True
 
