@@ -62,7 +62,8 @@ class Observation:
 
     ``record`` holds the start value of every row of a lane's record. Where ``stops`` is set, the rows begin
     with those of :mod:`fastmech.ensembles.stopping` (its own may follow), and a lane whose code is not zero
-    is taken out after at most ``call_steps`` steps.
+    is taken out after at most ``call_steps`` steps. With ``locate`` a stop is looked for inside the step
+    after which it was seen.
     """
 
     observe: Any
@@ -70,6 +71,7 @@ class Observation:
     record: Floats
     stops: bool = False
     call_steps: int = CALL_STEPS_WITH_STOPS
+    locate: bool = False
 
 
 NOTHING = Observation(observe_nothing, np.zeros(0), np.zeros(0))
@@ -168,6 +170,8 @@ def run_ensemble(
             if given_up is not None:
                 failed = given_up.reshape(-1)[: lanes.members.size].copy()
             stopped = _stopped(lanes, batch) if observation.stops else np.zeros(failed.size, dtype=np.bool_)
+            if observation.locate and stopped.any():
+                _locate(rhs, method, observation, lanes, span, batch, begun, stopped)
             failed[stopped] = np.nan
             lost = np.isnan(failed) & ~stopped & ~np.isfinite(now).all(axis=1)
             ensemble.status[lanes.members[~np.isnan(failed)]] = Status.NOT_CONVERGED
@@ -224,6 +228,25 @@ def _in_threads(
 def _stopped(lanes: Lanes, batch: Batch) -> NDArray[np.bool_]:
     """Which trajectories have stopped."""
     return np.asarray(lanes.rows(batch.record)[:, STOP_CODE] != 0.0)
+
+
+def _locate(
+    rhs: Any,
+    method: Method,
+    observation: Observation,
+    lanes: Lanes,
+    span: Span,
+    batch: Batch,
+    begun: Floats,
+    stopped: NDArray[np.bool_],
+) -> None:
+    """Put code, time and state of the stops themselves into the batch's record."""
+    o, who = observation, np.flatnonzero(stopped)
+    params, record = lanes.rows(lanes.params)[who], lanes.rows(batch.record)[who]
+    locate = import_module("fastmech.ensembles.locating").locate_stops  # kernels that few runs need
+    located = locate(rhs, o.observe, o.params, o.record, method, span, begun[who], params, record)
+    width = batch.record.shape[2]
+    batch.record[who // width, :, who % width] = located
 
 
 def _store(

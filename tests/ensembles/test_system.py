@@ -289,7 +289,7 @@ def test_wrong_systems_are_refused(arguments: Any, message: str) -> None:
         ({"omega": ["1.0"]}, "parameters.omega: must be real numbers"),
         ({"omega": [1j]}, "parameters.omega: must be real numbers"),
         ({3: [1.0]}, "parameters.3: unknown name; allowed: omega"),
-        ([1.0], "parameters = [1.0]: must be a mapping of names to values"),
+        ([1.0], "parameters = [1.0]: must map names to values, one a start"),
     ],
 )
 def test_wrong_parameters_are_refused(own: dict[str, Any], message: str) -> None:

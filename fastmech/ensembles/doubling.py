@@ -1,0 +1,264 @@
+"""Every trajectory twice, and those above the tolerance again with their own shorter steps, on a budget.
+
+A trajectory is given up where three shorter steps did not halve its error (chaos, a singularity, a start on a
+basin's border), where two resolutions disagree about whether it stops, or where the budget is spent. It keeps
+the best run that it has had, and an error that says so.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.ensembles.calibration import CALM
+from fastmech.ensembles.ladder import AIM, CHEAP, Calibrated
+from fastmech.ensembles.lanes import VECTOR_LANES
+from fastmech.ensembles.problem import Problem
+from fastmech.ensembles.richardson import LEAST_ORDER, RATIO, ROUNDING, distances, error_beyond, order_seen
+from fastmech.ensembles.run import Progress
+from fastmech.ensembles.solve import Settings, Solution, solve
+from fastmech.ensembles.stiffness import work
+from fastmech.ensembles.stopping import STOP_CODE
+from fastmech.integrators.implicit_method import ImplicitRungeKutta
+from fastmech.integrators.methods import find_method
+
+Floats = NDArray[np.float64]
+Members = NDArray[np.int64]
+
+#: Repetitions of trajectories at most.
+ROUNDS = 6
+
+#: Shorter steps that may bring nothing before a trajectory is given up.
+PATIENCE = 3
+
+#: Errors below this that two shorter steps do not halve are rounding, magnified by the motion.
+MAGNIFIED = 1e-3
+
+#: Steps of :data:`fastmech.ensembles.calibration.CALM` in those of the first runs; the best is kept.
+LONGER = (4.0, 2.0, 1.0)
+
+#: Trajectories of the largest estimates whose errors are measured by runs of half the step, at the end.
+AUDITED = 64
+
+#: Share of the method's order that a trajectory must show to be taken for smooth again.
+SMOOTH = 2.0 / 3.0
+
+#: Right-hand sides that repetitions may take in those of the two first runs; CHEAP more are always allowed.
+BUDGET = 4.0
+
+
+@dataclass
+class Doubling:
+    """Trajectories that run to a tolerance, each with the best run that it has had."""
+
+    problem: Problem
+    starts: Floats
+    outputs: Floats
+    found: Calibrated
+    tol: float
+    threads: int | None
+
+    def run(self, progress: Progress | None) -> tuple[Solution, Floats, str]:
+        """The solution, errors (n,), and what is to be said about those beyond the tolerance."""
+        settings, n = self.settings, len(self.starts)
+        self.finite = np.isfinite(self.starts).all(axis=1)
+        self.dt = np.full(n, float(settings.dt))
+        self.best = solve(self.problem, self.starts, self.outputs, settings, self.threads, progress)
+        everyone = np.arange(n)
+        coarse = self.solve(everyone, self.dt * RATIO)
+        self.distance = self.apart(self.best, coarse)
+        self.error = self.distance * self.found.median
+        self.rough, self.once_rough = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
+        if self.problem.coefficients is None:
+            # Nobody knows whether a user's right-hand side has jumps: a third run tells each one's order.
+            third = self.apart(coarse, self.solve(everyone, self.dt * RATIO**2))
+            self._reckon(everyone, third, self.distance, np.full(n, RATIO))
+        self.left = CHEAP + BUDGET * self.work(everyone, self.dt / 2.0)
+        self.vain = np.zeros(n, dtype=np.int64)
+        self.given_up, self.rounded = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
+        self.unpaid = np.zeros(n, dtype=np.bool_)
+        for _ in range(ROUNDS):
+            missing = self.finite & ~(self.margin * self.error <= self.tol)
+            again = self.affordable(np.flatnonzero(missing & ~self.given_up & ~self.rounded), 4.0)
+            if not again.size:
+                break
+            self._repeat(again)
+        self._resettle(np.flatnonzero(self.rounded | (self.given_up & ~self.once_rough & ~self.unpaid)))
+        self._audit()
+        return self.best, self.error, self.remark()
+
+    @property
+    def settings(self) -> Settings:
+        """What the calibration has found."""
+        return self.found.settings
+
+    @cached_property
+    def margin(self) -> float:
+        """Where even the ratio that covers most of the sample keeps an error within the tolerance, it is."""
+        return self.found.cover / self.found.median
+
+    def solve(self, who: Members, dt: Floats, settings: Settings | None = None) -> Solution:
+        """A run of some of the trajectories with their own steps."""
+        own = replace(settings or self.settings, dt=dt)
+        return solve(self.problem.part(who), self.starts[who], self.outputs, own, self.threads)
+
+    def apart(self, a: Solution, b: Solution) -> Floats:
+        """Distances (n,); infinite where one has stopped and the other not, or for another reason."""
+        apart = distances(a.y, b.y)
+        if self.problem.observation.stops:
+            apart[a.records[STOP_CODE] != b.records[STOP_CODE]] = np.inf
+        return apart
+
+    def work(self, who: Members, dt: Floats) -> float:
+        """Right-hand sides of a run, whole vectors of trajectories counted."""
+        total = 0.0
+        for length, lanes in zip(*np.unique(dt[np.isfinite(dt)], return_counts=True), strict=True):
+            whole = -(-int(lanes) // VECTOR_LANES) * VECTOR_LANES
+            total += whole * work(self.settings.method, float(length), self.outputs)
+        return total
+
+    def affordable(self, who: Members, finer: float) -> Members:
+        """As many of the trajectories, longest steps first, as the budget allows with steps so much finer."""
+        who = who[np.argsort(-self.dt[who], kind="stable")]
+        while who.size and self.work(who, self.dt[who] / finer) > self.left:
+            self.unpaid[who[who.size // 2 :]] = True
+            self.given_up[who[who.size // 2 :]] = True
+            who = who[: who.size // 2]
+        return np.sort(who)
+
+    def _reckon(self, who: Members, before: Floats, after: Floats, shorter: Floats) -> None:
+        """Errors from the last two distances, with the order that they show where it is not the method's.
+
+        Where a jump lies in its step is a matter of luck, and so is a single distance: from then on a rough
+        trajectory's error is the largest that its distances tell at order 1.
+        """
+        p = self.settings.method.order
+        seen = order_seen(before, after, shorter, p)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            smooth = np.log(before / after) / np.log(shorter) >= SMOOTH * p
+        # Steps that were too long to show any order may become short enough.
+        self.rough[who] = (self.rough[who] & ~smooth) | (seen < p)
+        self.once_rough |= self.rough
+        rough = self.rough[who]
+        lasting = np.fmax(after, np.where(np.isfinite(before), before / shorter, 0.0))
+        after = np.where(rough, lasting, after)
+        at_order = error_beyond(after, np.where(seen < LEAST_ORDER, 0.0, 1.0))
+        self.distance[who] = after
+        self.error[who] = np.where(rough, at_order, after * self.found.median)
+
+    def _repeat(self, again: Members) -> None:
+        """Run trajectories with the shorter steps that their errors ask for."""
+        order, error = self.settings.method.order, self.error[again]
+        known = np.isfinite(error)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            wanted = (AIM * self.tol / (self.margin * error)) ** (1.0 / order)
+        wanted = np.clip(np.where(known, wanted, 0.25), 0.25, 1.0 / RATIO)
+        rungs = np.ceil(-2.0 * np.log2(wanted) - 1e-9)  # each shorter by RATIO
+        own = self.dt[again] / RATIO**rungs
+        self.left -= self.work(again, own)
+        run = self.solve(again, own)
+        apart = np.empty(again.size)
+        near = rungs == 1.0  # one step of the ladder up there is a run already
+        far = np.flatnonzero(~near)
+        apart[near] = self.apart(_part(run, near), _part(self.best, again[near]))
+        if far.size:
+            self.left -= self.work(again[far], own[far] * RATIO)
+            apart[far] = self.apart(_part(run, far), self.solve(again[far], own[far] * RATIO))
+        self._reckon(again, self.distance[again], apart, self.dt[again] / own)
+        after = self.error[again]
+        in_vain = ~(after <= 0.5 * error) | np.isinf(after)
+        self.vain[again[in_vain]] += 1
+        # Where shorter steps bring nothing to a small error, rounding rules, magnified by the motion.
+        rounded = in_vain & ((after < ROUNDING) | ((self.vain[again] > 1) & (after < MAGNIFIED)))
+        # A rough one's earlier error may have been small by luck: the finer run has the better odds.
+        better = ~(after > error) | (self.rough[again] & np.isfinite(run.y[-1]).all(axis=1))
+        _replace(self.best, again[better], run, better)
+        self.dt[again] = own
+        rounded &= ~self.rough[again]
+        self.rounded[again[rounded]] = True
+        self.given_up[again[(self.vain[again] >= PATIENCE) & ~rounded]] = True
+
+    def _resettle(self, which: Members) -> None:
+        """Give trajectories that shorter steps do not help the longer ones of a one-step method.
+
+        Such a method rounds less. A run of a shorter step tells the error: where rounding rules, the two
+        differ by about as much as each does from the truth.
+        """
+        method = self.settings.method
+        if not which.size or isinstance(method, ImplicitRungeKutta):
+            return
+        calm = replace(self.settings, method=find_method(CALM))
+        for longer in LONGER if method.start_steps else (1.0,):
+            own = np.full(which.size, float(self.settings.dt) * longer)
+            run = self.solve(which, own, calm)
+            error = self.apart(run, self.solve(which, own / RATIO, calm))
+            better = error < self.error[which]
+            self.error[which[better]] = error[better]
+            _replace(self.best, which[better], run, better)
+
+    def _audit(self) -> None:
+        """Measure the errors of the worst trajectories by runs of half the step.
+
+        Where one is above the tolerance the finer run is kept, and measured in its turn while that helps.
+        """
+        settled = self.rounded | self.given_up | self.rough
+        open_ = np.flatnonzero(self.finite & ~settled)
+        worst = open_[np.argsort(-self.error[open_], kind="stable")[:AUDITED]]
+        last = np.full(worst.size, np.inf)
+        for turn in range(ROUNDS):
+            half = self.dt[worst] / 2.0
+            if not worst.size or (turn and self.work(worst, half) > self.left):
+                self.unpaid[worst] = True
+                return
+            self.left -= self.work(worst, half)
+            run = self.solve(worst, half)
+            self.dt[worst] = half
+            self.error[worst] = self.apart(run, _part(self.best, worst))
+            missing = ~(self.error[worst] <= self.tol)
+            # Two resolutions may disagree about a stop: the finer one has the better view.
+            helps = (self.error[worst] <= 0.5 * last) & (np.isfinite(self.error[worst]) | (turn < 2))
+            bad = missing & helps & np.isfinite(run.y[-1]).all(axis=1)
+            _replace(self.best, worst[bad], run, bad)
+            worst, last = worst[bad], self.error[worst[bad]]
+
+    def remark(self) -> str:
+        """Why trajectories have missed the tolerance; empty where none has."""
+        missed = self.finite & ~(self.error <= self.tol)
+        if not missed.any():
+            return ""
+        grazing = missed & ~np.isfinite(self.error) & np.isfinite(self.best.y[-1]).all(axis=1)
+        grazing &= self.problem.observation.stops
+        lost = missed & ~np.isfinite(self.best.y[-1]).all(axis=1)
+        unpaid = missed & self.unpaid & ~grazing & ~lost
+        causes = {
+            "two resolutions disagree about their stop": grazing,
+            "not finite at any step tried": lost,
+            "shorter steps would cost too much": unpaid,
+            "shorter steps do not reduce their errors as the order says (chaos, a jump or singularity of the "
+            "right-hand side, rounding)": missed & ~grazing & ~lost & ~unpaid,
+        }
+        each = [f"{np.count_nonzero(which):,}: {why}" for why, which in causes.items() if which.any()]
+        return f"; {np.count_nonzero(missed):,} of {missed.size:,} miss it ({'; '.join(each)})"
+
+
+def _part(solution: Solution, who: NDArray[np.int64] | NDArray[np.bool_]) -> Solution:
+    """Some of a solution's trajectories."""
+    s = solution
+    last = None if s.last is None else s.last[who]
+    return Solution(
+        s.y[:, who], s.records[:, who], s.status[who], s.steps[who], s.dt[:, who], s.failed[who], last
+    )
+
+
+def _replace(best: Solution, which: Members, run: Solution, part: NDArray[np.bool_]) -> None:
+    """Put some trajectories of a run into the places ``which`` of the solution."""
+    for old, new in ((best.y, run.y), (best.records, run.records), (best.dt, run.dt)):
+        old[:, which] = new[:, part]
+    best.status[which], best.steps[which] = run.status[part], run.steps[part]
+    best.failed[which] = run.failed[part]
+    if best.last is not None or run.last is not None:
+        best.last = best.y[-1].copy() if best.last is None else best.last
+        best.last[which] = (run.y[-1] if run.last is None else run.last)[part]

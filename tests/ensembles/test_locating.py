@@ -1,0 +1,98 @@
+"""Where a trajectory stops: closed forms, for each family of methods and any number of threads."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import fastmech as fm
+from fastmech.ensembles.locating import locate_stops
+from fastmech.ensembles.spans import Span
+from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
+from fastmech.ensembles.system import System
+from fastmech.integrators.methods import find_method
+
+OMEGA, N, T_END = 1.3, 48, 10.0
+
+
+def oscillator(t: float, x: float, v: float, omega: float) -> tuple[float, float]:
+    return v, -omega * omega * x
+
+
+def left(t: float, x: float, v: float) -> float:
+    return 3.0 if x < 0.0 else 0.0
+
+
+SYSTEM = System(oscillator, ["x", "v"], {"omega": OMEGA}, stop=left)
+
+
+def starts() -> np.ndarray:
+    rng = np.random.default_rng(0)
+    return np.stack([rng.uniform(0.1, 2.0, N), rng.uniform(-1.0, 1.0, N)], axis=1)
+
+
+def stops(y0: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """x = R cos(omega t - d) falls through zero at omega t = d + pi/2, with v = -R omega."""
+    size, d = np.hypot(y0[:, 0], y0[:, 1] / OMEGA), np.arctan2(y0[:, 1] / OMEGA, y0[:, 0])
+    return (0.5 * np.pi + d) / OMEGA, np.stack([np.zeros(len(y0)), -size * OMEGA], axis=1)
+
+
+@pytest.mark.parametrize(("tol", "method"), [(1e-3, None), (1e-6, None), (1e-10, None), (1e-6, "radau5")])
+def test_time_and_state_of_a_stop_keep_the_tolerance(tol: float, method: str | None) -> None:
+    time, state = stops(starts())
+    run = fm.integrate(SYSTEM, starts(), T_END, tol=tol, method=method)
+    assert run.error is not None
+    assert run.error_estimate is not None
+    assert run.stop_time is not None
+    true = np.abs(run.y[-1] - state).max(axis=1)
+    assert (run.stop_code == 3).all()
+    assert true.max() <= tol
+    assert true.max() / 3.0 <= run.error_estimate <= 3.0 * true.max()
+    # Within the state's error over its speed there, at least 0.1 omega^2.
+    assert np.abs(run.stop_time - time).max() <= tol / (0.1 * OMEGA)
+    assert run.own_steps.max() < 2000
+
+
+def test_outputs_before_and_after_the_stop() -> None:
+    y0 = starts()
+    time, _ = stops(y0)
+    times = np.linspace(0.5, T_END, 20)
+    run = fm.integrate(SYSTEM, y0, t_eval=times, tol=1e-8)
+    d, size = np.arctan2(y0[:, 1] / OMEGA, y0[:, 0]), np.hypot(y0[:, 0], y0[:, 1] / OMEGA)
+    x = size * np.cos(OMEGA * np.minimum(times[:, None], time) - d)
+    np.testing.assert_allclose(run.y[..., 0], x, rtol=0, atol=1e-8)
+    np.testing.assert_array_equal(run.y[-1], run.y[times > time.max()][0])
+
+
+def test_a_start_that_meets_the_condition_stops_there() -> None:
+    run = fm.integrate(SYSTEM, [[-1.0, -1.0], [1.0, 0.0]], T_END, tol=1e-6)
+    assert run.stop_time is not None
+    assert run.stop_time[0] < 1e-12
+    np.testing.assert_allclose(run.y[-1, 0], [-1.0, -1.0], atol=1e-12)
+
+
+def test_stops_do_not_depend_on_threads_or_companions() -> None:
+    y0 = starts()
+    one, three = (fm.integrate(SYSTEM, y0, T_END, tol=1e-6, threads=k) for k in (1, 3))
+    np.testing.assert_array_equal(one.y, three.y)
+    np.testing.assert_array_equal(one.stop_time, three.stop_time)
+    np.testing.assert_array_equal(one.error, three.error)
+
+
+@pytest.mark.parametrize(("name", "order"), [("rk4", 4), ("ab6", 6), ("radau3", 3)])
+def test_a_located_stop_has_the_method_s_order(name: str, order: int) -> None:
+    """Halved steps: the stop's time comes nearer by 2^p."""
+    method, y0 = find_method(name), np.array([[1.0, 0.0]])
+    errors = []
+    for steps in (48, 96):
+        step = 2.0 / steps
+        seen = int(np.ceil(0.5 * np.pi / OMEGA / step))
+        record = np.array([[3.0, seen * step, 0.0, 0.0]])
+        span = Span(np.array([0.0, 2.0]), np.array([steps]), np.array([0]), 1)
+        o = SYSTEM.observation
+        own = np.array([[OMEGA]])
+        found = locate_stops(SYSTEM.kernel, o.observe, o.params, o.record, method, span, y0, own, record)
+        assert found[0, STOP_CODE] == 3.0
+        assert abs(found[0, STOP_STATE]) < 1e-9
+        errors.append(abs(found[0, STOP_TIME] - 0.5 * np.pi / OMEGA))
+    assert 2.0 ** (order - 0.6) < errors[0] / errors[1] < 2.0 ** (order + 1.6)
