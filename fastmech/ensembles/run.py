@@ -17,14 +17,15 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib import import_module
+from itertools import chain
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.ensembles.failing import last_finite
+from fastmech.ensembles.failing import Resumption
 from fastmech.ensembles.lanes import VECTOR_LANES, Lanes
-from fastmech.ensembles.spans import Span, spans
+from fastmech.ensembles.spans import Span, Way, way
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
 from fastmech.ensembles.threads import thread_count
@@ -47,10 +48,10 @@ BLOCK_BYTES = 32768
 #: running move up into full blocks.
 TASK_BLOCKS = 32
 
-#: Numbers that the output of one call holds at most.
-CALL_OUTPUT = 2**21
-
-#: Steps a call: between calls an interrupt is heard, and where trajectories may stop they make room.
+#: Between calls an interrupt is heard, and trajectories that have stopped or failed make room. A call is
+#: begun in some 50 microseconds: it takes so many right-hand sides of lanes, of each lane at least and of
+#: methods that take few at least so many a step, but no more steps than that.
+CALL_EVALUATIONS, LANE_EVALUATIONS, STEP_EVALUATIONS = 2**20, 1024, 4
 CALL_STEPS = 2048
 CALL_STEPS_WITH_STOPS = 64
 
@@ -61,7 +62,7 @@ class Observation:
 
     ``record`` holds the start value of every row of a lane's record. Where ``stops`` is set, the rows begin
     with those of :mod:`fastmech.ensembles.stopping` (its own may follow), and a lane whose code is not zero
-    is taken out after at most ``call_steps`` steps.
+    is taken out after about ``call_steps`` steps.
     """
 
     observe: Any
@@ -79,7 +80,7 @@ class Ensemble:
     """States at the output times (outputs, n, dim), records (rows, n) and :class:`Status` values (n,).
 
     A trajectory that fails has NaN from the next output on; ``failed`` (n,) is the time [s] of its last
-    finite state, NaN for the others.
+    finite state, NaN for the others. One whose start is not finite has that as its last state.
     """
 
     states: Floats
@@ -135,10 +136,11 @@ def run_ensemble(
     own = np.asarray(params, dtype=np.float64)
     own = np.broadcast_to(own, (len(begin), own.shape[-1]))
     workers = thread_count(threads)
-    most = observation.call_steps * (1 + method.start_steps) if observation.stops else CALL_STEPS
+    usable = np.isfinite(begin).all(axis=1)
+    cost = max(STEP_EVALUATIONS, method.evaluations(CALL_STEPS) / CALL_STEPS)
     ensemble = Ensemble(
         states=np.empty((clock.size - 1, *begin.shape)),
-        records=np.empty((observation.record.size, len(begin))),
+        records=np.repeat(observation.record[:, None], len(begin), axis=1),
         status=np.full(len(begin), Status.OK, dtype=np.int8),
         failed=np.full(len(begin), np.nan),
         lost=[],
@@ -152,32 +154,40 @@ def run_ensemble(
     if block_lanes is None:
         block_lanes = block_width(method, begin.shape[1], precision)
 
+    def most_steps(lanes: Lanes) -> int:
+        if observation.stops:
+            return observation.call_steps
+        evaluations = max(LANE_EVALUATIONS, CALL_EVALUATIONS // lanes.members.size)
+        return min(CALL_STEPS, int(evaluations / cost))
+
     def run_task(task: _Task) -> int:
-        members = task.members
-        lanes = Lanes(members, begin[members], own[members], observation.record, block_lanes)
-        for span in task.way:
-            if interrupted.is_set() or not lanes.members.size:
-                break
+        members, piece = task.members, 0
+        memory = np.zeros((members.size, method.carried * begin.shape[1]), dtype=begin.dtype)
+        lanes = Lanes(members, begin[members], own[members], observation.record, block_lanes, memory)
+        while piece < task.way.steps.size and lanes.members.size and not interrupted.is_set():
+            span, before = task.way.span(piece, most_steps(lanes)), Resumption(lanes)
             batch = lanes.batch(span, observation.params)
-            begun = lanes.rows(lanes.Y).copy()
             given_up = method.run(rhs, observe, batch)
-            now, failed = lanes.rows(batch.Y).copy(), np.full(lanes.members.size, np.nan)
+            piece += span.steps.size
+            failed = np.full(lanes.members.size, np.nan)
             if given_up is not None:
                 failed = given_up.reshape(-1)[: lanes.members.size].copy()
             stopped = _stopped(lanes, batch) if observation.stops else np.zeros(failed.size, dtype=np.bool_)
             failed[stopped] = np.nan
+            now = lanes.rows(batch.Y).copy()
             lost = np.isnan(failed) & ~stopped & ~np.isfinite(now).all(axis=1)
             ensemble.status[lanes.members[~np.isnan(failed)]] = Status.NOT_CONVERGED
             ensemble.status[lanes.members[lost]] = Status.NOT_FINITE
             if lost.any():
-                own_params = lanes.rows(lanes.params)[lost]
-                failed[lost], now[lost] = last_finite(rhs, method, span, begun[lost], own_params)
+                which = np.flatnonzero(lost)
+                failed[lost], now[lost] = before.last_finite(rhs, method, span, batch.out, which)
             _store(ensemble, lanes, span, batch, now, failed, stopped)
         return members.size
 
-    width = min(block_lanes, max(VECTOR_LANES, CALL_OUTPUT // (begin.shape[1] * clock.size)))
-    tasks = list(_tasks(np.broadcast_to(dt, len(begin)), clock, most, workers, width * TASK_BLOCKS))
-    for finished in _in_threads(run_task, tasks, min(workers, len(tasks)), interrupted):
+    _set_aside(ensemble, np.flatnonzero(~usable), begin, clock[0])
+    tasks = list(_tasks(np.broadcast_to(dt, len(begin)), usable, clock, workers, block_lanes * TASK_BLOCKS))
+    finishing = _in_threads(run_task, tasks, min(workers, len(tasks)), interrupted)
+    for finished in chain([int(np.count_nonzero(~usable))], finishing):
         if progress is not None:
             progress(finished)
     return ensemble
@@ -188,18 +198,31 @@ class _Task:
     """Trajectories of one step's length, and how they pass the output times."""
 
     members: NDArray[np.int64]
-    way: list[Span]
+    way: Way
 
 
-def _tasks(dt: Floats, times: Floats, most: int, workers: int, lanes: int) -> Iterator[_Task]:
+def _set_aside(ensemble: Ensemble, members: NDArray[np.int64], begin: Floats, start: float) -> None:
+    """Trajectories whose starts are not finite never enter a block."""
+    ensemble.states[:, members] = np.nan
+    ensemble.status[members] = Status.START_NOT_FINITE
+    ensemble.failed[members] = start
+    if members.size:
+        ensemble.lost.append((members, begin[members]))
+
+
+def _tasks(
+    dt: Floats, usable: NDArray[np.bool_], times: Floats, workers: int, lanes: int
+) -> Iterator[_Task]:
     """Trajectories sorted by their step, shared evenly among the workers in tasks of at most ``lanes``."""
     for step in np.unique(dt):
-        members = np.flatnonzero(dt == step)
-        way = list(spans(times, float(step), most))
+        passed = way(times, float(step))
+        members = np.flatnonzero(usable & (dt == step))
+        if not members.size:
+            continue
         number = -(-members.size // (lanes * workers)) * workers
         size = -(-members.size // (number * VECTOR_LANES)) * VECTOR_LANES
         for first in range(0, members.size, size):
-            yield _Task(members[first : first + size], way)
+            yield _Task(members[first : first + size], passed)
 
 
 def _in_threads(

@@ -36,7 +36,7 @@ def test_last_finite_state_and_time(method: str) -> None:
     np.testing.assert_array_equal(run.states[:, tame], alone.states)
     np.testing.assert_array_equal(run.last[tame], run.states[-1, tame])
     wrong = fm.Status.NOT_CONVERGED if method == "gauss4" else fm.Status.NOT_FINITE
-    assert run.status.tolist() == [0, wrong, wrong, 0, wrong, wrong]
+    assert run.status.tolist() == [0, wrong, wrong, 0, wrong, fm.Status.START_NOT_FINITE]
     assert np.isnan(run.failed[tame]).all()
     np.testing.assert_allclose(run.failed[[1, 2, 4]], [1.0, 2.0, 0.5], atol=0.1)
     assert run.failed[5] == 0.0
