@@ -43,9 +43,7 @@ class Lanes:
         self.phase = np.zeros(PHASE)
         self._arrange(states, params, np.repeat(record[None, :], members.size, axis=0), memory)
 
-    def _arrange(
-        self, states: Floats, params: Floats, record: NDArray[np.float64], memory: Floats
-    ) -> None:
+    def _arrange(self, states: Floats, params: Floats, record: NDArray[np.float64], memory: Floats) -> None:
         n = len(states)
         blocks = max(1, -(-n // self.block_lanes))
         width = -(-n // (blocks * VECTOR_LANES)) * VECTOR_LANES

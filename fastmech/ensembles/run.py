@@ -48,12 +48,11 @@ BLOCK_BYTES = 32768
 #: running move up into full blocks.
 TASK_BLOCKS = 32
 
-#: Between calls an interrupt is heard, and trajectories that have stopped or failed make room. A call is
-#: begun in some 50 microseconds: it takes so many right-hand sides of lanes, of each lane at least and of
-#: methods that take few at least so many a step, but no more steps than that.
-CALL_EVALUATIONS, LANE_EVALUATIONS, STEP_EVALUATIONS = 2**20, 1024, 4
-CALL_STEPS = 2048
-CALL_STEPS_WITH_STOPS = 64
+#: Steps a call at most: between calls an interrupt is heard, and who has stopped or failed makes room. Most
+#: failures are early ones, so calls grow: the first has so many right-hand sides of lanes (but a step counts
+#: as four at least, and a lane as so many), the others as many steps as went before.
+CALL_STEPS, CALL_STEPS_WITH_STOPS = 2048, 64
+CALL_EVALUATIONS, STEP_EVALUATIONS, LANE_EVALUATIONS = 2**21, 4, 1024
 
 
 @dataclass(frozen=True)
@@ -154,34 +153,29 @@ def run_ensemble(
     if block_lanes is None:
         block_lanes = block_width(method, begin.shape[1], precision)
 
-    def most_steps(lanes: Lanes) -> int:
+    def most_steps(lanes: Lanes, passed: int) -> int:
         if observation.stops:
             return observation.call_steps
         evaluations = max(LANE_EVALUATIONS, CALL_EVALUATIONS // lanes.members.size)
-        return min(CALL_STEPS, int(evaluations / cost))
+        return min(CALL_STEPS, max(passed, int(evaluations / cost)))
 
     def run_task(task: _Task) -> int:
-        members, piece = task.members, 0
+        members, piece, passed = task.members, 0, 0
         memory = np.zeros((members.size, method.carried * begin.shape[1]), dtype=begin.dtype)
         lanes = Lanes(members, begin[members], own[members], observation.record, block_lanes, memory)
         while piece < task.way.steps.size and lanes.members.size and not interrupted.is_set():
-            span, before = task.way.span(piece, most_steps(lanes)), Resumption(lanes)
+            span, before = task.way.span(piece, most_steps(lanes, passed)), Resumption(lanes)
             batch = lanes.batch(span, observation.params)
             given_up = method.run(rhs, observe, batch)
-            piece += span.steps.size
-            failed = np.full(lanes.members.size, np.nan)
-            if given_up is not None:
-                failed = given_up.reshape(-1)[: lanes.members.size].copy()
-            stopped = _stopped(lanes, batch) if observation.stops else np.zeros(failed.size, dtype=np.bool_)
-            failed[stopped] = np.nan
-            now = lanes.rows(batch.Y).copy()
-            lost = np.isnan(failed) & ~stopped & ~np.isfinite(now).all(axis=1)
-            ensemble.status[lanes.members[~np.isnan(failed)]] = Status.NOT_CONVERGED
-            ensemble.status[lanes.members[lost]] = Status.NOT_FINITE
-            if lost.any():
-                which = np.flatnonzero(lost)
-                failed[lost], now[lost] = before.last_finite(rhs, method, span, batch.out, which)
-            _store(ensemble, lanes, span, batch, now, failed, stopped)
+            piece, passed = piece + span.steps.size, passed + int(span.steps.sum())
+            ended = _ended(lanes, batch, given_up, observation.stops)
+            if ended is not None:
+                ensemble.status[lanes.members[~np.isnan(ended.failed)]] = Status.NOT_CONVERGED
+                ensemble.status[lanes.members[ended.lost]] = Status.NOT_FINITE
+                if ended.lost.size:
+                    found = before.last_finite(rhs, method, span, batch.out, ended.lost)
+                    ended.failed[ended.lost], ended.now[ended.lost] = found
+            _store(ensemble, lanes, span, batch, ended)
         return members.size
 
     _set_aside(ensemble, np.flatnonzero(~usable), begin, clock[0])
@@ -210,9 +204,7 @@ def _set_aside(ensemble: Ensemble, members: NDArray[np.int64], begin: Floats, st
         ensemble.lost.append((members, begin[members]))
 
 
-def _tasks(
-    dt: Floats, usable: NDArray[np.bool_], times: Floats, workers: int, lanes: int
-) -> Iterator[_Task]:
+def _tasks(dt: Floats, usable: NDArray[np.bool_], times: Floats, workers: int, lanes: int) -> Iterator[_Task]:
     """Trajectories sorted by their step, shared evenly among the workers in tasks of at most ``lanes``."""
     for step in np.unique(dt):
         passed = way(times, float(step))
@@ -241,38 +233,55 @@ def _in_threads(
             raise
 
 
-def _stopped(lanes: Lanes, batch: Batch) -> NDArray[np.bool_]:
-    """Which trajectories have stopped."""
-    return np.asarray(lanes.rows(batch.record)[:, STOP_CODE] != 0.0)
+@dataclass(frozen=True)
+class _Ended:
+    """Trajectories of a task that ended in a call."""
+
+    stopped: NDArray[np.bool_]
+    failed: Floats  #: time [s] of the last state of those that failed, NaN for the others
+    lost: NDArray[np.int64]  #: places of those that are not finite now, of which no time is known yet
+    now: Floats  #: states of all (n, dim)
 
 
-def _store(
-    ensemble: Ensemble,
-    lanes: Lanes,
-    span: Span,
-    batch: Batch,
-    now: Floats,
-    failed: Floats,
-    stopped: NDArray[np.bool_],
-) -> None:
+def _ended(lanes: Lanes, batch: Batch, given_up: Floats | None, stops: bool) -> _Ended | None:
+    """Who has stopped or failed, nobody as a rule."""
+    healthy = (given_up is None or bool(np.isnan(given_up).all())) and bool(np.isfinite(batch.Y).all())
+    if healthy and not stops:
+        return None
+    n, now = lanes.members.size, lanes.rows(batch.Y).copy()
+    stopped = np.zeros(n, dtype=np.bool_)
+    if stops:
+        stopped = np.asarray(lanes.rows(batch.record)[:, STOP_CODE] != 0.0)
+        if healthy and not stopped.any():
+            return None
+    failed = np.full(n, np.nan) if given_up is None else given_up.reshape(-1)[:n].copy()
+    failed[stopped] = np.nan
+    lost = np.flatnonzero(np.isnan(failed) & ~stopped & ~np.isfinite(now).all(axis=1))
+    return _Ended(stopped, failed, lost, now)
+
+
+def _store(ensemble: Ensemble, lanes: Lanes, span: Span, batch: Batch, ended: _Ended | None) -> None:
     """Store what a span has brought; who has failed or stopped leaves and costs nothing any more."""
-    record, members = lanes.rows(batch.record), lanes.members
-    ensemble.records[:, members] = record.T
-    stop_state = record[stopped, STOP_STATE : STOP_STATE + now.shape[1]]
-    for piece, output in enumerate(span.outputs):
-        if output >= 0:
-            reached = lanes.rows(batch.out[:, piece])
-            if stopped.any():
-                before = record[stopped, STOP_TIME] <= span.times[piece + 1]
-                reached[np.flatnonzero(stopped)[before]] = stop_state[before]
-            reached[failed < span.times[piece + 1]] = np.nan
-            ensemble.states[output, members] = reached
-    over = ~np.isnan(failed)
-    if stopped.any():
-        ensemble.states[span.passed :, members[stopped]] = stop_state
+    members = lanes.members
+    if batch.record.size:
+        ensemble.records[:, members] = lanes.rows(batch.record).T
+    for piece in np.flatnonzero(span.outputs >= 0):
+        ensemble.states[span.outputs[piece], members] = lanes.rows(batch.out[:, piece])
+    if ended is None:
+        return
+    stopped, failed, over = ended.stopped, ended.failed, ~np.isnan(ended.failed)
+    for piece in np.flatnonzero(span.outputs >= 0):
+        ensemble.states[span.outputs[piece], members[failed < span.times[piece + 1]]] = np.nan
+    ensemble.states[span.passed :, members[over]] = np.nan
     if over.any():
-        ensemble.states[span.passed :, members[over]] = np.nan
         ensemble.failed[members[over]] = failed[over]
-        ensemble.lost.append((members[over], now[over]))
+        ensemble.lost.append((members[over], ended.now[over]))
+    if stopped.any():
+        record = lanes.rows(batch.record)[stopped]
+        state = record[:, STOP_STATE : STOP_STATE + ended.now.shape[1]]
+        for piece in np.flatnonzero(span.outputs >= 0):
+            before = record[:, STOP_TIME] <= span.times[piece + 1]
+            ensemble.states[span.outputs[piece], members[stopped][before]] = state[before]
+        ensemble.states[span.passed :, members[stopped]] = state
     if stopped.any() or over.any():
         lanes.keep(~(stopped | over), at_once=bool(over.any()))

@@ -54,7 +54,7 @@ class Way:
         return np.cumsum(self.outputs >= 0)
 
     def span(self, first: int, most: int) -> Span:
-        """What a call passes from piece ``first`` on: whole pieces, one at least, of at most ``most`` steps."""
+        """What a call passes from piece ``first`` on: one piece, or more while steps are at most ``most``."""
         before = self._steps_before
         end = max(first + 1, int(np.searchsorted(before, before[first] + most, side="right")) - 1)
         return Span(

@@ -29,6 +29,7 @@ ROUNDED_TIME = 4 * 2.0**-52
 #: Where the Jacobian comes from.
 DIFFERENCES, GENERAL, SECOND_ORDER = 0, 1, 2
 
+
 @kernel(
     types.void(
         RHS,

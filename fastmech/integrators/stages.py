@@ -8,12 +8,11 @@ arithmetic.
 from __future__ import annotations
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
 from fastmech.integrators.explicit import BlockRHS, Floats
 from fastmech.integrators.newton import apply_complex, apply_real, combine
-from fastmech.jit import CUBE, MATRIX, RHS, VECTOR, inlined, kernel
+from fastmech.jit import inlined
 
 #: Width of the narrowest block, and the share of a block's lanes that is worth a block of its own.
 NARROWEST, FEW = 16, 0.125
@@ -49,31 +48,7 @@ def accept(
     return left
 
 
-@kernel(
-    types.UniTuple(types.int64, 2)(
-        RHS,
-        types.float64,
-        VECTOR,
-        MATRIX,
-        CUBE,
-        CUBE,
-        MATRIX,
-        MATRIX,
-        MATRIX,
-        MATRIX,
-        MATRIX,
-        MATRIX,
-        MATRIX,
-        types.int64,
-        types.boolean,
-        types.float64,
-        VECTOR,
-        VECTOR,
-        VECTOR,
-        types.int64,
-        types.int64,
-    )
-)
+@inlined
 def iterate(
     rhs: BlockRHS,
     t: float,
