@@ -135,7 +135,7 @@ def run_ensemble(
     own = np.asarray(params, dtype=np.float64)
     own = np.broadcast_to(own, (len(begin), own.shape[-1]))
     workers = thread_count(threads)
-    usable = np.isfinite(begin).all(axis=1)
+    usable = np.asarray(np.isfinite(begin).all(axis=1))
     cost = max(STEP_EVALUATIONS, method.evaluations(CALL_STEPS) / CALL_STEPS)
     ensemble = Ensemble(
         states=np.empty((clock.size - 1, *begin.shape)),
@@ -283,5 +283,5 @@ def _store(ensemble: Ensemble, lanes: Lanes, span: Span, batch: Batch, ended: _E
             before = record[:, STOP_TIME] <= span.times[piece + 1]
             ensemble.states[span.outputs[piece], members[stopped][before]] = state[before]
         ensemble.states[span.passed :, members[stopped]] = state
-    if stopped.any() or over.any():
+    if (stopped.any() or over.any()) and span.passed < len(ensemble.states):
         lanes.keep(~(stopped | over), at_once=bool(over.any()))

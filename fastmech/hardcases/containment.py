@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 CONTAINED = {"rk4": 0.01, "dop853": 0.02, "ab6": 0.01, "abm8": 0.01, "gauss6": 0.05, "sdirk4": 0.05}
 
 #: Lengths of the runs [s], and those of the quick version.
-SPANS, QUICK_SPANS = (5.0, 20.0, 100.0), (0.5, 1.0)
+SPANS, QUICK_SPANS = (5.0, 20.0, 100.0), (2.0,)
 
 #: When trajectories fail: the mechanism's at once, the system's about these shares of the run's length.
 WHEN = {"in the first step": 0.0, "after 10 %": 0.1, "after 85 %": 0.85}
