@@ -148,7 +148,9 @@ class _Trial(Sample):
                     f"stability keeps {ladder.method.name} to {ladder.dt(ladder.rung):.1g} s, "
                     f"accuracy allows {implicit.dt(implicit.rung):.1g} s"
                 )
-            beside = implicit.method.name, implicit.dt(implicit.rung), self.cost(implicit) / self.cost(ladder)
+            if self.cost(ladder) > 0.0:  # else the only output is the start
+                ratio = self.cost(implicit) / self.cost(ladder)
+                beside = implicit.method.name, implicit.dt(implicit.rung), ratio
         if not ladder.good:
             return ladder.calibrated("nearest to a tolerance that no method tried has kept")
         dt, share = ladder.dt(ladder.rung), ladder.estimate(ladder.rung) / self.tol

@@ -17,35 +17,84 @@ from fastmech.jit import OBSERVER_SIGNATURE, kernel, observer_signature, single
 Floats = NDArray[np.float64]
 
 
+#: Rows of the record: whether the lane is finite now, the time, and the state, when it was so last.
+FINITE, TIME, STATE = 0, 1, 2
+
+
 @kernel(OBSERVER_SIGNATURE)
 def observe_last_finite(t: float, Y: Floats, params: Floats, record: Floats) -> None:
-    """Keep time and state, rows 0 and 1.., of every lane as long as all of its states are finite."""
+    """Keep time and state of every lane as long as all of its states are finite; branch-free."""
+    record[FINITE] = 0.0
+    for d in range(Y.shape[0]):
+        for i in range(Y.shape[1]):
+            record[FINITE, i] += Y[d, i] - Y[d, i]  # NaN where it is not finite
     for i in range(Y.shape[1]):
-        finite = True
-        for d in range(Y.shape[0]):
-            finite &= bool(np.isfinite(Y[d, i]))
-        if finite:
-            record[0, i] = t
-            for d in range(Y.shape[0]):
-                record[1 + d, i] = Y[d, i]
+        record[TIME, i] = t if record[FINITE, i] == 0.0 else record[TIME, i]
+    for d in range(Y.shape[0]):
+        for i in range(Y.shape[1]):
+            record[STATE + d, i] = Y[d, i] if record[FINITE, i] == 0.0 else record[STATE + d, i]
 
 
-def last_finite(rhs: Any, method: Method, span: Span, begin: Floats, params: Floats) -> tuple[Floats, Floats]:
-    """Times (n,) and states (n, dim) of trajectories that began a span finite and did not end it so.
+class Resumption:
+    """What lanes were like before a call, so that some of them can be taken through it once more."""
 
-    ``begin`` (n, dim) and ``params`` (n, count) are what they began with. They go through the span once more,
-    alone and watched: healthy trajectories pay nothing for it, and the same arithmetic gives the same states.
-    """
-    observe, dim = observe_last_finite, begin.shape[1]
-    if begin.dtype == np.float32:
-        observe = _in_single()
-    record = np.concatenate([[span.times[0]], np.full(dim, np.nan)])
-    lanes = Lanes(np.arange(len(begin)), begin, params, record, len(begin))
-    lanes.record[:, 1:] = lanes.Y
-    batch = lanes.batch(span, np.zeros(0))
-    method.run(rhs, observe, batch)
-    seen = lanes.rows(batch.record)
-    return seen[:, 0], seen[:, 1:]
+    def __init__(self, lanes: Lanes) -> None:
+        """From the lanes as they are."""
+        self._lanes = lanes
+        self._Y, self._memory, self._phase = lanes.Y.copy(), lanes.memory.copy(), lanes.phase.copy()
+        self._params = lanes.params
+
+    def last_finite(
+        self, rhs: Any, method: Method, span: Span, out: Floats, which: NDArray[np.int64]
+    ) -> tuple[Floats, Floats]:
+        """Times (n,) and states (n, dim) of lanes that began a call finite and did not end it so.
+
+        ``which`` (n,) are their places, ``out`` is what the call wrote. They go once more through the pieces
+        in which they failed, alone and watched, and through those before of which a method carries anything:
+        healthy trajectories pay nothing for it, and the same arithmetic gives the same states.
+        """
+        dim = out.shape[2]
+        block, lane = np.divmod(which, out.shape[3])
+        reached = out[block, :, :, lane]
+        failing = np.argmin(np.isfinite(reached).all(axis=2), axis=1)
+        first, end = 0 if method.carried else int(failing.min()), int(failing.max()) + 1
+        begin = reached[:, first - 1] if first else self.states(which)
+        record = np.empty((which.size, STATE + dim))
+        record[:, FINITE], record[:, TIME], record[:, STATE:] = 0.0, span.times[first], begin
+        observe = _in_single() if begin.dtype == np.float32 else observe_last_finite
+        seen = self.watched(rhs, observe, method, span.part(first, end), which, begin, record)
+        return seen[:, TIME], seen[:, STATE:]
+
+    def states(self, which: NDArray[np.int64]) -> Floats:
+        """States (n, dim) at the places ``which`` (n,)."""
+        return self._lanes.rows(self._Y)[which]
+
+    def params(self, which: NDArray[np.int64]) -> Floats:
+        """Parameters (n, count) at the places ``which`` (n,)."""
+        return self._lanes.rows(self._params)[which]
+
+    def watched(
+        self,
+        rhs: Any,
+        observe: Any,
+        method: Method,
+        span: Span,
+        which: NDArray[np.int64],
+        begin: Floats,
+        record: Floats,
+    ) -> Floats:
+        """Records (n, rows) that ``observe`` makes of lanes which go through pieces of the call once more.
+
+        They begin with the states ``begin`` (n, dim) and the records ``record`` (n, rows).
+        """
+        memory = self._lanes.rows(self._memory)[which]
+        again = Lanes(
+            np.arange(which.size), begin, self.params(which), record, self._lanes.block_lanes, memory
+        )
+        again.phase[:] = self._phase
+        batch = again.batch(span, np.zeros(0))
+        method.run(rhs, observe, batch)
+        return again.rows(batch.record)
 
 
 @cache

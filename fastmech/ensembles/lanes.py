@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.ensembles.spans import Span
-from fastmech.integrators.batch import Batch
+from fastmech.integrators.batch import PHASE, Batch
 
 Floats = NDArray[np.float64]
 
@@ -20,32 +20,46 @@ WORTH_MOVING = 0.125
 class Lanes:
     """Trajectories that still run, as blocks (blocks, rows, lanes) of states, parameters and records.
 
+    So is what their method carries from call to call, see :class:`fastmech.integrators.batch.Batch`.
+
     The last block is filled up with copies of the last trajectory, so every lane runs in whole vectors.
     """
 
     def __init__(
-        self, members: NDArray[np.int64], states: Floats, params: Floats, record: Floats, block_lanes: int
+        self,
+        members: NDArray[np.int64],
+        states: Floats,
+        params: Floats,
+        record: Floats,
+        block_lanes: int,
+        memory: Floats,
     ) -> None:
-        """From states (n, dim) and parameters (n, count) of the members, and the empty record (rows,)."""
+        """From states (n, dim) and parameters (n, count) of the members, and their records.
+
+        ``record`` is the empty one (rows,) of all, or those of each (n, rows).
+        ``memory`` (n, carried * dim) is what their method carries of them, zeros where it starts.
+        """
         self.block_lanes = block_lanes
         self.members = members
-        self._arrange(states, params, np.repeat(record[None, :], members.size, axis=0))
+        self.phase = np.zeros(PHASE)
+        self._arrange(states, params, np.broadcast_to(record, (members.size, record.shape[-1])), memory)
 
-    def _arrange(self, states: Floats, params: Floats, record: NDArray[np.float64]) -> None:
+    def _arrange(self, states: Floats, params: Floats, record: NDArray[np.float64], memory: Floats) -> None:
         n = len(states)
         blocks = max(1, -(-n // self.block_lanes))
         width = -(-n // (blocks * VECTOR_LANES)) * VECTOR_LANES
         lanes = np.minimum(np.arange(blocks * width), n - 1)
-        self.Y, self.params, self.record = (
+        self.Y, self.params, self.record, self.memory = (
             np.ascontiguousarray(a[lanes].reshape(blocks, width, a.shape[1]).transpose(0, 2, 1))
-            for a in (states, params, record)
+            for a in (states, params, record, memory)
         )
 
     def batch(self, span: Span, observer_params: NDArray[np.float64]) -> Batch:
         """What a method is given to take the lanes through a span."""
         blocks, dim, width = self.Y.shape
         out = np.empty((blocks, span.steps.size, dim, width), dtype=self.Y.dtype)
-        return Batch(span.times, span.steps, self.params, observer_params, self.Y, self.record, out)
+        own = self.params, observer_params, self.Y, self.record, out, self.memory, self.phase
+        return Batch(span.times, span.steps, *own)
 
     def rows(self, blocked: Floats) -> Floats:
         """Values (members, rows) of an array (blocks, rows, lanes)."""
@@ -57,7 +71,7 @@ class Lanes:
         few = which.any() and np.count_nonzero(~which) < WORTH_MOVING * which.size
         if which.all() or (few and not at_once):
             return
-        states, params, record = (self.rows(a)[which] for a in (self.Y, self.params, self.record))
+        kept = [self.rows(a)[which] for a in (self.Y, self.params, self.record, self.memory)]
         self.members = self.members[which]
         if self.members.size:
-            self._arrange(states, params, record)
+            self._arrange(*kept)

@@ -16,9 +16,11 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fastmech.ensembles.lanes import Lanes
+from fastmech.ensembles.failing import Resumption
+from fastmech.ensembles.run import Observation
 from fastmech.ensembles.spans import Span
 from fastmech.ensembles.stopping import STOP_CODE, STOP_TIME
+from fastmech.integrators.batch import PHASE
 from fastmech.integrators.explicit import TABLEAU, integrate_blocks
 from fastmech.integrators.implicit import integrate_implicit_block
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
@@ -93,7 +95,20 @@ def halve_steps(
 
 
 @kernel(
-    types.void(RHS, OBSERVER, MATRIX, VECTOR, VECTOR, MATRIX, MATRIX, VECTOR, MATRIX, types.float64, *_SEARCH)
+    types.void(
+        RHS,
+        OBSERVER,
+        MATRIX,
+        VECTOR,
+        VECTOR,
+        MATRIX,
+        MATRIX,
+        VECTOR,
+        MATRIX,
+        types.float64,
+        types.int64,
+        *_SEARCH,
+    )
 )
 def halve_implicit_steps(
     rhs: Any,
@@ -106,6 +121,7 @@ def halve_implicit_steps(
     eigenvalues: Floats,
     extrapolation: Floats,
     remainder: float,
+    carried: int,
     begin: Floats,
     states: Floats,
     params: Floats,
@@ -113,7 +129,7 @@ def halve_implicit_steps(
     empty: Floats,
     record: Floats,
 ) -> None:
-    """The same by an implicit method: see :func:`halve_steps`; ``a`` to ``remainder`` are its tableau.
+    """The same by an implicit method: see :func:`halve_steps`; ``a`` to ``carried`` are its tableau.
 
     A shortened step of which Newton's iteration finds no solution counts as one that does not reach the stop.
     """
@@ -121,6 +137,7 @@ def halve_implicit_steps(
     Y, out = np.empty((dim, 1)), np.empty((1, dim, 1))
     own, seen = np.empty((params.shape[1], 1)), np.empty((empty.size, 1))
     times, steps, failed = np.empty(2), np.ones(1, dtype=np.int64), np.empty(1)
+    memory, phase = np.empty((carried * dim, 1)), np.zeros(PHASE)
     for i in range(n):
         own[:, 0] = params[i]
         low, high = begin[i], record[i, STOP_TIME]
@@ -130,9 +147,10 @@ def halve_implicit_steps(
                 break
             times[0], times[1] = begin[i], middle
             Y[:, 0], seen[:, 0], failed[0] = states[i], empty, np.nan
+            memory[:], phase[:] = 0.0, 0.0
             integrate_implicit_block(
                 rhs, rhs, observe, DIFFERENCES, a, nodes, final, back, forth, eigenvalues, extrapolation,
-                remainder, times, steps, Y, own, observer_params, seen, out, failed,
+                remainder, times, steps, Y, own, observer_params, seen, out, failed, memory, phase,
             )  # fmt: skip
             if seen[STOP_CODE, 0] != 0.0:
                 high = middle
@@ -143,49 +161,47 @@ def halve_implicit_steps(
 
 def locate_stops(
     rhs: Any,
-    observe: Any,
-    observer_params: Floats,
-    empty: Floats,
+    observation: Observation,
     method: Method,
+    before: Resumption,
     span: Span,
-    begun: Floats,
-    params: Floats,
+    which: NDArray[np.int64],
     record: Floats,
 ) -> Floats:
-    """Records (n, rows) of trajectories that stopped in a span, with code, time and state of the stop itself.
+    """Records (n, rows) of trajectories that stopped in a call, with code, time and state of the stop itself.
 
-    ``begun`` (n, dim) is what they began the span with, ``params`` (n, count) their parameters, ``record``
-    what was seen after a whole step, ``empty`` (rows,) a record of no stop. The state before that step is not
-    kept on the way, where it would cost every trajectory: those that stopped go through the span once more.
+    ``which`` (n,) are their places among the lanes as they were ``before`` the call, ``record`` (n, rows) is
+    what was seen after a whole step. The state before that step is not kept on the way, where it would cost
+    every trajectory: those that stopped go through the call once more.
     """
     located = np.ascontiguousarray(record)
-    for first in range(0, len(begun), TOGETHER):
-        part = slice(first, first + TOGETHER)
-        own = np.ascontiguousarray(params[part])
-        begin, states = _step_begins(rhs, method, span, begun[part], own, located[part, STOP_TIME])
-        search = (begin, states, own, observer_params, empty, located[part])
+    for first in range(0, which.size, TOGETHER):
+        part = which[first : first + TOGETHER]
+        found = located[first : first + TOGETHER]
+        begin, states = _step_begins(rhs, method, before, span, part, found[:, STOP_TIME])
+        own = np.ascontiguousarray(before.params(part))
+        search = (begin, states, own, observation.params, observation.record, found)
         if isinstance(method, ImplicitRungeKutta):
             p = method.tableau.prepared
             halve_implicit_steps(
-                rhs, observe, p.a, p.nodes, p.final, p.back, p.forth, p.eigenvalues, p.extrapolation,
-                p.remainder, *search,
+                rhs, observation.observe, p.a, p.nodes, p.final, p.back, p.forth, p.eigenvalues,
+                p.extrapolation, p.remainder, method.carried, *search,
             )  # fmt: skip
         else:
             one_step: Any = method
             packed = (method.starter if isinstance(method, Adams) else one_step.tableau).packed
-            halve_steps(rhs, observe, packed.start, packed.stage, packed.weight, packed.nodes, *search)
+            halve_steps(
+                rhs, observation.observe, packed.start, packed.stage, packed.weight, packed.nodes, *search
+            )
     return located
 
 
 def _step_begins(
-    rhs: Any, method: Method, span: Span, begun: Floats, params: Floats, stop_time: Floats
+    rhs: Any, method: Method, before: Resumption, span: Span, which: NDArray[np.int64], stop_time: Floats
 ) -> tuple[Floats, Floats]:
     """Times (n,) and states (n, dim) before the steps that end at ``stop_time``; by the same arithmetic."""
-    n, dim = begun.shape
-    lanes = Lanes(np.arange(n), begun, params, np.zeros(2 + dim), n)
-    lanes.record[:, 0, :n], lanes.record[:, 1] = stop_time, span.times[0]
-    lanes.record[:, 2:] = lanes.Y
-    batch = lanes.batch(span, np.zeros(0))
-    method.run(rhs, observe_before, batch)
-    seen = lanes.rows(batch.record)
+    begin = before.states(which)
+    record = np.empty((which.size, 2 + begin.shape[1]))
+    record[:, 0], record[:, 1], record[:, 2:] = stop_time, span.times[0], begin
+    seen = before.watched(rhs, observe_before, method, span, which, begin, record)
     return np.ascontiguousarray(seen[:, 1]), np.ascontiguousarray(seen[:, 2:])

@@ -14,20 +14,20 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib import import_module
+from itertools import chain
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.ensembles.failing import last_finite
+from fastmech.ensembles.failing import Resumption
 from fastmech.ensembles.lanes import VECTOR_LANES, Lanes
-from fastmech.ensembles.spans import Span, spans
+from fastmech.ensembles.spans import Span, Way, way
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
-from fastmech.ensembles.threads import thread_count
+from fastmech.ensembles.threads import in_threads, thread_count
 from fastmech.integrators.batch import Batch
 from fastmech.integrators.explicit import observe_nothing
 from fastmech.integrators.method import Method
@@ -48,12 +48,11 @@ BLOCK_BYTES = 32768
 #: running move up into full blocks.
 TASK_BLOCKS = 32
 
-#: Numbers that the output of one call holds at most.
-CALL_OUTPUT = 2**21
-
-#: Steps a call: between calls an interrupt is heard, and where trajectories may stop they make room.
-CALL_STEPS = 2048
-CALL_STEPS_WITH_STOPS = 64
+#: Steps a call at most: between calls an interrupt is heard, and who has stopped or failed makes room. Most
+#: failures are early ones, so calls grow: the first has so many right-hand sides of lanes (but a step counts
+#: as four at least, and a lane as so many), the others as many steps as went before.
+CALL_STEPS, CALL_STEPS_WITH_STOPS = 2048, 64
+CALL_EVALUATIONS, STEP_EVALUATIONS, LANE_EVALUATIONS = 2**21, 4, 1024
 
 
 @dataclass(frozen=True)
@@ -62,8 +61,8 @@ class Observation:
 
     ``record`` holds the start value of every row of a lane's record. Where ``stops`` is set, the rows begin
     with those of :mod:`fastmech.ensembles.stopping` (its own may follow), and a lane whose code is not zero
-    is taken out after at most ``call_steps`` steps. With ``locate`` a stop is looked for inside the step
-    after which it was seen.
+    is taken out after about ``call_steps`` steps. With ``locate`` a stop is looked for inside the step after
+    which it was seen.
     """
 
     observe: Any
@@ -82,7 +81,7 @@ class Ensemble:
     """States at the output times (outputs, n, dim), records (rows, n) and :class:`Status` values (n,).
 
     A trajectory that fails has NaN from the next output on; ``failed`` (n,) is the time [s] of its last
-    finite state, NaN for the others.
+    finite state, NaN for the others. One whose start is not finite has that as its last state.
     """
 
     states: Floats
@@ -138,10 +137,11 @@ def run_ensemble(
     own = np.asarray(params, dtype=np.float64)
     own = np.broadcast_to(own, (len(begin), own.shape[-1]))
     workers = thread_count(threads)
-    most = observation.call_steps * (1 + method.start_steps) if observation.stops else CALL_STEPS
+    usable = np.asarray(np.isfinite(begin).all(axis=1))
+    cost = max(STEP_EVALUATIONS, method.evaluations(CALL_STEPS) / CALL_STEPS)
     ensemble = Ensemble(
         states=np.empty((clock.size - 1, *begin.shape)),
-        records=np.empty((observation.record.size, len(begin))),
+        records=np.repeat(observation.record[:, None], len(begin), axis=1),
         status=np.full(len(begin), Status.OK, dtype=np.int8),
         failed=np.full(len(begin), np.nan),
         lost=[],
@@ -157,34 +157,37 @@ def run_ensemble(
     if block_lanes is None:
         block_lanes = block_width(method, begin.shape[1], precision)
 
+    def most_steps(lanes: Lanes, passed: int) -> int:
+        if observation.stops:
+            return observation.call_steps
+        evaluations = max(LANE_EVALUATIONS, CALL_EVALUATIONS // lanes.members.size)
+        return min(CALL_STEPS, max(passed, int(evaluations / cost)))
+
     def run_task(task: _Task) -> int:
-        members = task.members
-        lanes = Lanes(members, begin[members], own[members], observation.record, block_lanes)
-        for span in task.way:
-            if interrupted.is_set() or not lanes.members.size:
-                break
+        members, piece, passed = task.members, 0, 0
+        memory = np.zeros((members.size, method.carried * begin.shape[1]), dtype=begin.dtype)
+        lanes = Lanes(members, begin[members], own[members], observation.record, block_lanes, memory)
+        while piece < task.way.steps.size and lanes.members.size and not interrupted.is_set():
+            span, before = task.way.span(piece, most_steps(lanes, passed)), Resumption(lanes)
             batch = lanes.batch(span, observation.params)
-            begun = lanes.rows(lanes.Y).copy()
             given_up = method.run(rhs, observe, batch)
-            now, failed = lanes.rows(batch.Y).copy(), np.full(lanes.members.size, np.nan)
-            if given_up is not None:
-                failed = given_up.reshape(-1)[: lanes.members.size].copy()
-            stopped = _stopped(lanes, batch) if observation.stops else np.zeros(failed.size, dtype=np.bool_)
-            if observation.locate and stopped.any():
-                _locate(rhs, method, observation, lanes, span, batch, begun, stopped)
-            failed[stopped] = np.nan
-            lost = np.isnan(failed) & ~stopped & ~np.isfinite(now).all(axis=1)
-            ensemble.status[lanes.members[~np.isnan(failed)]] = Status.NOT_CONVERGED
-            ensemble.status[lanes.members[lost]] = Status.NOT_FINITE
-            if lost.any():
-                own_params = lanes.rows(lanes.params)[lost]
-                failed[lost], now[lost] = last_finite(rhs, method, span, begun[lost], own_params)
-            _store(ensemble, lanes, span, batch, now, failed, stopped)
+            piece, passed = piece + span.steps.size, passed + int(span.steps.sum())
+            ended = _ended(lanes, batch, given_up, observation.stops)
+            if ended is not None:
+                if observation.locate and ended.stopped.any():
+                    _locate(rhs, method, observation, before, span, batch, np.flatnonzero(ended.stopped))
+                ensemble.status[lanes.members[~np.isnan(ended.failed)]] = Status.NOT_CONVERGED
+                ensemble.status[lanes.members[ended.lost]] = Status.NOT_FINITE
+                if ended.lost.size:
+                    found = before.last_finite(rhs, method, span, batch.out, ended.lost)
+                    ended.failed[ended.lost], ended.now[ended.lost] = found
+            _store(ensemble, lanes, span, batch, ended)
         return members.size
 
-    width = min(block_lanes, max(VECTOR_LANES, CALL_OUTPUT // (begin.shape[1] * clock.size)))
-    tasks = list(_tasks(np.broadcast_to(dt, len(begin)), clock, most, workers, width * TASK_BLOCKS))
-    for finished in _in_threads(run_task, tasks, min(workers, len(tasks)), interrupted):
+    _set_aside(ensemble, np.flatnonzero(~usable), begin, clock[0])
+    tasks = list(_tasks(np.broadcast_to(dt, len(begin)), usable, clock, workers, block_lanes * TASK_BLOCKS))
+    finishing = in_threads(run_task, tasks, min(workers, len(tasks)), interrupted)
+    for finished in chain([int(np.count_nonzero(~usable))], finishing):
         if progress is not None:
             progress(finished)
     return ensemble
@@ -195,87 +198,97 @@ class _Task:
     """Trajectories of one step's length, and how they pass the output times."""
 
     members: NDArray[np.int64]
-    way: list[Span]
+    way: Way
 
 
-def _tasks(dt: Floats, times: Floats, most: int, workers: int, lanes: int) -> Iterator[_Task]:
+def _set_aside(ensemble: Ensemble, members: NDArray[np.int64], begin: Floats, start: float) -> None:
+    """Trajectories whose starts are not finite never enter a block."""
+    ensemble.states[:, members] = np.nan
+    ensemble.status[members] = Status.START_NOT_FINITE
+    ensemble.failed[members] = start
+    if members.size:
+        ensemble.lost.append((members, begin[members]))
+
+
+def _tasks(dt: Floats, usable: NDArray[np.bool_], times: Floats, workers: int, lanes: int) -> Iterator[_Task]:
     """Trajectories sorted by their step, shared evenly among the workers in tasks of at most ``lanes``."""
     for step in np.unique(dt):
-        members = np.flatnonzero(dt == step)
-        way = list(spans(times, float(step), most))
+        passed = way(times, float(step))
+        members = np.flatnonzero(usable & (dt == step))
+        if not members.size:
+            continue
         number = -(-members.size // (lanes * workers)) * workers
         size = -(-members.size // (number * VECTOR_LANES)) * VECTOR_LANES
         for first in range(0, members.size, size):
-            yield _Task(members[first : first + size], way)
+            yield _Task(members[first : first + size], passed)
 
 
-def _in_threads(
-    work: Callable[[_Task], int], tasks: list[_Task], workers: int, interrupted: threading.Event
-) -> Iterator[int]:
-    """What ``work`` gives for each task; one worker is this thread itself, which costs nothing to start."""
-    if workers <= 1:
-        yield from map(work, tasks)
-        return
-    with ThreadPoolExecutor(workers) as pool:
-        try:
-            yield from pool.map(work, tasks)
-        except BaseException:  # Ctrl-C too: calls in hand end, the other tasks never begin
-            interrupted.set()
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+@dataclass(frozen=True)
+class _Ended:
+    """Trajectories of a task that ended in a call."""
 
-
-def _stopped(lanes: Lanes, batch: Batch) -> NDArray[np.bool_]:
-    """Which trajectories have stopped."""
-    return np.asarray(lanes.rows(batch.record)[:, STOP_CODE] != 0.0)
+    stopped: NDArray[np.bool_]
+    failed: Floats  #: time [s] of the last state of those that failed, NaN for the others
+    lost: NDArray[np.int64]  #: places of those that are not finite now, of which no time is known yet
+    now: Floats  #: states of all (n, dim)
 
 
 def _locate(
     rhs: Any,
     method: Method,
     observation: Observation,
-    lanes: Lanes,
+    before: Resumption,
     span: Span,
     batch: Batch,
-    begun: Floats,
-    stopped: NDArray[np.bool_],
+    which: NDArray[np.int64],
 ) -> None:
     """Put code, time and state of the stops themselves into the batch's record."""
-    o, who = observation, np.flatnonzero(stopped)
-    params, record = lanes.rows(lanes.params)[who], lanes.rows(batch.record)[who]
     locate = import_module("fastmech.ensembles.locating").locate_stops  # kernels that few runs need
-    located = locate(rhs, o.observe, o.params, o.record, method, span, begun[who], params, record)
-    width = batch.record.shape[2]
-    batch.record[who // width, :, who % width] = located
+    block, lane = np.divmod(which, batch.record.shape[2])
+    batch.record[block, :, lane] = locate(
+        rhs, observation, method, before, span, which, batch.record[block, :, lane]
+    )
 
 
-def _store(
-    ensemble: Ensemble,
-    lanes: Lanes,
-    span: Span,
-    batch: Batch,
-    now: Floats,
-    failed: Floats,
-    stopped: NDArray[np.bool_],
-) -> None:
+def _ended(lanes: Lanes, batch: Batch, given_up: Floats | None, stops: bool) -> _Ended | None:
+    """Who has stopped or failed, nobody as a rule."""
+    healthy = (given_up is None or bool(np.isnan(given_up).all())) and bool(np.isfinite(batch.Y).all())
+    if healthy and not stops:
+        return None
+    n, now = lanes.members.size, lanes.rows(batch.Y).copy()
+    stopped = np.zeros(n, dtype=np.bool_)
+    if stops:
+        stopped = np.asarray(lanes.rows(batch.record)[:, STOP_CODE] != 0.0)
+        if healthy and not stopped.any():
+            return None
+    failed = np.full(n, np.nan) if given_up is None else given_up.reshape(-1)[:n].copy()
+    failed[stopped] = np.nan
+    lost = np.flatnonzero(np.isnan(failed) & ~stopped & ~np.isfinite(now).all(axis=1))
+    return _Ended(stopped, failed, lost, now)
+
+
+def _store(ensemble: Ensemble, lanes: Lanes, span: Span, batch: Batch, ended: _Ended | None) -> None:
     """Store what a span has brought; who has failed or stopped leaves and costs nothing any more."""
-    record, members = lanes.rows(batch.record), lanes.members
-    ensemble.records[:, members] = record.T
-    stop_state = record[stopped, STOP_STATE : STOP_STATE + now.shape[1]]
-    for piece, output in enumerate(span.outputs):
-        if output >= 0:
-            reached = lanes.rows(batch.out[:, piece])
-            if stopped.any():
-                before = record[stopped, STOP_TIME] <= span.times[piece + 1]
-                reached[np.flatnonzero(stopped)[before]] = stop_state[before]
-            reached[failed < span.times[piece + 1]] = np.nan
-            ensemble.states[output, members] = reached
-    over = ~np.isnan(failed)
-    if stopped.any():
-        ensemble.states[span.passed :, members[stopped]] = stop_state
+    members = lanes.members
+    if batch.record.size:
+        ensemble.records[:, members] = lanes.rows(batch.record).T
+    for piece in np.flatnonzero(span.outputs >= 0):
+        ensemble.states[span.outputs[piece], members] = lanes.rows(batch.out[:, piece])
+    if ended is None:
+        return
+    stopped, failed, over = ended.stopped, ended.failed, ~np.isnan(ended.failed)
+    for piece in np.flatnonzero(span.outputs >= 0):
+        ensemble.states[span.outputs[piece], members[failed < span.times[piece + 1]]] = np.nan
+    ensemble.states[span.passed :, members[over]] = np.nan
     if over.any():
-        ensemble.states[span.passed :, members[over]] = np.nan
         ensemble.failed[members[over]] = failed[over]
-        ensemble.lost.append((members[over], now[over]))
-    if stopped.any() or over.any():
+        ensemble.lost.append((members[over], ended.now[over]))
+    if stopped.any():
+        record = lanes.rows(batch.record)[stopped]
+        state = record[:, STOP_STATE : STOP_STATE + ended.now.shape[1]]
+        for piece in np.flatnonzero(span.outputs >= 0):
+            before = record[:, STOP_TIME] <= span.times[piece + 1]
+            ensemble.states[span.outputs[piece], members[stopped][before]] = state[before]
+        ensemble.states[span.passed :, members[stopped]] = state
+    if (stopped.any() or over.any()) and span.passed < len(ensemble.states):
         lanes.keep(~(stopped | over), at_once=bool(over.any()))

@@ -1,9 +1,13 @@
-"""How the times of a run are passed: steps between outputs, in calls that are not too long."""
+"""How the times of a run are passed: steps between outputs, in pieces of which a call takes some.
+
+Where a piece ends depends on output times and step alone, never on who runs: it decides how times round.
+How many pieces a call takes is free.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +19,9 @@ Floats = NDArray[np.float64]
 #: More steps than this cannot be counted by their times in double precision.
 MOST_STEPS = 2.0**53
 
+#: Steps of a piece: as few as these, more where an interval has more than so many pieces, never above most.
+PIECE_STEPS, PIECES, MOST_PIECE_STEPS = 64, 1024, 2048
+
 
 @dataclass(frozen=True)
 class Span:
@@ -24,6 +31,38 @@ class Span:
     steps: NDArray[np.int64]
     outputs: NDArray[np.int64]  #: index of the output at the end of each piece, -1: none
     passed: int  #: outputs passed at the end of the span
+
+    def part(self, first: int, end: int) -> Span:
+        """Pieces from ``first`` on, before ``end``; outputs count as passed at the end of the whole span."""
+        return Span(self.times[first : end + 1], self.steps[first:end], self.outputs[first:end], self.passed)
+
+
+@dataclass(frozen=True)
+class Way:
+    """All pieces of a run; fields as those of :class:`Span`."""
+
+    times: Floats
+    steps: NDArray[np.int64]
+    outputs: NDArray[np.int64]
+
+    @cached_property
+    def _steps_before(self) -> NDArray[np.int64]:
+        return np.concatenate([[0], np.cumsum(self.steps)])
+
+    @cached_property
+    def _passed(self) -> NDArray[np.int64]:
+        return np.cumsum(self.outputs >= 0)
+
+    def span(self, first: int, most: int) -> Span:
+        """What a call passes from piece ``first`` on: one piece, or more while steps are at most ``most``."""
+        before = self._steps_before
+        end = max(first + 1, int(np.searchsorted(before, before[first] + most, side="right")) - 1)
+        return Span(
+            self.times[first : end + 1],
+            self.steps[first:end],
+            self.outputs[first:end],
+            int(self._passed[end - 1]),
+        )
 
 
 def output_steps(times: Floats, dt: float) -> NDArray[np.int64]:
@@ -43,24 +82,19 @@ def output_steps(times: Floats, dt: float) -> NDArray[np.int64]:
     return steps.astype(np.int64)
 
 
-def spans(times: Floats, dt: float, most: int) -> Iterator[Span]:
-    """The way through all output times in pieces of at most ``most`` steps.
+def way(times: Floats, dt: float) -> Way:
+    """The way through all output times; an interval of many steps is cut into pieces.
 
-    An interval between outputs that has more steps is cut; shorter ones are gathered into one span.
+    Raises:
+        InputError: as :func:`output_steps`.
     """
-    at: list[float] = [float(times[0])]
-    steps: list[int] = []
-    outputs: list[int] = []
-    passed = 0
-    for output, total in enumerate(output_steps(times, dt).tolist()):
-        start, stop = times[output], times[output + 1]
-        for end in [*range(most, total, most), total]:
-            piece = end - (end - 1) // most * most if end else 0
-            if steps and sum(steps) + piece > most:
-                yield Span(np.array(at), np.array(steps), np.array(outputs), passed)
-                at, steps, outputs = at[-1:], [], []
-            at.append(float(stop if end == total else start + (stop - start) * (end / total)))
-            steps.append(piece)
-            outputs.append(output if end == total else -1)
-            passed = output + 1 if end == total else passed
-    yield Span(np.array(at), np.array(steps), np.array(outputs), passed)
+    totals = output_steps(times, dt)
+    lengths = np.clip(-(-totals // PIECES), PIECE_STEPS, MOST_PIECE_STEPS)
+    pieces = np.maximum(1, -(-totals // lengths))
+    output = np.repeat(np.arange(totals.size), pieces)
+    number = np.arange(output.size) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    total, begin = totals[output], number * lengths[output]
+    end = np.minimum(begin + lengths[output], total)
+    start, stop, last = times[output], times[output + 1], end == total
+    at = np.where(last, stop, start + (stop - start) * (end / np.maximum(total, 1)))
+    return Way(np.append(times[:1], at), end - begin, np.where(last, output, -1))

@@ -1,10 +1,16 @@
-"""How many threads to use."""
+"""How many threads to use, and how they take tasks from a queue."""
 
 from __future__ import annotations
 
 import os
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
 
 from fastmech.ensembles import checks
+
+T = TypeVar("T")
 
 
 def thread_count(threads: int | None) -> int:
@@ -16,3 +22,19 @@ def thread_count(threads: int | None) -> int:
     if threads is not None:
         return checks.whole_number("threads", threads, least=1)
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def in_threads(
+    work: Callable[[T], int], tasks: list[T], workers: int, interrupted: threading.Event
+) -> Iterator[int]:
+    """What ``work`` gives for each task; one worker is this thread itself, which costs nothing to start."""
+    if workers <= 1:
+        yield from map(work, tasks)
+        return
+    with ThreadPoolExecutor(workers) as pool:
+        try:
+            yield from pool.map(work, tasks)
+        except BaseException:  # Ctrl-C too: calls in hand end, the other tasks never begin
+            interrupted.set()
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise

@@ -29,6 +29,11 @@ class ImplicitRungeKutta(OneStep):
     jacobian: Any = None
     second_order: bool = False
 
+    @property
+    def carried(self) -> int:
+        """The last step's increments, from which the next one's are guessed, and the sum's compensation."""
+        return int(self.tableau.stages) + 1
+
     def evaluations(self, steps: int) -> int:
         """Right-hand sides that so many steps take where Newton's iteration converges as usual."""
         return steps * self.tableau.stages * TYPICAL_ITERATIONS
@@ -42,9 +47,11 @@ class ImplicitRungeKutta(OneStep):
         """
         prepared = self.tableau.prepared
         blocks, _, lanes = batch.Y.shape
-        failed = np.full((blocks, lanes), np.nan)
+        failed, memory = np.full((blocks, lanes), np.nan), batch.memory_of(self.carried)
+        phase = batch.phase.copy()
         kind = DIFFERENCES if self.jacobian is None else SECOND_ORDER if self.second_order else GENERAL
         for block in range(blocks):
+            batch.phase[:] = phase
             integrate_implicit_block(
                 rhs,
                 rhs if self.jacobian is None else self.jacobian,
@@ -66,6 +73,8 @@ class ImplicitRungeKutta(OneStep):
                 batch.record[block],
                 batch.out[block],
                 failed[block],
+                memory[block],
+                batch.phase,
             )
         return failed
 

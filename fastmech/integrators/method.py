@@ -34,11 +34,15 @@ class Method(Protocol):
 
     @property
     def start_steps(self) -> int:
-        """Steps after each call, or change of the step's length, that a starter takes; 0 for most methods."""
+        """Steps at the start, and where the step's length changes, of a starter; 0 for most methods."""
 
     @property
     def rows(self) -> int:
         """Derivatives of a block that a step works on: stages or history."""
+
+    @property
+    def carried(self) -> int:
+        """What it carries of each lane from call to call, in states' sizes; 0: nothing."""
 
     def evaluations(self, steps: int) -> int:
         """Right-hand sides that so many steps of equal length take, the starter's included."""
@@ -88,6 +92,11 @@ class OneStep:
     def rows(self) -> int:
         """Stages."""
         return int(self.tableau.stages)
+
+    @property
+    def carried(self) -> int:
+        """Nothing."""
+        return 0
 
 
 @dataclass(frozen=True)
@@ -161,6 +170,11 @@ class Adams:
         """History."""
         return self.predictor.size
 
+    @property
+    def carried(self) -> int:
+        """History."""
+        return self.predictor.size
+
     def evaluations(self, steps: int) -> int:
         """Right-hand sides that so many steps of equal length take, the starter's included."""
         start = min(steps, self.start_steps)
@@ -178,6 +192,8 @@ class Adams:
             packed.nodes,
             self.predictor,
             self.corrector,
+            batch.memory_of(self.carried),
+            batch.phase,
             batch.times,
             batch.steps,
             batch.params,

@@ -7,6 +7,8 @@ outputs are those of :func:`fastmech.integrators.explicit.integrate_blocks`.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import types
 
@@ -18,7 +20,7 @@ from fastmech.integrators.explicit import (
     Observer,
 )
 from fastmech.integrators.sums import add_stages, add_two_sums, rows_of
-from fastmech.jit import VECTOR, driver_signature, inlined, kernel, rounded_to
+from fastmech.jit import VECTOR, driver_signature, inlined, kernel, lanes, rounded_to
 
 #: Step lengths that differ by less than this share of the time are the same: outputs were rounded.
 ROUNDED_TIME = 4 * 2.0**-52
@@ -32,11 +34,12 @@ def add_correction(y: Floats, w: Floats, d: Floats, weight: float) -> None:
         y[i] += w[i] + own * d[i]
 
 
-#: Types of the starter's packed tableau, of the predictor and of the corrector.
-ADAMS = (*TABLEAU, VECTOR, VECTOR)
+def adams(precision: Any) -> tuple[Any, ...]:
+    """Types of the starter's packed tableau, predictor, corrector, history and phase."""
+    return (*TABLEAU, VECTOR, VECTOR, lanes(precision, 3), VECTOR)
 
 
-@kernel(driver_signature(types.float64, *ADAMS))
+@kernel(driver_signature(types.float64, *adams(types.float64)))
 def integrate_multistep_blocks(
     rhs: BlockRHS,
     observe: Observer,
@@ -46,6 +49,8 @@ def integrate_multistep_blocks(
     nodes: Floats,
     predictor: Floats,
     corrector: Floats,
+    memory: Floats,
+    phase: Floats,
     times: Floats,
     steps: Integers,
     params: Floats,
@@ -59,22 +64,25 @@ def integrate_multistep_blocks(
     ``predictor`` weighs the derivatives at t_n, t_(n-1), ...; ``corrector`` that at the predicted t_(n+1),
     then the same ones, and is empty for an explicit method. ``start``, ``stage``, ``weight`` and ``nodes``
     are the packed tableau of the starter; the rest are the fields of
-    :class:`fastmech.integrators.batch.Batch`. The method starts anew wherever the step's length changes.
+    :class:`fastmech.integrators.batch.Batch`. The method starts anew wherever the step's length changes; its
+    ``memory`` is the history, its ``phase`` how much of that is known, which row is the newest, and the step.
     """
     stages, rows = nodes.shape[0], predictor.shape[0]
-    dim, lanes = Y.shape[1], Y.shape[2]
-    n = dim * lanes
+    dim, width = Y.shape[1], Y.shape[2]
+    n = dim * width
     F, K = (
-        rows_of(Y[0], rows).reshape((rows, dim, lanes)),
-        rows_of(Y[0], stages).reshape((stages, dim, lanes)),
+        rows_of(Y[0], rows).reshape((rows, dim, width)),
+        rows_of(Y[0], stages).reshape((stages, dim, width)),
     )
-    Z, w = rows_of(Y[0], 1).reshape((dim, lanes)), rows_of(Y[0], 1)
+    Z, w = rows_of(Y[0], 1).reshape((dim, width)), rows_of(Y[0], 1)
     f, k_flat, z = F.reshape(rows, n), K.reshape(stages, n), Z.reshape(n)
     row = np.empty(rows, dtype=np.int64)  # row[a] holds the derivative of a steps ago
+    known, newest, last = 0, 0, 0.0
     for b in range(Y.shape[0]):
         state, own, kept = Y[b], params[b], record[b]
-        y = state.reshape(n)
-        known, newest, last = 0, 0, 0.0
+        y, history = state.reshape(n), memory[b].reshape(rows, n)
+        f[:] = history
+        known, newest, last = int(phase[0]), int(phase[1]), phase[2]
         for j in range(steps.shape[0]):
             if steps[j] == 0:
                 out[b, j] = state
@@ -104,3 +112,5 @@ def integrate_multistep_blocks(
                         add_stages(y, None, f, h, row, predictor, 0, rows)
                 observe(times[j] + (step + 1) * h, state, observer_params, kept)
             out[b, j] = state
+        history[:] = f
+    phase[0], phase[1], phase[2] = known, newest, last

@@ -10,5 +10,5 @@ from fastmech.jit import driver_signature, observer_signature, single
 observe_nothing = single(explicit.observe_nothing, observer_signature(types.float32))
 integrate_blocks = single(explicit.integrate_blocks, driver_signature(types.float32, *explicit.TABLEAU))
 integrate_multistep_blocks = single(
-    multistep.integrate_multistep_blocks, driver_signature(types.float32, *multistep.ADAMS)
+    multistep.integrate_multistep_blocks, driver_signature(types.float32, *multistep.adams(types.float32))
 )

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 import fastmech as fm
+from fastmech.ensembles import run as running
 from fastmech.ensembles.problem import system_problem
-from fastmech.ensembles.run import run_ensemble
+from fastmech.ensembles.run import Ensemble, run_ensemble
+from fastmech.integrators.batch import Batch
 from fastmech.integrators.methods import METHODS
 
 
@@ -36,7 +38,7 @@ def test_last_finite_state_and_time(method: str) -> None:
     np.testing.assert_array_equal(run.states[:, tame], alone.states)
     np.testing.assert_array_equal(run.last[tame], run.states[-1, tame])
     wrong = fm.Status.NOT_CONVERGED if method == "gauss4" else fm.Status.NOT_FINITE
-    assert run.status.tolist() == [0, wrong, wrong, 0, wrong, wrong]
+    assert run.status.tolist() == [0, wrong, wrong, 0, wrong, fm.Status.START_NOT_FINITE]
     assert np.isnan(run.failed[tame]).all()
     np.testing.assert_allclose(run.failed[[1, 2, 4]], [1.0, 2.0, 0.5], atol=0.1)
     assert run.failed[5] == 0.0
@@ -97,3 +99,74 @@ def test_runs_to_a_tolerance_keep_last_finite_states() -> None:
     assert run.failed[5] == 0.0
     np.testing.assert_array_equal(run.last[5], starts[5])
     np.testing.assert_array_equal(run.last[:5], run.y[-1, :5])
+
+
+class Counted:
+    """A method that counts the steps of lanes that it takes, those that only fill vectors included."""
+
+    def __init__(self, name: str) -> None:
+        self.method, self.steps = METHODS[name], 0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.method, name)
+
+    def run(self, rhs: Any, observe: Any, batch: Batch) -> Any:
+        self.steps += batch.Y.shape[0] * batch.Y.shape[2] * int(batch.steps.sum())
+        return self.method.run(rhs, observe, batch)
+
+
+FAILING = np.arange(0, 1024, 16)
+
+
+def counted(method: str, when: float, t_end: float = 20.0) -> tuple[Ensemble, int]:
+    """1,024 trajectories of y' = y^2, of which every sixteenth fails at about ``when``; inf: none does."""
+    starts = np.random.default_rng(0).uniform(-2.0, -1.0, (1024, 1))
+    if when < np.inf:
+        starts[FAILING, 0] = 1.0 / (when * np.linspace(0.95, 1.05, FAILING.size)) if when else np.nan
+    p = system_problem(BLOW_UP, 1024, {})
+    method_counted: Any = Counted(method)
+    run = run_ensemble(p.rhs, p.params, starts, [0.0, t_end], 0.01, method_counted, threads=1)
+    return run, method_counted.steps
+
+
+@pytest.mark.parametrize("method", ["rk4", "dop853", "ab6", "abm8", "gauss4"])
+@pytest.mark.parametrize("when", [0.0, 2.0, 10.0, 18.0])
+def test_failing_trajectories_cost_the_rest_less_than_a_tenth(method: str, when: float) -> None:
+    """Counted in steps of lanes, which take the time; those that failing ones take until then are counted."""
+    right, alone = counted(method, np.inf)
+    run, beside = counted(method, when)
+    rest = np.setdiff1d(np.arange(1024), FAILING)
+    assert np.flatnonzero(run.status).tolist() == FAILING.tolist()
+    np.testing.assert_array_equal(run.states[:, rest], right.states[:, rest])
+    assert (rest.size / beside) / (1024 / alone) > 0.9
+    if when == 2.0:  # soon after it they are gone
+        assert beside < alone
+
+
+def test_starts_that_are_not_finite_take_no_steps() -> None:
+    p, method = system_problem(BLOW_UP, 3, {}), Counted("rk4")
+    told: list[int] = []
+    starts: Any = [[np.nan], [np.inf], [-np.inf]]
+    chosen: Any = method
+    run = run_ensemble(p.rhs, p.params, starts, [0.0, 1.0], 0.01, chosen, progress=told.append)
+    assert method.steps == 0
+    assert sum(told) == 3
+    assert run.status.tolist() == [fm.Status.START_NOT_FINITE] * 3
+    assert run.failed.tolist() == [0.0] * 3
+    np.testing.assert_array_equal(run.last, starts)
+
+
+@pytest.mark.parametrize("method", ["rk4", "ab6", "abm8", "gauss6", "radau5", "sdirk4"])
+def test_where_calls_end_does_not_matter(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not for those that fail either: one call, or one for every piece, between which most lanes leave."""
+    starts = np.random.default_rng(1).uniform(-1.0, 1.0, (60, 1))
+    p = system_problem(BLOW_UP, 60, {})
+    runs = []
+    for steps in (10**6, 1):
+        monkeypatch.setattr(running, "CALL_STEPS", steps)
+        monkeypatch.setattr(running, "CALL_EVALUATIONS", 10**9)
+        runs.append(run_ensemble(p.rhs, p.params, starts, [0.0, 7.0, 16.0], 0.02, METHODS[method]))
+    long, short = runs
+    assert 0 < np.count_nonzero(long.status) < 60
+    for name in ("states", "status", "failed", "last"):
+        np.testing.assert_array_equal(getattr(long, name), getattr(short, name))

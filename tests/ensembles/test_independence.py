@@ -31,7 +31,7 @@ def states(block_lanes: int, threads: int, method: str = "rk4", starts: Floats =
     ).states
 
 
-@pytest.mark.parametrize("method", ["rk4", "dop853", "ab6", "abm12"])
+@pytest.mark.parametrize("method", ["rk4", "dop853", "ab6", "abm12", "gauss6", "radau5", "sdirk4"])
 @pytest.mark.parametrize("block_lanes", [1, 7, 64, 256, 1000, 5000])
 def test_block_size_does_not_matter(method: str, block_lanes: int) -> None:
     np.testing.assert_array_equal(states(block_lanes, 1, method), states(256, 1, method))

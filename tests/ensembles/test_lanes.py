@@ -18,7 +18,8 @@ def filled(n: int, block_lanes: int) -> tuple[Lanes, Floats, Floats]:
     """Lanes, and the states and parameters that they were given; members are odd numbers."""
     random = np.random.default_rng(n)
     states, params = random.normal(size=(n, 4)), random.normal(size=(n, 8))
-    return Lanes(2 * np.arange(n) + 1, states, params, RECORD, block_lanes), states, params
+    lanes = Lanes(2 * np.arange(n) + 1, states, params, RECORD, block_lanes, states[:, :3])
+    return lanes, states, params
 
 
 @SIZES

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import fastmech as fm
-from fastmech.ensembles.locating import locate_stops
-from fastmech.ensembles.spans import Span
+from fastmech.ensembles.run import run_ensemble
 from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
 from fastmech.ensembles.system import System
 from fastmech.integrators.methods import find_method
@@ -82,17 +83,13 @@ def test_stops_do_not_depend_on_threads_or_companions() -> None:
 @pytest.mark.parametrize(("name", "order"), [("rk4", 4), ("ab6", 6), ("radau3", 3)])
 def test_a_located_stop_has_the_method_s_order(name: str, order: int) -> None:
     """Halved steps: the stop's time comes nearer by 2^p."""
-    method, y0 = find_method(name), np.array([[1.0, 0.0]])
+    watch = replace(SYSTEM.observation, locate=True)
     errors = []
     for steps in (48, 96):
-        step = 2.0 / steps
-        seen = int(np.ceil(0.5 * np.pi / OMEGA / step))
-        record = np.array([[3.0, seen * step, 0.0, 0.0]])
-        span = Span(np.array([0.0, 2.0]), np.array([steps]), np.array([0]), 1)
-        o = SYSTEM.observation
-        own = np.array([[OMEGA]])
-        found = locate_stops(SYSTEM.kernel, o.observe, o.params, o.record, method, span, y0, own, record)
-        assert found[0, STOP_CODE] == 3.0
-        assert abs(found[0, STOP_STATE]) < 1e-9
-        errors.append(abs(found[0, STOP_TIME] - 0.5 * np.pi / OMEGA))
+        run = run_ensemble(
+            SYSTEM.kernel, [OMEGA], [[1.0, 0.0]], [0.0, 2.0], 2.0 / steps, find_method(name), watch
+        )
+        assert run.records[STOP_CODE, 0] == 3.0
+        assert abs(run.records[STOP_STATE, 0]) < 1e-9
+        errors.append(abs(run.records[STOP_TIME, 0] - 0.5 * np.pi / OMEGA))
     assert 2.0 ** (order - 0.6) < errors[0] / errors[1] < 2.0 ** (order + 1.6)
