@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from importlib import import_module
 from types import SimpleNamespace
 from typing import Any
 
@@ -18,7 +19,6 @@ from fastmech.ensembles import checks
 from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError
-from fastmech.kernels.jacobians import canonical_jacobian, lagrange_jacobian
 from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.mechanism.equations import momenta_from_rates, rates_from_momenta
@@ -37,8 +37,19 @@ class Problem:
     observation: Observation = NOTHING
     coefficients: Coefficients | None = None  #: of a scene: numbers, or one a trajectory
     canonical: bool = False  #: momenta are integrated in place of rates
-    jacobian: Any = None  #: block Jacobian for implicit methods; None: they take differences
-    second_order: bool = False  #: whether the state is two angles and then their velocities
+
+    @property
+    def second_order(self) -> bool:
+        """Whether the state is two angles and then their velocities."""
+        return self.coefficients is not None and not self.canonical
+
+    @property
+    def jacobian(self) -> Any:
+        """Block Jacobian for implicit methods, loaded when asked for; ``None``: they take differences."""
+        if self.coefficients is None:
+            return None
+        jacobians = import_module("fastmech.kernels.jacobians")
+        return jacobians.canonical_jacobian if self.canonical else jacobians.lagrange_jacobian
 
     def inward(self, y: Floats) -> Floats:
         """Integrated states from public ones (..., n, dim)."""
@@ -76,9 +87,7 @@ def scene_problem(scene: Scene, n: int, parameters: Mapping[str, ArrayLike], for
         coefficients = Coefficients(*values)
     params = np.stack([np.asarray(c, dtype=np.float64) for c in coefficients], axis=-1)
     rhs = right_hand_side(coefficients, formulation)
-    if formulation == "lagrange":
-        return Problem(rhs, params, coefficients=coefficients, jacobian=lagrange_jacobian, second_order=True)
-    return Problem(rhs, params, coefficients=coefficients, canonical=True, jacobian=canonical_jacobian)
+    return Problem(rhs, params, coefficients=coefficients, canonical=formulation == "hamilton")
 
 
 def extreme_scenes(scene: Scene, parameters: Mapping[str, ArrayLike]) -> list[Scene]:

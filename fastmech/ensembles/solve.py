@@ -14,7 +14,7 @@ from fastmech.ensembles.problem import Problem
 from fastmech.ensembles.run import Progress, run_ensemble
 from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.status import Status
-from fastmech.integrators.implicit_method import with_jacobian
+from fastmech.integrators.implicit_method import ImplicitRungeKutta, with_jacobian
 from fastmech.integrators.method import Method
 
 Floats = NDArray[np.float64]
@@ -70,7 +70,9 @@ def solve(
     lost: list[tuple[NDArray[np.bool_], Floats]] = []
     steps, taken = np.zeros(n, dtype=np.int64), np.empty((len(ends), n))
     begin, now, shares = 0.0, problem.inward(starts), np.zeros(n)
-    method = with_jacobian(settings.method, problem.jacobian, problem.second_order)
+    method = settings.method
+    if isinstance(method, ImplicitRungeKutta):
+        method = with_jacobian(method, problem.jacobian, problem.second_order)
     for piece, end in enumerate(ends):
         inside = (outputs <= end) & ((outputs > begin) | (piece == 0))
         times = np.concatenate([[begin], outputs[inside]])

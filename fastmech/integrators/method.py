@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
-from types import ModuleType
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.integrators import explicit, multistep
 from fastmech.integrators.batch import Batch, Floats
 from fastmech.integrators.multistep_weights import bashforth, moulton
 from fastmech.integrators.tableau import Tableau
@@ -56,11 +54,10 @@ class Method(Protocol):
         """
 
 
-def _driver(module: ModuleType, name: str, batch: Batch) -> Any:
-    """The driver for the batch's precision; that for float32 is compiled or loaded on first use."""
-    if batch.Y.dtype == np.float32:
-        module = import_module("fastmech.integrators.single")
-    return getattr(module, name)
+def _driver(module: str, name: str, batch: Batch) -> Any:
+    """The driver of a module for the batch's precision, compiled or loaded on first use."""
+    single = batch.Y.dtype == np.float32
+    return getattr(import_module(f"fastmech.integrators.{'single' if single else module}"), name)
 
 
 class OneStep:
@@ -112,7 +109,7 @@ class RungeKutta(OneStep):
     def run(self, rhs: Any, observe: Any, batch: Batch) -> None:
         """Take a batch through its times."""
         packed = self.tableau.packed
-        _driver(explicit, "integrate_blocks", batch)(
+        _driver("explicit", "integrate_blocks", batch)(
             rhs,
             observe,
             packed.start,
@@ -183,7 +180,7 @@ class Adams:
     def run(self, rhs: Any, observe: Any, batch: Batch) -> None:
         """Take a batch through its times."""
         packed = self.starter.packed
-        _driver(multistep, "integrate_multistep_blocks", batch)(
+        _driver("multistep", "integrate_multistep_blocks", batch)(
             rhs,
             observe,
             packed.start,

@@ -10,12 +10,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import minimize
 
 from fastmech.errors import InputError, StepWarning
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
-from fastmech.mechanism.lagrange import potential_energy
+from fastmech.mechanism.lagrange import potential_energy, potential_gradient, potential_hessian
 from fastmech.scene import Scene
 from fastmech.stability.arguments import require_scene
 from fastmech.stability.linearize import SmallMotion, fill_state_matrix, small_motion
@@ -29,6 +28,9 @@ SIDE = 24
 
 #: Angle [rad] within which eigenvalues of the same direction are told by their largest alone.
 DIRECTION = 0.03
+
+#: Newton iterations from the grid to a minimum: twice what the flattest of 10,000 random scenes took.
+DESCENTS = 40
 
 #: Growth a step that is let pass where a motion only crosses the configurations that set the limit.
 PASSING = 0.01
@@ -83,13 +85,24 @@ def resting_eigenvalues(scene: Scene, force: float) -> NDArray[np.complex128]:
     energy = potential_energy(scene, np.stack(grid, axis=-1), force)
     shifts = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
     lowest = energy <= np.min([np.roll(energy, shift, (0, 1)) for shift in shifts], axis=0)
-    scale = max(float(np.ptp(energy)), np.finfo(float).tiny)
-    found = [
-        minimize(lambda q: float(potential_energy(scene, q, force)) / scale, [grid[0][at], grid[1][at]]).x
-        for at in zip(*np.nonzero(lowest), strict=True)
-    ]
-    phi, theta = np.array(found).reshape(-1, 2).T
+    phi, theta = _descended(scene, force, np.stack([angles[lowest] for angles in grid], axis=-1)).T
     return local_eigenvalues(scene, force, phi, theta).ravel()
+
+
+def _descended(scene: Scene, force: float, q: Floats) -> Floats:
+    """Where configurations ``q`` (n, 2) come to by Newton's method, with curvatures taken as positive.
+
+    It goes down from everywhere (Nocedal, Wright, *Numerical Optimization*, section 3.4), at most a step of
+    the grid at a time. (To import SciPy's minimizer takes a sixth of the time to a first result.)
+    """
+    for _ in range(DESCENTS):
+        curvature, axes = np.linalg.eigh(potential_hessian(scene, q, force))
+        least = np.finfo(float).eps * np.abs(curvature).max(axis=-1, keepdims=True) + np.finfo(float).tiny
+        slope = np.einsum("nij,ni->nj", axes, potential_gradient(scene, q, force))
+        move = -np.einsum("nij,nj->ni", axes, slope / np.maximum(np.abs(curvature), least))
+        length = np.abs(move).max(axis=-1, keepdims=True)
+        q = q + move * np.minimum(1.0, (2.0 * np.pi / SIDE) / np.maximum(length, np.finfo(float).tiny))
+    return q
 
 
 @cache
