@@ -31,6 +31,7 @@ from fastmech.ensembles.threads import thread_count
 from fastmech.integrators.batch import Batch
 from fastmech.integrators.explicit import observe_nothing
 from fastmech.integrators.method import Method
+from fastmech.interrupts import check
 from fastmech.kernels.single import in_single
 
 Floats = NDArray[np.float64]
@@ -156,6 +157,7 @@ def run_ensemble(
         members = task.members
         lanes = Lanes(members, begin[members], own[members], observation.record, block_lanes)
         for span in task.way:
+            check()
             if interrupted.is_set() or not lanes.members.size:
                 break
             batch = lanes.batch(span, observation.params)
