@@ -37,10 +37,9 @@ def output_steps(times: Floats, dt: float) -> NDArray[np.int64]:
     # A quotient that is an integer but for rounding must not cost a step more.
     with np.errstate(over="ignore"):  # an infinite number is refused below
         steps = np.ceil(np.diff(times) / dt * (1.0 - 1e-12))
-    if not steps.sum() <= MOST_STEPS:
-        raise InputError(
-            f"dt = {dt:g} s: gives {steps.sum():.3g} steps, at most {MOST_STEPS:.0e} are possible"
-        )
+        number = steps.sum()
+    if not number <= MOST_STEPS:
+        raise InputError(f"dt = {dt:g} s: gives {number:.3g} steps, at most {MOST_STEPS:.0e} are possible")
     return steps.astype(np.int64)
 
 

@@ -61,6 +61,8 @@ class ScanRun:
         tell: Callable[[str], None] = lambda line: None,
     ) -> None:
         self.request, self.request_file, self.target = request, request_file, target
+        if not target.parent.exists():  # of what is not there `..` is its name less one, whatever is made yet
+            self.target = target = Path(os.path.normpath(target))
         self.context, self.hire, self.tell = context, hire, tell
         self.asked = asked_for(request)
         self.identity = identity_of(self.asked)
