@@ -20,6 +20,7 @@ from numba.core import config as numba_config
 from numba.core.caching import FunctionCache
 from numba.extending import intrinsic, overload, register_jitable
 
+from fastmech.interrupts import check
 from fastmech.kernel_cache import cache_directory, sources_unchanged
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -107,6 +108,7 @@ def kernel(signature: Any, **options: Any) -> Callable[[F], Any]:
     """
 
     def decorate(function: F) -> Any:
+        check()  # the one place where a command can stop between two compilations
         settings: Any = numba_config
         previous = settings.CACHE_DIR
         settings.CACHE_DIR = str(cache_directory())

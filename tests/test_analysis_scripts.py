@@ -1,8 +1,10 @@
-"""The worked analyses run on a result file and say something."""
+"""The worked analyses run on the shipped result file and on others, and say something."""
 
 from __future__ import annotations
 
 import runpy
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -39,7 +41,19 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.name)
 def test_it_runs(script: Path, result: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    runpy.run_path(str(script))["main"](str(result))
-    lines = capsys.readouterr().out.splitlines()
-    assert len(lines) >= 4
-    assert not any("nan" in line for line in lines)
+    main = runpy.run_path(str(script))["main"]
+    for arguments in ([str(result)], []):
+        main(*arguments)
+        lines = capsys.readouterr().out.splitlines()
+        assert len(lines) >= 4
+        assert not any("nan" in line for line in lines)
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.name)
+def test_a_missing_file_is_one_line_with_the_command_that_makes_it(script: Path, tmp_path: Path) -> None:
+    command = [sys.executable, str(script), "none.h5"]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=120, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("none.h5: ")
+    assert "fastmech run scans/paper.toml makes" in line

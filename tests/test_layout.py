@@ -17,6 +17,7 @@ pytestmark = pytest.mark.nojit
 #: Each layer may import itself and the ones before it.
 LAYERS = (
     "errors",
+    "interrupts",
     "kernel_cache",
     "generated",
     "jit",
@@ -140,13 +141,18 @@ def test_no_cycles_inside_a_layer() -> None:
 def test_compiled_places_import_compiled_places_only(path: Path) -> None:
     """Else an edit elsewhere could change a kernel and leave its cached machine code in use."""
     if is_compiled(path):
-        allowed = {name.removesuffix(".py") for name in COMPILED} | {"scene", "errors", "kernel_cache"}
+        allowed = {name.removesuffix(".py") for name in COMPILED} | {
+            "scene",
+            "errors",
+            "interrupts",
+            "kernel_cache",
+        }
         assert set(imported(tree(path))) <= allowed
 
 
 def test_whatever_a_scan_computes_with_decides_its_identity() -> None:
     """Kept tiles of other sources are not continued; what only tells, shows or writes may change."""
-    apart = {"", "errors", "kernel_cache", "store", "plots"}
+    apart = {"", "errors", "interrupts", "kernel_cache", "store", "plots"}
     reached: set[str] = set()
     more = {"scan_types"}
     while more - reached:

@@ -242,7 +242,6 @@ def survey_of(
     n: int,
     directions: int,
     seed: int,
-    threads: int | None = None,
 ) -> Survey:
     """What to measure, checked; arguments and errors as for :func:`erosion`."""
     states = tuple(state_index(name) for name in axes)
@@ -257,7 +256,7 @@ def survey_of(
         states,
         lines,
         low + (high - low) * rng.random((n, len(lines))),
-        labels_of or partial(labels_by_capture, t_end=t_end, threads=threads),
+        labels_of or partial(labels_by_capture, t_end=t_end),
         most_shock,
         directions,
         seed,

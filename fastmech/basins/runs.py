@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 from fastmech.capture.certificate import Certificate
 from fastmech.capture.observe import CAPTURE_TIME, STOP_ENERGY, TURNS_PHI, TURNS_THETA
 from fastmech.ensembles.run import run_ensemble
+from fastmech.ensembles.spans import MOST_STEPS
 from fastmech.ensembles.stopping import STOP_CODE, STOP_TIME
+from fastmech.errors import InputError
 from fastmech.integrators.method import Method
 from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import reduce
@@ -70,7 +72,13 @@ ARRAYS = ("code", "turns", "time", "stop", "energy", "state", "status")
 
 
 def rounds_until(t_end: float, longest: float) -> int:
-    """Number of rounds, each at most ``longest`` [s], such that there is a stop at the end."""
+    """Number of rounds, each at most ``longest`` [s], such that there is a stop at the end.
+
+    Raises:
+        InputError: there would be more than can be counted.
+    """
+    if t_end > MOST_STEPS * longest:
+        raise InputError(f"t_end = {t_end:g} s: must be at most {MOST_STEPS * longest:.3g} s here")
     rounds = max(1, int(np.ceil(t_end / longest * (1.0 - 1e-12))))
     every = next((stops for until, _, stops in STAGES if rounds <= until), LATE[1])
     return -(-rounds // every) * every

@@ -7,13 +7,16 @@ of the command, so that ``fastmech --help`` answers at once.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib import import_module
+from typing import Any
 
 import click
 
 from fastmech import __version__
-from fastmech.cli.failure import Failure, one_line
+from fastmech.cli.failure import SUMMARY, Failure, one_line
 from fastmech.cli.vectors import ask_for_wide_vectors
+from fastmech.interrupts import listen
 
 COMMANDS = (
     "run",
@@ -52,12 +55,21 @@ class _Commands(click.Group):
     def make_context(
         self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: object
     ) -> click.Context:
-        with one_line():
-            return super().make_context(info_name, args, parent, **extra)
+        summary = {"command": next(iter(args), None)} if "--json" in args else None
+        with one_line(summary):
+            context = super().make_context(info_name, args, parent, **extra)
+        context.meta[SUMMARY] = summary
+        return context
 
     def invoke(self, ctx: click.Context) -> object:
-        with one_line():
+        with one_line(ctx.meta[SUMMARY]):
             return super().invoke(ctx)
+
+    def main(self, args: Sequence[str] | None = None, *others: Any, **extra: Any) -> Any:
+        """Run the command; signals are listened to only where it has the process to itself."""
+        if args is None:
+            listen()
+        return super().main(args, *others, **extra)
 
 
 def _hint(name: str) -> str:

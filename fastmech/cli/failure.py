@@ -1,8 +1,8 @@
-"""How the command line fails: one line on standard error, an exit code, no traceback."""
+"""How the command line fails: one line on standard error, an exit code, no traceback; JSON if asked for."""
 
 from __future__ import annotations
 
-import signal
+import json
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,65 +11,75 @@ from typing import IO, Any
 import click
 
 from fastmech.errors import InputError
-from fastmech.tiles.ends import CrashedTilesError, Stopped
+from fastmech.interrupts import signal_of
+from fastmech.tiles.ends import CrashedTilesError
+
+#: Added to the number of a signal that ends a command, as shells do: 130 for Ctrl-C, 143 for SIGTERM.
+BY_SIGNAL = 128
+
+#: Where in a context's ``meta`` a command leaves what it has done when it fails.
+SUMMARY = "fastmech.summary"
 
 
 class Failure(click.ClickException):
-    """Ends the command with ``fastmech: message`` on standard error."""
+    """Ends the command with ``fastmech: message`` on standard error.
 
-    exit_code = 2
+    Attributes:
+        summary: what the JSON on standard output says besides; None: no JSON is asked for.
+    """
 
-    def __init__(self, message: str) -> None:
+    def __init__(self, message: str, exit_code: int = 2) -> None:
         super().__init__(" ".join(message.splitlines()))
+        self.exit_code = exit_code  # type: ignore[misc] # click has one for each class of failures
+        self.summary: dict[str, Any] | None = None
 
     def show(self, file: IO[Any] | None = None) -> None:
-        """Write the line."""
+        """Write the line, and the JSON."""
         click.echo(f"fastmech: {self.message}", file=file, err=True)
-
-
-class Interrupted(Failure):
-    """The user has stopped the command."""
-
-    exit_code = 130
-
-
-class Terminated(Failure):
-    """SIGTERM has stopped the command."""
-
-    exit_code = 143
-
-
-class Crashed(Failure):
-    """Parts of a scan have failed; the others are kept."""
-
-    exit_code = 1
+        if self.summary is not None:
+            told = {**self.summary, "error": self.message, "exit_code": self.exit_code}
+            click.echo(json.dumps(told))
 
 
 @contextmanager
-def one_line() -> Iterator[None]:
+def one_line(summary: dict[str, Any] | None) -> Iterator[None]:
     """Turn what a user causes (a wrong command line, wrong input, an interruption) into a `Failure`.
 
     Warnings are lines of the same form.
+
+    Args:
+        summary: what is known to say in JSON; None: no JSON is asked for.
     """
     shown, warnings.showwarning = warnings.showwarning, _show_warning
     try:
         yield
-    except click.UsageError as error:
-        see = f" See: {error.ctx.command_path} --help" if error.ctx else ""
-        raise Failure(f"{error.format_message()}{see}") from None
-    except InputError as error:
-        raise Failure(str(error)) from None
-    except MemoryError as error:
-        raise Failure(f"more memory is needed than there is: {error}") from None
-    except CrashedTilesError as error:
-        raise Crashed(str(error)) from None
-    except Stopped as stopped:
-        kind = Terminated if stopped.signal_number == signal.SIGTERM else Interrupted
-        raise kind(str(stopped)) from None
-    except KeyboardInterrupt:
-        raise Interrupted("interrupted") from None
+    except (Exception, KeyboardInterrupt) as error:
+        failure = _failure(error)
+        if failure is None:
+            raise
+        failure.summary = summary
+        raise failure from None
     finally:
         warnings.showwarning = shown
+
+
+def _failure(error: BaseException) -> Failure | None:
+    """The same for a user; None where the program is wrong, not the user."""
+    match error:
+        case Failure():
+            return error
+        case click.UsageError():
+            see = f" See: {error.ctx.command_path} --help" if error.ctx else ""
+            return Failure(f"{error.format_message()}{see}")
+        case InputError():
+            return Failure(str(error))
+        case MemoryError():
+            return Failure(f"more memory is needed than there is: {error}")
+        case CrashedTilesError():
+            return Failure(str(error), 1)
+        case KeyboardInterrupt():
+            return Failure(str(error) or "interrupted", BY_SIGNAL + signal_of(error))
+    return None
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:

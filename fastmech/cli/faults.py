@@ -40,11 +40,12 @@ def command(
     from fastmech.faults.processes import FaultFound
 
     with account("faults", quiet, as_json) as told:
-        from fastmech.faults.disk import can_mount, disk_campaign
-        from fastmech.faults.fuzz import fuzz_requests, fuzz_results
-        from fastmech.faults.kill import kill_campaign
-        from fastmech.faults.processes import reference
-        from fastmech.faults.worker import worker_campaign
+        with told.bars.preparing():
+            from fastmech.faults.disk import can_mount, disk_campaign
+            from fastmech.faults.fuzz import fuzz_requests, fuzz_results
+            from fastmech.faults.kill import kill_campaign
+            from fastmech.faults.processes import reference
+            from fastmech.faults.worker import worker_campaign
 
         try:
             if kills or disks or workers:

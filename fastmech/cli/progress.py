@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -21,7 +22,7 @@ from rich.progress import (
 from rich.table import Column
 from rich.text import Text
 
-from fastmech.kernel_cache import cache_directory
+from fastmech.interrupts import check, is_noted
 
 
 class _Rate(ProgressColumn):
@@ -48,6 +49,15 @@ class _Time(ProgressColumn):
 
 #: Seconds between lines in a log file.
 LOG_PERIOD = 30.0
+
+#: Seconds between looks at whether loading and compiling is over.
+LOOK = 1.0
+
+#: Seconds of loading and compiling that pass without a word.
+SILENT = 3.0
+
+#: What loading is called: machine code that another run has left is read, the rest is made.
+PREPARING = "loading kernels, compiling what is new"
 
 
 class Stage:
@@ -107,10 +117,16 @@ class LogLine:
 
 
 class ProgressBars:
-    """Bars with percentage, rate and time left; without a terminal, a line every so often."""
+    """Bars with percentage, rate and time left; without a terminal, a line every so often.
+
+    Whenever progress is told, a command may also stop: see `fastmech.interrupts.check`.
+
+    Attributes:
+        prepared: seconds that loading and compiling have taken.
+    """
 
     def __init__(self, quiet: bool = False) -> None:
-        self._quiet, self._moved = quiet, 0.0
+        self._quiet, self._moved, self.prepared = quiet, 0.0, 0.0
         self._logs = not quiet and not sys.stderr.isatty()
         self._stages: list[Stage] = []
         self._progress = Progress(
@@ -164,6 +180,7 @@ class ProgressBars:
             self._moved = stage.last
             if log is not None:
                 log.tell()
+            check()
 
         return tell
 
@@ -183,10 +200,35 @@ class ProgressBars:
 
     @contextmanager
     def preparing(self) -> Iterator[None]:
-        """Show that kernels are compiled, while they are imported for the first time."""
-        if cache_directory().exists():
+        """Show that kernels are loaded and compiled, if that takes longer than `SILENT` seconds."""
+        begun, over = time.perf_counter(), threading.Event()
+        teller = threading.Thread(target=self._tell_preparing, args=(begun, over), daemon=True)
+        teller.start()
+        try:
             yield
-            return
-        task = self._progress.add_task("compiling, once for this version", total=None)
-        yield
-        self._progress.remove_task(task)
+        finally:
+            over.set()
+            teller.join()
+            self.prepared += time.perf_counter() - begun
+        check()
+
+    def _tell_preparing(self, begun: float, over: threading.Event) -> None:
+        task, due, stopping = None, SILENT, False
+        while not over.wait(LOOK):
+            seconds = time.perf_counter() - begun
+            if not self._quiet and is_noted() and not stopping:
+                stopping = True
+                self._line("stops when the kernel in hand is compiled, at once when interrupted again")
+            if seconds >= due and task is None:
+                task = self._progress.add_task(PREPARING, total=None)
+            if seconds >= due and self._logs:
+                due = seconds + LOG_PERIOD
+                self._line(f"{PREPARING}: {seconds:.0f} s")
+        if task is not None:
+            self._progress.remove_task(task)
+
+    def _line(self, line: str) -> None:
+        if self.shown:
+            self.above(f"fastmech: {line}")
+        else:
+            print(f"fastmech: {line}", file=sys.stderr, flush=True)

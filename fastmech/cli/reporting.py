@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from fastmech.cli.failure import SUMMARY
+from fastmech.interrupts import check
+
 if TYPE_CHECKING:
     from fastmech.cli.progress import ProgressBars
 
@@ -40,7 +43,13 @@ class Account:
 
     def __init__(self, bars: ProgressBars, as_json: bool) -> None:
         self.bars, self.facts = bars, dict[str, Any]()
+        self._begun = time.perf_counter()
         self._as_json, self._files = as_json, list[str]()
+
+    @property
+    def seconds(self) -> float:
+        """Wall time since the command began, loading and compiling included [s]."""
+        return time.perf_counter() - self._begun
 
     def say(self, line: object = "", err: bool = False) -> None:
         """A line for the user; with ``--json`` only what goes to standard error is shown."""
@@ -56,26 +65,37 @@ class Account:
         self._files.append(str(path))
         self.say(line.format(path))
 
-    def summary(self, name: str, seconds: float) -> dict[str, Any]:
+    def summary(self, name: str) -> dict[str, Any]:
         """Everything, for other programs."""
-        about = {"command": name, "seconds": round(seconds, 3), "stages": self.bars.stages(), **self.facts}
-        return about | ({"files": self._files} if self._files else {})
+        about = {"command": name, "seconds": round(self.seconds, 3)}
+        about |= {"seconds_preparing": round(self.bars.prepared, 3), "stages": self.bars.stages()}
+        return about | self.facts | ({"files": self._files} if self._files else {})
 
 
 @contextmanager
 def account(name: str, quiet: bool, as_json: bool) -> Iterator[Account]:
-    """Run a command with progress; in the end, also where it ends with a code of its own, comes the JSON."""
+    """Run a command with progress; in the end, also where it ends with a code of its own, comes the JSON.
+
+    Where it fails the JSON is left to who tells the failure.
+    """
     from fastmech.cli.progress import ProgressBars
 
-    started = time.perf_counter()
     with ProgressBars(quiet) as bars:
         told = Account(bars, as_json)
         code: click.exceptions.Exit | None = None
         try:
+            check()
             yield told
+            check()
         except click.exceptions.Exit as end:
             code = end
+        except BaseException:
+            context = click.get_current_context(silent=True)
+            if context is not None and as_json:
+                context.meta[SUMMARY] |= told.summary(name)
+            raise
     if as_json:
-        click.echo(json.dumps(told.summary(name, time.perf_counter() - started)))
+        ended = 0 if code is None else code.exit_code
+        click.echo(json.dumps({**told.summary(name), "exit_code": ended}))
     if code is not None:
         raise code

@@ -48,13 +48,11 @@ def command(
 
     Finished work is kept: after an interruption the same command goes on.
     """
-    from fastmech.tiles.ends import terminable
-
     if keep is not None and tile is None:
         raise click.UsageError("--keep needs --tile")
     if workers is not None and scheduler is not None:
         raise click.UsageError("--workers and --scheduler exclude each other")
-    with terminable(), account("run", quiet, as_json) as told:
+    with account("run", quiet, as_json) as told:
         with told.bars.preparing():
             from fastmech.runner import run_request
             from fastmech.scan_types.request import RunContext
@@ -114,7 +112,7 @@ def _show(told: Account, report: RunReport) -> None:
     if report.was_complete:
         told.say(f"{target} holds this result already; --fresh computes it again")
     else:
-        told.say(f"{report.seconds:9.2f} s  in all")
+        told.say(f"{told.seconds:9.2f} s  in all, {told.bars.prepared:.2f} s of it loading and compiling")
     told.say(f"Results: {target}")
     told.say(f"Next:    fastmech info {target}")
     told.say(f"         fastmech plot {target}")

@@ -32,6 +32,7 @@ from fastmech.integrators.batch import Batch
 from fastmech.integrators.explicit import observe_nothing
 from fastmech.integrators.method import Method
 from fastmech.integrators.whole import in_whole_steps
+from fastmech.interrupts import check
 from fastmech.kernels.single import in_single
 
 Floats = NDArray[np.float64]
@@ -168,6 +169,7 @@ def run_ensemble(
         memory = np.zeros((members.size, method.carried * begin.shape[1]), dtype=begin.dtype)
         lanes = Lanes(members, begin[members], own[members], observation.record, block_lanes, memory)
         while piece < task.way.steps.size and lanes.members.size and not interrupted.is_set():
+            check()
             span, before = task.way.span(piece, most_steps(lanes, passed)), Resumption(lanes)
             batch = lanes.batch(span, observation.params)
             given_up = method.run(rhs, observe, batch)

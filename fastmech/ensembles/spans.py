@@ -74,11 +74,11 @@ def output_steps(times: Floats, dt: float) -> NDArray[np.int64]:
     if not dt > 0.0 or not (np.diff(times) >= 0.0).all():
         raise InputError(f"dt = {dt:g} s: must be greater than 0, and the times must rise")
     # A quotient that is an integer but for rounding must not cost a step more.
-    steps = np.ceil(np.diff(times) / dt * (1.0 - 1e-12))
-    if not steps.sum() <= MOST_STEPS:
-        raise InputError(
-            f"dt = {dt:g} s: gives {steps.sum():.3g} steps, at most {MOST_STEPS:.0e} are possible"
-        )
+    with np.errstate(over="ignore"):  # an infinite number is refused below
+        steps = np.ceil(np.diff(times) / dt * (1.0 - 1e-12))
+        number = steps.sum()
+    if not number <= MOST_STEPS:
+        raise InputError(f"dt = {dt:g} s: gives {number:.3g} steps, at most {MOST_STEPS:.0e} are possible")
     return steps.astype(np.int64)
 
 

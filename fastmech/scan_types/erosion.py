@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import numpy as np
 from pydantic import AfterValidator, Field
 
-from fastmech.basins.erosion import FLAGS, MEASURES, survey_of, wells_along
-from fastmech.basins.label import require_damper
+from fastmech.basins.erosion import FLAGS, MEASURES, Ends, survey_of, wells_along
+from fastmech.basins.label import labels_of, require_damper
 from fastmech.basins.measures.norm import STATE
 from fastmech.disturbance.ensemble import require_constant_force
 from fastmech.errors import InputError
@@ -109,7 +109,7 @@ class Erosion(TiledScan):
             raise InputError(f"axes: ask for {total:.3g} starts, at most {MOST_POINTS:.0e} are allowed")
 
     def tiling(self, scene: Scene) -> Tiling:
-        """Every value is a tile."""
+        """Every well at every value is a tile."""
         return ErosionTiling(self, scene)
 
     @staticmethod
@@ -121,50 +121,56 @@ class Erosion(TiledScan):
 
 
 class ErosionTiling(Tiling):
-    """A tile a value: no value needs another."""
+    """A tile a well and value: none needs another. The wells of a value follow each other."""
 
-    what = "values of the erosion profile"
+    what = "wells of the erosion profile"
 
     def __init__(self, request: Erosion, scene: Scene) -> None:
         self.request, self.scene, self.values = request, scene, request.values
-        self.count = self.values.size
+        self.sheets, self.places = wells_along(scene, request.parameter, self.values)
+        self.count = self.values.size * self.sheets.size
         self.window = {
             name: np.linspace(axis.start, axis.stop, axis.num) for name, axis in request.axes.items()
         }
 
     def items(self, index: int) -> int:
-        """One value."""
+        """One well."""
         return 1
 
     def compute(self, index: int, context: RunContext) -> Dataset:
-        """Measure every well at one value."""
-        name = self.request.parameter
+        """Measure one well at one value."""
+        at, well = divmod(index, self.sheets.size)
+
+        def ends(scene: Scene, starts: np.ndarray) -> Ends:
+            context.check()
+            return labels_of(scene, starts, t_end=self.request.t_end, threads=context.threads)
+
         survey = survey_of(
             self.window,
             most_shock=self.request.most_shock,
             t_end=self.request.t_end,
+            labels_of=ends,
             n=self.request.starts,
             directions=self.request.directions,
             seed=self.request.seed,
-            threads=context.threads,
         )
-        _, places = wells_along(self.scene, name, self.values)
-        value = float(self.values[index])
-        found = survey.of_wells(self.scene.replace(**{name: value}), places[index])
-        return Dataset({key: Variable(("well",), array) for key, array in found.items()})
+        scene = self.scene.replace(**{self.request.parameter: float(self.values[at])})
+        found = survey.of_wells(scene, self.places[at, well][None])
+        return Dataset({key: Variable((), array[0]) for key, array in found.items()})
 
     def assemble(self, tile: Tiles) -> Dataset:
-        """Join the values."""
+        """Join the wells and values."""
         name = self.request.parameter
         tiles = [tile(index) for index in range(self.count)]
-        sheets, _ = wells_along(self.scene, name, self.values)
         unit, about = self.scene.described()[name][1:]
         variables = {
             name: Variable((name,), self.values, unit, about),
-            "sheet": Variable(("well",), sheets.astype(np.int32), "1", "identity of the well in the atlas"),
+            "sheet": Variable(
+                ("well",), self.sheets.astype(np.int32), "1", "identity of the well in the atlas"
+            ),
         }
         for key in MEASURES:
-            array = np.stack([part[key].data for part in tiles])
+            array = np.array([part[key].data for part in tiles]).reshape(self.values.size, -1)
             variables[f"well_{key}"] = Variable(
                 (name, "well"), array.astype(np.bool_) if key in FLAGS else array, *_ABOUT[key]
             )
@@ -175,11 +181,5 @@ class ErosionTiling(Tiling):
         return Dataset(variables, attrs)
 
     def missing(self, index: int) -> Dataset:
-        """A value that has not been measured."""
-        wells = len(wells_along(self.scene, self.request.parameter, self.values)[0])
-        return Dataset(
-            {
-                key: Variable(("well",), np.zeros(wells, bool) if key in FLAGS else np.full(wells, np.nan))
-                for key in MEASURES
-            }
-        )
+        """A well that has not been measured."""
+        return Dataset({key: Variable((), np.array(False if key in FLAGS else np.nan)) for key in MEASURES})

@@ -255,6 +255,8 @@ def _open_file(path: Path) -> h5py.File:
             empty = not file.read(1)
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValueError as error:  # a null character, or one that the file system's encoding lacks
+        raise InputError(f"{str(path)!r}: cannot be the path of a file: {error}") from None
     if empty:
         raise InputError(f"{path}: is empty")
     if not h5py.is_hdf5(path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -130,7 +131,7 @@ class ScanLook:
             there = {int(path.stem) for path in self.parts.names(section)}
             if len(there) == section.tiling.count or (there and section.tiling.missing(0) is not None):
                 note = {"partial": f"{len(there)} of {section.tiling.count} tiles"}
-                shown[section.name] = assembled(section, self._tiles(section), 0.0, note)
+                shown[section.name] = assembled(section, self._tiles(section), self._seconds(section), note)
         if not shown:
             raise InputError(f"{self.parts.target}: no section can be shown yet")
         notes = {
@@ -146,6 +147,15 @@ class ScanLook:
             replace=replace,
             deflate=False,  # which takes minutes where the rest takes seconds
         )
+
+    def _seconds(self, section: TiledSection) -> float:
+        """Wall time that the tiles have taken which are there [s]."""
+        seconds = 0.0
+        for path in self.parts.names(section):
+            with suppress(DamagedTileError):
+                head = self.parts.check(section, int(path.stem))
+                seconds += 0.0 if head is None else head.seconds
+        return seconds
 
     def _tiles(self, section: TiledSection) -> Tiles:
         def tile(index: int) -> Dataset:

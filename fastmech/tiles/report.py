@@ -26,7 +26,7 @@ class RunReport:
     was_complete: bool = False
     seconds: float = 0.0
 
-    def summary(self) -> dict[str, str | int | float | bool | list[str]]:
+    def summary(self) -> dict[str, str | int | bool | list[str]]:
         """The same as plain values, for other programs."""
         return {
             "result": str(self.path),
@@ -34,5 +34,4 @@ class RunReport:
             "computed": self.computed,
             "damaged": [str(path) for path in self.damaged],
             "was_complete": self.was_complete,
-            "seconds": round(self.seconds, 3),
         }

@@ -13,12 +13,13 @@ from pathlib import Path
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError
+from fastmech.interrupts import signal_of
 from fastmech.results import Dataset
 from fastmech.scan_types.request import Request, RunContext
 from fastmech.scan_types.tiling import Tiles
 from fastmech.store.provenance import provenance
 from fastmech.tiles.assemble import assembled, write_assembled
-from fastmech.tiles.ends import CrashedTilesError, Stopped, signal_of
+from fastmech.tiles.ends import CrashedTilesError, Stopped
 from fastmech.tiles.identity import asked_for, asked_of_result, differences, identity_of
 from fastmech.tiles.parts import DamagedManifestError, Manifest, Parts
 from fastmech.tiles.report import RunReport
@@ -60,6 +61,8 @@ class ScanRun:
         tell: Callable[[str], None] = lambda line: None,
     ) -> None:
         self.request, self.request_file, self.target = request, request_file, target
+        if not target.parent.exists():  # of what is not there `..` is its name less one, whatever is made yet
+            self.target = target = Path(os.path.normpath(target))
         self.context, self.hire, self.tell = context, hire, tell
         self.asked = asked_for(request)
         self.identity = identity_of(self.asked)

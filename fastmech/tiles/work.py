@@ -13,6 +13,7 @@ from typing import Protocol
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError
+from fastmech.interrupts import check as check_interrupt
 from fastmech.scan_types.request import RunContext
 from fastmech.tiles.section import TiledSection
 from fastmech.tiles.tile_file import Tile
@@ -174,6 +175,7 @@ def compute_tiles(
             if not running:
                 task = suspects.pop()
                 running[workers.submit(task)] = task
+            check_interrupt()
             done, _ = wait(running, PERIOD, FIRST_COMPLETED)
             for future in sorted(done, key=_failed):  # what is finished is kept before a failure ends the run
                 task = running.pop(future)

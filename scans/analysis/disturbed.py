@@ -1,21 +1,27 @@
 """What a disturbed-ensemble file says: how large a shock each equilibrium survives.
 
-Usage: python scans/analysis/disturbed.py [results/paper.h5]
+Usage: python scans/analysis/disturbed.py [FILE.h5]
+
+FILE.h5 is the shipped data/small.h5 unless one is named; `fastmech run scans/paper.toml` makes a larger one,
+results/paper.h5.
 """
 
 from __future__ import annotations
 
 import sys
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 
 import fastmech as fm
 
+SHIPPED = Path(__file__).parents[2] / "data" / "small.h5"
+
 BINS = 5
 
 
-def main(path: str = "results/paper.h5") -> None:
+def main(path: str | Path = SHIPPED) -> None:
     with fm.open_results(path) as results:
         section = results["disturbed"]
         radius = section.attrs["radius"]
@@ -42,4 +48,8 @@ def main(path: str = "results/paper.h5") -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    try:
+        main(*sys.argv[1:])
+    except fm.InputError as error:
+        print(f"{error}; fastmech run scans/paper.toml makes results/paper.h5, which has it", file=sys.stderr)
+        sys.exit(2)

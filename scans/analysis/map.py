@@ -1,18 +1,24 @@
 """What an equilibrium map says: for which load and stiffness the mechanism has a choice of resting positions.
 
-Usage: python scans/analysis/map.py [results/paper.h5] [map_F0_c1]
+Usage: python scans/analysis/map.py [FILE.h5] [map_F0_c1]
+
+FILE.h5 is the shipped data/small.h5 unless one is named; `fastmech run scans/paper.toml` makes a larger one,
+results/paper.h5.
 """
 
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
 import numpy as np
 
 import fastmech as fm
 
+SHIPPED = Path(__file__).parents[2] / "data" / "small.h5"
 
-def main(path: str = "results/paper.h5", name: str = "map_F0_c1") -> None:
+
+def main(path: str | Path = SHIPPED, name: str = "map_F0_c1") -> None:
     with fm.open_results(path) as results:
         section = results[name]
         x, y = section.attrs["axes"]
@@ -38,4 +44,8 @@ def main(path: str = "results/paper.h5", name: str = "map_F0_c1") -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    try:
+        main(*sys.argv[1:])
+    except fm.InputError as error:
+        print(f"{error}; fastmech run scans/paper.toml makes results/paper.h5, which has it", file=sys.stderr)
+        sys.exit(2)

@@ -1,18 +1,24 @@
 """What a motion file says: how fast the swing dies out and which rod is loaded most.
 
-Usage: python scans/analysis/motion.py [results/paper.h5]
+Usage: python scans/analysis/motion.py [FILE.h5]
+
+FILE.h5 is the shipped data/small.h5 unless one is named; `fastmech run scans/paper.toml` makes a larger one,
+results/paper.h5.
 """
 
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
 import numpy as np
 
 import fastmech as fm
 
+SHIPPED = Path(__file__).parents[2] / "data" / "small.h5"
 
-def main(path: str = "results/paper.h5") -> None:
+
+def main(path: str | Path = SHIPPED) -> None:
     with fm.open_results(path) as results:
         motion = results["motion"]
         t = motion["time"].data
@@ -30,4 +36,8 @@ def main(path: str = "results/paper.h5") -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    try:
+        main(*sys.argv[1:])
+    except fm.InputError as error:
+        print(f"{error}; fastmech run scans/paper.toml makes results/paper.h5, which has it", file=sys.stderr)
+        sys.exit(2)

@@ -157,3 +157,8 @@ def test_without_damper_there_are_no_basins() -> None:
     turns = fm.trapped(scene, starts[held]).turns
     for states in y:
         np.testing.assert_array_equal(fm.trapped(scene, states).turns, turns)
+
+
+def test_an_end_that_cannot_be_counted_to_is_refused() -> None:
+    with pytest.raises(fm.InputError, match=r"t_end = 1e\+308 s: must be at most"):
+        fm.labels_of(CONSTANT, np.zeros((1, 4)), 1e308)

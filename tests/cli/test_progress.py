@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import sys
+import time
 
 import pytest
 
-from fastmech.cli.progress import ProgressBars
+from fastmech.cli.progress import PREPARING, ProgressBars
 
 
 def use(bars: ProgressBars) -> None:
@@ -53,3 +54,27 @@ def test_a_line_every_so_often_in_a_log(monkeypatch: pytest.MonkeyPatch, capsys:
     assert any(line.startswith("fastmech: map: points: ") and line.endswith(" left") for line in lines)
     assert any(line.startswith("fastmech: pictures: ") and "/s, " in line for line in lines)
     assert 2 <= len(lines) <= 8
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_long_preparing_is_told(
+    terminal, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal)
+    monkeypatch.setattr("fastmech.cli.progress.LOOK", 0.001)
+    monkeypatch.setattr("fastmech.cli.progress.SILENT", 0.0)
+    shown = ""
+    with ProgressBars() as bars, bars.preparing():
+        until = time.monotonic() + 60.0
+        while PREPARING not in shown and time.monotonic() < until:
+            time.sleep(0.01)
+            shown += capsys.readouterr().err
+    assert PREPARING in shown
+    assert bars.prepared > 0.0
+    assert bars.stages() == []
+
+
+def test_short_preparing_is_not(capsys: pytest.CaptureFixture[str]):
+    with ProgressBars() as bars, bars.preparing():
+        pass
+    assert capsys.readouterr() == ("", "")

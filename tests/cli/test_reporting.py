@@ -59,6 +59,7 @@ def test_the_json_comes_also_where_a_command_ends_with_a_code(capsys: pytest.Cap
     assert end.value.exit_code == 1
     summary = json.loads(capsys.readouterr().out)
     assert (summary["passed"], summary["files"]) == (False, ["a.png"])
+    assert summary["exit_code"] == 1
     (stage,) = summary["stages"]
     assert (stage["name"], stage["done"], stage["total"]) == ("work", 2, 3)
 
@@ -73,3 +74,54 @@ def test_lines_stand_above_the_bars(monkeypatch: pytest.MonkeyPatch, capsys: pyt
     shown = capsys.readouterr()
     assert shown.out == "piped\n"
     assert "on the terminal" in shown.err
+
+
+@pytest.mark.parametrize("name", sorted(set(COMMANDS) - SHORT))
+def test_a_wrong_option_is_json_too(invoke, name):
+    result = invoke(name, "--no-such-option", "--json")
+    assert result.exit_code == 2
+    told = json.loads(result.stdout)
+    assert (told["command"], told["exit_code"]) == (name, 2)
+    assert result.stderr == f"fastmech: {told['error']}\n"
+    assert "--no-such-option" in told["error"]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["run", "none.toml"],
+        ["plot", "none.h5"],
+        ["export", "none.h5", "--to", "npz"],
+        ["equilibria", "--m1", "-3"],
+        ["equilibria", "none.toml"],
+        ["bench", "--scenes", "3"],
+        ["equilibrium"],
+    ],
+)
+def test_every_error_is_json_too(invoke, arguments):
+    result = invoke(*arguments, "--json")
+    assert result.exit_code == 2
+    told = json.loads(result.stdout)
+    assert (told["command"], told["exit_code"]) == (arguments[0], 2)
+    assert result.stderr == f"fastmech: {told['error']}\n"
+
+
+def test_an_interrupt_is_json_with_what_was_done(invoke, tiny, monkeypatch):
+    def interrupt(*arguments, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("fastmech.tiles.run.write_assembled", interrupt)
+    result = invoke("run", tiny, "--out", "x.h5", "--json")
+    assert result.exit_code == 130
+    told = json.loads(result.stdout)
+    assert (told["command"], told["exit_code"]) == ("run", 130)
+    assert told["error"] == "interrupted; 5 of 5 tiles are kept in x.h5.parts; the same command goes on"
+    assert {stage["name"] for stage in told["stages"]} >= {"swing: integrations of the motion"}
+
+
+def test_seconds_count_loading_and_compiling(invoke, tiny, monkeypatch):
+    clock = iter(float(second) for second in range(0, 100_000, 10))
+    monkeypatch.setattr("fastmech.cli.reporting.time.perf_counter", lambda: next(clock))
+    told = json.loads(invoke("run", tiny, "--out", "x.h5", "--json").stdout)
+    assert 10.0 <= told["seconds_preparing"] < told["seconds"]
+    assert told["exit_code"] == 0

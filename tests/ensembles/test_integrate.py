@@ -71,6 +71,12 @@ def test_output_steps_are_the_fewest_allowed() -> None:
     assert output_steps(times, 0.1).tolist() == [0, 1, 2, 7, 1]
 
 
+@pytest.mark.parametrize(("times", "dt"), [([0.0, 1e308], 1e-5), ([0.0, 5e307, 1e308, 1.5e308], 0.5)])
+def test_steps_without_number_are_refused(times: list[float], dt: float) -> None:
+    with pytest.raises(InputError, match="inf steps"):
+        output_steps(np.array(times), dt)
+
+
 def test_names_of_the_run() -> None:
     run = integrate(SCENE, START, 0.1, method="tsit5", formulation="hamilton")
     assert run.method == "tsit5"

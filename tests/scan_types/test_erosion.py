@@ -51,13 +51,25 @@ def test_a_file_holds_what_the_function_gives(section: Dataset) -> None:
 
 def test_a_tile_needs_no_other_one() -> None:
     tiling = Erosion(along=ALONG, axes=AXES, **SMALL).tiling(BISTABLE)
-    assert tiling.count == 3
-    alone = tiling.compute(2, RunContext(threads=1))
-    assert np.isnan(alone["phi"].data).sum() == 1
-    look = tiling.assemble(lambda index: alone if index == 2 else tiling.missing(index))
+    assert tiling.count == 3 * 2
+    last = [tiling.compute(index, RunContext(threads=1)) for index in (4, 5)]
+    assert sum(np.isnan(alone["phi"].data) for alone in last) == 1, "one of the wells has ended"
+    look = tiling.assemble(lambda index: last[index - 4] if index >= 4 else tiling.missing(index))
     assert isinstance(look, Dataset)
     assert np.isnan(look["well_stability"].data[:2]).all()
-    np.testing.assert_array_equal(look["well_stability"].data[2], alone["stability"].data)
+    np.testing.assert_array_equal(look["well_stability"].data[2], [alone["stability"].data for alone in last])
+
+
+def test_a_tile_is_left_between_integrations() -> None:
+    class Left(Exception):  # noqa: N818
+        pass
+
+    def leave() -> None:
+        raise Left
+
+    tiling = Erosion(along=ALONG, axes=AXES, **SMALL).tiling(BISTABLE)
+    with pytest.raises(Left):
+        tiling.compute(0, RunContext(threads=1, check=leave))
 
 
 def test_picture(section: Dataset) -> None:

@@ -186,3 +186,9 @@ def test_parameter_that_is_no_number(write: Write) -> None:
         del file["l"].attrs["units"]
     with pytest.raises(InputError, match=r"parameter 'l': is damaged"):
         open_results(path)
+
+
+@pytest.mark.parametrize("path", ["a\0b", "a\ud800b\0"])
+def test_a_path_that_no_file_can_have(path: str) -> None:
+    with pytest.raises(InputError, match="cannot be the path of a file"):
+        open_results(path)

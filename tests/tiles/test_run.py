@@ -281,3 +281,10 @@ def test_threads_are_shared_between_tiles_and_within(run: Run) -> None:
 
     run(threads=3, hire=Noting())
     assert hired == [("rest", 2, 3), ("line", 4, 1)]
+
+
+def test_a_way_through_a_missing_folder(run: Run, request_file: Path) -> None:
+    report = run("none/../x.h5")
+    assert report.path == request_file.parent / "x.h5"
+    assert content(report.path)
+    assert not (request_file.parent / "none").exists()
