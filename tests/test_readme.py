@@ -58,7 +58,7 @@ def test_links_and_anchors_lead_somewhere() -> None:
 def test_what_commands_name_exists() -> None:
     for name in re.findall(r"(?:^ {4}|`)fastmech ([a-z]+)", TEXT, re.MULTILINE):
         assert name in COMMANDS, name
-    paths = re.findall(r"\b(?:tests|scans|data)/[\w/]+(?:\.py|\.toml|\.png)?\b", TEXT)
+    paths = re.findall(r"\b(?:tests|scans|data)/[\w/]+(?:\.py|\.toml|\.png|\.h5)?\b", TEXT)
     assert len(paths) > 40
     for path in paths:
         assert (ROOT / path).exists(), path
