@@ -16,7 +16,8 @@ from fastmech.ensembles.ladder import CHEAP, LEAP, Calibrated, Ladder, Sample
 from fastmech.ensembles.problem import Problem
 from fastmech.ensembles.richardson import RATIO
 from fastmech.ensembles.solve import Settings
-from fastmech.ensembles.stiffness import damping_rate, explicit_limit, explicit_reason, work
+from fastmech.ensembles.stiffness import damping_rate, explicit_limit, explicit_reason, initial_layer, work
+from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Method
 from fastmech.integrators.methods import find_method
 
@@ -199,8 +200,10 @@ class _Trial(Sample):
         if c is not None and len(self.starts):
             limit = explicit_limit(method, c) / RATIO
             dt, stable = min(dt, limit), limit < dt
-        fade = fading_force(c, float(self.outputs[-1])) if c is not None else None
-        ladder = Ladder(self, Settings(method, dt, self.fit(), fade=fade), longest)
+        early = fading_force(c, float(self.outputs[-1])) if c is not None else ()
+        if c is not None and isinstance(method, ImplicitRungeKutta):
+            early += initial_layer(c, self.starts)
+        ladder = Ladder(self, Settings(method, dt, self.fit(), early=early), longest)
         ladder.affordable = affordable
         ladder.climb(1 if stable else LEAP)
         return ladder

@@ -63,14 +63,14 @@ def vibration_frequency(c: Coefficients) -> Floats:
     return np.asarray(np.sqrt(np.maximum(np.maximum(phi, theta), np.finfo(np.float64).tiny)))
 
 
-def fading_force(c: Coefficients, t_end: float) -> tuple[float, float] | None:
+def fading_force(c: Coefficients, t_end: float) -> tuple[tuple[float, float], ...]:
     """Where a force decays far faster than vibrations: until when [s], and what share of the step.
 
-    Until then steps are as short for the decay as they are for the vibrations later. ``None`` where no force
+    Until then steps are as short for the decay as they are for the vibrations later. Nothing where no force
     does so before ``t_end``.
     """
     slowest, rate = vibration_frequency(c), np.where(np.asarray(c.force) != 0.0, c.decay, 0.0)
     quick = rate[rate > QUICK * slowest] if np.ndim(rate) else rate[None][rate > QUICK * np.max(slowest)]
     if not quick.size or GONE / quick.min() >= t_end:
-        return None
-    return GONE / float(quick.min()), float(np.min(slowest) / quick.max())
+        return ()
+    return ((GONE / float(quick.min()), float(np.min(slowest) / quick.max())),)

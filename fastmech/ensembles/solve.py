@@ -29,7 +29,7 @@ class Settings:
     dt: float | Floats  #: longest step [s], of all trajectories or of each (n,)
     fit: tuple[float, ...] = ()  #: times [s] at which the steps are fitted to the energy; () for never
     precision: Precision = np.float64
-    fade: tuple[float, float] | None = None  #: until this time [s] steps are shorter by this factor
+    early: tuple[tuple[float, float], ...] = ()  #: until these times [s] steps are shorter by a factor
 
 
 @dataclass
@@ -63,8 +63,8 @@ def solve(
     n = len(starts)
     again = {t for t in settings.fit if 0.0 < t < outputs[-1]}
     exponent = EXPONENT_AGAIN if again else EXPONENT_ONCE
-    faded, share = settings.fade or (0.0, 1.0)
-    ends = sorted(again | {t for t in (faded,) if 0.0 < t < outputs[-1]} | {float(outputs[-1])})
+    sooner = {t for t, _ in settings.early if 0.0 < t < outputs[-1]}
+    ends = sorted(again | sooner | {float(outputs[-1])})
     pieces: list[Floats] = []
     status, failed = np.full(n, Status.OK, dtype=np.int8), np.full(n, np.nan)
     lost: list[tuple[NDArray[np.bool_], Floats]] = []
@@ -83,8 +83,7 @@ def solve(
             fitted = fitted_steps(problem.coefficients, problem.outward(now), 1.0, exponent)
             shares = np.maximum(fitted, shares)
             dt = dt * shares
-        if end <= faded:
-            dt = dt * share
+        dt = dt * min((share for until, share in settings.early if end <= until), default=1.0)
         run = run_ensemble(
             problem.rhs,
             problem.params,

@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.ensembles.fitting import vibration_frequency
+from fastmech.ensembles.fitting import QUICK, vibration_frequency
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Method
 from fastmech.integrators.methods import find_method
@@ -58,6 +58,21 @@ def damping_rate(c: Coefficients) -> Floats:
     """Bound [1/s] on the rate at which the damper stops motion, over all configurations; 0 without damper."""
     square = _SLIDER_RATIO
     return np.asarray(c.damping * square / (c.mass + c.slider * square))
+
+
+def initial_layer(c: Coefficients, starts: Floats) -> tuple[tuple[float, float], ...]:
+    """Times [s] until which steps are shorter, and by what share, where the damper stops motion at first.
+
+    Starts that move lose the damped part of their motion at once. A step far longer than that takes them to
+    the right slow motion, but not to its right place: an error that falls with the step only when the step
+    is as short as the layer (Hairer, Wanner, *Solving ODEs II*, section VI.1). So steps grow with the time,
+    from the layer's length to the vibrations'. Nothing where nothing moves, or no damping is that quick.
+    """
+    slow, rate = float(np.min(vibration_frequency(c))), float(np.max(damping_rate(c)))
+    if not rate > QUICK * slow or not np.any(starts[:, 2:]):
+        return ()
+    doublings = np.arange(math.ceil(math.log2(2.0 * rate / slow)))
+    return tuple((float(t), slow * float(t)) for t in 0.5 / rate * 2.0**doublings)
 
 
 def explicit_limit(method: Method, c: Coefficients) -> float:

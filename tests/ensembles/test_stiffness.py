@@ -64,6 +64,19 @@ def test_heavy_damping_is_integrated_implicitly(beta: float) -> None:
     assert true / 3.0 <= run.error_estimate <= max(3.0 * true, 1e-9)
 
 
+@pytest.mark.parametrize("beta", [1e5, 1e6])
+def test_starts_that_the_damper_stops_at_once(beta: float) -> None:
+    """Long steps would err by their first one alone, which halving does not show: every claim must hold."""
+    scene, tol = Scene(beta=beta, alpha=0.0), 1e-6
+    starts = np.random.default_rng(2).uniform([0.5, -1.0, -1.0, -1.0], [2.5, 1.0, 1.0, 1.0], (6, 4))
+    run = fm.integrate(scene, starts, 1.0, tol=tol)
+    true = errors(run.y, stiff_motions(scene, starts, 1.0)[None]).ravel()
+    assert run.method == "radau5"
+    assert run.error is not None
+    assert true.max() <= tol
+    assert (true <= 3.0 * run.error + 1e-9).all()
+
+
 @pytest.mark.parametrize(
     "name",
     ["damping_1e4", "damping_1e6", "heavy_m2", "short_rods", "long_rods", "sudden_decay",
