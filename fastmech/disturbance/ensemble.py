@@ -141,7 +141,8 @@ def disturb(
     status = judge(run.status, starts, final, reduce(scene))
     steps = float(times[-1]) / step
     if drives_rest(scene, step, steps, method):  # where it came to rest is no matter of the mechanism
-        outcome[(outcome != Outcome.UNDECIDED) | is_beyond(scene, step, steps, method)] = Outcome.STEP_TOO_LARGE
+        wrong = (outcome != Outcome.UNDECIDED) | is_beyond(scene, step, steps, method)
+        outcome[wrong] = Outcome.STEP_TOO_LARGE
     outcome[status == Status.STEP_TOO_LARGE] = Outcome.STEP_TOO_LARGE
     outcome[status == Status.NOT_FINITE] = Outcome.NOT_FINITE
     outcome[status == Status.NOT_CONVERGED] = Outcome.NOT_CONVERGED

@@ -127,12 +127,13 @@ def integrate(
     Returns:
         states at the output times and the status of every trajectory: a start that is not finite, a motion
         that became so, and a step too large for a scene are told apart and leave the others as they are. A
-        step is too large where the motion ends with an energy it cannot have, and where small motion about the
-        trajectory's start or its end grows over the steps taken there though it should die out (see
-        :mod:`fastmech.step_limits.beyond`): it keeps its states, but they are not to be trusted. Of a system nothing is known beforehand. One that
-        fails on the way has NaN from the next output on, and its last finite state and time in ``last`` and
-        ``failed``. With ``tol`` also an estimate of the error; with ``dt`` there is none. A trajectory that a
-        system's stopping condition ends keeps the state in which it stopped.
+        step is too large where the motion ends with an energy it cannot have, and where small motion about
+        the trajectory's start or its end grows over the steps taken there though it should die out (see
+        :mod:`fastmech.step_limits.beyond`): it keeps its states, but they are not to be trusted. Of a system
+        nothing is known beforehand. One that fails on the way has NaN from the next output on, and its last
+        finite state and time in ``last`` and ``failed``. With ``tol`` also an estimate of the error; with
+        ``dt`` there is none. A trajectory that a system's stopping condition ends keeps the state in which it
+        stopped.
 
     Raises:
         InputError: an argument is wrong, or the states would not fit into memory.

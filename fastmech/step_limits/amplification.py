@@ -69,7 +69,7 @@ def history_row(method: Adams, z: ArrayLike) -> NDArray[np.complex128]:
 
 
 def principal_root(method: Adams, z: ArrayLike) -> NDArray[np.complex128]:
-    """The root (of the shape of ``z``) that stands for exp(z), by Newton's method from there; NaN: none is near."""
+    """The root for exp(z), of the shape of ``z``, by Newton's method from there; NaN: none is near."""
     points = np.asarray(z, dtype=np.complex128)
     row = history_row(method, points)
     descending = np.moveaxis(np.concatenate([np.ones((*row.shape[:-1], 1)), -row], axis=-1), -1, 0)
@@ -106,10 +106,10 @@ def amplification(method: Method, z: ArrayLike) -> Floats:
 def amplifies(method: Method, z: ArrayLike, factor: ArrayLike) -> NDArray[np.bool_]:
     """Whether a step multiplies small motions by more than ``factor`` > 0: quicker to tell than by how much.
 
-    For an Adams method whether a root of the characteristic polynomial lies outside the circle of that radius,
-    by Schur's recursion (Henrici, *Applied and Computational Complex Analysis I*, section 6.8): the polynomial
-    has all roots inside the unit circle if its last coefficient is smaller than its first, and the polynomial
-    of one degree less that eliminates the last has them too.
+    For an Adams method whether a root of the characteristic polynomial lies outside the circle of that
+    radius, by Schur's recursion (Henrici, *Applied and Computational Complex Analysis I*, section 6.8): the
+    polynomial has all roots inside the unit circle if its last coefficient is smaller than its first, and the
+    polynomial of one degree less that eliminates the last has them too.
     """
     if not isinstance(method, Adams):
         return np.asarray(np.abs(stability_function(method, z)) > factor)

@@ -1,15 +1,18 @@
 """Which trajectories of a run have steps that cannot be right for them, one by one, and the warning of it.
 
 A step is too long for small motion where motion that should die out grows by more than 1 %
-(:data:`fastmech.step_limits.warning.PASSING`) over the steps taken *there*: amplification^steps > 1.01. A motion
-that only crosses a configuration takes few steps there, at least one; one that rests takes all steps of the run.
-Growth below that does not show: a method's region may end by 1e-9 a step short of the axis, and thousands of
-such steps are still right to many digits. An Adams method has roots that stand for no mode; they begin with its
-errors, not with the motion, and count from a growth by :data:`SPURIOUS`. Modes that decay by less than 1e-6 a radian
-(:data:`fastmech.step_limits.predict.GROWTH_PER_RADIAN`) count as undamped, and of undamped motion its energy
-tells whether it has grown, which is the better judge.
+(:data:`fastmech.step_limits.warning.PASSING`) over the steps taken *there*: amplification^steps > 1.01. A
+motion that only crosses a configuration takes few steps there, at least one; one that rests takes all steps
+of the run. Growth below that does not show: a method's region may end by 1e-9 a step short of the axis, and
+thousands of such steps are still right to many digits.
 
-Each trajectory is judged by its own parameters, step and states: its companions make no difference.
+An Adams method has roots that stand for no mode. They multiply its errors, not the motion, and count from a
+growth by :data:`SPURIOUS` in all steps of the run; the amplification is that at the start or at the end, so
+that of a motion to and fro it is a sample.
+
+Modes that decay by less than 1e-6 a radian (:data:`fastmech.step_limits.predict.GROWTH_PER_RADIAN`) count as
+undamped, and of undamped motion its energy tells whether it has grown, which is the better judge. Each
+trajectory is judged by its own parameters, step and states: its companions make no difference.
 """
 
 from __future__ import annotations
@@ -38,7 +41,6 @@ from fastmech.step_limits.warning import (
     TURN,
     Limit,
     scene_eigenvalues,
-    step_limit,
     warn_of_step,
 )
 
@@ -53,8 +55,8 @@ AT_ONCE = 2**14
 #: Steps of a run that are told apart: a year's are fewer.
 MOST_STEPS = 2.0**44
 
-#: Sizes of h lambda, falling, and directions of modes that decay (the others are their mirror images), at which
-#: a method's region is looked at.
+#: Sizes of h lambda, falling, and directions of modes that decay (the others are their mirror images), at
+#: which a method's region is looked at.
 SIZES = 8.0 * 0.95 ** np.arange(180.0)
 DIRECTIONS = np.exp(1j * np.linspace(0.5 * np.pi, np.pi, 33))
 
@@ -63,7 +65,7 @@ DIRECTIONS = np.exp(1j * np.linspace(0.5 * np.pi, np.pi, 33))
 class StepsTaken:
     """The steps of a run's trajectories."""
 
-    first: Floats  #: step of each [s] at the start, where the force is great and the start's rates count, (n,)
+    first: Floats  #: step of each [s] at the start, where force and rates are great, (n,)
     longest: Floats  #: longest step of each [s], (n,)
     number: Floats | NDArray[np.int64]  #: steps of each, (n,)
     until: float  #: end of the run [s]
@@ -81,7 +83,7 @@ def is_beyond(scene: Scene, dt: float, steps: float, method: str) -> bool:
 
 
 def drives_rest(scene: Scene, dt: float, steps: float, method: str) -> bool:
-    """Whether so many steps of dt [s] make motion grow, damped or not: then where it rests is the step's doing.
+    """Whether so many steps of dt [s] make motion grow, damped or not: where it rests is then their doing.
 
     Raises:
         InputError: no such method.
@@ -115,8 +117,8 @@ def steps_beyond(
         own: values (n,) of parameters that differ between trajectories.
         starts: states (n, 4).
         ends: last finite states (n, 4), ``None``: not known yet. A step that is too long for places where a
-            motion never is does it no harm: it must be so at the start, under the force's full strength, or where
-            the motion has come to, under what is left of it.
+            motion never is does it no harm: it must be so at the start, under the force's full strength, or
+            where the motion has come to, under what is left of it.
         taken: the steps.
         method: a name from :data:`fastmech.integrators.methods.METHODS`.
 
@@ -145,9 +147,9 @@ def warn_of_steps(
 ) -> None:
     """Warn, in the caller's caller, of a step [s] that is too long for one of many trajectories.
 
-    Looked at are the extreme scenes at every configuration, the rates of all starts, and every trajectory with
-    its own parameters at its start, by the rule of :func:`steps_beyond`. Not looked at is where trajectories of
-    other scenes will come to: that has its status after the run.
+    Looked at are the extreme scenes at every configuration, the rates of all starts, and every trajectory
+    with its own parameters at its start, by the rule of :func:`steps_beyond`. Not looked at is where
+    trajectories of other scenes will come to: that has its status after the run.
 
     Raises:
         InputError: no such method.
@@ -207,10 +209,11 @@ def _grows_there(method: Method, c: Coefficients, states: Floats, taken: StepsTa
         if asked.any():
             some = members[asked]
             values = taken.longest[some, None] * eigenvalues(matrices[..., asked])
-            number = np.clip(taken.number[some], 1.0, MOST_STEPS)
+            number: Floats = np.clip(taken.number[some].astype(np.float64), 1.0, MOST_STEPS)
             there = np.clip(time_near(_part(c, some), states[some]) / taken.longest[some], 1.0, number)
             # Conjugate eigenvalues say the same.
-            lane, mode = np.nonzero((values.real < -GROWTH_PER_RADIAN * np.abs(values)) & (values.imag >= 0.0))
+            damped = values.real < -GROWTH_PER_RADIAN * np.abs(values)
+            lane, mode = np.nonzero(damped & (values.imag >= 0.0))
             grows[some[lane[_grow(method, values[lane, mode], there[lane], number[lane])]]] = True
     return grows
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,17 +17,15 @@ Floats = NDArray[np.float64]
 NEAR = 1.0
 
 
-def state_matrices(c: Coefficients, phi: Floats, theta: Floats) -> Floats:
+def state_matrices(c: Coefficients, phi: Any, theta: Any) -> Floats:
     """Matrices of the motion linearized at rest in configurations (n,), shape (4, 4, n).
 
     ``c`` are reduced coefficients, numbers or one a configuration; their force is taken as constant.
     """
     out = np.empty((4, 4, phi.size))
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        motion = small_motion(
-            phi, theta, c.mass, c.slider, c.lift, c.spring, c.gravity, c.force, c.damping  # type: ignore[arg-type]
-        )
-        fill_state_matrix(SmallMotion(*motion), out)
+        values: Any = (c.mass, c.slider, c.lift, c.spring, c.gravity, c.force, c.damping)
+        fill_state_matrix(SmallMotion(*small_motion(phi, theta, *values)), out)
     return out
 
 
@@ -37,11 +37,12 @@ def eigenvalues(matrices: Floats) -> NDArray[np.complex128]:
 def eigenvalue_bound(matrices: Floats) -> Floats:
     """Bound [1/s] on the eigenvalues' magnitudes of state matrices (4, 4, n), shape (n,).
 
-    x'' = -A x - B x' with |x'| measured in units of s has a norm of max(s, |A|/s + |B|); the best s makes both
+    x'' = -A x - B x' with x' measured in units of s has a norm of max(s, |A|/s + |B|); the best s makes both
     the same.
     """
     with np.errstate(invalid="ignore", over="ignore"):
-        stiff, damped = (np.abs(matrices[2:, part]).sum(axis=1).max(axis=0) for part in (slice(2), slice(2, 4)))
+        norms = np.abs(matrices[2:])
+        stiff, damped = (norms[:, part].sum(axis=1).max(axis=0) for part in (slice(2), slice(2, 4)))
         return np.asarray(0.5 * (damped + np.sqrt(damped * damped + 4.0 * stiff)))
 
 

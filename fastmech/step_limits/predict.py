@@ -14,8 +14,8 @@ from fastmech.stability.linearize import Rest, jacobian
 from fastmech.step_limits.amplification import amplification
 from fastmech.step_limits.crossing import first_crossing
 
-#: Error of a mode's growth, a radian, that is let pass. A mode without damping sits on the edge of every region
-#: of stability; one that decays by less than this a radian is as good as undamped.
+#: Error of a mode's growth, a radian, that is let pass. A mode without damping sits on the edge of every
+#: region of stability; one that decays by less than this a radian is as good as undamped.
 GROWTH_PER_RADIAN = 1e-6
 
 #: Real part, relative to the eigenvalue, that rounding explains.
@@ -31,8 +31,8 @@ SHORTER = 0.8 ** np.arange(8.0)
 def stable_step(method: Method, eigenvalues: ArrayLike, growth: float = 0.0) -> float:
     """Largest step [s] up to which no decaying mode grows by more than ``growth``; inf if A-stable.
 
-    Growing modes set no limit. A mode that decays by less than :data:`GROWTH_PER_RADIAN` a radian may miss its
-    decay by that much, as one without damping may.
+    Growing modes set no limit. A mode that decays by less than :data:`GROWTH_PER_RADIAN` a radian may miss
+    its decay by that much, as one without damping may.
     """
     values, slack = _decaying(eigenvalues)
     if not values.size or isinstance(method, ImplicitRungeKutta):

@@ -39,7 +39,7 @@ PASSING = 0.01
 TURN = 1.0
 
 #: What is wrong with a step beyond stability.
-GROWS = "motions that die out would grow"
+GROWS, UNDAMPED_GROWS = "motions that die out would grow", "undamped motions would grow"
 
 #: Scenes whose limits are remembered.
 KEPT = 4096
@@ -212,7 +212,7 @@ def _first_limit(scene: Scene, dt: float, method: str, rates: Floats | None) -> 
     formula = find_method(method)
     limits = [Limit(np.inf, "")]
     if beyond_stability(scene, dt, method):
-        limits.append(Limit(step_limit(scene, method), GROWS if scene.beta > 0.0 else "undamped motions would grow"))
+        limits.append(Limit(step_limit(scene, method), GROWS if scene.beta > 0.0 else UNDAMPED_GROWS))
     if scene.alpha > 0.0 and scene.F0 != 0.0:
         ratio = impulse_ratio(formula, dt * scene.alpha)
         reason = f"the decaying force would give {ratio:.3g} times its impulse"
