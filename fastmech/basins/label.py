@@ -154,9 +154,14 @@ class Ladder:
         self.rounds = rounds_until(self.t_end, SUBSTEPS[0] * self.coarse)
         self.observer = self.certificate.packed
 
+    def grows(self, substeps: int) -> bool:
+        """Whether so many substeps let damped motion grow."""
+        step = SUBSTEPS[0] * self.coarse / substeps
+        return is_beyond(self.certificate.scene, step, self.t_end / step, self.method.name)
+
     def follow(self, starts: Floats, substeps: int, observer: Floats) -> Paths:
         """One computation; none where its step lets damped motion grow."""
-        if is_beyond(self.certificate.scene, SUBSTEPS[0] * self.coarse / substeps, self.method.name):
+        if self.grows(substeps):
             paths = Paths.empty(len(starts))
             paths.status[:] = Status.STEP_TOO_LARGE
             return paths
@@ -184,7 +189,7 @@ class Ladder:
     def lingers(self, starts: Floats) -> NDArray[np.bool_]:
         """Which motions come to an unstable equilibrium, with the finest step."""
         finest = self.coarse * SUBSTEPS[0] / SUBSTEPS[-1]
-        if is_beyond(self.certificate.scene, finest, self.method.name):
+        if self.grows(SUBSTEPS[-1]):
             return np.zeros(len(starts), dtype=np.bool_)
         return lingering(self.certificate, starts, self.t_end, finest, self.method.name, self.threads)
 

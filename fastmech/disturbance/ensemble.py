@@ -23,8 +23,8 @@ from fastmech.kernels.jacobians import lagrange_jacobian
 from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
-from fastmech.step_limits.beyond import is_beyond
-from fastmech.step_limits.warning import beyond_stability, warn_of_step
+from fastmech.step_limits.beyond import drives_rest, is_beyond
+from fastmech.step_limits.warning import warn_of_step
 
 Floats = NDArray[np.float64]
 
@@ -139,8 +139,10 @@ def disturb(
     outcome[(end_index >= 0) & ~stable[end_index]] = Outcome.AT_UNSTABLE
     outcome[(end_index == index) & ~turned & stable[end_index]] = Outcome.RETURNED
     status = judge(run.status, starts, final, reduce(scene))
-    if beyond_stability(scene, step, method):  # where it came to rest is no matter of the mechanism
-        outcome[(outcome != Outcome.UNDECIDED) | is_beyond(scene, step, method)] = Outcome.STEP_TOO_LARGE
+    steps = float(times[-1]) / step
+    if drives_rest(scene, step, steps, method):  # where it came to rest is no matter of the mechanism
+        wrong = (outcome != Outcome.UNDECIDED) | is_beyond(scene, step, steps, method)
+        outcome[wrong] = Outcome.STEP_TOO_LARGE
     outcome[status == Status.STEP_TOO_LARGE] = Outcome.STEP_TOO_LARGE
     outcome[status == Status.NOT_FINITE] = Outcome.NOT_FINITE
     outcome[status == Status.NOT_CONVERGED] = Outcome.NOT_CONVERGED

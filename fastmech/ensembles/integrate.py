@@ -28,8 +28,7 @@ from fastmech.integrators.method import Method
 from fastmech.integrators.methods import find_method
 from fastmech.kernels.select import FORMULATIONS
 from fastmech.scene import Scene, nearest
-from fastmech.step_limits.beyond import steps_beyond
-from fastmech.step_limits.warning import warn_of_step
+from fastmech.step_limits.beyond import StepsTaken, steps_beyond, warn_of_steps
 
 #: Longest step [s] where neither a step nor a tolerance is given.
 DEFAULT_DT = 0.01
@@ -128,12 +127,13 @@ def integrate(
     Returns:
         states at the output times and the status of every trajectory: a start that is not finite, a motion
         that became so, and a step too large for a scene are told apart and leave the others as they are. A
-        step is too large where the motion ends with an energy it cannot have, and where ``dt`` is beyond the
-        limit that the warning before the run names, for motion about the trajectory's start or its end: it
-        keeps its states, but they are not to be trusted. Of a system nothing is known beforehand. One that
-        fails on the way has NaN from the next output on, and its last finite state and time in ``last`` and
-        ``failed``. With ``tol`` also an estimate of the error; with ``dt`` there is none. A trajectory that a
-        system's stopping condition ends keeps the state in which it stopped.
+        step is too large where the motion ends with an energy it cannot have, and where small motion about
+        the trajectory's start or its end grows over the steps taken there though it should die out (see
+        :mod:`fastmech.step_limits.beyond`): it keeps its states, but they are not to be trusted. Of a system
+        nothing is known beforehand. One that fails on the way has NaN from the next output on, and its last
+        finite state and time in ``last`` and ``failed``. With ``tol`` also an estimate of the error; with
+        ``dt`` there is none. A trajectory that a system's stopping condition ends keeps the state in which it
+        stopped.
 
     Raises:
         InputError: an argument is wrong, or the states would not fit into memory.
@@ -168,13 +168,12 @@ def integrate(
         return _trajectories(
             problem, outputs, solve(problem, starts, outputs, settings, threads, progress), settings
         )
-    extremes = extreme_scenes(scene, parameters or {})
-    warn_of_step(extremes, step, formula.name, starts)
+    own, until = own_values(parameters or {}, scene.model_dump(), len(starts)), float(outputs[-1])
+    warn_of_steps(scene, extreme_scenes(scene, own), own, starts, step, until / step, formula.name)
     solution = solve(problem, starts, outputs, settings, threads, progress)
-    own = own_values(parameters or {}, scene.model_dump(), len(starts))
-    first, longest = solution.dt[0], solution.dt.max(axis=0)
+    taken = StepsTaken(solution.dt[0], solution.dt.max(axis=0), solution.steps, until)
     ends = solution.y[-1] if solution.last is None else solution.last
-    beyond = steps_beyond(scene, extremes, own, starts, ends, first, longest, formula.name)
+    beyond = steps_beyond(scene, own, starts, ends, taken, formula.name)
     solution.status[beyond & (solution.status == Status.OK)] = Status.STEP_TOO_LARGE
     return _trajectories(problem, outputs, solution, settings)
 

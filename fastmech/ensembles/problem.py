@@ -16,7 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.ensembles import checks
+from fastmech.ensembles.fitting import vibration_frequency
 from fastmech.ensembles.run import NOTHING, Observation
+from fastmech.ensembles.stiffness import damping_rate
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError
 from fastmech.kernels.select import right_hand_side
@@ -91,11 +93,18 @@ def scene_problem(scene: Scene, n: int, parameters: Mapping[str, ArrayLike], for
 
 
 def extreme_scenes(scene: Scene, parameters: Mapping[str, ArrayLike]) -> list[Scene]:
-    """The scene, or those of the trajectories in which a parameter that differs is least or greatest."""
+    """The scene, or those of the trajectories in which a parameter that differs is least or greatest.
+
+    With more than one that differs none of them may be the most damped or the stiffest: these are added.
+    """
     columns = {name: np.asarray(values, dtype=np.float64) for name, values in parameters.items()}
     rows = {
         int(pick(column)) for column in columns.values() if column.size for pick in (np.argmin, np.argmax)
     }
+    if rows:
+        scenes: Any = SimpleNamespace(**(scene.model_dump() | columns))
+        c: Any = reduce(scenes)
+        rows |= {int(np.argmax(rate(c))) for rate in (damping_rate, vibration_frequency)}
     return [
         scene.replace(**{name: float(column[row]) for name, column in columns.items()})
         for row in sorted(rows)

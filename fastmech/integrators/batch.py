@@ -12,6 +12,9 @@ Floats = NDArray[np.float64]
 #: Numbers of a batch's phase.
 PHASE = 3
 
+#: Lengths of steps that differ by less than this share of the time are the same: times were rounded.
+ROUNDED_TIME = 4 * 2.0**-52
+
 
 @dataclass(frozen=True)
 class Batch:

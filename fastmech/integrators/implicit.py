@@ -13,13 +13,11 @@ from __future__ import annotations
 import numpy as np
 from numba import types
 
+from fastmech.integrators.batch import ROUNDED_TIME
 from fastmech.integrators.explicit import BlockRHS, Floats, Integers, Observer
 from fastmech.integrators.newton import combine, newton_inverses
 from fastmech.integrators.stages import solve_stages
 from fastmech.jit import CUBE, INTEGERS, JACOBIAN, MATRIX, OBSERVER, RHS, VECTOR, kernel
-
-#: Lengths of steps that differ by less than this share of the time are the same: times were rounded.
-ROUNDED_TIME = 4 * 2.0**-52
 
 
 @kernel(

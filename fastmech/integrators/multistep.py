@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
+from fastmech.integrators.batch import ROUNDED_TIME
 from fastmech.integrators.explicit import (
     TABLEAU,
     BlockRHS,
@@ -21,9 +22,6 @@ from fastmech.integrators.explicit import (
 )
 from fastmech.integrators.sums import add_stages, add_two_sums, rows_of
 from fastmech.jit import VECTOR, driver_signature, inlined, kernel, lanes, rounded_to
-
-#: Step lengths that differ by less than this share of the time are the same: outputs were rounded.
-ROUNDED_TIME = 4 * 2.0**-52
 
 
 @inlined

@@ -18,6 +18,9 @@ from fastmech.integrators.method import Adams, Method, RungeKutta
 
 Floats = NDArray[np.float64]
 
+#: Newton iterations to a root that is near, and the last one's relative size.
+NEWTON, CONVERGED = 10, 1e-10
+
 
 def stability_polynomial(method: RungeKutta) -> Floats:
     """Coefficients of R(z), powers rising, of an explicit method: b A^(k-1) 1, summed without rounding.
@@ -53,8 +56,8 @@ def stability_function(method: Method, z: ArrayLike) -> NDArray[np.complex128]:
     return np.asarray(np.linalg.det(numerator) / np.linalg.det(matrix))
 
 
-def companion(method: Adams, z: ArrayLike) -> NDArray[np.complex128]:
-    """The matrices (..., k, k) that take the history (y_n, y_(n-1), ...) of y' = lambda y one step on."""
+def history_row(method: Adams, z: ArrayLike) -> NDArray[np.complex128]:
+    """Weights (..., k) of the history (y_n, y_(n-1), ...) of y' = lambda y in the next y."""
     points = np.asarray(z, dtype=np.complex128)[..., None]
     corrector = method.corrector
     row = points * method.predictor
@@ -62,6 +65,31 @@ def companion(method: Adams, z: ArrayLike) -> NDArray[np.complex128]:
     if method.corrects:
         row = points * corrector[0] * row + points * corrector[1:]
         row[..., 0] += 1.0
+    return row
+
+
+def principal_root(method: Adams, z: ArrayLike) -> NDArray[np.complex128]:
+    """The root for exp(z), of the shape of ``z``, by Newton's method from there; NaN: none is near."""
+    points = np.asarray(z, dtype=np.complex128)
+    row = history_row(method, points)
+    descending = np.moveaxis(np.concatenate([np.ones((*row.shape[:-1], 1)), -row], axis=-1), -1, 0)
+    rising, degree = descending[::-1], descending.shape[0] - 1
+    slope = rising[1:] * np.arange(1.0, degree + 1.0).reshape(-1, *(1,) * points.ndim)
+    root = np.exp(points)
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        for _ in range(NEWTON):
+            move = _values(rising, root) / _values(slope, root)
+            root = root - move
+        return np.where(np.abs(move) < CONVERGED * np.abs(root), root, np.nan)
+
+
+def _values(rising: NDArray[np.complex128], at: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    return np.asarray(np.polynomial.polynomial.polyval(at, rising, tensor=False))
+
+
+def companion(method: Adams, z: ArrayLike) -> NDArray[np.complex128]:
+    """The matrices (..., k, k) that take the history (y_n, y_(n-1), ...) of y' = lambda y one step on."""
+    row = history_row(method, z)
     size = row.shape[-1]
     matrices = np.tile(np.eye(size, k=-1, dtype=np.complex128), (*row.shape[:-1], 1, 1))
     matrices[..., 0, :] = row
@@ -73,3 +101,27 @@ def amplification(method: Method, z: ArrayLike) -> Floats:
     if not isinstance(method, Adams):
         return np.abs(stability_function(method, z))
     return np.asarray(np.abs(np.linalg.eigvals(companion(method, z))).max(axis=-1))
+
+
+def amplifies(method: Method, z: ArrayLike, factor: ArrayLike) -> NDArray[np.bool_]:
+    """Whether a step multiplies small motions by more than ``factor`` > 0: quicker to tell than by how much.
+
+    For an Adams method whether a root of the characteristic polynomial lies outside the circle of that
+    radius, by Schur's recursion (Henrici, *Applied and Computational Complex Analysis I*, section 6.8): the
+    polynomial has all roots inside the unit circle if its last coefficient is smaller than its first, and the
+    polynomial of one degree less that eliminates the last has them too.
+    """
+    if not isinstance(method, Adams):
+        return np.asarray(np.abs(stability_function(method, z)) > factor)
+    row = history_row(method, z)
+    degree = row.shape[-1]
+    scale = np.asarray(factor, dtype=np.float64)[..., None] ** -np.arange(1.0, degree + 1.0)
+    coefficients = np.concatenate([np.ones((*row.shape[:-1], 1)), -row * scale], axis=-1)
+    outside = np.zeros(row.shape[:-1], dtype=np.bool_)
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):  # of those already found outside
+        for _ in range(degree):
+            last = coefficients[..., -1:]
+            outside |= ~(np.abs(last[..., 0]) < 1.0)
+            less = coefficients - last * coefficients[..., ::-1].conj()
+            coefficients = less[..., :-1] / less[..., :1]
+    return outside

@@ -14,10 +14,11 @@ from fastmech.stability.linearize import Rest, jacobian
 from fastmech.step_limits.amplification import amplification
 from fastmech.step_limits.crossing import first_crossing
 
-#: Growth a radian that a mode without damping may have: such a mode sits on the edge of every region.
+#: Error of a mode's growth, a radian, that is let pass. A mode without damping sits on the edge of every
+#: region of stability; one that decays by less than this a radian is as good as undamped.
 GROWTH_PER_RADIAN = 1e-6
 
-#: Real part, relative to the eigenvalue, below which a mode counts as undamped.
+#: Real part, relative to the eigenvalue, that rounding explains.
 UNDAMPED = 1e-12
 
 #: Product of step and largest eigenvalue at which the search begins and ends.
@@ -30,7 +31,8 @@ SHORTER = 0.8 ** np.arange(8.0)
 def stable_step(method: Method, eigenvalues: ArrayLike, growth: float = 0.0) -> float:
     """Largest step [s] up to which no decaying mode grows by more than ``growth``; inf if A-stable.
 
-    Growing modes set no limit. A mode without damping may also grow by :data:`GROWTH_PER_RADIAN`.
+    Growing modes set no limit. A mode that decays by less than :data:`GROWTH_PER_RADIAN` a radian may miss
+    its decay by that much, as one without damping may.
     """
     values, slack = _decaying(eigenvalues)
     if not values.size or isinstance(method, ImplicitRungeKutta):
@@ -56,9 +58,8 @@ def _decaying(eigenvalues: ArrayLike) -> tuple[NDArray[np.complex128], NDArray[n
     """Eigenvalues of the modes that do not grow, and the growth [1/s] that each may have."""
     values = np.asarray(eigenvalues, dtype=np.complex128)
     values = values[(values.real <= UNDAMPED * np.abs(values)) & (values != 0.0)]
-    undamped = values.real > -UNDAMPED * np.abs(values)
-    slack = np.where(undamped, GROWTH_PER_RADIAN * np.abs(values), 0.0)
-    return np.where(undamped, 1j * values.imag, values), slack
+    values = np.minimum(values.real, 0.0) + 1j * values.imag
+    return values, np.maximum(values.real + GROWTH_PER_RADIAN * np.abs(values), 0.0)
 
 
 def largest_stable_step(scene: Scene, equilibrium: Rest, method: str) -> float:

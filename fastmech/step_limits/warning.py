@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from functools import cache
+from functools import lru_cache
 from numbers import Real
 from typing import Any, NamedTuple
 
@@ -17,8 +17,8 @@ from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import potential_energy, potential_gradient, potential_hessian
 from fastmech.scene import Scene
 from fastmech.stability.arguments import require_scene
-from fastmech.stability.linearize import SmallMotion, fill_state_matrix, small_motion
 from fastmech.step_limits.impulse import impulse_limit, impulse_ratio
+from fastmech.step_limits.local import eigenvalues, state_matrices
 from fastmech.step_limits.predict import is_stable, stable_step
 
 Floats = NDArray[np.float64]
@@ -37,6 +37,12 @@ PASSING = 0.01
 
 #: Angle [rad] by which a body may turn in one step.
 TURN = 1.0
+
+#: What is wrong with a step beyond stability.
+GROWS, UNDAMPED_GROWS = "motions that die out would grow", "undamped motions would grow"
+
+#: Scenes whose limits are remembered.
+KEPT = 4096
 
 
 def configuration_eigenvalues(scene: Scene, force: float) -> NDArray[np.complex128]:
@@ -57,22 +63,7 @@ def _grid() -> list[Any]:
 def local_eigenvalues(scene: Scene, force: float, phi: Any, theta: Any) -> NDArray[np.complex128]:
     """Eigenvalues [1/s] of the motion linearized at rest in configurations (n,), shape (n, 4)."""
     c = reduce(scene)._replace(force=force / (scene.m2 * scene.l))
-    motions = small_motion(
-        phi,
-        theta,
-        c.mass,
-        c.slider,
-        c.lift,
-        c.spring,
-        c.gravity,
-        c.force,
-        c.damping,
-    )
-    columns = [np.broadcast_to(value, phi.shape) for value in motions]
-    matrices = np.empty((phi.size, 4, 4))
-    for matrix, values in zip(matrices, np.stack(columns, axis=1), strict=True):
-        fill_state_matrix(SmallMotion(*values), matrix)
-    return np.asarray(np.linalg.eigvals(matrices), dtype=np.complex128)
+    return eigenvalues(state_matrices(c, phi, theta))
 
 
 def resting_eigenvalues(scene: Scene, force: float) -> NDArray[np.complex128]:
@@ -105,7 +96,7 @@ def _descended(scene: Scene, force: float, q: Floats) -> Floats:
     return q
 
 
-@cache
+@lru_cache(KEPT)
 def step_limit(scene: Scene, method: str) -> float:
     """Largest step [s] that is stable wherever a scene can rest, and nearly so at every configuration.
 
@@ -116,13 +107,13 @@ def step_limit(scene: Scene, method: str) -> float:
         InputError: no such method.
     """
     formula = find_method(method)
-    resting, passing = _scene_eigenvalues(scene)
+    resting, passing = scene_eigenvalues(scene)
     return min(stable_step(formula, resting), stable_step(formula, passing, PASSING))
 
 
-@cache
-def _scene_eigenvalues(scene: Scene) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """Those at minima, and of those elsewhere what sets the limit."""
+@lru_cache(KEPT)
+def scene_eigenvalues(scene: Scene) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    """Eigenvalues [1/s] at minima, and of those elsewhere what sets the limit."""
     forces = sorted({scene.F0, 0.0 if scene.alpha > 0.0 else scene.F0})
     resting = np.concatenate([resting_eigenvalues(scene, force) for force in forces])
     values = np.concatenate([configuration_eigenvalues(scene, force).ravel() for force in forces])
@@ -136,7 +127,7 @@ def _scene_eigenvalues(scene: Scene) -> tuple[NDArray[np.complex128], NDArray[np
     return resting, np.array(largest)
 
 
-@cache
+@lru_cache(KEPT)
 def beyond_stability(scene: Scene, dt: float, method: str) -> bool:
     """Whether a step [s] is longer than :func:`step_limit`, which takes longer to find.
 
@@ -144,7 +135,7 @@ def beyond_stability(scene: Scene, dt: float, method: str) -> bool:
         InputError: no such method.
     """
     formula = find_method(method)
-    resting, passing = _scene_eigenvalues(scene)
+    resting, passing = scene_eigenvalues(scene)
     return not (is_stable(formula, resting, dt) and is_stable(formula, passing, dt, PASSING))
 
 
@@ -167,7 +158,10 @@ def step_warning(scene: Scene, dt: float, method: str, starts: ArrayLike | None 
     rates = None if starts is None else _rates(starts)
     if not isinstance(dt, Real) or isinstance(dt, bool) or not 0.0 < dt < np.inf:
         raise InputError(f"dt = {dt!r}: must be a finite number of s greater than 0")
-    limit = _first_limit(scene, dt, method, rates)
+    return _told(_first_limit(scene, dt, method, rates), dt, method)
+
+
+def _told(limit: Limit, dt: float, method: str) -> str | None:
     if dt <= limit.step:
         return None
     if limit.step == 0.0:
@@ -178,23 +172,25 @@ def step_warning(scene: Scene, dt: float, method: str, starts: ArrayLike | None 
 
 
 def warn_of_step(
-    scenes: Sequence[Scene], dt: float, method: str, starts: ArrayLike | None = None, stacklevel: int = 2
+    scenes: Sequence[Scene],
+    dt: float,
+    method: str,
+    starts: ArrayLike | None = None,
+    stacklevel: int = 2,
+    others: Sequence[Limit] = (),
 ) -> None:
-    """Warn, in the caller's caller, if a step cannot be right for one of some scenes.
+    """Warn, in the caller's caller, if a step cannot be right for one of some scenes, or by ``others``.
 
     Raises:
         InputError: no such method.
     """
     rates = None if starts is None else _rates(starts)
-    limits = [(_first_limit(scene, dt, method, rates).step, k) for k, scene in enumerate(scenes)]
-    for _, k in sorted(limits):
-        told = step_warning(scenes[k], dt, method, starts)
-        if told:
-            warnings.warn(told, StepWarning, stacklevel=stacklevel + 1)
-            return
+    told = _told(min([*(_first_limit(scene, dt, method, rates) for scene in scenes), *others]), dt, method)
+    if told:
+        warnings.warn(told, StepWarning, stacklevel=stacklevel + 1)
 
 
-class _Limit(NamedTuple):
+class Limit(NamedTuple):
     """The longest step that is fine [s], and what is wrong with a longer one."""
 
     step: float
@@ -212,23 +208,22 @@ def _rates(starts: ArrayLike) -> Floats:
     return states[..., 2:]
 
 
-def _first_limit(scene: Scene, dt: float, method: str, rates: Floats | None) -> _Limit:
+def _first_limit(scene: Scene, dt: float, method: str, rates: Floats | None) -> Limit:
     formula = find_method(method)
-    limits = [_Limit(np.inf, "")]
+    limits = [Limit(np.inf, "")]
     if beyond_stability(scene, dt, method):
-        grows = "motions that die out would grow" if scene.beta > 0.0 else "undamped motions would grow"
-        limits.append(_Limit(step_limit(scene, method), grows))
+        limits.append(Limit(step_limit(scene, method), GROWS if scene.beta > 0.0 else UNDAMPED_GROWS))
     if scene.alpha > 0.0 and scene.F0 != 0.0:
         ratio = impulse_ratio(formula, dt * scene.alpha)
         reason = f"the decaying force would give {ratio:.3g} times its impulse"
         decay = impulse_limit(formula) / scene.alpha
-        limits.append(_Limit(decay, reason))
+        limits.append(Limit(decay, reason))
     if rates is not None:
         fastest = float(np.max(np.abs(rates[np.isfinite(rates)]), initial=0.0))
         if fastest > 0.0:
             turn = TURN / fastest
             reason = f"at {fastest:.3g} rad/s it would turn {dt * fastest:.3g} rad a step"
-            limits.append(_Limit(turn, reason))
+            limits.append(Limit(turn, reason))
     return min(limits)
 
 

@@ -17,8 +17,7 @@ from fastmech.ensembles.system import System
 from fastmech.errors import InputError
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.scene import Scene
-from fastmech.step_limits.beyond import steps_beyond
-from fastmech.step_limits.warning import warn_of_step
+from fastmech.step_limits.beyond import StepsTaken, steps_beyond, warn_of_steps
 from fastmech.transients.tangent import advance_tangents
 
 Floats = NDArray[np.float64]
@@ -89,8 +88,8 @@ def largest_lyapunov(
     elif isinstance(scene, Scene):
         starts = checks.states("y0", y0, 4)
         problem = scene_problem(scene, len(starts), parameters or {}, "lagrange")
-        extremes = extreme_scenes(scene, parameters or {})
-        warn_of_step(extremes, dt, METHOD, starts)
+        values = own_values(parameters or {}, scene.model_dump(), len(starts))
+        warn_of_steps(scene, extreme_scenes(scene, values), values, starts, dt, t_end / dt, METHOD)
     else:
         raise InputError(f"scene = {scene!r}: must be a Scene or a System")
     Y = np.array(starts.T, order="C")
@@ -127,7 +126,8 @@ def largest_lyapunov(
     reached = np.where(np.isfinite(Y).all(axis=0) & np.isfinite(growth), Status.OK, Status.NOT_FINITE)
     status = judge(reached.astype(np.int8), starts, np.ascontiguousarray(Y.T), problem.coefficients)
     if isinstance(scene, Scene):
-        taken, values = np.full(len(starts), h), own_values(parameters or {}, scene.model_dump(), len(starts))
-        beyond = steps_beyond(scene, extremes, values, starts, Y.T, taken, taken, METHOD)
+        each = np.full(len(starts), h)
+        taken = StepsTaken(each, each, np.full(len(starts), PIECES * steps), t_end)
+        beyond = steps_beyond(scene, values, starts, np.ascontiguousarray(Y.T), taken, METHOD)
         status[beyond & (status == Status.OK)] = Status.STEP_TOO_LARGE
     return LyapunovExponents(times[1:], exponents, status)

@@ -1,0 +1,172 @@
+"""Each trajectory's step is judged by itself: alone as in company, by growth that shows, at start and end."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+import fastmech as fm
+from fastmech.integrators.method import Adams
+from fastmech.integrators.methods import METHODS
+from fastmech.mechanism.coefficients import reduce
+from fastmech.stability.linearize import jacobian
+from fastmech.step_limits.amplification import amplifies, companion, principal_root, stability_function
+from fastmech.step_limits.beyond import StepsTaken, steps_beyond
+from fastmech.step_limits.local import eigenvalue_bound, eigenvalues, state_matrices, time_near
+from fastmech.step_limits.predict import stable_step
+from fastmech.step_limits.warning import step_limit, step_warning
+
+SCENE = fm.Scene(c2=1100 / 3, alpha=0.0)
+TOO_LARGE = fm.Status.STEP_TOO_LARGE
+
+
+def run(scene: fm.Scene, starts: np.ndarray, own: dict[str, np.ndarray], dt: float) -> tuple[list[int], bool]:
+    """Statuses, and whether the step was warned of."""
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        status = fm.integrate(scene, starts, 0.3, dt=dt, parameters=own).status
+    return status.tolist(), any(issubclass(w.category, fm.StepWarning) for w in told)
+
+
+def alone(
+    scene: fm.Scene, starts: np.ndarray, own: dict[str, np.ndarray], dt: float
+) -> list[tuple[int, bool]]:
+    each = []
+    for k in range(len(starts)):
+        status, told = run(scene, starts[k : k + 1], {n: v[k : k + 1] for n, v in own.items()}, dt)
+        each.append((status[0], told))
+    return each
+
+
+@pytest.mark.parametrize(
+    ("start", "last"), [([0.3, 0.2, 0.0, 0.0], TOO_LARGE), ([1.0, 0.5, 0.0, 0.0], fm.Status.NOT_FINITE)]
+)
+def test_no_parameter_of_the_worst_trajectory_is_extreme(start: list[float], last: fm.Status) -> None:
+    """Light masses and a strong damper together, neither of them the lightest or the strongest there is."""
+    own = {
+        "beta": np.array([2500.0, 10.0, 10.0, 2400.0]),
+        "m1": np.array([1000.0, 2.0, 1000.0, 2.5]),
+        "m2": np.array([1000.0, 1000.0, 2.0, 2.5]),
+    }
+    starts = np.tile(start, (4, 1))
+    status, told = run(fm.Scene(), starts, own, 0.02)
+    assert status == [fm.Status.OK] * 3 + [last]
+    assert told
+    assert alone(fm.Scene(), starts, own, 0.02) == [(fm.Status.OK, False)] * 3 + [(last, True)]
+
+
+def test_a_trajectory_has_the_same_status_alone_and_in_company() -> None:
+    """Many parameters that differ, some in the third digit only, on both sides of the limit."""
+    rng = np.random.default_rng(0)
+    own = {
+        "beta": np.append(10.0 ** rng.uniform(2.5, 3.6, 15), 2000.0 * (1.0 + 2e-3 * np.arange(-12, 13))),
+        "m1": np.append(10.0 ** rng.uniform(0.3, 1.7, 15), np.full(25, 9.37)),
+    }
+    starts = np.tile([1.0, 0.5, 0.0, 0.0], (40, 1))
+    status, told = run(fm.Scene(), starts, own, 0.03)
+    each = alone(fm.Scene(), starts, own, 0.03)
+    assert status == [s for s, _ in each]
+    assert told == any(t for _, t in each)
+    assert {fm.Status.OK, TOO_LARGE} <= set(status)
+    assert len(set(status[15:])) == 2
+
+
+def test_a_motion_that_only_ends_where_the_step_is_too_long() -> None:
+    scene, starts = SCENE.replace(beta=4e3), np.array([[1.9, 0.4, 0.0, 0.0], [1.9, 0.6, 0.0, 0.0]])
+    with pytest.warns(fm.StepWarning):
+        found = fm.integrate(scene, starts, 1.0, dt=0.02)
+    each = np.full(2, 0.02)
+    taken = StepsTaken(each, each, np.full(2, 50), 1.0)
+    assert steps_beyond(scene, {}, starts, None, taken, "rk4").tolist() == [False, False]
+    assert steps_beyond(scene, {}, starts, starts, taken, "rk4").tolist() == [False, False]
+    assert steps_beyond(scene, {}, starts, found.y[-1], taken, "rk4").tolist() == [True, True]
+    assert found.status.tolist() == [TOO_LARGE] * 2
+
+
+@pytest.mark.parametrize(
+    ("beta", "method", "dt", "error"),
+    [
+        (1.0, "abm12", 0.02, 1e-6),
+        (1e-6, "ab5", 0.005, 1e-5),
+        (1e-6, "midpoint", 0.002, 1e-3),
+        (1e-6, "midpoint", 0.005, 1e-2),
+    ],
+)
+def test_accurate_runs_are_not_failed(beta: float, method: str, dt: float, error: float) -> None:
+    scene, start = fm.Scene(beta=beta, F0=0.0), [0.3, 0.2, 0.0, 0.0]
+    expected = fm.integrate(scene, start, 5.0, dt=5e-4, method="dop853").y[-1]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fm.StepWarning)
+        found = fm.integrate(scene, start, 5.0, dt=dt, method=method)
+    assert np.abs(found.y[-1] - expected).max() < error
+    assert found.status.tolist() == [fm.Status.OK]
+
+
+def test_growth_at_rest_counts_over_the_whole_run() -> None:
+    """1e-5 beyond RK4's interval: so many steps as make 0.9 % of the fastest mode, and 1.1 %."""
+    rest = next(e for e in fm.find_equilibria(SCENE) if e.morse_index == 0)
+    start = np.array([[rest.phi, rest.theta, 0.0, 0.0]])
+    limit = fm.largest_stable_step(SCENE, rest, "rk4")
+    h = np.array([limit * (1.0 + 1e-5)])
+    z = h[0] * np.linalg.eigvals(jacobian(SCENE, rest))
+    growth = np.log(np.abs(1 + z + z**2 / 2 + z**3 / 6 + z**4 / 24).max())
+    for share, expected in ((0.9, False), (1.1, True)):
+        number = int(np.log1p(share * 0.01) / growth)
+        taken = StepsTaken(h, h, np.array([number]), 1.0)
+        assert steps_beyond(SCENE, {}, start, None, taken, "rk4").tolist() == [expected]
+
+
+@pytest.mark.parametrize("method", ["midpoint", "heun2", "ab5", "abm12", "tsit5", "rk4"])
+def test_a_weak_damper_is_as_none(method: str) -> None:
+    none = step_limit(fm.Scene(beta=0.0, F0=0.0), method)
+    assert none > 0.0
+    for beta in (1e-12, 1e-9, 1e-6):
+        assert step_limit(fm.Scene(beta=beta, F0=0.0), method) == pytest.approx(none, rel=0.02)
+        within = step_warning(fm.Scene(beta=beta, F0=0.0), 0.95 * none, method)
+        assert within is None
+
+
+@pytest.mark.parametrize("method", ["midpoint", "heun2", "ralston2"])
+def test_a_mode_that_the_damper_does_not_reach_leaves_a_limit(method: str) -> None:
+    """At this equilibrium sin(phi + theta) = 0: a mode's real part is rounding, of either sign."""
+    scene = fm.Scene(alpha=0.0, F0=89.2075641978, c1=96.0, c2=50.0327795757)
+    assert step_limit(scene, method) > 1e-3
+    for real in (-1e-17, 0.0, 1e-17, -1e-13):
+        limit = stable_step(METHODS[method], [real + 1j, real - 1j])
+        assert limit == pytest.approx(0.02, rel=1e-3)  # |R(iy)|^2 = 1 + y^4/4, so y^3/8 = 1e-6
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_what_is_amplified(name: str) -> None:
+    """Against R itself, and the eigenvalues of the history's map."""
+    rng, method = np.random.default_rng(1), METHODS[name]
+    z = (-rng.uniform(0, 1.5, 400) + 1j * rng.uniform(0, 1.5, 400)) * np.repeat([1.0, 0.1], 200)
+    factor = 1.0 + 10.0 ** rng.uniform(-7, -1, 400)
+    if not isinstance(method, Adams):
+        expected = np.abs(stability_function(method, z))
+    else:
+        roots = np.linalg.eigvals(companion(method, z))
+        expected = np.abs(roots).max(axis=-1)
+        near = np.abs(z) < 0.05
+        nearest = np.abs(roots - np.exp(z)[:, None]).argmin(axis=-1)[:, None]
+        own = np.take_along_axis(roots, nearest, axis=-1)[:, 0]
+        np.testing.assert_allclose(principal_root(method, z[near]), own[near], rtol=1e-10)
+    assert amplifies(method, z, factor).tolist() == (expected > factor).tolist()
+
+
+def test_bound_and_dwelling() -> None:
+    """No eigenvalue exceeds the bound; a motion is where it was for as long as an integration says."""
+    rng = np.random.default_rng(2)
+    scene = fm.Scene(alpha=0.0, beta=300.0)
+    undamped = fm.Scene(alpha=0.0, beta=0.0)
+    states = np.column_stack([rng.uniform(-3, 3, (50, 2)), np.zeros((50, 2))])
+    matrices = state_matrices(reduce(scene), *states[:, :2].T)
+    largest = np.abs(eigenvalues(matrices)).max(axis=1)
+    assert (largest <= eigenvalue_bound(matrices) * (1 + 1e-12)).all()
+    # From rest, for a hundredth of the time that the acceleration needs for 1 rad: 1e-4 rad.
+    times = time_near(reduce(undamped), states)
+    for state, time in zip(states[:10], times[:10], strict=True):
+        end = fm.integrate(undamped, state, time / 100.0, dt=time / 400.0).y[-1, 0]
+        assert np.abs(end - state)[:2].max() == pytest.approx(1e-4, rel=1e-2)
