@@ -72,7 +72,8 @@ _STAGE = """
 
 _TAIL = """
         Z[0, i], Z[1, i], Z[2, i], Z[3, i] = phi{s}, theta{s}, phi_dot{s}, theta_dot{s}
-        far = reach > REDUCTION_LIMIT * REDUCTION_LIMIT
+        finite = 0.0 * (phi0 + theta0 + phi_dot0 + theta_dot0) == 0.0
+        far = (reach > REDUCTION_LIMIT * REDUCTION_LIMIT) | ((reach != reach) & finite)
         work[{s}, i] = far
         beyond |= far
     return beyond
@@ -107,8 +108,9 @@ def whole_step(rhs: Any, tableau: Formula) -> Any:
 
     It writes the states (dim, lanes) after a step from ``Y`` into ``Z``, with ``work`` (stages + 1, lanes) as
     scratch. Where an angle at any stage may have left the range of the fast trigonometry (the squares of all
-    of them are summed: one instruction an angle) it says so: by a result that is not 0, and by the last row
-    of ``work`` for the lanes concerned, whose new states are not to be used.
+    of them are summed: one instruction an angle; NaN counts in the step that made it) it says so: by a result
+    that is not 0, and by the last row of ``work`` for the lanes concerned, whose new states are not to be
+    used.
     """
     name = getattr(rhs, "__name__", "")
     if tableau.name not in METHODS or rhs is not getattr(lagrange, name, None):

@@ -34,7 +34,7 @@ from fastmech.scene import Scene
 from fastmech.step_limits.amplification import amplifies, principal_root
 from fastmech.step_limits.impulse import impulse_limit
 from fastmech.step_limits.local import eigenvalue_bound, eigenvalues, state_matrices, time_near
-from fastmech.step_limits.predict import GROWTH_PER_RADIAN, UNDAMPED, stable_step
+from fastmech.step_limits.predict import GROWTH_PER_RADIAN, UNDAMPED, is_stable, stable_step
 from fastmech.step_limits.warning import (
     GROWS,
     PASSING,
@@ -177,8 +177,11 @@ def _own_limit(method: Method, scene: Scene, start: Floats, dt: float, steps: fl
     if not np.isfinite(matrices).all():
         return []
     growth = PASSING / float(np.clip(time_near(c, state)[0] / dt, 1.0, max(steps, 1.0)))
-    limit = stable_step(method, eigenvalues(matrices), growth)
-    return [Limit(limit, GROWS)] if scene.beta > 0.0 and limit > 0.0 else []
+    values = eigenvalues(matrices)
+    if scene.beta == 0.0 or is_stable(method, values, dt, growth):  # told at once, the limit is not
+        return []
+    limit = stable_step(method, values, growth)
+    return [Limit(limit, GROWS)] if limit > 0.0 else []
 
 
 def _coefficients(scene: Scene, own: Mapping[str, Floats], n: int) -> Coefficients:

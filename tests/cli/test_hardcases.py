@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from fastmech import open_results
-from fastmech.hardcases import gallery, report
+from fastmech.hardcases import containment, gallery, report
 from fastmech.hardcases.case import HardCase, Row
-from fastmech.hardcases.containment import CONTAINED
+from fastmech.hardcases.containment import CONTAINED, NUMBER, ONE_IN
 from fastmech.integrators.methods import METHODS
 
 
@@ -49,7 +49,7 @@ def test_table_result_file_and_pictures(invoke, one_case):
         )
         beside = results["containment"]
         assert beside["method"].data.tolist() == list(CONTAINED)
-        assert (beside["failed"].data == 64).all()
+        assert (beside["failed"].data == NUMBER // ONE_IN).all()
         assert beside["same"].data.all()
 
 
@@ -58,6 +58,16 @@ def test_a_case_that_fails_ends_with_code_1(invoke, one_case):
     result = invoke("hardcases", "--quick", "--out", "hard")
     assert result.exit_code == 1
     assert result.stdout.splitlines()[-1] == "1 of 1 cases failed: easy"
+
+
+def test_neighbours_that_get_a_status_end_with_code_1(invoke, one_case, monkeypatch):
+    """At 0.05 s the Adams method is beyond its limit: healthy trajectories have a status too."""
+    one_case(1e-9)
+    monkeypatch.setattr(containment, "CONTAINED", {"ab6": 0.05})
+    result = invoke("hardcases", "--quick", "--out", "hard")
+    assert result.exit_code == 1
+    assert result.stdout.splitlines()[-1].endswith("failing trajectories are not contained")
+    assert "the same to the bit: NO" in Path("hard/hardcases.md").read_text(encoding="utf-8")
 
 
 def test_a_folder_that_cannot_be_made(invoke):

@@ -50,12 +50,14 @@ def test_a_step_is_the_formula_of_its_tableau(method: str, terms: str) -> None:
 @pytest.mark.nojit
 def test_only_lanes_out_of_range_are_marked() -> None:
     Y = lanes(16)
-    Y[0, 3], Y[1, 8], Y[2, 11] = 1.1 * REDUCTION_LIMIT, -3 * REDUCTION_LIMIT, 1e9
+    Y[0, 3], Y[1, 8], Y[2, 11] = 1.1 * REDUCTION_LIMIT, -1e200, 1e9
+    Y[3, 14] = np.nan  # failed before: nothing to be done again
     Z, beyond, marks = stepped("rk4", "damped", Y, Scene(F0=0.0))
     assert beyond
     assert np.flatnonzero(marks).tolist() == [3, 8, 11]
     alone = stepped("rk4", "damped", lanes(16), Scene(F0=0.0))[0]
-    np.testing.assert_array_equal(Z[:, marks == 0], alone[:, marks == 0])
+    healthy = (marks == 0) & (np.arange(16) != 14)
+    np.testing.assert_array_equal(Z[:, healthy], alone[:, healthy])
 
 
 @pytest.mark.nojit
