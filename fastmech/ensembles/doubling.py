@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from fastmech.ensembles.calibration import CALM
 from fastmech.ensembles.ladder import AIM, CHEAP, Calibrated
 from fastmech.ensembles.lanes import VECTOR_LANES
+from fastmech.ensembles.places import part_of, put_into
 from fastmech.ensembles.problem import Problem
 from fastmech.ensembles.richardson import LEAST_ORDER, RATIO, ROUNDING, distances, error_beyond, order_seen
 from fastmech.ensembles.run import Progress
@@ -45,6 +46,9 @@ AUDITED = 64
 
 #: Share of the method's order that a trajectory must show to be taken for smooth again.
 SMOOTH = 2.0 / 3.0
+
+#: Steps of the second of two finer runs, by which errors are measured where a right-hand side may jump.
+FINER = 2.0 * RATIO
 
 #: Right-hand sides that repetitions may take in those of the two first runs; CHEAP more are always allowed.
 BUDGET = 4.0
@@ -163,10 +167,10 @@ class Doubling:
         apart = np.empty(again.size)
         near = rungs == 1.0  # one step of the ladder up there is a run already
         far = np.flatnonzero(~near)
-        apart[near] = self.apart(_part(run, near), _part(self.best, again[near]))
+        apart[near] = self.apart(part_of(run, near), part_of(self.best, again[near]))
         if far.size:
             self.left -= self.work(again[far], own[far] * RATIO)
-            apart[far] = self.apart(_part(run, far), self.solve(again[far], own[far] * RATIO))
+            apart[far] = self.apart(part_of(run, far), self.solve(again[far], own[far] * RATIO))
         self._reckon(again, self.distance[again], apart, self.dt[again] / own)
         after = self.error[again]
         in_vain = ~(after <= 0.5 * error) | np.isinf(after)
@@ -175,9 +179,9 @@ class Doubling:
         rounded = in_vain & ((after < ROUNDING) | ((self.vain[again] > 1) & (after < MAGNIFIED)))
         # A rough one's earlier error may have been small by luck: the finer run has the better odds.
         better = ~(after > error) | (self.rough[again] & np.isfinite(run.y[-1]).all(axis=1))
-        _replace(self.best, again[better], run, better)
+        put_into(self.best, again[better], run, better)
         self.dt[again] = own
-        rounded &= ~self.rough[again]
+        rounded &= ~self.once_rough[again]
         self.rounded[again[rounded]] = True
         self.given_up[again[(self.vain[again] >= PATIENCE) & ~rounded]] = True
 
@@ -197,16 +201,18 @@ class Doubling:
             error = self.apart(run, self.solve(which, own / RATIO, calm))
             better = error < self.error[which]
             self.error[which[better]] = error[better]
-            _replace(self.best, which[better], run, better)
+            put_into(self.best, which[better], run, better)
 
     def _audit(self) -> None:
         """Measure the errors of the worst trajectories by runs of half the step.
 
         Where one is above the tolerance the finer run is kept, and measured in its turn while that helps.
         """
-        settled = self.rounded | self.given_up | self.rough
-        open_ = np.flatnonzero(self.finite & ~settled)
-        worst = open_[np.argsort(-self.error[open_], kind="stable")[:AUDITED]]
+        open_ = self.finite & ~self.rounded & ~self.given_up
+        worst = self._worst(open_ & ~self.rough)[:AUDITED]
+        if self.problem.coefficients is None:
+            self._audit_rough(np.concatenate([worst, self._worst(open_ & self.rough)]))
+            return
         last = np.full(worst.size, np.inf)
         for turn in range(ROUNDS):
             half = self.dt[worst] / 2.0
@@ -216,13 +222,57 @@ class Doubling:
             self.left -= self.work(worst, half)
             run = self.solve(worst, half)
             self.dt[worst] = half
-            self.error[worst] = self.apart(run, _part(self.best, worst))
+            self.error[worst] = self.apart(run, part_of(self.best, worst))
             missing = ~(self.error[worst] <= self.tol)
             # Two resolutions may disagree about a stop: the finer one has the better view.
             helps = (self.error[worst] <= 0.5 * last) & (np.isfinite(self.error[worst]) | (turn < 2))
             bad = missing & helps & np.isfinite(run.y[-1]).all(axis=1)
-            _replace(self.best, worst[bad], run, bad)
+            put_into(self.best, worst[bad], run, bad)
             worst, last = worst[bad], self.error[worst[bad]]
+
+    def _worst(self, which: NDArray[np.bool_]) -> Members:
+        """Trajectories in the order of their errors, largest first."""
+        members = np.flatnonzero(which)
+        return members[np.argsort(-self.error[members], kind="stable")]
+
+    def _audit_rough(self, who: Members) -> None:
+        """The same where the right-hand side may jump: one difference of two runs may be small by luck.
+
+        Two finer runs tell three. Where they do not fall as the order says, the largest is taken for the
+        error of the finest run, which is kept.
+        """
+        p = self.settings.method.order
+        last = np.full(who.size, np.inf)
+        for turn in range(ROUNDS):
+            number = self._audited(who, turn)
+            who, last = who[:number], last[:number]
+            if not who.size:
+                return
+            half, finer = self.dt[who] / 2.0, self.dt[who] / FINER
+            self.left -= self.work(who, half) + self.work(who, finer)
+            middle, finest, best = self.solve(who, half), self.solve(who, finer), part_of(self.best, who)
+            first, between = self.apart(middle, best), self.apart(finest, middle)
+            error = np.maximum(first, self.apart(finest, best))
+            rough = ~(between <= np.maximum(ROUNDING, first * 0.5 ** (SMOOTH * p)))
+            error = np.where(rough, np.maximum(error, between), error)
+            self.error[who] = error
+            missing = ~(error <= self.tol)
+            finer_kept = (rough | missing) & np.isfinite(finest.y[-1]).all(axis=1)
+            put_into(self.best, who[finer_kept], finest, finer_kept)
+            self.dt[who[finer_kept]] = finer[finer_kept]
+            again = finer_kept & missing & (error <= 0.5 * last) & (np.isfinite(error) | (turn < 2))
+            who, last = who[again], error[again]
+
+    def _audited(self, who: Members, turn: int) -> int:
+        """How many of the trajectories, worst first, the budget gives two finer runs; some in any case."""
+        number = who.size
+        while number > (0 if turn else AUDITED):
+            part = who[:number]
+            if self.work(part, self.dt[part] / 2.0) + self.work(part, self.dt[part] / FINER) <= self.left:
+                break
+            self.unpaid[part[number // 2 :]] = True
+            number //= 2
+        return number
 
     def remark(self) -> str:
         """Why trajectories have missed the tolerance; empty where none has."""
@@ -242,23 +292,3 @@ class Doubling:
         }
         each = [f"{np.count_nonzero(which):,}: {why}" for why, which in causes.items() if which.any()]
         return f"; {np.count_nonzero(missed):,} of {missed.size:,} miss it ({'; '.join(each)})"
-
-
-def _part(solution: Solution, who: NDArray[np.int64] | NDArray[np.bool_]) -> Solution:
-    """Some of a solution's trajectories."""
-    s = solution
-    last = None if s.last is None else s.last[who]
-    return Solution(
-        s.y[:, who], s.records[:, who], s.status[who], s.steps[who], s.dt[:, who], s.failed[who], last
-    )
-
-
-def _replace(best: Solution, which: Members, run: Solution, part: NDArray[np.bool_]) -> None:
-    """Put some trajectories of a run into the places ``which`` of the solution."""
-    for old, new in ((best.y, run.y), (best.records, run.records), (best.dt, run.dt)):
-        old[:, which] = new[:, part]
-    best.status[which], best.steps[which] = run.status[part], run.steps[part]
-    best.failed[which] = run.failed[part]
-    if best.last is not None or run.last is not None:
-        best.last = best.y[-1].copy() if best.last is None else best.last
-        best.last[which] = (run.y[-1] if run.last is None else run.last)[part]
