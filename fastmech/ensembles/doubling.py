@@ -7,7 +7,7 @@ the best run that it has had, and an error that says so.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -28,6 +28,7 @@ from fastmech.integrators.methods import find_method
 
 Floats = NDArray[np.float64]
 Members = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 #: Repetitions of trajectories at most.
 ROUNDS = 6
@@ -47,7 +48,7 @@ AUDITED = 64
 #: Share of the method's order that a trajectory must show to be taken for smooth again.
 SMOOTH = 2.0 / 3.0
 
-#: Steps of the second of two finer runs, by which errors are measured where a right-hand side may jump.
+#: The second of two finer runs, where a right-hand side may jump, has steps so many times shorter.
 FINER = 2.0 * RATIO
 
 #: Right-hand sides that repetitions may take in those of the two first runs; CHEAP more are always allowed.
@@ -64,11 +65,23 @@ class Doubling:
     found: Calibrated
     tol: float
     threads: int | None
+    best: Solution = field(init=False)  #: each trajectory's best run
+    dt: Floats = field(init=False)  #: its steps [s], shape (n,) like all that follow
+    distance: Floats = field(init=False)  #: of the last two runs
+    error: Floats = field(init=False)  #: estimate for the best run
+    left: float = field(init=False)  #: right-hand sides that may still be taken
+    finite: Flags = field(init=False)  #: the start is
+    rough: Flags = field(init=False)  #: shows less than the method's order
+    once_rough: Flags = field(init=False)  #: has shown less
+    rounded: Flags = field(init=False)  #: rounding rules
+    given_up: Flags = field(init=False)
+    unpaid: Flags = field(init=False)  #: its shorter steps would exceed the budget
+    vain: Members = field(init=False)  #: shorter steps that have not halved the error
 
     def run(self, progress: Progress | None) -> tuple[Solution, Floats, str]:
         """The solution, errors (n,), and what is to be said about those beyond the tolerance."""
         settings, n = self.settings, len(self.starts)
-        self.finite = np.isfinite(self.starts).all(axis=1)
+        self.finite = np.asarray(np.isfinite(self.starts).all(axis=1))
         self.dt = np.full(n, float(settings.dt))
         self.best = solve(self.problem, self.starts, self.outputs, settings, self.threads, progress)
         everyone = np.arange(n)
@@ -76,8 +89,8 @@ class Doubling:
         self.distance = self.apart(self.best, coarse)
         self.error = self.distance * self.found.median
         self.rough, self.once_rough = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
-        if self.problem.coefficients is None:
-            # Nobody knows whether a user's right-hand side has jumps: a third run tells each one's order.
+        if self.jumps:
+            # A third run tells each one's order.
             third = self.apart(coarse, self.solve(everyone, self.dt * RATIO**2))
             self._reckon(everyone, third, self.distance, np.full(n, RATIO))
         self.left = CHEAP + BUDGET * self.work(everyone, self.dt / 2.0)
@@ -98,6 +111,11 @@ class Doubling:
     def settings(self) -> Settings:
         """What the calibration has found."""
         return self.found.settings
+
+    @property
+    def jumps(self) -> bool:
+        """Whether the right-hand side may jump: of a user's nobody knows."""
+        return self.problem.coefficients is None
 
     @cached_property
     def margin(self) -> float:
@@ -181,7 +199,8 @@ class Doubling:
         better = ~(after > error) | (self.rough[again] & np.isfinite(run.y[-1]).all(axis=1))
         put_into(self.best, again[better], run, better)
         self.dt[again] = own
-        rounded &= ~self.once_rough[again]
+        # Where jumps are possible, luck looks like rounding.
+        rounded &= ~(self.once_rough if self.jumps else self.rough)[again]
         self.rounded[again[rounded]] = True
         self.given_up[again[(self.vain[again] >= PATIENCE) & ~rounded]] = True
 
@@ -207,68 +226,54 @@ class Doubling:
         """Measure the errors of the worst trajectories by runs of half the step.
 
         Where one is above the tolerance the finer run is kept, and measured in its turn while that helps.
+        Where the right-hand side may jump, one difference of two runs may be small by luck. There two finer
+        runs tell three, and if these do not fall as the order says, the finest run is kept and the largest
+        difference taken for its error.
         """
         open_ = self.finite & ~self.rounded & ~self.given_up
-        worst = self._worst(open_ & ~self.rough)[:AUDITED]
-        if self.problem.coefficients is None:
-            self._audit_rough(np.concatenate([worst, self._worst(open_ & self.rough)]))
-            return
-        last = np.full(worst.size, np.inf)
-        for turn in range(ROUNDS):
-            half = self.dt[worst] / 2.0
-            if not worst.size or (turn and self.work(worst, half) > self.left):
-                self.unpaid[worst] = True
-                return
-            self.left -= self.work(worst, half)
-            run = self.solve(worst, half)
-            self.dt[worst] = half
-            self.error[worst] = self.apart(run, part_of(self.best, worst))
-            missing = ~(self.error[worst] <= self.tol)
-            # Two resolutions may disagree about a stop: the finer one has the better view.
-            helps = (self.error[worst] <= 0.5 * last) & (np.isfinite(self.error[worst]) | (turn < 2))
-            bad = missing & helps & np.isfinite(run.y[-1]).all(axis=1)
-            put_into(self.best, worst[bad], run, bad)
-            worst, last = worst[bad], self.error[worst[bad]]
-
-    def _worst(self, which: NDArray[np.bool_]) -> Members:
-        """Trajectories in the order of their errors, largest first."""
-        members = np.flatnonzero(which)
-        return members[np.argsort(-self.error[members], kind="stable")]
-
-    def _audit_rough(self, who: Members) -> None:
-        """The same where the right-hand side may jump: one difference of two runs may be small by luck.
-
-        Two finer runs tell three. Where they do not fall as the order says, the largest is taken for the
-        error of the finest run, which is kept.
-        """
-        p = self.settings.method.order
+        who = self._worst(open_ & ~self.rough)[:AUDITED]
+        if self.jumps:
+            who = np.concatenate([who, self._worst(open_ & self.rough)])
         last = np.full(who.size, np.inf)
         for turn in range(ROUNDS):
             number = self._audited(who, turn)
             who, last = who[:number], last[:number]
-            if not who.size:
+            if not number:
                 return
-            half, finer = self.dt[who] / 2.0, self.dt[who] / FINER
-            self.left -= self.work(who, half) + self.work(who, finer)
-            middle, finest, best = self.solve(who, half), self.solve(who, finer), part_of(self.best, who)
-            first, between = self.apart(middle, best), self.apart(finest, middle)
-            error = np.maximum(first, self.apart(finest, best))
-            rough = ~(between <= np.maximum(ROUNDING, first * 0.5 ** (SMOOTH * p)))
-            error = np.where(rough, np.maximum(error, between), error)
+            best, own = part_of(self.best, who), self.dt[who] / 2.0
+            run = self.solve(who, own)
+            error, rough = self.apart(run, best), np.zeros(number, dtype=np.bool_)
+            if self.jumps:
+                own, middle, first = self.dt[who] / FINER, run, error
+                run = self.solve(who, own)
+                between, error = self.apart(run, middle), np.maximum(first, self.apart(run, best))
+                falls = 0.5 ** (SMOOTH * self.settings.method.order)
+                rough = ~(between <= np.maximum(ROUNDING, falls * first))
+                error = np.where(rough, np.maximum(error, between), error)
             self.error[who] = error
-            missing = ~(error <= self.tol)
-            finer_kept = (rough | missing) & np.isfinite(finest.y[-1]).all(axis=1)
-            put_into(self.best, who[finer_kept], finest, finer_kept)
-            self.dt[who[finer_kept]] = finer[finer_kept]
-            again = finer_kept & missing & (error <= 0.5 * last) & (np.isfinite(error) | (turn < 2))
+            missing, helps = ~(error <= self.tol), error <= 0.5 * last
+            # Two resolutions may disagree about a stop: the finer one has the better view.
+            helps &= np.isfinite(error) | (turn < 2)
+            kept = (rough | (missing & helps)) & np.isfinite(run.y[-1]).all(axis=1)
+            put_into(self.best, who[kept], run, kept)
+            self.dt[who[kept]] = own[kept]
+            again = kept & missing & helps
             who, last = who[again], error[again]
 
+    def _worst(self, which: Flags) -> Members:
+        """Trajectories in the order of their errors, largest first."""
+        members = np.flatnonzero(which)
+        return members[np.argsort(-self.error[members], kind="stable")]
+
     def _audited(self, who: Members, turn: int) -> int:
-        """How many of the trajectories, worst first, the budget gives two finer runs; some in any case."""
+        """How many of the trajectories, worst first, the budget gives finer runs; some in any case."""
         number = who.size
-        while number > (0 if turn else AUDITED):
+        while number:
             part = who[:number]
-            if self.work(part, self.dt[part] / 2.0) + self.work(part, self.dt[part] / FINER) <= self.left:
+            cost = self.work(part, self.dt[part] / 2.0)
+            cost += self.work(part, self.dt[part] / FINER) if self.jumps else 0.0
+            if cost <= self.left or (not turn and number <= AUDITED):
+                self.left -= cost
                 break
             self.unpaid[part[number // 2 :]] = True
             number //= 2
