@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
+import threading
 from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
@@ -43,7 +44,7 @@ def _write_once(path: Path, source: str) -> None:
         return
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        aside = path.with_suffix(f".{os.getpid()}.tmp")
+        aside = path.with_suffix(f".{os.getpid()}.{threading.get_ident()}.tmp")
         aside.write_text(source, encoding="utf-8")
         os.replace(aside, path)
     except OSError as error:

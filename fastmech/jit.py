@@ -8,6 +8,7 @@ by them.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from functools import wraps
 from typing import Any, TypeVar
@@ -91,8 +92,24 @@ def driver_signature(precision: Any, *method: Any) -> Any:
     )
 
 
+#: Held while numba's cache directory, one for the whole process, is the package's.
+_DIRECTORY_SET = threading.Lock()
+
+
 class _Kept(FunctionCache):
     """Numba's disk cache of a kernel, which keeps nothing once the package's sources have been edited."""
+
+    @classmethod
+    def of(cls, function: Any) -> _Kept:
+        """A kernel's, in the package's directory: numba looks where that is only here."""
+        settings: Any = numba_config
+        with _DIRECTORY_SET:
+            previous = settings.CACHE_DIR
+            settings.CACHE_DIR = str(cache_directory())
+            try:
+                return cls(function)
+            finally:
+                settings.CACHE_DIR = previous
 
     def save_overload(self, sig: Any, data: Any) -> None:
         if sources_unchanged():
@@ -103,24 +120,18 @@ def kernel(signature: Any, **options: Any) -> Callable[[F], Any]:
     """Compile a function for one explicit signature, without the interpreter's lock, kept on disk.
 
     Explicit signatures make the disk entry usable in every later process even where an argument is a
-    first-class function. The cache directory is set for this decoration only, so the user's own kernels
-    keep theirs.
+    first-class function. The user's own kernels keep their cache directory, and any thread may compile.
     """
 
     def decorate(function: F) -> Any:
         check()  # the one place where a command can stop between two compilations
         settings: Any = numba_config
-        previous = settings.CACHE_DIR
-        settings.CACHE_DIR = str(cache_directory())
-        try:
-            dispatcher = numba.njit(nogil=True, **FLAGS, **options)(function)
-            if not settings.DISABLE_JIT:
-                dispatcher._cache = _Kept(function)  # type: ignore[no-untyped-call]
-                dispatcher.compile(signature)
-                dispatcher.disable_compile()
-            return dispatcher
-        finally:
-            settings.CACHE_DIR = previous
+        dispatcher = numba.njit(nogil=True, **FLAGS, **options)(function)
+        if not settings.DISABLE_JIT:
+            dispatcher._cache = _Kept.of(function)
+            dispatcher.compile(signature)
+            dispatcher.disable_compile()
+        return dispatcher
 
     return decorate
 

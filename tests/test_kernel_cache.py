@@ -7,14 +7,17 @@ import os
 import shutil
 import subprocess
 import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import numba
 import numpy as np
 import pytest
+from numba import types
 
-from fastmech import kernel_cache
+from fastmech import jit, kernel_cache
 from fastmech.kernels.lagrange import lagrange_free
 
 pytestmark = pytest.mark.skipif(
@@ -228,3 +231,26 @@ def test_an_unchanged_touched_source_keeps_the_directory(
     before = kernel_cache.source_hash([source])
     os.utime(source, (1.0, 1.0))
     assert kernel_cache.source_hash([source]) == before
+
+
+def test_threads_that_compile_at_once_leave_the_setting_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(jit, "cache_directory", lambda: tmp_path)
+    before = numba.config.CACHE_DIR  # type: ignore[attr-defined]
+    together = threading.Barrier(4)
+
+    def compiled(_: int) -> Any:
+        def twice(x: float) -> float:
+            return 2.0 * x
+
+        together.wait()
+        return jit.kernel(types.float64(types.float64))(twice)
+
+    with ThreadPoolExecutor(4) as pool:
+        kernels = list(pool.map(compiled, range(8)))
+    after = numba.config.CACHE_DIR  # type: ignore[attr-defined]
+    assert after == before
+    for kernel in kernels:
+        assert kernel(2.0) == 4.0
+        assert Path(kernel.stats.cache_path).parent == tmp_path

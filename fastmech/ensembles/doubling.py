@@ -7,7 +7,7 @@ the best run that it has had, and an error that says so.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from fastmech.ensembles.calibration import CALM
 from fastmech.ensembles.ladder import AIM, CHEAP, Calibrated
 from fastmech.ensembles.lanes import VECTOR_LANES
+from fastmech.ensembles.places import part_of, put_into
 from fastmech.ensembles.problem import Problem
 from fastmech.ensembles.richardson import LEAST_ORDER, RATIO, ROUNDING, distances, error_beyond, order_seen
 from fastmech.ensembles.run import Progress
@@ -27,6 +28,7 @@ from fastmech.integrators.methods import find_method
 
 Floats = NDArray[np.float64]
 Members = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 #: Repetitions of trajectories at most.
 ROUNDS = 6
@@ -46,6 +48,9 @@ AUDITED = 64
 #: Share of the method's order that a trajectory must show to be taken for smooth again.
 SMOOTH = 2.0 / 3.0
 
+#: The second of two finer runs, where a right-hand side may jump, has steps so many times shorter.
+FINER = 2.0 * RATIO
+
 #: Right-hand sides that repetitions may take in those of the two first runs; CHEAP more are always allowed.
 BUDGET = 4.0
 
@@ -60,11 +65,23 @@ class Doubling:
     found: Calibrated
     tol: float
     threads: int | None
+    best: Solution = field(init=False)  #: each trajectory's best run
+    dt: Floats = field(init=False)  #: its steps [s], shape (n,) like all that follow
+    distance: Floats = field(init=False)  #: of the last two runs
+    error: Floats = field(init=False)  #: estimate for the best run
+    left: float = field(init=False)  #: right-hand sides that may still be taken
+    finite: Flags = field(init=False)  #: the start is
+    rough: Flags = field(init=False)  #: shows less than the method's order
+    once_rough: Flags = field(init=False)  #: has shown less
+    rounded: Flags = field(init=False)  #: rounding rules
+    given_up: Flags = field(init=False)
+    unpaid: Flags = field(init=False)  #: its shorter steps would exceed the budget
+    vain: Members = field(init=False)  #: shorter steps that have not halved the error
 
     def run(self, progress: Progress | None) -> tuple[Solution, Floats, str]:
         """The solution, errors (n,), and what is to be said about those beyond the tolerance."""
         settings, n = self.settings, len(self.starts)
-        self.finite = np.isfinite(self.starts).all(axis=1)
+        self.finite = np.asarray(np.isfinite(self.starts).all(axis=1))
         self.dt = np.full(n, float(settings.dt))
         self.best = solve(self.problem, self.starts, self.outputs, settings, self.threads, progress)
         everyone = np.arange(n)
@@ -72,8 +89,8 @@ class Doubling:
         self.distance = self.apart(self.best, coarse)
         self.error = self.distance * self.found.median
         self.rough, self.once_rough = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
-        if self.problem.coefficients is None:
-            # Nobody knows whether a user's right-hand side has jumps: a third run tells each one's order.
+        if self.jumps:
+            # A third run tells each one's order.
             third = self.apart(coarse, self.solve(everyone, self.dt * RATIO**2))
             self._reckon(everyone, third, self.distance, np.full(n, RATIO))
         self.left = CHEAP + BUDGET * self.work(everyone, self.dt / 2.0)
@@ -94,6 +111,11 @@ class Doubling:
     def settings(self) -> Settings:
         """What the calibration has found."""
         return self.found.settings
+
+    @property
+    def jumps(self) -> bool:
+        """Whether the right-hand side may jump: of a user's nobody knows."""
+        return self.problem.coefficients is None
 
     @cached_property
     def margin(self) -> float:
@@ -163,10 +185,10 @@ class Doubling:
         apart = np.empty(again.size)
         near = rungs == 1.0  # one step of the ladder up there is a run already
         far = np.flatnonzero(~near)
-        apart[near] = self.apart(_part(run, near), _part(self.best, again[near]))
+        apart[near] = self.apart(part_of(run, near), part_of(self.best, again[near]))
         if far.size:
             self.left -= self.work(again[far], own[far] * RATIO)
-            apart[far] = self.apart(_part(run, far), self.solve(again[far], own[far] * RATIO))
+            apart[far] = self.apart(part_of(run, far), self.solve(again[far], own[far] * RATIO))
         self._reckon(again, self.distance[again], apart, self.dt[again] / own)
         after = self.error[again]
         in_vain = ~(after <= 0.5 * error) | np.isinf(after)
@@ -175,9 +197,10 @@ class Doubling:
         rounded = in_vain & ((after < ROUNDING) | ((self.vain[again] > 1) & (after < MAGNIFIED)))
         # A rough one's earlier error may have been small by luck: the finer run has the better odds.
         better = ~(after > error) | (self.rough[again] & np.isfinite(run.y[-1]).all(axis=1))
-        _replace(self.best, again[better], run, better)
+        put_into(self.best, again[better], run, better)
         self.dt[again] = own
-        rounded &= ~self.rough[again]
+        # Where jumps are possible, luck looks like rounding.
+        rounded &= ~(self.once_rough if self.jumps else self.rough)[again]
         self.rounded[again[rounded]] = True
         self.given_up[again[(self.vain[again] >= PATIENCE) & ~rounded]] = True
 
@@ -197,32 +220,64 @@ class Doubling:
             error = self.apart(run, self.solve(which, own / RATIO, calm))
             better = error < self.error[which]
             self.error[which[better]] = error[better]
-            _replace(self.best, which[better], run, better)
+            put_into(self.best, which[better], run, better)
 
     def _audit(self) -> None:
         """Measure the errors of the worst trajectories by runs of half the step.
 
         Where one is above the tolerance the finer run is kept, and measured in its turn while that helps.
+        Where the right-hand side may jump, one difference of two runs may be small by luck. There two finer
+        runs tell three, and if these do not fall as the order says, the finest run is kept and the largest
+        difference taken for its error.
         """
-        settled = self.rounded | self.given_up | self.rough
-        open_ = np.flatnonzero(self.finite & ~settled)
-        worst = open_[np.argsort(-self.error[open_], kind="stable")[:AUDITED]]
-        last = np.full(worst.size, np.inf)
+        open_ = self.finite & ~self.rounded & ~self.given_up
+        who = self._worst(open_ & ~self.rough)[:AUDITED]
+        if self.jumps:
+            who = np.concatenate([who, self._worst(open_ & self.rough)])
+        last = np.full(who.size, np.inf)
         for turn in range(ROUNDS):
-            half = self.dt[worst] / 2.0
-            if not worst.size or (turn and self.work(worst, half) > self.left):
-                self.unpaid[worst] = True
+            number = self._audited(who, turn)
+            who, last = who[:number], last[:number]
+            if not number:
                 return
-            self.left -= self.work(worst, half)
-            run = self.solve(worst, half)
-            self.dt[worst] = half
-            self.error[worst] = self.apart(run, _part(self.best, worst))
-            missing = ~(self.error[worst] <= self.tol)
+            best, own = part_of(self.best, who), self.dt[who] / 2.0
+            run = self.solve(who, own)
+            error, rough = self.apart(run, best), np.zeros(number, dtype=np.bool_)
+            if self.jumps:
+                own, middle, first = self.dt[who] / FINER, run, error
+                run = self.solve(who, own)
+                between, error = self.apart(run, middle), np.maximum(first, self.apart(run, best))
+                falls = 0.5 ** (SMOOTH * self.settings.method.order)
+                rough = ~(between <= np.maximum(ROUNDING, falls * first))
+                error = np.where(rough, np.maximum(error, between), error)
+            self.error[who] = error
+            missing, helps = ~(error <= self.tol), error <= 0.5 * last
             # Two resolutions may disagree about a stop: the finer one has the better view.
-            helps = (self.error[worst] <= 0.5 * last) & (np.isfinite(self.error[worst]) | (turn < 2))
-            bad = missing & helps & np.isfinite(run.y[-1]).all(axis=1)
-            _replace(self.best, worst[bad], run, bad)
-            worst, last = worst[bad], self.error[worst[bad]]
+            helps &= np.isfinite(error) | (turn < 2)
+            kept = (rough | (missing & helps)) & np.isfinite(run.y[-1]).all(axis=1)
+            put_into(self.best, who[kept], run, kept)
+            self.dt[who[kept]] = own[kept]
+            again = kept & missing & helps
+            who, last = who[again], error[again]
+
+    def _worst(self, which: Flags) -> Members:
+        """Trajectories in the order of their errors, largest first."""
+        members = np.flatnonzero(which)
+        return members[np.argsort(-self.error[members], kind="stable")]
+
+    def _audited(self, who: Members, turn: int) -> int:
+        """How many of the trajectories, worst first, the budget gives finer runs; some in any case."""
+        number = who.size
+        while number:
+            part = who[:number]
+            cost = self.work(part, self.dt[part] / 2.0)
+            cost += self.work(part, self.dt[part] / FINER) if self.jumps else 0.0
+            if cost <= self.left or (not turn and number <= AUDITED):
+                self.left -= cost
+                break
+            self.unpaid[part[number // 2 :]] = True
+            number //= 2
+        return number
 
     def remark(self) -> str:
         """Why trajectories have missed the tolerance; empty where none has."""
@@ -242,23 +297,3 @@ class Doubling:
         }
         each = [f"{np.count_nonzero(which):,}: {why}" for why, which in causes.items() if which.any()]
         return f"; {np.count_nonzero(missed):,} of {missed.size:,} miss it ({'; '.join(each)})"
-
-
-def _part(solution: Solution, who: NDArray[np.int64] | NDArray[np.bool_]) -> Solution:
-    """Some of a solution's trajectories."""
-    s = solution
-    last = None if s.last is None else s.last[who]
-    return Solution(
-        s.y[:, who], s.records[:, who], s.status[who], s.steps[who], s.dt[:, who], s.failed[who], last
-    )
-
-
-def _replace(best: Solution, which: Members, run: Solution, part: NDArray[np.bool_]) -> None:
-    """Put some trajectories of a run into the places ``which`` of the solution."""
-    for old, new in ((best.y, run.y), (best.records, run.records), (best.dt, run.dt)):
-        old[:, which] = new[:, part]
-    best.status[which], best.steps[which] = run.status[part], run.steps[part]
-    best.failed[which] = run.failed[part]
-    if best.last is not None or run.last is not None:
-        best.last = best.y[-1].copy() if best.last is None else best.last
-        best.last[which] = (run.y[-1] if run.last is None else run.last)[part]

@@ -61,7 +61,7 @@ class Resumption:
         begin = reached[:, first - 1] if first else self.states(which)
         record = np.empty((which.size, STATE + dim))
         record[:, FINITE], record[:, TIME], record[:, STATE:] = 0.0, span.times[first], begin
-        observe = _in_single() if begin.dtype == np.float32 else observe_last_finite
+        observe = last_finite_observer(begin.dtype.type)
         seen = self.watched(rhs, observe, method, span.part(first, end), which, begin, record)
         return seen[:, TIME], seen[:, STATE:]
 
@@ -95,6 +95,11 @@ class Resumption:
         batch = again.batch(span, np.zeros(0))
         method.run(rhs, observe, batch)
         return again.rows(batch.record)
+
+
+def last_finite_observer(precision: Any) -> Any:
+    """:func:`observe_last_finite` for lanes of a precision."""
+    return _in_single() if precision is np.float32 else observe_last_finite
 
 
 @cache

@@ -11,8 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from fastmech.errors import InputError
+
 #: Modules whose contents are part of an installed version, not of the user's work.
-_FIXED = ("math", "cmath", "numpy", "fastmech", "builtins")
+FIXED = ("math", "cmath", "numpy", "fastmech", "builtins")
 
 _unknown = itertools.count()
 
@@ -26,8 +28,23 @@ def fingerprint(value: Any) -> str:
     return hashlib.sha256(_text(value, set()).encode()).hexdigest()[:16]
 
 
+def enclosed(function: types.FunctionType) -> dict[str, Any]:
+    """Variables of enclosing functions that a function uses, by name.
+
+    Raises:
+        InputError: one of them has no value.
+    """
+    found = {}
+    for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
+        try:
+            found[name] = cell.cell_contents
+        except ValueError:
+            raise InputError(f"{function.__name__}: uses {name}, which has no value yet") from None
+    return found
+
+
 def _text(value: Any, seen: set[int]) -> str:
-    value = getattr(value, "py_func", value)  # numba's dispatcher of a helper
+    value = getattr(value, "py_func", value)  # of what numba has compiled
     if value is None or isinstance(value, bool | int | float | complex | str | bytes):
         return repr(value)
     if isinstance(value, np.generic):
@@ -39,7 +56,7 @@ def _text(value: Any, seen: set[int]) -> str:
     if isinstance(value, tuple | list | frozenset):
         return f"{type(value).__name__}({','.join(_text(item, seen) for item in value)})"
     home = str(getattr(value, "__module__", None) or getattr(value, "__name__", ""))
-    if home.split(".")[0] in _FIXED:
+    if home.split(".")[0] in FIXED:
         return f"{getattr(value, '__module__', '')}.{getattr(value, '__name__', repr(value))}"
     if isinstance(value, types.FunctionType):
         return _function(value, seen)
@@ -50,7 +67,7 @@ def _function(function: types.FunctionType, seen: set[int]) -> str:
     if id(function) in seen:
         return function.__qualname__
     seen.add(id(function))
-    cells = [_text(cell.cell_contents, seen) for cell in function.__closure__ or ()]
+    cells = [_text(value, seen) for value in enclosed(function).values()]
     defaults = _text(function.__defaults__ or (), seen)
     return "|".join([_code(function.__code__, function.__globals__, seen), defaults, *cells])
 
@@ -70,7 +87,7 @@ def _code(code: types.CodeType, known: dict[str, Any], seen: set[int]) -> str:
 
 def _attributes(module: types.ModuleType, names: tuple[str, ...], seen: set[int]) -> str:
     """What code that mentions ``names`` can take from a module."""
-    if module.__name__.split(".")[0] in _FIXED:
+    if module.__name__.split(".")[0] in FIXED:
         return module.__name__
     used = {name: vars(module)[name] for name in names if name in vars(module)}
     return ",".join(f"{module.__name__}.{name}={_text(value, seen)}" for name, value in used.items())

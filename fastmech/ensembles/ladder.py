@@ -194,6 +194,7 @@ class Ladder:
         error = unseen(distances(fine, truth), distance, self.method.order)
         settings = replace(self.base, dt=self.dt(k))
         known = (distance > 0.0) & np.isfinite(distance) & np.isfinite(error)
+        known &= error > 0.0  # an error of exactly 0 tells no ratio: of x' = 1 most are
         if not known.any():
             return Calibrated(settings, reason, 1.0, 1.0, truth, distance, math.inf if len(error) else 0.0)
         ratios = error[known] / distance[known]

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dis
 import types
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import numba
 from numba.core.registry import CPUDispatcher
+
+from fastmech.ensembles.fingerprint import FIXED, enclosed
 
 #: Functions to be called in the place of others.
 Swaps = dict[Callable[[float], float], Callable[[float], float]]
@@ -27,6 +30,35 @@ def rebuilt(function: types.FunctionType, module: str, swaps: Swaps) -> types.Fu
 def reaches(function: types.FunctionType, swaps: Swaps) -> bool:
     """Whether a copy calls anything in the place of something else."""
     return _reaches(function, swaps, ())
+
+
+def raises(function: types.FunctionType) -> bool:
+    """Whether a function raises or asserts itself."""
+    return any(instruction.opname == "RAISE_VARARGS" for instruction in dis.get_instructions(function))
+
+
+def compiled_callees(function: types.FunctionType) -> Iterator[types.FunctionType]:
+    """Sources of the compiled functions that a function can call, directly or through one another."""
+    seen: set[tuple[int, frozenset[str]]] = set()  # another mention of a module may find more in it
+    reached: list[tuple[Any, set[str]]] = [(function, set())]
+    while reached:
+        value, mentioned = reached.pop()
+        if (id(value), frozenset(mentioned)) in seen:
+            continue
+        seen.add((id(value), frozenset(mentioned)))
+        if isinstance(value, types.ModuleType):
+            if value.__name__.split(".")[0] not in FIXED:
+                reached += [(vars(value)[name], mentioned) for name in mentioned & vars(value).keys()]
+            continue
+        if isinstance(value, CPUDispatcher):
+            dispatcher: Any = value
+            value = dispatcher.py_func
+            yield value
+        elif value is not function:
+            continue
+        mentioned = set(_names(value.__code__))
+        known = [value.__globals__[name] for name in mentioned & value.__globals__.keys()]
+        reached += [(item, mentioned) for item in [*known, *enclosed(value).values()]]
 
 
 def _reaches(function: Any, swaps: Swaps, above: tuple[Any, ...]) -> bool:
@@ -62,9 +94,9 @@ def _cell_changes(function: Any, module: str, swaps: Swaps, above: tuple[Any, ..
     """Variables of enclosing functions that a copy sees otherwise."""
     names = set(_names(function.__code__))
     found = {}
-    for number, cell in enumerate(function.__closure__ or ()):
-        other = _instead(cell.cell_contents, names, module, swaps, above)
-        if other is not cell.cell_contents:
+    for number, value in enumerate(enclosed(function).values()):
+        other = _instead(value, names, module, swaps, above)
+        if other is not value:
             found[number] = types.CellType(other)
     return found
 
@@ -83,11 +115,11 @@ def _instead(value: Any, names: set[str], module: str, swaps: Swaps, above: tupl
         if value is old:
             return new
     if isinstance(value, CPUDispatcher):
-        helper: Any = value
-        function = helper.py_func
-        if value in above or not helper._can_compile or not _reaches(function, swaps, (*above, value)):
+        dispatcher: Any = value
+        function = dispatcher.py_func
+        if value in above or not dispatcher._can_compile or not _reaches(function, swaps, (*above, value)):
             return value
-        return numba.jit(**helper.targetoptions)(_copy(function, module, swaps, (*above, value)))
+        return numba.jit(**dispatcher.targetoptions)(_copy(function, module, swaps, (*above, value)))
     if isinstance(value, types.ModuleType):
         return _module_instead(value, names, module, swaps, above)
     return value

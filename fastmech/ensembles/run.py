@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.ensembles.failing import Resumption
+from fastmech.ensembles.failing import Resumption, last_finite_observer
 from fastmech.ensembles.lanes import VECTOR_LANES, Lanes
 from fastmech.ensembles.spans import Span, Way, way
 from fastmech.ensembles.status import Status
@@ -152,7 +152,7 @@ def run_ensemble(
     if precision is np.float32:
         rhs, observe = in_single(rhs), import_module("fastmech.integrators.single").observe_nothing
         begin, own = begin.astype(precision), own.astype(precision)
-
+        last_finite_observer(precision)  # compiled here, not in a thread
     else:
         method = in_whole_steps(method, rhs)
     if block_lanes is None:
@@ -174,7 +174,7 @@ def run_ensemble(
             batch = lanes.batch(span, observation.params)
             given_up = method.run(rhs, observe, batch)
             piece, passed = piece + span.steps.size, passed + int(span.steps.sum())
-            ended = _ended(lanes, batch, given_up, observation.stops)
+            ended = _ended(lanes, batch, given_up, observation)
             if ended is not None:
                 if observation.locate and ended.stopped.any():
                     _locate(rhs, method, observation, before, span, batch, np.flatnonzero(ended.stopped))
@@ -252,18 +252,23 @@ def _locate(
     )
 
 
-def _ended(lanes: Lanes, batch: Batch, given_up: Floats | None, stops: bool) -> _Ended | None:
+def _ended(lanes: Lanes, batch: Batch, given_up: Floats | None, observation: Observation) -> _Ended | None:
     """Who has stopped or failed, nobody as a rule."""
     healthy = (given_up is None or bool(np.isnan(given_up).all())) and bool(np.isfinite(batch.Y).all())
-    if healthy and not stops:
+    if healthy and not observation.stops:
         return None
     n, now = lanes.members.size, lanes.rows(batch.Y).copy()
     stopped = np.zeros(n, dtype=np.bool_)
-    if stops:
-        stopped = np.asarray(lanes.rows(batch.record)[:, STOP_CODE] != 0.0)
+    failed = np.full(n, np.nan) if given_up is None else given_up.reshape(-1)[:n].copy()
+    if observation.stops:
+        record = lanes.rows(batch.record)
+        # A lane that has been given up waits for the call's end: what is seen of it meanwhile is no stop.
+        waiting = record[:, STOP_TIME] > failed
+        block, lane = np.divmod(np.flatnonzero(waiting), batch.record.shape[2])
+        batch.record[block, :, lane] = observation.record
+        stopped = np.asarray((record[:, STOP_CODE] != 0.0) & ~waiting)
         if healthy and not stopped.any():
             return None
-    failed = np.full(n, np.nan) if given_up is None else given_up.reshape(-1)[:n].copy()
     failed[stopped] = np.nan
     lost = np.flatnonzero(np.isnan(failed) & ~stopped & ~np.isfinite(now).all(axis=1))
     return _Ended(stopped, failed, lost, now)

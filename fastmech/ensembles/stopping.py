@@ -15,13 +15,12 @@ STOP_CODE, STOP_TIME, STOP_STATE = 0, 1, 2
 def note_stop(code: float, t: float, Y: NDArray[np.float64], record: NDArray[np.float64], i: int) -> None:
     """Keep code, time and state of lane ``i`` when its code is not zero for the first time.
 
-    A code that is NaN because the state is not finite stops nothing.
+    A state that is not finite stops nothing, whatever its code: the trajectory has failed before.
     """
-    if np.isnan(code):
+    if code != 0.0 and record[STOP_CODE, i] == 0.0:
         for d in range(Y.shape[0]):
             if not np.isfinite(Y[d, i]):
                 return
-    if code != 0.0 and record[STOP_CODE, i] == 0.0:
         record[STOP_CODE, i], record[STOP_TIME, i] = code, t
         for d in range(Y.shape[0]):
             record[STOP_STATE + d, i] = Y[d, i]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dis
 import inspect
 import types
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 
 from fastmech.ensembles import checks
 from fastmech.ensembles.fingerprint import fingerprint
-from fastmech.ensembles.rebuilding import reaches, rebuilt
+from fastmech.ensembles.rebuilding import compiled_callees, raises, reaches, rebuilt
 from fastmech.ensembles.refusals import explain, reason
 from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
@@ -132,6 +131,12 @@ class System:
     def _compiled(self) -> types.ModuleType:
         """The system's kernels, loaded from the disk cache where they are there."""
         functions: dict[str, Any] = {"rhs": self.rhs} | ({"stop": self.stop} if self.stop else {})
+        for field, function in functions.items():
+            for callee in filter(raises, compiled_callees(function)):
+                raise InputError(
+                    f"{field}: calls {callee.__name__}, which must not raise or assert; "
+                    "nan as a result ends a trajectory"
+                )
         swaps = {} if numba.config.DISABLE_JIT else WITHIN  # type: ignore[attr-defined]
         source = self._source(reaches(functions["rhs"], swaps))
         module = new_module("system", source, [fingerprint(function) for function in functions.values()])
@@ -209,5 +214,5 @@ def _check_function(field: str, function: Any, state: list[str], parameters: lis
     if not fits or any(one.kind is not one.POSITIONAL_OR_KEYWORD for one in given.values()):
         told = inspect.Signature([one.replace(annotation=one.empty) for one in given.values()])
         raise InputError(f"{field}: takes {told}, must take ({wanted})")
-    if any(instruction.opname == "RAISE_VARARGS" for instruction in dis.get_instructions(function)):
+    if raises(function):
         raise InputError(f"{field}: must not raise or assert; nan as a result ends a trajectory")

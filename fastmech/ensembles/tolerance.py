@@ -53,6 +53,18 @@ class Estimated:
     estimate: float  #: the quantile of the errors that was asked for
 
 
+@dataclass(frozen=True)
+class _Wanted:
+    """What is to be integrated, and whose error counts."""
+
+    problem: Problem
+    starts: Floats
+    outputs: Floats
+    usable: NDArray[np.int64]  #: starts that are finite
+    quantile: float
+    threads: int | None
+
+
 def solve_to_tolerance(
     problem: Problem,
     starts: Floats,
@@ -71,7 +83,8 @@ def solve_to_tolerance(
     if problem.observation.stops:
         problem = replace(problem, observation=replace(problem.observation, locate=True))
     usable = np.flatnonzero(np.isfinite(starts).all(axis=1))
-    sample = _sample(problem, starts, usable, SAMPLE_MAXIMUM if quantile == 1.0 else SAMPLE_QUANTILE)
+    wanted = _Wanted(problem, starts, outputs, usable, quantile, threads)
+    sample = _sample(wanted, SAMPLE_MAXIMUM if quantile == 1.0 else SAMPLE_QUANTILE)
     aim = quantile if quantile < 1.0 else TYPICAL
     part, begun = problem.part(sample), starts[sample]
     found = calibrate(part, begun, outputs, tol, aim, method, threads)
@@ -90,35 +103,25 @@ def solve_to_tolerance(
         ):
             settings = single
     solution = solve(problem, starts, outputs, settings, threads, progress)
-    error = _sampled_errors(
-        problem, starts, outputs, usable, sample, quantile, solution, settings, found, threads
-    )
+    error = _sampled_errors(wanted, sample, solution, settings, found)
     estimate = order_statistic(error, aim)
     remark = "" if estimate <= tol else f"; the {quantile:.3g} quantile misses it"
     return Estimated(solution, settings, found.reason + remark, None, estimate)
 
 
 def _sampled_errors(
-    problem: Problem,
-    starts: Floats,
-    outputs: Floats,
-    usable: NDArray[np.int64],
-    sample: NDArray[np.int64],
-    quantile: float,
-    solution: Solution,
-    settings: Settings,
-    found: Calibrated,
-    threads: int | None,
+    wanted: _Wanted, sample: NDArray[np.int64], solution: Solution, settings: Settings, found: Calibrated
 ) -> Floats:
     """Errors of a sample that is large enough for the quantile, by a run of half the step."""
-    size = min(math.ceil(BEYOND / (1.0 - quantile)), SAMPLE_MOST)
+    w = wanted
+    size = min(math.ceil(BEYOND / (1.0 - w.quantile)), SAMPLE_MOST)
     truth, distance = found.truth, found.distance
-    if size > sample.size and sample.size < usable.size:
-        sample = _sample(problem, starts, usable, size)
-        part, begun = problem.part(sample), starts[sample]
+    if size > sample.size and sample.size < w.usable.size:
+        sample = _sample(w, size)
+        part, begun = w.problem.part(sample), w.starts[sample]
         dt = np.asarray(found.settings.dt)
-        truth = solve(part, begun, outputs, replace(found.settings, dt=dt / 2.0), threads).y
-        longer = solve(part, begun, outputs, replace(found.settings, dt=dt * RATIO), threads).y
+        truth = solve(part, begun, w.outputs, replace(found.settings, dt=dt / 2.0), w.threads).y
+        longer = solve(part, begun, w.outputs, replace(found.settings, dt=dt * RATIO), w.threads).y
         distance = distances(solution.y[:, sample], longer)
     error = distances(solution.y[:, sample], truth)
     if settings.precision is np.float64:
@@ -128,12 +131,13 @@ def _sampled_errors(
     return error
 
 
-def _sample(problem: Problem, starts: Floats, usable: NDArray[np.int64], size: int) -> NDArray[np.int64]:
+def _sample(wanted: _Wanted, size: int) -> NDArray[np.int64]:
     """Evenly spaced groups of the trajectories, sorted by what bounds their speed."""
+    usable, coefficients = wanted.usable, wanted.problem.coefficients
     if usable.size <= size:
         return usable
-    if problem.coefficients is not None:
-        usable = usable[np.argsort(speed_bound(problem.coefficients, starts)[usable], kind="stable")]
+    if coefficients is not None:
+        usable = usable[np.argsort(speed_bound(coefficients, wanted.starts)[usable], kind="stable")]
     groups = size // NEIGHBOURS
     # Each group is from the middle of its share of them: the fastest count no more than the others.
     middle = (np.arange(groups) + 0.5) * usable.size / groups

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import fastmech as fm
 from fastmech.ensembles import run as running
 from fastmech.ensembles.problem import system_problem
 from fastmech.ensembles.run import Ensemble, run_ensemble
+from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
 from fastmech.integrators.batch import Batch
 from fastmech.integrators.methods import METHODS
 
@@ -170,3 +172,50 @@ def test_where_calls_end_does_not_matter(method: str, monkeypatch: pytest.Monkey
     assert 0 < np.count_nonzero(long.status) < 60
     for name in ("states", "status", "failed", "last"):
         np.testing.assert_array_equal(getattr(long, name), getattr(short, name))
+
+
+def late(t: float, y: float) -> float:
+    return 1.0 if t > 1.2 else 0.0
+
+
+def large(t: float, y: float) -> float:
+    return 2.0 if not y < 1e9 else 0.0
+
+
+@pytest.mark.parametrize("method", ["rk4", "ab6", "abm8", "radau5", "sdirk4"])
+@pytest.mark.parametrize("call_steps", [1, 10**6])
+def test_a_stop_after_a_failure_is_none(method: str, call_steps: int) -> None:
+    """y' = y^2 from 1 is over at t = 1; only the other two are there to be stopped at t > 1.2."""
+    p = system_problem(fm.System(square, ["y"], {}, stop=late), 3, {})
+    watched = replace(p.observation, call_steps=call_steps)
+    times = np.linspace(0.0, 3.0, 61)
+    run = run_ensemble(p.rhs, p.params, [[1.0], [0.1], [-1.0]], times, 0.01, METHODS[method], watched)
+    assert run.status[0] in (fm.Status.NOT_FINITE, fm.Status.NOT_CONVERGED)
+    assert run.status[1:].tolist() == [fm.Status.OK] * 2
+    assert run.records[STOP_CODE].tolist() == [0.0, 1.0, 1.0]
+    np.testing.assert_allclose(run.records[STOP_TIME, 1:], 1.21, atol=0.011)
+    np.testing.assert_allclose(run.failed[0], 1.0, atol=0.1)
+    assert np.isnan(run.failed[1:]).all()
+    assert np.isnan(run.states[-1, 0]).all()
+    np.testing.assert_allclose(run.states[-1, 1:, 0], run.records[STOP_STATE, 1:])
+
+
+@pytest.mark.parametrize("method", ["rk4", "ab6"])
+def test_no_code_stops_a_state_that_is_not_finite(method: str) -> None:
+    """From 1e200 the first step is infinite already, and its code is 2."""
+    run = fm.integrate(fm.System(square, ["y"], {}, stop=large), [[1e200], [0.1]], 0.5, 0.1, method)
+    assert run.status.tolist() == [fm.Status.NOT_FINITE, fm.Status.OK]
+    assert run.stop_code is not None
+    assert run.stop_code.tolist() == [0, 0]
+    assert run.last is not None
+    assert run.last[0, 0] == 1e200
+
+
+def test_runs_to_a_tolerance_do_not_stop_what_has_failed() -> None:
+    system = fm.System(square, ["y"], {}, stop=late)
+    run = fm.integrate(system, [[1.0], [0.1], [-1.0]], 3.0, tol=1e-6)
+    assert run.status.tolist() == [fm.Status.NOT_FINITE, fm.Status.OK, fm.Status.OK]
+    assert run.stop_code is not None
+    assert run.stop_time is not None
+    assert run.stop_code.tolist() == [0, 1, 1]
+    np.testing.assert_allclose(run.stop_time[1:], 1.2, rtol=1e-12)

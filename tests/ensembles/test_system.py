@@ -216,6 +216,55 @@ def test_whole_numbers_are_starts() -> None:
     np.testing.assert_array_equal(whole, real)
 
 
+def test_a_variable_without_a_value_is_refused_in_one_line() -> None:
+    def growing(t: float, x: float) -> tuple[float]:
+        return (rate * x,)
+
+    with pytest.raises(fm.InputError) as refusal:
+        fm.integrate(System(growing, ["x"], {}), [[1.0]], 1.0)
+    assert str(refusal.value) == "growing: uses rate, which has no value yet"
+    rate = 2.0
+    run = fm.integrate(System(growing, ["x"], {}), [[1.0]], 1.0)
+    np.testing.assert_allclose(run.y, math.exp(rate), rtol=1e-7)
+
+
+RAISING = """
+import types, numba
+
+@numba.njit
+def root(x):
+    if x < 0.0:
+        raise ValueError(x)
+    return x**0.5
+
+@numba.njit
+def half(x):
+    return 0.5 * root(x)
+
+own = types.ModuleType("own")
+own.half = half
+"""
+
+
+@pytest.mark.parametrize(
+    ("line", "field"),
+    [
+        ("def rhs(t, x): return (root(x),)", "rhs"),
+        ("def rhs(t, x): return (half(x),)", "rhs"),
+        ("def rhs(t, x): return (own.half(x),)", "rhs"),
+        ("def rhs(t, x): return (x,)\ndef stop(t, x): return half(x) > 2.0", "stop"),
+    ],
+)
+def test_no_function_that_is_called_may_raise(line: str, field: str) -> None:
+    """One trajectory's error would end all the others."""
+    names: dict[str, Any] = {}
+    exec(RAISING + line, names)
+    with pytest.raises(fm.InputError) as refusal:
+        fm.integrate(System(names["rhs"], ["x"], {}, names.get("stop")), [[1.0]], 1.0)
+    told = "calls root, which must not raise or assert; nan as a result ends a trajectory"
+    assert str(refusal.value) == f"{field}: {told}"
+
+
 CONSTANT_IN = {
     "a global number": "K = {k}\ndef rhs(t, x):\n    return (K * x,)\n",
     "a compiled helper": (

@@ -204,6 +204,75 @@ def test_the_only_output_may_be_the_start() -> None:
     assert run.error_estimate == 0.0
 
 
+def drift(t: float, x: float) -> tuple[float]:
+    return (1.0,)
+
+
+def ramp(t: float, x: float) -> tuple[float]:
+    return (t,)
+
+
+def turning(t: float, x: float, v: float) -> tuple[float, float]:
+    return v, 0.0
+
+
+@pytest.mark.parametrize("quantile", [0.9, 1.0])
+@pytest.mark.parametrize(
+    ("rhs", "states", "ends"),
+    [
+        (drift, ["x"], lambda y: y + 1.0),
+        (ramp, ["x"], lambda y: y + 0.5),
+        (turning, ["x", "v"], lambda y: y + y[:, [1, 1]] * np.array([1.0, 0.0])),
+    ],
+)
+def test_motions_that_any_method_has_exactly(rhs: Any, states: list[str], ends: Any, quantile: float) -> None:
+    """Most errors are 0, all are rounding: nothing can be told of their ratio to a distance."""
+    starts = np.random.default_rng(4).normal(size=(20, len(states)))
+    run = fm.integrate(fm.System(rhs, states, {}), starts, 1.0, tol=1e-5, quantile=quantile)
+    np.testing.assert_allclose(run.y[-1], ends(starts), rtol=0.0, atol=1e-12)
+    assert run.error_estimate is not None
+    assert run.error_estimate < 1e-12
+
+
+def switched(t: float, x: float, when: float) -> tuple[float]:
+    return (1.0 if t < when else -2.0,)
+
+
+def pushed(t: float, x: float, v: float, when: float) -> tuple[float, float]:
+    return v, -x + (1.0 if t < when else -1.0)
+
+
+def turned(y: Floats, t: float, force: float) -> Floats:
+    """A unit oscillator's state after time t under a constant force."""
+    x, v = y[:, 0] - force, y[:, 1]
+    return np.stack([force + x * math.cos(t) + v * math.sin(t), v * math.cos(t) - x * math.sin(t)], axis=1)
+
+
+@pytest.mark.parametrize(("tol", "times"), [(1e-3, 100), (1e-5, 20)])
+@pytest.mark.parametrize(
+    ("rhs", "states", "ends"),
+    [
+        (switched, ["x"], lambda y, when: y + when - 2.0 * (1.0 - when)),
+        (pushed, ["x", "v"], lambda y, when: turned(turned(y, when, 1.0), 1.0 - when, -1.0)),
+    ],
+)
+def test_a_jump_common_to_all_is_no_matter_of_luck(
+    rhs: Any, states: list[str], ends: Any, tol: float, times: int
+) -> None:
+    """Where in a step all trajectories jump is the same, so nobody's error makes up for another's."""
+    system, starts = fm.System(rhs, states, {"when": 0.5}), np.linspace(0.6, 1.4, 10 * len(states))
+    starts = starts.reshape(10, -1)
+    shares, false = [], 0
+    for when in np.random.default_rng(3).uniform(0.1, 0.9, times):
+        run = fm.integrate(system, starts, 1.0, tol=tol, parameters={"when": np.full(10, when)})
+        assert run.error_estimate is not None
+        true = np.abs(run.y[-1] - ends(starts, when)).max()
+        shares.append(true / run.error_estimate)
+        false += run.error_estimate <= tol < true
+    assert np.mean(np.array(shares) > 3.0) <= 0.05
+    assert false <= 0.05 * times
+
+
 def test_progress_counts_every_trajectory_once() -> None:
     told: list[int] = []
     fm.integrate(Scene(), rest_starts(30), 1.0, tol=1e-6, progress=told.append)
