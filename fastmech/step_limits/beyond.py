@@ -7,8 +7,8 @@ of the run. Growth below that does not show: a method's region may end by 1e-9 a
 thousands of such steps are still right to many digits.
 
 An Adams method has roots that stand for no mode. They multiply its errors, not the motion, and count from a
-growth by :data:`SPURIOUS` in all steps of the run; the amplification is that at the start or at the end, so
-that of a motion to and fro it is a sample.
+growth by :data:`SPURIOUS` in all steps of the run: at the start, at the end, and, of a scene whose parameters
+all share, at its minima, about which damped motion goes to and fro.
 
 Modes that decay by less than 1e-6 a radian (:data:`fastmech.step_limits.predict.GROWTH_PER_RADIAN`) count as
 undamped, and of undamped motion its energy tells whether it has grown, which is the better judge. Each
@@ -31,7 +31,7 @@ from fastmech.integrators.method import Adams, Method
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.scene import Scene
-from fastmech.step_limits.amplification import amplifies, principal_root
+from fastmech.step_limits.amplification import amplification, amplifies, principal_root
 from fastmech.step_limits.impulse import impulse_limit
 from fastmech.step_limits.local import eigenvalue_bound, eigenvalues, state_matrices, time_near
 from fastmech.step_limits.predict import GROWTH_PER_RADIAN, UNDAMPED, is_stable, stable_step
@@ -46,8 +46,8 @@ from fastmech.step_limits.warning import (
 
 Floats = NDArray[np.float64]
 
-#: Growth of an Adams method's errors in a run that counts: one of 1e-12, as rounding makes, becomes 1 %.
-SPURIOUS = 1e10
+#: Growth of an Adams method's errors in a run that counts: those of its starter are far above rounding.
+SPURIOUS = 1e4
 
 #: Trajectories judged at once: what is computed on the way stays in the caches.
 AT_ONCE = 2**14
@@ -132,7 +132,19 @@ def steps_beyond(
     if ends is not None:
         left: Any = c.force * np.exp(-c.decay * taken.until)
         beyond |= _grows_there(formula, c._replace(force=left), ends, taken)
+    if isinstance(formula, Adams) and not own:
+        beyond |= _errors_grow_at_rest(formula, scene, taken)
     return beyond
+
+
+def _errors_grow_at_rest(method: Adams, scene: Scene, taken: StepsTaken) -> NDArray[np.bool_]:
+    """Whether errors (n,) grow at the scene's minima, over all steps, by a root that stands for no mode."""
+    resting = scene_eigenvalues(scene)[0]
+    damped = resting[resting.real < -GROWTH_PER_RADIAN * np.abs(resting)]
+    growth = np.zeros(len(taken.longest))
+    for dt in np.unique(taken.longest) if damped.size else ():
+        growth[taken.longest == dt] = np.log(np.max(amplification(method, dt * damped)))
+    return np.asarray(growth * taken.number > np.log(SPURIOUS))
 
 
 def warn_of_steps(
