@@ -3,9 +3,8 @@
 A lane's result depends on its own start and parameters alone: the same bits for any threads and blocks.
 
 Trajectories that have stopped or failed make room: the others of a task move up into full blocks, and a
-task's end, when few are left, runs in narrow ones. New trajectories join with the next task, not in the
-middle of one, because lanes of a block share their time: of the Lorenz case, of which 82 % stop all over the
-run, 92 % of all lane steps are wanted ones.
+task's end, when few are left, runs in narrow ones. New ones join with the next task, as lanes of a block
+share their time: of the Lorenz case, of which 82 % stop on the way, 92 % of all lane steps are wanted ones.
 """
 
 from __future__ import annotations
