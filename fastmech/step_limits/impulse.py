@@ -6,10 +6,13 @@ impulse: RK4 at h alpha = 1e4 takes the first node's share, h F0 / 6.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Adams, Method, RungeKutta
+from fastmech.integrators.methods import METHODS
 from fastmech.step_limits.crossing import first_crossing
 
 #: Relative error of the impulse that a step may make.
@@ -37,4 +40,11 @@ def impulse_ratio(method: Method, x: float) -> float:
 
 def impulse_limit(method: Method) -> float:
     """Largest h alpha up to which the impulse is right to :data:`TOLERATED`."""
+    return _limit_of(method.name)
+
+
+@cache
+def _limit_of(name: str) -> float:
+    """The same by the registry's name: every run asks for it."""
+    method = METHODS[name]
     return first_crossing(lambda x: abs(impulse_ratio(method, x) - 1.0) - TOLERATED, 1e-3, 1e3)
