@@ -44,7 +44,7 @@ class ImplicitRungeKutta(OneStep):
             (blocks, lanes): NaN, or the time [s] at which Newton's iteration no longer converged; such a lane
             keeps the state that it had then.
         """
-        # Their kernels are loaded when a run first needs them: importing the package takes a quarter less.
+        # Their kernels are loaded when a run first needs them: a first result comes sooner.
         drive = import_module("fastmech.integrators.implicit").integrate_implicit_block
         newton = import_module("fastmech.integrators.newton")
         kind = newton.SECOND_ORDER if self.second_order else newton.GENERAL

@@ -1,8 +1,8 @@
 """Whole steps of a Runge-Kutta method in one loop over lanes, for the methods that run most.
 
-Stage by stage, a step reads and writes its stages' derivatives in memory, a fifth of its time. Here all
-stages of a lane are local numbers: the loop's source is made from the tableau, once for each combination of
-terms, and compiled when a run first asks for it.
+Stage by stage, a step reads and writes its stages' derivatives in memory. Here all stages of a lane are local
+numbers: the loop's source is made from the tableau, once for each combination of terms, and compiled when a
+run first asks for it. ``fastmech bench`` shows the engine beside a hand-fused loop.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from fastmech.generated import new_module, run_module
 from fastmech.kernels import lagrange
 
 #: Methods that have whole steps: the fourth order that everybody knows and the best of order 8. Each costs a
-#: second or three of compilation for each combination of terms, on first use.
+#: compilation for each combination of terms, on first use.
 METHODS = ("rk4", "dop853")
 
 

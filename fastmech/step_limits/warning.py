@@ -29,7 +29,7 @@ SIDE = 24
 #: Angle [rad] within which eigenvalues of the same direction are told by their largest alone.
 DIRECTION = 0.03
 
-#: Newton iterations from the grid to a minimum: twice what the flattest of 10,000 random scenes took.
+#: Newton iterations from the grid to a minimum: a few are enough, flat minima take more.
 DESCENTS = 40
 
 #: Growth a step that is let pass where a motion only crosses the configurations that set the limit.
@@ -84,7 +84,7 @@ def _descended(scene: Scene, force: float, q: Floats) -> Floats:
     """Where configurations ``q`` (n, 2) come to by Newton's method, with curvatures taken as positive.
 
     It goes down from everywhere (Nocedal, Wright, *Numerical Optimization*, section 3.4), at most a step of
-    the grid at a time. (To import SciPy's minimizer takes a sixth of the time to a first result.)
+    the grid at a time. (SciPy's minimizer would have to be imported before every first result.)
     """
     for _ in range(DESCENTS):
         curvature, axes = np.linalg.eigh(potential_hessian(scene, q, force))
