@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from fastmech.ensembles.spans import Span
 from fastmech.integrators.batch import PHASE, Batch
+from fastmech.integrators.sums import CACHE_LINE
 
 Floats = NDArray[np.float64]
 
@@ -15,6 +16,22 @@ VECTOR_LANES = 16
 
 #: Share of the lanes that must have ended before the others move up: moving costs a copy of all.
 WORTH_MOVING = 0.125
+
+
+def rows_at(values: Floats, which: NDArray[np.int64]) -> Floats:
+    """Rows of an array (n, count); no copies where all rows are one (:func:`numpy.broadcast_to`)."""
+    if values.strides[0] == 0:
+        return np.broadcast_to(values[:1], (which.size, values.shape[1]))
+    return values[which]
+
+
+def _on_lines(values: Floats) -> Floats:
+    """A copy in C order whose rows begin on lines of the cache: no vector lies on two."""
+    memory = np.empty(values.nbytes + CACHE_LINE, dtype=np.uint8)
+    first = -memory.ctypes.data % CACHE_LINE
+    copy = memory[first : first + values.nbytes].view(values.dtype).reshape(values.shape)
+    copy[...] = values
+    return copy
 
 
 class Lanes:
@@ -50,7 +67,7 @@ class Lanes:
         width = -(-n // (blocks * VECTOR_LANES)) * VECTOR_LANES
         lanes = np.minimum(np.arange(blocks * width), n - 1)
         self.Y, self.params, self.record, self.memory = (
-            np.ascontiguousarray(a[lanes].reshape(blocks, width, a.shape[1]).transpose(0, 2, 1))
+            _on_lines(rows_at(a, lanes).reshape(blocks, width, a.shape[1]).transpose(0, 2, 1))
             for a in (states, params, record, memory)
         )
 

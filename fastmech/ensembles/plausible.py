@@ -66,9 +66,10 @@ def breaks_energy_bounds(c: Coefficients, start: Floats, final: Floats) -> NDArr
 
 def energy(c: Coefficients, y: Floats, force: Floats) -> tuple[Floats, Floats]:
     """T + Pi - F x2 over m2 l^2 of states (n, 4), and the scale to compare it with: sum of its terms."""
-    phi, theta, phi_dot, theta_dot = y.T
+    phi, theta, phi_dot, theta_dot = np.ascontiguousarray(y.T)
     with np.errstate(invalid="ignore", over="ignore"):  # what is not finite has a status of its own
-        s1, c1, s2, c2, s12 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta), np.sin(phi + theta)
+        s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
+        s12 = s1 * c2 + c1 * s2
         k, _ = slider_ratio(s1, c1)
         a11 = metric_11(c.mass, c.slider, k)
         kinetic = 0.5 * (a11 * phi_dot**2 + theta_dot**2) + s12 * phi_dot * theta_dot

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.ensembles.failing import Resumption, last_finite_observer
-from fastmech.ensembles.lanes import VECTOR_LANES, Lanes
+from fastmech.ensembles.lanes import VECTOR_LANES, Lanes, rows_at
 from fastmech.ensembles.spans import Span, Way, way
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
@@ -165,7 +165,7 @@ def run_ensemble(
     def run_task(task: _Task) -> int:
         members, piece, passed = task.members, 0, 0
         memory = np.zeros((members.size, method.carried * begin.shape[1]), dtype=begin.dtype)
-        lanes = Lanes(members, begin[members], own[members], observation.record, block_lanes, memory)
+        lanes = Lanes(members, begin[members], rows_at(own, members), observation.record, block_lanes, memory)
         while piece < task.way.steps.size and lanes.members.size and not interrupted.is_set():
             check()
             span, before = task.way.span(piece, most_steps(lanes, passed)), Resumption(lanes)

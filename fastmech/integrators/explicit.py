@@ -94,5 +94,6 @@ def integrate_blocks(
             h = (times[j + 1] - times[j]) / max(steps[j], 1)
             for step in range(steps[j]):
                 one_step(rhs, times[j] + step * h, h, start, stage, weight, nodes, state, own, K, Z)
-                observe(times[j] + (step + 1) * h, state, observer_params, kept)
+                if kept.size:
+                    observe(times[j] + (step + 1) * h, state, observer_params, kept)
             out[b, j] = state

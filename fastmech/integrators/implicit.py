@@ -162,6 +162,7 @@ def integrate_implicit_block(
                     moved = Y[x, i] + total
                     comp[x, i] = total - (moved - Y[x, i])
                     Y[x, i] = moved if alive[i] > 0.0 else Y[x, i]
-            observe(times[j] + (step + 1) * h, Y, observer_params, record)
+            if record.size:
+                observe(times[j] + (step + 1) * h, Y, observer_params, record)
         out[j] = Y
     phase[0] = previous

@@ -108,7 +108,8 @@ def integrate_multistep_blocks(
                         add_correction(y, w, k_flat[0], h * corrector[0])
                     else:
                         add_stages(y, None, f, h, row, predictor, 0, rows)
-                observe(times[j] + (step + 1) * h, state, observer_params, kept)
+                if kept.size:
+                    observe(times[j] + (step + 1) * h, state, observer_params, kept)
             out[b, j] = state
         history[:] = f
     phase[0], phase[1], phase[2] = known, newest, last

@@ -15,7 +15,7 @@ from fastmech.integrators.explicit import TABLEAU, BlockRHS, Observer, one_step
 from fastmech.integrators.method import Method, RungeKutta
 from fastmech.integrators.sums import rows_of
 from fastmech.jit import STEP, driver_signature, inlined, kernel
-from fastmech.kernels.whole_steps import whole_step
+from fastmech.kernels.whole_steps import is_far, whole_step
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -34,14 +34,17 @@ def redo(
     now: Floats,
     then: Floats,
     params: Floats,
-    far: Floats,
 ) -> None:
-    """The step once more, stage by stage, for lanes that are ``far`` out: one by one."""
+    """The step once more, stage by stage, for lanes that are far out: one by one.
+
+    Not for those that were lost before: nothing changes them.
+    """
     dim, stages = now.shape[0], nodes.shape[0]
     y, own = np.empty((dim, 1)), np.empty((params.shape[0], 1))
     K, Z = np.empty((stages, dim, 1)), np.empty((dim, 1))
     for i in range(now.shape[1]):
-        if far[i] != 0.0:
+        lost = 0.0 * (now[0, i] + now[1, i] + now[2, i] + now[3, i]) != 0.0
+        if not lost and is_far(now, i, h) | is_far(then, i, h):
             y[:, 0], own[:, 0] = now[:, i], params[:, i]
             one_step(rhs, t, h, start, stage, weight, nodes, y, own, K, Z)
             then[:, i] = y[:, 0]
@@ -70,18 +73,22 @@ def integrate_whole_steps(
     between the block and a second one: a copy would cost as much as a stage.
     """
     dim, lanes = Y.shape[1], Y.shape[2]
-    work = np.empty((nodes.shape[0] + 1, lanes))
+    work = rows_of(Y[0, 0], nodes.shape[0]).reshape((nodes.shape[0], lanes))
     other = rows_of(Y[0], 1).reshape((dim, lanes))
     for b in range(Y.shape[0]):
         now, then, own, kept = Y[b], other, params[b], record[b]
         for j in range(steps.shape[0]):
             h = (times[j + 1] - times[j]) / max(steps[j], 1)
+            some_far = True  # nothing is known of where a piece begins
             for k in range(steps[j]):
                 t = times[j] + k * h
-                if step(t, h, now, then, own, work):
-                    redo(rhs, t, h, start, stage, weight, nodes, now, then, own, work[-1])
+                reaches_far = step(t, h, now, then, own, work) != 0
+                if some_far | reaches_far:
+                    redo(rhs, t, h, start, stage, weight, nodes, now, then, own)
+                some_far = reaches_far
                 now, then = then, now
-                observe(times[j] + (k + 1) * h, now, observer_params, kept)
+                if kept.size:
+                    observe(times[j] + (k + 1) * h, now, observer_params, kept)
             out[b, j] = now
         if steps.sum() % 2:
             Y[b] = other

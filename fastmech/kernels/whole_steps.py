@@ -11,12 +11,25 @@ from collections.abc import Sequence
 from functools import cache
 from typing import Any, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fastmech.generated import new_module, run_module
+from fastmech.jit import inlined
 from fastmech.kernels import lagrange
+from fastmech.kernels.sincos import REDUCTION_LIMIT
+
+#: Angles [rad], and turns of an angle in a step [rad], within which no stage of a step leaves the range of
+#: the fast trigonometry: no row of a tableau here has weights whose sizes sum to 100. (A stage much faster
+#: than both ends of its step could: that is a step for nothing.)
+FARTHEST, TURNED = 0.5 * REDUCTION_LIMIT, 0.004 * REDUCTION_LIMIT
 
 #: Methods that have whole steps: the fourth order that everybody knows and the best of order 8. Each costs a
 #: compilation for each combination of terms, on first use.
 METHODS = ("rk4", "dop853")
+
+
+Floats = NDArray[np.float64]
 
 
 class Formula(Protocol):
@@ -43,18 +56,19 @@ _HEAD = '''"""Made by fastmech: a step of {name} of Lagrange's equations, all st
 
 from fastmech.jit import STEP_SIGNATURE, kernel
 from fastmech.kernels.blocks import DAMPING, DECAY, FORCE, write_decay
-from fastmech.kernels.sincos import REDUCTION_LIMIT, sincos
+from fastmech.kernels.sincos import sincos
+from fastmech.kernels.whole_steps import FARTHEST, TURNED
 from fastmech.mechanism.equations import lagrange_accelerations
 
 
 @kernel(STEP_SIGNATURE)
 def step(t, h, Y, Z, p, work):
     beyond = 0
+    turn = FARTHEST / TURNED * h
 {decay}    for i in range(Y.shape[1]):
         phi0, theta0, phi_dot0, theta_dot0 = Y[0, i], Y[1, i], Y[2, i], Y[3, i]
         mass, slider, lift, spring, gravity = p[0, i], p[1, i], p[2, i], p[3, i], p[4, i]
         force, damping = {force}, {damping}
-        reach = 0.0
 '''
 
 _DECAY = """    write_decay(t + {c!r} * h, p, DECAY, work[{s}:])
@@ -63,8 +77,6 @@ _DECAY = """    write_decay(t + {c!r} * h, p, DECAY, work[{s}:])
 _STAGE = """
         s1, c1 = sincos(phi{s})
         s2, c2 = sincos(theta{s})
-        reach += phi{s} * phi{s}
-        reach += theta{s} * theta{s}
         a{s}, b{s} = lagrange_accelerations(
             s1, c1, s2, c2, phi_dot{s}, theta_dot{s}, mass, slider, lift, spring, gravity, {push}, damping
         )
@@ -72,10 +84,9 @@ _STAGE = """
 
 _TAIL = """
         Z[0, i], Z[1, i], Z[2, i], Z[3, i] = phi{s}, theta{s}, phi_dot{s}, theta_dot{s}
-        finite = 0.0 * (phi0 + theta0 + phi_dot0 + theta_dot0) == 0.0
-        far = (reach > REDUCTION_LIMIT * REDUCTION_LIMIT) | ((reach != reach) & finite)
-        work[{s}, i] = far
-        beyond |= far
+        turned, bent = turn * phi_dot{s}, turn * theta_dot{s}
+        reach = phi{s} * phi{s} + theta{s} * theta{s} + turned * turned + bent * bent
+        beyond |= not reach < 0.5 * FARTHEST * FARTHEST
     return beyond
 """
 
@@ -106,16 +117,25 @@ def _sum(row: Sequence[float], rate: str) -> str:
 def whole_step(rhs: Any, tableau: Formula) -> Any:
     """``step(t, h, Y, Z, p, work)`` of a block right-hand side and a method, ``None`` where there is none.
 
-    It writes the states (dim, lanes) after a step from ``Y`` into ``Z``, with ``work`` (stages + 1, lanes) as
-    scratch. Where an angle at any stage may have left the range of the fast trigonometry (the squares of all
-    of them are summed: one instruction an angle; NaN counts in the step that made it) it says so: by a result
-    that is not 0, and by the last row of ``work`` for the lanes concerned, whose new states are not to be
-    used.
+    It writes the states (dim, lanes) after a step from ``Y`` into ``Z``, with ``work`` (stages, lanes) as
+    scratch. The result is not 0 where a new state may be :func:`is_far`, or is not finite: a sum of squares
+    tells it of a block in a few instructions. Steps from or to states that are far are not to be used.
     """
     name = getattr(rhs, "__name__", "")
     if tableau.name not in METHODS or rhs is not getattr(lagrange, name, None):
         return None
     return _compiled(source(tableau, name.removeprefix("lagrange_")))
+
+
+@inlined
+def is_far(Y: Floats, i: int, h: float) -> bool:
+    """Whether a step h [s] from or to a lane's state may need angles beyond the fast trigonometry.
+
+    NaN counts. Comparisons only: a lane's verdict is the same in any compiled code.
+    """
+    near = (abs(Y[0, i]) <= FARTHEST) & (abs(Y[1, i]) <= FARTHEST)
+    slow = (h * abs(Y[2, i]) <= TURNED) & (h * abs(Y[3, i]) <= TURNED)
+    return not (near & slow)
 
 
 @cache
