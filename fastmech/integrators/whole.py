@@ -11,7 +11,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from fastmech.integrators.batch import Batch
-from fastmech.integrators.explicit import TABLEAU, BlockRHS, Observer, one_step
+from fastmech.integrators.explicit import TABLEAU, BlockRHS, Observer
 from fastmech.integrators.method import Method, RungeKutta
 from fastmech.integrators.sums import rows_of
 from fastmech.jit import STEP, driver_signature, inlined, kernel
@@ -37,16 +37,22 @@ def redo(
 ) -> None:
     """The step once more, stage by stage, for lanes that are far out: one by one.
 
-    Not for those that were lost before: nothing changes them.
+    Not for those that were lost before: nothing changes them. (The sums are plain loops: those of
+    :func:`fastmech.integrators.explicit.one_step` would take longer to compile than all the rest.)
     """
     dim, stages = now.shape[0], nodes.shape[0]
-    y, own = np.empty((dim, 1)), np.empty((params.shape[0], 1))
-    K, Z = np.empty((stages, dim, 1)), np.empty((dim, 1))
+    own, y, K = np.empty((params.shape[0], 1)), np.empty((dim, 1)), np.empty((stages, dim, 1))
     for i in range(now.shape[1]):
         lost = 0.0 * (now[0, i] + now[1, i] + now[2, i] + now[3, i]) != 0.0
         if not lost and is_far(now, i, h) | is_far(then, i, h):
-            y[:, 0], own[:, 0] = now[:, i], params[:, i]
-            one_step(rhs, t, h, start, stage, weight, nodes, y, own, K, Z)
+            own[:, 0] = params[:, i]
+            for s in range(stages + 1):
+                for d in range(dim):
+                    y[d, 0] = now[d, i]
+                    for k in range(start[s], start[s + 1]):
+                        y[d, 0] += h * weight[k] * K[stage[k], d, 0]
+                if s < stages:
+                    rhs(t + nodes[s] * h, y, K[s], own)
             then[:, i] = y[:, 0]
 
 
