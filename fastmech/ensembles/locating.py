@@ -21,7 +21,8 @@ from fastmech.ensembles.run import Observation
 from fastmech.ensembles.spans import Span
 from fastmech.ensembles.stopping import STOP_CODE, STOP_TIME
 from fastmech.integrators.batch import PHASE
-from fastmech.integrators.explicit import TABLEAU, integrate_blocks
+from fastmech.integrators.driver import TABLEAU
+from fastmech.integrators.explicit import integrate_blocks
 from fastmech.integrators.implicit import integrate_implicit_block
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Adams, Method

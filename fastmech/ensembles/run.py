@@ -26,7 +26,7 @@ from fastmech.ensembles.status import Status
 from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
 from fastmech.ensembles.threads import in_threads, thread_count
 from fastmech.integrators.batch import Batch
-from fastmech.integrators.explicit import observe_nothing
+from fastmech.integrators.driver import observe_nothing
 from fastmech.integrators.method import Method
 from fastmech.integrators.whole import in_whole_steps
 from fastmech.interrupts import check

@@ -9,7 +9,7 @@ import numpy as np
 from fastmech.hardcases.case import Floats
 from fastmech.hardcases.walk import Goal
 from fastmech.integrators.batch import Batch
-from fastmech.integrators.explicit import observe_nothing
+from fastmech.integrators.driver import observe_nothing
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.methods import METHODS
 from fastmech.integrators.tableaus.implicit import IMPLICIT_TABLEAUS

@@ -1,36 +1,16 @@
 """Driver of explicit Runge-Kutta methods with a fixed step over blocks of lanes.
 
-The driver knows neither the mechanism nor the method: a block right-hand side and an observer come as
-first-class functions (one indirect call a stage and block), the tableau as arrays.
+The driver knows neither the mechanism nor the method: right-hand side and observer come as functions, the
+tableau as arrays.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
+from fastmech.integrators.driver import TABLEAU, BlockRHS, Floats, Integers, Observer
 from fastmech.integrators.sums import add_stages, rows_of
-from fastmech.jit import (
-    INTEGERS,
-    OBSERVER_SIGNATURE,
-    VECTOR,
-    driver_signature,
-    inlined,
-    kernel,
-)
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-BlockRHS = Callable[[float, Floats, Floats, Floats], None]
-Observer = Callable[[float, Floats, Floats, Floats], None]
-
-
-@kernel(OBSERVER_SIGNATURE)
-def observe_nothing(t: float, Y: Floats, params: Floats, record: Floats) -> None:
-    """The observer of runs that keep nothing but states."""
+from fastmech.jit import driver_signature, inlined, kernel
 
 
 @inlined
@@ -58,10 +38,6 @@ def one_step(
         add_stages(z, y, k_flat, h, stage, weight, int(start[s]), int(start[s + 1]))
         rhs(t + nodes[s] * h, Z, K[s], own)
     add_stages(y, None, k_flat, h, stage, weight, int(start[stages]), int(start[stages + 1]))
-
-
-#: Types of a packed tableau: start, stage, weight, nodes.
-TABLEAU = (INTEGERS, INTEGERS, VECTOR, VECTOR)
 
 
 @kernel(driver_signature(types.float64, *TABLEAU))

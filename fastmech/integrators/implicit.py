@@ -14,7 +14,7 @@ import numpy as np
 from numba import types
 
 from fastmech.integrators.batch import ROUNDED_TIME
-from fastmech.integrators.explicit import BlockRHS, Floats, Integers, Observer
+from fastmech.integrators.driver import BlockRHS, Floats, Integers, Observer
 from fastmech.integrators.newton import combine, newton_inverses
 from fastmech.integrators.stages import solve_stages
 from fastmech.jit import CUBE, INTEGERS, JACOBIAN, MATRIX, OBSERVER, RHS, VECTOR, kernel

@@ -13,7 +13,7 @@ import numpy as np
 from numba import types
 
 from fastmech.integrators.batch import ROUNDED_TIME
-from fastmech.integrators.explicit import (
+from fastmech.integrators.driver import (
     TABLEAU,
     BlockRHS,
     Floats,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from numba import types
 
-from fastmech.integrators.explicit import BlockRHS, Floats
+from fastmech.integrators.driver import BlockRHS, Floats
 from fastmech.jit import CUBE, JACOBIAN, MATRIX, RHS, VECTOR, kernel
 
 #: Where the Jacobian comes from.

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.integrators.explicit import BlockRHS, Floats
+from fastmech.integrators.driver import BlockRHS, Floats
 from fastmech.integrators.newton import apply_complex, apply_real, combine, newton_inverses
 from fastmech.jit import inlined
 

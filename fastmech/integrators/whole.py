@@ -11,7 +11,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from fastmech.integrators.batch import Batch
-from fastmech.integrators.explicit import TABLEAU, BlockRHS, Observer
+from fastmech.integrators.driver import TABLEAU, BlockRHS, Observer
 from fastmech.integrators.method import Method, RungeKutta
 from fastmech.integrators.sums import rows_of
 from fastmech.jit import STEP, driver_signature, inlined, kernel

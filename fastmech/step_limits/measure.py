@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.integrators.batch import Batch
-from fastmech.integrators.explicit import observe_nothing
+from fastmech.integrators.driver import observe_nothing
 from fastmech.integrators.implicit_method import with_jacobian
 from fastmech.integrators.method import Adams, Method
 from fastmech.integrators.methods import find_method

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import types
 
-from fastmech.integrators.explicit import BlockRHS, Floats
+from fastmech.integrators.driver import BlockRHS, Floats
 from fastmech.integrators.newton import difference_jacobian
 from fastmech.jit import JACOBIAN, MATRIX, RHS, VECTOR, kernel
 

@@ -8,7 +8,7 @@ from integrators.driving import A, W, drive, one_block, polynomial, rotation
 from integrators.systems import Floats
 
 import fastmech as fm
-from fastmech.integrators.explicit import observe_nothing
+from fastmech.integrators.driver import observe_nothing
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.implicit_tableau import ImplicitTableau
 from fastmech.integrators.methods import METHODS

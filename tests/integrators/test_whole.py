@@ -9,7 +9,7 @@ import pytest
 from integrators.driving import one_block
 from kernels.blocks_of_lanes import Floats, lanes
 
-from fastmech.integrators.explicit import observe_nothing
+from fastmech.integrators.driver import observe_nothing
 from fastmech.integrators.method import RungeKutta
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.integrators.whole import WholeSteps, in_whole_steps

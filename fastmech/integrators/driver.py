@@ -1,0 +1,26 @@
+"""What every driver is given besides a method's own numbers: a right-hand side and an observer.
+
+They come as first-class functions, one indirect call a stage, or step, and block; a tableau comes as arrays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.jit import INTEGERS, OBSERVER_SIGNATURE, VECTOR, kernel
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+BlockRHS = Callable[[float, Floats, Floats, Floats], None]
+Observer = Callable[[float, Floats, Floats, Floats], None]
+
+#: Types of a packed tableau: start, stage, weight, nodes.
+TABLEAU = (INTEGERS, INTEGERS, VECTOR, VECTOR)
+
+
+@kernel(OBSERVER_SIGNATURE)
+def observe_nothing(t: float, Y: Floats, params: Floats, record: Floats) -> None:
+    """The observer of runs that keep nothing but states."""
