@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from fastmech.bench.measure import Row
+from fastmech.bench.memory import Peak
 from fastmech.bench.peak import Throughput
 from fastmech.bench.precision import TARGETS, fastest_at, rate_at
 from fastmech.bench.problem import Problem
@@ -146,9 +147,13 @@ def problem_section(problem: Problem, rows: list[Row]) -> list[str]:
 
 
 def machine_sections(
-    peak: float, throughputs: list[Throughput], costs: list[Cost], starts: list[Start]
+    peak: float,
+    throughputs: list[Throughput],
+    costs: list[Cost],
+    starts: list[Start],
+    memory: list[Peak],
 ) -> list[str]:
-    """Peak, terms and cold starts."""
+    """Peak, terms, cold starts and memory."""
     lines = [
         "## Right-hand sides and the core's peak",
         "",
@@ -178,4 +183,15 @@ def machine_sections(
                  for s in starts),
             ),
         ]  # fmt: skip
+    if memory:
+        lines += [
+            "## Memory",
+            "",
+            "The most that a process takes which asks for final states, its starts included.",
+            "",
+            *table(
+                ["trajectories", "GiB"],
+                ([f"{p.trajectories:,}", f"{p.memory / 2**30:.2f}"] for p in memory),
+            ),
+        ]
     return lines

@@ -24,10 +24,10 @@ ENTRANTS = (
     ("plain", "Numba RK4, one at a time, small arrays", "dt = 0.02 s"),
     ("plain", "Numba RK4, one at a time, local numbers", "dt = 0.02 s"),
     ("package", "fastmech rk4", "dt = 0.02 s"),
-    ("package", "fastmech ab6", "dt = 0.017 s"),
+    ("package", "fastmech ab6", "dt = 0.0175 s"),
     ("package", "fastmech dop853", "dt = 0.05 s"),
     ("package", "fastmech rk4, float32", "dt = 0.03 s"),
-    ("package", "fastmech ab6, float32", "dt = 0.018 s"),
+    ("package", "fastmech ab6, float32", "dt = 0.0175 s"),
 )
 
 TURNS = 3
