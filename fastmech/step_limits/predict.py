@@ -11,7 +11,7 @@ from fastmech.integrators.methods import find_method
 from fastmech.scene import Scene
 from fastmech.stability.arguments import require_rest
 from fastmech.stability.linearize import Rest, jacobian
-from fastmech.step_limits.amplification import amplification
+from fastmech.step_limits.amplification import amplifies
 from fastmech.step_limits.crossing import first_crossing
 
 #: Error of a mode's growth, a radian, that is let pass. A mode without damping sits on the edge of every
@@ -39,10 +39,11 @@ def stable_step(method: Method, eigenvalues: ArrayLike, growth: float = 0.0) -> 
         return np.inf
     fastest = float(np.abs(values).max())
 
-    def excess(h: float) -> float:
-        return float((amplification(method, h * values) - 1.0 - growth - h * slack).max())
+    def grow(h: NDArray[np.float64]) -> NDArray[np.bool_]:
+        factor = 1.0 + growth + h[:, None] * slack
+        return np.asarray(amplifies(method, h[:, None] * values, factor).any(axis=1))
 
-    return first_crossing(excess, NEAREST / fastest, FARTHEST / fastest)
+    return first_crossing(grow, NEAREST / fastest, FARTHEST / fastest)
 
 
 def is_stable(method: Method, eigenvalues: ArrayLike, h: float, growth: float = 0.0) -> bool:
@@ -51,14 +52,18 @@ def is_stable(method: Method, eigenvalues: ArrayLike, h: float, growth: float = 
     if not values.size or isinstance(method, ImplicitRungeKutta):
         return True
     steps = h * SHORTER[:, None]
-    return bool((amplification(method, steps * values) <= 1.0 + growth + steps * slack).all())
+    return not amplifies(method, steps * values, 1.0 + growth + steps * slack).any()
 
 
 def _decaying(eigenvalues: ArrayLike) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
-    """Eigenvalues of the modes that do not grow, and the growth [1/s] that each may have."""
+    """Eigenvalues of the modes that do not grow, and the growth [1/s] that each may have.
+
+    Conjugate ones say the same: one of them stands for both.
+    """
     values = np.asarray(eigenvalues, dtype=np.complex128)
-    values = values[(values.real <= UNDAMPED * np.abs(values)) & (values != 0.0)]
-    values = np.minimum(values.real, 0.0) + 1j * values.imag
+    decays = (values.real <= UNDAMPED * np.abs(values)) & (values != 0.0)
+    values = values[decays]
+    values = np.unique(np.minimum(values.real, 0.0) + 1j * np.abs(values.imag))
     return values, np.maximum(values.real + GROWTH_PER_RADIAN * np.abs(values), 0.0)
 
 
