@@ -31,9 +31,17 @@ from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.scene import Scene
 from fastmech.step_limits.amplification import amplification, amplifies
-from fastmech.step_limits.growth import CERTAIN, SPURIOUS, Growth, bounded, growing, part, steps_there
+from fastmech.step_limits.growth import (
+    CERTAIN,
+    SPURIOUS,
+    Growth,
+    bounded,
+    growing,
+    steps_there,
+    stiffest_growing,
+)
 from fastmech.step_limits.impulse import impulse_limit
-from fastmech.step_limits.local import eigenvalue_bound, eigenvalues, local_motion, state_matrices
+from fastmech.step_limits.local import eigenvalues, local_motion, state_matrices
 from fastmech.step_limits.predict import GROWTH_PER_RADIAN, UNDAMPED, is_stable, stable_step
 from fastmech.step_limits.region import region, rows_of, sectors_of
 from fastmech.step_limits.warning import (
@@ -46,6 +54,9 @@ from fastmech.step_limits.warning import (
 )
 
 Floats = NDArray[np.float64]
+
+#: Divisions of :func:`fastmech.step_limits.crossing.first_crossing` for a limit that is told to two digits.
+TOLD = 3
 
 #: By how much rounding may make a step longer than the dt that it was to be.
 ROUNDED = 1e-6
@@ -126,21 +137,18 @@ class StepJudge:
         """
         n, method, c = len(self._starts), self._method, self._coefficients
         each, number = np.broadcast_to(dt, n), np.broadcast_to(steps, n)
-        self._known = dt, bounded(method, c, self._starts, each, number)
-        beyond = np.flatnonzero(self.beyond(None, StepsTaken(each, each, number, 0.0)))
+        known = bounded(method, c, self._starts, each, number)
+        self._known = dt, known
         others: list[Limit] = []
         scenes = dict.fromkeys(extremes)
-        if beyond.size:
-            asked, some = set(), part(c, beyond)
-            bound = eigenvalue_bound(local_motion(some, self._starts[beyond]))
-            asked.add(int(beyond[np.argmax(np.where(np.isfinite(bound), bound, -1.0))]))
-            fading = np.where(some.force != 0.0, some.decay, 0.0)
-            if fading.any():
-                asked.add(int(beyond[np.argmax(fading)]))
-            for k in asked:
-                scene = self._scene.replace(**{name: float(values[k]) for name, values in self._own.items()})
-                scenes[scene] = None
-                others += _own_limit(method, scene, self._starts[k], dt, steps)
+        asked = {stiffest_growing(method, c, self._starts, each, number, known)}
+        fading: Any = np.where(c.force != 0.0, c.decay, 0.0)
+        if fading.any():
+            asked.add(int(np.argmax(fading)))
+        for k in asked - {None}:
+            scene = self._scene.replace(**{name: float(values[k]) for name, values in self._own.items()})
+            scenes[scene] = None
+            others += _own_limit(method, scene, self._starts[k], dt, steps)
         warn_of_step(list(scenes), dt, method.name, self._starts, stacklevel + 1, others)
 
     def beyond(self, ends: Floats | None, taken: StepsTaken) -> NDArray[np.bool_]:
@@ -192,7 +200,7 @@ def _own_limit(method: Method, scene: Scene, start: Floats, dt: float, steps: fl
     values = eigenvalues(matrices)
     if scene.beta == 0.0 or is_stable(method, values, dt, growth):  # told at once, the limit is not
         return []
-    limit = stable_step(method, values, growth)
+    limit = stable_step(method, values, growth, TOLD)
     return [Limit(limit, GROWS)] if limit > 0.0 else []
 
 

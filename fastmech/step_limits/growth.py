@@ -132,6 +132,25 @@ def growing(
     return grows
 
 
+def stiffest_growing(
+    method: Method, c: Coefficients, states: Floats, dt: Floats, number: Numbers, known: Growth
+) -> int | None:
+    """Of the motions that :func:`growing` tells of, if any, the one whose eigenvalues' bound is greatest.
+
+    ``known`` are the bounds of the growth in these steps.
+    """
+    rest = np.flatnonzero(~acquitted(known, dt, number))
+    rest = rest[np.argsort(-eigenvalue_bound(local_motion(part(c, rest), states[rest])), kind="stable")]
+    first, after = 0, 256  # most often it is one of the first
+    while first < rest.size:
+        some = rest[first:after]
+        grows = _grow(method, part(c, some), states[some], dt[some], number[some])
+        if grows.any():
+            return int(some[np.argmax(grows)])
+        first, after = after, after + AT_ONCE
+    return None
+
+
 def _grow(method: Method, c: Coefficients, states: Floats, dt: Floats, number: Numbers) -> NDArray[np.bool_]:
     """The same without bounds: a mode grows by more than is let pass in the steps there, or errors in all."""
     table, motion = region(method.name), local_motion(c, states)
@@ -144,13 +163,14 @@ def _grow(method: Method, c: Coefficients, states: Floats, dt: Floats, number: N
     lane, values = decaying_modes(c, states, motion, GROWTH_PER_RADIAN, suspect)
     z, factor = dt[lane] * values, (1.0 + PASSING) ** (1.0 / there[lane])
     grow = amplifies(method, z, factor)
-    if isinstance(method, Adams):
+    if isinstance(method, Adams) and grow.any():
         # Of what is amplified: errors in all steps, else the mode itself.
         some = np.flatnonzero(grow)
         most = np.clip(number[lane[some]].astype(np.float64), 1.0, MOST_STEPS)
         grow[some] = amplifies(method, z[some], SPURIOUS ** (1.0 / most))
         some = some[~grow[some]]
-        grow[some] = np.abs(principal_root(method, z[some])) > factor[some]
+        if some.size:
+            grow[some] = np.abs(principal_root(method, z[some])) > factor[some]
     grows = np.zeros(len(states), dtype=np.bool_)
     grows[lane[grow]] = True
     return grows
