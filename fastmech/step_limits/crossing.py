@@ -24,8 +24,8 @@ def first_crossing(
 ) -> float:
     """Least x at which ``beyond`` turns true; 0.0 if so at ``start``, inf if not up to ``stop``.
 
-    From places that grow by :data:`RATIO` it is narrowed down by so many divisions. ``beyond`` is asked of many
-    places (m,) in one call, for which it pays to compute with arrays.
+    From places that grow by :data:`RATIO` it is narrowed down by so many divisions. ``beyond`` is asked of
+    many places (m,) in one call: it pays to compute with arrays.
     """
     last = max(int(np.ceil(np.log(stop / start) / np.log(RATIO))), 0)
     for first in range(0, last + 1, AT_ONCE):
