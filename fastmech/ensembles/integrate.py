@@ -28,7 +28,7 @@ from fastmech.integrators.method import Method
 from fastmech.integrators.methods import find_method
 from fastmech.kernels.select import FORMULATIONS
 from fastmech.scene import Scene, nearest
-from fastmech.step_limits.beyond import StepsTaken, steps_beyond, warn_of_steps
+from fastmech.step_limits.beyond import StepJudge, StepsTaken
 
 #: Longest step [s] where neither a step nor a tolerance is given.
 DEFAULT_DT = 0.01
@@ -169,11 +169,12 @@ def integrate(
             problem, outputs, solve(problem, starts, outputs, settings, threads, progress), settings
         )
     own, until = own_values(parameters or {}, scene.model_dump(), len(starts)), float(outputs[-1])
-    warn_of_steps(scene, extreme_scenes(scene, own), own, starts, step, until / step, formula.name)
+    steps = StepJudge(scene, own, starts, formula.name)
+    steps.warn(extreme_scenes(scene, own), step, until / step)
     solution = solve(problem, starts, outputs, settings, threads, progress)
     taken = StepsTaken(solution.dt[0], solution.dt.max(axis=0), solution.steps, until)
     ends = solution.y[-1] if solution.last is None else solution.last
-    beyond = steps_beyond(scene, own, starts, ends, taken, formula.name)
+    beyond = steps.beyond(ends, taken)
     solution.status[beyond & (solution.status == Status.OK)] = Status.STEP_TOO_LARGE
     return _trajectories(problem, outputs, solution, settings)
 

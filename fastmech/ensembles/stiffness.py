@@ -19,7 +19,7 @@ from fastmech.integrators.method import Method
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import Coefficients
 from fastmech.mechanism.reduced import slider_ratio
-from fastmech.step_limits.amplification import amplification
+from fastmech.step_limits.amplification import amplifies
 from fastmech.step_limits.crossing import first_crossing
 
 Floats = NDArray[np.float64]
@@ -50,7 +50,7 @@ def stability_radius(name: str) -> float:
     if isinstance(method, ImplicitRungeKutta):
         return math.inf
     return first_crossing(
-        lambda r: float(amplification(method, r * DIRECTIONS).max()) - 1.0 - ROUNDED, 1e-3, 1e3
+        lambda r: np.any(amplifies(method, r[:, None] * DIRECTIONS, 1.0 + ROUNDED), axis=1), 1e-3, 1e3
     )
 
 

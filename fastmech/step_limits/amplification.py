@@ -112,16 +112,20 @@ def amplifies(method: Method, z: ArrayLike, factor: ArrayLike) -> NDArray[np.boo
     polynomial of one degree less that eliminates the last has them too.
     """
     if not isinstance(method, Adams):
-        return np.asarray(np.abs(stability_function(method, z)) > factor)
-    row = history_row(method, z)
-    degree = row.shape[-1]
-    scale = np.asarray(factor, dtype=np.float64)[..., None] ** -np.arange(1.0, degree + 1.0)
-    coefficients = np.concatenate([np.ones((*row.shape[:-1], 1)), -row * scale], axis=-1)
-    outside = np.zeros(row.shape[:-1], dtype=np.bool_)
+        return np.asarray(~(np.abs(stability_function(method, z)) <= factor))  # too large for a number, too
+    row = np.moveaxis(history_row(method, z), -1, 0)  # coefficients first: arrays of many points are quicker
+    degree, points = len(row), row.shape[1:]
+    scale = 1.0 / np.asarray(factor, dtype=np.float64)
+    coefficients = np.empty((degree, *points), dtype=np.complex128)  # all but the first, which is 1
+    shrunk = -np.ones_like(scale)
+    for age in range(degree):
+        shrunk = shrunk * scale
+        coefficients[age] = row[age] * shrunk
+    outside = np.zeros(points, dtype=np.bool_)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):  # of those already found outside
         for _ in range(degree):
-            last = coefficients[..., -1:]
-            outside |= ~(np.abs(last[..., 0]) < 1.0)
-            less = coefficients - last * coefficients[..., ::-1].conj()
-            coefficients = less[..., :-1] / less[..., :1]
+            last, rest = coefficients[-1], coefficients[:-1]
+            size = last.real * last.real + last.imag * last.imag
+            outside |= ~(size < 1.0)
+            coefficients = (rest - last * rest[::-1].conj()) * (1.0 / (1.0 - size))
     return outside

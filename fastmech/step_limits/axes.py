@@ -9,7 +9,7 @@ import numpy as np
 
 from fastmech.integrators.method import Adams, Method, RungeKutta
 from fastmech.integrators.multistep_weights import bashforth, moulton
-from fastmech.step_limits.amplification import amplification, stability_polynomial
+from fastmech.step_limits.amplification import amplifies, stability_polynomial
 from fastmech.step_limits.crossing import first_crossing
 
 #: Growth a step that rounding explains.
@@ -21,7 +21,7 @@ NEAREST, FARTHEST = 1e-3, 1e8
 
 def real_limit(method: Method) -> float:
     """Largest x such that the method is stable at every -x' with 0 < x' <= x; inf if A-stable there."""
-    return first_crossing(lambda x: float(amplification(method, -x)) - 1.0 - ROUNDED, NEAREST, FARTHEST)
+    return first_crossing(lambda x: amplifies(method, -x, 1.0 + ROUNDED), NEAREST, FARTHEST)
 
 
 def imaginary_limit(method: Method) -> float:
@@ -30,7 +30,7 @@ def imaginary_limit(method: Method) -> float:
         return _explicit_imaginary(method)
     if isinstance(method, Adams) and _first_growth(method) > 0:
         return 0.0
-    return first_crossing(lambda y: float(amplification(method, 1j * y)) - 1.0 - ROUNDED, NEAREST, FARTHEST)
+    return first_crossing(lambda y: amplifies(method, 1j * y, 1.0 + ROUNDED), NEAREST, FARTHEST)
 
 
 def _first_growth(method: Adams) -> Fraction:

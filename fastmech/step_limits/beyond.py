@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from types import SimpleNamespace
 from typing import Any
 
@@ -31,10 +30,20 @@ from fastmech.integrators.method import Adams, Method
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.scene import Scene
-from fastmech.step_limits.amplification import amplification, amplifies, principal_root
+from fastmech.step_limits.amplification import amplification, amplifies
+from fastmech.step_limits.growth import (
+    CERTAIN,
+    SPURIOUS,
+    Growth,
+    bounded,
+    growing,
+    steps_there,
+    stiffest_growing,
+)
 from fastmech.step_limits.impulse import impulse_limit
-from fastmech.step_limits.local import eigenvalue_bound, eigenvalues, state_matrices, time_near
+from fastmech.step_limits.local import eigenvalues, local_motion, state_matrices
 from fastmech.step_limits.predict import GROWTH_PER_RADIAN, UNDAMPED, is_stable, stable_step
+from fastmech.step_limits.region import region, rows_of, sectors_of
 from fastmech.step_limits.warning import (
     GROWS,
     PASSING,
@@ -46,19 +55,11 @@ from fastmech.step_limits.warning import (
 
 Floats = NDArray[np.float64]
 
-#: Growth of an Adams method's errors in a run that counts: those of its starter are far above rounding.
-SPURIOUS = 1e4
+#: Divisions of :func:`fastmech.step_limits.crossing.first_crossing` for a limit that is told to two digits.
+TOLD = 3
 
-#: Trajectories judged at once: what is computed on the way stays in the caches.
-AT_ONCE = 2**14
-
-#: Steps of a run that are told apart: a year's are fewer.
-MOST_STEPS = 2.0**44
-
-#: Sizes of h lambda, falling, and directions of modes that decay (the others are their mirror images), at
-#: which a method's region is looked at.
-SIZES = 8.0 * 0.95 ** np.arange(180.0)
-DIRECTIONS = np.exp(1j * np.linspace(0.5 * np.pi, np.pi, 33))
+#: By how much rounding may make a step longer than the dt that it was to be.
+ROUNDED = 1e-6
 
 
 @dataclass(frozen=True)
@@ -102,84 +103,91 @@ def _grows_in(scene: Scene, dt: float, steps: float, method: str, direction: flo
     return False
 
 
-def steps_beyond(
-    scene: Scene,
-    own: Mapping[str, Floats],
-    starts: Floats,
-    ends: Floats | None,
-    taken: StepsTaken,
-    method: str,
-) -> NDArray[np.bool_]:
-    """Which trajectories (n,) have a step beyond a limit: of stability, of the impulse, of the angle turned.
+class StepJudge:
+    """The judge of a run's steps: before the run in words, after it trajectory by trajectory.
 
     Args:
         scene: the mechanism.
         own: values (n,) of parameters that differ between trajectories.
         starts: states (n, 4).
-        ends: last finite states (n, 4), ``None``: not known yet. A step that is too long for places where a
-            motion never is does it no harm: it must be so at the start, under the force's full strength, or
-            where the motion has come to, under what is left of it.
-        taken: the steps.
         method: a name from :data:`fastmech.integrators.methods.METHODS`.
 
     Raises:
         InputError: no such method.
     """
-    formula, c = find_method(method), _coefficients(scene, own, len(starts))
-    beyond = _turns_too_far(starts[:, 2:], taken.first)
-    beyond |= (c.force != 0.0) & (taken.first * c.decay > impulse_limit(formula))
-    beyond |= _grows_there(formula, c, starts, taken)
-    if ends is not None:
-        left: Any = c.force * np.exp(-c.decay * taken.until)
-        beyond |= _grows_there(formula, c._replace(force=left), ends, taken)
-    if isinstance(formula, Adams) and not own:
-        beyond |= _errors_grow_at_rest(formula, scene, taken)
-    return beyond
+
+    def __init__(self, scene: Scene, own: Mapping[str, Floats], starts: Floats, method: str) -> None:
+        self._scene, self._own, self._starts = scene, own, starts
+        self._method = find_method(method)
+        self._coefficients = _coefficients(scene, own, len(starts))
+        self._known: tuple[float, Growth] | None = None  # what starts do in steps [s] up to the first
+
+    def warn(self, extremes: Sequence[Scene], dt: float, steps: float, stacklevel: int = 2) -> None:
+        """Warn, in the caller's caller, of a step [s] that is too long for one of many trajectories.
+
+        Looked at are the extreme scenes at every configuration, the rates of all starts, and every trajectory
+        with its own parameters at its start, by the rule of :meth:`beyond`. Not looked at is where
+        trajectories of other scenes will come to: that has its status after the run.
+
+        Args:
+            extremes: the scenes of :func:`fastmech.ensembles.problem.extreme_scenes`.
+            dt: longest step [s].
+            steps: how many of them make the run.
+            stacklevel: of the warning, 1 for the caller of this function.
+        """
+        n, method, c = len(self._starts), self._method, self._coefficients
+        each, number = np.broadcast_to(dt, n), np.broadcast_to(steps, n)
+        known = bounded(method, c, self._starts, each, number)
+        self._known = dt, known
+        others: list[Limit] = []
+        scenes = dict.fromkeys(extremes)
+        asked = {stiffest_growing(method, c, self._starts, each, number, known)}
+        fading: Any = np.where(c.force != 0.0, c.decay, 0.0)
+        if fading.any():
+            asked.add(int(np.argmax(fading)))
+        for k in asked - {None}:
+            scene = self._scene.replace(**{name: float(values[k]) for name, values in self._own.items()})
+            scenes[scene] = None
+            others += _own_limit(method, scene, self._starts[k], dt, steps)
+        warn_of_step(list(scenes), dt, method.name, self._starts, stacklevel + 1, others)
+
+    def beyond(self, ends: Floats | None, taken: StepsTaken) -> NDArray[np.bool_]:
+        """Which trajectories (n,) have a step beyond a limit: of stability, the impulse, the angle turned.
+
+        Args:
+            ends: last finite states (n, 4), ``None``: not known yet. A step that is too long for places where
+                a motion never is does it no harm: it must be so at the start, under the force's full
+                strength, or where the motion has come to, under what is left of it.
+            taken: the steps.
+        """
+        method, c, starts = self._method, self._coefficients, self._starts
+        beyond = _turns_too_far(starts[:, 2:], taken.first)
+        if np.any(c.force != 0.0):
+            beyond |= (c.force != 0.0) & (taken.first * c.decay > impulse_limit(method))
+        known = None
+        if self._known is not None and taken.longest.max(initial=0.0) <= (1.0 + ROUNDED) * self._known[0]:
+            known = self._known[1]
+        beyond |= growing(method, c, starts, taken.longest, taken.number, known)
+        if ends is not None:
+            left: Any = c.force * np.exp(-c.decay * taken.until)
+            beyond |= growing(method, c._replace(force=left), ends, taken.longest, taken.number)
+        if isinstance(method, Adams) and not self._own:
+            beyond |= _errors_grow_at_rest(method, self._scene, taken)
+        return beyond
 
 
 def _errors_grow_at_rest(method: Adams, scene: Scene, taken: StepsTaken) -> NDArray[np.bool_]:
     """Whether errors (n,) grow at the scene's minima, over all steps, by a root that stands for no mode."""
     resting = scene_eigenvalues(scene)[0]
-    damped = resting[resting.real < -GROWTH_PER_RADIAN * np.abs(resting)]
-    growth = np.zeros(len(taken.longest))
-    for dt in np.unique(taken.longest) if damped.size else ():
-        growth[taken.longest == dt] = np.log(np.max(amplification(method, dt * damped)))
+    damped = resting[(resting.real < -GROWTH_PER_RADIAN * np.abs(resting)) & (resting.imag >= 0.0)]
+    growth, longest = np.zeros(len(taken.longest)), taken.longest.max(initial=0.0)
+    rows, sectors = rows_of(longest * np.abs(damped)), sectors_of(damped.real, damped.imag)
+    most = region(method.name).sector[rows, sectors].max(initial=0.0) * taken.number.max(initial=0)
+    if most <= CERTAIN * np.log(SPURIOUS):
+        return np.zeros(growth.size, dtype=np.bool_)
+    steps, of = np.unique(taken.longest, return_inverse=True)
+    growth = np.log(amplification(method, steps[:, None] * damped).max(axis=1))[of]
     return np.asarray(growth * taken.number > np.log(SPURIOUS))
-
-
-def warn_of_steps(
-    scene: Scene,
-    extremes: Sequence[Scene],
-    own: Mapping[str, Floats],
-    starts: Floats,
-    dt: float,
-    steps: float,
-    method: str,
-    stacklevel: int = 2,
-) -> None:
-    """Warn, in the caller's caller, of a step [s] that is too long for one of many trajectories.
-
-    Looked at are the extreme scenes at every configuration, the rates of all starts, and every trajectory
-    with its own parameters at its start, by the rule of :func:`steps_beyond`. Not looked at is where
-    trajectories of other scenes will come to: that has its status after the run.
-
-    Raises:
-        InputError: no such method.
-    """
-    n = len(starts)
-    taken = StepsTaken(np.full(n, dt), np.full(n, dt), np.full(n, steps), 0.0)
-    others: list[Limit] = []
-    scenes = list(extremes)
-    beyond = np.flatnonzero(steps_beyond(scene, own, starts, None, taken, method))
-    if beyond.size:
-        c = _part(_coefficients(scene, own, n), beyond)
-        bound = eigenvalue_bound(state_matrices(c, *starts[beyond, :2].T))
-        stiffest = np.argmax(np.where(np.isfinite(bound), bound, -1.0))
-        shortest = np.argmax(np.where(c.force != 0.0, c.decay, -1.0))
-        for k in {int(beyond[stiffest]), int(beyond[shortest])}:
-            scenes.append(scene.replace(**{name: float(values[k]) for name, values in own.items()}))
-            others += _own_limit(find_method(method), scenes[-1], starts[k], dt, steps)
-    warn_of_step(scenes, dt, method, starts, stacklevel + 1, others)
 
 
 def _own_limit(method: Method, scene: Scene, start: Floats, dt: float, steps: float) -> list[Limit]:
@@ -188,11 +196,11 @@ def _own_limit(method: Method, scene: Scene, start: Floats, dt: float, steps: fl
     matrices = state_matrices(c, *state[:, :2].T)
     if not np.isfinite(matrices).all():
         return []
-    growth = PASSING / float(np.clip(time_near(c, state)[0] / dt, 1.0, max(steps, 1.0)))
+    growth = PASSING / float(steps_there(local_motion(c, state).time, np.array(dt), np.array(steps))[0])
     values = eigenvalues(matrices)
     if scene.beta == 0.0 or is_stable(method, values, dt, growth):  # told at once, the limit is not
         return []
-    limit = stable_step(method, values, growth)
+    limit = stable_step(method, values, growth, TOLD)
     return [Limit(limit, GROWS)] if limit > 0.0 else []
 
 
@@ -203,67 +211,7 @@ def _coefficients(scene: Scene, own: Mapping[str, Floats], n: int) -> Coefficien
     return Coefficients(*values)
 
 
-def _part(c: Coefficients, members: Any) -> Coefficients:
-    values: Any = (np.asarray(value)[members] for value in c)
-    return Coefficients(*values)
-
-
-def _grows_there(method: Method, c: Coefficients, states: Floats, taken: StepsTaken) -> NDArray[np.bool_]:
-    """Whether damped small motion about each configuration (n,) grows by 1 % over the steps taken there."""
-    grows = np.zeros(len(states), dtype=np.bool_)
-    if isinstance(method, ImplicitRungeKutta) or not np.any(c.damping):
-        return grows
-    most = float(taken.number.max(initial=1))
-    quiet = quiet_size(method.name, int(np.ceil(np.log2(min(max(most, 1.0), MOST_STEPS)))))
-    for first in range(0, len(states), AT_ONCE):
-        members = np.arange(first, min(first + AT_ONCE, len(states)))
-        matrices = state_matrices(_part(c, members), *states[members, :2].T)
-        bound = eigenvalue_bound(matrices) * taken.longest[members]
-        # What is not finite has a status of its own.
-        asked = (bound > quiet) & np.isfinite(bound) & (np.asarray(c.damping)[members] > 0.0)
-        if asked.any():
-            some = members[asked]
-            values = taken.longest[some, None] * eigenvalues(matrices[..., asked])
-            number: Floats = np.clip(taken.number[some].astype(np.float64), 1.0, MOST_STEPS)
-            there = np.clip(time_near(_part(c, some), states[some]) / taken.longest[some], 1.0, number)
-            # Conjugate eigenvalues say the same.
-            damped = values.real < -GROWTH_PER_RADIAN * np.abs(values)
-            lane, mode = np.nonzero(damped & (values.imag >= 0.0))
-            grows[some[lane[_grow(method, values[lane, mode], there[lane], number[lane])]]] = True
-    return grows
-
-
-def _grow(method: Method, z: NDArray[np.complex128], there: Floats, number: Floats) -> NDArray[np.bool_]:
-    """Which modes (n,), z = h lambda, grow by more than is let pass in the steps there, or errors in all."""
-    factor = (1.0 + PASSING) ** (1.0 / there)
-    grow = amplifies(method, z, factor)
-    if isinstance(method, Adams) and grow.any():
-        own = np.abs(principal_root(method, z[grow])) > factor[grow]
-        grow[grow] = own | amplifies(method, z[grow], SPURIOUS ** (1.0 / number[grow]))
-    return grow
-
-
-@lru_cache(1024)
-def quiet_size(method: str, doublings: int) -> float:
-    """Size of h lambda up to which no mode that decays grows by 0.5 % in 2^doublings steps.
-
-    Between the directions looked at a method's amplification changes by less than what is left to 1 %. By the
-    maximum principle what holds on the boundary of a half disk holds within.
-    """
-    growth = 0.5 * PASSING / 2.0**doublings
-    grows = amplifies(find_method(method), SIZES[:, None] * DIRECTIONS, 1.0 + growth).any(axis=1)
-    last = np.flatnonzero(grows)
-    smaller = int(last[-1]) + 1 if last.size else 0
-    return float(SIZES[smaller]) if smaller < SIZES.size else 0.0
-
-
 def _turns_too_far(rates: Floats, first: Floats) -> NDArray[np.bool_]:
     """Which motions (n,) turn a body by more than 1 rad in a step if they stay as fast as at first."""
-    too_far = np.zeros(len(rates), dtype=np.bool_)
-    with np.errstate(
-        invalid="ignore", over="ignore"
-    ):  # starts that are not finite have a status of their own
-        fastest = max(rates.max(initial=0.0), -rates.min(initial=0.0))
-        if not fastest * first.max(initial=0.0) <= TURN:
-            too_far |= first * np.abs(rates).max(axis=1) > TURN
-    return too_far
+    with np.errstate(invalid="ignore", over="ignore"):  # starts that are not finite have their own status
+        return np.asarray(first * np.maximum(np.abs(rates[:, 0]), np.abs(rates[:, 1])) > TURN)

@@ -1,38 +1,53 @@
-"""The first place at which a function of one positive number turns positive."""
+"""The first place at which something begins along the positive numbers."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
 #: Ratio of neighbouring places of the search: finer than any lobe of a stability region.
 RATIO = 1.03
 
-#: Halvings of an interval of that ratio after which it is as narrow as rounding.
-HALVINGS = 45
+#: Places that are looked at in one call.
+AT_ONCE = 64
+
+#: Divisions of an interval of that ratio by 17 after which it is as narrow as rounding.
+PARTS, DIVISIONS = 17, 11
 
 
-def first_crossing(function: Callable[[float], float], start: float, stop: float) -> float:
-    """Least x at which ``function`` turns positive; 0.0 if so at ``start``, inf if not up to ``stop``."""
-    x = start
-    if function(x) > 0.0:
-        return 0.0
-    while x < stop:
-        after = RATIO * x
-        if function(after) > 0.0:
-            return _halved(function, x, after)
-        x = after
+def first_crossing(
+    beyond: Callable[[Floats], NDArray[np.bool_]], start: float, stop: float, divisions: int = DIVISIONS
+) -> float:
+    """Least x at which ``beyond`` turns true; 0.0 if so at ``start``, inf if not up to ``stop``.
+
+    From places that grow by :data:`RATIO` it is narrowed down by so many divisions. ``beyond`` is asked of
+    many places (m,) in one call: it pays to compute with arrays.
+    """
+    last = max(int(np.ceil(np.log(stop / start) / np.log(RATIO))), 0)
+    for first in range(0, last + 1, AT_ONCE):
+        places = start * RATIO ** np.arange(first, min(first + AT_ONCE, last + 1.0))
+        found = np.flatnonzero(beyond(places))
+        if found.size:
+            at = float(places[found[0]])
+            return 0.0 if first + found[0] == 0 else _narrowed(beyond, at / RATIO, at, divisions)
     return float("inf")
 
 
-def _halved(function: Callable[[float], float], below: float, above: float) -> float:
-    """Where the function turns positive between two places, by bisection.
+def _narrowed(
+    beyond: Callable[[Floats], NDArray[np.bool_]], below: float, above: float, divisions: int
+) -> float:
+    """Where it turns true between two places: in the first part whose end is beyond, again and again.
 
     Importing SciPy's root finders takes longer than a first run, and every run asks for a step limit.
     """
-    for _ in range(HALVINGS):
-        middle = 0.5 * (below + above)
-        if function(middle) > 0.0:
-            above = middle
-        else:
-            below = middle
-    return above
+    for _ in range(divisions):
+        places = below + (above - below) * np.arange(1, PARTS) / PARTS
+        found = np.flatnonzero(beyond(places))
+        first = int(found[0]) if found.size else places.size
+        ends = [below, *places.tolist(), above]
+        below, above = ends[first], ends[first + 1]
+    return below

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.mechanism.coefficients import Coefficients
-from fastmech.mechanism.reduced import metric_11, metric_determinant, potential_gradient, slider_ratio
-from fastmech.stability.linearize import SmallMotion, fill_state_matrix, small_motion
+from fastmech.mechanism.reduced import (
+    metric_11,
+    metric_determinant,
+    potential_gradient,
+    potential_hessian,
+    slider_ratio,
+)
+from fastmech.stability.linearize import SmallMotion, fill_state_matrix, polynomial, small_motion
 
 Floats = NDArray[np.float64]
 
@@ -17,11 +23,53 @@ Floats = NDArray[np.float64]
 NEAR = 1.0
 
 
-def state_matrices(c: Coefficients, phi: Any, theta: Any) -> Floats:
-    """Matrices of the motion linearized at rest in configurations (n,), shape (4, 4, n).
+class LocalMotion(NamedTuple):
+    """The small motion where trajectories are, and how long they are there; each of shape (n,)."""
 
-    ``c`` are reduced coefficients, numbers or one a configuration; their force is taken as constant.
+    p3: Floats  #: lambda^4 + p3 lambda^3 + p2 lambda^2 + p1 lambda + p0 is the characteristic polynomial
+    p2: Floats
+    p1: Floats
+    p0: Floats
+    time: Floats  #: see :func:`local_motion` [s]
+
+
+def local_motion(c: Coefficients, states: Floats) -> LocalMotion:
+    """The motion linearized at rest in the configurations of states (n, 4), and the time spent there.
+
+    ``c`` are reduced coefficients, numbers or one a configuration; their force is taken as constant. The time
+    is that in which motions leave where they are by :data:`NEAR`, from their rates and the acceleration at
+    rest, as the motion that starts so goes on at first; inf at rest in an equilibrium.
     """
+    phi, theta, rate_1, rate_2 = np.ascontiguousarray(states.T)
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
+        s12, c12 = s1 * c2 + c1 * s2, c1 * c2 - s1 * s2
+        k = slider_ratio(s1, c1)[0]
+        m11, determinant = metric_11(c.mass, c.slider, k), metric_determinant(c.mass, c.slider, k, c12)
+        hessian = potential_hessian(s1, c1, s2, c2, s12, c.lift, c.spring, c.gravity, c.force)
+        motion = SmallMotion(m11, s12, determinant, k, c.damping * k * k, *hessian)
+        u1, u2 = potential_gradient(s1, c1, s2, c2, c12, c.lift, c.spring, c.gravity, c.force)
+        acceleration = np.maximum(np.abs(s12 * u2 - u1), np.abs(s12 * u1 - m11 * u2)) / determinant
+        speed = np.maximum(np.abs(rate_1), np.abs(rate_2))
+        time = 2.0 * NEAR / (speed + np.sqrt(speed * speed + 2.0 * NEAR * acceleration))
+        p3, p2, p1, p0 = (np.asarray(p) for p in polynomial(motion))
+        return LocalMotion(p3, p2, p1, p0, time)
+
+
+def eigenvalue_bound(motion: LocalMotion) -> Floats:
+    """Bound [1/s] on the magnitudes of the small motions' eigenvalues, shape (n,).
+
+    With x* M x = 1 an eigenvector x has lambda^2 + b lambda + k = 0: b = x* B x lies between 0 and p3, the
+    one eigenvalue of M^-1 B that is not 0, k = x* K x between the two of M^-1 K, with w^2 - p2 w + p0 = 0.
+    """
+    with np.errstate(invalid="ignore", over="ignore"):
+        half = 0.5 * motion.p2
+        stiff = np.abs(half) + np.sqrt(np.maximum(half * half - motion.p0, 0.0))
+        return np.asarray(0.5 * (motion.p3 + np.sqrt(motion.p3 * motion.p3 + 4.0 * stiff)))
+
+
+def state_matrices(c: Coefficients, phi: Any, theta: Any) -> Floats:
+    """Matrices of the motion linearized at rest in configurations (n,), shape (4, 4, n)."""
     out = np.empty((4, 4, phi.size))
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         values: Any = (c.mass, c.slider, c.lift, c.spring, c.gravity, c.force, c.damping)
@@ -32,34 +80,3 @@ def state_matrices(c: Coefficients, phi: Any, theta: Any) -> Floats:
 def eigenvalues(matrices: Floats) -> NDArray[np.complex128]:
     """Eigenvalues [1/s] of state matrices (4, 4, n), shape (n, 4)."""
     return np.asarray(np.linalg.eigvals(np.moveaxis(matrices, -1, 0)), dtype=np.complex128)
-
-
-def eigenvalue_bound(matrices: Floats) -> Floats:
-    """Bound [1/s] on the eigenvalues' magnitudes of state matrices (4, 4, n), shape (n,).
-
-    x'' = -A x - B x' with x' measured in units of s has a norm of max(s, |A|/s + |B|); the best s makes both
-    the same.
-    """
-    with np.errstate(invalid="ignore", over="ignore"):
-        norms = np.abs(matrices[2:])
-        stiff, damped = (norms[:, part].sum(axis=1).max(axis=0) for part in (slice(2), slice(2, 4)))
-        return np.asarray(0.5 * (damped + np.sqrt(damped * damped + 4.0 * stiff)))
-
-
-def time_near(c: Coefficients, states: Floats) -> Floats:
-    """Time [s] in which motions (n, 4) leave where they are by :data:`NEAR`; inf at rest in an equilibrium.
-
-    From their rates and the acceleration at rest, as the motion that starts so goes on at first.
-    """
-    phi, theta = states[:, :2].T
-    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
-        s12, c12 = s1 * c2 + c1 * s2, c1 * c2 - s1 * s2
-        u1, u2 = potential_gradient(s1, c1, s2, c2, c12, c.lift, c.spring, c.gravity, c.force)
-        k = slider_ratio(s1, c1)[0]
-        determinant = metric_determinant(c.mass, c.slider, k, c12)
-        a1 = (s12 * u2 - u1) / determinant
-        a2 = (s12 * u1 - metric_11(c.mass, c.slider, k) * u2) / determinant
-        speed = np.abs(states[:, 2:]).max(axis=1)
-        acceleration = np.maximum(np.abs(a1), np.abs(a2))
-        return np.asarray(2.0 * NEAR / (speed + np.sqrt(speed * speed + 2.0 * NEAR * acceleration)))

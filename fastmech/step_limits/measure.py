@@ -46,14 +46,12 @@ def measured_stable_step(scene: Scene, equilibrium: Rest, method: str) -> float:
     params = np.array(reduce(frozen), dtype=np.float64)
     rhs = right_hand_side(reduce(frozen))
 
-    def excess(h: float) -> float:
-        if isinstance(formula, Adams):
-            matrix = _history_map(formula, rhs, params, at, h)
-        else:
-            matrix = _step_map(formula, rhs, params, at, h)
-        return float(np.abs(np.linalg.eigvals(matrix)).max()) - 1.0
+    def grow(steps: Floats) -> NDArray[np.bool_]:
+        step_map: Any = _history_map if isinstance(formula, Adams) else _step_map
+        matrices = np.array([step_map(formula, rhs, params, at, float(h)) for h in steps])
+        return np.asarray(np.abs(np.linalg.eigvals(matrices)).max(axis=1) > 1.0)
 
-    return first_crossing(excess, 0.01 / fastest, 100.0 / fastest)
+    return first_crossing(grow, 0.01 / fastest, 100.0 / fastest)
 
 
 def _around(at: Floats) -> Floats:

@@ -11,8 +11,8 @@ from fastmech.integrators.methods import find_method
 from fastmech.scene import Scene
 from fastmech.stability.arguments import require_rest
 from fastmech.stability.linearize import Rest, jacobian
-from fastmech.step_limits.amplification import amplification
-from fastmech.step_limits.crossing import first_crossing
+from fastmech.step_limits.amplification import amplifies
+from fastmech.step_limits.crossing import DIVISIONS, first_crossing
 
 #: Error of a mode's growth, a radian, that is let pass. A mode without damping sits on the edge of every
 #: region of stability; one that decays by less than this a radian is as good as undamped.
@@ -28,21 +28,24 @@ NEAREST, FARTHEST = 1e-3, 1e6
 SHORTER = 0.8 ** np.arange(8.0)
 
 
-def stable_step(method: Method, eigenvalues: ArrayLike, growth: float = 0.0) -> float:
+def stable_step(
+    method: Method, eigenvalues: ArrayLike, growth: float = 0.0, divisions: int = DIVISIONS
+) -> float:
     """Largest step [s] up to which no decaying mode grows by more than ``growth``; inf if A-stable.
 
     Growing modes set no limit. A mode that decays by less than :data:`GROWTH_PER_RADIAN` a radian may miss
-    its decay by that much, as one without damping may.
+    its decay by that much, as one without damping may. It is found to rounding, or with fewer ``divisions``.
     """
     values, slack = _decaying(eigenvalues)
     if not values.size or isinstance(method, ImplicitRungeKutta):
         return np.inf
     fastest = float(np.abs(values).max())
 
-    def excess(h: float) -> float:
-        return float((amplification(method, h * values) - 1.0 - growth - h * slack).max())
+    def grow(h: NDArray[np.float64]) -> NDArray[np.bool_]:
+        factor = 1.0 + growth + h[:, None] * slack
+        return np.asarray(amplifies(method, h[:, None] * values, factor).any(axis=1))
 
-    return first_crossing(excess, NEAREST / fastest, FARTHEST / fastest)
+    return first_crossing(grow, NEAREST / fastest, FARTHEST / fastest, divisions)
 
 
 def is_stable(method: Method, eigenvalues: ArrayLike, h: float, growth: float = 0.0) -> bool:
@@ -51,14 +54,18 @@ def is_stable(method: Method, eigenvalues: ArrayLike, h: float, growth: float = 
     if not values.size or isinstance(method, ImplicitRungeKutta):
         return True
     steps = h * SHORTER[:, None]
-    return bool((amplification(method, steps * values) <= 1.0 + growth + steps * slack).all())
+    return not amplifies(method, steps * values, 1.0 + growth + steps * slack).any()
 
 
 def _decaying(eigenvalues: ArrayLike) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
-    """Eigenvalues of the modes that do not grow, and the growth [1/s] that each may have."""
+    """Eigenvalues of the modes that do not grow, and the growth [1/s] that each may have.
+
+    Conjugate ones say the same: one of them stands for both.
+    """
     values = np.asarray(eigenvalues, dtype=np.complex128)
-    values = values[(values.real <= UNDAMPED * np.abs(values)) & (values != 0.0)]
-    values = np.minimum(values.real, 0.0) + 1j * values.imag
+    decays = (values.real <= UNDAMPED * np.abs(values)) & (values != 0.0)
+    values = values[decays]
+    values = np.unique(np.minimum(values.real, 0.0) + 1j * np.abs(values.imag))
     return values, np.maximum(values.real + GROWTH_PER_RADIAN * np.abs(values), 0.0)
 
 

@@ -17,7 +17,7 @@ from fastmech.ensembles.system import System
 from fastmech.errors import InputError
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.scene import Scene
-from fastmech.step_limits.beyond import StepsTaken, steps_beyond, warn_of_steps
+from fastmech.step_limits.beyond import StepJudge, StepsTaken
 from fastmech.transients.tangent import advance_tangents
 
 Floats = NDArray[np.float64]
@@ -89,7 +89,8 @@ def largest_lyapunov(
         starts = checks.states("y0", y0, 4)
         problem = scene_problem(scene, len(starts), parameters or {}, "lagrange")
         values = own_values(parameters or {}, scene.model_dump(), len(starts))
-        warn_of_steps(scene, extreme_scenes(scene, values), values, starts, dt, t_end / dt, METHOD)
+        judge_of_steps = StepJudge(scene, values, starts, METHOD)
+        judge_of_steps.warn(extreme_scenes(scene, values), dt, t_end / dt)
     else:
         raise InputError(f"scene = {scene!r}: must be a Scene or a System")
     Y = np.array(starts.T, order="C")
@@ -128,6 +129,6 @@ def largest_lyapunov(
     if isinstance(scene, Scene):
         each = np.full(len(starts), h)
         taken = StepsTaken(each, each, np.full(len(starts), PIECES * steps), t_end)
-        beyond = steps_beyond(scene, values, starts, np.ascontiguousarray(Y.T), taken, METHOD)
+        beyond = judge_of_steps.beyond(np.ascontiguousarray(Y.T), taken)
         status[beyond & (status == Status.OK)] = Status.STEP_TOO_LARGE
     return LyapunovExponents(times[1:], exponents, status)

@@ -8,18 +8,23 @@ import numpy as np
 import pytest
 
 import fastmech as fm
+from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Adams
 from fastmech.integrators.methods import METHODS
-from fastmech.mechanism.coefficients import reduce
+from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.stability.linearize import jacobian
 from fastmech.step_limits.amplification import amplifies, companion, principal_root, stability_function
-from fastmech.step_limits.beyond import StepsTaken, steps_beyond
-from fastmech.step_limits.local import eigenvalue_bound, eigenvalues, state_matrices, time_near
+from fastmech.step_limits.beyond import StepJudge, StepsTaken
+from fastmech.step_limits.growth import CERTAIN, acquitted, bounded, growing, stiffest_growing
+from fastmech.step_limits.local import eigenvalue_bound, eigenvalues, local_motion, state_matrices
+from fastmech.step_limits.modes import decaying_modes, factored
 from fastmech.step_limits.predict import stable_step
+from fastmech.step_limits.region import region, rows_of, sectors_of
 from fastmech.step_limits.warning import step_limit, step_warning
 
 SCENE = fm.Scene(c2=1100 / 3, alpha=0.0)
 TOO_LARGE = fm.Status.STEP_TOO_LARGE
+EXPLICIT = [name for name, method in METHODS.items() if not isinstance(method, ImplicitRungeKutta)]
 
 
 def run(scene: fm.Scene, starts: np.ndarray, own: dict[str, np.ndarray], dt: float) -> tuple[list[int], bool]:
@@ -79,9 +84,10 @@ def test_a_motion_that_only_ends_where_the_step_is_too_long() -> None:
         found = fm.integrate(scene, starts, 1.0, dt=0.02)
     each = np.full(2, 0.02)
     taken = StepsTaken(each, each, np.full(2, 50), 1.0)
-    assert steps_beyond(scene, {}, starts, None, taken, "rk4").tolist() == [False, False]
-    assert steps_beyond(scene, {}, starts, starts, taken, "rk4").tolist() == [False, False]
-    assert steps_beyond(scene, {}, starts, found.y[-1], taken, "rk4").tolist() == [True, True]
+    judge = StepJudge(scene, {}, starts, "rk4")
+    assert judge.beyond(None, taken).tolist() == [False, False]
+    assert judge.beyond(starts, taken).tolist() == [False, False]
+    assert judge.beyond(found.y[-1], taken).tolist() == [True, True]
     assert found.status.tolist() == [TOO_LARGE] * 2
 
 
@@ -122,7 +128,7 @@ def test_growth_at_rest_counts_over_the_whole_run() -> None:
     for share, expected in ((0.9, False), (1.1, True)):
         number = int(np.log1p(share * 0.01) / growth)
         taken = StepsTaken(h, h, np.array([number]), 1.0)
-        assert steps_beyond(SCENE, {}, start, None, taken, "rk4").tolist() == [expected]
+        assert StepJudge(SCENE, {}, start, "rk4").beyond(None, taken).tolist() == [expected]
 
 
 @pytest.mark.parametrize("method", ["midpoint", "heun2", "ab5", "abm12", "tsit5", "rk4"])
@@ -169,11 +175,67 @@ def test_bound_and_dwelling() -> None:
     scene = fm.Scene(alpha=0.0, beta=300.0)
     undamped = fm.Scene(alpha=0.0, beta=0.0)
     states = np.column_stack([rng.uniform(-3, 3, (50, 2)), np.zeros((50, 2))])
-    matrices = state_matrices(reduce(scene), *states[:, :2].T)
-    largest = np.abs(eigenvalues(matrices)).max(axis=1)
-    assert (largest <= eigenvalue_bound(matrices) * (1 + 1e-12)).all()
+    largest = np.abs(eigenvalues(state_matrices(reduce(scene), *states[:, :2].T))).max(axis=1)
+    assert (largest <= eigenvalue_bound(local_motion(reduce(scene), states)) * (1 + 1e-12)).all()
     # From rest, for a hundredth of the time that the acceleration needs for 1 rad: 1e-4 rad.
-    times = time_near(reduce(undamped), states)
+    times = local_motion(reduce(undamped), states).time
     for state, time in zip(states[:10], times[:10], strict=True):
         end = fm.integrate(undamped, state, time / 100.0, dt=time / 400.0).y[-1, 0]
         assert np.abs(end - state)[:2].max() == pytest.approx(1e-4, rel=1e-2)
+
+
+def random_motions(seed: int, n: int) -> tuple[Coefficients, np.ndarray]:
+    """Scenes of every damping, where they may be and how fast."""
+    rng = np.random.default_rng(seed)
+    wide = 10.0 ** rng.uniform([[-1], [-1], [0], [1], [0], [-3]], [[1], [1], [3], [3], [2], [6]], (6, n))
+    mass, slider, lift, spring, force, damping = wide
+    c = Coefficients(mass, slider, lift, spring, np.full(n, 9.8), force, damping, np.zeros(n))  # type: ignore[arg-type]
+    return c, np.column_stack([rng.uniform(-3, 3, (n, 2)), rng.uniform(-5, 5, (n, 2))])
+
+
+def test_modes_are_the_eigenvalues() -> None:
+    """Against LAPACK's of the state matrices, whose rounding is relative to the fastest mode."""
+    c, states = random_motions(3, 2000)
+    motion = local_motion(c, states)
+    lane, values = decaying_modes(c, states, motion, 1e-6, lambda lane, _: np.ones(lane.size, dtype=bool))
+    expected = eigenvalues(state_matrices(c, *states[:, :2].T))
+    decays = (expected.real < -1e-6 * np.abs(expected)) & (expected.imag >= 0.0)
+    for k in range(len(states)):
+        own, exact = np.sort_complex(values[lane == k]), np.sort_complex(expected[k, decays[k]])
+        assert own.size == exact.size
+        np.testing.assert_allclose(own, exact, rtol=1e-7, atol=1e-12 * np.abs(expected[k]).max())
+    assert factored(motion).found[c.damping < 10.0].all()
+
+
+@pytest.mark.parametrize("name", EXPLICIT)
+def test_no_table_acquits_what_grows(name: str) -> None:
+    """At random places of the half plane, most of them near the region's boundary."""
+    rng, method, table = np.random.default_rng(4), METHODS[name], region(name)
+    edge = np.array([1e-3 * 1.06 ** np.argmax(column > 1e-4) for column in table.sector.T])
+    inward = rng.uniform(0, 1, 4000) ** 2
+    z = -inward + 1j * (1.0 - inward)
+    z *= edge[sectors_of(z.real, z.imag)] * rng.uniform(0.5, 1.1, z.size) / np.abs(z)
+    growth = table.sector[rows_of(np.abs(z)), sectors_of(z.real, z.imag)]
+    allowed = 10.0 ** rng.uniform(-6, -2, z.size)
+    acquits = growth <= CERTAIN * allowed
+    assert not amplifies(method, z[acquits], np.exp(allowed[acquits])).any()
+    assert acquits.mean() > 0.2  # and it does acquit
+
+
+@pytest.mark.parametrize(("name", "size"), [("rk4", 3.0), ("ab6", 0.3), ("abm12", 0.8)])
+def test_bounds_change_no_verdict(name: str, size: float) -> None:
+    """Those of longer steps neither, nor company."""
+    c, states = random_motions(5, 400)
+    method, number = METHODS[name], np.full(400, 300)
+    dt = size * np.random.default_rng(6).uniform(0.1, 1.5, 400) / eigenvalue_bound(local_motion(c, states))
+    known = bounded(method, c, states, 1.3 * dt, number)
+    verdicts = growing(method, c, states, dt, number)
+    stiffest = stiffest_growing(method, c, states, dt, number, bounded(method, c, states, dt, number))
+    assert stiffest == np.argmax(np.where(verdicts, eigenvalue_bound(local_motion(c, states)), 0.0))
+    assert growing(method, c, states, dt, number, known).tolist() == verdicts.tolist()
+    alone = [
+        growing(method, Coefficients(*(v[k : k + 1] for v in c)), states[[k]], dt[[k]], number[[k]])[0]  # type: ignore[index]
+        for k in range(400)
+    ]
+    assert alone == verdicts.tolist()
+    assert 0 < verdicts.sum() < np.sum(~acquitted(known, dt, number))
