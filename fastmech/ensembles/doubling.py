@@ -1,5 +1,7 @@
 """Every trajectory twice, and those above the tolerance again with their own shorter steps, on a budget.
 
+Those whose two runs may be near each other by luck run once more with longer steps.
+
 A trajectory is given up where three shorter steps did not halve its error (chaos, a singularity, a start on a
 basin's border), where two resolutions disagree about whether it stops, or where the budget is spent. It keeps
 the best run that it has had, and an error that says so.
@@ -8,27 +10,20 @@ the best run that it has had, and an error that says so.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastmech.ensembles.calibration import CALM
-from fastmech.ensembles.ladder import AIM, CHEAP, Calibrated
-from fastmech.ensembles.lanes import VECTOR_LANES
+from fastmech.ensembles.ladder import AIM, CHEAP
+from fastmech.ensembles.missed import missed_line
 from fastmech.ensembles.places import part_of, put_into
-from fastmech.ensembles.problem import Problem
-from fastmech.ensembles.richardson import LEAST_ORDER, RATIO, ROUNDING, distances, error_beyond, order_seen
+from fastmech.ensembles.repeatable import Flags, Floats, Members, Repeatable
+from fastmech.ensembles.richardson import LEAST_ORDER, RATIO, ROUNDING, error_beyond, order_seen
 from fastmech.ensembles.run import Progress
-from fastmech.ensembles.solve import Settings, Solution, solve
-from fastmech.ensembles.stiffness import work
-from fastmech.ensembles.stopping import STOP_CODE
+from fastmech.ensembles.solve import Solution, solve
+from fastmech.ensembles.stiffness import explicit_limit
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.methods import find_method
-
-Floats = NDArray[np.float64]
-Members = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 #: Repetitions of trajectories at most.
 ROUNDS = 6
@@ -45,6 +40,10 @@ LONGER = (4.0, 2.0, 1.0)
 #: Trajectories of the largest estimates whose errors are measured by runs of half the step, at the end.
 AUDITED = 64
 
+#: A difference of two runs is rarely so many times too small by luck; where it might be, steps so many times
+#: longer, or at least twice as long, tell.
+LUCK, FAR, LEAST_FAR = 100.0, RATIO**3, 2.0
+
 #: Share of the method's order that a trajectory must show to be taken for smooth again.
 SMOOTH = 2.0 / 3.0
 
@@ -56,15 +55,9 @@ BUDGET = 4.0
 
 
 @dataclass
-class Doubling:
+class Doubling(Repeatable):
     """Trajectories that run to a tolerance, each with the best run that it has had."""
 
-    problem: Problem
-    starts: Floats
-    outputs: Floats
-    found: Calibrated
-    tol: float
-    threads: int | None
     best: Solution = field(init=False)  #: each trajectory's best run
     dt: Floats = field(init=False)  #: its steps [s], shape (n,) like all that follow
     distance: Floats = field(init=False)  #: of the last two runs
@@ -103,44 +96,9 @@ class Doubling:
             if not again.size:
                 break
             self._repeat(again)
-        self._resettle(np.flatnonzero(self.rounded | (self.given_up & ~self.once_rough & ~self.unpaid)))
         self._audit()
+        self._resettle(np.flatnonzero(self.rounded | (self.given_up & ~self.once_rough & ~self.unpaid)))
         return self.best, self.error, self.remark()
-
-    @property
-    def settings(self) -> Settings:
-        """What the calibration has found."""
-        return self.found.settings
-
-    @property
-    def jumps(self) -> bool:
-        """Whether the right-hand side may jump: of a user's nobody knows."""
-        return self.problem.coefficients is None
-
-    @cached_property
-    def margin(self) -> float:
-        """Where even the ratio that covers most of the sample keeps an error within the tolerance, it is."""
-        return self.found.cover / self.found.median
-
-    def solve(self, who: Members, dt: Floats, settings: Settings | None = None) -> Solution:
-        """A run of some of the trajectories with their own steps."""
-        own = replace(settings or self.settings, dt=dt)
-        return solve(self.problem.part(who), self.starts[who], self.outputs, own, self.threads)
-
-    def apart(self, a: Solution, b: Solution) -> Floats:
-        """Distances (n,); infinite where one has stopped and the other not, or for another reason."""
-        apart = distances(a.y, b.y)
-        if self.problem.observation.stops:
-            apart[a.records[STOP_CODE] != b.records[STOP_CODE]] = np.inf
-        return apart
-
-    def work(self, who: Members, dt: Floats) -> float:
-        """Right-hand sides of a run, whole vectors of trajectories counted."""
-        total = 0.0
-        for length, lanes in zip(*np.unique(dt[np.isfinite(dt)], return_counts=True), strict=True):
-            whole = -(-int(lanes) // VECTOR_LANES) * VECTOR_LANES
-            total += whole * work(self.settings.method, float(length), self.outputs)
-        return total
 
     def affordable(self, who: Members, finer: float) -> Members:
         """As many of the trajectories, longest steps first, as the budget allows with steps so much finer."""
@@ -223,15 +181,17 @@ class Doubling:
             put_into(self.best, which[better], run, better)
 
     def _audit(self) -> None:
-        """Measure the errors of the worst trajectories by runs of half the step.
+        """Measure the errors of the worst and of doubtful trajectories by runs of half the step.
 
         Where one is above the tolerance the finer run is kept, and measured in its turn while that helps.
+        Where it does not help any more, rounding rules, and the largest difference seen is the error.
         Where the right-hand side may jump, one difference of two runs may be small by luck. There two finer
         runs tell three, and if these do not fall as the order says, the finest run is kept and the largest
         difference taken for its error.
         """
         open_ = self.finite & ~self.rounded & ~self.given_up
         who = self._worst(open_ & ~self.rough)[:AUDITED]
+        who = np.concatenate([who, np.setdiff1d(self._doubtful(open_ & ~self.rough), who)])
         if self.jumps:
             who = np.concatenate([who, self._worst(open_ & self.rough)])
         last = np.full(who.size, np.inf)
@@ -254,6 +214,10 @@ class Doubling:
             missing, helps = ~(error <= self.tol), error <= 0.5 * last
             # Two resolutions may disagree about a stop: the finer one has the better view.
             helps &= np.isfinite(error) | (turn < 2)
+            if not self.jumps:
+                stuck = ~helps & np.isfinite(last)
+                self.error[who] = np.where(stuck, np.fmax(np.fmax(error, last), self.distance[who]), error)
+                self.rounded[who[stuck]] = True
             kept = (rough | (missing & helps)) & np.isfinite(run.y[-1]).all(axis=1)
             put_into(self.best, who[kept], run, kept)
             self.dt[who[kept]] = own[kept]
@@ -264,6 +228,24 @@ class Doubling:
         """Trajectories in the order of their errors, largest first."""
         members = np.flatnonzero(which)
         return members[np.argsort(-self.error[members], kind="stable")]
+
+    def _doubtful(self, which: Flags) -> Members:
+        """Trajectories whose two runs may be near each other by luck.
+
+        As a function of the step the error may have an extremum or a zero, about which two runs hardly differ
+        however large it is. Another of far longer steps, reckoned with the order, then tells of an error
+        above the tolerance. Steps that would be unstable tell nothing.
+        """
+        who = np.flatnonzero(which & (self.error > self.tol / LUCK))
+        longer, c = self.dt[who] * FAR, self.problem.coefficients
+        if c is not None:
+            longer = np.minimum(longer, explicit_limit(self.settings.method, c))
+        told = longer >= LEAST_FAR * self.dt[who]
+        who, longer = who[told], longer[told]
+        self.left -= self.work(who, longer)
+        apart = self.apart(self.solve(who, longer), part_of(self.best, who))
+        error = apart / ((longer / self.dt[who]) ** self.settings.method.order - 1.0)
+        return who[np.isfinite(error) & (error > self.tol)]
 
     def _audited(self, who: Members, turn: int) -> int:
         """How many of the trajectories, worst first, the budget gives finer runs; some in any case."""
@@ -282,18 +264,6 @@ class Doubling:
     def remark(self) -> str:
         """Why trajectories have missed the tolerance; empty where none has."""
         missed = self.finite & ~(self.error <= self.tol)
-        if not missed.any():
-            return ""
-        grazing = missed & ~np.isfinite(self.error) & np.isfinite(self.best.y[-1]).all(axis=1)
-        grazing &= self.problem.observation.stops
-        lost = missed & ~np.isfinite(self.best.y[-1]).all(axis=1)
-        unpaid = missed & self.unpaid & ~grazing & ~lost
-        causes = {
-            "two resolutions disagree about their stop": grazing,
-            "not finite at any step tried": lost,
-            "shorter steps would cost too much": unpaid,
-            "shorter steps do not reduce their errors as the order says (chaos, a jump or singularity of the "
-            "right-hand side, rounding)": missed & ~grazing & ~lost & ~unpaid,
-        }
-        each = [f"{np.count_nonzero(which):,}: {why}" for why, which in causes.items() if which.any()]
-        return f"; {np.count_nonzero(missed):,} of {missed.size:,} miss it ({'; '.join(each)})"
+        ended = np.isfinite(self.best.y[-1]).all(axis=1)
+        grazing = ended & ~np.isfinite(self.error) & self.problem.observation.stops
+        return missed_line(missed, grazing, ~ended, self.unpaid)

@@ -56,14 +56,19 @@ def error_beyond(distance: Floats, order: ArrayLike) -> Floats:
     return distance / np.where(q < LEAST_ORDER, 1.0, RATIO ** np.maximum(q, LEAST_ORDER) - 1.0)
 
 
+def half_over(order: ArrayLike) -> Floats:
+    """Distance to a run of half the step over that to one of steps longer by :data:`RATIO`, at an order."""
+    q = np.asarray(order, dtype=np.float64)
+    return np.asarray((1.0 - RATIO ** (-2.0 * q)) / (RATIO**q - 1.0))
+
+
 def unseen(half: Floats, longer: Floats, order: int) -> Floats:
     """Errors (n,) from distances to runs of half the step, and to runs with steps longer by :data:`RATIO`.
 
     The first is nearly all of the error at a high order, and half of it where both show order 1.
     """
     orders = np.linspace(1.0, max(order, 1.0), 64)
-    missing = 1.0 - RATIO ** (-2.0 * orders)
-    ratios = missing / (RATIO**orders - 1.0)
+    missing, ratios = 1.0 - RATIO ** (-2.0 * orders), half_over(orders)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = half / longer
     told = np.isfinite(ratio) & (half > ROUNDING)

@@ -14,15 +14,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.ensembles.calibration import calibrate
-from fastmech.ensembles.doubling import Doubling
+from fastmech.ensembles.calibration import CALM, calibrate
+from fastmech.ensembles.doubling import SMOOTH, Doubling
 from fastmech.ensembles.fitting import speed_bound
 from fastmech.ensembles.ladder import Calibrated
 from fastmech.ensembles.problem import Problem
-from fastmech.ensembles.richardson import RATIO, ROUNDING, distances, order_statistic, unseen
+from fastmech.ensembles.richardson import RATIO, ROUNDING, distances, half_over, order_statistic, unseen
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.solve import Settings, Solution, solve
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
+from fastmech.integrators.methods import find_method
 
 Floats = NDArray[np.float64]
 
@@ -36,6 +37,9 @@ BEYOND, SAMPLE_MOST = 16, 4096
 
 #: For the largest error the calibration looks at this quantile of the sample: single trajectories run again.
 TYPICAL = 0.9
+
+#: Steps of :data:`fastmech.ensembles.calibration.CALM` in an Adams method's, of a run that tells rounding.
+CALM_STEPS = 2.0
 
 #: Least tolerance for which lanes of float32 are tried, for quantiles: in the worst trajectories rounding is
 #: magnified more than the distance of two runs tells.
@@ -127,7 +131,15 @@ def _sampled_errors(
     if settings.precision is np.float64:
         # Where rounding rules, the run with longer steps is the nearer one: it rounds less.
         rounded = np.minimum(error, distance)
-        error = np.where(error < ROUNDING, rounded, unseen(error, distance, settings.method.order))
+        half, order = error, settings.method.order
+        error = np.where(half < ROUNDING, rounded, unseen(half, distance, order))
+        noisy = np.flatnonzero(half > half_over(SMOOTH * order) * distance)
+        if settings.method.start_steps and noisy.size:
+            # Half the step rounds as much or more: a method that rounds less is nearer to the truth.
+            calm = replace(settings, method=find_method(CALM), dt=CALM_STEPS * np.asarray(settings.dt))
+            who = sample[noisy]
+            right = solve(w.problem.part(who), w.starts[who], w.outputs, calm, w.threads).y
+            error[noisy] = distances(solution.y[:, who], right)
     return error
 
 

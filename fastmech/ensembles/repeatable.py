@@ -1,0 +1,68 @@
+"""An ensemble of which some trajectories run again with steps of their own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.ensembles.ladder import Calibrated
+from fastmech.ensembles.lanes import VECTOR_LANES
+from fastmech.ensembles.problem import Problem
+from fastmech.ensembles.richardson import distances
+from fastmech.ensembles.solve import Settings, Solution, solve
+from fastmech.ensembles.stiffness import work
+from fastmech.ensembles.stopping import STOP_CODE
+
+Floats = NDArray[np.float64]
+Members = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+
+@dataclass
+class Repeatable:
+    """What is integrated, and what a calibration has found for it."""
+
+    problem: Problem
+    starts: Floats
+    outputs: Floats
+    found: Calibrated
+    tol: float
+    threads: int | None
+
+    @property
+    def settings(self) -> Settings:
+        """What the calibration has found."""
+        return self.found.settings
+
+    @property
+    def jumps(self) -> bool:
+        """Whether the right-hand side may jump: of a user's nobody knows."""
+        return self.problem.coefficients is None
+
+    @cached_property
+    def margin(self) -> float:
+        """Where even the ratio that covers most of the sample keeps an error within the tolerance, it is."""
+        return self.found.cover / self.found.median
+
+    def solve(self, who: Members, dt: Floats, settings: Settings | None = None) -> Solution:
+        """A run of some of the trajectories with their own steps."""
+        own = replace(settings or self.settings, dt=dt)
+        return solve(self.problem.part(who), self.starts[who], self.outputs, own, self.threads)
+
+    def apart(self, a: Solution, b: Solution) -> Floats:
+        """Distances (n,); infinite where one has stopped and the other not, or for another reason."""
+        apart = distances(a.y, b.y)
+        if self.problem.observation.stops:
+            apart[a.records[STOP_CODE] != b.records[STOP_CODE]] = np.inf
+        return apart
+
+    def work(self, who: Members, dt: Floats) -> float:
+        """Right-hand sides of a run, whole vectors of trajectories counted."""
+        total = 0.0
+        for length, lanes in zip(*np.unique(dt[np.isfinite(dt)], return_counts=True), strict=True):
+            whole = -(-int(lanes) // VECTOR_LANES) * VECTOR_LANES
+            total += whole * work(self.settings.method, float(length), self.outputs)
+        return total
