@@ -41,7 +41,8 @@ class Resumption:
     def __init__(self, lanes: Lanes) -> None:
         """From the lanes as they are."""
         self._lanes = lanes
-        self._Y, self._memory, self._phase = lanes.Y.copy(), lanes.memory.copy(), lanes.phase.copy()
+        self._Y, self._phase = lanes.Y.copy(), lanes.phase.copy()
+        self._memory = lanes.memory.copy() if lanes.phase.any() else np.zeros_like(lanes.memory)
         self._params = lanes.params
 
     def last_finite(

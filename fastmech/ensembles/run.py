@@ -164,7 +164,7 @@ def run_ensemble(
 
     def run_task(task: _Task) -> int:
         members, piece, passed = task.members, 0, 0
-        memory = np.zeros((members.size, method.carried * begin.shape[1]), dtype=begin.dtype)
+        memory = np.broadcast_to(begin.dtype.type(0), (members.size, method.carried * begin.shape[1]))
         lanes = Lanes(members, begin[members], rows_at(own, members), observation.record, block_lanes, memory)
         while piece < task.way.steps.size and lanes.members.size and not interrupted.is_set():
             check()
