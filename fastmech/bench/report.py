@@ -19,7 +19,7 @@ from fastmech.bench.entrant import Entrant
 from fastmech.bench.entrants import entrants, missing
 from fastmech.bench.fused import METHODS
 from fastmech.bench.measure import BUDGET, Row, measure
-from fastmech.bench.memory import TRAJECTORIES, peaks
+from fastmech.bench.memory import TRAJECTORIES, footprints
 from fastmech.bench.peak import TURNS as PEAK_TURNS
 from fastmech.bench.peak import Throughput, throughputs
 from fastmech.bench.picture import draw_bench
@@ -88,7 +88,7 @@ def run_bench(
     peak, rhs = throughputs(problems[0], stage("right-hand sides", PEAK_TURNS))
     prices = costs(problems[0], stage("terms", TURNS))
     starts = [] if quick else list(started(stage("cold starts", len(STARTED))))
-    memory = [] if quick else peaks(stage("memory", len(TRAJECTORIES)))
+    memory = [] if quick else footprints(stage("memory", len(TRAJECTORIES)))
     others = [path for study in STUDIES.values() for path in study(out, quick=quick, stage=stage)]
     table, picture = out / "bench.md", out / "bench.png"
     lines = _preamble(quick, failures)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from fastmech.bench.measure import Row
-from fastmech.bench.memory import Peak
+from fastmech.bench.memory import Footprint
 from fastmech.bench.peak import Throughput
 from fastmech.bench.precision import TARGETS, fastest_at, rate_at
 from fastmech.bench.problem import Problem
@@ -151,7 +151,7 @@ def machine_sections(
     throughputs: list[Throughput],
     costs: list[Cost],
     starts: list[Start],
-    memory: list[Peak],
+    memory: list[Footprint],
 ) -> list[str]:
     """Peak, terms, cold starts and memory."""
     lines = [

@@ -42,7 +42,9 @@ class Resumption:
         """From the lanes as they are."""
         self._lanes = lanes
         self._Y, self._phase = lanes.Y.copy(), lanes.phase.copy()
-        self._memory = lanes.memory.copy() if lanes.phase.any() else np.zeros_like(lanes.memory)
+        self._memory = (
+            lanes.memory.copy() if lanes.phase.any() else np.zeros(lanes.memory.shape, lanes.memory.dtype)
+        )
         self._params = lanes.params
 
     def last_finite(

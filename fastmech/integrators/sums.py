@@ -20,7 +20,7 @@ Integers = NDArray[np.int64]
 
 #: Terms of the widest pass of one sum, and of two sums over the same rows.
 TERMS: tuple[int, ...] = tuple(range(8))
-TERMS_OF_TWO: tuple[int, ...] = tuple(range(6))
+TERMS_OF_TWO: tuple[int, ...] = tuple(range(7))
 
 #: Bytes that processors move at once, and the length of their longest vectors.
 CACHE_LINE = 64

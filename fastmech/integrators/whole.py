@@ -37,14 +37,13 @@ def redo(
 ) -> None:
     """The step once more, stage by stage, for lanes that are far out: one by one.
 
-    Not for those that were lost before: nothing changes them. (The sums are plain loops: those of
-    :func:`fastmech.integrators.explicit.one_step` would take longer to compile than all the rest.)
+    The sums are plain loops: those of :func:`fastmech.integrators.explicit.one_step` would take longer to
+    compile than all the rest.
     """
     dim, stages = now.shape[0], nodes.shape[0]
     own, y, K = np.empty((params.shape[0], 1)), np.empty((dim, 1)), np.empty((stages, dim, 1))
     for i in range(now.shape[1]):
-        lost = 0.0 * (now[0, i] + now[1, i] + now[2, i] + now[3, i]) != 0.0
-        if not lost and is_far(now, i, h) | is_far(then, i, h):
+        if is_far(now, i, h) | is_far(then, i, h):
             own[:, 0] = params[:, i]
             for s in range(stages + 1):
                 for d in range(dim):

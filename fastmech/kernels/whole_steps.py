@@ -19,6 +19,8 @@ from fastmech.jit import inlined
 from fastmech.kernels import lagrange
 from fastmech.kernels.sincos import REDUCTION_LIMIT
 
+Floats = NDArray[np.float64]
+
 #: Angles [rad], and turns of an angle in a step [rad], within which no stage of a step leaves the range of
 #: the fast trigonometry: no row of a tableau here has weights whose sizes sum to 100. (A stage much faster
 #: than both ends of its step could: that is a step for nothing.)
@@ -27,9 +29,6 @@ FARTHEST, TURNED = 0.5 * REDUCTION_LIMIT, 0.004 * REDUCTION_LIMIT
 #: Methods that have whole steps: the fourth order that everybody knows and the best of order 8. Each costs a
 #: compilation for each combination of terms, on first use.
 METHODS = ("rk4", "dop853")
-
-
-Floats = NDArray[np.float64]
 
 
 class Formula(Protocol):
@@ -86,7 +85,7 @@ _TAIL = """
         Z[0, i], Z[1, i], Z[2, i], Z[3, i] = phi{s}, theta{s}, phi_dot{s}, theta_dot{s}
         turned, bent = turn * phi_dot{s}, turn * theta_dot{s}
         reach = phi{s} * phi{s} + theta{s} * theta{s} + turned * turned + bent * bent
-        beyond |= not reach < 0.5 * FARTHEST * FARTHEST
+        beyond |= reach > 0.5 * FARTHEST * FARTHEST
     return beyond
 """
 
@@ -118,8 +117,8 @@ def whole_step(rhs: Any, tableau: Formula) -> Any:
     """``step(t, h, Y, Z, p, work)`` of a block right-hand side and a method, ``None`` where there is none.
 
     It writes the states (dim, lanes) after a step from ``Y`` into ``Z``, with ``work`` (stages, lanes) as
-    scratch. The result is not 0 where a new state may be :func:`is_far`, or is not finite: a sum of squares
-    tells it of a block in a few instructions. Steps from or to states that are far are not to be used.
+    scratch. The result is not 0 where a new state may be :func:`is_far`: a sum of squares tells it of a block
+    in a few instructions. Steps from or to states that are far are not to be used.
     """
     name = getattr(rhs, "__name__", "")
     if tableau.name not in METHODS or rhs is not getattr(lagrange, name, None):
@@ -131,11 +130,10 @@ def whole_step(rhs: Any, tableau: Formula) -> Any:
 def is_far(Y: Floats, i: int, h: float) -> bool:
     """Whether a step h [s] from or to a lane's state may need angles beyond the fast trigonometry.
 
-    NaN counts. Comparisons only: a lane's verdict is the same in any compiled code.
+    NaN does not: nothing mends it. Comparisons only: a lane's verdict is the same in any compiled code.
     """
-    near = (abs(Y[0, i]) <= FARTHEST) & (abs(Y[1, i]) <= FARTHEST)
-    slow = (h * abs(Y[2, i]) <= TURNED) & (h * abs(Y[3, i]) <= TURNED)
-    return not (near & slow)
+    turned = (abs(Y[0, i]) > FARTHEST) | (abs(Y[1, i]) > FARTHEST)
+    return turned | (h * abs(Y[2, i]) > TURNED) | (h * abs(Y[3, i]) > TURNED)
 
 
 @cache

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from types import SimpleNamespace
 from typing import Any
 
@@ -46,6 +47,7 @@ from fastmech.step_limits.predict import GROWTH_PER_RADIAN, UNDAMPED, is_stable,
 from fastmech.step_limits.region import region, rows_of, sectors_of
 from fastmech.step_limits.warning import (
     GROWS,
+    KEPT,
     PASSING,
     TURN,
     Limit,
@@ -60,6 +62,9 @@ TOLD = 3
 
 #: By how much rounding may make a step longer than the dt that it was to be.
 ROUNDED = 1e-6
+
+#: Eigenvalues between the grid's configurations may be larger than those at them by this factor.
+BETWEEN = 1.15
 
 
 @dataclass(frozen=True)
@@ -137,7 +142,10 @@ class StepJudge:
         """
         n, method, c = len(self._starts), self._method, self._coefficients
         each, number = np.broadcast_to(dt, n), np.broadcast_to(steps, n)
-        known = bounded(method, c, self._starts, each, number)
+        if self._is_quiet(dt, steps):
+            known = Growth(np.zeros(n), np.full(n, np.inf))
+        else:
+            known = bounded(method, c, self._starts, each, number)
         self._known = dt, known
         others: list[Limit] = []
         scenes = dict.fromkeys(extremes)
@@ -167,13 +175,33 @@ class StepJudge:
         known = None
         if self._known is not None and taken.longest.max(initial=0.0) <= (1.0 + ROUNDED) * self._known[0]:
             known = self._known[1]
-        beyond |= growing(method, c, starts, taken.longest, taken.number, known)
-        if ends is not None:
+        quiet = self._is_quiet(taken.longest.max(initial=0.0), taken.number.max(initial=0))
+        if not quiet:
+            beyond |= growing(method, c, starts, taken.longest, taken.number, known)
+        if not quiet and ends is not None:
             left: Any = c.force * np.exp(-c.decay * taken.until)
             beyond |= growing(method, c._replace(force=left), ends, taken.longest, taken.number)
         if isinstance(method, Adams) and not self._own:
             beyond |= _errors_grow_at_rest(method, self._scene, taken)
         return beyond
+
+    def _is_quiet(self, dt: float, steps: float) -> bool:
+        """Whether steps of dt [s] are so short that small motion grows nowhere, however long it stays."""
+        if self._own or isinstance(self._method, ImplicitRungeKutta):
+            return False
+        most = region(self._method.name).largest[rows_of(np.array(dt * fastest_decaying(self._scene)))]
+        return bool(most * steps <= CERTAIN * np.log1p(PASSING))
+
+
+@lru_cache(KEPT)
+def fastest_decaying(scene: Scene) -> float:
+    """Bound [1/s] on the eigenvalues of decaying small motion about all configurations of a scene.
+
+    Those of a grid, and a margin for what lies between. What is left of a force that decays makes none of
+    them larger: of a matrix linear in the force the largest eigenvalue is a convex function of it.
+    """
+    values = np.concatenate(scene_eigenvalues(scene))
+    return BETWEEN * float(np.abs(values[values.real < 0.0]).max(initial=0.0))
 
 
 def _errors_grow_at_rest(method: Adams, scene: Scene, taken: StepsTaken) -> NDArray[np.bool_]:

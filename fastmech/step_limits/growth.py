@@ -152,7 +152,10 @@ def stiffest_growing(
 
 
 def _grow(method: Method, c: Coefficients, states: Floats, dt: Floats, number: Numbers) -> NDArray[np.bool_]:
-    """The same without bounds: a mode grows by more than is let pass in the steps there, or errors in all."""
+    """What :func:`growing` tells, without bounds.
+
+    A mode grows by more than is let pass in the steps there, or errors do in all.
+    """
     table, motion = region(method.name), local_motion(c, states)
     there = steps_there(motion.time, dt, number)
 

@@ -2,7 +2,8 @@
 
 They tell of most modes, without the method's polynomials, that they are stable. The logarithm of a method's
 amplification is subharmonic: a bound on the boundary of a part of the half plane is one within it (maximum
-principle). The table's places lie so close on those boundaries that in between the growth hardly differs.
+principle). Boundaries are sampled: rays, and the arcs between them by the rays on either side. What lies
+between is left to the margin of those who use the table.
 """
 
 from __future__ import annotations

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from ensembles.starts import Floats
 
-from fastmech.ensembles.lanes import VECTOR_LANES, Lanes
+from fastmech.ensembles.lanes import VECTOR_LANES, Lanes, rows_at
+from fastmech.integrators.sums import CACHE_LINE
 
 pytestmark = pytest.mark.nojit
 
@@ -44,6 +45,25 @@ def test_blocks_are_whole_vectors_and_filled_with_the_last(n: int, block_lanes: 
         assert array.flags.c_contiguous
     padding = lanes.Y.transpose(0, 2, 1).reshape(-1, 4)[n:]
     np.testing.assert_array_equal(padding, np.tile(states[-1], (len(padding), 1)))
+
+
+@SIZES
+@pytest.mark.parametrize("precision", [np.float64, np.float32])
+def test_rows_begin_on_lines_of_the_cache(n: int, precision: type) -> None:
+    states = np.random.default_rng(n).normal(size=(n, 4)).astype(precision)
+    lanes = Lanes(np.arange(n), states, states, RECORD, 100, states)
+    for array in (lanes.Y, lanes.params, lanes.memory):
+        for row in array.reshape(-1, array.shape[2]):
+            assert row.ctypes.data % CACHE_LINE == 0
+
+
+def test_common_rows_are_taken_without_copies() -> None:
+    one = np.random.default_rng(1).normal(size=8)
+    common, own = np.broadcast_to(one, (5, 8)), np.tile(one, (5, 1)) * np.arange(5.0)[:, None]
+    which = np.array([4, 1, 1])
+    np.testing.assert_array_equal(rows_at(common, which), common[which])
+    np.testing.assert_array_equal(rows_at(own, which), own[which])
+    assert np.shares_memory(rows_at(common, which), one)
 
 
 @SIZES

@@ -53,12 +53,10 @@ def test_motions_far_out_are_those_of_the_stages_and_others_do_not_notice(name: 
     alone = through(whole, near)
     np.testing.assert_allclose(alone, through(staged, near), rtol=0, atol=1e-11)
     mixed = near.copy()
-    mixed[0, 2], mixed[1, 9] = 2.2 * FARTHEST, -1e9  # beyond the range of the fast trigonometry
+    mixed[0, 2], mixed[1, 9] = 1e17, -1e200  # where the fast trigonometry gives nonsense; the angles stay
     mixed[2, 12] = np.nan
     found, stages = through(whole, mixed), through(staged, mixed)
-    np.testing.assert_allclose(
-        found[:, [2, 9]], stages[:, [2, 9]], rtol=1e-13, atol=1e-5
-    )  # angles are rounded to 1e-7
+    np.testing.assert_allclose(found[:, [2, 9]], stages[:, [2, 9]], rtol=1e-9, atol=0)
     np.testing.assert_array_equal(found[:, [2, 9]], through(whole, mixed[:, ::-1].copy())[:, [13, 6]])
     assert np.isnan(found[:, 12]).all()
     healthy = np.setdiff1d(np.arange(16), [2, 9, 12])
@@ -70,10 +68,10 @@ def test_motions_far_out_are_those_of_the_stages_and_others_do_not_notice(name: 
 def test_motions_that_come_and_go_across_the_limit_depend_on_nobody(direction: float) -> None:
     _, whole = both("rk4")
     Y = lanes(16)
-    Y[0], Y[2] = FARTHEST - direction * 2.0, direction * 20.0  # cross it within the run
+    Y[0], Y[2] = FARTHEST - direction * 2.0, direction * np.linspace(12.0, 28.0, 16)  # cross it one by one
     together = through(whole, Y)
     assert (np.sign(together[0] - FARTHEST) == direction).any()
-    for i in range(0, 16, 5):
+    for i in range(16):
         one = np.repeat(Y[:, i : i + 1], 16, axis=1)
         np.testing.assert_array_equal(through(whole, one)[:, 0], together[:, i])
 
