@@ -109,7 +109,7 @@ def integrate(
             at the worst output time. Method, step and precision are chosen by a calibration on a sample:
             an implicit method where stability, not accuracy, would set an explicit one's step.
         quantile: whose error ``tol`` is: 1.0, the default, the largest of all trajectories, for which every
-            one runs twice and bad ones again; less: that quantile of the trajectories, estimated from a
+            one runs twice or three times and bad ones again; less: that quantile, estimated from a
             sample.
         fit: whether each trajectory's step is fitted to its energy: ``dt`` then belongs to slow motions, and
             the faster a trajectory can become, the shorter its own step, see

@@ -3,7 +3,7 @@
 The error of a run is estimated by step doubling in its finer form: a second run with steps longer by
 sqrt(2), see :mod:`fastmech.ensembles.richardson`. A sample of trajectories settles method, step and
 precision. For a quantile of the errors the sample's quantile is the estimate; for the largest error every
-trajectory runs twice, see :mod:`fastmech.ensembles.doubling`.
+trajectory runs twice, and those near the tolerance once more, see :mod:`fastmech.ensembles.doubling`.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Estimated:
     solution: Solution
     settings: Settings
     reason: str  #: why this method, one line
-    error: Floats | None  #: of each trajectory (n,), where every one has run twice
+    error: Floats | None  #: of each trajectory (n,), where every one has run at least twice
     estimate: float  #: the quantile of the errors that was asked for
 
 
