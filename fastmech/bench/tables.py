@@ -163,7 +163,7 @@ def machine_sections(
             ["where", "million right-hand sides/s", "of the kernel alone", "multiply-adds in that time"],
             ([t.name, f"{t.rhs / 1e6:.1f}", f"{t.share:.2f}", f"{t.slots:.0f}"] for t in throughputs),
         ),
-        "## Terms of a scene (RK4, dt = 0.02 s)",
+        "## Terms of a scene (RK4, dt = 0.01 s)",
         "",
         *table(
             ["scene", "trajectories per core second", "relative"],

@@ -13,7 +13,7 @@ import numpy as np
 from fastmech.bench.problem import Problem
 from fastmech.ensembles.integrate import integrate
 
-METHOD, DT = "rk4", 0.02
+METHOD, DT = "rk4", 0.01
 TURNS = 9
 
 #: Scenes by the terms that they have, as changes of Table 1.

@@ -47,9 +47,10 @@ def redo(
             own[:, 0] = params[:, i]
             for s in range(stages + 1):
                 for d in range(dim):
-                    y[d, 0] = now[d, i]
+                    total = 0.0
                     for k in range(start[s], start[s + 1]):
-                        y[d, 0] += h * weight[k] * K[stage[k], d, 0]
+                        total += weight[k] * K[stage[k], d, 0]
+                    y[d, 0] = now[d, i] + h * total
                 if s < stages:
                     rhs(t + nodes[s] * h, y, K[s], own)
             then[:, i] = y[:, 0]

@@ -142,17 +142,16 @@ class StepJudge:
         """
         n, method, c = len(self._starts), self._method, self._coefficients
         each, number = np.broadcast_to(dt, n), np.broadcast_to(steps, n)
-        if self._is_quiet(dt, steps):
-            known = Growth(np.zeros(n), np.full(n, np.inf))
-        else:
+        asked: set[int | None] = set()
+        if not self._is_quiet(dt, steps):
             known = bounded(method, c, self._starts, each, number)
-        self._known = dt, known
+            self._known = dt, known
+            asked.add(stiffest_growing(method, c, self._starts, each, number, known))
         others: list[Limit] = []
         scenes = dict.fromkeys(extremes)
-        asked = {stiffest_growing(method, c, self._starts, each, number, known)}
-        fading: Any = np.where(c.force != 0.0, c.decay, 0.0)
-        if fading.any():
-            asked.add(int(np.argmax(fading)))
+        if np.any(c.decay):
+            fading: Any = np.where(c.force != 0.0, c.decay, 0.0)
+            asked.add(int(np.argmax(fading)) if fading.any() else None)
         for k in asked - {None}:
             scene = self._scene.replace(**{name: float(values[k]) for name, values in self._own.items()})
             scenes[scene] = None
@@ -170,15 +169,15 @@ class StepJudge:
         """
         method, c, starts = self._method, self._coefficients, self._starts
         beyond = _turns_too_far(starts[:, 2:], taken.first)
-        if np.any(c.force != 0.0):
+        if np.any(c.decay):
             beyond |= (c.force != 0.0) & (taken.first * c.decay > impulse_limit(method))
         known = None
         if self._known is not None and taken.longest.max(initial=0.0) <= (1.0 + ROUNDED) * self._known[0]:
             known = self._known[1]
-        quiet = self._is_quiet(taken.longest.max(initial=0.0), taken.number.max(initial=0))
-        if not quiet:
-            beyond |= growing(method, c, starts, taken.longest, taken.number, known)
-        if not quiet and ends is not None:
+        if self._is_quiet(taken.longest.max(initial=0.0), taken.number.max(initial=0)):
+            return beyond
+        beyond |= growing(method, c, starts, taken.longest, taken.number, known)
+        if ends is not None:
             left: Any = c.force * np.exp(-c.decay * taken.until)
             beyond |= growing(method, c._replace(force=left), ends, taken.longest, taken.number)
         if isinstance(method, Adams) and not self._own:
@@ -190,7 +189,7 @@ class StepJudge:
         if self._own or isinstance(self._method, ImplicitRungeKutta):
             return False
         most = region(self._method.name).largest[rows_of(np.array(dt * fastest_decaying(self._scene)))]
-        return bool(most * steps <= CERTAIN * np.log1p(PASSING))
+        return bool(most * max(steps, 1.0) <= CERTAIN * np.log1p(PASSING))
 
 
 @lru_cache(KEPT)
