@@ -34,6 +34,7 @@ from fastmech.scene import Scene
 from fastmech.step_limits.amplification import amplification, amplifies
 from fastmech.step_limits.growth import (
     CERTAIN,
+    MOST_STEPS,
     SPURIOUS,
     Growth,
     bounded,
@@ -189,7 +190,7 @@ class StepJudge:
         if self._own or isinstance(self._method, ImplicitRungeKutta):
             return False
         most = region(self._method.name).largest[rows_of(np.array(dt * fastest_decaying(self._scene)))]
-        return bool(most * max(steps, 1.0) <= CERTAIN * np.log1p(PASSING))
+        return bool(most * np.clip(steps, 1.0, MOST_STEPS) <= CERTAIN * np.log1p(PASSING))
 
 
 @lru_cache(KEPT)
