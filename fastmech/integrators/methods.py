@@ -2,11 +2,12 @@
 
 Measured on the mechanism (largest error of final states, right-hand sides a trajectory): the Adams methods
 need the fewest right-hand sides at every accuracy, because each step costs one or two. With steps fitted to
-each trajectory (:mod:`fastmech.ensembles.fitting`) ``ab6`` leads down to errors of 1e-6, ``ab7`` to 1e-8,
-``abm12`` below; of the Runge-Kutta methods ``tsit5`` leads down to 1e-4, ``verner6`` and ``dop853`` to 1e-7,
-``hairer10`` below. Choose a Runge-Kutta method where outputs are close together or unevenly spaced (an Adams
-method starts anew whenever its step changes), where trajectories are short, or where the step is large for
-the system: the Adams methods' stability intervals are short and end abruptly,
+each trajectory (:mod:`fastmech.ensembles.fitting`) ``abm8`` leads down to errors of 1e-5, ``abm10`` to 1e-9,
+``abm12`` below, with ``ab6`` and ``ab7`` close behind; of the Runge-Kutta methods ``tsit5`` leads down to
+1e-4, ``verner6`` and ``dop853`` to 1e-7, ``hairer10`` below. Choose a Runge-Kutta method where outputs are
+close together or unevenly spaced (an Adams method starts anew whenever its step changes), where trajectories
+are short, or where the step is large for the system: the Adams methods' stability intervals are short and end
+abruptly,
 
     =========  ====  =====  =====  =====  ====  =====  =====
     method     ab5   ab6    ab7    ab8    abm8  abm10  abm12
