@@ -37,8 +37,8 @@ def redo(
 ) -> None:
     """The step once more, stage by stage, for lanes that are far out: one by one.
 
-    The sums are plain loops: those of :func:`fastmech.integrators.explicit.one_step` would take longer to
-    compile than all the rest.
+    The sums are plain loops: those of :func:`fastmech.integrators.explicit.one_step` are fast, but long to
+    compile, and no run needs them here.
     """
     dim, stages = now.shape[0], nodes.shape[0]
     own, y, K = np.empty((params.shape[0], 1)), np.empty((dim, 1)), np.empty((stages, dim, 1))

@@ -73,7 +73,27 @@ def small_motion(
     damping: float,
 ) -> SmallMotion:
     """Matrices of the small motion about (phi, theta) from the reduced coefficients."""
-    s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
+    return small_motion_at(
+        np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta),
+        mass, slider, lift, spring, gravity, force, damping,
+    )  # fmt: skip
+
+
+@inlined
+def small_motion_at(
+    s1: float,
+    c1: float,
+    s2: float,
+    c2: float,
+    mass: float,
+    slider: float,
+    lift: float,
+    spring: float,
+    gravity: float,
+    force: float,
+    damping: float,
+) -> SmallMotion:
+    """The same from sines and cosines: ``s1, c1`` of phi, ``s2, c2`` of theta."""
     s12, c12 = s1 * c2 + c1 * s2, c1 * c2 - s1 * s2
     k = slider_ratio(s1, c1)[0]
     k11, k12, k22 = potential_hessian(s1, c1, s2, c2, s12, lift, spring, gravity, force)

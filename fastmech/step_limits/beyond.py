@@ -143,17 +143,18 @@ class StepJudge:
         """
         n, method, c = len(self._starts), self._method, self._coefficients
         each, number = np.broadcast_to(dt, n), np.broadcast_to(steps, n)
-        asked: set[int | None] = set()
+        asked: set[int] = set()
         if not self._is_quiet(dt, steps):
             known = bounded(method, c, self._starts, each, number)
             self._known = dt, known
-            asked.add(stiffest_growing(method, c, self._starts, each, number, known))
+            stiffest = stiffest_growing(method, c, self._starts, each, number, known)
+            asked |= set() if stiffest is None else {stiffest}
         others: list[Limit] = []
         scenes = dict.fromkeys(extremes)
         if np.any(c.decay):
             fading: Any = np.where(c.force != 0.0, c.decay, 0.0)
-            asked.add(int(np.argmax(fading)) if fading.any() else None)
-        for k in asked - {None}:
+            asked |= {int(np.argmax(fading))} if fading.any() else set()
+        for k in asked:
             scene = self._scene.replace(**{name: float(values[k]) for name, values in self._own.items()})
             scenes[scene] = None
             others += _own_limit(method, scene, self._starts[k], dt, steps)
@@ -172,11 +173,11 @@ class StepJudge:
         beyond = _turns_too_far(starts[:, 2:], taken.first)
         if np.any(c.decay):
             beyond |= (c.force != 0.0) & (taken.first * c.decay > impulse_limit(method))
-        known = None
-        if self._known is not None and taken.longest.max(initial=0.0) <= (1.0 + ROUNDED) * self._known[0]:
-            known = self._known[1]
-        if self._is_quiet(taken.longest.max(initial=0.0), taken.number.max(initial=0)):
+        longest, known = taken.longest.max(initial=0.0), None
+        if self._is_quiet(longest, taken.number.max(initial=0)):
             return beyond
+        if self._known is not None and longest <= (1.0 + ROUNDED) * self._known[0]:
+            known = self._known[1]
         beyond |= growing(method, c, starts, taken.longest, taken.number, known)
         if ends is not None:
             left: Any = c.force * np.exp(-c.decay * taken.until)

@@ -15,7 +15,7 @@ from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Adams, Method
 from fastmech.mechanism.coefficients import Coefficients
 from fastmech.step_limits.amplification import amplifies, principal_root
-from fastmech.step_limits.local import LocalMotion, eigenvalue_bound, local_motion
+from fastmech.step_limits.local import LocalMotion, eigenvalue_bound, local_motion, part
 from fastmech.step_limits.modes import decaying_modes, factored
 from fastmech.step_limits.predict import GROWTH_PER_RADIAN
 from fastmech.step_limits.region import region, rows_of, sectors_of
@@ -43,12 +43,6 @@ class Growth(NamedTuple):
 
     most: Floats  #: logarithm of a decaying mode's growth in a step of the length looked at or a shorter one
     time: Floats  #: time [s] spent there, or inf
-
-
-def part(c: Coefficients, members: Any) -> Coefficients:
-    """The coefficients of some of the trajectories."""
-    values: Any = (np.asarray(value)[members] for value in c)
-    return Coefficients(*values)
 
 
 def steps_there(time: Floats, dt: Floats, number: Numbers) -> Floats:

@@ -8,14 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.mechanism.coefficients import Coefficients
-from fastmech.mechanism.reduced import (
-    metric_11,
-    metric_determinant,
-    potential_gradient,
-    potential_hessian,
-    slider_ratio,
-)
-from fastmech.stability.linearize import SmallMotion, fill_state_matrix, polynomial, small_motion
+from fastmech.mechanism.reduced import potential_gradient
+from fastmech.stability.linearize import fill_state_matrix, polynomial, small_motion, small_motion_at
 
 Floats = NDArray[np.float64]
 
@@ -43,17 +37,26 @@ def local_motion(c: Coefficients, states: Floats) -> LocalMotion:
     phi, theta, rate_1, rate_2 = np.ascontiguousarray(states.T)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
-        s12, c12 = s1 * c2 + c1 * s2, c1 * c2 - s1 * s2
-        k = slider_ratio(s1, c1)[0]
-        m11, determinant = metric_11(c.mass, c.slider, k), metric_determinant(c.mass, c.slider, k, c12)
-        hessian = potential_hessian(s1, c1, s2, c2, s12, c.lift, c.spring, c.gravity, c.force)
-        motion = SmallMotion(m11, s12, determinant, k, c.damping * k * k, *hessian)
+        motion = small_motion_at(s1, c1, s2, c2, *_of_motion(c))
+        m11, s12, determinant = motion.m11, motion.s12, motion.determinant
+        c12 = c1 * c2 - s1 * s2
         u1, u2 = potential_gradient(s1, c1, s2, c2, c12, c.lift, c.spring, c.gravity, c.force)
         acceleration = np.maximum(np.abs(s12 * u2 - u1), np.abs(s12 * u1 - m11 * u2)) / determinant
         speed = np.maximum(np.abs(rate_1), np.abs(rate_2))
         time = 2.0 * NEAR / (speed + np.sqrt(speed * speed + 2.0 * NEAR * acceleration))
         p3, p2, p1, p0 = (np.asarray(p) for p in polynomial(motion))
         return LocalMotion(p3, p2, p1, p0, time)
+
+
+def part(c: Coefficients, members: Any) -> Coefficients:
+    """The coefficients of some of the trajectories."""
+    values: Any = (np.asarray(value)[members] for value in c)
+    return Coefficients(*values)
+
+
+def _of_motion(c: Coefficients) -> Any:
+    """The coefficients that small motion depends on, in the order of :func:`small_motion`."""
+    return c.mass, c.slider, c.lift, c.spring, c.gravity, c.force, c.damping
 
 
 def eigenvalue_bound(motion: LocalMotion) -> Floats:
@@ -72,8 +75,7 @@ def state_matrices(c: Coefficients, phi: Any, theta: Any) -> Floats:
     """Matrices of the motion linearized at rest in configurations (n,), shape (4, 4, n)."""
     out = np.empty((4, 4, phi.size))
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        values: Any = (c.mass, c.slider, c.lift, c.spring, c.gravity, c.force, c.damping)
-        fill_state_matrix(SmallMotion(*small_motion(phi, theta, *values)), out)
+        fill_state_matrix(small_motion(phi, theta, *_of_motion(c)), out)
     return out
 
 

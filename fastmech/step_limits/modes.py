@@ -10,13 +10,13 @@ Newton's method from p2 needs few steps for both. Where they are too few LAPACK 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.mechanism.coefficients import Coefficients
-from fastmech.step_limits.local import LocalMotion, eigenvalues, state_matrices
+from fastmech.step_limits.local import LocalMotion, eigenvalues, part, state_matrices
 
 Floats = NDArray[np.float64]
 
@@ -100,8 +100,7 @@ def decaying_modes(
     fails[lane[~sure]] = True
     if fails.any():
         keep, rest = ~fails[lane], np.flatnonzero(fails)
-        own: Any = (np.asarray(value)[rest] for value in c)
-        exact = eigenvalues(state_matrices(Coefficients(*own), *states[rest, :2].T)).ravel()
+        exact = eigenvalues(state_matrices(part(c, rest), *states[rest, :2].T)).ravel()
         lane, values = np.append(lane[keep], np.repeat(rest, 4)), np.append(values[keep], exact)
     decays = (values.real < -least * np.abs(values)) & (values.imag >= 0.0)
     return lane[decays], values[decays]
