@@ -67,6 +67,22 @@ OBSERVER = types.FunctionType(OBSERVER_SIGNATURE)
 STEP_SIGNATURE = types.int64(types.float64, types.float64, MATRIX, MATRIX, MATRIX, MATRIX)
 STEP = types.FunctionType(STEP_SIGNATURE)
 
+#: ``advance(t, h, first, last, F, oldest, Y, params, work, checked)``: whole steps of a block, see
+#: :mod:`fastmech.kernels.whole_adams`.
+ADVANCE_SIGNATURE = types.int64(
+    types.float64,
+    types.float64,
+    types.int64,
+    types.int64,
+    VECTOR,
+    types.int64,
+    MATRIX,
+    MATRIX,
+    MATRIX,
+    types.boolean,
+)
+ADVANCE = types.FunctionType(ADVANCE_SIGNATURE)
+
 #: ``jacobian(t, Y, J, params)``: row ``r * dim + c`` of ``J`` (dim * dim, lanes) is the derivative of the
 #: rate of state ``r`` by state ``c``.
 JACOBIAN_SIGNATURE = types.void(types.float64, MATRIX, MATRIX, MATRIX)

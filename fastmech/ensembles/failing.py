@@ -42,9 +42,7 @@ class Resumption:
         """From the lanes as they are."""
         self._lanes = lanes
         self._Y, self._phase = lanes.Y.copy(), lanes.phase.copy()
-        self._memory = (
-            lanes.memory.copy() if lanes.phase.any() else np.zeros(lanes.memory.shape, lanes.memory.dtype)
-        )
+        self._memory = lanes.memory_before() if lanes.phase.any() else None  # None: the method starts
         self._params = lanes.params
 
     def last_finite(
@@ -90,10 +88,9 @@ class Resumption:
 
         They begin with the states ``begin`` (n, dim) and the records ``record`` (n, rows).
         """
-        memory = self._lanes.rows(self._memory)[which]
-        again = Lanes(
-            np.arange(which.size), begin, self.params(which), record, self._lanes.block_lanes, memory
-        )
+        lanes, memory = self._lanes, self._memory
+        carried = method.carried if memory is None else lanes.rows(memory)[which]
+        again = Lanes(np.arange(which.size), begin, self.params(which), record, lanes.block_lanes, carried)
         again.phase[:] = self._phase
         batch = again.batch(span, np.zeros(0))
         method.run(rhs, observe, batch)

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.ensembles.spans import Span
 from fastmech.integrators.batch import PHASE, Batch
 from fastmech.integrators.sums import CACHE_LINE
+from fastmech.kernels.blocks import VECTOR_LANES
 
 Floats = NDArray[np.float64]
-
-#: Widths of blocks are multiples of this: whole vectors of any processor, in either precision.
-VECTOR_LANES = 16
 
 #: Share of the lanes that must have ended before the others move up: moving costs a copy of all.
 WORTH_MOVING = 0.125
@@ -25,11 +26,17 @@ def rows_at(values: Floats, which: NDArray[np.int64]) -> Floats:
     return values[which]
 
 
-def _on_lines(values: Floats) -> Floats:
-    """A copy in C order whose rows begin on lines of the cache: no vector lies on two."""
-    memory = np.empty(values.nbytes + CACHE_LINE, dtype=np.uint8)
+def _zeros(shape: tuple[int, ...], precision: Any) -> Floats:
+    """Zeros in C order whose rows begin on lines of the cache: no vector lies on two."""
+    size = math.prod(shape) * np.dtype(precision).itemsize
+    memory = np.zeros(size + CACHE_LINE, dtype=np.uint8)
     first = -memory.ctypes.data % CACHE_LINE
-    copy = memory[first : first + values.nbytes].view(values.dtype).reshape(values.shape)
+    return memory[first : first + size].view(precision).reshape(shape)
+
+
+def _on_lines(values: Floats) -> Floats:
+    """A copy that lies in memory as :func:`_zeros` do."""
+    copy = _zeros(values.shape, values.dtype)
     copy[...] = values
     return copy
 
@@ -49,27 +56,41 @@ class Lanes:
         params: Floats,
         record: Floats,
         block_lanes: int,
-        memory: Floats,
+        carried: int | Floats,
     ) -> None:
         """From states (n, dim) and parameters (n, count) of the members, and their records.
 
         ``record`` is the empty one (rows,) of all, or those of each (n, rows).
-        ``memory`` (n, carried * dim) is what their method carries of them, zeros where it starts.
+        ``carried`` is how many states their method carries of each, or what it carries (n, carried * dim).
         """
         self.block_lanes = block_lanes
         self.members = members
         self.phase = np.zeros(PHASE)
-        self._arrange(states, params, np.broadcast_to(record, (members.size, record.shape[-1])), memory)
+        each = np.broadcast_to(record, (members.size, record.shape[-1]))
+        self._arrange(states, params, each)
+        if isinstance(carried, int):
+            blocks, dim, width = self.Y.shape
+            self.memory = _zeros((blocks, carried * dim, width), states.dtype)
+        else:
+            self.memory = self._blocked(carried)
+        self._before = np.empty_like(self.memory)
 
-    def _arrange(self, states: Floats, params: Floats, record: NDArray[np.float64], memory: Floats) -> None:
-        n = len(states)
-        blocks = max(1, -(-n // self.block_lanes))
-        width = -(-n // (blocks * VECTOR_LANES)) * VECTOR_LANES
-        lanes = np.minimum(np.arange(blocks * width), n - 1)
-        self.Y, self.params, self.record, self.memory = (
-            _on_lines(rows_at(a, lanes).reshape(blocks, width, a.shape[1]).transpose(0, 2, 1))
-            for a in (states, params, record, memory)
-        )
+    def _arrange(self, states: Floats, params: Floats, record: Floats) -> None:
+        blocks = max(1, -(-len(states) // self.block_lanes))
+        self._width = -(-len(states) // (blocks * VECTOR_LANES)) * VECTOR_LANES
+        self.Y, self.params, self.record = map(self._blocked, (states, params, record))
+
+    def _blocked(self, values: Floats) -> Floats:
+        """Values (n, rows) as blocks (blocks, rows, lanes)."""
+        n, rows = values.shape
+        blocks = -(-n // self._width)
+        lanes = np.minimum(np.arange(blocks * self._width), n - 1)
+        return _on_lines(rows_at(values, lanes).reshape(blocks, self._width, rows).transpose(0, 2, 1))
+
+    def memory_before(self) -> Floats:
+        """What the memory is now: kept until this is asked again, in place of a new copy for each call."""
+        self._before[...] = self.memory
+        return self._before
 
     def batch(self, span: Span, observer_params: NDArray[np.float64]) -> Batch:
         """What a method is given to take the lanes through a span."""
@@ -91,4 +112,7 @@ class Lanes:
         kept = [self.rows(a)[which] for a in (self.Y, self.params, self.record, self.memory)]
         self.members = self.members[which]
         if self.members.size:
-            self._arrange(*kept)
+            *others, memory = kept
+            self._arrange(*others)
+            self.memory = self._blocked(memory)
+            self._before = np.empty_like(self.memory)

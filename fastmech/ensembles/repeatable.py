@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.ensembles.ladder import Calibrated
-from fastmech.ensembles.lanes import VECTOR_LANES
 from fastmech.ensembles.problem import Problem
 from fastmech.ensembles.richardson import distances
 from fastmech.ensembles.solve import Settings, Solution, solve
 from fastmech.ensembles.stiffness import work
 from fastmech.ensembles.stopping import STOP_CODE
+from fastmech.kernels.blocks import VECTOR_LANES
 
 Floats = NDArray[np.float64]
 Members = NDArray[np.int64]

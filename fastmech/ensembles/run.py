@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.ensembles.failing import Resumption, last_finite_observer
-from fastmech.ensembles.lanes import VECTOR_LANES, Lanes, rows_at
+from fastmech.ensembles.lanes import Lanes, rows_at
 from fastmech.ensembles.spans import Span, Way, way
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
@@ -30,6 +30,7 @@ from fastmech.integrators.driver import observe_nothing
 from fastmech.integrators.method import Method
 from fastmech.integrators.whole import in_whole_steps
 from fastmech.interrupts import check
+from fastmech.kernels.blocks import VECTOR_LANES
 from fastmech.kernels.single import in_single
 
 Floats = NDArray[np.float64]
@@ -42,9 +43,10 @@ BLOCK_LANES = (64, 256)
 #: Bytes of a processor's first cache that a block may fill: all stages, state, their sum and parameters.
 BLOCK_BYTES = 32768
 
-#: Blocks that a task holds at most: one call runs them all, and where trajectories may stop, those still
-#: running move up into full blocks.
-TASK_BLOCKS = 32
+#: Lanes that a task holds at most, and bytes of their states and of what their method carries, which then
+#: stay in the second cache: one call runs them all, and where trajectories may stop, those still running move
+#: up into full blocks.
+TASK_LANES, TASK_BYTES = 8192, 2**19
 
 #: Steps a call at most: between calls an interrupt is heard, and who has stopped or failed makes room. Most
 #: failures are early ones, so calls grow: the first has so many right-hand sides of lanes (but a step counts
@@ -100,10 +102,17 @@ class Ensemble:
 
 
 def block_width(method: Method, dim: int, precision: type[np.floating[Any]] = np.float64) -> int:
-    """Lanes of a block of ``dim`` states whose step stays in the first cache."""
+    """Lanes of a block of ``dim`` states whose step stays in the first cache, if the method can choose."""
+    if method.lanes:
+        return method.lanes
     row = dim * np.dtype(precision).itemsize
     least, most = BLOCK_LANES
     return int(np.clip(BLOCK_BYTES // (row * (method.rows + 4)) // VECTOR_LANES * VECTOR_LANES, least, most))
+
+
+def task_lanes(method: Method, dim: int) -> int:
+    """Lanes that a task of a method of ``dim`` states holds at most."""
+    return min(TASK_LANES, TASK_BYTES // (np.dtype(np.float64).itemsize * dim * (1 + method.carried)))
 
 
 def run_ensemble(
@@ -125,7 +134,7 @@ def run_ensemble(
     ``params`` are the parameters of all trajectories (count,) or of each (n, count); ``dt`` is the longest
     step of all trajectories or of each (n,). A trajectory that has stopped keeps the state in which it did.
     ``progress`` is told the number of trajectories finished since its last call. In float32 nothing can be
-    observed. ``block_lanes`` is :func:`block_width` by default.
+    observed. ``block_lanes`` is :func:`block_width` by default, and always so of a method that has a width.
 
     Raises:
         InputError: the step, the times or the number of threads are wrong.
@@ -153,7 +162,7 @@ def run_ensemble(
     else:
         method = in_whole_steps(method, rhs)
     usable = np.asarray(np.isfinite(begin).all(axis=1))
-    if block_lanes is None:
+    if block_lanes is None or method.lanes:
         block_lanes = block_width(method, begin.shape[1], precision)
 
     def most_steps(lanes: Lanes, passed: int) -> int:
@@ -164,8 +173,8 @@ def run_ensemble(
 
     def run_task(task: _Task) -> int:
         members, piece, passed = task.members, 0, 0
-        memory = np.broadcast_to(begin.dtype.type(0), (members.size, method.carried * begin.shape[1]))
-        lanes = Lanes(members, begin[members], rows_at(own, members), observation.record, block_lanes, memory)
+        states, params = begin[members], rows_at(own, members)
+        lanes = Lanes(members, states, params, observation.record, block_lanes, method.carried)
         while piece < task.way.steps.size and lanes.members.size and not interrupted.is_set():
             check()
             span, before = task.way.span(piece, most_steps(lanes, passed)), Resumption(lanes)
@@ -185,7 +194,15 @@ def run_ensemble(
         return members.size
 
     _set_aside(ensemble, np.flatnonzero(~usable), np.asarray(starts, dtype=np.float64), clock[0])
-    tasks = list(_tasks(np.broadcast_to(dt, len(begin)), usable, clock, workers, block_lanes * TASK_BLOCKS))
+    tasks = list(
+        _tasks(
+            np.broadcast_to(dt, len(begin)),
+            usable,
+            clock,
+            workers,
+            max(block_lanes, task_lanes(method, begin.shape[1])),
+        )
+    )
     finishing = in_threads(run_task, tasks, min(workers, len(tasks)), interrupted)
     for finished in chain([int(np.count_nonzero(~usable))], finishing):
         if progress is not None:

@@ -42,6 +42,10 @@ class Method(Protocol):
     def carried(self) -> int:
         """What it carries of each lane from call to call, in states' sizes; 0: nothing."""
 
+    @property
+    def lanes(self) -> int:
+        """Width of its blocks; 0: any."""
+
     def evaluations(self, steps: int) -> int:
         """Right-hand sides that so many steps of equal length take, the starter's included."""
 
@@ -60,7 +64,16 @@ def _driver(module: str, name: str, batch: Batch) -> Any:
     return getattr(import_module(f"fastmech.integrators.{'single' if single else module}"), name)
 
 
-class OneStep:
+class AnyWidth:
+    """A method that works on blocks of any width."""
+
+    @property
+    def lanes(self) -> int:
+        """Any."""
+        return 0
+
+
+class OneStep(AnyWidth):
     """What a Runge-Kutta method takes from its tableau, explicit or implicit."""
 
     tableau: Any
@@ -127,7 +140,7 @@ class RungeKutta(OneStep):
 
 
 @dataclass(frozen=True)
-class Adams:
+class Adams(AnyWidth):
     """An Adams method, started by a Runge-Kutta method.
 
     Explicit (Adams-Bashforth): one right-hand side a step, a history of ``order`` derivatives; error constant
@@ -149,13 +162,12 @@ class Adams:
     @cached_property
     def predictor(self) -> NDArray[np.float64]:
         """Weights of the derivatives at t_n, t_(n-1), ...: explicit formula."""
-        weights = bashforth(self.order - 1 if self.corrects else self.order)
-        return np.array([float(w) for w in weights])
+        return np.array(bashforth(self.order - 1 if self.corrects else self.order), dtype=np.float64)
 
     @cached_property
     def corrector(self) -> NDArray[np.float64]:
         """Weights of the derivatives at t_(n+1), t_n, ...: implicit formula; empty without a corrector."""
-        return np.array([float(w) for w in moulton(self.order)] if self.corrects else [], dtype=np.float64)
+        return np.array(moulton(self.order) if self.corrects else [], dtype=np.float64)
 
     @property
     def start_steps(self) -> int:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
+from functools import cache
 
 
 def interpolatory_weights(nodes: Sequence[int]) -> list[Fraction]:
@@ -28,11 +29,13 @@ def interpolatory_weights(nodes: Sequence[int]) -> list[Fraction]:
     return weights
 
 
-def bashforth(order: int) -> list[Fraction]:
+@cache
+def bashforth(order: int) -> tuple[Fraction, ...]:
     """Explicit formula: weights of f at t_n, t_(n-1), ..., t_(n-order+1)."""
-    return interpolatory_weights(range(0, -order, -1))
+    return tuple(interpolatory_weights(range(0, -order, -1)))
 
 
-def moulton(order: int) -> list[Fraction]:
+@cache
+def moulton(order: int) -> tuple[Fraction, ...]:
     """Implicit formula: weights of f at t_(n+1), t_n, ..., t_(n-order+2)."""
-    return interpolatory_weights(range(1, 1 - order, -1))
+    return tuple(interpolatory_weights(range(1, 1 - order, -1)))

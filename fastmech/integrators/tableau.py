@@ -63,7 +63,7 @@ class Packed:
     nodes: NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Tableau:
     """An explicit Runge-Kutta method.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -12,14 +13,18 @@ from numpy.typing import NDArray
 
 from fastmech.integrators.batch import Batch
 from fastmech.integrators.driver import TABLEAU, BlockRHS, Observer
-from fastmech.integrators.method import Method, RungeKutta
+from fastmech.integrators.method import Adams, Method, RungeKutta
 from fastmech.integrators.sums import rows_of
 from fastmech.jit import STEP, driver_signature, inlined, kernel
-from fastmech.kernels.whole_steps import is_far, whole_step
+from fastmech.kernels.whole_steps import is_far, is_lagrange, whole_step
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 BlockStep = Callable[[float, float, Floats, Floats, Floats, Floats], int]
+
+#: Runge-Kutta methods that have whole steps: the fourth order that everybody knows and the best of order 8.
+#: Each costs a compilation for each combination of terms, on first use.
+METHODS = ("rk4", "dop853")
 
 
 @inlined
@@ -34,13 +39,16 @@ def redo(
     now: Floats,
     then: Floats,
     params: Floats,
-) -> None:
+) -> bool:
     """The step once more, stage by stage, for lanes that are far out: one by one.
+
+    Whether one of them still is, which the step that went wrong could not tell.
 
     The sums are plain loops: those of :func:`fastmech.integrators.explicit.one_step` are fast, but long to
     compile, and no run needs them here.
     """
     dim, stages = now.shape[0], nodes.shape[0]
+    still = False
     own, y, K = np.empty((params.shape[0], 1)), np.empty((dim, 1)), np.empty((stages, dim, 1))
     for i in range(now.shape[1]):
         if is_far(now, i, h) | is_far(then, i, h):
@@ -54,6 +62,8 @@ def redo(
                 if s < stages:
                     rhs(t + nodes[s] * h, y, K[s], own)
             then[:, i] = y[:, 0]
+            still |= is_far(then, i, h)
+    return still
 
 
 @kernel(driver_signature(types.float64, STEP, *TABLEAU))
@@ -90,8 +100,7 @@ def integrate_whole_steps(
                 t = times[j] + k * h
                 reaches_far = step(t, h, now, then, own, work) != 0
                 if some_far | reaches_far:
-                    redo(rhs, t, h, start, stage, weight, nodes, now, then, own)
-                some_far = reaches_far
+                    some_far = redo(rhs, t, h, start, stage, weight, nodes, now, then, own)
                 now, then = then, now
                 if kept.size:
                     observe(times[j] + (k + 1) * h, now, observer_params, kept)
@@ -133,9 +142,13 @@ class WholeSteps(RungeKutta):
 
 
 def in_whole_steps(method: Method, rhs: Any) -> Method:
-    """The same method with a compiled step for this right-hand side, where there is one."""
-    if isinstance(method, RungeKutta):
-        step = whole_step(rhs, method.tableau)
-        if step is not None:
-            return WholeSteps(method.tableau, step)
+    """The same method with compiled steps for this right-hand side, where it has them."""
+    if not is_lagrange(rhs):
+        return method
+    if isinstance(method, Adams):
+        module = import_module("fastmech.integrators.whole_multistep")  # a driver that few runs need
+        whole: Method = module.adams_in_whole_steps(method, rhs)
+        return whole
+    if isinstance(method, RungeKutta) and method.name in METHODS:
+        return WholeSteps(method.tableau, whole_step(rhs, method.tableau))
     return method

@@ -20,6 +20,9 @@ from fastmech.mechanism.equations import canonical_rates, lagrange_accelerations
 
 Block = NDArray[np.float64]
 
+#: Widths of blocks are multiples of this: whole vectors of any processor, in either precision.
+VECTOR_LANES = 16
+
 #: Rows of the parameters that belong to terms which a scene may lack.
 FORCE, DAMPING, DECAY = 5, 6, 7
 

@@ -26,10 +26,6 @@ Floats = NDArray[np.float64]
 #: than both ends of its step could: that is a step for nothing.)
 FARTHEST, TURNED = 0.5 * REDUCTION_LIMIT, 0.004 * REDUCTION_LIMIT
 
-#: Methods that have whole steps: the fourth order that everybody knows and the best of order 8. Each costs a
-#: compilation for each combination of terms, on first use.
-METHODS = ("rk4", "dop853")
-
 
 class Formula(Protocol):
     """What a loop is made from: the tableau of an explicit method."""
@@ -73,24 +69,30 @@ def step(t, h, Y, Z, p, work):
 _DECAY = """    write_decay(t + {c!r} * h, p, DECAY, work[{s}:])
 """
 
-_STAGE = """
+#: Sines and cosines of a state, and its accelerations.
+ANGLES = """
         s1, c1 = sincos(phi{s})
         s2, c2 = sincos(theta{s})
+"""
+ACCELERATIONS = """\
         a{s}, b{s} = lagrange_accelerations(
             s1, c1, s2, c2, phi_dot{s}, theta_dot{s}, mass, slider, lift, spring, gravity, {push}, damping
         )
 """
 
-_TAIL = """
-        Z[0, i], Z[1, i], Z[2, i], Z[3, i] = phi{s}, theta{s}, phi_dot{s}, theta_dot{s}
+#: Whether a new state may be far: one sum of squares.
+REACH = """\
         turned, bent = turn * phi_dot{s}, turn * theta_dot{s}
         reach = phi{s} * phi{s} + theta{s} * theta{s} + turned * turned + bent * bent
         beyond |= reach > 0.5 * FARTHEST * FARTHEST
-    return beyond
+"""
+
+_TAIL = """
+        Z[0, i], Z[1, i], Z[2, i], Z[3, i] = phi{s}, theta{s}, phi_dot{s}, theta_dot{s}
 """
 
 #: A state, and what its rate is called.
-_RATES = (("phi", "phi_dot"), ("theta", "theta_dot"), ("phi_dot", "a"), ("theta_dot", "b"))
+RATES = (("phi", "phi_dot"), ("theta", "theta_dot"), ("phi_dot", "a"), ("theta_dot", "b"))
 
 
 def source(tableau: Formula, terms: str) -> str:
@@ -103,27 +105,36 @@ def source(tableau: Formula, terms: str) -> str:
         damping="p[DAMPING, i]" if "damped" in terms else None,
     )
     for s, row in enumerate([*tableau.a[1:], tableau.b], start=1):
-        text += _STAGE.format(s=s - 1, push=f"force * work[{s - 1}, i]" if decays else "force")
-        for state, rate in _RATES:
+        push = f"force * work[{s - 1}, i]" if decays else "force"
+        text += ANGLES.format(s=s - 1) + ACCELERATIONS.format(s=s - 1, push=push)
+        for state, rate in RATES:
             text += f"        {state}{s} = {state}0 + h * ({_sum(row, rate)})\n"
-    return text + _TAIL.format(s=len(tableau.b))
+    return text + (_TAIL + REACH).format(s=len(tableau.b)) + "    return beyond\n"
 
 
 def _sum(row: Sequence[float], rate: str) -> str:
     return " + ".join(f"{float(weight)!r} * {rate}{s}" for s, weight in enumerate(row) if weight)
 
 
+@cache
 def whole_step(rhs: Any, tableau: Formula) -> Any:
-    """``step(t, h, Y, Z, p, work)`` of a block right-hand side and a method, ``None`` where there is none.
+    """``step(t, h, Y, Z, p, work)`` of one of Lagrange's block right-hand sides and a method.
 
     It writes the states (dim, lanes) after a step from ``Y`` into ``Z``, with ``work`` (stages, lanes) as
     scratch. The result is not 0 where a new state may be :func:`is_far`: a sum of squares tells it of a block
     in a few instructions. Steps from or to states that are far are not to be used.
     """
-    name = getattr(rhs, "__name__", "")
-    if tableau.name not in METHODS or rhs is not getattr(lagrange, name, None):
-        return None
-    return _compiled(source(tableau, name.removeprefix("lagrange_")))
+    return compiled(source(tableau, terms_of(rhs))).step
+
+
+def is_lagrange(rhs: Any) -> bool:
+    """Whether a block right-hand side is one of Lagrange's equations."""
+    return rhs is getattr(lagrange, getattr(rhs, "__name__", ""), None)
+
+
+def terms_of(rhs: Any) -> str:
+    """The combination of terms of one of Lagrange's block right-hand sides."""
+    return str(rhs.__name__).removeprefix("lagrange_")
 
 
 @inlined
@@ -136,6 +147,6 @@ def is_far(Y: Floats, i: int, h: float) -> bool:
     return turned | (h * abs(Y[2, i]) > TURNED) | (h * abs(Y[3, i]) > TURNED)
 
 
-@cache
-def _compiled(text: str) -> Any:
-    return run_module(new_module("step", text), text).step
+def compiled(text: str) -> Any:
+    """The module of a loop's source."""
+    return run_module(new_module("step", text), text)

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from ensembles.starts import Floats
 
-from fastmech.ensembles.lanes import VECTOR_LANES, Lanes, rows_at
+from fastmech.ensembles.lanes import Lanes, rows_at
 from fastmech.integrators.sums import CACHE_LINE
+from fastmech.kernels.blocks import VECTOR_LANES
 
 pytestmark = pytest.mark.nojit
 

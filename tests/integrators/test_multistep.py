@@ -44,8 +44,8 @@ def fractions(printed: str) -> list[Fraction]:
 
 @pytest.mark.parametrize("order", PRINTED_BASHFORTH)
 def test_weights_are_those_printed(order: int) -> None:
-    assert bashforth(order) == fractions(PRINTED_BASHFORTH[order])
-    assert moulton(order) == fractions(PRINTED_MOULTON[order])
+    assert list(bashforth(order)) == fractions(PRINTED_BASHFORTH[order])
+    assert list(moulton(order)) == fractions(PRINTED_MOULTON[order])
 
 
 @pytest.mark.parametrize("order", range(1, 9))

@@ -12,9 +12,9 @@ from kernels.blocks_of_lanes import Floats, lanes
 from fastmech.integrators.driver import observe_nothing
 from fastmech.integrators.method import RungeKutta
 from fastmech.integrators.tableaus import TABLEAUS
-from fastmech.integrators.whole import WholeSteps, in_whole_steps
+from fastmech.integrators.whole import METHODS, WholeSteps, in_whole_steps
 from fastmech.kernels import lagrange
-from fastmech.kernels.whole_steps import FARTHEST, METHODS
+from fastmech.kernels.whole_steps import FARTHEST
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 
@@ -61,6 +61,20 @@ def test_motions_far_out_are_those_of_the_stages_and_others_do_not_notice(name: 
     assert np.isnan(found[:, 12]).all()
     healthy = np.setdiff1d(np.arange(16), [2, 9, 12])
     np.testing.assert_array_equal(found[:, healthy], alone[:, healthy])
+
+
+@pytest.mark.nojit
+@pytest.mark.parametrize("angle", [1e154, -1e300])
+def test_a_motion_beyond_squares_needs_no_companions_that_are_far(angle: float) -> None:
+    """What the fast step leaves of it is NaN, which does not tell that it still is far."""
+    staged, whole = both("rk4")
+    Y = lanes(16)
+    Y[1, 5] = angle
+    alone, right = through(whole, Y), through(staged, Y)
+    assert np.isfinite(alone).all()
+    np.testing.assert_allclose(alone[:, 5], right[:, 5], rtol=1e-9, atol=0)
+    Y[0, 7] = 2.0 * FARTHEST
+    np.testing.assert_array_equal(through(whole, Y)[:, 5], alone[:, 5])
 
 
 @pytest.mark.nojit

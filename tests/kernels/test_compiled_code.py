@@ -16,11 +16,15 @@ import pytest
 from kernels.blocks_of_lanes import COMBINATIONS, MODULES, kernel, lanes
 from numba import float64, int64, none
 
+from fastmech.integrators.method import Adams
+from fastmech.integrators.methods import METHODS as REGISTRY
 from fastmech.integrators.sums import TERMS, add_stages
 from fastmech.integrators.tableaus import TABLEAUS
+from fastmech.integrators.whole import METHODS
 from fastmech.jit import FLAGS, INTEGERS, MATRIX, VECTOR
 from fastmech.kernels.blocks import DAMPING, DECAY, FORCE
-from fastmech.kernels.whole_steps import METHODS, whole_step
+from fastmech.kernels.whole_adams import whole_steps
+from fastmech.kernels.whole_steps import whole_step
 from fastmech.kernels.work import lagrange_work
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
@@ -36,7 +40,12 @@ STEPS = {
     for method in METHODS
     for terms in ("free", "damped_constant", "damped_decaying")
 }
-SHIPPED = {**KERNELS, "work": lagrange_work, **STEPS}
+ADVANCES = {
+    f"{method.name}-{terms}": whole_steps(kernel("lagrange", terms), method)
+    for method, terms in [(m, "damped_constant") for m in REGISTRY.values() if isinstance(m, Adams)]
+    + [(REGISTRY["abm8"], "free"), (REGISTRY["abm8"], "damped_decaying")]
+}
+SHIPPED = {**KERNELS, "work": lagrange_work, **STEPS, **ADVANCES}
 
 PACKED = re.compile(r"\bv(?:f?n?m(?:add|sub)\d*|mul)\w*pd\s.*%[yz]mm")
 VECTOR_ARITHMETIC = re.compile(r"= f(?:add|sub|mul|div) .*<[48] x double>")

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from kernels.blocks_of_lanes import TERMS, Floats, expected, kernel, lanes
 
-from fastmech.integrators.methods import METHODS as REGISTRY
 from fastmech.integrators.tableaus import TABLEAUS
+from fastmech.integrators.whole import METHODS
 from fastmech.kernels.sincos import REDUCTION_LIMIT
-from fastmech.kernels.whole_steps import FARTHEST, METHODS, TURNED, is_far, whole_step
+from fastmech.kernels.whole_steps import FARTHEST, TURNED, is_far, is_lagrange, whole_step
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 
@@ -80,6 +80,6 @@ def test_between_ends_that_are_near_no_stage_of_steady_motion_leaves_the_range(m
 
 
 @pytest.mark.nojit
-def test_other_methods_and_right_hand_sides_have_none() -> None:
-    assert whole_step(kernel("lagrange", "free"), REGISTRY["tsit5"].tableau) is None  # type: ignore[attr-defined]
-    assert whole_step(kernel("hamilton", "free"), TABLEAUS["rk4"]) is None
+def test_they_are_lagrange_s() -> None:
+    assert is_lagrange(kernel("lagrange", "free"))
+    assert not is_lagrange(kernel("hamilton", "free"))

@@ -1,0 +1,214 @@
+"""Driver of Adams methods whose steps are compiled whole, see :mod:`fastmech.kernels.whole_adams`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from fastmech.integrators.batch import ROUNDED_TIME, Batch
+from fastmech.integrators.driver import BlockRHS, Floats, Integers, Observer
+from fastmech.integrators.method import Adams
+from fastmech.integrators.multistep import adams
+from fastmech.integrators.sums import rows_of
+from fastmech.integrators.whole import BlockStep, redo
+from fastmech.jit import ADVANCE, STEP, driver_signature, inlined, kernel
+from fastmech.kernels.blocks import VECTOR_LANES
+from fastmech.kernels.whole_adams import STRETCH, whole_steps
+from fastmech.kernels.whole_steps import is_far, whole_step
+
+Marks = NDArray[np.bool_]
+Advance = Callable[[float, float, int, int, Floats, int, Floats, Floats, Floats, bool], int]
+
+#: Steps between two moves of a block's history: it grows at its end, and then goes back to the begin of its
+#: memory.
+MOVED = 8 * STRETCH
+
+
+@inlined
+def mark_far(Y: Floats, h: float, far: Marks) -> None:
+    """Mark the lanes that are far out."""
+    for i in range(Y.shape[1]):
+        far[i] = is_far(Y, i, h)
+
+
+@inlined
+def redo_adams(
+    rhs: BlockRHS,
+    t: float,
+    h: float,
+    predictor: Floats,
+    corrector: Floats,
+    F: Floats,
+    newest: int,
+    now: Floats,
+    then: Floats,
+    params: Floats,
+    far: Marks,
+) -> None:
+    """The step once more for marked lanes, one by one, with the library's trigonometry where it is needed.
+
+    ``F`` (rows, dim, lanes) holds the history up to the row ``newest``; the next one is written too.
+    """
+    dim, rows = now.shape[0], predictor.shape[0]
+    own, y, f = np.empty((params.shape[0], 1)), np.empty((dim, 1)), np.empty((dim, 1))
+    past = np.empty((2, dim))
+    for i in range(now.shape[1]):
+        if far[i]:
+            own[:, 0], y[:, 0] = params[:, i], now[:, i]
+            rhs(t, y, f, own)
+            F[newest, :, i] = f[:, 0]
+            past[:] = 0.0
+            for a in range(rows):
+                for d in range(dim):
+                    past[0, d] += predictor[a] * F[newest - a, d, i]
+                    if corrector.shape[0]:
+                        past[1, d] += corrector[a + 1] * F[newest - a, d, i]
+            y[:, 0] = now[:, i] + h * past[0]
+            rhs(t + h, y, f, own)
+            if corrector.shape[0]:
+                y[:, 0] = now[:, i] + h * (past[1] + corrector[0] * f[:, 0])
+                rhs(t + h, y, f, own)
+            then[:, i], F[newest + 1, :, i] = y[:, 0], f[:, 0]
+
+
+@kernel(driver_signature(types.float64, STEP, ADVANCE, *adams(types.float64)))
+def integrate_whole_multistep(
+    rhs: BlockRHS,
+    observe: Observer,
+    begin: BlockStep,
+    advance: Advance,
+    start: Integers,
+    stage: Integers,
+    weight: Floats,
+    nodes: Floats,
+    predictor: Floats,
+    corrector: Floats,
+    memory: Floats,
+    phase: Floats,
+    times: Floats,
+    steps: Integers,
+    params: Floats,
+    observer_params: Floats,
+    Y: Floats,
+    record: Floats,
+    out: Floats,
+) -> None:
+    """Take blocks of ``VECTOR_LANES`` lanes through all times, one block after the other.
+
+    ``begin`` is a whole step of the starter, ``advance`` takes those of the method; the rest is as in
+    :func:`fastmech.integrators.multistep.integrate_multistep_blocks`, except that the history ends with the
+    derivative at the present state, and that its rows are in the order of their times.
+    """
+    rows, dim, lanes = predictor.shape[0], Y.shape[1], Y.shape[2]
+    f = rows_of(Y[0], rows + MOVED)
+    F = f.reshape((rows + MOVED, dim, lanes))
+    work = rows_of(Y[0, 0], nodes.shape[0]).reshape((nodes.shape[0], lanes))
+    far = np.zeros(lanes, dtype=np.bool_)
+    before = rows_of(Y[0], 1).reshape((dim, lanes))
+    known, last = 0, 0.0
+    for b in range(Y.shape[0]):
+        state, own, kept, newest = Y[b], params[b], record[b], rows - 1
+        known, last = int(phase[0]), phase[2]
+        if known:
+            F[:rows] = memory[b].reshape((rows, dim, lanes))
+        for j in range(steps.shape[0]):
+            if steps[j] > 0:
+                h = (times[j + 1] - times[j]) / steps[j]
+                if abs(h - last) > ROUNDED_TIME * max(abs(times[j]), abs(times[j + 1])):
+                    known, last = 0, h
+                if known == 0:
+                    rhs(times[j], state, F[newest], own)
+                    known = 1
+                some_far = True  # nothing is known of where a piece begins
+                k = slow = 0  # so many steps are taken one by one
+                while k < steps[j]:
+                    if newest + STRETCH >= F.shape[0]:
+                        F[:rows] = F[newest + 1 - rows : newest + 1].copy()
+                        newest = rows - 1
+                    t, many = times[j] + k * h, 1
+                    if known < rows:
+                        before[:] = state
+                        reaches_far = begin(t, h, before, state, own, work) != 0
+                        if some_far | reaches_far:
+                            some_far = redo(rhs, t, h, start, stage, weight, nodes, before, state, own)
+                        rhs(t + h, state, F[newest + 1], own)
+                        known += 1
+                    elif slow == 0 and not kept.size:
+                        whole = (F.shape[0] - newest - 1) // STRETCH * STRETCH
+                        whole = min(steps[j] - k, whole)
+                        many = advance(
+                            times[j], h, k, k + whole, f, newest + 1 - rows, state, own, work, True
+                        )
+                        if many < whole:
+                            mark_far(state, h, far)
+                            slow = STRETCH
+                    else:
+                        if slow == 0:
+                            mark_far(state, h, far)
+                            slow = STRETCH
+                        before[:] = state
+                        advance(times[j], h, k, k + 1, f, newest + 1 - rows, state, own, work, False)
+                        redo_adams(rhs, t, h, predictor, corrector, F, newest, before, state, own, far)
+                        slow -= 1
+                    newest += many
+                    k += many
+                    if kept.size and many:
+                        observe(times[j] + k * h, state, observer_params, kept)
+            out[b, j] = state
+        memory[b] = F[newest + 1 - rows : newest + 1].copy().reshape((rows * dim, lanes))
+    phase[0], phase[2] = known, last
+
+
+@dataclass(frozen=True)
+class WholeAdams(Adams):
+    """An Adams method with compiled steps for one right-hand side."""
+
+    begin: Any
+    advance: Any
+
+    @property
+    def lanes(self) -> int:
+        """What its steps are compiled for."""
+        return VECTOR_LANES
+
+    def evaluations(self, steps: int) -> int:
+        """Right-hand sides that so many steps of equal length take, the starter's and the first included."""
+        return super().evaluations(steps) + min(steps, self.start_steps) + 1
+
+    def run(self, rhs: Any, observe: Any, batch: Batch) -> None:
+        """Take a batch through its times."""
+        packed = self.starter.packed
+        integrate_whole_multistep(
+            rhs,
+            observe,
+            self.begin,
+            self.advance,
+            packed.start,
+            packed.stage,
+            packed.weight,
+            packed.nodes,
+            self.predictor,
+            self.corrector,
+            batch.memory_of(self.carried),
+            batch.phase,
+            batch.times,
+            batch.steps,
+            batch.params,
+            batch.observer_params,
+            batch.Y,
+            batch.record,
+            batch.out,
+        )
+
+
+@cache
+def adams_in_whole_steps(method: Adams, rhs: Any) -> WholeAdams:
+    """The same method with compiled steps for one of Lagrange's right-hand sides."""
+    own = method.name, method.order, method.corrects, method.starter, method.source
+    return WholeAdams(*own, begin=whole_step(rhs, method.starter), advance=whole_steps(rhs, method))
