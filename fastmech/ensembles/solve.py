@@ -80,7 +80,7 @@ def solve(
         dt = np.broadcast_to(np.asarray(settings.dt, dtype=np.float64), n)
         if settings.fit and problem.coefficients is not None:
             # No motion becomes faster than its start allows: a step never shrinks where one has blown up.
-            fitted = fitted_steps(problem.coefficients, problem.outward(now), 1.0, exponent)
+            fitted = fitted_steps(problem.coefficients, problem.outward(now), 1.0, exponent, threads)
             shares = np.maximum(fitted, shares)
             dt = dt * shares
         dt = dt * min((share for until, share in settings.early if end <= until), default=1.0)
@@ -112,7 +112,7 @@ def solve(
     if problem.canonical:
         for output in y:  # one at a time: what is computed on the way takes little memory
             output[:] = problem.outward(output)
-    judged = judge(status, starts, y[-1], problem.coefficients)
+    judged = judge(status, starts, y[-1], problem.coefficients, threads)
     last = None
     if lost:
         last = y[-1].copy()
