@@ -49,7 +49,7 @@ def fitted_steps(
     with np.errstate(invalid="ignore", over="ignore"):
         ratio = speed_bound(c, starts, threads) / vibration_frequency(c)
         rungs = np.ceil(RUNGS * exponent * np.log2(np.maximum(ratio, 1.0)) - 1e-9)
-    return dt * 2.0 ** (-np.where(np.isfinite(rungs), rungs, 0.0) / RUNGS)
+    return dt * np.exp2(np.where(np.isfinite(rungs), rungs, 0.0) / -RUNGS)
 
 
 def speed_bound(c: Coefficients, starts: Floats, threads: int | None = None) -> Floats:

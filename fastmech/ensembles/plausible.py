@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.ensembles.energies import columns, energy_at, tell_broken
+from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.threads import in_parts
 from fastmech.mechanism.coefficients import Coefficients
@@ -35,7 +36,7 @@ def judge(
     """
     status = reached.copy()
     if c is None:
-        finite = np.isfinite(start).all(axis=1)
+        finite = finite_rows(start)
     else:
         broken, finite = _told(c, start, final, threads)
         status[broken & (reached == Status.OK)] = Status.STEP_TOO_LARGE

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.ensembles.failing import Resumption, last_finite_observer
-from fastmech.ensembles.lanes import VECTOR_LANES, Lanes, rows_at
+from fastmech.ensembles.lanes import VECTOR_LANES, Lanes, finite_rows, put_rows, rows_at
 from fastmech.ensembles.spans import Span, Way, way
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
@@ -86,9 +86,8 @@ class Ensemble:
     records: Floats
     status: NDArray[np.int8]
     failed: Floats
-    lost: list[
-        tuple[NDArray[np.int64], Floats]
-    ]  #: members that failed together, and their last finite states
+    #: Members that failed together, and their last finite states.
+    lost: list[tuple[NDArray[np.int64], Floats]]
 
     @property
     def last(self) -> Floats:
@@ -152,7 +151,7 @@ def run_ensemble(
         last_finite_observer(precision)  # compiled here, not in a thread
     else:
         method = in_whole_steps(method, rhs)
-    usable = np.asarray(np.isfinite(begin).all(axis=1))
+    usable = finite_rows(begin)
     if block_lanes is None:
         block_lanes = block_width(method, begin.shape[1], precision)
 
@@ -165,7 +164,8 @@ def run_ensemble(
     def run_task(task: _Task) -> int:
         members, piece, passed = task.members, 0, 0
         memory = np.broadcast_to(begin.dtype.type(0), (members.size, method.carried * begin.shape[1]))
-        lanes = Lanes(members, begin[members], rows_at(own, members), observation.record, block_lanes, memory)
+        states, params = rows_at(begin, members), rows_at(own, members)
+        lanes = Lanes(members, states, params, observation.record, block_lanes, memory)
         while piece < task.way.steps.size and lanes.members.size and not interrupted.is_set():
             check()
             span, before = task.way.span(piece, most_steps(lanes, passed)), Resumption(lanes)
@@ -278,7 +278,7 @@ def _store(ensemble: Ensemble, lanes: Lanes, span: Span, batch: Batch, ended: _E
     if batch.record.size:
         ensemble.records[:, members] = lanes.rows(batch.record).T
     for piece in np.flatnonzero(span.outputs >= 0):
-        ensemble.states[span.outputs[piece], members] = lanes.rows(batch.out[:, piece])
+        put_rows(ensemble.states[span.outputs[piece]], members, lanes.rows(batch.out[:, piece]))
     if ended is None:
         return
     stopped, failed, over = ended.stopped, ended.failed, ~np.isnan(ended.failed)

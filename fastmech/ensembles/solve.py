@@ -103,10 +103,12 @@ def solve(
         failed[first] = run.failed[first]
         if first.any():
             lost.append((first, problem.outward(run.last)[first]))
-        for length in np.unique(dt):
-            number = output_steps(times, float(length))
-            steps[dt == length] += number.sum()
-            taken[piece, dt == length] = np.max(np.diff(times) / np.maximum(number, 1))
+        lengths = np.unique(dt)  # a search in these few is quicker than their inverse
+        of = np.searchsorted(lengths, dt)
+        numbers = [output_steps(times, float(length)) for length in lengths]
+        steps += np.array([number.sum() for number in numbers], dtype=np.int64)[of]
+        longest = [np.max(np.diff(times) / np.maximum(number, 1)) for number in numbers]
+        taken[piece] = np.array(longest, dtype=np.float64)[of]
         begin, now = end, run.states[-1]
     y = pieces[0] if len(pieces) == 1 else np.concatenate(pieces)
     if problem.canonical:
