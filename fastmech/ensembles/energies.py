@@ -1,7 +1,4 @@
-"""Energies of many trajectories in compiled passes over lanes, for the bounds that no motion breaks.
-
-Lanes go through in whole vectors: a trajectory's numbers do not depend on its place, nor on its companions.
-"""
+"""Energies of many trajectories in a compiled pass over lanes, for the bounds that no motion breaks."""
 
 from __future__ import annotations
 
@@ -12,22 +9,13 @@ from numba import types
 from numpy.typing import NDArray
 
 from fastmech.jit import MATRIX, inlined, kernel
-from fastmech.kernels.sincos import REDUCTION_LIMIT, sincos
-from fastmech.mechanism.coefficients import Coefficients
+from fastmech.kernels.passes import LANES, ROWS, STATES, fill_trigonometry, load, load_own
 from fastmech.mechanism.reduced import kinetic, metric_11, potential, slider_ratio
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-#: States (n, 4), which the user may have locked.
-STATES = types.Array(types.float64, 2, "C", readonly=True)
 FLAGS = types.Array(types.boolean, 1, "C")
-
-#: Trajectories that are in the caches together; whole vectors of any processor.
-LANES = 64
-
-#: Rows of what is known of a lane: its state, then sines and cosines of phi and theta.
-ROWS = 8
 
 
 @inlined
@@ -58,47 +46,6 @@ def is_constant(force: Any, decay: Any) -> Any:
     return (decay == 0.0) | (force == 0.0)
 
 
-def columns(c: Coefficients, members: slice) -> Floats:
-    """Coefficients of some trajectories as kernels are given them, shape (8, n); (8, 1) where all share."""
-    if not any(np.ndim(value) for value in c):
-        return np.array(c, dtype=np.float64)[:, None]
-    values = [np.asarray(value)[members] if np.ndim(value) else value for value in c]
-    return np.array(np.broadcast_arrays(*values), dtype=np.float64)
-
-
-@inlined
-def load(states: Floats, first: int, Y: Floats, place: int) -> None:
-    """Put states from ``first`` on into ``Y`` from ``place`` on; what is left over holds the last one."""
-    for i in range(LANES):
-        row = min(first + i, states.shape[0] - 1)
-        for d in range(4):
-            Y[d, place + i] = states[row, d]
-
-
-@inlined
-def fill_trigonometry(Y: Floats) -> None:
-    """Sines and cosines of lanes (ROWS, lanes) into their rows."""
-    for angle in range(2):
-        beyond = 0
-        for i in range(Y.shape[1]):
-            beyond |= abs(Y[angle, i]) > REDUCTION_LIMIT
-            Y[4 + 2 * angle, i], Y[5 + 2 * angle, i] = sincos(Y[angle, i])
-        if beyond:
-            for i in range(Y.shape[1]):
-                if abs(Y[angle, i]) > REDUCTION_LIMIT:
-                    Y[4 + 2 * angle, i], Y[5 + 2 * angle, i] = np.sin(Y[angle, i]), np.cos(Y[angle, i])
-
-
-@inlined
-def load_own(own: Floats, first: int, p: Floats) -> None:
-    """Put the coefficients of lanes from ``first`` on into ``p`` (8, LANES)."""
-    last = own.shape[1] - 1
-    if last or not first:
-        for r in range(own.shape[0]):
-            for i in range(LANES):
-                p[r, i] = own[r, min(first + i, last)]
-
-
 @inlined
 def lane_energy(Y: Floats, i: int, p: Floats, j: int) -> tuple[float, float]:
     """:func:`energy_at` of lane ``i`` with the coefficients of lane ``j``."""
@@ -125,8 +72,8 @@ def tell_broken(
 ) -> None:
     """Which trajectories (n, 4) end with an energy that they cannot have, and whose starts are finite.
 
-    ``own`` are the :func:`columns` of their coefficients, ``slack`` the share of the energy's scale, the sum
-    of its terms, by which a bound may be missed.
+    ``own`` are the :func:`fastmech.kernels.passes.columns` of their coefficients. A bound may be missed by
+    the share ``slack`` of the energy's scale, the sum of its terms.
     """
     Y, p = np.empty((ROWS, 2 * LANES)), np.empty((own.shape[0], LANES))
     told = np.empty((2, LANES))

@@ -13,8 +13,9 @@ from importlib import import_module
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.ensembles.energies import columns, is_constant
+from fastmech.ensembles.energies import is_constant
 from fastmech.ensembles.threads import in_parts
+from fastmech.kernels.passes import columns
 from fastmech.mechanism.coefficients import Coefficients
 
 Floats = NDArray[np.float64]

@@ -6,17 +6,9 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fastmech.ensembles.energies import (
-    LANES,
-    ROWS,
-    STATES,
-    fill_trigonometry,
-    lane_energy,
-    lane_work,
-    load,
-    load_own,
-)
+from fastmech.ensembles.energies import lane_energy, lane_work
 from fastmech.jit import MATRIX, VECTOR, kernel
+from fastmech.kernels.passes import LANES, ROWS, STATES, fill_trigonometry, load, load_own
 
 Floats = NDArray[np.float64]
 
@@ -25,7 +17,7 @@ Floats = NDArray[np.float64]
 def highest_energies(start: Floats, own: Floats, energy: Floats) -> None:
     """T + U over m2 l^2 [1/s^2] of starts (n, 4), and the most that a decaying force can add to it.
 
-    ``own`` are the :func:`fastmech.ensembles.energies.columns` of the coefficients.
+    ``own`` are the :func:`fastmech.kernels.passes.columns` of the coefficients.
     """
     Y, p = np.empty((ROWS, LANES)), np.empty((own.shape[0], LANES))
     told = np.empty(LANES)

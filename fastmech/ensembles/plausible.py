@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.ensembles.energies import columns, energy_at, tell_broken
+from fastmech.ensembles.energies import energy_at, tell_broken
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.threads import in_parts
+from fastmech.kernels.passes import columns
 from fastmech.mechanism.coefficients import Coefficients
 
 Floats = NDArray[np.float64]

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.ensembles.failing import Resumption, last_finite_observer
-from fastmech.ensembles.lanes import VECTOR_LANES, Lanes, finite_rows, put_rows, rows_at
+from fastmech.ensembles.lanes import VECTOR_LANES, Lanes, finite_rows, rows_at
 from fastmech.ensembles.spans import Span, Way, way
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
@@ -278,7 +278,7 @@ def _store(ensemble: Ensemble, lanes: Lanes, span: Span, batch: Batch, ended: _E
     if batch.record.size:
         ensemble.records[:, members] = lanes.rows(batch.record).T
     for piece in np.flatnonzero(span.outputs >= 0):
-        put_rows(ensemble.states[span.outputs[piece]], members, lanes.rows(batch.out[:, piece]))
+        lanes.put(batch.out[:, piece], ensemble.states[span.outputs[piece]])
     if ended is None:
         return
     stopped, failed, over = ended.stopped, ended.failed, ~np.isnan(ended.failed)
