@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
+import numpy as np
+
 from fastmech.ensembles import checks
 from fastmech.interrupts import check
 
@@ -52,7 +54,8 @@ def in_parts(work: Callable[[slice], None], n: int, threads: int | None) -> None
     """
 
     def part(first: int) -> int:
-        work(slice(first, min(first + PART, n)))
+        with np.errstate(invalid="ignore", over="ignore"):  # what is not finite has a status of its own
+            work(slice(first, min(first + PART, n)))
         return 1
 
     firsts = list(range(0, n, PART))

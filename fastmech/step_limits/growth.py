@@ -73,8 +73,8 @@ def bounded(method: Method, c: Coefficients, states: Floats, dt: Floats, number:
     for first in range(0, n, AT_ONCE):
         block = slice(first, min(first + AT_ONCE, n))
         of, there = size[: block.stop - first], Growth(*(values[block] for values in growth))
-        bounds.eigenvalue_bounds(states[block], columns(c, block), of)
-        # What is not finite has a status of its own.
+        with np.errstate(invalid="ignore", over="ignore"):  # what is not finite has a status of its own
+            bounds.eigenvalue_bounds(states[block], columns(c, block), of)
         asked = np.isfinite(of) & (np.asarray(c.damping)[block] > 0.0)
         there.most[:] = np.where(asked, table.largest[rows_of(dt[block] * of)], 0.0)
         some = first + np.flatnonzero(~acquitted(there, dt[block], number[block]))
