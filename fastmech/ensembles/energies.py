@@ -41,6 +41,12 @@ def energy_at(
 
 
 @inlined
+def energy_scale(T: Any, lift: Any, spring: Any, gravity: Any, force: Any) -> Any:
+    """What an energy over m2 l^2 is compared with: the sum of its terms."""
+    return T + abs(lift) + gravity + spring + 2.0 * abs(force)
+
+
+@inlined
 def is_constant(force: Any, decay: Any) -> Any:
     """Whether a force stays what it is; only then it has a potential."""
     return (decay == 0.0) | (force == 0.0)
@@ -73,7 +79,7 @@ def tell_broken(
     """Which trajectories (n, 4) end with an energy that they cannot have, and whose starts are finite.
 
     ``own`` are the :func:`fastmech.kernels.passes.columns` of their coefficients. A bound may be missed by
-    the share ``slack`` of the energy's scale, the sum of its terms.
+    the share ``slack`` of :func:`energy_scale`.
     """
     Y, p = np.empty((ROWS, 2 * LANES)), np.empty((own.shape[0], LANES))
     told = np.empty((2, LANES))
@@ -87,7 +93,7 @@ def tell_broken(
             T_after, u_after = lane_energy(Y, LANES + i, p, i)
             before, after = T + u, T_after + u_after
             gain, fall = lane_work(Y, p, i)
-            scale = T + abs(p[2, i]) + p[4, i] + p[3, i] + 2.0 * abs(p[5, i])
+            scale = energy_scale(T, p[2, i], p[3, i], p[4, i], p[5, i])
             # An energy beyond a double's range is none that a motion can have.
             wrong = (after - after != 0.0) | (after - before - gain > slack * scale)
             wrong |= (p[6, i] == 0.0) & (before - after - fall > slack * scale)

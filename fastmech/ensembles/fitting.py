@@ -60,7 +60,7 @@ def speed_bound(c: Coefficients, starts: Floats, threads: int | None = None) -> 
         InputError: the number of threads is wrong.
     """
     highest_energies = import_module("fastmech.ensembles.highest").highest_energies  # few runs need it
-    starts, highest = np.ascontiguousarray(starts), np.empty(len(starts))
+    starts, highest = np.ascontiguousarray(starts, dtype=np.float64), np.empty(len(starts))
     in_parts(
         lambda part: highest_energies(starts[part], columns(c, part), highest[part]), len(starts), threads
     )

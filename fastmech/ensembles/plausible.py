@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.ensembles.energies import energy_at, tell_broken
+from fastmech.ensembles.energies import energy_at, energy_scale, tell_broken
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.threads import in_parts
@@ -58,7 +58,7 @@ def breaks_energy_bounds(c: Coefficients, start: Floats, final: Floats) -> NDArr
 
 def _told(c: Coefficients, start: Floats, final: Floats, threads: int | None) -> tuple[Bools, Bools]:
     """Which trajectories end with an energy that they cannot have, and whose starts are finite."""
-    start, final = np.ascontiguousarray(start), np.ascontiguousarray(final)
+    start, final = (np.ascontiguousarray(states, dtype=np.float64) for states in (start, final))
     broken, finite = np.empty(len(start), dtype=np.bool_), np.empty(len(start), dtype=np.bool_)
 
     def tell(part: slice) -> None:
@@ -76,4 +76,4 @@ def energy(c: Coefficients, y: Floats, force: Floats) -> tuple[Floats, Floats]:
         T, u = energy_at(
             s1, c1, s2, c2, phi_dot, theta_dot, c.mass, c.slider, c.lift, c.spring, c.gravity, force
         )
-        return T + u, T + np.abs(c.lift) + c.gravity + c.spring + 2.0 * np.abs(c.force)
+        return T + u, energy_scale(T, c.lift, c.spring, c.gravity, c.force)

@@ -69,7 +69,8 @@ def bounded(method: Method, c: Coefficients, states: Floats, dt: Floats, number:
     if isinstance(method, ImplicitRungeKutta) or not np.any(c.damping):
         return growth
     bounds = import_module("fastmech.step_limits.bounds")  # a kernel that quiet steps do not need
-    table, states, size = region(method.name), np.ascontiguousarray(states), np.empty(min(n, AT_ONCE))
+    states = np.ascontiguousarray(states, dtype=np.float64)
+    table, size = region(method.name), np.empty(min(n, AT_ONCE))
     for first in range(0, n, AT_ONCE):
         block = slice(first, min(first + AT_ONCE, n))
         of, there = size[: block.stop - first], Growth(*(values[block] for values in growth))
