@@ -138,7 +138,7 @@ def disturb(
     outcome[(end_index >= 0) & stable[end_index]] = Outcome.ELSEWHERE
     outcome[(end_index >= 0) & ~stable[end_index]] = Outcome.AT_UNSTABLE
     outcome[(end_index == index) & ~turned & stable[end_index]] = Outcome.RETURNED
-    status = judge(run.status, starts, final, reduce(scene))
+    status = judge(run.status, starts, final, reduce(scene), threads)
     steps = float(times[-1]) / step
     if drives_rest(scene, step, steps, method):  # where it came to rest is no matter of the mechanism
         wrong = (outcome != Outcome.UNDECIDED) | is_beyond(scene, step, steps, method)

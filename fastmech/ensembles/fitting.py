@@ -8,10 +8,14 @@ gains nothing from a longer step; a faster one needs a shorter one.
 
 from __future__ import annotations
 
+from importlib import import_module
+
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.ensembles.plausible import energy
+from fastmech.ensembles.energies import is_constant
+from fastmech.ensembles.threads import in_parts
+from fastmech.kernels.passes import columns
 from fastmech.mechanism.coefficients import Coefficients
 
 Floats = NDArray[np.float64]
@@ -31,29 +35,39 @@ GONE = 40.0
 RUNGS = 4
 
 
-def fitted_steps(c: Coefficients, starts: Floats, dt: float, exponent: float) -> Floats:
+def fitted_steps(
+    c: Coefficients, starts: Floats, dt: float, exponent: float, threads: int | None = None
+) -> Floats:
     """The step [s] of every trajectory, shape (n,), at most ``dt``, from states (n, 4).
 
     ``dt`` belongs to motions as slow as the linear vibrations; the others have it divided by
     (speed bound / vibration's frequency)^``exponent``, rounded up to a power of 2^(1/4). A trajectory's step
     depends on its own start and parameters alone.
+
+    Raises:
+        InputError: the number of threads is wrong.
     """
     with np.errstate(invalid="ignore", over="ignore"):
-        ratio = speed_bound(c, starts) / vibration_frequency(c)
+        ratio = speed_bound(c, starts, threads) / vibration_frequency(c)
         rungs = np.ceil(RUNGS * exponent * np.log2(np.maximum(ratio, 1.0)) - 1e-9)
-    return dt * 2.0 ** (-np.where(np.isfinite(rungs), rungs, 0.0) / RUNGS)
+    return dt * np.exp2(np.where(np.isfinite(rungs), rungs, 0.0) / -RUNGS)
 
 
-def speed_bound(c: Coefficients, starts: Floats) -> Floats:
-    """Bound (n,) on the kinetic-energy norm of the rates, sqrt(2 T / (m2 l^2)) [rad/s], for all time."""
-    constant = (np.asarray(c.decay) == 0.0) | (np.asarray(c.force) == 0.0)
-    force = np.where(constant, c.force, 0.0)
-    now, _ = energy(c, starts, force)
-    reach = 2.0 - np.sign(c.force) * (np.cos(starts[:, 0]) - np.sin(starts[:, 1]))
-    work = np.where(constant, 0.0, np.abs(c.force) * reach)
+def speed_bound(c: Coefficients, starts: Floats, threads: int | None = None) -> Floats:
+    """Bound (n,) on the kinetic-energy norm of the rates, sqrt(2 T / (m2 l^2)) [rad/s], for all time.
+
+    Raises:
+        InputError: the number of threads is wrong.
+    """
+    highest_energies = import_module("fastmech.ensembles.highest").highest_energies  # few runs need it
+    starts, highest = np.ascontiguousarray(starts, dtype=np.float64), np.empty(len(starts))
+    in_parts(
+        lambda part: highest_energies(starts[part], columns(c, part), highest[part]), len(starts), threads
+    )
+    force = np.where(is_constant(np.asarray(c.force), np.asarray(c.decay)), c.force, 0.0)
     # U = lift sin phi - force cos phi + force sin theta - gravity cos theta - spring sin(phi + theta)
     lowest = -np.hypot(c.lift, force) - np.hypot(c.gravity, force) - np.abs(c.spring)
-    return np.asarray(np.sqrt(2.0 * np.maximum(now + work - lowest, 0.0)))
+    return np.asarray(np.sqrt(2.0 * np.maximum(highest - lowest, 0.0)))
 
 
 def vibration_frequency(c: Coefficients) -> Floats:

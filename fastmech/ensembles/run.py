@@ -10,7 +10,7 @@ share their time: of the Lorenz case, of which 82 % stop on the way, 92 % of all
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from itertools import chain
@@ -20,33 +20,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.ensembles.failing import Resumption, last_finite_observer
-from fastmech.ensembles.lanes import Lanes, rows_at
-from fastmech.ensembles.spans import Span, Way, way
+from fastmech.ensembles.lanes import Lanes, finite_rows, rows_at
+from fastmech.ensembles.spans import Span
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
+from fastmech.ensembles.tasks import Task, block_width, task_lanes, tasks_of
 from fastmech.ensembles.threads import in_threads, thread_count
 from fastmech.integrators.batch import Batch
 from fastmech.integrators.driver import observe_nothing
 from fastmech.integrators.method import Method
 from fastmech.integrators.whole import in_whole_steps
 from fastmech.interrupts import check
-from fastmech.kernels.blocks import VECTOR_LANES
 from fastmech.kernels.single import in_single
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int], None]
-
-#: Lanes a block: at least as many as make calls cost little, at most as many as keep a block of all methods
-#: in the caches.
-BLOCK_LANES = (64, 256)
-
-#: Bytes of a processor's first cache that a block may fill: all stages, state, their sum and parameters.
-BLOCK_BYTES = 32768
-
-#: Lanes that a task holds at most, and bytes of their states and of what their method carries, which then
-#: stay in the second cache: one call runs them all, and where trajectories may stop, those still running move
-#: up into full blocks.
-TASK_LANES, TASK_BYTES = 8192, 2**19
 
 #: Steps a call at most: between calls an interrupt is heard, and who has stopped or failed makes room. Most
 #: failures are early ones, so calls grow: the first has so many right-hand sides of lanes (but a step counts
@@ -88,9 +76,8 @@ class Ensemble:
     records: Floats
     status: NDArray[np.int8]
     failed: Floats
-    lost: list[
-        tuple[NDArray[np.int64], Floats]
-    ]  #: members that failed together, and their last finite states
+    #: Members that failed together, and their last finite states.
+    lost: list[tuple[NDArray[np.int64], Floats]]
 
     @property
     def last(self) -> Floats:
@@ -99,20 +86,6 @@ class Ensemble:
         for members, states in self.lost:
             last[members] = states
         return last
-
-
-def block_width(method: Method, dim: int, precision: type[np.floating[Any]] = np.float64) -> int:
-    """Lanes of a block of ``dim`` states whose step stays in the first cache, if the method can choose."""
-    if method.lanes:
-        return method.lanes
-    row = dim * np.dtype(precision).itemsize
-    least, most = BLOCK_LANES
-    return int(np.clip(BLOCK_BYTES // (row * (method.rows + 4)) // VECTOR_LANES * VECTOR_LANES, least, most))
-
-
-def task_lanes(method: Method, dim: int) -> int:
-    """Lanes that a task of a method of ``dim`` states holds at most."""
-    return min(TASK_LANES, TASK_BYTES // (np.dtype(np.float64).itemsize * dim * (1 + method.carried)))
 
 
 def run_ensemble(
@@ -161,7 +134,7 @@ def run_ensemble(
         last_finite_observer(precision)  # compiled here, not in a thread
     else:
         method = in_whole_steps(method, rhs)
-    usable = np.asarray(np.isfinite(begin).all(axis=1))
+    usable = finite_rows(begin)
     if block_lanes is None or method.lanes:
         block_lanes = block_width(method, begin.shape[1], precision)
 
@@ -171,9 +144,9 @@ def run_ensemble(
         evaluations = max(LANE_EVALUATIONS, CALL_EVALUATIONS // lanes.members.size)
         return min(CALL_STEPS, max(passed, int(evaluations / cost)))
 
-    def run_task(task: _Task) -> int:
+    def run_task(task: Task) -> int:
         members, piece, passed = task.members, 0, 0
-        states, params = begin[members], rows_at(own, members)
+        states, params = rows_at(begin, members), rows_at(own, members)
         lanes = Lanes(members, states, params, observation.record, block_lanes, method.carried)
         while piece < task.way.steps.size and lanes.members.size and not interrupted.is_set():
             check()
@@ -194,28 +167,13 @@ def run_ensemble(
         return members.size
 
     _set_aside(ensemble, np.flatnonzero(~usable), np.asarray(starts, dtype=np.float64), clock[0])
-    tasks = list(
-        _tasks(
-            np.broadcast_to(dt, len(begin)),
-            usable,
-            clock,
-            workers,
-            max(block_lanes, task_lanes(method, begin.shape[1])),
-        )
-    )
+    most = max(block_lanes, task_lanes(method, begin.shape[1]))
+    tasks = list(tasks_of(np.broadcast_to(dt, len(begin)), usable, clock, workers, most))
     finishing = in_threads(run_task, tasks, min(workers, len(tasks)), interrupted)
     for finished in chain([int(np.count_nonzero(~usable))], finishing):
         if progress is not None:
             progress(finished)
     return ensemble
-
-
-@dataclass(frozen=True)
-class _Task:
-    """Trajectories of one step's length, and how they pass the output times."""
-
-    members: NDArray[np.int64]
-    way: Way
 
 
 def _set_aside(ensemble: Ensemble, members: NDArray[np.int64], begin: Floats, start: float) -> None:
@@ -225,19 +183,6 @@ def _set_aside(ensemble: Ensemble, members: NDArray[np.int64], begin: Floats, st
     ensemble.failed[members] = start
     if members.size:
         ensemble.lost.append((members, begin[members]))
-
-
-def _tasks(dt: Floats, usable: NDArray[np.bool_], times: Floats, workers: int, lanes: int) -> Iterator[_Task]:
-    """Trajectories sorted by their step, shared evenly among the workers in tasks of at most ``lanes``."""
-    for step in np.unique(dt):
-        passed = way(times, float(step))
-        members = np.flatnonzero(usable & (dt == step))
-        if not members.size:
-            continue
-        number = -(-members.size // (lanes * workers)) * workers
-        size = -(-members.size // (number * VECTOR_LANES)) * VECTOR_LANES
-        for first in range(0, members.size, size):
-            yield _Task(members[first : first + size], passed)
 
 
 @dataclass(frozen=True)
@@ -295,7 +240,7 @@ def _store(ensemble: Ensemble, lanes: Lanes, span: Span, batch: Batch, ended: _E
     if batch.record.size:
         ensemble.records[:, members] = lanes.rows(batch.record).T
     for piece in np.flatnonzero(span.outputs >= 0):
-        ensemble.states[span.outputs[piece], members] = lanes.rows(batch.out[:, piece])
+        lanes.put(batch.out[:, piece], ensemble.states[span.outputs[piece]])
     if ended is None:
         return
     stopped, failed, over = ended.stopped, ended.failed, ~np.isnan(ended.failed)

@@ -80,7 +80,7 @@ def solve(
         dt = np.broadcast_to(np.asarray(settings.dt, dtype=np.float64), n)
         if settings.fit and problem.coefficients is not None:
             # No motion becomes faster than its start allows: a step never shrinks where one has blown up.
-            fitted = fitted_steps(problem.coefficients, problem.outward(now), 1.0, exponent)
+            fitted = fitted_steps(problem.coefficients, problem.outward(now), 1.0, exponent, threads)
             shares = np.maximum(fitted, shares)
             dt = dt * shares
         dt = dt * min((share for until, share in settings.early if end <= until), default=1.0)
@@ -103,16 +103,18 @@ def solve(
         failed[first] = run.failed[first]
         if first.any():
             lost.append((first, problem.outward(run.last)[first]))
-        for length in np.unique(dt):
-            number = output_steps(times, float(length))
-            steps[dt == length] += number.sum()
-            taken[piece, dt == length] = np.max(np.diff(times) / np.maximum(number, 1))
+        lengths = np.unique(dt)  # a search in these few is quicker than their inverse
+        of = np.searchsorted(lengths, dt)
+        numbers = [output_steps(times, float(length)) for length in lengths]
+        steps += np.array([number.sum() for number in numbers], dtype=np.int64)[of]
+        longest = [np.max(np.diff(times) / np.maximum(number, 1)) for number in numbers]
+        taken[piece] = np.array(longest, dtype=np.float64)[of]
         begin, now = end, run.states[-1]
     y = pieces[0] if len(pieces) == 1 else np.concatenate(pieces)
     if problem.canonical:
         for output in y:  # one at a time: what is computed on the way takes little memory
             output[:] = problem.outward(output)
-    judged = judge(status, starts, y[-1], problem.coefficients)
+    judged = judge(status, starts, y[-1], problem.coefficients, threads)
     last = None
     if lost:
         last = y[-1].copy()

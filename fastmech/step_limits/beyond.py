@@ -144,16 +144,15 @@ class StepJudge:
         n, method, c = len(self._starts), self._method, self._coefficients
         each, number = np.broadcast_to(dt, n), np.broadcast_to(steps, n)
         asked: set[int] = set()
-        if not self._is_quiet(dt, steps):
+        if not self._is_quiet(dt, steps):  # else there is one scene, which is looked at in any case
             known = bounded(method, c, self._starts, each, number)
             self._known = dt, known
             stiffest = stiffest_growing(method, c, self._starts, each, number, known)
             asked |= set() if stiffest is None else {stiffest}
-        others: list[Limit] = []
-        scenes = dict.fromkeys(extremes)
-        if np.any(c.decay):
             fading: Any = np.where(c.force != 0.0, c.decay, 0.0)
             asked |= {int(np.argmax(fading))} if fading.any() else set()
+        others: list[Limit] = []
+        scenes = dict.fromkeys(extremes)
         for k in asked:
             scene = self._scene.replace(**{name: float(values[k]) for name, values in self._own.items()})
             scenes[scene] = None

@@ -6,13 +6,15 @@ Most are acquitted by a bound on their growth: by the size of h lambda, else by 
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from importlib import import_module
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Adams, Method
+from fastmech.kernels.passes import columns
 from fastmech.mechanism.coefficients import Coefficients
 from fastmech.step_limits.amplification import amplifies, principal_root
 from fastmech.step_limits.local import LocalMotion, eigenvalue_bound, local_motion, part
@@ -66,28 +68,28 @@ def bounded(method: Method, c: Coefficients, states: Floats, dt: Floats, number:
     growth = Growth(np.zeros(n), np.full(n, np.inf))
     if isinstance(method, ImplicitRungeKutta) or not np.any(c.damping):
         return growth
+    bounds = import_module("fastmech.step_limits.bounds")  # a kernel that quiet steps do not need
+    states = np.ascontiguousarray(states, dtype=np.float64)
+    table, size = region(method.name), np.empty(min(n, AT_ONCE))
     for first in range(0, n, AT_ONCE):
-        block = slice(first, first + AT_ONCE)
-        some, there = part(c, block), Growth(*(values[block] for values in growth))
-        _bound(method, some.damping, local_motion(some, states[block]), dt[block], number[block], there)
+        block = slice(first, min(first + AT_ONCE, n))
+        of, there = size[: block.stop - first], Growth(*(values[block] for values in growth))
+        with np.errstate(invalid="ignore", over="ignore"):  # what is not finite has a status of its own
+            bounds.eigenvalue_bounds(states[block], columns(c, block), of)
+        asked = np.isfinite(of) & (np.asarray(c.damping)[block] > 0.0)
+        there.most[:] = np.where(asked, table.largest[rows_of(dt[block] * of)], 0.0)
+        some = first + np.flatnonzero(~acquitted(there, dt[block], number[block]))
+        if some.size:
+            motion = local_motion(part(c, some), states[some])
+            growth.most[some], growth.time[some] = _bounded(method, motion, dt[some])
     return growth
 
 
-def _bound(
-    method: Method, damping: Any, motion: LocalMotion, dt: Floats, number: Numbers, growth: Growth
-) -> None:
-    """Fill in the growth of a block."""
+def _bounded(method: Method, motion: LocalMotion, step: Floats) -> Growth:
+    """Bounds by the table's sectors, in steps [s]."""
     table = region(method.name)
-    size = eigenvalue_bound(motion)
-    # What is not finite has a status of its own.
-    asked = np.isfinite(size) & (damping > 0.0)
-    growth.most[:] = np.where(asked, table.largest[rows_of(dt * size)], 0.0)
-    some = np.flatnonzero(~acquitted(growth, dt, number))
-    if some.size == 0:
-        return
-    motion, step = LocalMotion(*(values[some] for values in motion)), dt[some]
     factors = factored(motion)
-    most = np.zeros(some.size)
+    most = np.zeros(step.size)
     with np.errstate(invalid="ignore", over="ignore"):
         for slope, offset in ((factors.a, factors.b), (factors.c, factors.d)):
             # Of real modes the faster: the table's bounds are those of smaller ones too.
@@ -98,7 +100,7 @@ def _bound(
             worst = table.sector[rows_of(step * size), sectors_of(real, imaginary)]
             # Half, as the factors are not exact.
             most = np.maximum(most, np.where(real < -0.5 * GROWTH_PER_RADIAN * size, worst, 0.0))
-    growth.most[some], growth.time[some] = np.where(factors.found, most, np.inf), motion.time
+    return Growth(np.where(factors.found, most, np.inf), motion.time)
 
 
 def growing(

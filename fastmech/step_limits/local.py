@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.jit import inlined
 from fastmech.mechanism.coefficients import Coefficients
 from fastmech.mechanism.reduced import potential_gradient
 from fastmech.stability.linearize import fill_state_matrix, polynomial, small_motion, small_motion_at
@@ -59,16 +60,22 @@ def _of_motion(c: Coefficients) -> Any:
     return c.mass, c.slider, c.lift, c.spring, c.gravity, c.force, c.damping
 
 
-def eigenvalue_bound(motion: LocalMotion) -> Floats:
-    """Bound [1/s] on the magnitudes of the small motions' eigenvalues, shape (n,).
+@inlined
+def bound_of(p3: Any, p2: Any, p0: Any) -> Any:
+    """Bound [1/s] on the magnitudes of small motion's eigenvalues from its characteristic polynomial.
 
     With x* M x = 1 an eigenvector x has lambda^2 + b lambda + k = 0: b = x* B x lies between 0 and p3, the
     one eigenvalue of M^-1 B that is not 0, k = x* K x between the two of M^-1 K, with w^2 - p2 w + p0 = 0.
     """
+    half = 0.5 * p2
+    stiff = np.abs(half) + np.sqrt(np.maximum(half * half - p0, 0.0))
+    return 0.5 * (p3 + np.sqrt(p3 * p3 + 4.0 * stiff))
+
+
+def eigenvalue_bound(motion: LocalMotion) -> Floats:
+    """:func:`bound_of` small motions, shape (n,)."""
     with np.errstate(invalid="ignore", over="ignore"):
-        half = 0.5 * motion.p2
-        stiff = np.abs(half) + np.sqrt(np.maximum(half * half - motion.p0, 0.0))
-        return np.asarray(0.5 * (motion.p3 + np.sqrt(motion.p3 * motion.p3 + 4.0 * stiff)))
+        return np.asarray(bound_of(motion.p3, motion.p2, motion.p0))
 
 
 def state_matrices(c: Coefficients, phi: Any, theta: Any) -> Floats:

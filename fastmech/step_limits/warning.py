@@ -219,7 +219,9 @@ def _first_limit(scene: Scene, dt: float, method: str, rates: Floats | None) -> 
         decay = impulse_limit(formula) / scene.alpha
         limits.append(Limit(decay, reason))
     if rates is not None:
-        fastest = float(np.max(np.abs(rates[np.isfinite(rates)]), initial=0.0))
+        fastest = float(np.max(np.abs(rates), initial=0.0))
+        if not np.isfinite(fastest):  # what is not has a status of its own
+            fastest = float(np.max(np.abs(rates[np.isfinite(rates)]), initial=0.0))
         if fastest > 0.0:
             turn = TURN / fastest
             reason = f"at {fastest:.3g} rad/s it would turn {dt * fastest:.3g} rad a step"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from ensembles.starts import Floats
 
-from fastmech.ensembles.lanes import Lanes, rows_at
+from fastmech.ensembles.lanes import Lanes, finite_rows, rows_at
 from fastmech.integrators.sums import CACHE_LINE
 from fastmech.kernels.blocks import VECTOR_LANES
 
@@ -61,10 +61,39 @@ def test_rows_begin_on_lines_of_the_cache(n: int, precision: type) -> None:
 def test_common_rows_are_taken_without_copies() -> None:
     one = np.random.default_rng(1).normal(size=8)
     common, own = np.broadcast_to(one, (5, 8)), np.tile(one, (5, 1)) * np.arange(5.0)[:, None]
-    which = np.array([4, 1, 1])
+    which = np.array([1, 4, 4])
     np.testing.assert_array_equal(rows_at(common, which), common[which])
     np.testing.assert_array_equal(rows_at(own, which), own[which])
     assert np.shares_memory(rows_at(common, which), one)
+    for together in (np.arange(1, 4), np.array([2])):
+        np.testing.assert_array_equal(rows_at(own, together), own[together])
+        assert np.shares_memory(rows_at(own, together), own)
+    assert rows_at(own, np.arange(0)).shape == (0, 8)
+
+
+@SIZES
+@pytest.mark.parametrize("block_lanes", [16, 100, 256])
+@pytest.mark.parametrize("stride", [1, 3])
+@pytest.mark.parametrize("precision", [np.float64, np.float32])
+def test_states_are_put_where_they_belong(n: int, block_lanes: int, stride: int, precision: type) -> None:
+    """NaN too, and nothing beside them changes."""
+    states = np.random.default_rng(n).normal(size=(n, 4)).astype(precision)
+    states[0, 2] = np.nan
+    members = 2 + stride * np.arange(n)
+    lanes = Lanes(members, states, states, RECORD, block_lanes, states)
+    values = np.full((members[-1] + 2, 4), -7.0)
+    expected = values.copy()
+    expected[members] = states
+    lanes.put(lanes.Y, values)
+    np.testing.assert_array_equal(values, expected)
+
+
+def test_which_rows_are_finite() -> None:
+    values = np.random.default_rng(1).normal(size=(9, 4))
+    assert finite_rows(values).all()
+    values[[2, 5], [0, 3]] = np.nan, -np.inf
+    np.testing.assert_array_equal(np.flatnonzero(~finite_rows(values)), [2, 5])
+    assert finite_rows(np.empty((0, 4))).shape == (0,)
 
 
 @SIZES

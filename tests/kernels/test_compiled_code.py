@@ -16,6 +16,8 @@ import pytest
 from kernels.blocks_of_lanes import COMBINATIONS, MODULES, kernel, lanes
 from numba import float64, int64, none
 
+from fastmech.ensembles.energies import tell_broken
+from fastmech.ensembles.highest import highest_energies
 from fastmech.integrators.method import Adams
 from fastmech.integrators.methods import METHODS as REGISTRY
 from fastmech.integrators.sums import TERMS, add_stages
@@ -28,6 +30,7 @@ from fastmech.kernels.whole_steps import whole_step
 from fastmech.kernels.work import lagrange_work
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
+from fastmech.step_limits.bounds import eigenvalue_bounds
 
 pytestmark = pytest.mark.skipif(
     not llvm.get_host_cpu_features().get("fma", False),
@@ -97,6 +100,15 @@ def test_machine_code_of_the_loop(name: str) -> None:
     for loop in loops:
         assert len(PACKED.findall(loop)) >= 40
         assert not re.search(r"\bcall", loop)
+
+
+@pytest.mark.parametrize("shipped", [tell_broken, highest_energies, eigenvalue_bounds])
+def test_passes_over_trajectories_are_packed(shipped: Any) -> None:
+    """Their trigonometry is a loop of its own."""
+    code = intermediate(shipped)
+    assert PACKED_QUADRANT.search(code)
+    assert PACKED_ROOT.search(code)
+    assert len(VECTOR_ARITHMETIC.findall(code)) >= 80
 
 
 @pytest.mark.parametrize("start", [VECTOR, none])

@@ -11,10 +11,12 @@ import fastmech as fm
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Adams
 from fastmech.integrators.methods import METHODS
+from fastmech.kernels.passes import columns
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.stability.linearize import jacobian
 from fastmech.step_limits.amplification import amplifies, companion, principal_root, stability_function
 from fastmech.step_limits.beyond import StepJudge, StepsTaken
+from fastmech.step_limits.bounds import eigenvalue_bounds
 from fastmech.step_limits.growth import CERTAIN, acquitted, bounded, growing, stiffest_growing
 from fastmech.step_limits.local import eigenvalue_bound, eigenvalues, local_motion, state_matrices
 from fastmech.step_limits.modes import decaying_modes, factored
@@ -191,6 +193,19 @@ def random_motions(seed: int, n: int) -> tuple[Coefficients, np.ndarray]:
     mass, slider, lift, spring, force, damping = wide
     c = Coefficients(mass, slider, lift, spring, np.full(n, 9.8), force, damping, np.zeros(n))  # type: ignore[arg-type]
     return c, np.column_stack([rng.uniform(-3, 3, (n, 2)), rng.uniform(-5, 5, (n, 2))])
+
+
+def test_the_pass_over_many_gives_the_bound() -> None:
+    """Beyond the range of the packed trigonometry too; alone as in company."""
+    c, states = random_motions(7, 150)
+    states[::7, 1] += 1e7
+    states[3, 0] = np.nan
+    found, one = np.empty(150), np.empty(1)
+    eigenvalue_bounds(states, columns(c, slice(0, 150)), found)
+    np.testing.assert_allclose(found, eigenvalue_bound(local_motion(c, states)), rtol=1e-9)
+    for k in range(150):
+        eigenvalue_bounds(states[[k]], columns(c, slice(k, k + 1)), one)
+        np.testing.assert_array_equal(one[0], found[k])
 
 
 def test_modes_are_the_eigenvalues() -> None:
