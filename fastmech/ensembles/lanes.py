@@ -42,19 +42,13 @@ def lie_together(which: NDArray[np.int64]) -> bool:
     return which.size > 0 and which.size == which[-1] - which[0] + 1
 
 
-def _zeros(shape: tuple[int, ...], precision: Any) -> Floats:
-    """Zeros in C order whose rows begin on lines of the cache: no vector lies on two."""
+def _on_lines(shape: tuple[int, ...], precision: Any, allocate: Any = np.empty) -> Floats:
+    """An array in C order whose rows begin on lines of the cache: no vector lies on two."""
     size = math.prod(shape) * np.dtype(precision).itemsize
-    memory = np.zeros(size + CACHE_LINE, dtype=np.uint8)
+    memory = allocate(size + CACHE_LINE, dtype=np.uint8)
     first = -memory.ctypes.data % CACHE_LINE
-    return memory[first : first + size].view(precision).reshape(shape)
-
-
-def _on_lines(values: Floats) -> Floats:
-    """A copy that lies in memory as :func:`_zeros` do."""
-    copy = _zeros(values.shape, values.dtype)
-    copy[...] = values
-    return copy
+    lines: Floats = memory[first : first + size].view(precision).reshape(shape)
+    return lines
 
 
 class Lanes:
@@ -86,7 +80,7 @@ class Lanes:
         self._arrange(states, params, each)
         if isinstance(carried, int):
             blocks, dim, width = self.Y.shape
-            self.memory = _zeros((blocks, carried * dim, width), states.dtype)
+            self.memory = _on_lines((blocks, carried * dim, width), states.dtype, np.zeros)
         else:
             self.memory = self._blocked(carried)
         self._before = np.empty_like(self.memory)
@@ -101,7 +95,9 @@ class Lanes:
         n, rows = values.shape
         blocks = -(-n // self._width)
         lanes = np.minimum(np.arange(blocks * self._width), n - 1)
-        return _on_lines(rows_at(values, lanes).reshape(blocks, self._width, rows).transpose(0, 2, 1))
+        blocked = _on_lines((blocks, rows, self._width), values.dtype)
+        blocked[...] = rows_at(values, lanes).reshape(blocks, self._width, rows).transpose(0, 2, 1)
+        return blocked
 
     def memory_before(self) -> Floats:
         """What the memory is now: kept until this is asked again, in place of a new copy for each call."""
