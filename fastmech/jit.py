@@ -64,7 +64,7 @@ OBSERVER = types.FunctionType(OBSERVER_SIGNATURE)
 
 #: ``step(t, h, Y, Z, params, work)``: a whole step of a block from ``Y`` to ``Z``, see
 #: :mod:`fastmech.kernels.whole_steps`.
-STEP_SIGNATURE = types.int64(types.float64, types.float64, MATRIX, MATRIX, MATRIX, MATRIX)
+STEP_SIGNATURE = types.void(types.float64, types.float64, MATRIX, MATRIX, MATRIX, MATRIX)
 STEP = types.FunctionType(STEP_SIGNATURE)
 
 #: ``advance(t, h, first, last, F, oldest, Y, params, work, checked)``: whole steps of a block, see

@@ -16,11 +16,12 @@ from fastmech.integrators.driver import TABLEAU, BlockRHS, Observer
 from fastmech.integrators.method import Adams, Method, RungeKutta
 from fastmech.integrators.sums import rows_of
 from fastmech.jit import STEP, driver_signature, inlined, kernel
-from fastmech.kernels.whole_steps import is_far, is_lagrange, whole_step
+from fastmech.kernels.far import STRETCH, Marks, mark_far
+from fastmech.kernels.whole_steps import is_lagrange, whole_step
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-BlockStep = Callable[[float, float, Floats, Floats, Floats, Floats], int]
+BlockStep = Callable[[float, float, Floats, Floats, Floats, Floats], None]
 
 #: Runge-Kutta methods that have whole steps: the fourth order that everybody knows and the best of order 8.
 #: Each costs a compilation for each combination of terms, on first use.
@@ -39,19 +40,17 @@ def redo(
     now: Floats,
     then: Floats,
     params: Floats,
-) -> bool:
-    """The step once more, stage by stage, for lanes that are far out: one by one.
-
-    Whether one of them still is, which the step that went wrong could not tell.
+    far: Marks,
+) -> None:
+    """The step once more, stage by stage, for marked lanes: one by one.
 
     The sums are plain loops: those of :func:`fastmech.integrators.explicit.one_step` are fast, but long to
     compile, and no run needs them here.
     """
     dim, stages = now.shape[0], nodes.shape[0]
-    still = False
     own, y, K = np.empty((params.shape[0], 1)), np.empty((dim, 1)), np.empty((stages, dim, 1))
     for i in range(now.shape[1]):
-        if is_far(now, i, h) | is_far(then, i, h):
+        if far[i]:
             own[:, 0] = params[:, i]
             for s in range(stages + 1):
                 for d in range(dim):
@@ -62,8 +61,6 @@ def redo(
                 if s < stages:
                     rhs(t + nodes[s] * h, y, K[s], own)
             then[:, i] = y[:, 0]
-            still |= is_far(then, i, h)
-    return still
 
 
 @kernel(driver_signature(types.float64, STEP, *TABLEAU))
@@ -85,22 +82,24 @@ def integrate_whole_steps(
 ) -> None:
     """Take blocks of lanes through all times, as :func:`fastmech.integrators.explicit.integrate_blocks` does.
 
-    ``step`` does the work; ``rhs`` and the packed tableau serve lanes that it cannot do. States go to and fro
+    ``step`` does the work; ``rhs`` and the packed tableau serve lanes that are far out. States go to and fro
     between the block and a second one: a copy would cost as much as a stage.
     """
     dim, lanes = Y.shape[1], Y.shape[2]
     work = rows_of(Y[0, 0], nodes.shape[0]).reshape((nodes.shape[0], lanes))
     other = rows_of(Y[0], 1).reshape((dim, lanes))
+    far, some_far = np.zeros(lanes, dtype=np.bool_), False
     for b in range(Y.shape[0]):
         now, then, own, kept = Y[b], other, params[b], record[b]
         for j in range(steps.shape[0]):
             h = (times[j + 1] - times[j]) / max(steps[j], 1)
-            some_far = True  # nothing is known of where a piece begins
             for k in range(steps[j]):
                 t = times[j] + k * h
-                reaches_far = step(t, h, now, then, own, work) != 0
-                if some_far | reaches_far:
-                    some_far = redo(rhs, t, h, start, stage, weight, nodes, now, then, own)
+                if k % STRETCH == 0:
+                    some_far = mark_far(now, h, far)
+                step(t, h, now, then, own, work)
+                if some_far:
+                    redo(rhs, t, h, start, stage, weight, nodes, now, then, own, far)
                 now, then = then, now
                 if kept.size:
                     observe(times[j] + (k + 1) * h, now, observer_params, kept)

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
 from fastmech.integrators.batch import ROUNDED_TIME, Batch
 from fastmech.integrators.driver import BlockRHS, Floats, Integers, Observer
@@ -19,22 +18,15 @@ from fastmech.integrators.sums import rows_of
 from fastmech.integrators.whole import BlockStep, redo
 from fastmech.jit import ADVANCE, STEP, driver_signature, inlined, kernel
 from fastmech.kernels.blocks import VECTOR_LANES
-from fastmech.kernels.whole_adams import STRETCH, whole_steps
-from fastmech.kernels.whole_steps import is_far, whole_step
+from fastmech.kernels.far import STRETCH, Marks, mark_far
+from fastmech.kernels.whole_adams import whole_steps
+from fastmech.kernels.whole_steps import whole_step
 
-Marks = NDArray[np.bool_]
 Advance = Callable[[float, float, int, int, Floats, int, Floats, Floats, Floats, bool], int]
 
 #: Steps between two moves of a block's history: it grows at its end, and then goes back to the begin of its
 #: memory.
 MOVED = 8 * STRETCH
-
-
-@inlined
-def mark_far(Y: Floats, h: float, far: Marks) -> None:
-    """Mark the lanes that are far out."""
-    for i in range(Y.shape[1]):
-        far[i] = is_far(Y, i, h)
 
 
 @inlined
@@ -111,7 +103,7 @@ def integrate_whole_multistep(
     work = rows_of(Y[0, 0], nodes.shape[0]).reshape((nodes.shape[0], lanes))
     far = np.zeros(lanes, dtype=np.bool_)
     before = rows_of(Y[0], 1).reshape((dim, lanes))
-    known, last = 0, 0.0
+    known, last, some_far = 0, 0.0, False
     for b in range(Y.shape[0]):
         state, own, kept, newest = Y[b], params[b], record[b], rows - 1
         known, last = int(phase[0]), phase[2]
@@ -125,7 +117,6 @@ def integrate_whole_multistep(
                 if known == 0:
                     rhs(times[j], state, F[newest], own)
                     known = 1
-                some_far = True  # nothing is known of where a piece begins
                 k = slow = 0  # so many steps are taken one by one
                 while k < steps[j]:
                     if newest + STRETCH >= F.shape[0]:
@@ -133,10 +124,12 @@ def integrate_whole_multistep(
                         newest = rows - 1
                     t, many = times[j] + k * h, 1
                     if known < rows:
+                        if k % STRETCH == 0:
+                            some_far = mark_far(state, h, far)
                         before[:] = state
-                        reaches_far = begin(t, h, before, state, own, work) != 0
-                        if some_far | reaches_far:
-                            some_far = redo(rhs, t, h, start, stage, weight, nodes, before, state, own)
+                        begin(t, h, before, state, own, work)
+                        if some_far:
+                            redo(rhs, t, h, start, stage, weight, nodes, before, state, own, far)
                         rhs(t + h, state, F[newest + 1], own)
                         known += 1
                     elif slow == 0 and not kept.size:
@@ -146,15 +139,14 @@ def integrate_whole_multistep(
                             times[j], h, k, k + whole, f, newest + 1 - rows, state, own, work, True
                         )
                         if many < whole:
-                            mark_far(state, h, far)
-                            slow = STRETCH
+                            slow, some_far = STRETCH, mark_far(state, h, far)
                     else:
                         if slow == 0:
-                            mark_far(state, h, far)
-                            slow = STRETCH
+                            slow, some_far = STRETCH, mark_far(state, h, far)
                         before[:] = state
                         advance(times[j], h, k, k + 1, f, newest + 1 - rows, state, own, work, False)
-                        redo_adams(rhs, t, h, predictor, corrector, F, newest, before, state, own, far)
+                        if some_far:
+                            redo_adams(rhs, t, h, predictor, corrector, F, newest, before, state, own, far)
                         slow -= 1
                     newest += many
                     k += many

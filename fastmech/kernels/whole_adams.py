@@ -11,31 +11,13 @@ angles, turned by the difference: of order 4 in it, which is itself of the predi
 
 from __future__ import annotations
 
+from textwrap import indent
 from typing import Any, Protocol
 
-import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.jit import inlined
 from fastmech.kernels.blocks import VECTOR_LANES
-from fastmech.kernels.whole_steps import ACCELERATIONS, ANGLES, FARTHEST, RATES, TURNED, compiled, terms_of
-
-Floats = NDArray[np.float64]
-
-#: Steps of a stretch: where one begins it is seen whether lanes are far out, in between nobody looks.
-STRETCH = 8
-
-
-@inlined
-def may_be_far(Y: Floats, h: float) -> bool:
-    """Whether lanes of a block (4, lanes) may be :func:`~fastmech.kernels.whole_steps.is_far`."""
-    beyond = 0
-    turn = FARTHEST / TURNED * h
-    for i in range(VECTOR_LANES):
-        turned, bent = turn * Y[2, i], turn * Y[3, i]
-        reach = Y[0, i] * Y[0, i] + Y[1, i] * Y[1, i] + turned * turned + bent * bent
-        beyond |= reach > 0.5 * FARTHEST * FARTHEST
-    return beyond != 0
+from fastmech.kernels.whole_steps import ACCELERATIONS, ANGLES, RATES, compiled, terms_of
 
 
 class Formula(Protocol):
@@ -58,8 +40,8 @@ _HEAD = '''"""Made by fastmech: steps of {name} of Lagrange's equations, each in
 
 from fastmech.jit import ADVANCE_SIGNATURE, kernel
 from fastmech.kernels.blocks import DAMPING, DECAY, FORCE, write_decay
+from fastmech.kernels.far import STRETCH, may_be_far
 from fastmech.kernels.sincos import sincos
-from fastmech.kernels.whole_adams import STRETCH, may_be_far
 from fastmech.mechanism.equations import lagrange_accelerations
 
 
@@ -77,13 +59,14 @@ def advance(t, h, first, last, F, oldest, Y, p, work, checked):
 _DECAY = """            write_decay(t + (k + 1) * h, p, DECAY, work)
 """
 
+#: The angles' sines and cosines, turned from the predicted to the corrected ones.
 _TURN = """
-        d1, d2 = phi_n - phi_p, theta_n - theta_p
-        q1, q2 = d1 * d1, d2 * d2
-        sine1, sine2 = d1 - d1 * q1 * (1.0 / 6.0), d2 - d2 * q2 * (1.0 / 6.0)
-        versine1, versine2 = q1 * (0.5 - q1 * (1.0 / 24.0)), q2 * (0.5 - q2 * (1.0 / 24.0))
-        s1, c1 = s1 + (c1 * sine1 - s1 * versine1), c1 - (s1 * sine1 + c1 * versine1)
-        s2, c2 = s2 + (c2 * sine2 - s2 * versine2), c2 - (s2 * sine2 + c2 * versine2)
+d1, d2 = phi_n - phi_p, theta_n - theta_p
+q1, q2 = d1 * d1, d2 * d2
+sine1, sine2 = d1 - d1 * q1 * (1.0 / 6.0), d2 - d2 * q2 * (1.0 / 6.0)
+versine1, versine2 = q1 * (0.5 - q1 * (1.0 / 24.0)), q2 * (0.5 - q2 * (1.0 / 24.0))
+s1, c1 = s1 + (c1 * sine1 - s1 * versine1), c1 - (s1 * sine1 + c1 * versine1)
+s2, c2 = s2 + (c2 * sine2 - s2 * versine2), c2 - (s2 * sine2 + c2 * versine2)
 """
 
 
@@ -95,31 +78,26 @@ def source(method: Formula, terms: str) -> str:
     text = _HEAD.format(
         name=method.name, rows=rows, row=row, lanes=VECTOR_LANES, decay=_DECAY if decays else ""
     )
-    loop = "".join(f"        {state}0 = {_at('y', d)}\n" for d, (state, _) in enumerate(RATES))
+    loop = "".join(f"{state}0 = {_at('y', d)}\n" for d, (state, _) in enumerate(RATES))
     names = "mass", "slider", "lift", "spring", "gravity"
-    loop += "".join(f"        {name} = {_at('own', place)}\n" for place, name in enumerate(names))
-    loop += f"        force = {_at('own', 'FORCE') if decays or 'constant' in terms else None}\n"
-    loop += f"        damping = {_at('own', 'DAMPING') if 'damped' in terms else None}\n"
-    new = "p" if corrects else "n"  # the state that the history alone gives
+    loop += "".join(f"{name} = {_at('own', place)}\n" for place, name in enumerate(names))
+    loop += f"force = {_at('own', 'FORCE') if decays or 'constant' in terms else None}\n"
+    loop += f"damping = {_at('own', 'DAMPING') if 'damped' in terms else None}\n"
+    new = "_p" if corrects else "_n"  # the state that the history alone gives
     for d, (state, rate) in enumerate(RATES):
         past = [_at("f", (rows - 1 - age) * len(RATES) + d) for age in range(rows)]
-        loop += "".join(f"        f{age} = {value}\n" for age, value in enumerate(past))
-        loop += f"        {state}_{new} = {state}0 + h * ({_sum(method.predictor)})\n"
+        loop += "".join(f"f{age} = {value}\n" for age, value in enumerate(past))
+        loop += f"{state}{new} = {state}0 + h * ({_sum(method.predictor)})\n"
         if corrects:
-            loop += f"        {rate}_w = {_sum(method.corrector[1:])}\n"
-    loop += ANGLES.format(s="_" + new) + ACCELERATIONS.format(s="_" + new, push=push)
+            loop += f"{rate}_w = {_sum(method.corrector[1:])}\n"
+    loop += ANGLES.format(s=new) + ACCELERATIONS.format(s=new, push=push)
     if corrects:
         for state, rate in RATES:
-            latest = f"{float(method.corrector[0])!r} * {rate}_p"
-            loop += f"        {state}_n = {state}0 + h * ({rate}_w + {latest})\n"
+            loop += f"{state}_n = {state}0 + h * ({rate}_w + {float(method.corrector[0])!r} * {rate}_p)\n"
         loop += _TURN + ACCELERATIONS.format(s="_n", push=push)
     for d, (state, rate) in enumerate(RATES):
-        loop += f"        {_at('y', d)} = {state}_n\n        {_at('f', rows * len(RATES) + d)} = {rate}_n\n"
-    return (
-        text
-        + "".join(f"        {line}\n" if line else "\n" for line in loop.splitlines())
-        + "    return last - first\n"
-    )
+        loop += f"{_at('y', d)}, {_at('f', rows * len(RATES) + d)} = {state}_n, {rate}_n\n"
+    return text + indent(loop, " " * 16) + "    return last - first\n"
 
 
 def _at(array: str, row: int | str) -> str:

@@ -9,22 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
+from textwrap import indent
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.generated import new_module, run_module
-from fastmech.jit import inlined
 from fastmech.kernels import lagrange
-from fastmech.kernels.sincos import REDUCTION_LIMIT
 
 Floats = NDArray[np.float64]
-
-#: Angles [rad], and turns of an angle in a step [rad], within which no stage of a step leaves the range of
-#: the fast trigonometry: no row of a tableau here has weights whose sizes sum to 100. (A stage much faster
-#: than both ends of its step could: that is a step for nothing.)
-FARTHEST, TURNED = 0.5 * REDUCTION_LIMIT, 0.004 * REDUCTION_LIMIT
 
 
 class Formula(Protocol):
@@ -52,14 +46,11 @@ _HEAD = '''"""Made by fastmech: a step of {name} of Lagrange's equations, all st
 from fastmech.jit import STEP_SIGNATURE, kernel
 from fastmech.kernels.blocks import DAMPING, DECAY, FORCE, write_decay
 from fastmech.kernels.sincos import sincos
-from fastmech.kernels.whole_steps import FARTHEST, TURNED
 from fastmech.mechanism.equations import lagrange_accelerations
 
 
 @kernel(STEP_SIGNATURE)
 def step(t, h, Y, Z, p, work):
-    beyond = 0
-    turn = FARTHEST / TURNED * h
 {decay}    for i in range(Y.shape[1]):
         phi0, theta0, phi_dot0, theta_dot0 = Y[0, i], Y[1, i], Y[2, i], Y[3, i]
         mass, slider, lift, spring, gravity = p[0, i], p[1, i], p[2, i], p[3, i], p[4, i]
@@ -71,24 +62,17 @@ _DECAY = """    write_decay(t + {c!r} * h, p, DECAY, work[{s}:])
 
 #: Sines and cosines of a state, and its accelerations.
 ANGLES = """
-        s1, c1 = sincos(phi{s})
-        s2, c2 = sincos(theta{s})
+s1, c1 = sincos(phi{s})
+s2, c2 = sincos(theta{s})
 """
 ACCELERATIONS = """\
-        a{s}, b{s} = lagrange_accelerations(
-            s1, c1, s2, c2, phi_dot{s}, theta_dot{s}, mass, slider, lift, spring, gravity, {push}, damping
-        )
+a{s}, b{s} = lagrange_accelerations(
+    s1, c1, s2, c2, phi_dot{s}, theta_dot{s}, mass, slider, lift, spring, gravity, {push}, damping
+)
 """
 
-#: Whether a new state may be far: one sum of squares.
-REACH = """\
-        turned, bent = turn * phi_dot{s}, turn * theta_dot{s}
-        reach = phi{s} * phi{s} + theta{s} * theta{s} + turned * turned + bent * bent
-        beyond |= reach > 0.5 * FARTHEST * FARTHEST
-"""
-
-_TAIL = """
-        Z[0, i], Z[1, i], Z[2, i], Z[3, i] = phi{s}, theta{s}, phi_dot{s}, theta_dot{s}
+_END = """
+Z[0, i], Z[1, i], Z[2, i], Z[3, i] = phi{s}, theta{s}, phi_dot{s}, theta_dot{s}
 """
 
 #: A state, and what its rate is called.
@@ -104,12 +88,13 @@ def source(tableau: Formula, terms: str) -> str:
         force="p[FORCE, i]" if decays or "constant" in terms else None,
         damping="p[DAMPING, i]" if "damped" in terms else None,
     )
+    loop = ""
     for s, row in enumerate([*tableau.a[1:], tableau.b], start=1):
         push = f"force * work[{s - 1}, i]" if decays else "force"
-        text += ANGLES.format(s=s - 1) + ACCELERATIONS.format(s=s - 1, push=push)
+        loop += ANGLES.format(s=s - 1) + ACCELERATIONS.format(s=s - 1, push=push)
         for state, rate in RATES:
-            text += f"        {state}{s} = {state}0 + h * ({_sum(row, rate)})\n"
-    return text + (_TAIL + REACH).format(s=len(tableau.b)) + "    return beyond\n"
+            loop += f"{state}{s} = {state}0 + h * ({_sum(row, rate)})\n"
+    return text + indent(loop + _END.format(s=len(tableau.b)), " " * 8)
 
 
 def _sum(row: Sequence[float], rate: str) -> str:
@@ -121,8 +106,7 @@ def whole_step(rhs: Any, tableau: Formula) -> Any:
     """``step(t, h, Y, Z, p, work)`` of one of Lagrange's block right-hand sides and a method.
 
     It writes the states (dim, lanes) after a step from ``Y`` into ``Z``, with ``work`` (stages, lanes) as
-    scratch. The result is not 0 where a new state may be :func:`is_far`: a sum of squares tells it of a block
-    in a few instructions. Steps from or to states that are far are not to be used.
+    scratch. Lanes that are far out (:mod:`fastmech.kernels.far`) are not to be used.
     """
     return compiled(source(tableau, terms_of(rhs))).step
 
@@ -135,16 +119,6 @@ def is_lagrange(rhs: Any) -> bool:
 def terms_of(rhs: Any) -> str:
     """The combination of terms of one of Lagrange's block right-hand sides."""
     return str(rhs.__name__).removeprefix("lagrange_")
-
-
-@inlined
-def is_far(Y: Floats, i: int, h: float) -> bool:
-    """Whether a step h [s] from or to a lane's state may need angles beyond the fast trigonometry.
-
-    NaN does not: nothing mends it. Comparisons only: a lane's verdict is the same in any compiled code.
-    """
-    turned = (abs(Y[0, i]) > FARTHEST) | (abs(Y[1, i]) > FARTHEST)
-    return turned | (h * abs(Y[2, i]) > TURNED) | (h * abs(Y[3, i]) > TURNED)
 
 
 def compiled(text: str) -> Any:

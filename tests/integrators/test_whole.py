@@ -14,7 +14,7 @@ from fastmech.integrators.method import RungeKutta
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.integrators.whole import METHODS, WholeSteps, in_whole_steps
 from fastmech.kernels import lagrange
-from fastmech.kernels.whole_steps import FARTHEST
+from fastmech.kernels.far import FARTHEST
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 

@@ -17,7 +17,7 @@ from fastmech.integrators.whole import in_whole_steps
 from fastmech.integrators.whole_multistep import WholeAdams
 from fastmech.kernels import lagrange
 from fastmech.kernels.blocks import VECTOR_LANES
-from fastmech.kernels.whole_steps import FARTHEST
+from fastmech.kernels.far import FARTHEST
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 

@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 from fastmech.integrators.method import Adams
 from fastmech.integrators.methods import METHODS
 from fastmech.kernels.blocks import VECTOR_LANES
-from fastmech.kernels.whole_adams import STRETCH, may_be_far, whole_steps
-from fastmech.kernels.whole_steps import FARTHEST, TURNED
+from fastmech.kernels.far import FARTHEST, STRETCH, TURNED, may_be_far
+from fastmech.kernels.whole_adams import whole_steps
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 
