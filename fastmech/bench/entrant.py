@@ -26,6 +26,6 @@ class Entrant:
     family: str  #: integrator; its settings make one curve
     setting: str  #: step or tolerance
     prepare: Prepare
-    most: int = 8192  #: trajectories a call at most; slow integrators are given the first few
+    most: int = 32768  #: trajectories a call at most; slow integrators are given the first few
     least: int = 1  #: trajectories a call at least: a batch that needs them to be at its best
     threaded: bool = False  #: whether it also enters on all cores

@@ -53,7 +53,9 @@ def test_while_kernels_are_compiled(tiny, number, arguments):
     """The compilation in hand is finished, the next is not begun; every one looks for its place first."""
     done = stopped(number, "fastmech.jit:cache_directory", *arguments, "--json")
     assert done.returncode == 128 + number
-    assert done.stderr == "fastmech: interrupted\n"
+    *waits, last = done.stderr.splitlines()
+    assert last == "fastmech: interrupted"
+    assert all("stops when the kernel in hand is compiled" in line for line in waits)  # of a slow machine
     told = json.loads(done.stdout)
     assert (told["command"], told["error"], told["exit_code"]) == (
         arguments[0],
