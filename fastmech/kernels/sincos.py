@@ -67,7 +67,10 @@ def sincos_double(x: float) -> tuple[float, float]:
 
 @inlined
 def sincos_single(x: float) -> tuple[float, float]:
-    """Sine and cosine of a float32 ``x`` [rad], ``abs(x) <= REDUCTION_LIMIT_SINGLE``; NaN gives NaN."""
+    """Sine and cosine of a float32 ``x`` [rad], ``abs(x) <= REDUCTION_LIMIT_SINGLE``; NaN gives NaN.
+
+    Absolute error at most 1.3e-7; beside zeros, where less is left, at most 1e-4 of the value.
+    """
     n = np.floor(x * rounded_to(x, _TWO_OVER_PI) + rounded_to(x, 0.5))
     r = x - n * rounded_to(x, _HALF_PI_1_SINGLE)
     r = (r - n * rounded_to(x, _HALF_PI_2_SINGLE)) - n * rounded_to(x, _HALF_PI_3_SINGLE)
