@@ -124,10 +124,8 @@ class Lanes:
             together = values[members[0] : members[-1] + 1].reshape(blocks, width, dim)
             together[...] = blocked.transpose(0, 2, 1)
         else:  # a row is copied as one thing: number by number takes twice as long
-            rows, row = (
-                self.rows(blocked).astype(values.dtype, order="C", copy=False),
-                f"V{values.strides[0]}",
-            )
+            rows = self.rows(blocked).astype(values.dtype, order="C", copy=False)
+            row = f"V{values.strides[0]}"
             values.view(row)[members, 0] = rows.view(row)[:, 0]
 
     def keep(self, which: NDArray[np.bool_], at_once: bool) -> None:

@@ -1,6 +1,7 @@
 """Runs an ensemble: blocks of lanes, taken from a queue by threads that hold no interpreter lock.
 
-A lane's result depends on its own start and parameters alone: the same bits for any threads and blocks.
+A lane's result depends on its own start and parameters alone: the same bits for any threads, tasks, calls and
+blocks (some methods have blocks of one width).
 
 Trajectories that have stopped or failed make room: the others of a task move up into full blocks, and a
 task's end, when few are left, runs in narrow ones. New ones join with the next task, as lanes of a block

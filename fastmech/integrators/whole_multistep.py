@@ -45,7 +45,8 @@ def redo_adams(
 ) -> None:
     """The step once more for marked lanes, one by one, with the library's trigonometry where it is needed.
 
-    ``F`` (rows, dim, lanes) holds the history up to the row ``newest``; the next one is written too.
+    ``F`` (rows, dim, lanes) holds the history up to the row ``newest``; the next one is written too. The
+    newest is computed anew: a lane may have left the range in the stretch before.
     """
     dim, rows = now.shape[0], predictor.shape[0]
     own, y, f = np.empty((params.shape[0], 1)), np.empty((dim, 1)), np.empty((dim, 1))
@@ -133,24 +134,23 @@ def integrate_whole_multistep(
                         rhs(t + h, state, F[newest + 1], own)
                         known += 1
                     elif slow == 0 and not kept.size:
-                        whole = (F.shape[0] - newest - 1) // STRETCH * STRETCH
-                        whole = min(steps[j] - k, whole)
-                        many = advance(
-                            times[j], h, k, k + whole, f, newest + 1 - rows, state, own, work, True
-                        )
-                        if many < whole:
+                        room = (F.shape[0] - newest - 1) // STRETCH * STRETCH
+                        wanted, oldest = min(room, steps[j] - k), newest + 1 - rows
+                        many = advance(times[j], h, k, k + wanted, f, oldest, state, own, work, True)
+                        if many < wanted:
                             slow, some_far = STRETCH, mark_far(state, h, far)
                     else:
                         if slow == 0:
                             slow, some_far = STRETCH, mark_far(state, h, far)
-                        before[:] = state
+                        if some_far:
+                            before[:] = state
                         advance(times[j], h, k, k + 1, f, newest + 1 - rows, state, own, work, False)
                         if some_far:
                             redo_adams(rhs, t, h, predictor, corrector, F, newest, before, state, own, far)
                         slow -= 1
                     newest += many
                     k += many
-                    if kept.size and many:
+                    if kept.size:
                         observe(times[j] + k * h, state, observer_params, kept)
             out[b, j] = state
         memory[b] = F[newest + 1 - rows : newest + 1].copy().reshape((rows * dim, lanes))
@@ -174,7 +174,13 @@ class WholeAdams(Adams):
         return super().evaluations(steps) + min(steps, self.start_steps) + 1
 
     def run(self, rhs: Any, observe: Any, batch: Batch) -> None:
-        """Take a batch through its times."""
+        """Take a batch through its times.
+
+        Raises:
+            ValueError: its blocks are not :attr:`lanes` wide, for which steps are compiled.
+        """
+        if batch.Y.shape[2] != self.lanes:
+            raise ValueError(f"blocks of {batch.Y.shape[2]} lanes: must be {self.lanes} wide")
         packed = self.starter.packed
         integrate_whole_multistep(
             rhs,

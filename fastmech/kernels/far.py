@@ -16,9 +16,10 @@ from fastmech.kernels.sincos import REDUCTION_LIMIT
 Floats = NDArray[np.float64]
 Marks = NDArray[np.bool_]
 
-#: Angles [rad], and turns of an angle in a step [rad], within which no stage of a step leaves the range of
-#: the fast trigonometry: no row of a tableau here has weights whose sizes sum to 100. (A motion that becomes
-#: much faster in a stretch could: its steps are for nothing.)
+#: Angles [rad], and turns of an angle in a step [rad], within which no stage of steady motion leaves the
+#: range of the fast trigonometry in a stretch: rows of tableaus have weights whose sizes sum to under 100. (A
+#: motion that becomes much faster in a stretch, or turns to and fro by hundreds of rad a step, could: its
+#: steps are for nothing.)
 FARTHEST, TURNED = 0.5 * REDUCTION_LIMIT, 0.004 * REDUCTION_LIMIT
 
 #: Steps of a stretch.
@@ -29,10 +30,13 @@ STRETCH = 8
 def is_far(Y: Floats, i: int, h: float) -> bool:
     """Whether a stretch of steps h [s] from a lane's state may need angles beyond the fast trigonometry.
 
-    NaN does not: nothing mends it. Comparisons only: a lane's verdict is the same in any compiled code.
+    A lane with NaN does not: nothing mends it. Comparisons only: its verdict is the same in any compiled
+    code.
     """
+    lost = (Y[0, i] != Y[0, i]) | (Y[1, i] != Y[1, i]) | (Y[2, i] != Y[2, i]) | (Y[3, i] != Y[3, i])
     turned = (abs(Y[0, i]) > FARTHEST) | (abs(Y[1, i]) > FARTHEST)
-    return turned | (h * abs(Y[2, i]) > TURNED) | (h * abs(Y[3, i]) > TURNED)
+    turned |= (h * abs(Y[2, i]) > TURNED) | (h * abs(Y[3, i]) > TURNED)
+    return turned & (not lost)
 
 
 @inlined

@@ -1,4 +1,4 @@
-"""Whole steps of a Runge-Kutta method in one loop over lanes, for the methods that run most.
+"""Whole steps of a Runge-Kutta method in one loop over lanes, for those that run most and for starters.
 
 Stage by stage, a step reads and writes its stages' derivatives in memory. Here all stages of a lane are local
 numbers: the loop's source is made from the tableau, once for each combination of terms, and compiled when a

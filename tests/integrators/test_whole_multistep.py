@@ -10,6 +10,7 @@ import pytest
 from integrators.driving import observe_times, one_block
 from kernels.blocks_of_lanes import Floats, lanes
 
+from fastmech.integrators.batch import Batch
 from fastmech.integrators.driver import observe_nothing
 from fastmech.integrators.method import Adams
 from fastmech.integrators.methods import METHODS
@@ -87,6 +88,53 @@ def test_motions_that_come_and_go_across_the_limit_depend_on_nobody(name: str, d
     for i in range(VECTOR_LANES):
         one = np.repeat(Y[:, i : i + 1], VECTOR_LANES, axis=1)
         np.testing.assert_array_equal(through(method, one)[:, 0], together[:, i])
+
+
+def forced(lane_blocks: int, rows: int = 0) -> Any:
+    """Blocks of damped motion under a decaying force, each lane with its own; the step changes and comes back."""
+    times, steps = np.array([0.3, 0.45, 0.75, 0.9]), np.array([60, 50, 60])
+    n = lane_blocks * VECTOR_LANES
+    random = np.random.default_rng(5)
+    own = [
+        np.array(reduce(Scene(F0=force, alpha=alpha, c1=spring)))
+        for force, alpha, spring in random.uniform([-300, 1, 100], [300, 9, 200], (n, 3))
+    ]
+    params = np.ascontiguousarray(np.array(own).reshape(lane_blocks, VECTOR_LANES, -1).transpose(0, 2, 1))
+    Y = np.ascontiguousarray(lanes(n).reshape(4, lane_blocks, VECTOR_LANES).transpose(1, 0, 2))
+    Y[1, 0, 3], Y[2, 1, 7] = 3e7, -1e17  # far out, where a motion that is seen has 9 digits, or none
+    Y[2, 2, 8] = 1.0 / 3e-3  # turns by more than 1 rad a step
+    blocks, dim, width = Y.shape
+    return Batch(
+        times=times,
+        steps=steps,
+        params=params,
+        observer_params=np.ones(1),
+        Y=Y,
+        record=np.zeros((blocks, rows, width)),
+        out=np.empty((blocks, steps.size, dim, width)),
+    )
+
+
+@EVERY_ADAMS
+def test_blocks_with_their_own_parameters_under_a_force_of_time(name: str) -> None:
+    """Against the general driver, observed or not; motions that a step is too long for are left out."""
+    rhs, general = lagrange.lagrange_damped_decaying, forced(3)
+    method = in_whole_steps(ADAMS[name], rhs)
+    found, seen = forced(3), forced(3, rows=4)
+    with np.errstate(all="ignore"):  # plain Python warns where compiled code is silent
+        ADAMS[name].run(rhs, observe_nothing, general)
+        method.run(rhs, observe_nothing, found)
+        method.run(rhs, observe_times, seen)
+    np.testing.assert_array_equal(found.out, seen.out)
+    np.testing.assert_array_equal(seen.record[:, 1], seen.times[-1])
+    ends = seen.times[:-1, None] + np.diff(seen.times)[:, None] / seen.steps[:, None] * np.arange(1, 61)
+    every = sum(end[:steps].sum() for end, steps in zip(ends, seen.steps, strict=True))
+    np.testing.assert_allclose(seen.record[:, 2], every, rtol=1e-13)
+    steady = np.ones((3, VECTOR_LANES), dtype=bool)
+    steady[1, 3] = steady[2, 8] = False
+    off = np.abs(found.out - general.out).max(axis=(1, 2))
+    assert off[steady].max() < 1e-10
+    assert off[1, 3] < 1e-6  # an angle of 3e7 rad has 8 digits behind the point
 
 
 @EVERY_ADAMS
