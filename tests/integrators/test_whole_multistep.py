@@ -91,7 +91,7 @@ def test_motions_that_come_and_go_across_the_limit_depend_on_nobody(name: str, d
 
 
 def forced(lane_blocks: int, rows: int = 0) -> Any:
-    """Blocks of damped motion under a decaying force, each lane with its own; the step changes and comes back."""
+    """Blocks of damped motion under a decaying force, own for each lane; the step changes and comes back."""
     times, steps = np.array([0.3, 0.45, 0.75, 0.9]), np.array([60, 50, 60])
     n = lane_blocks * VECTOR_LANES
     random = np.random.default_rng(5)
