@@ -208,8 +208,10 @@ def test_scaling_masses_stiffnesses_and_force_changes_nothing(scene: Scene, fact
     changes = {name: factor * getattr(scene, name) for name in ("m1", "m2", "m3", "c1", "c2", "F0")}
     first, second = find_equilibria(scene), find_equilibria(scene.replace(**changes))
     assert first.kind == second.kind
-    for e, f in zip(first, second, strict=True):
-        if e.radius < 1e-7:
-            assert abs(on_torus(e.phi - f.phi)) + abs(on_torus(e.theta - f.theta)) <= 2 * (
-                e.radius + f.radius
+    for e in first:
+        if e.radius < 1e-7:  # mirror images have one energy: rounding orders them
+            assert any(
+                abs(on_torus(e.phi - f.phi)) + abs(on_torus(e.theta - f.theta)) <= 2 * (e.radius + f.radius)
+                for f in second
+                if f.kind == e.kind
             )
