@@ -23,9 +23,9 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 BlockStep = Callable[[float, float, Floats, Floats, Floats, Floats], None]
 
-#: Runge-Kutta methods that have whole steps: the fourth order that everybody knows and the best of order 8.
-#: Each costs a compilation for each combination of terms, on first use.
-METHODS = ("rk4", "dop853")
+#: Runge-Kutta methods that have whole steps, as all Adams methods do: the fourth order that everybody knows
+#: and the best of order 8. Each costs a compilation for each combination of terms, on first use.
+IN_WHOLE_STEPS = ("rk4", "dop853")
 
 
 @inlined
@@ -148,6 +148,6 @@ def in_whole_steps(method: Method, rhs: Any) -> Method:
         module = import_module("fastmech.integrators.whole_multistep")  # a driver that few runs need
         whole: Method = module.adams_in_whole_steps(method, rhs)
         return whole
-    if isinstance(method, RungeKutta) and method.name in METHODS:
+    if isinstance(method, RungeKutta) and method.name in IN_WHOLE_STEPS:
         return WholeSteps(method.tableau, whole_step(rhs, method.tableau))
     return method

@@ -19,7 +19,7 @@ from fastmech.integrators.whole import BlockStep, redo
 from fastmech.jit import ADVANCE, STEP, driver_signature, inlined, kernel
 from fastmech.kernels.blocks import VECTOR_LANES
 from fastmech.kernels.far import STRETCH, Marks, mark_far
-from fastmech.kernels.whole_adams import whole_steps
+from fastmech.kernels.whole_adams import whole_adams_steps
 from fastmech.kernels.whole_steps import whole_step
 
 Advance = Callable[[float, float, int, int, Floats, int, Floats, Floats, Floats, bool], int]
@@ -209,4 +209,4 @@ class WholeAdams(Adams):
 def adams_in_whole_steps(method: Adams, rhs: Any) -> WholeAdams:
     """The same method with compiled steps for one of Lagrange's right-hand sides."""
     own = method.name, method.order, method.corrects, method.starter, method.source
-    return WholeAdams(*own, begin=whole_step(rhs, method.starter), advance=whole_steps(rhs, method))
+    return WholeAdams(*own, begin=whole_step(rhs, method.starter), advance=whole_adams_steps(rhs, method))

@@ -16,11 +16,10 @@ from fastmech.kernels.sincos import REDUCTION_LIMIT
 Floats = NDArray[np.float64]
 Marks = NDArray[np.bool_]
 
-#: Angles [rad], and turns of an angle in a step [rad], within which no stage of steady motion leaves the
-#: range of the fast trigonometry in a stretch: rows of tableaus have weights whose sizes sum to under 100. (A
-#: motion that becomes much faster in a stretch, or turns to and fro by hundreds of rad a step, could: its
-#: steps are for nothing.)
-FARTHEST, TURNED = 0.5 * REDUCTION_LIMIT, 0.004 * REDUCTION_LIMIT
+#: Angles [rad], and turns of an angle in a step [rad], within which no angle of a stretch leaves the range of
+#: the fast trigonometry: weights of tableaus' rows and of predictors have sizes that sum to under 900. (A
+#: motion that becomes much faster in a stretch could: its steps are for nothing.)
+FARTHEST, TURNED = 0.5 * REDUCTION_LIMIT, 0.0005 * REDUCTION_LIMIT
 
 #: Steps of a stretch.
 STRETCH = 8

@@ -109,7 +109,7 @@ def _sum(weights: NDArray[Any]) -> str:
     return " + ".join(f"{float(weight)!r} * f{age}" for age, weight in enumerate(weights))
 
 
-def whole_steps(rhs: Any, method: Formula) -> Any:
+def whole_adams_steps(rhs: Any, method: Formula) -> Any:
     """``advance(t, h, first, last, F, oldest, Y, p, work, checked)`` of one of Lagrange's right-hand sides.
 
     It takes a block of ``VECTOR_LANES`` lanes through the steps ``first`` to ``last`` (excluded) from the

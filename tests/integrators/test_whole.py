@@ -12,7 +12,7 @@ from kernels.blocks_of_lanes import Floats, lanes
 from fastmech.integrators.driver import observe_nothing
 from fastmech.integrators.method import RungeKutta
 from fastmech.integrators.tableaus import TABLEAUS
-from fastmech.integrators.whole import METHODS, WholeSteps, in_whole_steps
+from fastmech.integrators.whole import IN_WHOLE_STEPS, WholeSteps, in_whole_steps
 from fastmech.kernels import lagrange
 from fastmech.kernels.far import FARTHEST
 from fastmech.mechanism.coefficients import reduce
@@ -46,7 +46,7 @@ def both(name: str) -> tuple[RungeKutta, RungeKutta]:
 
 
 @pytest.mark.nojit
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("name", IN_WHOLE_STEPS)
 def test_motions_far_out_are_those_of_the_stages_and_others_do_not_notice(name: str) -> None:
     staged, whole = both(name)
     near = lanes(16)
@@ -91,7 +91,7 @@ def test_motions_that_come_and_go_across_the_limit_depend_on_nobody(direction: f
 
 
 @pytest.mark.nojit
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("name", IN_WHOLE_STEPS)
 def test_pieces_change_nothing(name: str) -> None:
     _, whole = both(name)
     np.testing.assert_allclose(through(whole, lanes(16)), through(whole, lanes(16), 5), rtol=0, atol=1e-13)

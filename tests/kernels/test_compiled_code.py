@@ -22,10 +22,10 @@ from fastmech.integrators.method import Adams
 from fastmech.integrators.methods import METHODS as REGISTRY
 from fastmech.integrators.sums import TERMS, add_stages
 from fastmech.integrators.tableaus import TABLEAUS
-from fastmech.integrators.whole import METHODS
+from fastmech.integrators.whole import IN_WHOLE_STEPS
 from fastmech.jit import FLAGS, INTEGERS, MATRIX, VECTOR
 from fastmech.kernels.blocks import DAMPING, DECAY, FORCE
-from fastmech.kernels.whole_adams import whole_steps
+from fastmech.kernels.whole_adams import whole_adams_steps
 from fastmech.kernels.whole_steps import whole_step
 from fastmech.kernels.work import lagrange_work
 from fastmech.mechanism.coefficients import reduce
@@ -40,11 +40,11 @@ pytestmark = pytest.mark.skipif(
 KERNELS = {f"{formulation}-{terms}": kernel(formulation, terms) for formulation, terms in COMBINATIONS}
 STEPS = {
     f"{method}-{terms}": whole_step(kernel("lagrange", terms), TABLEAUS[method])
-    for method in METHODS
+    for method in IN_WHOLE_STEPS
     for terms in ("free", "damped_constant", "damped_decaying")
 }
 ADVANCES = {
-    f"{method.name}-{terms}": whole_steps(kernel("lagrange", terms), method)
+    f"{method.name}-{terms}": whole_adams_steps(kernel("lagrange", terms), method)
     for method, terms in [(m, "damped_constant") for m in REGISTRY.values() if isinstance(m, Adams)]
     + [(REGISTRY["abm8"], "free"), (REGISTRY["abm8"], "damped_decaying")]
 }

@@ -11,7 +11,7 @@ from fastmech.integrators.method import Adams
 from fastmech.integrators.methods import METHODS
 from fastmech.kernels.blocks import VECTOR_LANES
 from fastmech.kernels.far import FARTHEST, STRETCH, TURNED, may_be_far
-from fastmech.kernels.whole_adams import whole_steps
+from fastmech.kernels.whole_adams import whole_adams_steps
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 
@@ -39,7 +39,7 @@ def advanced(
     room = np.concatenate([F, np.full((steps, *Y.shape), np.nan)]).ravel()
     state, work = Y.copy(), np.empty((1, Y.shape[1]))
     params = np.repeat(np.array(reduce(scene))[:, None], Y.shape[1], axis=1)
-    advance = whole_steps(kernel("lagrange", terms), method)
+    advance = whole_adams_steps(kernel("lagrange", terms), method)
     with np.errstate(all="ignore"):  # plain Python warns where compiled code is silent
         done = advance(BEGIN, H, 0, steps, room, 0, state, params, work, checked)
     return state, room.reshape(-1, *Y.shape), done
