@@ -1,4 +1,4 @@
-"""Progress on standard error: bars on a terminal, a line every so often in a log file."""
+"""Progress on standard error: bars on a terminal that can draw them, else a line every so often."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ class LogLine:
 
 
 class ProgressBars:
-    """Bars with percentage, rate and time left; without a terminal, a line every so often.
+    """Bars with percentage, rate and time left; where they cannot be drawn, a line every so often.
 
     Whenever progress is told, a command may also stop: see `fastmech.interrupts.check`.
 
@@ -127,7 +127,9 @@ class ProgressBars:
 
     def __init__(self, quiet: bool = False) -> None:
         self._quiet, self._moved, self.prepared = quiet, 0.0, 0.0
-        self._logs = not quiet and not sys.stderr.isatty()
+        console = Console(stderr=True)
+        draws = sys.stderr.isatty() and not console.is_dumb_terminal
+        self._logs = not quiet and not draws
         self._stages: list[Stage] = []
         self._progress = Progress(
             TextColumn(
@@ -137,8 +139,8 @@ class ProgressBars:
             TaskProgressColumn(),
             _Rate(Column(justify="right", min_width=10, no_wrap=True)),
             _Time(Column(min_width=12, no_wrap=True)),
-            console=Console(stderr=True),
-            disable=quiet or not sys.stderr.isatty(),
+            console=console,
+            disable=quiet or not draws,
             redirect_stdout=False,
         )
 

@@ -22,6 +22,7 @@ def use(bars: ProgressBars) -> None:
 
 def test_bars_on_a_terminal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setenv("TERM", "xterm")
     use(ProgressBars())
     shown = capsys.readouterr()
     assert shown.out == ""
@@ -56,11 +57,12 @@ def test_a_line_every_so_often_in_a_log(monkeypatch: pytest.MonkeyPatch, capsys:
     assert 2 <= len(lines) <= 8
 
 
-@pytest.mark.parametrize("terminal", [False, True])
+@pytest.mark.parametrize(("terminal", "kind"), [(False, "xterm"), (True, "xterm"), (True, "dumb")])
 def test_long_preparing_is_told(
-    terminal, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    terminal, kind, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
     monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal)
+    monkeypatch.setenv("TERM", kind)
     monkeypatch.setattr("fastmech.cli.progress.LOOK", 0.001)
     monkeypatch.setattr("fastmech.cli.progress.SILENT", 0.0)
     shown = ""
