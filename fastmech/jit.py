@@ -21,6 +21,7 @@ from numba.core import config as numba_config
 from numba.core.caching import FunctionCache
 from numba.extending import intrinsic, overload, register_jitable
 
+from fastmech.callee import CalleeType
 from fastmech.interrupts import check
 from fastmech.kernel_cache import cache_directory, sources_unchanged
 
@@ -58,14 +59,14 @@ def observer_signature(precision: Any) -> Any:
 
 
 RHS_SIGNATURE = rhs_signature(types.float64)
-RHS = types.FunctionType(RHS_SIGNATURE)
+RHS = CalleeType(RHS_SIGNATURE)
 OBSERVER_SIGNATURE = observer_signature(types.float64)
-OBSERVER = types.FunctionType(OBSERVER_SIGNATURE)
+OBSERVER = CalleeType(OBSERVER_SIGNATURE)
 
 #: ``step(t, h, Y, Z, params, work)``: a whole step of a block from ``Y`` to ``Z``, see
 #: :mod:`fastmech.kernels.whole_steps`.
 STEP_SIGNATURE = types.void(types.float64, types.float64, MATRIX, MATRIX, MATRIX, MATRIX)
-STEP = types.FunctionType(STEP_SIGNATURE)
+STEP = CalleeType(STEP_SIGNATURE)
 
 #: ``advance(t, h, first, last, F, oldest, Y, params, work, checked)``: whole steps of a block, see
 #: :mod:`fastmech.kernels.whole_adams`.
@@ -81,12 +82,12 @@ ADVANCE_SIGNATURE = types.int64(
     MATRIX,
     types.boolean,
 )
-ADVANCE = types.FunctionType(ADVANCE_SIGNATURE)
+ADVANCE = CalleeType(ADVANCE_SIGNATURE)
 
 #: ``jacobian(t, Y, J, params)``: row ``r * dim + c`` of ``J`` (dim * dim, lanes) is the derivative of the
 #: rate of state ``r`` by state ``c``.
 JACOBIAN_SIGNATURE = types.void(types.float64, MATRIX, MATRIX, MATRIX)
-JACOBIAN = types.FunctionType(JACOBIAN_SIGNATURE)
+JACOBIAN = CalleeType(JACOBIAN_SIGNATURE)
 
 
 def driver_signature(precision: Any, *method: Any) -> Any:
@@ -95,8 +96,8 @@ def driver_signature(precision: Any, *method: Any) -> Any:
     The last seven are the fields of :class:`fastmech.integrators.batch.Batch`.
     """
     return types.void(
-        types.FunctionType(rhs_signature(precision)),
-        types.FunctionType(observer_signature(precision)),
+        CalleeType(rhs_signature(precision)),
+        CalleeType(observer_signature(precision)),
         *method,
         VECTOR,
         INTEGERS,

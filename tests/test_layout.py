@@ -20,6 +20,7 @@ LAYERS = (
     "interrupts",
     "kernel_cache",
     "generated",
+    "callee",
     "jit",
     "scene",
     "mechanism",

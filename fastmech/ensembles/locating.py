@@ -16,6 +16,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
+from fastmech.callee import callee
 from fastmech.ensembles.failing import Resumption
 from fastmech.ensembles.run import Observation
 from fastmech.ensembles.spans import Span
@@ -181,19 +182,18 @@ def locate_stops(
         found = located[first : first + TOGETHER]
         begin, states = _step_begins(rhs, method, before, span, part, found[:, STOP_TIME])
         own = np.ascontiguousarray(before.params(part))
+        called = callee(rhs), callee(observation.observe)
         search = (begin, states, own, observation.params, observation.record, found)
         if isinstance(method, ImplicitRungeKutta):
             p = method.tableau.prepared
             halve_implicit_steps(
-                rhs, observation.observe, p.a, p.nodes, p.final, p.back, p.forth, p.eigenvalues,
+                *called, p.a, p.nodes, p.final, p.back, p.forth, p.eigenvalues,
                 p.extrapolation, p.remainder, method.carried, *search,
             )  # fmt: skip
         else:
             one_step: Any = method
             packed = (method.starter if isinstance(method, Adams) else one_step.tableau).packed
-            halve_steps(
-                rhs, observation.observe, packed.start, packed.stage, packed.weight, packed.nodes, *search
-            )
+            halve_steps(*called, packed.start, packed.stage, packed.weight, packed.nodes, *search)
     return located
 
 

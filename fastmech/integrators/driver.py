@@ -1,6 +1,7 @@
 """What every driver is given besides a method's own numbers: a right-hand side and an observer.
 
-They come as first-class functions, one indirect call a stage, or step, and block; a tableau comes as arrays.
+They come as :class:`fastmech.callee.Callee`, one indirect call a stage, or step, and block; a tableau comes
+as arrays.
 """
 
 from __future__ import annotations

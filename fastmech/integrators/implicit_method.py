@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fastmech.callee import callee
 from fastmech.integrators.batch import Batch, Floats
 from fastmech.integrators.implicit_tableau import ImplicitTableau
 from fastmech.integrators.method import Method, OneStep
@@ -56,9 +57,9 @@ class ImplicitRungeKutta(OneStep):
         for block in range(blocks):
             batch.phase[:] = phase
             drive(
-                rhs,
-                rhs if self.jacobian is None else self.jacobian,
-                observe,
+                callee(rhs),
+                callee(rhs if self.jacobian is None else self.jacobian),
+                callee(observe),
                 kind,
                 prepared.a,
                 prepared.nodes,

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.callee import callee
 from fastmech.integrators.batch import Batch, Floats
 from fastmech.integrators.multistep_weights import bashforth, moulton
 from fastmech.integrators.tableau import Tableau
@@ -123,8 +124,8 @@ class RungeKutta(OneStep):
         """Take a batch through its times."""
         packed = self.tableau.packed
         _driver("explicit", "integrate_blocks", batch)(
-            rhs,
-            observe,
+            callee(rhs),
+            callee(observe),
             packed.start,
             packed.stage,
             packed.weight,
@@ -193,8 +194,8 @@ class Adams(AnyWidth):
         """Take a batch through its times."""
         packed = self.starter.packed
         _driver("multistep", "integrate_multistep_blocks", batch)(
-            rhs,
-            observe,
+            callee(rhs),
+            callee(observe),
             packed.start,
             packed.stage,
             packed.weight,

@@ -11,6 +11,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
+from fastmech.callee import callee
 from fastmech.integrators.batch import Batch
 from fastmech.integrators.driver import TABLEAU, BlockRHS, Observer
 from fastmech.integrators.method import Adams, Method, RungeKutta
@@ -123,9 +124,9 @@ class WholeSteps(RungeKutta):
         """Take a batch through its times."""
         packed = self.tableau.packed
         integrate_whole_steps(
-            rhs,
-            observe,
-            self.step,
+            callee(rhs),
+            callee(observe),
+            callee(self.step),
             packed.start,
             packed.stage,
             packed.weight,

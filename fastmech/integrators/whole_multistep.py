@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
+from fastmech.callee import callee
 from fastmech.integrators.batch import ROUNDED_TIME, Batch
 from fastmech.integrators.driver import BlockRHS, Floats, Integers, Observer
 from fastmech.integrators.method import Adams
@@ -183,10 +184,10 @@ class WholeAdams(Adams):
             raise ValueError(f"blocks of {batch.Y.shape[2]} lanes: must be {self.lanes} wide")
         packed = self.starter.packed
         integrate_whole_multistep(
-            rhs,
-            observe,
-            self.begin,
-            self.advance,
+            callee(rhs),
+            callee(observe),
+            callee(self.begin),
+            callee(self.advance),
             packed.start,
             packed.stage,
             packed.weight,

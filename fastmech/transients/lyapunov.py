@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.callee import callee
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import FAILURES
 from fastmech.ensembles.plausible import judge
@@ -109,8 +110,8 @@ def largest_lyapunov(
     analytic = problem.jacobian is not None
     for piece in range(PIECES):
         advance_tangents(
-            problem.rhs,
-            problem.jacobian if analytic else problem.rhs,
+            callee(problem.rhs),
+            callee(problem.jacobian if analytic else problem.rhs),
             int(analytic),
             TABLEAU.matrix,
             np.array(TABLEAU.b),
