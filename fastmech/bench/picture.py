@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
 LARGEST, SMALLEST = 3e-2, 3e-15
 
 GREY = "0.35"
+
+#: Names of methods on the curve keep this ratio of errors between them.
+APART = 20.0
 
 #: Curves: what the family's name begins with, its label, marker; in the order of the colours.
 CURVES = (
@@ -66,6 +70,19 @@ def _draw(axes: Axes, rows: list[Row]) -> None:
             errors, rates = [row.max_error() for row in best], [row.rate for row in best]
             width = 2.4 if prefix == "fastmech" else 1.4
             axes.plot(errors, rates, marker=marker, color=color, linewidth=width, label=label)
+            if prefix == "fastmech":
+                _name_methods(axes, best, color)
+
+
+def _name_methods(axes: Axes, best: list[Row], color: str) -> None:
+    """Names above the curve, where the settings of a method begin that lie together on it."""
+    last, named = 0.0, ""
+    for name, rows in groupby(best, key=lambda row: row.family.split()[1].rstrip(",")):
+        row = list(rows)[-1]
+        if name != named and row.max_error() > last * APART:
+            last, named = row.max_error(), name
+            at = (last, row.rate)
+            axes.annotate(name, at, (2, 7), textcoords="offset points", color=color, size=9)
 
 
 def _shown(rows: Iterable[Row]) -> list[Row]:
