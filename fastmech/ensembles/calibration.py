@@ -173,9 +173,9 @@ class _Trial(Sample):
 
     def guess_blindly(self) -> float:
         """The time [s] in which a user's system would move as far as its starts are from zero, or less."""
-        t_end, p = float(self.outputs[-1]), np.atleast_2d(self.problem.params)
+        t_end = float(self.outputs[-1])
         Y = self.starts.T.copy()
-        own = np.broadcast_to(p, (Y.shape[1], p.shape[1])).T.copy()
+        own = self.problem.params.rows(np.arange(Y.shape[1])).T.copy()
         rates = np.zeros_like(Y)
         self.problem.rhs(0.0, Y, rates, own)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastmech.ensembles import checks
 from fastmech.ensembles.fitting import vibration_frequency
+from fastmech.ensembles.parameters import Parameters
 from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.ensembles.stiffness import damping_rate
 from fastmech.ensembles.system import System
@@ -35,7 +36,7 @@ class Problem:
     """A right-hand side with the parameters of n trajectories."""
 
     rhs: Any
-    params: Floats  #: shape (count,) or (n, count)
+    params: Parameters
     observation: Observation = NOTHING
     coefficients: Coefficients | None = None  #: of a scene: numbers, or one a trajectory
     canonical: bool = False  #: momenta are integrated in place of rates
@@ -63,13 +64,13 @@ class Problem:
 
     def part(self, members: NDArray[np.int64]) -> Problem:
         """The same for some of the trajectories."""
-        if self.params.ndim == 1:
+        if self.params.shared:
             return self
         own: Any = self.coefficients
         if own is not None:
             values: Any = (np.asarray(c)[members] for c in own)
             own = Coefficients(*values)
-        return replace(self, params=self.params[members], coefficients=own)
+        return replace(self, params=self.params.part(members), coefficients=own)
 
 
 def scene_problem(scene: Scene, n: int, parameters: Mapping[str, ArrayLike], formulation: str) -> Problem:
@@ -84,11 +85,11 @@ def scene_problem(scene: Scene, n: int, parameters: Mapping[str, ArrayLike], for
             scene.replace(**{name: float(extreme)})
     scenes: Any = SimpleNamespace(**(scene.model_dump() | own))
     coefficients: Any = reduce(scenes)
+    params = Parameters(tuple(np.asarray(c, dtype=np.float64) for c in coefficients))
+    rhs = right_hand_side(coefficients, formulation)
     if own:
         values: Any = (np.broadcast_to(value, n) for value in coefficients)
         coefficients = Coefficients(*values)
-    params = np.stack([np.asarray(c, dtype=np.float64) for c in coefficients], axis=-1)
-    rhs = right_hand_side(coefficients, formulation)
     return Problem(rhs, params, coefficients=coefficients, canonical=formulation == "hamilton")
 
 
@@ -118,9 +119,8 @@ def system_problem(system: System, n: int, parameters: Mapping[str, ArrayLike]) 
         InputError: an unknown parameter or wrong values.
     """
     own = own_values(parameters, system.parameters, n)
-    columns = [np.broadcast_to(own.get(k, v), n if own else ()) for k, v in system.parameters.items()]
-    params = np.stack(columns, axis=-1).astype(np.float64) if columns else np.zeros(0)
-    return Problem(system.kernel, params, system.observation)
+    columns = (np.asarray(own.get(k, v), dtype=np.float64) for k, v in system.parameters.items())
+    return Problem(system.kernel, Parameters(tuple(columns)), system.observation)
 
 
 def own_values(parameters: Mapping[str, ArrayLike], known: Mapping[str, float], n: int) -> dict[str, Floats]:

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastmech.ensembles.failing import Resumption, last_finite_observer
 from fastmech.ensembles.lanes import Lanes, finite_rows, rows_at
+from fastmech.ensembles.parameters import Parameters
 from fastmech.ensembles.spans import Span
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
@@ -91,7 +92,7 @@ class Ensemble:
 
 def run_ensemble(
     rhs: Any,
-    params: ArrayLike,
+    params: ArrayLike | Parameters,
     starts: ArrayLike,
     times: ArrayLike,
     dt: float | Floats,
@@ -115,8 +116,7 @@ def run_ensemble(
     """
     begin = np.asarray(starts, dtype=np.float64)
     clock = np.asarray(times, dtype=np.float64)
-    own = np.asarray(params, dtype=np.float64)
-    own = np.broadcast_to(own, (len(begin), own.shape[-1]))
+    own = Parameters.of(params)
     workers = thread_count(threads)
     cost = max(STEP_EVALUATIONS, method.evaluations(CALL_STEPS) / CALL_STEPS)
     ensemble = Ensemble(
@@ -131,7 +131,7 @@ def run_ensemble(
     if precision is np.float32:
         rhs, observe = in_single(rhs), import_module("fastmech.integrators.single").observe_nothing
         with np.errstate(over="ignore"):  # what is too large is set aside
-            begin, own = begin.astype(precision), own.astype(precision)
+            begin = begin.astype(precision)
         last_finite_observer(precision)  # compiled here, not in a thread
     else:
         method = in_whole_steps(method, rhs)
@@ -147,7 +147,7 @@ def run_ensemble(
 
     def run_task(task: Task) -> int:
         members, piece, passed = task.members, 0, 0
-        states, params = rows_at(begin, members), rows_at(own, members)
+        states, params = rows_at(begin, members), own.rows(members, precision)
         lanes = Lanes(members, states, params, observation.record, block_lanes, method.carried)
         while piece < task.way.steps.size and lanes.members.size and not interrupted.is_set():
             check()

@@ -1,0 +1,51 @@
+"""Parameters of the trajectories of an ensemble, of which most are shared by all."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastmech.ensembles.lanes import rows_at
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Columns of parameters, each a number that all trajectories share, or one of each.
+
+    Rows are made for those who run: all of ten million trajectories would take 640 MB.
+    """
+
+    columns: tuple[Floats, ...]  #: each of shape () or (n,)
+
+    @classmethod
+    def of(cls, values: ArrayLike | Parameters) -> Parameters:
+        """From those of all (count,) or of each (n, count)."""
+        if isinstance(values, Parameters):
+            return values
+        given = np.asarray(values, dtype=np.float64)
+        return cls(tuple(np.asarray(column) for column in given.T))
+
+    @property
+    def shared(self) -> bool:
+        """Whether all trajectories have the same ones."""
+        return not any(column.ndim for column in self.columns)
+
+    def rows(self, members: NDArray[np.int64], precision: Any = np.float64) -> Floats:
+        """Those of trajectories whose indices rise, shape (members, count); all rows are one if shared."""
+        with np.errstate(over="ignore"):  # trajectories of which one is too large for float32 have a status
+            if self.shared:
+                row = np.array(self.columns, dtype=precision)
+                return np.broadcast_to(row, (members.size, row.size))
+            rows = np.empty((members.size, len(self.columns)), dtype=precision)
+            for k, column in enumerate(self.columns):
+                rows[:, k] = rows_at(column[:, None], members)[:, 0] if column.ndim else column
+        return rows
+
+    def part(self, members: NDArray[np.int64]) -> Parameters:
+        """Those of some trajectories."""
+        return Parameters(tuple(column[members] if column.ndim else column for column in self.columns))
