@@ -175,9 +175,8 @@ class _Trial(Sample):
         """The time [s] in which a user's system would move as far as its starts are from zero, or less."""
         t_end = float(self.outputs[-1])
         Y = self.starts.T.copy()
-        own = self.problem.params.rows(np.arange(Y.shape[1])).T.copy()
         rates = np.zeros_like(Y)
-        self.problem.rhs(0.0, Y, rates, own)
+        self.problem.rhs(0.0, Y, rates, self.problem.params.block(Y.shape[1]))
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             times = np.abs(Y).max(axis=0) / np.abs(rates).max(axis=0)
         times = times[np.isfinite(times) & (times > 0.0)]

@@ -28,10 +28,8 @@ def finite_rows(values: Floats) -> NDArray[np.bool_]:
 def rows_at(values: Floats, which: NDArray[np.int64]) -> Floats:
     """Rows of an array (n, count), rising, of which only the last may be there more than once.
 
-    No copies where all rows are one (:func:`numpy.broadcast_to`), or where they lie together.
+    No copies where they lie together.
     """
-    if values.strides[0] == 0:
-        return np.broadcast_to(values[:1], (which.size, values.shape[1]))
     if lie_together(which):
         return values[which[0] : which[-1] + 1]
     return values.take(which, axis=0)  # an index in brackets takes five times as long
@@ -46,7 +44,7 @@ def _on_lines(shape: tuple[int, ...], precision: Any, allocate: Any = np.empty) 
     """An array in C order whose rows begin on lines of the cache: no vector lies on two."""
     size = math.prod(shape) * np.dtype(precision).itemsize
     memory = allocate(size + CACHE_LINE, dtype=np.uint8)
-    first = -memory.ctypes.data % CACHE_LINE
+    first = -memory.__array_interface__["data"][0] % CACHE_LINE
     lines: Floats = memory[first : first + size].view(precision).reshape(shape)
     return lines
 
@@ -68,16 +66,16 @@ class Lanes:
         block_lanes: int,
         carried: int | Floats,
     ) -> None:
-        """From states (n, dim) and parameters (n, count) of the members, and their records.
+        """From states (n, dim) of the members, their parameters and their records.
 
-        ``record`` is the empty one (rows,) of all, or those of each (n, rows).
-        ``carried`` is how many states their method carries of each, or what it carries (n, carried * dim).
+        ``params`` are those of all (count,), or of each (n, count); ``record`` is the empty one (rows,) of
+        all, or those of each (n, rows). ``carried`` is how many states their method carries of each, or what
+        it carries (n, carried * dim).
         """
         self.block_lanes = block_lanes
         self.members = members
         self.phase = np.zeros(PHASE)
-        each = np.broadcast_to(record, (members.size, record.shape[-1]))
-        self._arrange(states, params, each)
+        self._arrange(states, params, record)
         if isinstance(carried, int):
             blocks, dim, width = self.Y.shape
             self.memory = _on_lines((blocks, carried * dim, width), states.dtype, np.zeros)
@@ -91,11 +89,14 @@ class Lanes:
         self.Y, self.params, self.record = map(self._blocked, (states, params, record))
 
     def _blocked(self, values: Floats) -> Floats:
-        """Values (n, rows) as blocks (blocks, rows, lanes)."""
-        n, rows = values.shape
+        """Values of all (rows,), or of each (n, rows), as blocks (blocks, rows, lanes)."""
+        n, rows = self.members.size, values.shape[-1]
         blocks = -(-n // self._width)
-        lanes = np.minimum(np.arange(blocks * self._width), n - 1)
         blocked = _on_lines((blocks, rows, self._width), values.dtype)
+        if values.ndim == 1:
+            blocked[...] = values[:, None]
+            return blocked
+        lanes = np.minimum(np.arange(blocks * self._width), n - 1)
         blocked[...] = rows_at(values, lanes).reshape(blocks, self._width, rows).transpose(0, 2, 1)
         return blocked
 

@@ -35,15 +35,21 @@ class Parameters:
         """Whether all trajectories have the same ones."""
         return not any(column.ndim for column in self.columns)
 
-    def rows(self, members: NDArray[np.int64], precision: Any = np.float64) -> Floats:
-        """Those of trajectories whose indices rise, shape (members, count); all rows are one if shared."""
+    def at(self, members: NDArray[np.int64], precision: Any = np.float64) -> Floats:
+        """Those of trajectories whose indices rise, shape (members, count), or of all (count,)."""
         with np.errstate(over="ignore"):  # trajectories of which one is too large for float32 have a status
             if self.shared:
-                row = np.array(self.columns, dtype=precision)
-                return np.broadcast_to(row, (members.size, row.size))
+                return np.array(self.columns, dtype=precision)
             rows = np.empty((members.size, len(self.columns)), dtype=precision)
             for k, column in enumerate(self.columns):
                 rows[:, k] = rows_at(column[:, None], members)[:, 0] if column.ndim else column
+        return rows
+
+    def block(self, n: int) -> Floats:
+        """Those of n trajectories, which are all, as kernels are given them: shape (count, n)."""
+        rows = np.empty((len(self.columns), n))
+        for row, column in zip(rows, self.columns, strict=True):
+            row[:] = column
         return rows
 
     def part(self, members: NDArray[np.int64]) -> Parameters:

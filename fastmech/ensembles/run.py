@@ -147,7 +147,7 @@ def run_ensemble(
 
     def run_task(task: Task) -> int:
         members, piece, passed = task.members, 0, 0
-        states, params = rows_at(begin, members), own.rows(members, precision)
+        states, params = rows_at(begin, members), own.at(members, precision)
         lanes = Lanes(members, states, params, observation.record, block_lanes, method.carried)
         while piece < task.way.steps.size and lanes.members.size and not interrupted.is_set():
             check()

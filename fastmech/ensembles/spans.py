@@ -49,10 +49,6 @@ class Way:
     def _steps_before(self) -> NDArray[np.int64]:
         return np.concatenate([[0], np.cumsum(self.steps)])
 
-    @cached_property
-    def _passed(self) -> NDArray[np.int64]:
-        return np.cumsum(self.outputs >= 0)
-
     def span(self, first: int, most: int) -> Span:
         """What a call passes from piece ``first`` on: one piece, or more while steps are at most ``most``."""
         before = self._steps_before
@@ -61,7 +57,7 @@ class Way:
             self.times[first : end + 1],
             self.steps[first:end],
             self.outputs[first:end],
-            int(self._passed[end - 1]),
+            int(self.outputs[:end].max()) + 1,
         )
 
 
@@ -71,11 +67,12 @@ def output_steps(times: Floats, dt: float) -> NDArray[np.int64]:
     Raises:
         InputError: the step is not positive, the times do not rise, or there would be too many steps.
     """
-    if not dt > 0.0 or not (np.diff(times) >= 0.0).all():
+    intervals = times[1:] - times[:-1]
+    if not dt > 0.0 or not (intervals >= 0.0).all():
         raise InputError(f"dt = {dt:g} s: must be greater than 0, and the times must rise")
     # A quotient that is an integer but for rounding must not cost a step more.
     with np.errstate(over="ignore"):  # an infinite number is refused below
-        steps = np.ceil(np.diff(times) / dt * (1.0 - 1e-12))
+        steps = np.ceil(intervals / dt * (1.0 - 1e-12))
         number = steps.sum()
     if not number <= MOST_STEPS:
         raise InputError(f"dt = {dt:g} s: gives {number:.3g} steps, at most {MOST_STEPS:.0e} are possible")
@@ -89,7 +86,7 @@ def way(times: Floats, dt: float) -> Way:
         InputError: as :func:`output_steps`.
     """
     totals = output_steps(times, dt)
-    lengths = np.clip(-(-totals // PIECES), PIECE_STEPS, MOST_PIECE_STEPS)
+    lengths = np.minimum(np.maximum(-(-totals // PIECES), PIECE_STEPS), MOST_PIECE_STEPS)
     pieces = np.maximum(1, -(-totals // lengths))
     output = np.repeat(np.arange(totals.size), pieces)
     number = np.arange(output.size) - np.repeat(np.cumsum(pieces) - pieces, pieces)
@@ -97,4 +94,4 @@ def way(times: Floats, dt: float) -> Way:
     end = np.minimum(begin + lengths[output], total)
     start, stop, last = times[output], times[output + 1], end == total
     at = np.where(last, stop, start + (stop - start) * (end / np.maximum(total, 1)))
-    return Way(np.append(times[:1], at), end - begin, np.where(last, output, -1))
+    return Way(np.concatenate([times[:1], at]), end - begin, np.where(last, output, -1))

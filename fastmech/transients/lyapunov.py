@@ -95,7 +95,7 @@ def largest_lyapunov(
     else:
         raise InputError(f"scene = {scene!r}: must be a Scene or a System")
     Y = np.array(starts.T, order="C")
-    params = np.array(problem.params.rows(np.arange(len(starts))).T, order="C")
+    params = problem.params.block(len(starts))
     # A fixed direction with no special zeros: it turns to the fastest growing one within a few periods.
     D = np.repeat(1.0 / np.sqrt(np.arange(2.0, 2.0 + len(Y)))[:, None], Y.shape[1], axis=1)
     D /= np.linalg.norm(D, axis=0)
