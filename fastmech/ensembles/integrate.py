@@ -21,6 +21,7 @@ from fastmech.ensembles.solve import Precision, Settings, Solution, solve
 from fastmech.ensembles.status import Status, failure_counts, failure_line
 from fastmech.ensembles.stopping import STOP_TIME
 from fastmech.ensembles.system import System, stop_codes
+from fastmech.ensembles.threads import in_parts
 from fastmech.ensembles.tolerance import solve_to_tolerance
 from fastmech.errors import InputError
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
@@ -174,7 +175,7 @@ def integrate(
     solution = solve(problem, starts, outputs, settings, threads, progress)
     taken = StepsTaken(solution.dt[0], solution.dt.max(axis=0), solution.steps, until)
     ends = solution.y[-1] if solution.last is None else solution.last
-    beyond = steps.beyond(ends, taken)
+    beyond = steps.beyond(ends, taken, lambda work, n, part: in_parts(work, n, threads, part))
     solution.status[beyond & (solution.status == Status.OK)] = Status.STEP_TOO_LARGE
     return _trajectories(problem, outputs, solution, settings)
 

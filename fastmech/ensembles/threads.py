@@ -15,7 +15,7 @@ from fastmech.interrupts import check
 
 T = TypeVar("T")
 
-#: Trajectories of a part: to start a thread takes as long as a pass over many thousands of them.
+#: Trajectories of a part where one takes a few nanoseconds: to start a thread takes as long as thousands.
 PART = 2**15
 
 
@@ -46,8 +46,8 @@ def in_threads(
             raise
 
 
-def in_parts(work: Callable[[slice], None], n: int, threads: int | None) -> None:
-    """Do a work of a few nanoseconds a trajectory on all parts of ``n`` trajectories, which share nothing.
+def in_parts(work: Callable[[slice], None], n: int, threads: int | None, size: int = PART) -> None:
+    """Do a work on all of ``n`` trajectories, which share nothing, in parts of so many.
 
     Raises:
         InputError: not a number of threads.
@@ -55,9 +55,9 @@ def in_parts(work: Callable[[slice], None], n: int, threads: int | None) -> None
 
     def part(first: int) -> int:
         with np.errstate(invalid="ignore", over="ignore"):  # what is not finite has a status of its own
-            work(slice(first, min(first + PART, n)))
+            work(slice(first, min(first + size, n)))
         return 1
 
-    firsts = list(range(0, n, PART))
+    firsts = list(range(0, n, size))
     for _ in in_threads(part, firsts, min(thread_count(threads), len(firsts)), threading.Event()):
         check()

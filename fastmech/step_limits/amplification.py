@@ -9,17 +9,17 @@ from __future__ import annotations
 
 from fractions import Fraction
 from functools import cache
+from importlib import import_module
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Adams, Method, RungeKutta
+from fastmech.step_limits.circle import history_weight
 
 Floats = NDArray[np.float64]
-
-#: Newton iterations to a root that is near, and the last one's relative size.
-NEWTON, CONVERGED = 10, 1e-10
 
 
 def stability_polynomial(method: RungeKutta) -> Floats:
@@ -58,33 +58,29 @@ def stability_function(method: Method, z: ArrayLike) -> NDArray[np.complex128]:
 
 def history_row(method: Adams, z: ArrayLike) -> NDArray[np.complex128]:
     """Weights (..., k) of the history (y_n, y_(n-1), ...) of y' = lambda y in the next y."""
-    points = np.asarray(z, dtype=np.complex128)[..., None]
-    corrector = method.corrector
-    row = points * method.predictor
-    row[..., 0] += 1.0
-    if method.corrects:
-        row = points * corrector[0] * row + points * corrector[1:]
-        row[..., 0] += 1.0
-    return row
+    points = np.asarray(z, dtype=np.complex128)
+    ages = range(method.predictor.size)
+    return np.stack(
+        [history_weight(points, age, method.predictor, method.corrector) for age in ages], axis=-1
+    )
 
 
 def principal_root(method: Adams, z: ArrayLike) -> NDArray[np.complex128]:
     """The root for exp(z), of the shape of ``z``, by Newton's method from there; NaN: none is near."""
     points = np.asarray(z, dtype=np.complex128)
-    row = history_row(method, points)
-    descending = np.moveaxis(np.concatenate([np.ones((*row.shape[:-1], 1)), -row], axis=-1), -1, 0)
-    rising, degree = descending[::-1], descending.shape[0] - 1
-    slope = rising[1:] * np.arange(1.0, degree + 1.0).reshape(-1, *(1,) * points.ndim)
-    root = np.exp(points)
-    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        for _ in range(NEWTON):
-            move = _values(rising, root) / _values(slope, root)
-            root = root - move
-        return np.where(np.abs(move) < CONVERGED * np.abs(root), root, np.nan)
+    found = np.empty((2, points.size))
+    _many_roots().find_roots(*_parts(points), method.predictor, method.corrector, *found)
+    return (found[0] + 1j * found[1]).reshape(points.shape)
 
 
-def _values(rising: NDArray[np.complex128], at: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    return np.asarray(np.polynomial.polynomial.polyval(at, rising, tensor=False))
+def _many_roots() -> Any:
+    """Kernels that Runge-Kutta methods do not need."""
+    return import_module("fastmech.step_limits.many_roots")
+
+
+def _parts(points: NDArray[np.complex128]) -> tuple[Floats, Floats]:
+    """Real and imaginary parts, each in a row."""
+    return points.real.flatten(), points.imag.flatten()
 
 
 def companion(method: Adams, z: ArrayLike) -> NDArray[np.complex128]:
@@ -106,26 +102,12 @@ def amplification(method: Method, z: ArrayLike) -> Floats:
 def amplifies(method: Method, z: ArrayLike, factor: ArrayLike) -> NDArray[np.bool_]:
     """Whether a step multiplies small motions by more than ``factor`` > 0: quicker to tell than by how much.
 
-    For an Adams method whether a root of the characteristic polynomial lies outside the circle of that
-    radius, by Schur's recursion (Henrici, *Applied and Computational Complex Analysis I*, section 6.8): the
-    polynomial has all roots inside the unit circle if its last coefficient is smaller than its first, and the
-    polynomial of one degree less that eliminates the last has them too.
+    For an Adams method whether a root of the characteristic polynomial lies outside a circle of that radius.
     """
     if not isinstance(method, Adams):
         return np.asarray(~(np.abs(stability_function(method, z)) <= factor))  # too large for a number, too
-    row = np.moveaxis(history_row(method, z), -1, 0)  # coefficients first: arrays of many points are quicker
-    degree, points = len(row), row.shape[1:]
-    scale = 1.0 / np.asarray(factor, dtype=np.float64)
-    coefficients = np.empty((degree, *points), dtype=np.complex128)  # all but the first, which is 1
-    shrunk = -np.ones_like(scale)
-    for age in range(degree):
-        shrunk = shrunk * scale
-        coefficients[age] = row[age] * shrunk
-    outside = np.zeros(points, dtype=np.bool_)
-    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):  # of those already found outside
-        for _ in range(degree):
-            last, rest = coefficients[-1], coefficients[:-1]
-            size = last.real * last.real + last.imag * last.imag
-            outside |= ~(size < 1.0)
-            coefficients = (rest - last * rest[::-1].conj()) * (1.0 / (1.0 - size))
-    return outside
+    points = np.asarray(z, dtype=np.complex128)
+    radius = np.array(np.broadcast_to(factor, points.shape), dtype=np.float64).ravel()
+    outside = np.empty(points.size, dtype=np.bool_)
+    _many_roots().tell_outside(*_parts(points), radius, method.predictor, method.corrector, outside)
+    return outside.reshape(points.shape)

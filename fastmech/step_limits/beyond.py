@@ -1,7 +1,7 @@
 """Which trajectories of a run have steps that cannot be right for them, one by one, and the warning of it.
 
 A step is too long for small motion where motion that should die out grows by more than 1 %
-(:data:`fastmech.step_limits.warning.PASSING`) over the steps taken *there*: amplification^steps > 1.01. A
+(:data:`fastmech.step_limits.limits.PASSING`) over the steps taken *there*: amplification^steps > 1.01. A
 motion that only crosses a configuration takes few steps there, at least one; one that rests takes all steps
 of the run. Growth below that does not show: a method's region may end by 1e-9 a step short of the axis, and
 thousands of such steps are still right to many digits.
@@ -17,7 +17,7 @@ trajectory is judged by its own parameters, step and states: its companions make
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from types import SimpleNamespace
@@ -27,45 +27,39 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
-from fastmech.integrators.method import Adams, Method
+from fastmech.integrators.method import Adams
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.scene import Scene
 from fastmech.step_limits.amplification import amplification, amplifies
-from fastmech.step_limits.growth import (
-    CERTAIN,
-    MOST_STEPS,
-    SPURIOUS,
-    Growth,
-    bounded,
-    growing,
-    steps_there,
-    stiffest_growing,
-)
+from fastmech.step_limits.growth import MOST_STEPS, counted, mark_growing, stiffest_growing
 from fastmech.step_limits.impulse import impulse_limit
-from fastmech.step_limits.local import eigenvalues, local_motion, state_matrices
+from fastmech.step_limits.limits import ALLOWED, CERTAIN, INNOCENT, PASSING, ROUNDED, SPURIOUS, steps_there
+from fastmech.step_limits.local import eigenvalues, local_motion, part, state_matrices
 from fastmech.step_limits.predict import GROWTH_PER_RADIAN, UNDAMPED, is_stable, stable_step
 from fastmech.step_limits.region import region, rows_of, sectors_of
-from fastmech.step_limits.warning import (
-    GROWS,
-    KEPT,
-    PASSING,
-    TURN,
-    Limit,
-    scene_eigenvalues,
-    warn_of_step,
-)
+from fastmech.step_limits.warning import GROWS, KEPT, TURN, Limit, scene_eigenvalues, warn_of_step
 
 Floats = NDArray[np.float64]
 
 #: Divisions of :func:`fastmech.step_limits.crossing.first_crossing` for a limit that is told to two digits.
 TOLD = 3
 
-#: By how much rounding may make a step longer than the dt that it was to be.
-ROUNDED = 1e-6
-
 #: Eigenvalues between the grid's configurations may be larger than those at them by this factor.
 BETWEEN = 1.15
+
+
+#: Trajectories of a part where some are looked at closely, and where they are far from a limit.
+CLOSE_PART, FAR_PART = 2**12, 2**15
+
+#: Does a work on all of so many trajectories, which share nothing, in parts of so many.
+Share = Callable[[Callable[[slice], None], int, int], None]
+
+
+def alone(work: Callable[[slice], None], n: int, part: int) -> None:
+    """All trajectories as one part, in this thread."""
+    with np.errstate(invalid="ignore", over="ignore"):  # what is not finite has a status of its own
+        work(slice(0, n))
 
 
 @dataclass(frozen=True)
@@ -125,8 +119,10 @@ class StepJudge:
     def __init__(self, scene: Scene, own: Mapping[str, Floats], starts: Floats, method: str) -> None:
         self._scene, self._own, self._starts = scene, own, starts
         self._method = find_method(method)
-        self._coefficients = _coefficients(scene, own, len(starts))
-        self._known: tuple[float, Growth] | None = None  # what starts do in steps [s] up to the first
+        self._coefficients = _coefficients(scene, own)
+        self._still: tuple[float, float] | None = (
+            None  # step [s] and number that leave starts far from growth
+        )
 
     def warn(self, extremes: Sequence[Scene], dt: float, steps: float, stacklevel: int = 2) -> None:
         """Warn, in the caller's caller, of a step [s] that is too long for one of many trajectories.
@@ -141,13 +137,11 @@ class StepJudge:
             steps: how many of them make the run.
             stacklevel: of the warning, 1 for the caller of this function.
         """
-        n, method, c = len(self._starts), self._method, self._coefficients
-        each, number = np.broadcast_to(dt, n), np.broadcast_to(steps, n)
+        method, c = self._method, self._coefficients
         asked: set[int] = set()
         if not self._is_quiet(dt, steps):  # else there is one scene, which is looked at in any case
-            known = bounded(method, c, self._starts, each, number)
-            self._known = dt, known
-            stiffest = stiffest_growing(method, c, self._starts, each, number, known)
+            stiffest, still = stiffest_growing(method, c, self._starts, dt, steps)
+            self._still = ((1.0 + ROUNDED) * dt, float(np.ceil(steps))) if still else None
             asked |= set() if stiffest is None else {stiffest}
             fading: Any = np.where(c.force != 0.0, c.decay, 0.0)
             asked |= {int(np.argmax(fading))} if fading.any() else set()
@@ -156,10 +150,10 @@ class StepJudge:
         for k in asked:
             scene = self._scene.replace(**{name: float(values[k]) for name, values in self._own.items()})
             scenes[scene] = None
-            others += _own_limit(method, scene, self._starts[k], dt, steps)
+            others += _own_limit(method.name, scene, tuple(self._starts[k].tolist()), dt, steps)
         warn_of_step(list(scenes), dt, method.name, self._starts, stacklevel + 1, others)
 
-    def beyond(self, ends: Floats | None, taken: StepsTaken) -> NDArray[np.bool_]:
+    def beyond(self, ends: Floats | None, taken: StepsTaken, share: Share = alone) -> NDArray[np.bool_]:
         """Which trajectories (n,) have a step beyond a limit: of stability, the impulse, the angle turned.
 
         Args:
@@ -167,30 +161,36 @@ class StepJudge:
                 a motion never is does it no harm: it must be so at the start, under the force's full
                 strength, or where the motion has come to, under what is left of it.
             taken: the steps.
+            share: does the work, in threads if need be.
         """
         method, c, starts = self._method, self._coefficients, self._starts
         beyond = _turns_too_far(starts[:, 2:], taken.first)
         if np.any(c.decay):
             beyond |= (c.force != 0.0) & (taken.first * c.decay > impulse_limit(method))
-        longest, known = taken.longest.max(initial=0.0), None
-        if self._is_quiet(longest, taken.number.max(initial=0)):
+        longest, most = taken.longest.max(initial=0.0), taken.number.max(initial=0)
+        if self._is_quiet(longest, most):
             return beyond
-        if self._known is not None and longest <= (1.0 + ROUNDED) * self._known[0]:
-            known = self._known[1]
-        beyond |= growing(method, c, starts, taken.longest, taken.number, known)
-        if ends is not None:
-            left: Any = c.force * np.exp(-c.decay * taken.until)
-            beyond |= growing(method, c._replace(force=left), ends, taken.longest, taken.number)
         if isinstance(method, Adams) and not self._own:
             beyond |= _errors_grow_at_rest(method, self._scene, taken)
-        return beyond
+        verdicts = beyond.astype(np.int8)
+        left: Any = c.force * np.exp(-c.decay * taken.until)
+        places = [] if self._still and longest <= self._still[0] and most <= self._still[1] else [(c, starts)]
+        places += [] if ends is None else [(c._replace(force=left), ends)]
+
+        def judge(members: slice) -> None:
+            for own, states in places:
+                steps = taken.longest[members], taken.number[members]
+                mark_growing(method, part(own, members), states[members], *steps, verdicts[members])
+
+        share(judge, len(starts), FAR_PART if self._still else CLOSE_PART)
+        return verdicts != INNOCENT
 
     def _is_quiet(self, dt: float, steps: float) -> bool:
         """Whether steps of dt [s] are so short that small motion grows nowhere, however long it stays."""
         if self._own or isinstance(self._method, ImplicitRungeKutta):
             return False
         most = region(self._method.name).largest[rows_of(np.array(dt * fastest_decaying(self._scene)))]
-        return bool(most * np.clip(steps, 1.0, MOST_STEPS) <= CERTAIN * np.log1p(PASSING))
+        return bool(most * np.clip(steps, 1.0, MOST_STEPS) <= CERTAIN * ALLOWED)
 
 
 @lru_cache(KEPT)
@@ -206,37 +206,51 @@ def fastest_decaying(scene: Scene) -> float:
 
 def _errors_grow_at_rest(method: Adams, scene: Scene, taken: StepsTaken) -> NDArray[np.bool_]:
     """Whether errors (n,) grow at the scene's minima, over all steps, by a root that stands for no mode."""
+    longest, most = taken.longest.max(initial=0.0), taken.number.max(initial=0)
+    if not _may_grow_at_rest(method, scene, longest, most).size:
+        return np.zeros(len(taken.longest), dtype=np.bool_)
+    steps = np.unique(taken.longest)  # a search in these few is quicker than their inverse
+    growth = np.array([_growth_at_rest(method.name, scene, float(dt), int(most)) for dt in steps])
+    return np.asarray(growth[np.searchsorted(steps, taken.longest)] * taken.number > np.log(SPURIOUS))
+
+
+def _may_grow_at_rest(method: Adams, scene: Scene, dt: float, most: float) -> NDArray[np.complex128]:
+    """Damped modes at the scene's minima that the method's table does not acquit in so many steps of dt."""
     resting = scene_eigenvalues(scene)[0]
     damped = resting[(resting.real < -GROWTH_PER_RADIAN * np.abs(resting)) & (resting.imag >= 0.0)]
-    growth, longest = np.zeros(len(taken.longest)), taken.longest.max(initial=0.0)
-    rows, sectors = rows_of(longest * np.abs(damped)), sectors_of(damped.real, damped.imag)
-    most = region(method.name).sector[rows, sectors].max(initial=0.0) * taken.number.max(initial=0)
-    if most <= CERTAIN * np.log(SPURIOUS):
-        return np.zeros(growth.size, dtype=np.bool_)
-    steps, of = np.unique(taken.longest, return_inverse=True)
-    growth = np.log(amplification(method, steps[:, None] * damped).max(axis=1))[of]
-    return np.asarray(growth * taken.number > np.log(SPURIOUS))
+    place = rows_of(dt * np.abs(damped)), sectors_of(damped.real, damped.imag)
+    return np.asarray(damped[~(region(method.name).sector[place] * most <= CERTAIN * np.log(SPURIOUS))])
 
 
-def _own_limit(method: Method, scene: Scene, start: Floats, dt: float, steps: float) -> list[Limit]:
+@lru_cache(KEPT)
+def _growth_at_rest(method: str, scene: Scene, dt: float, most: int) -> float:
+    """Logarithm of the growth a step [s] there, 0 where it cannot count in ``most`` steps."""
+    formula = find_method(method)
+    assert isinstance(formula, Adams)
+    modes = _may_grow_at_rest(formula, scene, dt, most)
+    return float(np.log(amplification(formula, dt * modes).max(initial=0.5)))
+
+
+@lru_cache(KEPT)
+def _own_limit(
+    method: str, scene: Scene, start: tuple[float, ...], dt: float, steps: float
+) -> tuple[Limit, ...]:
     """The longest step [s] at the start of a trajectory for which dt is too long; none if it is not."""
-    c, state = _coefficients(scene, {}, 1), start[None]
+    c, state, formula = reduce(scene), np.array([start]), find_method(method)
     matrices = state_matrices(c, *state[:, :2].T)
     if not np.isfinite(matrices).all():
-        return []
-    growth = PASSING / float(steps_there(local_motion(c, state).time, np.array(dt), np.array(steps))[0])
+        return ()
+    growth = PASSING / float(steps_there(local_motion(c, state).time[0], dt, counted(np.array(steps))))
     values = eigenvalues(matrices)
-    if scene.beta == 0.0 or is_stable(method, values, dt, growth):  # told at once, the limit is not
-        return []
-    limit = stable_step(method, values, growth, TOLD)
-    return [Limit(limit, GROWS)] if limit > 0.0 else []
+    if scene.beta == 0.0 or is_stable(formula, values, dt, growth):  # told at once, the limit is not
+        return ()
+    limit = stable_step(formula, values, growth, TOLD)
+    return (Limit(limit, GROWS),) if limit > 0.0 else ()
 
 
-def _coefficients(scene: Scene, own: Mapping[str, Floats], n: int) -> Coefficients:
-    """Reduced coefficients, each of shape (n,)."""
-    scenes: Any = SimpleNamespace(**(scene.model_dump() | dict(own)))
-    values: Any = (np.broadcast_to(np.asarray(value, dtype=np.float64), n) for value in reduce(scenes))
-    return Coefficients(*values)
+def _coefficients(scene: Scene, own: Mapping[str, Floats]) -> Coefficients:
+    """Reduced coefficients, numbers or of shape (n,)."""
+    return reduce(SimpleNamespace(**(scene.model_dump() | dict(own))))  # type: ignore[arg-type]
 
 
 def _turns_too_far(rates: Floats, first: Floats) -> NDArray[np.bool_]:

@@ -10,7 +10,13 @@ from numpy.typing import NDArray
 from fastmech.jit import inlined
 from fastmech.mechanism.coefficients import Coefficients
 from fastmech.mechanism.reduced import potential_gradient
-from fastmech.stability.linearize import fill_state_matrix, polynomial, small_motion, small_motion_at
+from fastmech.stability.linearize import (
+    SmallMotion,
+    fill_state_matrix,
+    polynomial,
+    small_motion,
+    small_motion_at,
+)
 
 Floats = NDArray[np.float64]
 
@@ -37,21 +43,39 @@ def local_motion(c: Coefficients, states: Floats) -> LocalMotion:
     """
     phi, theta, rate_1, rate_2 = np.ascontiguousarray(states.T)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
-        motion = small_motion_at(s1, c1, s2, c2, *_of_motion(c))
-        m11, s12, determinant = motion.m11, motion.s12, motion.determinant
-        c12 = c1 * c2 - s1 * s2
-        u1, u2 = potential_gradient(s1, c1, s2, c2, c12, c.lift, c.spring, c.gravity, c.force)
-        acceleration = np.maximum(np.abs(s12 * u2 - u1), np.abs(s12 * u1 - m11 * u2)) / determinant
-        speed = np.maximum(np.abs(rate_1), np.abs(rate_2))
-        time = 2.0 * NEAR / (speed + np.sqrt(speed * speed + 2.0 * NEAR * acceleration))
+        at = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
+        motion = small_motion_at(*at, *_of_motion(c))
+        time = time_near(*at, rate_1, rate_2, motion, c.lift, c.spring, c.gravity, c.force)
         p3, p2, p1, p0 = (np.asarray(p) for p in polynomial(motion))
         return LocalMotion(p3, p2, p1, p0, time)
 
 
+@inlined
+def time_near(
+    s1: Any,
+    c1: Any,
+    s2: Any,
+    c2: Any,
+    rate_1: Any,
+    rate_2: Any,
+    motion: SmallMotion,
+    lift: Any,
+    spring: Any,
+    gravity: Any,
+    force: Any,
+) -> Any:
+    """The time [s] that :func:`local_motion` tells of, from sines, cosines and rates [rad/s]."""
+    c12 = c1 * c2 - s1 * s2
+    u1, u2 = potential_gradient(s1, c1, s2, c2, c12, lift, spring, gravity, force)
+    pull_1, pull_2 = motion.s12 * u2 - u1, motion.s12 * u1 - motion.m11 * u2
+    acceleration = np.maximum(np.abs(pull_1), np.abs(pull_2)) / motion.determinant
+    speed = np.maximum(np.abs(rate_1), np.abs(rate_2))
+    return 2.0 * NEAR / (speed + np.sqrt(speed * speed + 2.0 * NEAR * acceleration))
+
+
 def part(c: Coefficients, members: Any) -> Coefficients:
     """The coefficients of some of the trajectories."""
-    values: Any = (np.asarray(value)[members] for value in c)
+    values: Any = (value[members] if np.ndim(value) else value for value in map(np.asarray, c))
     return Coefficients(*values)
 
 

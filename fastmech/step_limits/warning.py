@@ -18,6 +18,7 @@ from fastmech.mechanism.lagrange import potential_energy, potential_gradient, po
 from fastmech.scene import Scene
 from fastmech.stability.arguments import require_scene
 from fastmech.step_limits.impulse import impulse_limit, impulse_ratio
+from fastmech.step_limits.limits import PASSING
 from fastmech.step_limits.local import eigenvalues, state_matrices
 from fastmech.step_limits.predict import is_stable, stable_step
 
@@ -31,9 +32,6 @@ DIRECTION = 0.03
 
 #: Newton iterations from the grid to a minimum: a few are enough, flat minima take more.
 DESCENTS = 40
-
-#: Growth a step that is let pass where a motion only crosses the configurations that set the limit.
-PASSING = 0.01
 
 #: Angle [rad] by which a body may turn in one step.
 TURN = 1.0
@@ -155,10 +153,10 @@ def step_warning(scene: Scene, dt: float, method: str, starts: ArrayLike | None 
         InputError: an argument is wrong.
     """
     require_scene(scene)
-    rates = None if starts is None else _rates(starts)
+    fastest = 0.0 if starts is None else _fastest(starts)
     if not isinstance(dt, Real) or isinstance(dt, bool) or not 0.0 < dt < np.inf:
         raise InputError(f"dt = {dt!r}: must be a finite number of s greater than 0")
-    return _told(_first_limit(scene, dt, method, rates), dt, method)
+    return _told(_first_limit(scene, dt, method, fastest), dt, method)
 
 
 def _told(limit: Limit, dt: float, method: str) -> str | None:
@@ -184,8 +182,8 @@ def warn_of_step(
     Raises:
         InputError: no such method.
     """
-    rates = None if starts is None else _rates(starts)
-    told = _told(min([*(_first_limit(scene, dt, method, rates) for scene in scenes), *others]), dt, method)
+    fastest = 0.0 if starts is None else _fastest(starts)
+    told = _told(min([*(_first_limit(scene, dt, method, fastest) for scene in scenes), *others]), dt, method)
     if told:
         warnings.warn(told, StepWarning, stacklevel=stacklevel + 1)
 
@@ -197,18 +195,22 @@ class Limit(NamedTuple):
     reason: str
 
 
-def _rates(starts: ArrayLike) -> Floats:
-    """The rates of states (n, 4) or (4,)."""
+def _fastest(starts: ArrayLike) -> float:
+    """The greatest finite rate [rad/s] of states (n, 4) or (4,)."""
     try:
         states = np.asarray(starts, dtype=np.float64)
     except (TypeError, ValueError):
         raise InputError("starts: must be numbers of shape (n, 4)") from None
     if states.ndim not in (1, 2) or states.shape[-1] != 4:
         raise InputError(f"starts: has shape {states.shape}, must be (n, 4)")
-    return states[..., 2:]
+    rates = np.abs(states[..., 2:])
+    fastest = float(np.max(rates, initial=0.0))
+    if not np.isfinite(fastest):  # what is not has a status of its own
+        fastest = float(np.max(rates[np.isfinite(rates)], initial=0.0))
+    return fastest
 
 
-def _first_limit(scene: Scene, dt: float, method: str, rates: Floats | None) -> Limit:
+def _first_limit(scene: Scene, dt: float, method: str, fastest: float) -> Limit:
     formula = find_method(method)
     limits = [Limit(np.inf, "")]
     if beyond_stability(scene, dt, method):
@@ -218,14 +220,10 @@ def _first_limit(scene: Scene, dt: float, method: str, rates: Floats | None) -> 
         reason = f"the decaying force would give {ratio:.3g} times its impulse"
         decay = impulse_limit(formula) / scene.alpha
         limits.append(Limit(decay, reason))
-    if rates is not None:
-        fastest = float(np.max(np.abs(rates), initial=0.0))
-        if not np.isfinite(fastest):  # what is not has a status of its own
-            fastest = float(np.max(np.abs(rates[np.isfinite(rates)]), initial=0.0))
-        if fastest > 0.0:
-            turn = TURN / fastest
-            reason = f"at {fastest:.3g} rad/s it would turn {dt * fastest:.3g} rad a step"
-            limits.append(Limit(turn, reason))
+    if fastest > 0.0:
+        turn = TURN / fastest
+        reason = f"at {fastest:.3g} rad/s it would turn {dt * fastest:.3g} rad a step"
+        limits.append(Limit(turn, reason))
     return min(limits)
 
 

@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pytest
 
 import fastmech as fm
+from fastmech.ensembles.threads import in_parts
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Adams
 from fastmech.integrators.methods import METHODS
-from fastmech.kernels.passes import columns
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.stability.linearize import jacobian
 from fastmech.step_limits.amplification import amplifies, companion, principal_root, stability_function
 from fastmech.step_limits.beyond import StepJudge, StepsTaken
-from fastmech.step_limits.bounds import eigenvalue_bounds
-from fastmech.step_limits.growth import CERTAIN, acquitted, bounded, growing, stiffest_growing
-from fastmech.step_limits.local import eigenvalue_bound, eigenvalues, local_motion, state_matrices
-from fastmech.step_limits.modes import decaying_modes, factored
+from fastmech.step_limits.growth import mark_growing, stiffest_growing
+from fastmech.step_limits.limits import CERTAIN
+from fastmech.step_limits.local import eigenvalue_bound, eigenvalues, local_motion, part, state_matrices
+from fastmech.step_limits.modes import factored, polished
 from fastmech.step_limits.predict import stable_step
 from fastmech.step_limits.region import region, rows_of, sectors_of
 from fastmech.step_limits.warning import step_limit, step_warning
@@ -195,31 +197,41 @@ def random_motions(seed: int, n: int) -> tuple[Coefficients, np.ndarray]:
     return c, np.column_stack([rng.uniform(-3, 3, (n, 2)), rng.uniform(-5, 5, (n, 2))])
 
 
-def test_the_pass_over_many_gives_the_bound() -> None:
-    """Beyond the range of the packed trigonometry too; alone as in company."""
-    c, states = random_motions(7, 150)
-    states[::7, 1] += 1e7
-    states[3, 0] = np.nan
-    found, one = np.empty(150), np.empty(1)
-    eigenvalue_bounds(states, columns(c, slice(0, 150)), found)
-    np.testing.assert_allclose(found, eigenvalue_bound(local_motion(c, states)), rtol=1e-9)
-    for k in range(150):
-        eigenvalue_bounds(states[[k]], columns(c, slice(k, k + 1)), one)
-        np.testing.assert_array_equal(one[0], found[k])
-
-
 def test_modes_are_the_eigenvalues() -> None:
     """Against LAPACK's of the state matrices, whose rounding is relative to the fastest mode."""
-    c, states = random_motions(3, 2000)
+    c, states = random_motions(3, 1000)
+    c.damping[:300] *= 1e-3
     motion = local_motion(c, states)
-    lane, values = decaying_modes(c, states, motion, 1e-6, lambda lane, _: np.ones(lane.size, dtype=bool))
     expected = eigenvalues(state_matrices(c, *states[:, :2].T))
-    decays = (expected.real < -1e-6 * np.abs(expected)) & (expected.imag >= 0.0)
+    found = 0
     for k in range(len(states)):
-        own, exact = np.sort_complex(values[lane == k]), np.sort_complex(expected[k, decays[k]])
-        assert own.size == exact.size
-        np.testing.assert_allclose(own, exact, rtol=1e-7, atol=1e-12 * np.abs(expected[k]).max())
-    assert factored(motion).found[c.damping < 10.0].all()
+        polynomial = [float(p[k]) for p in motion[:4]]
+        with np.errstate(all="ignore"):
+            a, b, c_, d, sure = factored(*(np.float64(p) for p in polynomial))
+            if not sure:
+                continue
+            rough = np.concatenate([np.roots([1.0, a, b]), np.roots([1.0, c_, d])]).astype(complex)
+            parts = [polished(np.float64(z.real), np.float64(z.imag), *polynomial) for z in rough]
+        own = np.sort_complex(np.array([real + 1j * imaginary for real, imaginary, exact in parts if exact]))
+        exact = np.sort_complex(expected[k])
+        assert own.size == 4
+        np.testing.assert_allclose(own, exact, rtol=1e-7, atol=1e-12 * np.abs(exact).max())
+        found += 1
+    assert found > 500
+
+
+def test_factors_where_both_modes_are_equally_fast() -> None:
+    """Quadratics of equal last coefficients, told apart by the damping alone."""
+    cases = [
+        (a, b, c, d) for a, c in ((0.5, 0.1), (2.0, 0.2)) for b, d in ((4, 4), (4, 4 + 1e-7), (4.0001, 4))
+    ]
+    for a, b, c, d in cases:
+        product = np.polymul([1.0, a, b], [1.0, c, d])
+        with np.errstate(invalid="ignore"):
+            found = factored(*(np.float64(p) for p in product[1:]))
+        assert found.found
+        pairs = sorted([(found.a, found.b), (found.c, found.d)])
+        np.testing.assert_allclose(pairs, sorted([(a, b), (c, d)]), rtol=1e-6)
 
 
 @pytest.mark.parametrize("name", EXPLICIT)
@@ -237,20 +249,86 @@ def test_no_table_acquits_what_grows(name: str) -> None:
     assert acquits.mean() > 0.2  # and it does acquit
 
 
-@pytest.mark.parametrize(("name", "size"), [("rk4", 3.0), ("ab6", 0.3), ("abm12", 0.8)])
-def test_bounds_change_no_verdict(name: str, size: float) -> None:
-    """Those of longer steps neither, nor company."""
+def judged(name: str, c: Coefficients, states: np.ndarray, dt: np.ndarray, number: np.ndarray) -> list[bool]:
+    verdicts = np.zeros(len(states), dtype=np.int8)
+    mark_growing(METHODS[name], c, states, dt, number, verdicts)
+    assert verdicts.max() <= 1
+    return [bool(v) for v in verdicts]
+
+
+def by_definition(
+    name: str, c: Coefficients, states: np.ndarray, dt: np.ndarray, number: np.ndarray
+) -> list[bool | None]:
+    """The rule itself from LAPACK's eigenvalues of every matrix; None where rounding decides."""
+    method, motion, expected = METHODS[name], local_motion(c, states), []
+    values = eigenvalues(state_matrices(c, *states[:, :2].T))
+    there = np.minimum(np.maximum(motion.time / dt, 1.0), number)
+    for k in range(len(states)):
+        z = dt[k] * values[k]
+        z = z[(z.real < -1e-6 * np.abs(z)) & (z.imag >= 0.0)]
+        if isinstance(method, Adams):
+            roots = np.linalg.eigvals(companion(method, z)) if z.size else np.zeros((0, 1))
+            own, largest = np.log(np.abs(principal_root(method, z))), np.log(np.abs(roots).max(axis=-1))
+            own = np.where(np.isnan(own), -1.0, own)
+            grown = np.maximum(own * there[k] / np.log(1.01), largest * number[k] / np.log(1e4))
+            grown = np.minimum(grown, largest * there[k] / np.log(1.01))
+        else:
+            grown = np.log(np.abs(stability_function(method, z))) * there[k] / np.log(1.01)
+        most = grown.max(initial=0.0)
+        expected.append(None if abs(most - 1.0) < 1e-6 else bool(most > 1.0))
+    return expected
+
+
+@pytest.mark.parametrize(
+    ("name", "size"), [("rk4", 3.0), ("dop853", 5.0), ("ab6", 0.3), ("abm8", 1.0), ("abm12", 0.8)]
+)
+def test_verdicts_are_the_rule(name: str, size: float) -> None:
+    """And nobody's company changes them, nor which of them is found the stiffest."""
     c, states = random_motions(5, 400)
-    method, number = METHODS[name], np.full(400, 300)
+    c.damping[:200] *= 1e-3
+    number = np.full(400, 300)
     dt = size * np.random.default_rng(6).uniform(0.1, 1.5, 400) / eigenvalue_bound(local_motion(c, states))
-    known = bounded(method, c, states, 1.3 * dt, number)
-    verdicts = growing(method, c, states, dt, number)
-    stiffest = stiffest_growing(method, c, states, dt, number, bounded(method, c, states, dt, number))
-    assert stiffest == np.argmax(np.where(verdicts, eigenvalue_bound(local_motion(c, states)), 0.0))
-    assert growing(method, c, states, dt, number, known).tolist() == verdicts.tolist()
-    alone = [
-        growing(method, Coefficients(*(v[k : k + 1] for v in c)), states[[k]], dt[[k]], number[[k]])[0]  # type: ignore[index]
-        for k in range(400)
-    ]
-    assert alone == verdicts.tolist()
-    assert 0 < verdicts.sum() < np.sum(~acquitted(known, dt, number))
+    verdicts, expected = judged(name, c, states, dt, number), by_definition(name, c, states, dt, number)
+    sure = [k for k, e in enumerate(expected) if e is not None]
+    assert len(sure) > 390
+    assert [verdicts[k] for k in sure] == [expected[k] for k in sure]
+    assert 40 < sum(verdicts) < 360
+    one = [slice(k, k + 1) for k in range(400)]
+    alone = [judged(name, part(c, k), states[k], dt[k], number[k])[0] for k in one]
+    assert alone == verdicts
+    same = float(np.median(dt))
+    place, far = stiffest_growing(METHODS[name], c, states, same, 300.0)
+    verdicts = judged(name, c, states, np.full(400, same), number)
+    assert place == np.argmax(np.where(verdicts, eigenvalue_bound(local_motion(c, states)), 0.0))
+    assert not far
+    assert stiffest_growing(METHODS[name], c, states, 1e-9, 300.0) == (None, True)
+
+
+def test_who_is_condemned_is_judged_no_more() -> None:
+    c, states = random_motions(8, 70)
+    c.damping[:] = 0.0
+    verdicts = np.ones(70, dtype=np.int8)
+    mark_growing(METHODS["rk4"], c, states, np.ones(70), np.ones(70), verdicts)
+    assert verdicts.tolist() == [1] * 70
+
+
+def shared(threads: int, work: Callable[[slice], None], n: int, part: int) -> None:
+    in_parts(work, n, threads, part // 4 - 25)
+
+
+def test_parts_in_threads_have_the_verdicts_of_the_whole() -> None:
+    """Steps about the limit, angles beyond the packed trigonometry's range, and some that are no numbers."""
+    n = 3 * 2**12 + 5
+    scene = fm.Scene(alpha=0.0)
+    rng = np.random.default_rng(9)
+    starts = np.column_stack([rng.uniform(-3, 3, (n, 2)), np.zeros((n, 2))])
+    starts[::77, 0] += 2e6
+    starts[5, 1], starts[n - 1, 0] = np.nan, np.inf
+    own = {"beta": rng.uniform(100, 4e3, n)}
+    each = np.full(n, 0.02)
+    judge, taken = StepJudge(scene, own, starts, "rk4"), StepsTaken(each, each, np.full(n, 50), 1.0)
+    whole = judge.beyond(starts[::-1], taken)
+    for threads in (1, 3):
+        share = partial(shared, threads)
+        assert judge.beyond(starts[::-1], taken, share).tolist() == whole.tolist()
+    assert 0.05 < whole.mean() < 0.95
