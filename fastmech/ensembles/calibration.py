@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 #: and with rates up to 10 rad/s.
 FRONTIER = (
     (3e-10, "abm12", "dop853"),
-    (1e-7, "ab7", "dop853"),
+    (1e-7, "abm10", "dop853"),
     (3e-4, "ab6", "verner6"),
     (3e-3, "verner6", "verner6"),
     (math.inf, "tsit5", "tsit5"),
@@ -45,6 +45,7 @@ STIFF = 4.0
 FIRST_GUESS = {
     "ab6": 0.07,
     "ab7": 0.077,
+    "abm10": 0.14,
     "abm12": 0.14,
     "dop853": 0.45,
     "verner6": 0.25,
