@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 #: and with rates up to 10 rad/s.
 FRONTIER = (
     (3e-10, "abm12", "dop853"),
-    (1e-7, "ab7", "dop853"),
+    (1e-7, "abm10", "dop853"),
     (3e-4, "ab6", "verner6"),
     (3e-3, "verner6", "verner6"),
     (math.inf, "tsit5", "tsit5"),
@@ -45,6 +45,7 @@ STIFF = 4.0
 FIRST_GUESS = {
     "ab6": 0.07,
     "ab7": 0.077,
+    "abm10": 0.14,
     "abm12": 0.14,
     "dop853": 0.45,
     "verner6": 0.25,
@@ -75,13 +76,15 @@ def calibrate(
     aim: float,
     method: str | None,
     threads: int | None,
+    many: float = 1.0,
 ) -> Calibrated:
     """The longest step at which the quantile ``aim`` of a sample's errors is within the tolerance.
 
-    ``method`` is kept if given. Else it is one of :data:`FRONTIER`, or :data:`IMPLICIT` where that costs less
-    because an explicit method's step would be set by stability.
+    ``many`` trajectories are to be integrated to one of the sample. ``method`` is kept if given. Else it is
+    one of :data:`FRONTIER`, or :data:`IMPLICIT` where that costs less because an explicit method's step would
+    be set by stability.
     """
-    trial = _Trial(problem, starts, outputs, tol, aim, threads)
+    trial = _Trial(problem, starts, outputs, tol, aim, threads, many)
     if method is not None:
         return trial.ladder(find_method(method)).calibrated("as asked for")
     return trial.choose()
@@ -114,7 +117,7 @@ class _Trial(Sample):
             refused = stiff
         ladder = self.calmed(self.ladder(explicit))
         if refused is None and ladder.unstable():
-            refused = self.ladder(implicit)
+            refused = self.ladder(implicit, ladder.dearest)
         return self.cheaper(ladder, refused)
 
     def choose_blindly(self, few: Method, single_step: Method, implicit: Method) -> Calibrated:
@@ -129,13 +132,13 @@ class _Trial(Sample):
         if ladder.method is few and few is not single_step and self.cost(ladder) >= 2 * at_once:
             ladder = self.ladder(single_step)
         ladder = self.calmed(ladder)
-        return self.cheaper(ladder, self.ladder(implicit) if ladder.unstable() else None)
+        return self.cheaper(ladder, self.ladder(implicit, ladder.dearest) if ladder.unstable() else None)
 
     def calmed(self, ladder: Ladder) -> Ladder:
         """The ladder, or that of :data:`CALM` where another method misses the tolerance by more."""
         if ladder.good or ladder.method.name == CALM:
             return ladder
-        other = self.ladder(find_method(CALM))
+        other = self.ladder(find_method(CALM), ladder.dearest)
         return other if other.score(other.rung) < ladder.score(ladder.rung) else ladder
 
     def cheaper(self, ladder: Ladder, implicit: Ladder | None) -> Calibrated:

@@ -9,6 +9,7 @@ the best run that it has had, and an error that says so.
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -17,10 +18,10 @@ from fastmech.ensembles.calibration import CALM
 from fastmech.ensembles.ladder import AIM, CHEAP
 from fastmech.ensembles.missed import missed_line
 from fastmech.ensembles.places import part_of, put_into
-from fastmech.ensembles.repeatable import Flags, Floats, Members, Repeatable
+from fastmech.ensembles.repeatable import Flags, Floats, Members, Repeatable, usable_starts
 from fastmech.ensembles.richardson import LEAST_ORDER, RATIO, ROUNDING, error_beyond, order_seen
 from fastmech.ensembles.run import Progress
-from fastmech.ensembles.solve import Solution, solve
+from fastmech.ensembles.solve import Solution, mean_shares, solve
 from fastmech.ensembles.stiffness import explicit_limit
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.methods import find_method
@@ -63,7 +64,7 @@ class Doubling(Repeatable):
     distance: Floats = field(init=False)  #: of the last two runs
     error: Floats = field(init=False)  #: estimate for the best run
     left: float = field(init=False)  #: right-hand sides that may still be taken
-    finite: Flags = field(init=False)  #: the start is
+    usable: Flags = field(init=False)  #: the start is
     rough: Flags = field(init=False)  #: shows less than the method's order
     once_rough: Flags = field(init=False)  #: has shown less
     rounded: Flags = field(init=False)  #: rounding rules
@@ -74,10 +75,11 @@ class Doubling(Repeatable):
     def run(self, progress: Progress | None) -> tuple[Solution, Floats, str]:
         """The solution, errors (n,), and what is to be said about those beyond the tolerance."""
         settings, n = self.settings, len(self.starts)
-        self.finite = np.asarray(np.isfinite(self.starts).all(axis=1))
+        self.usable = usable_starts(self.problem, self.starts, float(self.outputs[-1]))
         self.dt = np.full(n, float(settings.dt))
         self.best = solve(self.problem, self.starts, self.outputs, settings, self.threads, progress)
         everyone = np.arange(n)
+        self.shares = mean_shares(self.best, float(settings.dt), self.outputs)
         coarse = self.solve(everyone, self.dt * RATIO)
         self.distance = self.apart(self.best, coarse)
         self.error = self.distance * self.found.median
@@ -91,7 +93,7 @@ class Doubling(Repeatable):
         self.given_up, self.rounded = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
         self.unpaid = np.zeros(n, dtype=np.bool_)
         for _ in range(ROUNDS):
-            missing = self.finite & ~(self.margin * self.error <= self.tol)
+            missing = self.usable & ~(self.margin * self.error <= self.tol)
             again = self.affordable(np.flatnonzero(missing & ~self.given_up & ~self.rounded), 4.0)
             if not again.size:
                 break
@@ -102,12 +104,12 @@ class Doubling(Repeatable):
 
     def affordable(self, who: Members, finer: float) -> Members:
         """As many of the trajectories, longest steps first, as the budget allows with steps so much finer."""
-        who = who[np.argsort(-self.dt[who], kind="stable")]
-        while who.size and self.work(who, self.dt[who] / finer) > self.left:
-            self.unpaid[who[who.size // 2 :]] = True
-            self.given_up[who[who.size // 2 :]] = True
-            who = who[: who.size // 2]
-        return np.sort(who)
+        who = who[np.argsort(-self.dt[who] * self.shares[who], kind="stable")]
+        number = bisect_right(
+            range(1, who.size + 1), self.left, key=lambda n: self.work(who[:n], self.dt[who[:n]] / finer)
+        )
+        self.unpaid[who[number:]] = self.given_up[who[number:]] = True
+        return np.sort(who[:number])
 
     def _reckon(self, who: Members, before: Floats, after: Floats, shorter: Floats) -> None:
         """Errors from the last two distances, with the order that they show where it is not the method's.
@@ -196,7 +198,7 @@ class Doubling(Repeatable):
         runs tell three, and if these do not fall as the order says, the finest run is kept and the largest
         difference taken for its error.
         """
-        open_ = self.finite & ~self.rounded & ~self.given_up
+        open_ = self.usable & ~self.rounded & ~self.given_up
         doubtful = self._doubtful(open_ & ~self.rough)
         worst = self._worst(open_ & ~self.rough)  # the doubtful among them first: their errors say so
         who = worst[: max(AUDITED, doubtful.size)]
@@ -276,7 +278,7 @@ class Doubling(Repeatable):
 
     def remark(self) -> str:
         """Why trajectories have missed the tolerance; empty where none has."""
-        missed = self.finite & ~(self.error <= self.tol)
+        missed = self.usable & ~(self.error <= self.tol)
         ended = np.isfinite(self.best.y[-1]).all(axis=1)
         grazing = ended & ~np.isfinite(self.error) & self.problem.observation.stops
         return missed_line(missed, grazing, ~ended, self.unpaid)

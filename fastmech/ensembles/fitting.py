@@ -19,6 +19,7 @@ from fastmech.kernels.passes import columns
 from fastmech.mechanism.coefficients import Coefficients
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 #: How the step shrinks with the bound on the speed: where it is fitted once, and where it is fitted again as
 #: the motion slows down. The local error alone asks for 1; fast trajectories also pass saddles, which magnify
@@ -30,6 +31,10 @@ QUICK = 3.0
 
 #: Decay times after which a force is gone: exp(-40) is less than a double's rounding.
 GONE = 40.0
+
+#: Turns [rad] that a motion may make, by its bound on the speed, for steps to be fitted to it: with more, one
+#: trajectory would keep all others waiting for hours, and its angles' rounding would show.
+MOST_TURNS = 2.0**28
 
 #: Steps of a factor 2 between the longest and the next: trajectories of equal step run in common blocks.
 RUNGS = 4
@@ -51,6 +56,17 @@ def fitted_steps(
         ratio = speed_bound(c, starts, threads) / vibration_frequency(c)
         rungs = np.ceil(RUNGS * exponent * np.log2(np.maximum(ratio, 1.0)) - 1e-9)
     return dt * np.exp2(np.where(np.isfinite(rungs), rungs, 0.0) / -RUNGS)
+
+
+def is_too_fast(c: Coefficients, starts: Floats, t_end: float, threads: int | None = None) -> Flags:
+    """Which finite starts (n, 4) are too fast for any steps to follow their motions until ``t_end`` [s].
+
+    Raises:
+        InputError: the number of threads is wrong.
+    """
+    with np.errstate(invalid="ignore", over="ignore"):
+        followed = speed_bound(c, starts, threads) * t_end <= MOST_TURNS
+    return np.asarray(~followed & np.isfinite(starts).all(axis=1))
 
 
 def speed_bound(c: Coefficients, starts: Floats, threads: int | None = None) -> Floats:

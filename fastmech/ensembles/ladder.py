@@ -27,8 +27,8 @@ from fastmech.ensembles.richardson import (
     order_statistic,
     unseen,
 )
-from fastmech.ensembles.solve import Settings, solve
-from fastmech.ensembles.stiffness import work
+from fastmech.ensembles.solve import Settings, mean_shares, solve
+from fastmech.ensembles.stiffness import total_work
 from fastmech.ensembles.stopping import STOP_CODE
 from fastmech.integrators.method import Method
 
@@ -41,7 +41,7 @@ AIM = 0.5
 CALIBRATIONS, LEAP = 10, 4
 
 #: Rungs tried in vain (the error fell less than the order asks for) before the next one must cost less than
-#: CHEAP right-hand sides: a second or two of one core.
+#: CHEAP right-hand sides, a second or two of one core; until then it may cost as much as the integration.
 PATIENCE, CHEAP = 3, 1e7
 
 #: Of the trajectories that need not keep the tolerance, the share that may differ in their stops.
@@ -64,6 +64,7 @@ class Sample:
     tol: float
     aim: float  #: the quantile of the sample's errors that is looked at
     threads: int | None
+    many: float  #: trajectories that are to be integrated, to one of the sample
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,7 @@ class Ladder:
     runs: dict[int, Floats] = field(default_factory=dict)
     tried: dict[int, float] = field(default_factory=dict)  #: estimates by rung
     codes: dict[int, NDArray[np.int64]] = field(default_factory=dict)  #: of stops, by rung
+    shares: Floats = field(default_factory=lambda: np.ones(1))  #: mean fitted steps over the rung's, (n,)
     affordable: float = math.inf  #: right-hand sides of a run at most
     rung: int = 0  #: the one found
     good: bool = False  #: whether it keeps the tolerance
@@ -108,7 +110,7 @@ class Ladder:
             t = self.sample
             settings = replace(self.base, dt=self.dt(rung))
             run = solve(t.problem, t.starts, t.outputs, settings, t.threads)
-            self.runs[rung] = run.y
+            self.runs[rung], self.shares = run.y, mean_shares(run, self.dt(rung), t.outputs)
             if t.problem.observation.stops:
                 self.codes[rung] = run.records[STOP_CODE].astype(np.int64)
         return self.runs[rung]
@@ -170,15 +172,28 @@ class Ladder:
                     asked = last * RATIO ** (SHARE * self.method.order * (above - rung))
                     vain = vain + 1 if not found < asked else 0
                     after, above, last = rung + min(max(math.ceil(wanted), 1), LEAP), rung, found
-                    if self.right_hand_sides(after) > (CHEAP if vain >= PATIENCE else self.affordable):
+                    if self.right_hand_sides(after) > self.limit(vain, rung):
                         break
             rung = after
         self.good = good is not None
         self.rung = good if good is not None else min(self.tried, key=self.score)
 
+    def limit(self, vain: int, rung: int) -> float:
+        """Right-hand sides that the run after a rung may take: in vain no more than all trajectories once."""
+        if not vain:
+            return self.affordable
+        if vain >= PATIENCE:
+            return CHEAP
+        return min(self.affordable, max(CHEAP, self.sample.many * self.right_hand_sides(rung)))
+
+    @property
+    def dearest(self) -> float:
+        """Right-hand sides of the costliest run, at least CHEAP: those that a rival's runs may take."""
+        return max(CHEAP, self.right_hand_sides(max(self.runs)))
+
     def right_hand_sides(self, rung: int) -> float:
-        """Of all trajectories of the sample together."""
-        return len(self.sample.starts) * work(self.method, self.dt(rung), self.sample.outputs)
+        """Of all trajectories of the sample together, by the steps that earlier runs have fitted to them."""
+        return total_work(self.method, self.dt(rung) * self.shares, self.sample.outputs)
 
     def unstable(self) -> bool:
         """Whether the step is set by stability: one rung less would fail, and the error is far too small."""

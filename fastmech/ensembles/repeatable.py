@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.ensembles.fitting import is_too_fast
 from fastmech.ensembles.ladder import Calibrated
+from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.problem import Problem
 from fastmech.ensembles.richardson import distances
 from fastmech.ensembles.solve import Settings, Solution, solve
-from fastmech.ensembles.stiffness import work
+from fastmech.ensembles.stiffness import total_work
 from fastmech.ensembles.stopping import STOP_CODE
 from fastmech.kernels.blocks import VECTOR_LANES
 
 Floats = NDArray[np.float64]
 Members = NDArray[np.int64]
 Flags = NDArray[np.bool_]
+
+
+def usable_starts(problem: Problem, starts: Floats, t_end: float) -> Flags:
+    """Which starts (n, dim) have motions until ``t_end`` [s] that steps can follow."""
+    usable, c = finite_rows(starts), problem.coefficients
+    return usable if c is None else usable & ~is_too_fast(c, starts, t_end)
 
 
 @dataclass
@@ -31,6 +39,7 @@ class Repeatable:
     found: Calibrated
     tol: float
     threads: int | None
+    shares: Floats = field(init=False)  #: mean fitted steps over the settings', (n,)
 
     @property
     def settings(self) -> Settings:
@@ -61,8 +70,4 @@ class Repeatable:
 
     def work(self, who: Members, dt: Floats) -> float:
         """Right-hand sides of a run, whole vectors of trajectories counted."""
-        total = 0.0
-        for length, lanes in zip(*np.unique(dt[np.isfinite(dt)], return_counts=True), strict=True):
-            whole = -(-int(lanes) // VECTOR_LANES) * VECTOR_LANES
-            total += whole * work(self.settings.method, float(length), self.outputs)
-        return total
+        return total_work(self.settings.method, dt * self.shares[who], self.outputs, VECTOR_LANES)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.ensembles.fitting import EXPONENT_AGAIN, EXPONENT_ONCE, fitted_steps
+from fastmech.ensembles.fitting import EXPONENT_AGAIN, EXPONENT_ONCE, fitted_steps, is_too_fast
 from fastmech.ensembles.plausible import judge
 from fastmech.ensembles.problem import Problem
 from fastmech.ensembles.run import Progress, run_ensemble
@@ -45,6 +45,15 @@ class Solution:
     last: Floats | None  #: last finite states, shape (n, dim); None: none failed, they are the final ones
 
 
+def mean_shares(solution: Solution, dt: float, outputs: Floats) -> Floats:
+    """The part (n,) of the step ``dt`` [s] of a run's settings that each trajectory's steps were, on average.
+
+    Less than 1 where steps were fitted: what a trajectory costs is known from any run of it.
+    """
+    number = output_steps(np.concatenate([[0.0], outputs]), dt).sum()
+    return np.asarray(number / np.maximum(solution.steps, 1)) if number else np.ones(solution.steps.size)
+
+
 def solve(
     problem: Problem,
     starts: Floats,
@@ -55,7 +64,8 @@ def solve(
 ) -> Solution:
     """Integrate from t = 0 through the output times [s].
 
-    Where steps are fitted again, the times at which that is done end a piece of the run.
+    Where steps are fitted again, the times at which that is done end a piece of the run. Starts to whose
+    motions no steps can be fitted do not run: any step is too large for them.
 
     Raises:
         InputError: the step or the number of threads are wrong.
@@ -73,6 +83,10 @@ def solve(
     method = settings.method
     if isinstance(method, ImplicitRungeKutta):
         method = with_jacobian(method, problem.jacobian, problem.second_order)
+    aside = np.zeros(n, dtype=np.bool_)
+    if settings.fit and problem.coefficients is not None:
+        aside = is_too_fast(problem.coefficients, starts, float(outputs[-1]), threads)
+        now = np.where(aside[:, None], np.nan, now) if aside.any() else now  # they never enter a block
     for piece, end in enumerate(ends):
         inside = (outputs <= end) & ((outputs > begin) | (piece == 0))
         times = np.concatenate([[begin], outputs[inside]])
@@ -114,10 +128,12 @@ def solve(
     if problem.canonical:
         for output in y:  # one at a time: what is computed on the way takes little memory
             output[:] = problem.outward(output)
+    status[aside] = Status.STEP_TOO_LARGE
     judged = judge(status, starts, y[-1], problem.coefficients, threads)
     last = None
     if lost:
         last = y[-1].copy()
         for members, states in lost:
             last[members] = states
+        last[aside] = starts[aside]
     return Solution(y, run.records, judged, steps, taken, failed, last)

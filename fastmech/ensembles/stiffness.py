@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.ensembles.fitting import QUICK, vibration_frequency
+from fastmech.ensembles.fitting import QUICK, RUNGS, vibration_frequency
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Method
 from fastmech.integrators.methods import find_method
@@ -90,6 +90,20 @@ def work(method: Method, dt: float, outputs: Floats) -> float:
     if method.start_steps == 0:
         return float(method.evaluations(1) * steps.sum())
     return float(sum(method.evaluations(int(number)) for number in steps))
+
+
+def total_work(method: Method, dt: Floats, outputs: Floats, lanes: int = 1) -> float:
+    """Cost of trajectories with steps ``dt`` (n,) [s], in right-hand sides as :func:`work`'s.
+
+    Those of about equal steps run in common blocks and are counted in whole groups of so many ``lanes``.
+    """
+    dt = dt[np.isfinite(dt) & (dt > 0.0)]
+    rungs, numbers = np.unique(np.rint(RUNGS * np.log2(dt)), return_counts=True)
+    whole = -(-numbers // lanes) * lanes
+    return sum(
+        int(number) * work(method, float(length), outputs)
+        for length, number in zip(np.exp2(rungs / RUNGS), whole, strict=True)
+    )
 
 
 def explicit_reason(

@@ -19,6 +19,7 @@ from fastmech.ensembles.doubling import SMOOTH, Doubling
 from fastmech.ensembles.fitting import speed_bound
 from fastmech.ensembles.ladder import Calibrated
 from fastmech.ensembles.problem import Problem
+from fastmech.ensembles.repeatable import usable_starts
 from fastmech.ensembles.richardson import RATIO, ROUNDING, distances, half_over, order_statistic, unseen
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.solve import Settings, Solution, solve
@@ -64,7 +65,7 @@ class _Wanted:
     problem: Problem
     starts: Floats
     outputs: Floats
-    usable: NDArray[np.int64]  #: starts that are finite
+    usable: NDArray[np.int64]  #: starts that are finite and not too fast
     quantile: float
     threads: int | None
 
@@ -86,12 +87,13 @@ def solve_to_tolerance(
     """
     if problem.observation.stops:
         problem = replace(problem, observation=replace(problem.observation, locate=True))
-    usable = np.flatnonzero(np.isfinite(starts).all(axis=1))
+    usable = np.flatnonzero(usable_starts(problem, starts, float(outputs[-1])))
     wanted = _Wanted(problem, starts, outputs, usable, quantile, threads)
     sample = _sample(wanted, SAMPLE_MAXIMUM if quantile == 1.0 else SAMPLE_QUANTILE)
     aim = quantile if quantile < 1.0 else TYPICAL
     part, begun = problem.part(sample), starts[sample]
-    found = calibrate(part, begun, outputs, tol, aim, method, threads)
+    many = usable.size / max(sample.size, 1)
+    found = calibrate(part, begun, outputs, tol, aim, method, threads, many)
     if quantile == 1.0:
         doubling = Doubling(problem, starts, outputs, found, tol, threads)
         solution, errors, remark = doubling.run(progress)

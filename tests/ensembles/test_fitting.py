@@ -228,3 +228,29 @@ def test_bad_times_are_refused_in_one_line(fit: Any, message: str) -> None:
     with pytest.raises(InputError, match=f"^{re.escape(message)}") as error:
         fm.integrate(SCENE, [0.9, 0.4, 0.0, 0.0], 1.0, fit=fit)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("speed", [1e20, 1e100, 1e300])
+@pytest.mark.parametrize("fit", [True, [0.0, 0.5]])
+@pytest.mark.filterwarnings("ignore::fastmech.step_limits.warning.StepWarning")
+def test_a_start_that_no_steps_follow_leaves_others_alone(speed: float, fit: Any) -> None:
+    """It would take more steps than can be counted; the others are the same to the bit."""
+    starts = random_starts(40)
+    right = fm.integrate(SCENE, np.delete(starts, 13, axis=0), t_eval=[0.0, 1.0], fit=fit)
+    starts[13, 2] = speed
+    run, others = fm.integrate(SCENE, starts, t_eval=[0.0, 1.0], fit=fit), np.arange(40) != 13
+    np.testing.assert_array_equal(run.y[:, others], right.y)
+    np.testing.assert_array_equal(run.own_dt[:, others], right.own_dt)
+    np.testing.assert_array_equal(run.status[others], right.status)
+    assert run.status[13] == fm.Status.STEP_TOO_LARGE
+    assert run.failures == "1 of 40 trajectories failed: 1 step_too_large; use a smaller dt"
+    assert np.isnan(run.y[:, 13]).all()
+    assert run.failed is not None
+    assert run.last is not None
+    assert run.failed[13] == 0.0
+    np.testing.assert_array_equal(run.last[13], starts[13])
+
+
+def test_a_step_that_is_too_short_for_all_is_still_refused() -> None:
+    with pytest.raises(InputError, match=r"^dt = .* s: gives .* steps, at most 9e\+15 are possible$"):
+        fm.integrate(SCENE, [0.1, 0.2, 0.0, 0.0], 1.0, dt=1e-17, fit=True)

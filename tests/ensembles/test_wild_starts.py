@@ -1,0 +1,68 @@
+"""Starts far faster than all others, in runs to a tolerance: what they cost, and that they disturb nobody."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from ensembles.references import rest_starts
+
+import fastmech as fm
+from fastmech.ensembles import doubling, ladder, repeatable
+from fastmech.ensembles.solve import solve
+from fastmech.ensembles.stiffness import total_work
+from fastmech.integrators.methods import find_method
+
+SCENE = fm.Scene(c2=1100 / 3, alpha=0.0)
+
+
+@pytest.mark.parametrize("quantile", [0.9, 1.0])
+@pytest.mark.parametrize("speed", [1e20, 1e100, 1e300])
+def test_a_start_that_no_steps_follow_leaves_others_alone(speed: float, quantile: float) -> None:
+    starts, times = rest_starts(24), np.linspace(0.0, 4.0, 9)
+    right = fm.integrate(SCENE, starts, t_eval=times, tol=1e-4, quantile=quantile)
+    wild = np.insert(starts, 7, [0.3, 0.2, speed, 0.0], axis=0)
+    run, others = fm.integrate(SCENE, wild, t_eval=times, tol=1e-4, quantile=quantile), np.arange(25) != 7
+    np.testing.assert_array_equal(run.y[:, others], right.y)
+    np.testing.assert_array_equal(run.status == fm.Status.STEP_TOO_LARGE, ~others)
+    assert run.error_estimate == right.error_estimate
+    if quantile == 1.0:
+        assert run.error is not None
+        np.testing.assert_array_equal(run.error[others], right.error)
+        assert run.error[7] == np.inf
+
+
+@pytest.mark.parametrize("slow", [0, 5, 100])
+def test_a_fast_start_costs_no_more_than_its_steps_ask_for(
+    slow: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At 1,000 rad/s the motion is chaotic: no step brings it to a tolerance, and few are tried in vain.
+
+    Without a count of fitted steps the shortest would be 64 times as short as the first.
+    """
+    steps: list[int] = []
+
+    def counted(*arguments: Any, **named: Any) -> Any:
+        solution = solve(*arguments, **named)
+        steps.append(int(solution.steps.max(initial=0)))
+        return solution
+
+    for module in (ladder, doubling, repeatable):
+        monkeypatch.setattr(module, "solve", counted)
+    starts = np.vstack([rest_starts(slow) * 0.5, [[0.3, 0.2, 1e3, 0.0]]])
+    run = fm.integrate(SCENE, starts, 10.0, tol=1e-6)
+    assert run.error is not None
+    assert (run.error[:-1] <= 1e-6).all()
+    assert run.error[-1] > 1e-6
+    # 10 s at 1,000 rad/s are 1e4 rad, of which an Adams method takes about 20 steps a rad at first.
+    assert max(steps) < 32 * 2e5
+    assert sum(steps) < 100 * 2e5
+
+
+def test_the_cost_of_fitted_steps_is_that_of_the_steps_taken() -> None:
+    """One right-hand side a step for ab6, but for its start; lengths of steps are counted to 10 %."""
+    starts = np.vstack([rest_starts(20), [[0.3, 0.2, 50.0, 0.0], [0.3, 0.2, 500.0, 0.0]]])
+    taken = fm.integrate(SCENE, starts, 10.0, dt=0.01, method="ab6", fit=True)
+    counted = total_work(find_method("ab6"), taken.own_dt[0], np.array([10.0]))
+    assert counted == pytest.approx(taken.own_steps.sum(), rel=0.15)
