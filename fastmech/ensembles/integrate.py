@@ -34,6 +34,9 @@ from fastmech.step_limits.beyond import StepJudge, StepsTaken
 #: Longest step [s] where neither a step nor a tolerance is given.
 DEFAULT_DT = 0.01
 
+#: Numbers beside the states that a run holds of each trajectory, and of each parameter of its own.
+BESIDE, OWN = 4, 3
+
 #: Statuses of trajectories that have failed.
 FAILURES = [status for status in Status if status != Status.OK]
 
@@ -141,7 +144,9 @@ def integrate(
     """
     outputs = _output_times(t_end, t_eval)
     starts, problem = _problem(scene, y0, parameters or {}, formulation)
-    checks.memory(outputs.size * starts.size, 2 if tol is None else 4)
+    kept = starts.shape[1] * (outputs.size + np.size(fit) - 1 + problem.canonical)
+    beside = BESIDE + OWN * len(parameters or {})
+    checks.memory(len(starts) * (kept + (1 if tol is None else 2) * beside), 2 if tol is None else 4)
     if tol is not None:
         if dt is not None or fit is not False or dtype != "float64":
             raise InputError(
