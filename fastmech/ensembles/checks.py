@@ -12,6 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastmech.errors import InputError
 
+#: Bytes for which the machine is not asked whether it has them: the question takes longer than a small run.
+UNASKED = 2**26
+
 
 def number(name: str, value: Any, unit: str, *, above: float = -math.inf, least: float = -math.inf) -> float:
     """A finite number greater than ``above`` and not less than ``least``.
@@ -78,7 +81,8 @@ def memory(numbers: int, copies: int) -> None:
     Raises:
         InputError: the machine has not as much free memory.
     """
-    needed, free = 8 * numbers * copies, free_memory()
+    needed = 8 * numbers * copies
+    free = free_memory() if needed > UNASKED else math.inf
     if needed > free:
         raise InputError(
             f"y0, t_eval: the states would take {needed / 2**30:.3g} GiB on the way, {free / 2**30:.3g} GiB "

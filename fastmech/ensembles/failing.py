@@ -41,9 +41,8 @@ class Resumption:
     def __init__(self, lanes: Lanes) -> None:
         """From the lanes as they are."""
         self._lanes = lanes
-        self._Y, self._phase = lanes.Y.copy(), lanes.phase.copy()
+        self._Y, self._phase = lanes.states_before(), lanes.phase.copy()
         self._memory = lanes.memory_before() if lanes.phase.any() else None  # None: the method starts
-        self._params = lanes.params
 
     def last_finite(
         self, rhs: Any, method: Method, span: Span, out: Floats, which: NDArray[np.int64]
@@ -72,7 +71,8 @@ class Resumption:
 
     def params(self, which: NDArray[np.int64]) -> Floats:
         """Parameters (n, count) at the places ``which`` (n,)."""
-        return self._lanes.rows(self._params)[which]
+        params = self._lanes.own_params()
+        return np.broadcast_to(params, (which.size, params.size)) if params.ndim == 1 else params[which]
 
     def watched(
         self,

@@ -53,6 +53,7 @@ class Lanes:
     """Trajectories that still run, as blocks (blocks, rows, lanes) of states, parameters and records.
 
     So is what their method carries from call to call, see :class:`fastmech.integrators.batch.Batch`.
+    Parameters that all share are in one block for all.
 
     The last block is filled up with copies of the last trajectory, so every lane runs in whole vectors.
     """
@@ -81,29 +82,43 @@ class Lanes:
             self.memory = _on_lines((blocks, carried * dim, width), states.dtype, np.zeros)
         else:
             self.memory = self._blocked(carried)
-        self._before = np.empty_like(self.memory)
+        self._before = np.empty_like(self.Y), np.empty_like(self.memory)
 
     def _arrange(self, states: Floats, params: Floats, record: Floats) -> None:
         blocks = max(1, -(-len(states) // self.block_lanes))
         self._width = -(-len(states) // (blocks * VECTOR_LANES)) * VECTOR_LANES
-        self.Y, self.params, self.record = map(self._blocked, (states, params, record))
+        self.Y, self._shared = self._blocked(states), params.ndim == 1
+        self.params = self._filled(params, 1) if self._shared else self._blocked(params)
+        self.record = self._filled(record, len(self.Y)) if record.ndim == 1 else self._blocked(record)
 
     def _blocked(self, values: Floats) -> Floats:
-        """Values of all (rows,), or of each (n, rows), as blocks (blocks, rows, lanes)."""
-        n, rows = self.members.size, values.shape[-1]
+        """Values of each (n, rows) as blocks (blocks, rows, lanes)."""
+        n, rows = values.shape
         blocks = -(-n // self._width)
-        blocked = _on_lines((blocks, rows, self._width), values.dtype)
-        if values.ndim == 1:
-            blocked[...] = values[:, None]
-            return blocked
         lanes = np.minimum(np.arange(blocks * self._width), n - 1)
+        blocked = _on_lines((blocks, rows, self._width), values.dtype)
         blocked[...] = rows_at(values, lanes).reshape(blocks, self._width, rows).transpose(0, 2, 1)
         return blocked
 
+    def _filled(self, values: Floats, blocks: int) -> Floats:
+        """Values of all (rows,) as blocks (blocks, rows, lanes)."""
+        filled = _on_lines((blocks, values.size, self._width), values.dtype)
+        filled[...] = values[:, None]
+        return filled
+
+    def states_before(self) -> Floats:
+        """What the states are now: kept until this is asked again, in place of a new copy for each call."""
+        self._before[0][...] = self.Y
+        return self._before[0]
+
     def memory_before(self) -> Floats:
-        """What the memory is now: kept until this is asked again, in place of a new copy for each call."""
-        self._before[...] = self.memory
-        return self._before
+        """What the memory is now, as :meth:`states_before`."""
+        self._before[1][...] = self.memory
+        return self._before[1]
+
+    def own_params(self) -> Floats:
+        """Parameters of all (count,), or of each member (members, count)."""
+        return self.params[0, :, 0] if self._shared else self.rows(self.params)
 
     def batch(self, span: Span, observer_params: NDArray[np.float64]) -> Batch:
         """What a method is given to take the lanes through a span."""
@@ -134,10 +149,10 @@ class Lanes:
         few = which.any() and np.count_nonzero(~which) < WORTH_MOVING * which.size
         if which.all() or (few and not at_once):
             return
-        kept = [self.rows(a)[which] for a in (self.Y, self.params, self.record, self.memory)]
+        states, record, memory = (self.rows(a)[which] for a in (self.Y, self.record, self.memory))
+        params = self.own_params() if self._shared else self.own_params()[which]
         self.members = self.members[which]
         if self.members.size:
-            *others, memory = kept
-            self._arrange(*others)
+            self._arrange(states, params, record)
             self.memory = self._blocked(memory)
-            self._before = np.empty_like(self.memory)
+            self._before = np.empty_like(self.Y), np.empty_like(self.memory)

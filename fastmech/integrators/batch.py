@@ -26,7 +26,7 @@ class Batch:
 
     times: NDArray[np.float64]  #: start, then the end of every piece [s]
     steps: NDArray[np.int64]  #: steps of every piece
-    params: Floats  #: parameters of the lanes, shape (blocks, count, lanes)
+    params: Floats  #: parameters of the lanes, shape (blocks, count, lanes); (1, count, lanes): of all blocks
     observer_params: NDArray[np.float64]  #: parameters of the observer
     Y: Floats  #: states, advanced in place, shape (blocks, dim, lanes)
     record: NDArray[np.float64]  #: what the observer keeps, shape (blocks, rows, lanes)

@@ -65,7 +65,7 @@ def integrate_blocks(
     stages, dim, lanes = nodes.shape[0], Y.shape[1], Y.shape[2]
     K, Z = rows_of(Y[0], stages).reshape((stages, dim, lanes)), rows_of(Y[0], 1).reshape((dim, lanes))
     for b in range(Y.shape[0]):
-        state, own, kept = Y[b], params[b], record[b]
+        state, own, kept = Y[b], params[min(b, params.shape[0] - 1)], record[b]
         for j in range(steps.shape[0]):
             h = (times[j + 1] - times[j]) / max(steps[j], 1)
             for step in range(steps[j]):

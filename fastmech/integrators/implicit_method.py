@@ -72,7 +72,7 @@ class ImplicitRungeKutta(OneStep):
                 batch.times,
                 batch.steps,
                 batch.Y[block],
-                batch.params[block],
+                batch.params[min(block, len(batch.params) - 1)],
                 batch.observer_params,
                 batch.record[block],
                 batch.out[block],

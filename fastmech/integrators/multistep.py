@@ -77,7 +77,7 @@ def integrate_multistep_blocks(
     row = np.empty(rows, dtype=np.int64)  # row[a] holds the derivative of a steps ago
     known, newest, last = 0, 0, 0.0
     for b in range(Y.shape[0]):
-        state, own, kept = Y[b], params[b], record[b]
+        state, own, kept = Y[b], params[min(b, params.shape[0] - 1)], record[b]
         y, history = state.reshape(n), memory[b].reshape(rows, n)
         f[:] = history
         known, newest, last = int(phase[0]), int(phase[1]), phase[2]

@@ -91,7 +91,7 @@ def integrate_whole_steps(
     other = rows_of(Y[0], 1).reshape((dim, lanes))
     far, some_far = np.zeros(lanes, dtype=np.bool_), False
     for b in range(Y.shape[0]):
-        now, then, own, kept = Y[b], other, params[b], record[b]
+        now, then, own, kept = Y[b], other, params[min(b, params.shape[0] - 1)], record[b]
         for j in range(steps.shape[0]):
             h = (times[j + 1] - times[j]) / max(steps[j], 1)
             for k in range(steps[j]):

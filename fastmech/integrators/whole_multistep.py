@@ -107,7 +107,7 @@ def integrate_whole_multistep(
     before = rows_of(Y[0], 1).reshape((dim, lanes))
     known, last, some_far = 0, 0.0, False
     for b in range(Y.shape[0]):
-        state, own, kept, newest = Y[b], params[b], record[b], rows - 1
+        state, own, kept, newest = Y[b], params[min(b, params.shape[0] - 1)], record[b], rows - 1
         known, last = int(phase[0]), phase[2]
         if known:
             F[:rows] = memory[b].reshape((rows, dim, lanes))

@@ -29,7 +29,7 @@ def filled(n: int, block_lanes: int) -> tuple[Lanes, Floats, Floats]:
 def test_what_goes_in_comes_out(n: int, block_lanes: int) -> None:
     lanes, states, params = filled(n, block_lanes)
     np.testing.assert_array_equal(lanes.rows(lanes.Y), states)
-    np.testing.assert_array_equal(lanes.rows(lanes.params), params)
+    np.testing.assert_array_equal(lanes.own_params(), params)
     np.testing.assert_array_equal(lanes.rows(lanes.record), np.tile(RECORD, (n, 1)))
 
 
@@ -52,6 +52,11 @@ def test_blocks_are_whole_vectors_and_filled_with_the_last(n: int, block_lanes: 
 def test_what_all_share_is_given_to_every_lane(n: int) -> None:
     lanes = Lanes(np.arange(n), np.zeros((n, 4)), np.arange(8.0), RECORD, 100, 0)
     np.testing.assert_array_equal(lanes.params.transpose(0, 2, 1) - np.arange(8.0), 0.0)
+    assert lanes.params.shape == (1, 8, lanes.Y.shape[2])
+    assert lanes.own_params().tolist() == list(range(8))
+    lanes.keep(np.arange(n) % 3 == 0, True)
+    assert lanes.params.shape == (1, 8, lanes.Y.shape[2])
+    assert lanes.own_params().tolist() == list(range(8))
 
 
 @SIZES
@@ -114,7 +119,7 @@ def test_those_who_stay_keep_what_they_have(n: int) -> None:
         np.testing.assert_array_equal(lanes.members, 2 * stay + 1)
         if stay.size:
             np.testing.assert_array_equal(lanes.rows(lanes.Y), 3.0 * states[stay])
-            np.testing.assert_array_equal(lanes.rows(lanes.params), params[stay])
+            np.testing.assert_array_equal(lanes.own_params(), params[stay])
             np.testing.assert_array_equal(lanes.rows(lanes.record), np.tile([0.0, 0.5, -1.0], (stay.size, 1)))
     assert lanes.members.size == 0
 
