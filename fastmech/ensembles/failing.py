@@ -72,7 +72,7 @@ class Resumption:
     def params(self, which: NDArray[np.int64]) -> Floats:
         """Parameters (n, count) at the places ``which`` (n,)."""
         params = self._lanes.own_params()
-        return np.broadcast_to(params, (which.size, params.size)) if params.ndim == 1 else params[which]
+        return np.repeat(params[None], which.size, axis=0) if params.ndim == 1 else params[which]
 
     def watched(
         self,
