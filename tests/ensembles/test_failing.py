@@ -74,7 +74,7 @@ def test_no_energy_beyond_a_double_s_range_is_right(method: str, dt: float, step
 
 @pytest.mark.parametrize("options", [{}, {"fit": [0.0, 1.0]}, {"formulation": "hamilton"}])
 def test_a_result_tells_of_its_failures(options: dict[str, Any]) -> None:
-    """At 1e200 rad/s the squares overflow in the first step, and no steps fit: the start is the last state."""
+    """At 1e200 rad/s the squares overflow in the first step, no steps fit: the start is the last state."""
     starts = np.random.default_rng(0).normal(size=(8, 4))
     why = "step_too_large" if "fit" in options else "not_finite"
     starts[3, 0], starts[5, 2:] = np.nan, [1e200, 0.0]
