@@ -89,7 +89,6 @@ def run_bench(
     prices = costs(problems[0], stage("terms", TURNS))
     starts = [] if quick else list(started(stage("cold starts", len(STARTED))))
     memory = [] if quick else footprints(stage("memory", len(TRAJECTORIES)))
-    others = [path for study in STUDIES.values() for path in study(out, quick=quick, stage=stage)]
     table, picture = out / "bench.md", out / "bench.png"
     lines = _preamble(quick, failures)
     for problem in problems:
@@ -113,7 +112,8 @@ def run_bench(
         | provenance(thread_count(None)),
         replace=True,
     )
-    return [table, picture, data, *others]
+    others = (study(out, quick=quick, stage=stage) for study in STUDIES.values())
+    return [table, picture, data, *(path for paths in others for path in paths)]
 
 
 def enlarged(entrant: Entrant) -> Entrant:
