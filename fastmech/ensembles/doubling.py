@@ -75,7 +75,7 @@ class Doubling(Repeatable):
     def run(self, progress: Progress | None) -> tuple[Solution, Floats, str]:
         """The solution, errors (n,), and what is to be said about those beyond the tolerance."""
         settings, n = self.settings, len(self.starts)
-        self.usable = usable_starts(self.problem, self.starts, float(self.outputs[-1]))
+        self.usable = usable_starts(self.problem, self.starts, float(self.outputs[-1]), self.threads)
         self.dt = np.full(n, float(settings.dt))
         self.best = solve(self.problem, self.starts, self.outputs, settings, self.threads, progress)
         everyone = np.arange(n)
@@ -105,6 +105,8 @@ class Doubling(Repeatable):
     def affordable(self, who: Members, finer: float) -> Members:
         """As many of the trajectories, longest steps first, as the budget allows with steps so much finer."""
         who = who[np.argsort(-self.dt[who] * self.shares[who], kind="stable")]
+        if self.work(who, self.dt[who] / finer) <= self.left:  # as a rule
+            return np.sort(who)
         number = bisect_right(
             range(1, who.size + 1), self.left, key=lambda n: self.work(who[:n], self.dt[who[:n]] / finer)
         )

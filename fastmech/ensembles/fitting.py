@@ -32,9 +32,10 @@ QUICK = 3.0
 #: Decay times after which a force is gone: exp(-40) is less than a double's rounding.
 GONE = 40.0
 
-#: Turns [rad] that a motion may make, by its bound on the speed, for steps to be fitted to it: with more, one
-#: trajectory would keep all others waiting for hours, and its angles' rounding would show.
-MOST_TURNS = 2.0**28
+#: Angle [rad] that a motion may turn through, by its bound on the speed, and steps that it may take by itself
+#: for them to be fitted to it: with more, one trajectory would keep all others waiting for many minutes, and
+#: its angles' rounding would show.
+MOST_ANGLE, MOST_FITTED = 2.0**28, 2.0**30
 
 #: Steps of a factor 2 between the longest and the next: trajectories of equal step run in common blocks.
 RUNGS = 4
@@ -65,7 +66,7 @@ def is_too_fast(c: Coefficients, starts: Floats, t_end: float, threads: int | No
         InputError: the number of threads is wrong.
     """
     with np.errstate(invalid="ignore", over="ignore"):
-        followed = speed_bound(c, starts, threads) * t_end <= MOST_TURNS
+        followed = speed_bound(c, starts, threads) * t_end <= MOST_ANGLE
     return np.asarray(~followed & np.isfinite(starts).all(axis=1))
 
 

@@ -34,8 +34,8 @@ from fastmech.step_limits.beyond import StepJudge, StepsTaken
 #: Longest step [s] where neither a step nor a tolerance is given.
 DEFAULT_DT = 0.01
 
-#: Numbers beside the states that a run holds of each trajectory, and of each parameter of its own.
-BESIDE, OWN = 4, 3
+#: Numbers beside the states that a run holds of each trajectory, and of each coefficient of its own.
+BESIDE, OWN = 4, 2
 
 #: Statuses of trajectories that have failed.
 FAILURES = [status for status in Status if status != Status.OK]
@@ -133,11 +133,12 @@ def integrate(
         that became so, and a step too large for a scene are told apart and leave the others as they are. A
         step is too large where the motion ends with an energy it cannot have, and where small motion about
         the trajectory's start or its end grows over the steps taken there though it should die out (see
-        :mod:`fastmech.step_limits.beyond`): it keeps its states, but they are not to be trusted. Of a system
-        nothing is known beforehand. One that fails on the way has NaN from the next output on, and its last
-        finite state and time in ``last`` and ``failed``. With ``tol`` also an estimate of the error; with
-        ``dt`` there is none. A trajectory that a system's stopping condition ends keeps the state in which it
-        stopped.
+        :mod:`fastmech.step_limits.beyond`): it keeps its states, but they are not to be trusted. With
+        ``fit`` or ``tol`` a start too fast for any steps has that status too, does not run, and has NaN after
+        t = 0. Of a system nothing is known beforehand. One that fails on the way has NaN from the next output
+        on, and its last finite state and time in ``last`` and ``failed``. With ``tol`` also an estimate of
+        the error; with ``dt`` there is none. A trajectory that a system's stopping condition ends keeps the
+        state in which it stopped.
 
     Raises:
         InputError: an argument is wrong, or the states would not fit into memory.
@@ -145,7 +146,7 @@ def integrate(
     outputs = _output_times(t_end, t_eval)
     starts, problem = _problem(scene, y0, parameters or {}, formulation)
     kept = starts.shape[1] * (outputs.size + np.size(fit) - 1 + problem.canonical)
-    beside = BESIDE + OWN * len(parameters or {})
+    beside = BESIDE + OWN * sum(column.ndim for column in problem.params.columns)
     checks.memory(len(starts) * (kept + (1 if tol is None else 2) * beside), 2 if tol is None else 4)
     if tol is not None:
         if dt is not None or fit is not False or dtype != "float64":

@@ -23,10 +23,14 @@ Members = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 
-def usable_starts(problem: Problem, starts: Floats, t_end: float) -> Flags:
-    """Which starts (n, dim) have motions until ``t_end`` [s] that steps can follow."""
+def usable_starts(problem: Problem, starts: Floats, t_end: float, threads: int | None) -> Flags:
+    """Which starts (n, dim) have motions until ``t_end`` [s] that steps can follow.
+
+    Raises:
+        InputError: the number of threads is wrong.
+    """
     usable, c = finite_rows(starts), problem.coefficients
-    return usable if c is None else usable & ~is_too_fast(c, starts, t_end)
+    return usable if c is None else usable & ~is_too_fast(c, starts, t_end, threads)
 
 
 @dataclass

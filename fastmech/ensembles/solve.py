@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.ensembles.fitting import EXPONENT_AGAIN, EXPONENT_ONCE, fitted_steps, is_too_fast
+from fastmech.ensembles.fitting import EXPONENT_AGAIN, EXPONENT_ONCE, MOST_FITTED, fitted_steps, is_too_fast
 from fastmech.ensembles.plausible import judge
 from fastmech.ensembles.problem import Problem
 from fastmech.ensembles.run import Progress, run_ensemble
@@ -79,25 +79,29 @@ def solve(
     status, failed = np.full(n, Status.OK, dtype=np.int8), np.full(n, np.nan)
     lost: list[tuple[NDArray[np.bool_], Floats]] = []
     steps, taken = np.zeros(n, dtype=np.int64), np.empty((len(ends), n))
-    begin, now, shares = 0.0, problem.inward(starts), np.zeros(n)
+    begin, now, shares = 0.0, problem.inward(starts), np.ones(n)
     method = settings.method
     if isinstance(method, ImplicitRungeKutta):
         method = with_jacobian(method, problem.jacobian, problem.second_order)
     aside = np.zeros(n, dtype=np.bool_)
     if settings.fit and problem.coefficients is not None:
         aside = is_too_fast(problem.coefficients, starts, float(outputs[-1]), threads)
+        shares = fitted_steps(problem.coefficients, starts, 1.0, exponent, threads)
+        number = outputs[-1] / np.asarray(settings.dt, dtype=np.float64)
+        aside |= (number / shares > MOST_FITTED) & (number <= MOST_FITTED) & np.isfinite(starts).all(axis=1)
         now = np.where(aside[:, None], np.nan, now) if aside.any() else now  # they never enter a block
     for piece, end in enumerate(ends):
         inside = (outputs <= end) & ((outputs > begin) | (piece == 0))
         times = np.concatenate([[begin], outputs[inside]])
         times = times if times[-1] == end and times.size > 1 else np.append(times, end)
         dt = np.broadcast_to(np.asarray(settings.dt, dtype=np.float64), n)
-        if settings.fit and problem.coefficients is not None:
+        if piece and settings.fit and problem.coefficients is not None:
             # No motion becomes faster than its start allows: a step never shrinks where one has blown up.
             fitted = fitted_steps(problem.coefficients, problem.outward(now), 1.0, exponent, threads)
             shares = np.maximum(fitted, shares)
-            dt = dt * shares
-        dt = dt * min((share for until, share in settings.early if end <= until), default=1.0)
+        dt = np.where(aside, dt, dt * shares) * min(
+            (share for until, share in settings.early if end <= until), default=1.0
+        )
         run = run_ensemble(
             problem.rhs,
             problem.params,
@@ -129,6 +133,7 @@ def solve(
         for output in y:  # one at a time: what is computed on the way takes little memory
             output[:] = problem.outward(output)
     status[aside] = Status.STEP_TOO_LARGE
+    y[: 1 if outputs[0] == 0.0 else 0, aside] = starts[aside]
     judged = judge(status, starts, y[-1], problem.coefficients, threads)
     last = None
     if lost:

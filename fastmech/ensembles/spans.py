@@ -49,6 +49,10 @@ class Way:
     def _steps_before(self) -> NDArray[np.int64]:
         return np.concatenate([[0], np.cumsum(self.steps)])
 
+    @cached_property
+    def _passed(self) -> NDArray[np.int64]:
+        return np.cumsum(self.outputs >= 0)
+
     def span(self, first: int, most: int) -> Span:
         """What a call passes from piece ``first`` on: one piece, or more while steps are at most ``most``."""
         before = self._steps_before
@@ -57,7 +61,7 @@ class Way:
             self.times[first : end + 1],
             self.steps[first:end],
             self.outputs[first:end],
-            int(self.outputs[:end].max()) + 1,
+            int(self._passed[end - 1]),
         )
 
 

@@ -87,7 +87,13 @@ def solve_to_tolerance(
     """
     if problem.observation.stops:
         problem = replace(problem, observation=replace(problem.observation, locate=True))
-    usable = np.flatnonzero(usable_starts(problem, starts, float(outputs[-1])))
+    usable = np.flatnonzero(usable_starts(problem, starts, float(outputs[-1]), threads))
+    if not usable.size:
+        fit = () if problem.coefficients is None else (0.0,)
+        settings = Settings(find_method(method or CALM), float(outputs[-1]) or 1.0, fit)
+        solution = solve(problem, starts, outputs, settings, threads, progress)
+        none = np.full(len(starts), np.inf) if quantile == 1.0 else None
+        return Estimated(solution, settings, "no start has a motion that steps can follow", none, 0.0)
     wanted = _Wanted(problem, starts, outputs, usable, quantile, threads)
     sample = _sample(wanted, SAMPLE_MAXIMUM if quantile == 1.0 else SAMPLE_QUANTILE)
     aim = quantile if quantile < 1.0 else TYPICAL

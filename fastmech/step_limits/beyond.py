@@ -48,7 +48,6 @@ TOLD = 3
 #: Eigenvalues between the grid's configurations may be larger than those at them by this factor.
 BETWEEN = 1.15
 
-
 #: Trajectories of a part where some are looked at closely, and where they are far from a limit.
 CLOSE_PART, FAR_PART = 2**12, 2**15
 
@@ -139,7 +138,9 @@ class StepJudge:
         """
         method, c = self._method, self._coefficients
         asked: set[int] = set()
-        if not self._is_quiet(dt, steps):  # else there is one scene, which is looked at in any case
+        if len(self._starts) and not self._is_quiet(
+            dt, steps
+        ):  # else there is one scene, which is looked at in any case
             stiffest, still = stiffest_growing(method, c, self._starts, dt, steps)
             self._still = ((1.0 + ROUNDED) * dt, float(np.ceil(steps))) if still else None
             asked |= set() if stiffest is None else {stiffest}
@@ -224,7 +225,7 @@ def _may_grow_at_rest(method: Adams, scene: Scene, dt: float, most: float) -> ND
 
 @lru_cache(KEPT)
 def _growth_at_rest(method: str, scene: Scene, dt: float, most: int) -> float:
-    """Logarithm of the growth a step [s] there, 0 where it cannot count in ``most`` steps."""
+    """Logarithm of the growth a step [s] there, negative where it cannot count in ``most`` steps."""
     formula = find_method(method)
     assert isinstance(formula, Adams)
     modes = _may_grow_at_rest(formula, scene, dt, most)

@@ -66,7 +66,8 @@ def judge_chunk(
         find_principal(modes[ZR], modes[ZI], predictor, corrector, work, modes[RR], modes[RI])
         for i in range(CHUNK):
             size = np.sqrt(modes[RR, i] * modes[RR, i] + modes[RI, i] * modes[RI, i])
-            told[i] |= size > modes[FACTOR, i]
+            asked = (modes[FACTOR, i] < modes[ERRORS, i]) & (modes[DOUBTED, i] != 0.0)
+            told[i] |= asked & (size > modes[FACTOR, i])
 
 
 @inlined
@@ -212,8 +213,9 @@ def judge_states(
                 )
                 size = np.sqrt(real * real + imaginary * imaginary)
                 # A mode that does not decay after all is taken for one at rest, which does not grow.
-                step = modes[ZR, j] if (real < -GROWTH_PER_RADIAN * size) & (imaginary >= 0.0) else 0.0
-                modes[ZR, j], modes[ZI, j] = step * real, step * imaginary
+                step = modes[ZR, j] if real < -GROWTH_PER_RADIAN * size else 0.0
+                # Beside critical damping a mode may have become its conjugate: the two grow alike.
+                modes[ZR, j], modes[ZI, j] = step * real, step * abs(imaginary)
             judge_chunk(modes, powers, predictor, corrector, work, told)
             for j in range(min(CHUNK, count - begin)):
                 i = of[begin + j]

@@ -57,6 +57,7 @@ GEOMETRY = {"m2": np.linspace(3.0, 4.0, 100_000), "l": np.linspace(0.5, 0.6, 100
         {"tol": 1e-4},
         {"parameters": OWN},
         {"parameters": OWN | GEOMETRY},
+        {"parameters": {"m2": GEOMETRY["m2"]}},
         {"parameters": OWN, "tol": 1e-4},
     ],
     ids=str,

@@ -66,3 +66,37 @@ def test_the_cost_of_fitted_steps_is_that_of_the_steps_taken() -> None:
     taken = fm.integrate(SCENE, starts, 10.0, dt=0.01, method="ab6", fit=True)
     counted = total_work(find_method("ab6"), taken.own_dt[0], np.array([10.0]))
     assert counted == pytest.approx(taken.own_steps.sum(), rel=0.15)
+
+
+@pytest.mark.parametrize("quantile", [0.9, 1.0])
+@pytest.mark.parametrize("own", [False, True])
+@pytest.mark.parametrize("speed", [1e20, 1e200])
+def test_starts_that_no_steps_follow_are_told_so_alone_too(speed: float, own: bool, quantile: float) -> None:
+    starts = np.array([[0.3, 0.2, speed, 0.0]] * 2)
+    parameters = {"beta": np.ones(2)} if own else {}
+    run = fm.integrate(SCENE, starts, t_eval=[0.0, 1.0], tol=1e-6, quantile=quantile, parameters=parameters)
+    assert (run.status == fm.Status.STEP_TOO_LARGE).all()
+    np.testing.assert_array_equal(run.y[0], starts)
+    assert np.isnan(run.y[1]).all()
+    assert "no start" in str(run.reason)
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_no_start_that_is_finite_and_no_start_at_all(own: bool) -> None:
+    for starts in (np.full((2, 4), np.nan), np.zeros((0, 4))):
+        parameters = {"beta": np.ones(len(starts))} if own else {}
+        run = fm.integrate(SCENE, starts, 1.0, tol=1e-6, parameters=parameters)
+        assert (run.status == fm.Status.START_NOT_FINITE).all()
+        assert run.y.shape == (1, len(starts), 4)
+
+
+@pytest.mark.parametrize(("speed", "aside"), [(1e6, False), (1e8, True), (2e7, True)])
+def test_steps_are_fitted_to_no_motion_that_takes_too_many(speed: float, aside: bool) -> None:
+    """Fitted again, a step shrinks with the speed to the power 1.5; a microsecond takes few all the same."""
+    slow = rest_starts(3)
+    starts, end = np.vstack([slow, [[0.3, 0.2, speed, 0.0]]]), 1e-6 if not aside else 1.0
+    run = fm.integrate(SCENE, starts, end, dt=1e-3, fit=[0.0, 0.5 * end])
+    assert (run.status[3] == fm.Status.STEP_TOO_LARGE) == aside
+    alone = fm.integrate(SCENE, slow, end, dt=1e-3, fit=[0.0, 0.5 * end])
+    np.testing.assert_array_equal(run.y[:, :3], alone.y)
+    assert (run.status[:3] == fm.Status.OK).all()

@@ -332,3 +332,30 @@ def test_parts_in_threads_have_the_verdicts_of_the_whole() -> None:
         share = partial(shared, threads)
         assert judge.beyond(starts[::-1], taken, share).tolist() == whole.tolist()
     assert 0.05 < whole.mean() < 0.95
+
+
+@pytest.mark.parametrize("method", ["rk4", "ab6", "dop853", "tsit5"])
+@pytest.mark.parametrize("alpha", [0.0, 1.0])
+def test_no_trajectories_are_judged_without_a_word(method: str, alpha: float) -> None:
+    run = fm.integrate(fm.Scene(alpha=alpha), np.zeros((0, 4)), 1.0, dt=0.5, method=method)
+    assert run.status.shape == (0,)
+
+
+def test_a_start_that_grows_is_told_after_a_warning_too() -> None:
+    """What is known of starts from before the run spares no trajectory whose end alone is innocent."""
+    scene, dt, random = fm.Scene(alpha=0.0), 0.02, np.random.default_rng(3)
+    own = {"beta": 10.0 ** random.uniform(2.0, 4.0, 400)}
+    starts = random.uniform(-3.0, 3.0, (400, 4)) * [1.0, 1.0, 0.0, 0.0]
+    taken = StepsTaken(np.full(400, dt), np.full(400, dt), np.full(400, 500.0), 10.0)
+    grow = StepJudge(scene, own, starts, "rk4").beyond(None, taken)
+    ends, harmless = starts.copy(), ~grow
+    for _ in range(50):  # places where those that grow would not
+        there = random.permutation(starts)
+        spared = ~StepJudge(scene, own, there, "rk4").beyond(None, taken) & ~harmless
+        ends[spared], harmless = there[spared], harmless | spared
+    assert np.count_nonzero(grow & harmless) > 5
+    judge = StepJudge(scene, own, starts, "rk4")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        judge.warn([scene], dt, 500.0)
+    np.testing.assert_array_equal(judge.beyond(ends, taken)[harmless], grow[harmless])
