@@ -16,8 +16,8 @@ from fastmech.errors import InputError
 
 Floats = NDArray[np.float64]
 
-#: More steps than this cannot be counted by their times in double precision.
-MOST_STEPS = 2.0**53
+#: More steps than this take hours, and the times of their pieces more memory than most machines have.
+MOST_STEPS = 2.0**34
 
 #: Steps of a piece: as few as these, more where an interval has more than so many pieces, never above most.
 PIECE_STEPS, PIECES, MOST_PIECE_STEPS = 64, 1024, 2048
