@@ -169,7 +169,7 @@ def run_ensemble(
 
     _set_aside(ensemble, np.flatnonzero(~usable), np.asarray(starts, dtype=np.float64), clock[0])
     most = max(block_lanes, task_lanes(method, begin.shape[1]))
-    tasks = list(tasks_of(np.broadcast_to(dt, len(begin)), usable, clock, workers, most))
+    tasks = tasks_of(np.broadcast_to(dt, len(begin)), usable, clock, workers, most)
     finishing = in_threads(run_task, tasks, min(workers, len(tasks)), interrupted)
     for finished in chain([int(np.count_nonzero(~usable))], finishing):
         if progress is not None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,6 +27,10 @@ BLOCK_BYTES = 32768
 TASK_LANES, TASK_BYTES = 8192, 2**19
 
 
+#: Tasks for each worker, if no step's trajectories are more than others'.
+SHARES = 3
+
+
 @dataclass(frozen=True)
 class Task:
     """Trajectories of one step's length, and how they pass the output times."""
@@ -50,16 +53,22 @@ def task_lanes(method: Method, dim: int) -> int:
     return min(TASK_LANES, TASK_BYTES // (np.dtype(np.float64).itemsize * dim * (1 + method.carried)))
 
 
-def tasks_of(
-    dt: Floats, usable: NDArray[np.bool_], times: Floats, workers: int, lanes: int
-) -> Iterator[Task]:
-    """Trajectories sorted by their step, shared evenly among the workers in tasks of at most ``lanes``."""
-    for step in np.unique(dt):
-        passed = way(times, float(step))
-        members = np.flatnonzero(usable & (dt == step))
-        if not members.size:
-            continue
-        number = -(-members.size // (lanes * workers)) * workers
+def tasks_of(dt: Floats, usable: NDArray[np.bool_], times: Floats, workers: int, lanes: int) -> list[Task]:
+    """Trajectories of one step each in tasks of at most ``lanes``, the costliest first.
+
+    All workers share a step's trajectories where they are all there are. Of several steps' each is divided as
+    far as its part of the work asks for: a task costs about as much beside its steps as a hundred of them.
+    """
+    groups = [(way(times, float(step)), np.flatnonzero(usable & (dt == step))) for step in np.unique(dt)]
+    groups = [(passed, members) for passed, members in groups if members.size]
+    work = [members.size * max(int(passed.steps.sum()), 1) for passed, members in groups]
+    equal = workers if len(groups) == 1 else SHARES * workers
+    tasks: list[tuple[int, Task]] = []
+    for (passed, members), own in zip(groups, work, strict=True):
+        number = max(-(-members.size // lanes), -(-own * equal // sum(work)) if workers > 1 else 1)
+        number = -(-number // workers) * workers if len(groups) == 1 else number
         size = -(-members.size // (number * VECTOR_LANES)) * VECTOR_LANES
         for first in range(0, members.size, size):
-            yield Task(members[first : first + size], passed)
+            part = members[first : first + size]
+            tasks.append((own * part.size // members.size, Task(part, passed)))
+    return [task for _, task in sorted(tasks, key=lambda costed: -costed[0])]
