@@ -1,7 +1,7 @@
 """Kernels as arguments of kernels: a driver is given its right-hand side as an address.
 
 Numba takes compiled functions as arguments too, but looks each one up anew at every call, with the
-interpreter's lock held: some 50 us for each. Of a :class:`Callee` it reads one number.
+interpreter's lock held: that takes as long as a step of many lanes. Of a :class:`Callee` it reads one number.
 """
 
 from __future__ import annotations

@@ -168,7 +168,7 @@ def integrate(
         )
     if quantile is not None:
         raise InputError(f"quantile = {quantile!r}: tells whose error tol is; give tol with it")
-    formula = find_method(method or "rk4")
+    formula = find_method("rk4" if method is None else method)
     step = checks.number("dt", DEFAULT_DT if dt is None else dt, "s", above=0.0)
     settings = Settings(formula, step, _fit_times(fit, scene), _precision(dtype, problem, formula))
     if not isinstance(scene, Scene):
@@ -225,7 +225,7 @@ def _fit_times(fit: bool | ArrayLike, scene: Scene | System) -> tuple[float, ...
 
 def _precision(dtype: str, problem: Problem, method: Method) -> Precision:
     known: dict[str, Precision] = {"float64": np.float64, "float32": np.float32}
-    if dtype not in known:
+    if not isinstance(dtype, str) or dtype not in known:
         raise InputError(f"dtype = {dtype!r}: must be one of {', '.join(known)}")
     if dtype == "float32" and problem.observation.stops:
         raise InputError("dtype = 'float32': not with a stopping condition")
@@ -254,9 +254,9 @@ def _problem(
     if isinstance(scene, System) and formulation is not None:
         raise InputError(f"formulation = {formulation!r}: only for a scene")
     formulation = "lagrange" if formulation is None else formulation
-    if formulation not in FORMULATIONS:
+    if not isinstance(formulation, str) or formulation not in FORMULATIONS:
         raise InputError(
-            f"formulation = {formulation!r}: unknown; {nearest(formulation, list(FORMULATIONS))}"
+            f"formulation = {formulation!r}: unknown; {nearest(str(formulation), list(FORMULATIONS))}"
         )
     if isinstance(scene, System):
         starts = checks.states("y0", y0, len(scene.state))
