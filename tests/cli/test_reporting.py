@@ -66,6 +66,7 @@ def test_the_json_comes_also_where_a_command_ends_with_a_code(capsys: pytest.Cap
 
 def test_lines_stand_above_the_bars(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
     """On a terminal the bars' own console writes them; what is piped gets plain lines."""
+    monkeypatch.setenv("TERM", "xterm")  # one that can draw bars, wherever the tests run
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     with account("try", quiet=False, as_json=False) as told:
         told.say("piped")
