@@ -214,9 +214,10 @@ def run_tolerances(
     quick: bool = False,
     stage: Callable[[str, int], Progress] = lambda name, total: lambda done: None,
     scenes: int = SCENES,
+    starts: int = STARTS,
 ) -> list[Path]:
     """Measure and write ``tolerances.md`` into the folder ``out``."""
-    scenes, n = (2, 16) if quick else (scenes, STARTS)
+    scenes, n = (2, 16) if quick else (scenes, starts)
     found = estimates(scenes, n, stage("tolerances", scenes))
     out.mkdir(parents=True, exist_ok=True)
     path = out / "tolerances.md"

@@ -25,18 +25,30 @@ from fastmech.cli.reporting import account, reporting_options
     help="One study alone.",
 )
 @click.option("--scenes", metavar="N", type=click.IntRange(min=1), help="Random scenes of `tolerances`.")
+@click.option(
+    "--starts", metavar="N", type=click.IntRange(min=1), help="Trajectories of each scene of `tolerances`."
+)
 @reporting_options
-def command(out: Path, quick: bool, only: str | None, scenes: int | None, quiet: bool, as_json: bool) -> None:
+def command(
+    out: Path,
+    quick: bool,
+    only: str | None,
+    scenes: int | None,
+    starts: int | None,
+    quiet: bool,
+    as_json: bool,
+) -> None:
     """Measure trajectories per second against the error."""
-    if scenes is not None and only != "tolerances":
-        raise click.UsageError("--scenes: goes with --only tolerances")
+    chosen = {name: value for name, value in (("scenes", scenes), ("starts", starts)) if value is not None}
+    for name in chosen:
+        if only != "tolerances":
+            raise click.UsageError(f"--{name}: goes with --only tolerances")
     with account("bench", quiet, as_json) as told:
         with told.bars.preparing():
             from fastmech.bench.report import STUDIES, run_bench
         if only is None:
             written = run_bench(out, quick=quick, stage=told.bars.stage)
         else:
-            chosen = {} if scenes is None else {"scenes": scenes}
             written = STUDIES[only](out, quick=quick, stage=told.bars.stage, **chosen)
         for path in written:
             told.wrote(path)

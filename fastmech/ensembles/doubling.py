@@ -1,6 +1,8 @@
 """Every trajectory twice, and those above the tolerance again with their own shorter steps, on a budget.
 
-Those whose two runs may be near each other by luck run once more with longer steps.
+The second run has steps shorter by sqrt(2), and its distance from the first is the first one's error. (The
+distance to a run with *longer* steps would cost less, but says little of a single trajectory: it is many
+times its error, so where the longer steps are right by luck the error is taken for many times too small.)
 
 A trajectory is given up where three shorter steps did not halve its error (chaos, a singularity, a start on a
 basin's border), where two resolutions disagree about whether it stops, or where the budget is spent. It keeps
@@ -19,10 +21,9 @@ from fastmech.ensembles.ladder import AIM, CHEAP
 from fastmech.ensembles.missed import missed_line
 from fastmech.ensembles.places import part_of, put_into
 from fastmech.ensembles.repeatable import Flags, Floats, Members, Repeatable, usable_starts
-from fastmech.ensembles.richardson import LEAST_ORDER, RATIO, ROUNDING, error_beyond, order_seen
+from fastmech.ensembles.richardson import LEAST_ORDER, RATIO, ROUNDING, error_of_longer, order_seen
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.solve import Solution, mean_shares, solve
-from fastmech.ensembles.stiffness import explicit_limit
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.methods import find_method
 
@@ -38,17 +39,17 @@ MAGNIFIED = 1e-3
 #: Steps of :data:`fastmech.ensembles.calibration.CALM` in those of the first runs; the best is kept.
 LONGER = (4.0, 2.0, 1.0)
 
-#: Trajectories of the largest estimates whose errors are measured by runs of half the step, at the end.
-AUDITED = 64
+#: Trajectories are run again from this share of the tolerance: what two runs tell is not exact.
+KEPT = 0.75
 
-#: A difference of two runs is rarely so many times too small by luck; where it might be, steps so many times
-#: longer, or at least twice as long, tell.
-LUCK, FAR, LEAST_FAR = 100.0, RATIO**3, 2.0
+#: Trajectories of the largest estimates whose errors are measured by finer runs at the end, where a
+#: right-hand side may jump.
+AUDITED = 64
 
 #: Share of the method's order that a trajectory must show to be taken for smooth again.
 SMOOTH = 2.0 / 3.0
 
-#: The second of two finer runs, where a right-hand side may jump, has steps so many times shorter.
+#: The second of the two finer runs that measure has steps so many times shorter.
 FINER = 2.0 * RATIO
 
 #: Right-hand sides that repetitions may take in those of the two first runs; CHEAP more are always allowed.
@@ -60,7 +61,8 @@ class Doubling(Repeatable):
     """Trajectories that run to a tolerance, each with the best run that it has had."""
 
     best: Solution = field(init=False)  #: each trajectory's best run
-    dt: Floats = field(init=False)  #: its steps [s], shape (n,) like all that follow
+    finer: Solution = field(init=False)  #: its last run with steps shorter by RATIO
+    dt: Floats = field(init=False)  #: the steps of the last run but that one [s], (n,) like all that follow
     distance: Floats = field(init=False)  #: of the last two runs
     error: Floats = field(init=False)  #: estimate for the best run
     left: float = field(init=False)  #: right-hand sides that may still be taken
@@ -80,25 +82,26 @@ class Doubling(Repeatable):
         self.best = solve(self.problem, self.starts, self.outputs, settings, self.threads, progress)
         everyone = np.arange(n)
         self.shares = mean_shares(self.best, float(settings.dt), self.outputs)
-        coarse = self.solve(everyone, self.dt * RATIO)
-        self.distance = self.apart(self.best, coarse)
-        self.error = self.distance * self.found.median
+        self.finer = self.solve(everyone, self.dt / RATIO)
+        self.distance = self.apart(self.best, self.finer)
+        self.error = error_of_longer(self.distance, settings.method.order)
         self.rough, self.once_rough = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
         if self.jumps:
             # A third run tells each one's order.
-            third = self.apart(coarse, self.solve(everyone, self.dt * RATIO**2))
-            self._reckon(everyone, third, self.distance, np.full(n, RATIO))
+            longer = self.apart(self.solve(everyone, self.dt * RATIO), self.best)
+            self._reckon(everyone, longer, self.distance, np.full(n, RATIO))
         self.left = CHEAP + BUDGET * self.work(everyone, self.dt / 2.0)
         self.vain = np.zeros(n, dtype=np.int64)
         self.given_up, self.rounded = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
         self.unpaid = np.zeros(n, dtype=np.bool_)
         for _ in range(ROUNDS):
-            missing = self.usable & ~(self.margin * self.error <= self.tol)
+            missing = self.usable & ~(self.error <= KEPT * self.tol)
             again = self.affordable(np.flatnonzero(missing & ~self.given_up & ~self.rounded), 4.0)
             if not again.size:
                 break
             self._repeat(again)
-        self._audit()
+        if self.jumps:
+            self._audit()
         self._resettle(np.flatnonzero(self.rounded | (self.given_up & ~self.once_rough & ~self.unpaid)))
         return self.best, self.error, self.remark()
 
@@ -129,28 +132,28 @@ class Doubling(Repeatable):
         rough = self.rough[who]
         lasting = np.fmax(after, np.where(np.isfinite(before), before / shorter, 0.0))
         after = np.where(rough, lasting, after)
-        at_order = error_beyond(after, np.where(seen < LEAST_ORDER, 0.0, 1.0))
         self.distance[who] = after
-        self.error[who] = np.where(rough, at_order, after * self.found.median)
+        self.error[who] = error_of_longer(
+            after, np.where(rough, np.where(seen < LEAST_ORDER, 0.0, 1.0), float(p))
+        )
 
     def _repeat(self, again: Members) -> None:
         """Run trajectories with the shorter steps that their errors ask for."""
         order, error = self.settings.method.order, self.error[again]
         known = np.isfinite(error)
         with np.errstate(divide="ignore", invalid="ignore"):
-            wanted = (AIM * self.tol / (self.margin * error)) ** (1.0 / order)
+            wanted = (AIM * self.tol / error) ** (1.0 / order)
         wanted = np.clip(np.where(known, wanted, 0.25), 0.25, 1.0 / RATIO)
         rungs = np.ceil(-2.0 * np.log2(wanted) - 1e-9)  # each shorter by RATIO
         own = self.dt[again] / RATIO**rungs
-        self.left -= self.work(again, own)
-        run = self.solve(again, own)
-        apart = np.empty(again.size)
-        near = rungs == 1.0  # one step of the ladder up there is a run already
-        far = np.flatnonzero(~near)
-        apart[near] = self.apart(part_of(run, near), part_of(self.best, again[near]))
+        run, far = part_of(self.finer, again), np.flatnonzero(rungs > 1.0)  # one rung down there is a run
         if far.size:
-            self.left -= self.work(again[far], own[far] * RATIO)
-            apart[far] = self.apart(part_of(run, far), self.solve(again[far], own[far] * RATIO))
+            self.left -= self.work(again[far], own[far])
+            put_into(run, far, self.solve(again[far], own[far]), np.ones(far.size, dtype=np.bool_))
+        self.left -= self.work(again, own / RATIO)
+        finer = self.solve(again, own / RATIO)
+        put_into(self.finer, again, finer, np.ones(again.size, dtype=np.bool_))
+        apart = self.apart(run, finer)
         self._reckon(again, self.distance[again], apart, self.dt[again] / own)
         after = self.error[again]
         in_vain = ~(after <= 0.5 * error) | np.isinf(after)
@@ -192,44 +195,31 @@ class Doubling(Repeatable):
         self.error[which] = np.where(by_luck, second, first)
 
     def _audit(self) -> None:
-        """Measure the errors of the worst and of doubtful trajectories by runs of half the step.
+        """Measure the errors of the worst trajectories again, where the right-hand side may jump.
 
-        Where one is above the tolerance the finer run is kept, and measured in its turn while that helps.
-        Where it does not help any more, rounding rules, and the largest difference seen is the error.
-        Where the right-hand side may jump, one difference of two runs may be small by luck. There two finer
-        runs tell three, and if these do not fall as the order says, the finest run is kept and the largest
-        difference taken for its error.
+        One difference of two runs may be small by luck. Two finer runs tell three, and if these do not fall
+        as the order says, the finest run is kept and the largest difference taken for its error. Where one is
+        above the tolerance the finer run is kept, and measured in its turn while that helps.
         """
         open_ = self.usable & ~self.rounded & ~self.given_up
-        doubtful = self._doubtful(open_ & ~self.rough)
-        worst = self._worst(open_ & ~self.rough)  # the doubtful among them first: their errors say so
-        who = worst[: max(AUDITED, doubtful.size)]
-        if self.jumps:
-            who = np.concatenate([who, self._worst(open_ & self.rough)])
-        last = np.full(who.size, np.inf)
+        who = np.concatenate([self._worst(open_ & ~self.rough)[:AUDITED], self._worst(open_ & self.rough)])
+        last, falls = np.full(who.size, np.inf), 0.5 ** (SMOOTH * self.settings.method.order)
         for turn in range(ROUNDS):
             number = self._audited(who, turn)
             who, last = who[:number], last[:number]
             if not number:
                 return
-            best, own = part_of(self.best, who), self.dt[who] / 2.0
+            middle = self.solve(who, self.dt[who] / 2.0)
+            first, own = self.apart(middle, part_of(self.best, who)), self.dt[who] / FINER
             run = self.solve(who, own)
-            error, rough = self.apart(run, best), np.zeros(number, dtype=np.bool_)
-            if self.jumps:
-                own, middle, first = self.dt[who] / FINER, run, error
-                run = self.solve(who, own)
-                between, error = self.apart(run, middle), np.maximum(first, self.apart(run, best))
-                falls = 0.5 ** (SMOOTH * self.settings.method.order)
-                rough = ~(between <= np.maximum(ROUNDING, falls * first))
-                error = np.where(rough, np.maximum(error, between), error)
+            between = self.apart(run, middle)
+            error = np.maximum(first, self.apart(run, part_of(self.best, who)))
+            rough = ~(between <= np.maximum(ROUNDING, falls * first))
+            error = np.where(rough, np.maximum(error, between), error)
             self.error[who] = error
             missing, helps = ~(error <= self.tol), error <= 0.5 * last
             # Two resolutions may disagree about a stop: the finer one has the better view.
             helps &= np.isfinite(error) | (turn < 2)
-            if not self.jumps:
-                stuck = ~helps & np.isfinite(last)
-                self.error[who] = np.where(stuck, np.fmax(np.fmax(error, last), self.distance[who]), error)
-                self.rounded[who[stuck]] = True
             kept = (rough | (missing & helps)) & np.isfinite(run.y[-1]).all(axis=1)
             put_into(self.best, who[kept], run, kept)
             self.dt[who[kept]] = own[kept]
@@ -241,36 +231,12 @@ class Doubling(Repeatable):
         members = np.flatnonzero(which)
         return members[np.argsort(-self.error[members], kind="stable")]
 
-    def _doubtful(self, which: Flags) -> Members:
-        """Trajectories whose two runs may be near each other by luck.
-
-        As a function of the step the error may have an extremum or a zero, about which two runs hardly differ
-        however large it is. Another of far longer steps, reckoned with the order, then tells of an error
-        above the tolerance. Steps that would be unstable tell nothing.
-        """
-        who = np.flatnonzero(which & (self.error > self.tol / LUCK))
-        longer, c = self.dt[who] * FAR, self.problem.coefficients
-        if c is not None:
-            longer = np.minimum(longer, explicit_limit(self.settings.method, c))
-        told = longer >= LEAST_FAR * self.dt[who]
-        who, longer = who[told], longer[told]
-        self.left -= self.work(who, longer)
-        far, best = self.solve(who, longer), part_of(self.best, who)
-        # Steps divide the time between outputs: those taken may be less long than asked for.
-        ratio = far.dt.max(axis=0) / best.dt.max(axis=0)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            error = self.apart(far, best) / (ratio**self.settings.method.order - 1.0)
-        told = np.isfinite(error) & (error > self.tol)
-        self.error[who[told]] = error[told]  # until it is measured, or if it cannot be
-        return who[told]
-
     def _audited(self, who: Members, turn: int) -> int:
         """How many of the trajectories, worst first, the budget gives finer runs; some in any case."""
         number = who.size
         while number:
             part = who[:number]
-            cost = self.work(part, self.dt[part] / 2.0)
-            cost += self.work(part, self.dt[part] / FINER) if self.jumps else 0.0
+            cost = self.work(part, self.dt[part] / 2.0) + self.work(part, self.dt[part] / FINER)
             if cost <= self.left or (not turn and number <= AUDITED):
                 self.left -= cost
                 break

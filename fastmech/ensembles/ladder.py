@@ -22,10 +22,9 @@ from fastmech.ensembles.richardson import (
     ROUNDING,
     SHARE,
     distances,
-    error_beyond,
+    error_of_shorter,
     order_seen,
     order_statistic,
-    unseen,
 )
 from fastmech.ensembles.solve import Settings, mean_shares, solve
 from fastmech.ensembles.stiffness import total_work
@@ -47,9 +46,6 @@ PATIENCE, CHEAP = 3, 1e7
 #: Of the trajectories that need not keep the tolerance, the share that may differ in their stops.
 UNSEEN = 0.25
 
-#: Share of the sample's errors that the ratio used for the largest error covers.
-COVERED = 0.95
-
 #: Overshoot from which an explicit method's step is taken to be set by stability.
 OVERSHOT = 1e-3
 
@@ -65,19 +61,6 @@ class Sample:
     aim: float  #: the quantile of the sample's errors that is looked at
     threads: int | None
     many: float  #: trajectories that are to be integrated, to one of the sample
-
-
-@dataclass(frozen=True)
-class Calibrated:
-    """Settings that suit a tolerance, and what the sample's errors were."""
-
-    settings: Settings
-    reason: str  #: why this method, one line
-    median: float  #: error of the finer of two runs over their distance
-    cover: float  #: the same for most trajectories
-    truth: Floats  #: states of the sample (outputs, n, dim) by steps half as long
-    distance: Floats  #: between the sample's run and the one with longer steps, shape (n,)
-    error: float  #: the sample's quantile of the errors
 
 
 @dataclass
@@ -121,10 +104,10 @@ class Ladder:
         found = distances(self.run(rung), self.run(rung - 1))
         above = [tried for tried in self.tried if tried < rung]
         if not above:
-            return error_beyond(found, p)
+            return error_of_shorter(found, p)
         last = max(above)
         before = distances(self.run(last), self.run(last - 1))
-        return error_beyond(found, order_seen(before, found, RATIO ** (rung - last), p))
+        return error_of_shorter(found, order_seen(before, found, RATIO ** (rung - last), p))
 
     def estimate(self, rung: int) -> float:
         """The sample's quantile of the errors, from two runs."""
@@ -202,18 +185,24 @@ class Ladder:
         return self.estimate(self.rung) < OVERSHOT * self.sample.tol and self.dt(self.rung - 1) < self.longest
 
     def calibrated(self, reason: str) -> Calibrated:
-        """Errors of the rung, seen by one of half its step, over the distance of two runs."""
-        k = self.rung
-        truth, fine, coarse = self.run(k + 2), self.run(k), self.run(k - 1)
-        distance = distances(fine, coarse)
-        error = unseen(distances(fine, truth), distance, self.method.order)
-        settings = replace(self.base, dt=self.dt(k))
-        known = (distance > 0.0) & np.isfinite(distance) & np.isfinite(error)
-        known &= error > 0.0  # an error of exactly 0 tells no ratio: of x' = 1 most are
-        if not known.any():
-            return Calibrated(settings, reason, 1.0, 1.0, truth, distance, math.inf if len(error) else 0.0)
-        ratios = error[known] / distance[known]
-        median, cover = float(np.median(ratios)), float(np.quantile(ratios, COVERED))
-        return Calibrated(
-            settings, reason, median, cover, truth, distance, order_statistic(error, self.sample.aim)
-        )
+        """The rung found."""
+        return Calibrated(replace(self.base, dt=self.dt(self.rung)), reason, self)
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """Settings that suit a tolerance, and the sample's runs that have told so."""
+
+    settings: Settings
+    reason: str  #: why this method, one line
+    ladder: Ladder
+
+    @property
+    def truth(self) -> Floats:
+        """States of the sample (outputs, n, dim) by steps half as long."""
+        return self.ladder.run(self.ladder.rung + 2)
+
+    @property
+    def distance(self) -> Floats:
+        """Between the sample's run and the one with longer steps, shape (n,)."""
+        return distances(self.ladder.run(self.ladder.rung), self.ladder.run(self.ladder.rung - 1))

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.ensembles.fitting import is_too_fast
-from fastmech.ensembles.ladder import Calibrated
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.problem import Problem
 from fastmech.ensembles.richardson import distances
@@ -35,30 +33,20 @@ def usable_starts(problem: Problem, starts: Floats, t_end: float, threads: int |
 
 @dataclass
 class Repeatable:
-    """What is integrated, and what a calibration has found for it."""
+    """What is integrated, and how."""
 
     problem: Problem
     starts: Floats
     outputs: Floats
-    found: Calibrated
+    settings: Settings  #: that a calibration has found
     tol: float
     threads: int | None
     shares: Floats = field(init=False)  #: mean fitted steps over the settings', (n,)
 
     @property
-    def settings(self) -> Settings:
-        """What the calibration has found."""
-        return self.found.settings
-
-    @property
     def jumps(self) -> bool:
         """Whether the right-hand side may jump: of a user's nobody knows."""
         return self.problem.coefficients is None
-
-    @cached_property
-    def margin(self) -> float:
-        """Where even the ratio that covers most of the sample keeps an error within the tolerance, it is."""
-        return self.found.cover / self.found.median
 
     def solve(self, who: Members, dt: Floats, settings: Settings | None = None) -> Solution:
         """A run of some of the trajectories with their own steps."""

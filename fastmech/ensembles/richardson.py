@@ -50,10 +50,16 @@ def order_seen(before: Floats, after: Floats, shorter: ArrayLike, order: int) ->
     return np.where(told, np.maximum(seen, 0.0), float(order))
 
 
-def error_beyond(distance: Floats, order: ArrayLike) -> Floats:
+def error_of_shorter(distance: Floats, order: ArrayLike) -> Floats:
     """Errors (n,) of runs from their distances to those with steps longer by :data:`RATIO`."""
     q = np.asarray(order, dtype=np.float64)
     return distance / np.where(q < LEAST_ORDER, 1.0, RATIO ** np.maximum(q, LEAST_ORDER) - 1.0)
+
+
+def error_of_longer(distance: Floats, order: ArrayLike) -> Floats:
+    """Errors (n,) of runs from their distances to those with steps shorter by :data:`RATIO`."""
+    q = np.asarray(order, dtype=np.float64)
+    return distance / np.where(q < LEAST_ORDER, 1.0, 1.0 - RATIO ** -np.maximum(q, LEAST_ORDER))
 
 
 def half_over(order: ArrayLike) -> Floats:

@@ -1,9 +1,9 @@
 """A tolerance in place of a step: method, step and precision from a calibration, and the error estimated.
 
-The error of a run is estimated by step doubling in its finer form: a second run with steps longer by
+The error of a run is estimated by step doubling in its finer form: a second run with steps that differ by
 sqrt(2), see :mod:`fastmech.ensembles.richardson`. A sample of trajectories settles method, step and
 precision. For a quantile of the errors the sample's quantile is the estimate; for the largest error every
-trajectory runs twice, and those near the tolerance once more, see :mod:`fastmech.ensembles.doubling`.
+trajectory runs twice, see :mod:`fastmech.ensembles.doubling`.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def solve_to_tolerance(
     many = usable.size / max(sample.size, 1)
     found = calibrate(part, begun, outputs, tol, aim, method, threads, many)
     if quantile == 1.0:
-        doubling = Doubling(problem, starts, outputs, found, tol, threads)
+        doubling = Doubling(problem, starts, outputs, found.settings, tol, threads)
         solution, errors, remark = doubling.run(progress)
         largest = float(np.max(errors[usable], initial=0.0))
         return Estimated(solution, found.settings, found.reason + remark, errors, largest)
@@ -127,7 +127,6 @@ def _sampled_errors(
     """Errors of a sample that is large enough for the quantile, by a run of half the step."""
     w = wanted
     size = min(math.ceil(BEYOND / (1.0 - w.quantile)), SAMPLE_MOST)
-    truth, distance = found.truth, found.distance
     if size > sample.size and sample.size < w.usable.size:
         sample = _sample(w, size)
         part, begun = w.problem.part(sample), w.starts[sample]
@@ -135,6 +134,8 @@ def _sampled_errors(
         truth = solve(part, begun, w.outputs, replace(found.settings, dt=dt / 2.0), w.threads).y
         longer = solve(part, begun, w.outputs, replace(found.settings, dt=dt * RATIO), w.threads).y
         distance = distances(solution.y[:, sample], longer)
+    else:
+        truth, distance = found.truth, found.distance
     error = distances(solution.y[:, sample], truth)
     if settings.precision is np.float64:
         # Where rounding rules, the run with longer steps is the nearer one: it rounds less.
