@@ -21,9 +21,17 @@ from fastmech.ensembles.ladder import AIM, CHEAP
 from fastmech.ensembles.missed import missed_line
 from fastmech.ensembles.places import part_of, put_into
 from fastmech.ensembles.repeatable import Flags, Floats, Members, Repeatable, usable_starts
-from fastmech.ensembles.richardson import LEAST_ORDER, RATIO, ROUNDING, error_of_longer, order_seen
+from fastmech.ensembles.richardson import (
+    LEAST_ORDER,
+    RATIO,
+    ROUNDING,
+    distances,
+    error_of_longer,
+    order_seen,
+)
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.solve import Solution, mean_shares, solve
+from fastmech.ensembles.stopping import STOP_CODE
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.methods import find_method
 
@@ -33,11 +41,12 @@ ROUNDS = 6
 #: Shorter steps that may bring nothing before a trajectory is given up.
 PATIENCE = 3
 
-#: Errors below this that two shorter steps do not halve are rounding, magnified by the motion.
+#: Errors below this that a shorter step does not halve are rounding, magnified by the motion.
 MAGNIFIED = 1e-3
 
-#: Steps of :data:`fastmech.ensembles.calibration.CALM` in those of the first runs; the best is kept.
-LONGER = (4.0, 2.0, 1.0)
+#: Where rounding rules: longest step of :data:`fastmech.ensembles.calibration.CALM` in an Adams method's,
+#: runs of it, and which of them is kept, the nearest to their median being 0.
+LONGER, CALM_RUNS, TYPICAL = RATIO**3, 6, 3
 
 #: Trajectories are run again from this share of the tolerance: what two runs tell is not exact.
 KEPT = 0.75
@@ -102,7 +111,8 @@ class Doubling(Repeatable):
             self._repeat(again)
         if self.jumps:
             self._audit()
-        self._resettle(np.flatnonzero(self.rounded | (self.given_up & ~self.once_rough & ~self.unpaid)))
+        jumped = self.once_rough & self.jumps
+        self._resettle(np.flatnonzero(self.rounded | (self.given_up & ~jumped & ~self.unpaid)))
         return self.best, self.error, self.remark()
 
     def affordable(self, who: Members, finer: float) -> Members:
@@ -159,40 +169,39 @@ class Doubling(Repeatable):
         in_vain = ~(after <= 0.5 * error) | np.isinf(after)
         self.vain[again[in_vain]] += 1
         # Where shorter steps bring nothing to a small error, rounding rules, magnified by the motion.
-        rounded = in_vain & ((after < ROUNDING) | ((self.vain[again] > 1) & (after < MAGNIFIED)))
+        rounded = in_vain & (after < MAGNIFIED)
         # A rough one's earlier error may have been small by luck: the finer run has the better odds.
         better = ~(after > error) | (self.rough[again] & np.isfinite(run.y[-1]).all(axis=1))
         put_into(self.best, again[better], run, better)
         self.dt[again] = own
         # Where jumps are possible, luck looks like rounding.
-        rounded &= ~(self.once_rough if self.jumps else self.rough)[again]
+        rounded &= ~(self.once_rough & self.jumps)[again]
         self.rounded[again[rounded]] = True
         self.given_up[again[(self.vain[again] >= PATIENCE) & ~rounded]] = True
 
     def _resettle(self, which: Members) -> None:
-        """Give trajectories that shorter steps do not help the longer ones of a one-step method.
+        """Give trajectories that shorter steps do not help the run of a one-step method, which rounds less.
 
-        Such a method rounds less. A run of a shorter step tells the error: where rounding rules, the two
-        differ by about as much as each does from the truth, or by luck less. So the error is the least
-        difference seen only if the next one is as much larger as longer steps explain, else the next one.
+        Where rounding rules, a run differs from another by about as much as each does from the truth, or by
+        luck far less. So the truth is taken to be the median of several runs, each state's for itself, and
+        what is kept is no run that is near it by luck, but a typical one, whose distance is its error.
         """
         method = self.settings.method
         if not which.size or isinstance(method, ImplicitRungeKutta):
             return
         calm = replace(self.settings, method=find_method(CALM))
-        least = self.error[which]
-        seen = [] if method.start_steps else [least.copy()]
-        for longer in LONGER if method.start_steps else (1.0,):
-            own = np.full(which.size, float(self.settings.dt) * longer)
-            run = self.solve(which, own, calm)
-            error = self.apart(run, self.solve(which, own / RATIO, calm))
-            better = error < least
-            least[better] = error[better]
-            put_into(self.best, which[better], run, better)
-            seen.append(error)
-        first, second = np.sort(np.fmin(seen, np.inf), axis=0)[:2]
-        by_luck = second <= 2.0 ** (SMOOTH * calm.method.order) * first
-        self.error[which] = np.where(by_luck, second, first)
+        longest = float(self.settings.dt) * (LONGER if method.start_steps else 1.0)
+        runs = [self.solve(which, np.full(which.size, longest / RATIO**k), calm) for k in range(CALM_RUNS)]
+        truth = np.median([run.y for run in runs], axis=0)
+        errors = np.array([distances(run.y, truth) for run in runs])
+        if self.problem.observation.stops:
+            codes = np.array([run.records[STOP_CODE] for run in runs])
+            errors[:, (codes != codes[0]).any(axis=0)] = np.inf
+        typical = np.argsort(errors, axis=0, kind="stable")[TYPICAL]
+        for k, run in enumerate(runs):
+            chosen = (typical == k) & np.isfinite(errors[k])
+            put_into(self.best, which[chosen], run, chosen)
+            self.error[which[chosen]] = errors[k, chosen]
 
     def _audit(self) -> None:
         """Measure the errors of the worst trajectories again, where the right-hand side may jump.
