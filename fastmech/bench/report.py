@@ -27,6 +27,7 @@ from fastmech.bench.problem import PROBLEMS, Problem
 from fastmech.bench.startup import STARTED, Start, started
 from fastmech.bench.stiff import run_stiff
 from fastmech.bench.terms import TURNS, Cost, costs
+from fastmech.bench.threads import run_threads
 from fastmech.bench.tolerances import run_tolerances
 from fastmech.bench.vectors import run_vectors
 from fastmech.ensembles.run import Progress
@@ -53,6 +54,7 @@ STUDIES: dict[str, Callable[..., list[Path]]] = {
     "atlas": run_atlas,
     "basins": run_basins,
     "stiff": run_stiff,
+    "threads": run_threads,
     "tolerances": run_tolerances,
     "vectors": run_vectors,
 }

@@ -21,7 +21,7 @@ from fastmech.cli.reporting import account, reporting_options
 @click.option("--quick", is_flag=True, help="Fewer trajectories and methods.")
 @click.option(
     "--only",
-    type=click.Choice(["atlas", "basins", "stiff", "tolerances", "vectors"]),
+    type=click.Choice(["atlas", "basins", "stiff", "threads", "tolerances", "vectors"]),
     help="One study alone.",
 )
 @click.option("--scenes", metavar="N", type=click.IntRange(min=1), help="Random scenes of `tolerances`.")

@@ -46,7 +46,7 @@ MAGNIFIED = 1e-3
 
 #: Where rounding rules: longest step of :data:`fastmech.ensembles.calibration.CALM` in an Adams method's,
 #: runs of it, and which of them is kept, the nearest to their median being 0.
-LONGER, CALM_RUNS, TYPICAL = RATIO**3, 6, 3
+LONGER, CALM_RUNS, TYPICAL_RUN = RATIO**3, 6, 3
 
 #: Trajectories are run again from this share of the tolerance: what two runs tell is not exact.
 KEPT = 0.75
@@ -169,7 +169,8 @@ class Doubling(Repeatable):
         in_vain = ~(after <= 0.5 * error) | np.isinf(after)
         self.vain[again[in_vain]] += 1
         # Where shorter steps bring nothing to a small error, rounding rules, magnified by the motion.
-        rounded = in_vain & (after < MAGNIFIED)
+        implicit = isinstance(self.settings.method, ImplicitRungeKutta)  # of reduced order, where it is stiff
+        rounded = in_vain & (after < (ROUNDING if implicit else MAGNIFIED))
         # A rough one's earlier error may have been small by luck: the finer run has the better odds.
         better = ~(after > error) | (self.rough[again] & np.isfinite(run.y[-1]).all(axis=1))
         put_into(self.best, again[better], run, better)
@@ -197,7 +198,7 @@ class Doubling(Repeatable):
         if self.problem.observation.stops:
             codes = np.array([run.records[STOP_CODE] for run in runs])
             errors[:, (codes != codes[0]).any(axis=0)] = np.inf
-        typical = np.argsort(errors, axis=0, kind="stable")[TYPICAL]
+        typical = np.argsort(errors, axis=0, kind="stable")[TYPICAL_RUN]
         for k, run in enumerate(runs):
             chosen = (typical == k) & np.isfinite(errors[k])
             put_into(self.best, which[chosen], run, chosen)

@@ -1,0 +1,128 @@
+"""Threads: the same ensembles on one thread and on all, in turns, beside what the machine itself gives.
+
+A yardstick goes along in every turn: a loop of multiply-adds in registers, which shares nothing, once on one
+thread and once on each. What it falls short of the number of threads the machine has kept from everybody.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fastmech.bench.package import AGAIN, prepared
+from fastmech.bench.peak import LANES, multiply_adds
+from fastmech.bench.problem import Problem, fast_starts, rest_starts
+from fastmech.bench.tables import table
+from fastmech.ensembles.run import Progress
+from fastmech.ensembles.threads import thread_count
+
+#: Trajectories of a call: tenths of a second to seconds of work.
+TRAJECTORIES = 32_768
+
+#: Measured turns after one that warms up.
+TURNS = 7
+
+#: Turns of the yardstick's loop: about a third of a second.
+YARDSTICK = 500_000
+
+#: From rest: method, step [s], fitted. From fast starts: method, step [s], fitted again.
+REST = (
+    ("rk4", 0.02, False),
+    ("dop853", 0.05, False),
+    ("ab6", 0.0175, False),
+    ("abm10", 0.018, True),
+    ("abm8", 0.028, True),
+    ("abm12", 0.0115, True),
+)
+FAST = (("abm8", 0.028), ("abm10", 0.018))
+
+
+@dataclass(frozen=True)
+class Case:
+    """A run that is timed, and on how many threads it can."""
+
+    name: str
+    run: Callable[[int], Any]  #: on so many threads
+
+
+def run_threads(
+    out: Path,
+    *,
+    quick: bool = False,
+    stage: Callable[[str, int], Progress] = lambda name, total: lambda done: None,
+) -> list[Path]:
+    """Measure and write ``threads.md`` into the folder ``out``; ``quick``: a turn of few trajectories."""
+    many, turns, n = thread_count(None), 1 if quick else TURNS, 1024 if quick else TRAJECTORIES
+    found = cases(n, YARDSTICK // 20 if quick else YARDSTICK)
+    advance = stage("threads", len(found) * (turns + 1))
+    ratios: dict[str, list[float]] = {case.name: [] for case in found}
+    for turn in range(turns + 1):
+        for case in found:
+            ratio = _seconds(case, 1) / _seconds(case, many)
+            if turn:
+                ratios[case.name].append(ratio)
+            advance(1)
+    lines = [
+        "# Threads",
+        "",
+        f"{n:,} trajectories to t = 10 s on {many} threads over one, by wall time: {turns} "
+        f"turn{'s' * (turns > 1)}, each on one thread and at once on all. The multiply-adds share nothing: "
+        "what they fall short of the number of threads, the machine gave to others.",
+        "",
+        *table(
+            ["run", "speed-up, median", "least", "greatest"],
+            (
+                [name, *(f"{value:.2f}" for value in (statistics.median(r), min(r), max(r)))]
+                for name, r in ratios.items()
+            ),
+        ),
+    ]
+    out.mkdir(parents=True, exist_ok=True)
+    path = out / "threads.md"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return [path]
+
+
+def cases(n: int, turns: int) -> list[Case]:
+    """The yardstick and the engine's runs of ``n`` trajectories."""
+    found = [Case("multiply-adds, one loop a thread", _arithmetic(turns))]
+    rest, fast = rest_starts(), fast_starts()
+    for method, dt, fit in REST:
+        name = f"{method}, dt = {dt:g} s{', `fit=True`' * fit}, from rest"
+        found.append(Case(name, _ensemble(rest, n, {"method": method, "dt": dt, "fit": fit})))
+    again = [share * fast.t_end for share in AGAIN]
+    for method, dt in FAST:
+        name = f"{method}, dt = {dt:g} s, fitted again, fast starts"
+        found.append(Case(name, _ensemble(fast, n, {"method": method, "dt": dt, "fit": again})))
+    return found
+
+
+def _ensemble(problem: Problem, n: int, keywords: dict[str, object]) -> Callable[[int], Any]:
+    starts = np.resize(problem.starts, (n, problem.starts.shape[1]))
+    prepare = prepared(keywords)
+    return lambda threads: prepare(problem, threads)(starts)
+
+
+def _arithmetic(turns: int) -> Callable[[int], Any]:
+    """So many turns of the loop in all, shared among the threads."""
+    loop = multiply_adds()
+
+    def run(threads: int) -> Any:
+        lanes = [np.ones(LANES) for _ in range(threads)]
+        with ThreadPoolExecutor(threads) as pool:
+            return list(pool.map(lambda x: loop(x, turns // threads, 0.5), lanes))
+
+    return run
+
+
+def _seconds(case: Case, threads: int) -> float:
+    began = time.perf_counter()
+    case.run(threads)
+    return time.perf_counter() - began
