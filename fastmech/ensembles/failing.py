@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
 from fastmech.ensembles.lanes import Lanes
 from fastmech.ensembles.spans import Span
 from fastmech.integrators.method import Method
-from fastmech.jit import OBSERVER_SIGNATURE, kernel, observer_signature, single
+from fastmech.jit import OBSERVER_SIGNATURE, kernel
+from fastmech.kernels.single import observer_in_single
 
 Floats = NDArray[np.float64]
 
@@ -99,9 +98,4 @@ class Resumption:
 
 def last_finite_observer(precision: Any) -> Any:
     """:func:`observe_last_finite` for lanes of a precision."""
-    return _in_single() if precision is np.float32 else observe_last_finite
-
-
-@cache
-def _in_single() -> Any:
-    return single(observe_last_finite, observer_signature(types.float32))
+    return observer_in_single(observe_last_finite) if precision is np.float32 else observe_last_finite

@@ -23,9 +23,10 @@ from fastmech.ensembles.stopping import STOP_TIME
 from fastmech.ensembles.system import System, stop_codes
 from fastmech.ensembles.threads import in_parts
 from fastmech.ensembles.tolerance import solve_to_tolerance
+from fastmech.ensembles.turning import TURNS
 from fastmech.errors import InputError
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
-from fastmech.integrators.method import Method
+from fastmech.integrators.method import Adams, Method
 from fastmech.integrators.methods import find_method
 from fastmech.kernels.select import FORMULATIONS
 from fastmech.scene import Scene, nearest
@@ -35,7 +36,7 @@ from fastmech.step_limits.beyond import StepJudge, StepsTaken
 DEFAULT_DT = 0.01
 
 #: Numbers beside the states that a run holds of each trajectory, and of each coefficient of its own.
-BESIDE, OWN = 4, 2
+BESIDE, OWN = 9, 2
 
 #: Statuses of trajectories that have failed.
 FAILURES = [status for status in Status if status != Status.OK]
@@ -131,9 +132,11 @@ def integrate(
     Returns:
         states at the output times and the status of every trajectory: a start that is not finite, a motion
         that became so, and a step too large for a scene are told apart and leave the others as they are. A
-        step is too large where the motion ends with an energy it cannot have, and where small motion about
-        the trajectory's start or its end grows over the steps taken there though it should die out (see
-        :mod:`fastmech.step_limits.beyond`): it keeps its states, but they are not to be trusted. With
+        step is too large where the motion ends with an energy it cannot have, where a body turns by more than
+        1 rad in it, where an Adams method's history does not describe the motion, and where small motion
+        about the trajectory's start or its end grows over the steps taken there though it should die out (see
+        :mod:`fastmech.step_limits.beyond`): it keeps its states, but they are not to be trusted. That others
+        have no status does not say that they are accurate. With
         ``fit`` or ``tol`` a start too fast for any steps has that status too, does not run, and has NaN after
         t = 0. Of a system nothing is known beforehand. One that fails on the way has NaN from the next output
         on, and its last finite state and time in ``last`` and ``failed``. With ``tol`` also an estimate of
@@ -178,8 +181,9 @@ def integrate(
     own, until = own_values(parameters or {}, scene.model_dump(), len(starts)), float(outputs[-1])
     steps = StepJudge(scene, own, starts, formula.name)
     steps.warn(extreme_scenes(scene, own), step, until / step)
-    solution = solve(problem, starts, outputs, settings, threads, progress)
-    taken = StepsTaken(solution.dt[0], solution.dt.max(axis=0), solution.steps, until)
+    watched = problem if isinstance(formula, Adams) else replace(problem, observation=TURNS)
+    solution = solve(watched, starts, outputs, settings, threads, progress)
+    taken = StepsTaken(solution.dt[0], solution.dt.max(axis=0), solution.steps, until, solution.turned)
     ends = solution.y[-1] if solution.last is None else solution.last
     beyond = steps.beyond(ends, taken, lambda work, n, part: in_parts(work, n, threads, part))
     solution.status[beyond & (solution.status == Status.OK)] = Status.STEP_TOO_LARGE

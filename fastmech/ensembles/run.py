@@ -30,10 +30,11 @@ from fastmech.ensembles.tasks import Task, block_width, task_lanes, tasks_of
 from fastmech.ensembles.threads import in_threads, thread_count
 from fastmech.integrators.batch import Batch
 from fastmech.integrators.driver import observe_nothing
-from fastmech.integrators.method import Method
+from fastmech.integrators.method import Adams, Method
 from fastmech.integrators.whole import in_whole_steps
 from fastmech.interrupts import check
-from fastmech.kernels.single import in_single
+from fastmech.kernels.last_term import LOOKED_AT
+from fastmech.kernels.single import in_single, observer_in_single
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int], None]
@@ -78,6 +79,9 @@ class Ensemble:
     records: Floats
     status: NDArray[np.int8]
     failed: Floats
+    #: Greatest last term of an Adams method's predictor in an angle [rad], see
+    #: :mod:`fastmech.kernels.last_term`; 0 of other methods; (n,).
+    last_term: Floats
     #: Members that failed together, and their last finite states.
     lost: list[tuple[NDArray[np.int64], Floats]]
 
@@ -108,8 +112,8 @@ def run_ensemble(
 
     ``params`` are the parameters of all trajectories (count,) or of each (n, count); ``dt`` is the longest
     step of all trajectories or of each (n,). A trajectory that has stopped keeps the state in which it did.
-    ``progress`` is told the number of trajectories finished since its last call. In float32 nothing can be
-    observed. ``block_lanes`` is :func:`block_width` by default, and always so of a method that has a width.
+    ``progress`` is told the number of trajectories finished since its last call. ``block_lanes`` is
+    :func:`block_width` by default, and always so of a method that has a width.
 
     Raises:
         InputError: the step, the times or the number of threads are wrong.
@@ -124,12 +128,13 @@ def run_ensemble(
         records=np.repeat(observation.record[:, None], len(begin), axis=1),
         status=np.full(len(begin), Status.OK, dtype=np.int8),
         failed=np.full(len(begin), np.nan),
+        last_term=np.zeros(len(begin)),
         lost=[],
     )
     interrupted = threading.Event()
     observe = observation.observe
     if precision is np.float32:
-        rhs, observe = in_single(rhs), import_module("fastmech.integrators.single").observe_nothing
+        rhs, observe = in_single(rhs), observer_in_single(observe)
         with np.errstate(over="ignore"):  # what is too large is set aside
             begin = begin.astype(precision)
         last_finite_observer(precision)  # compiled here, not in a thread
@@ -165,6 +170,9 @@ def run_ensemble(
                     found = before.last_finite(rhs, method, span, batch.out, ended.lost)
                     ended.failed[ended.lost], ended.now[ended.lost] = found
             _store(ensemble, lanes, span, batch, ended)
+        if isinstance(method, Adams) and lanes.members.size:
+            terms = lanes.rows(lanes.memory)[:, -begin.shape[1] :][:, :LOOKED_AT]
+            ensemble.last_term[lanes.members] = terms.max(axis=1)
         return members.size
 
     _set_aside(ensemble, np.flatnonzero(~usable), np.asarray(starts, dtype=np.float64), clock[0])

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from fastmech.ensembles.fitting import EXPONENT_AGAIN, EXPONENT_ONCE, MOST_FITTED, fitted_steps, is_too_fast
 from fastmech.ensembles.plausible import judge
 from fastmech.ensembles.problem import Problem
-from fastmech.ensembles.run import Progress, run_ensemble
+from fastmech.ensembles.run import Ensemble, Observation, Progress, run_ensemble
 from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.status import Status
+from fastmech.ensembles.turning import TURNED, TURNS
 from fastmech.integrators.implicit_method import ImplicitRungeKutta, with_jacobian
 from fastmech.integrators.method import Method
 
@@ -42,7 +43,16 @@ class Solution:
     steps: NDArray[np.int64]  #: steps of each trajectory that runs to the end, shape (n,)
     dt: Floats  #: longest step of each [s], shape (pieces, n): a piece ends where steps are fitted again
     failed: Floats  #: time of the last finite state of a trajectory that failed [s], else NaN, shape (n,)
+    turned: Floats  #: what an angle did in a step, see :func:`turned_in`; shape (n,)
     last: Floats | None  #: last finite states, shape (n, dim); None: none failed, they are the final ones
+
+
+def turned_in(run: Ensemble, observation: Observation) -> Floats:
+    """What the angles of each trajectory (n,) did at most in a step of a run [rad].
+
+    That is a turn, where turns were observed, and the last term of an Adams method's predictor; else 0.
+    """
+    return run.records[TURNED] if observation is TURNS else run.last_term
 
 
 def mean_shares(solution: Solution, dt: float, outputs: Floats) -> Floats:
@@ -78,7 +88,7 @@ def solve(
     pieces: list[Floats] = []
     status, failed = np.full(n, Status.OK, dtype=np.int8), np.full(n, np.nan)
     lost: list[tuple[NDArray[np.bool_], Floats]] = []
-    steps, taken = np.zeros(n, dtype=np.int64), np.empty((len(ends), n))
+    steps, taken, turned = np.zeros(n, dtype=np.int64), np.empty((len(ends), n)), np.zeros(n)
     begin, now, shares = 0.0, problem.inward(starts), np.ones(n)
     method = settings.method
     if isinstance(method, ImplicitRungeKutta):
@@ -114,6 +124,7 @@ def solve(
             precision=settings.precision,
             progress=progress if end == ends[-1] else None,
         )
+        turned = np.maximum(turned, turned_in(run, problem.observation))
         pieces.append(run.states[: np.count_nonzero(inside)])
         worse = run.status != Status.OK
         status[worse & (status == Status.OK)] = run.status[worse & (status == Status.OK)]
@@ -141,4 +152,4 @@ def solve(
         for members, states in lost:
             last[members] = states
         last[aside] = starts[aside]
-    return Solution(y, run.records, judged, steps, taken, failed, last)
+    return Solution(y, run.records, judged, steps, taken, failed, turned, last)

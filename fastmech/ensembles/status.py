@@ -27,8 +27,8 @@ class Status(IntEnum):
 _ADVICE = {
     Status.OK: "reached the end of the run, or its stopping condition",
     Status.NOT_FINITE: "became NaN or infinite on the way; use a smaller dt",
-    Status.STEP_TOO_LARGE: "dt is beyond the method's limit, or the motion ends with an energy that it "
-    "cannot have; use a smaller dt (with fit or tol, unless it begins too fast for any steps)",
+    Status.STEP_TOO_LARGE: "dt is beyond the method's limit or too long for the motion, or it ends with an "
+    "energy that it cannot have; use a smaller dt (with fit or tol, unless it begins too fast for any steps)",
     Status.NOT_CONVERGED: "Newton's iteration found no solution of a step; use a smaller dt",
     Status.START_NOT_FINITE: "the start is NaN or infinite",
 }

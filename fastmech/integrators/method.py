@@ -182,8 +182,8 @@ class Adams(AnyWidth):
 
     @property
     def carried(self) -> int:
-        """History."""
-        return self.predictor.size
+        """History, and the greatest last terms of the predictor."""
+        return self.predictor.size + 1
 
     def evaluations(self, steps: int) -> int:
         """Right-hand sides that so many steps of equal length take, the starter's included."""

@@ -22,6 +22,7 @@ from fastmech.integrators.driver import (
 )
 from fastmech.integrators.sums import add_stages, add_two_sums, rows_of
 from fastmech.jit import VECTOR, driver_signature, inlined, kernel, lanes, rounded_to
+from fastmech.kernels.last_term import EVERY, LOOKED_AT, note_term, term_weights
 
 
 @inlined
@@ -63,7 +64,9 @@ def integrate_multistep_blocks(
     then the same ones, and is empty for an explicit method. ``start``, ``stage``, ``weight`` and ``nodes``
     are the packed tableau of the starter; the rest are the fields of
     :class:`fastmech.integrators.batch.Batch`. The method starts anew wherever the step's length changes; its
-    ``memory`` is the history, its ``phase`` how much of that is known, which row is the newest, and the step.
+    ``memory`` is the history, then the greatest last terms of the predictor (see
+    :mod:`fastmech.kernels.last_term`), its ``phase`` how much of the history is known, which row is the
+    newest, and the step.
     """
     stages, rows = nodes.shape[0], predictor.shape[0]
     dim, width = Y.shape[1], Y.shape[2]
@@ -75,11 +78,12 @@ def integrate_multistep_blocks(
     Z, w = rows_of(Y[0], 1).reshape((dim, width)), rows_of(Y[0], 1)
     f, k_flat, z = F.reshape(rows, n), K.reshape(stages, n), Z.reshape(n)
     row = np.empty(rows, dtype=np.int64)  # row[a] holds the derivative of a steps ago
+    weights, seen = term_weights(predictor), min(LOOKED_AT, dim) * width
     known, newest, last = 0, 0, 0.0
     for b in range(Y.shape[0]):
         state, own, kept = Y[b], params[min(b, params.shape[0] - 1)], record[b]
-        y, history = state.reshape(n), memory[b].reshape(rows, n)
-        f[:] = history
+        y, history = state.reshape(n), memory[b].reshape(rows + 1, n)
+        f[:] = history[:rows]
         known, newest, last = int(phase[0]), int(phase[1]), phase[2]
         for j in range(steps.shape[0]):
             if steps[j] == 0:
@@ -102,6 +106,8 @@ def integrate_multistep_blocks(
                 else:
                     for a in range(rows):
                         row[a] = (newest - a) % rows
+                    if step % EVERY == 0:
+                        note_term(history[rows][:seen], z, f, row, weights, h)
                     if corrector.shape[0]:
                         add_two_sums(z, w, y, f, h, row, predictor, corrector[1:])
                         rhs(t + h, Z, K[0], own)
@@ -111,5 +117,5 @@ def integrate_multistep_blocks(
                 if kept.size:
                     observe(times[j] + (step + 1) * h, state, observer_params, kept)
             out[b, j] = state
-        history[:] = f
+        history[:rows] = f
     phase[0], phase[1], phase[2] = known, newest, last

@@ -5,9 +5,8 @@ from __future__ import annotations
 from numba import types
 
 from fastmech.integrators import driver, explicit, multistep
-from fastmech.jit import driver_signature, observer_signature, single
+from fastmech.jit import driver_signature, single
 
-observe_nothing = single(driver.observe_nothing, observer_signature(types.float32))
 integrate_blocks = single(explicit.integrate_blocks, driver_signature(types.float32, *driver.TABLEAU))
 integrate_multistep_blocks = single(
     multistep.integrate_multistep_blocks, driver_signature(types.float32, *multistep.adams(types.float32))

@@ -20,6 +20,7 @@ from fastmech.integrators.whole import BlockStep, redo
 from fastmech.jit import ADVANCE, STEP, driver_signature, inlined, kernel
 from fastmech.kernels.blocks import VECTOR_LANES
 from fastmech.kernels.far import STRETCH, Marks, mark_far
+from fastmech.kernels.last_term import LOOKED_AT
 from fastmech.kernels.whole_adams import whole_adams_steps
 from fastmech.kernels.whole_steps import whole_step
 
@@ -98,19 +99,23 @@ def integrate_whole_multistep(
     ``begin`` is a whole step of the starter, ``advance`` takes those of the method; the rest is as in
     :func:`fastmech.integrators.multistep.integrate_multistep_blocks`, except that the history ends with the
     derivative at the present state, and that its rows are in the order of their times.
+    ``advance`` keeps the predictor's greatest last terms in the last rows of ``work``.
     """
     rows, dim, lanes = predictor.shape[0], Y.shape[1], Y.shape[2]
     f = rows_of(Y[0], rows + MOVED)
     F = f.reshape((rows + MOVED, dim, lanes))
-    work = rows_of(Y[0, 0], nodes.shape[0]).reshape((nodes.shape[0], lanes))
+    work = rows_of(Y[0, 0], nodes.shape[0] + LOOKED_AT).reshape((nodes.shape[0] + LOOKED_AT, lanes))
+    terms = work[nodes.shape[0] :]
     far = np.zeros(lanes, dtype=np.bool_)
     before = rows_of(Y[0], 1).reshape((dim, lanes))
     known, last, some_far = 0, 0.0, False
     for b in range(Y.shape[0]):
         state, own, kept, newest = Y[b], params[min(b, params.shape[0] - 1)], record[b], rows - 1
         known, last = int(phase[0]), phase[2]
+        carried = memory[b].reshape((rows + 1, dim, lanes))
+        terms[:] = carried[rows, :LOOKED_AT]
         if known:
-            F[:rows] = memory[b].reshape((rows, dim, lanes))
+            F[:rows] = carried[:rows]
         for j in range(steps.shape[0]):
             if steps[j] > 0:
                 h = (times[j + 1] - times[j]) / steps[j]
@@ -154,7 +159,7 @@ def integrate_whole_multistep(
                     if kept.size:
                         observe(times[j] + k * h, state, observer_params, kept)
             out[b, j] = state
-        memory[b] = F[newest + 1 - rows : newest + 1].copy().reshape((rows * dim, lanes))
+        carried[:rows], carried[rows, :LOOKED_AT] = F[newest + 1 - rows : newest + 1], terms
     phase[0], phase[2] = known, last
 
 

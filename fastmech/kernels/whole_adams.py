@@ -17,6 +17,7 @@ from typing import Any, Protocol
 from numpy.typing import NDArray
 
 from fastmech.kernels.blocks import VECTOR_LANES
+from fastmech.kernels.last_term import EVERY, LOOKED_AT, term_weights
 from fastmech.kernels.whole_steps import ACCELERATIONS, ANGLES, RATES, compiled, terms_of
 
 
@@ -53,7 +54,9 @@ def advance(t, h, first, last, F, oldest, Y, p, work, checked):
             return begin - first
         for k in range(begin, min(begin + STRETCH, last)):
             f = F[(oldest + k - first) * {row} : (oldest + k - first + {rows} + 1) * {row}]
-{decay}            for i in range({lanes}):
+            if k % {every} == 0:
+                for i in range({lanes}):
+{look}{decay}            for i in range({lanes}):
 '''
 
 _DECAY = """            write_decay(t + (k + 1) * h, p, DECAY, work)
@@ -76,7 +79,13 @@ def source(method: Formula, terms: str) -> str:
     rows, row = method.predictor.size, len(RATES) * VECTOR_LANES
     push = "force * work[0, i]" if decays else "force"
     text = _HEAD.format(
-        name=method.name, rows=rows, row=row, lanes=VECTOR_LANES, decay=_DECAY if decays else ""
+        name=method.name,
+        rows=rows,
+        row=row,
+        lanes=VECTOR_LANES,
+        every=EVERY,
+        look=indent(_look(method.predictor), " " * 20),
+        decay=_DECAY if decays else "",
     )
     loop = "".join(f"{state}0 = {_at('y', d)}\n" for d, (state, _) in enumerate(RATES))
     names = "mass", "slider", "lift", "spring", "gravity"
@@ -100,6 +109,18 @@ def source(method: Formula, terms: str) -> str:
     return text + indent(loop, " " * 16) + "    return last - first\n"
 
 
+def _look(predictor: NDArray[Any]) -> str:
+    """A lane's last terms of the predictor, the greatest of which stay in the last rows of ``work``."""
+    rows, text = predictor.size, ""
+    weights = [float(weight) for weight in term_weights(predictor)]
+    for angle in range(LOOKED_AT):
+        past = (_at("f", (rows - 1 - age) * len(RATES) + angle) for age in range(rows))
+        term = " + ".join(f"{weight!r} * {f}" for weight, f in zip(weights, past, strict=True))
+        seen = f"work[work.shape[0] - {LOOKED_AT - angle}, i]"
+        text += f"term = abs(h * ({term}))\n{seen} = term if term > {seen} else {seen}\n"
+    return text
+
+
 def _at(array: str, row: int | str) -> str:
     """A lane's number in a row of a block, flat."""
     return f"{array}[{row} * {VECTOR_LANES} + i]"
@@ -115,7 +136,8 @@ def whole_adams_steps(rhs: Any, method: Formula) -> Any:
     It takes a block of ``VECTOR_LANES`` lanes through the steps ``first`` to ``last`` (excluded) from the
     time t [s] on, in place. ``F`` holds derivatives (rows, dim, lanes), flat: those at the times of the
     history in rows ``oldest`` and following, and after them room for one of every step; the first row of
-    ``work`` is scratch. The result is the number of steps done: where ``checked``, these end before a stretch
-    that lanes may begin far out. A lane that does is not to be used.
+    ``work`` is scratch, its last ones keep the greatest last terms of the predictor, see
+    :mod:`fastmech.kernels.last_term`. The result is the number of steps done: where ``checked``, these end
+    before a stretch that lanes may begin far out. A lane that does is not to be used.
     """
     return compiled(source(method, terms_of(rhs))).advance

@@ -1,18 +1,23 @@
 """Which trajectories of a run have steps that cannot be right for them, one by one, and the warning of it.
 
-A step is too long for small motion where motion that should die out grows by more than 1 %
-(:data:`fastmech.step_limits.limits.PASSING`) over the steps taken *there*: amplification^steps > 1.01. A
-motion that only crosses a configuration takes few steps there, at least one; one that rests takes all steps
-of the run. Growth below that does not show: a method's region may end by 1e-9 a step short of the axis, and
-thousands of such steps are still right to many digits.
+What a run itself shows comes first. A one-step method follows no body that turns by more than 1 rad in a
+step. An Adams method lays a polynomial through its history; where the polynomial's last term moves an angle
+by more than 0.01 rad (:mod:`fastmech.kernels.last_term`), it does not describe the motion, or one of the
+method's spurious roots, which stand for no mode, has grown until it shows. By theory alone these are not
+judged: a motion that swings is seldom where they grow, and what does not show does no harm.
 
-An Adams method has roots that stand for no mode. They multiply its errors, not the motion, and count from a
-growth by :data:`SPURIOUS` in all steps of the run: at the start, at the end, and, of a scene whose parameters
-all share, at its minima, about which damped motion goes to and fro.
+By theory a step is too long for small motion where motion that should die out grows by more than 1 %
+(:data:`fastmech.step_limits.limits.PASSING`) over the steps taken *there*, at the start or where the motion
+has come to: amplification^steps > 1.01, of an Adams method by the mode's own root. A motion that only
+crosses a configuration takes few steps there, at least one; one that rests takes all steps of the run.
+Growth below that does not show: a method's region may end by 1e-9 a step short of the axis, and thousands of
+such steps are still right to many digits. Modes that decay by less than 1e-6 a radian
+(:data:`fastmech.step_limits.predict.GROWTH_PER_RADIAN`) count as undamped, and of undamped motion its energy
+tells whether it has grown, which is the better judge.
 
-Modes that decay by less than 1e-6 a radian (:data:`fastmech.step_limits.predict.GROWTH_PER_RADIAN`) count as
-undamped, and of undamped motion its energy tells whether it has grown, which is the better judge. Each
-trajectory is judged by its own parameters, step and states: its companions make no difference.
+Each trajectory is judged by its own parameters, step and states: its companions make no difference. One that
+passes may still be wrong, by steps too long for accuracy and within these limits; one that does not may yet
+have come to rest in the right place. Only a run with shorter steps tells.
 """
 
 from __future__ import annotations
@@ -31,14 +36,23 @@ from fastmech.integrators.method import Adams
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.scene import Scene
-from fastmech.step_limits.amplification import amplification, amplifies
+from fastmech.step_limits.amplification import amplifies
 from fastmech.step_limits.growth import MOST_STEPS, counted, mark_growing, stiffest_growing
 from fastmech.step_limits.impulse import impulse_limit
-from fastmech.step_limits.limits import ALLOWED, CERTAIN, INNOCENT, PASSING, ROUNDED, SPURIOUS, steps_there
+from fastmech.step_limits.limits import (
+    ALLOWED,
+    CERTAIN,
+    INNOCENT,
+    LAST_TERM,
+    PASSING,
+    ROUNDED,
+    TURN,
+    steps_there,
+)
 from fastmech.step_limits.local import eigenvalues, local_motion, part, state_matrices
 from fastmech.step_limits.predict import GROWTH_PER_RADIAN, UNDAMPED, is_stable, stable_step
-from fastmech.step_limits.region import region, rows_of, sectors_of
-from fastmech.step_limits.warning import GROWS, KEPT, TURN, Limit, scene_eigenvalues, warn_of_step
+from fastmech.step_limits.region import region, rows_of
+from fastmech.step_limits.warning import GROWS, KEPT, Limit, scene_eigenvalues, warn_of_step
 
 Floats = NDArray[np.float64]
 
@@ -69,6 +83,9 @@ class StepsTaken:
     longest: Floats  #: longest step of each [s], (n,)
     number: Floats | NDArray[np.int64]  #: steps of each, (n,)
     until: float  #: end of the run [s]
+    #: What an angle of each did at most in a step [rad], (n,): a turn, or the last term of an Adams method's
+    #: predictor; ``None``: nobody has looked.
+    turned: Floats | None = None
 
 
 def is_beyond(scene: Scene, dt: float, steps: float, method: str) -> bool:
@@ -168,11 +185,11 @@ class StepJudge:
         beyond = _turns_too_far(starts[:, 2:], taken.first)
         if np.any(c.decay):
             beyond |= (c.force != 0.0) & (taken.first * c.decay > impulse_limit(method))
+        if taken.turned is not None:
+            beyond |= taken.turned > (LAST_TERM if isinstance(method, Adams) else TURN)
         longest, most = taken.longest.max(initial=0.0), taken.number.max(initial=0)
         if self._is_quiet(longest, most):
             return beyond
-        if isinstance(method, Adams) and not self._own:
-            beyond |= _errors_grow_at_rest(method, self._scene, taken)
         verdicts = beyond.astype(np.int8)
         left: Any = c.force * np.exp(-c.decay * taken.until)
         places = [] if self._still and longest <= self._still[0] and most <= self._still[1] else [(c, starts)]
@@ -203,33 +220,6 @@ def fastest_decaying(scene: Scene) -> float:
     """
     values = np.concatenate(scene_eigenvalues(scene))
     return BETWEEN * float(np.abs(values[values.real < 0.0]).max(initial=0.0))
-
-
-def _errors_grow_at_rest(method: Adams, scene: Scene, taken: StepsTaken) -> NDArray[np.bool_]:
-    """Whether errors (n,) grow at the scene's minima, over all steps, by a root that stands for no mode."""
-    longest, most = taken.longest.max(initial=0.0), taken.number.max(initial=0)
-    if not _may_grow_at_rest(method, scene, longest, most).size:
-        return np.zeros(len(taken.longest), dtype=np.bool_)
-    steps = np.unique(taken.longest)  # a search in these few is quicker than their inverse
-    growth = np.array([_growth_at_rest(method.name, scene, float(dt), int(most)) for dt in steps])
-    return np.asarray(growth[np.searchsorted(steps, taken.longest)] * taken.number > np.log(SPURIOUS))
-
-
-def _may_grow_at_rest(method: Adams, scene: Scene, dt: float, most: float) -> NDArray[np.complex128]:
-    """Damped modes at the scene's minima that the method's table does not acquit in so many steps of dt."""
-    resting = scene_eigenvalues(scene)[0]
-    damped = resting[(resting.real < -GROWTH_PER_RADIAN * np.abs(resting)) & (resting.imag >= 0.0)]
-    place = rows_of(dt * np.abs(damped)), sectors_of(damped.real, damped.imag)
-    return np.asarray(damped[~(region(method.name).sector[place] * most <= CERTAIN * np.log(SPURIOUS))])
-
-
-@lru_cache(KEPT)
-def _growth_at_rest(method: str, scene: Scene, dt: float, most: int) -> float:
-    """Logarithm of the growth a step [s] there, negative where it cannot count in ``most`` steps."""
-    formula = find_method(method)
-    assert isinstance(formula, Adams)
-    modes = _may_grow_at_rest(formula, scene, dt, most)
-    return float(np.log(amplification(formula, dt * modes).max(initial=0.5)))
 
 
 @lru_cache(KEPT)

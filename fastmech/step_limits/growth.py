@@ -15,7 +15,16 @@ from fastmech.integrators.methods import find_method
 from fastmech.kernels.passes import columns
 from fastmech.mechanism.coefficients import Coefficients
 from fastmech.step_limits.amplification import stability_polynomial
-from fastmech.step_limits.limits import ALLOWED, CERTAIN, GROWS, INNOCENT, ROUNDED, UNSURE, steps_there
+from fastmech.step_limits.limits import (
+    ALLOWED,
+    CERTAIN,
+    GROWS,
+    INNOCENT,
+    ROUNDED,
+    SPURIOUS,
+    UNSURE,
+    steps_there,
+)
 from fastmech.step_limits.local import eigenvalue_bound, eigenvalues, local_motion, part, state_matrices
 from fastmech.step_limits.predict import GROWTH_PER_RADIAN
 from fastmech.step_limits.region import region, size_within
@@ -42,6 +51,8 @@ def mark_growing(
 ) -> None:
     """Mark those whose damped small motion about a state (n, 4) grows over the steps of dt [s] taken there.
 
+    Of an Adams method's roots only the mode's own counts.
+
     Args:
         method: how the steps are taken.
         c: reduced coefficients, numbers or one a trajectory.
@@ -53,8 +64,8 @@ def mark_growing(
     if isinstance(method, ImplicitRungeKutta) or not np.any(c.damping) or not len(states):
         return
     number = counted(number)
-    _judged(method, c, states, dt, number, False, verdicts)
-    _settle(method, c, states, dt, number, verdicts)
+    _judged(method, c, states, dt, number, np.inf, False, verdicts)
+    _settle(method, c, states, dt, number, np.inf, verdicts)
 
 
 def stiffest_growing(
@@ -62,7 +73,8 @@ def stiffest_growing(
 ) -> tuple[int | None, bool]:
     """Of the motions that :func:`mark_growing` marks, the one whose eigenvalues' bound is greatest.
 
-    All take so many steps of dt [s].
+    All take so many steps of dt [s]. Here an Adams method's errors count too, from a growth by
+    :data:`fastmech.step_limits.limits.SPURIOUS` in all steps.
 
     Returns:
         its place, ``None`` if there is none; and whether all are acquitted by the size of h lambda alone,
@@ -72,11 +84,11 @@ def stiffest_growing(
         return None, True
     verdicts = np.zeros(len(states), dtype=np.int8)
     steps = counted(np.array([number]))
-    place, closer = _judged(method, c, states, np.array([dt]), steps, True, verdicts)
+    place, closer = _judged(method, c, states, np.array([dt]), steps, SPURIOUS, True, verdicts)
     unsure = np.flatnonzero(verdicts == UNSURE)
     if unsure.size:
         each = np.full(len(states), dt), np.full(len(states), steps[0])
-        _settle(method, c, states, *each, verdicts)
+        _settle(method, c, states, *each, SPURIOUS, verdicts)
         unsure = unsure[verdicts[unsure] == GROWS]
     found = np.append(unsure, place) if place >= 0 else unsure
     if not found.size:
@@ -91,6 +103,7 @@ def _judged(
     states: Floats,
     dt: Floats,
     number: Floats,
+    spurious: float,
     stiffest: bool,
     verdicts: NDArray[np.int8],
 ) -> tuple[int, int]:
@@ -105,6 +118,7 @@ def _judged(
         *_formula(method.name),
         *table,
         size_within(table.largest, CERTAIN * ALLOWED / most),
+        spurious,
         stiffest,
         verdicts,
     )
@@ -132,6 +146,7 @@ def _settle(
     states: Floats,
     dt: Floats,
     number: Floats,
+    spurious: float,
     verdicts: NDArray[np.int8],
 ) -> None:
     """Judge those of which the pass was unsure, with LAPACK's eigenvalues."""
@@ -147,7 +162,7 @@ def _settle(
     z = dt[unsure][which] * values
     grow = np.empty(z.size, dtype=np.bool_)
     _kernels().judge_modes(
-        z.real.copy(), z.imag.copy(), there, number[unsure][which], *_formula(method.name), grow
+        z.real.copy(), z.imag.copy(), there, number[unsure][which], *_formula(method.name), spurious, grow
     )
     verdicts[unsure] = INNOCENT
     verdicts[unsure[which[grow]]] = GROWS

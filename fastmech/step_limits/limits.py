@@ -14,8 +14,14 @@ PASSING = 0.01
 #: Logarithm of the growth that is let pass in the steps taken at a place.
 ALLOWED = float(np.log1p(PASSING))
 
-#: Growth of an Adams method's errors in a run that counts: those of its starter are far above rounding.
+#: Growth of an Adams method's errors in a run that is warned of: those of its starter are far above rounding.
 SPURIOUS = 1e4
+
+#: Angle [rad] by which a body may turn in one step.
+TURN = 1.0
+
+#: Last term of an Adams method's predictor in an angle [rad] that is let pass.
+LAST_TERM = 0.01
 
 #: Share of a growth that is let pass up to which a bound acquits: the rest is for what a table misses between
 #: its places.
@@ -41,6 +47,6 @@ def factor_of(there: Any) -> Any:
 
 
 @inlined
-def errors_of(number: Any) -> Any:
-    """The growth a step that makes what counts of errors in so many steps."""
-    return np.exp(np.log(SPURIOUS) / number)
+def errors_of(number: Any, spurious: Any) -> Any:
+    """The growth a step that makes ``spurious`` of errors in so many steps."""
+    return np.exp(np.log(spurious) / number)

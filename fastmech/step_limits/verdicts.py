@@ -128,6 +128,7 @@ def collect(
         *METHOD,
         *(MATRIX, MATRIX, VECTOR),
         types.float64,
+        types.float64,
         types.boolean,
         STATUSES,
     )
@@ -144,6 +145,7 @@ def judge_states(
     principal: Floats,
     largest: Floats,
     quiet: float,
+    spurious: float,
     stiffest: bool,
     verdicts: NDArray[np.int8],
 ) -> tuple[int, int]:
@@ -151,7 +153,8 @@ def judge_states(
 
     ``own`` are the :func:`fastmech.kernels.passes.columns` of the coefficients; ``dt`` and ``number`` have
     one entry for all or one for each; ``sector``, ``principal``, ``largest`` are the method's table, and h
-    lambda of size ``quiet`` is acquitted in the greatest number of steps. Lanes that have a verdict keep it.
+    lambda of size ``quiet`` is acquitted in the greatest number of steps. Errors of an Adams method count
+    from a growth by ``spurious`` in all steps; inf: they do not. Lanes that have a verdict keep it.
     With ``stiffest`` only those are judged that are stiffer than the ones found growing before.
 
     Returns:
@@ -205,7 +208,7 @@ def judge_states(
                     modes[row, j] = known[row, i]
                 step, most = known[STEP, i], known[NUMBER, i]
                 modes[RR, j], modes[RI, j], modes[DOUBTED, j] = found[0, k], found[1, k], found[2, k]
-                modes[ZR, j], modes[ERRORS, j] = step, errors_of(most)
+                modes[ZR, j], modes[ERRORS, j] = step, errors_of(most, spurious)
                 modes[FACTOR, j] = factor_of(steps_there(known[TIME, i], step, most))
             for j in range(CHUNK):
                 real, imaginary, sure[j] = polished(
@@ -229,7 +232,9 @@ def judge_states(
     return place, closer
 
 
-@kernel(types.void(VECTOR, VECTOR, VECTOR, VECTOR, *METHOD, types.Array(types.boolean, 1, "C")))
+@kernel(
+    types.void(VECTOR, VECTOR, VECTOR, VECTOR, *METHOD, types.float64, types.Array(types.boolean, 1, "C"))
+)
 def judge_modes(
     real: Floats,
     imaginary: Floats,
@@ -238,16 +243,20 @@ def judge_modes(
     powers: Floats,
     predictor: Floats,
     corrector: Floats,
+    spurious: float,
     grow: NDArray[np.bool_],
 ) -> None:
-    """Which modes z = h lambda (n,) that decay grow in ``there`` steps, or errors in ``number`` steps."""
+    """Which modes z = h lambda (n,) that decay grow in ``there`` steps.
+
+    Or errors do, by ``spurious`` in ``number`` steps; inf: they do not count.
+    """
     modes, work = np.empty((OF_MODES, CHUNK)), np.empty((2, predictor.size + 2, CHUNK))
     told = np.empty(CHUNK, dtype=np.bool_)
     for first in range(0, real.size, CHUNK):
         for j in range(CHUNK):
             k = min(first + j, real.size - 1)
             modes[ZR, j], modes[ZI, j] = real[k], imaginary[k]
-            modes[FACTOR, j], modes[ERRORS, j] = factor_of(there[k]), errors_of(number[k])
+            modes[FACTOR, j], modes[ERRORS, j] = factor_of(there[k]), errors_of(number[k], spurious)
             modes[DOUBTED, j] = 1.0
         judge_chunk(modes, powers, predictor, corrector, work, told)
         for j in range(min(CHUNK, real.size - first)):

@@ -18,7 +18,7 @@ from fastmech.mechanism.lagrange import potential_energy, potential_gradient, po
 from fastmech.scene import Scene
 from fastmech.stability.arguments import require_scene
 from fastmech.step_limits.impulse import impulse_limit, impulse_ratio
-from fastmech.step_limits.limits import PASSING
+from fastmech.step_limits.limits import PASSING, TURN
 from fastmech.step_limits.local import eigenvalues, state_matrices
 from fastmech.step_limits.predict import is_stable, stable_step
 
@@ -32,9 +32,6 @@ DIRECTION = 0.03
 
 #: Newton iterations from the grid to a minimum: a few are enough, flat minima take more.
 DESCENTS = 40
-
-#: Angle [rad] by which a body may turn in one step.
-TURN = 1.0
 
 #: What is wrong with a step beyond stability.
 GROWS, UNDAMPED_GROWS = "motions that die out would grow", "undamped motions would grow"

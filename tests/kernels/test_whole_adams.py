@@ -11,6 +11,7 @@ from fastmech.integrators.method import Adams
 from fastmech.integrators.methods import METHODS
 from fastmech.kernels.blocks import VECTOR_LANES
 from fastmech.kernels.far import FARTHEST, STRETCH, TURNED, may_be_far
+from fastmech.kernels.last_term import LOOKED_AT
 from fastmech.kernels.whole_adams import whole_adams_steps
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
@@ -37,7 +38,7 @@ def advanced(
 ) -> tuple[Floats, Floats, int]:
     """States, the whole history and the steps done."""
     room = np.concatenate([F, np.full((steps, *Y.shape), np.nan)]).ravel()
-    state, work = Y.copy(), np.empty((1, Y.shape[1]))
+    state, work = Y.copy(), np.zeros((1 + LOOKED_AT, Y.shape[1]))
     params = np.repeat(np.array(reduce(scene))[:, None], Y.shape[1], axis=1)
     advance = whole_adams_steps(kernel("lagrange", terms), method)
     with np.errstate(all="ignore"):  # plain Python warns where compiled code is silent

@@ -194,7 +194,7 @@ def test_no_label_comes_out_beyond_the_limit() -> None:
     [
         ({"beta": 2e3}, [1.4, -0.2, 0.0, 0.0], 0.025, "rk4"),
         ({"alpha": 1e6}, [1.4, -0.2, 0.0, 0.0], 0.01, "rk4"),
-        ({}, [0.0, 0.0, 40.0, 0.0], 0.03, "dop853"),
+        ({}, [0.0, 0.3, 20.0, 0.0], 0.06, "dop853"),
     ],
     ids=["stability", "impulse", "turn"],
 )
