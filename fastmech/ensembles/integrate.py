@@ -23,7 +23,7 @@ from fastmech.ensembles.stopping import STOP_TIME
 from fastmech.ensembles.system import System, stop_codes
 from fastmech.ensembles.threads import in_parts
 from fastmech.ensembles.tolerance import solve_to_tolerance
-from fastmech.ensembles.turning import TURNS
+from fastmech.ensembles.turning import counted_turns, watched
 from fastmech.errors import InputError
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Adams, Method
@@ -181,9 +181,11 @@ def integrate(
     own, until = own_values(parameters or {}, scene.model_dump(), len(starts)), float(outputs[-1])
     steps = StepJudge(scene, own, starts, formula.name)
     steps.warn(extreme_scenes(scene, own), step, until / step)
-    watched = problem if isinstance(formula, Adams) else replace(problem, observation=TURNS)
-    solution = solve(watched, starts, outputs, settings, threads, progress)
-    taken = StepsTaken(solution.dt[0], solution.dt.max(axis=0), solution.steps, until, solution.turned)
+    problem = problem if isinstance(formula, Adams) else watched(problem, starts, step, threads)
+    solution = solve(problem, starts, outputs, settings, threads, progress)
+    longest = solution.dt.max(axis=0)
+    turned = counted_turns(problem, starts, longest, solution.turned)
+    taken = StepsTaken(solution.dt[0], longest, solution.steps, until, turned)
     ends = solution.y[-1] if solution.last is None else solution.last
     beyond = steps.beyond(ends, taken, lambda work, n, part: in_parts(work, n, threads, part))
     solution.status[beyond & (solution.status == Status.OK)] = Status.STEP_TOO_LARGE

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.ensembles.fitting import speed_bound
+from fastmech.ensembles.problem import Problem
 from fastmech.ensembles.run import Observation
 from fastmech.jit import OBSERVER_SIGNATURE, kernel
+from fastmech.mechanism.coefficients import Coefficients
+from fastmech.step_limits.limits import TURN
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 #: Rows of the record: the greatest turn of an angle in a step [rad], and the angles that the step began with.
 TURNED, BEFORE = 0, 1
@@ -25,3 +32,40 @@ def observe_turns(t: float, Y: Floats, params: Floats, record: Floats) -> None:
 
 
 TURNS = Observation(observe_turns, np.zeros(0), np.array([0.0, np.nan, np.nan]))
+
+
+def may_turn(c: Coefficients, starts: Floats, dt: float | Floats, threads: int | None = None) -> Flags:
+    """Whether a body may turn by more than :data:`TURN` in a step of ``dt`` [s], by its energy; shape (n,).
+
+    Of rates whose kinetic-energy norm is 1 none is greater than sqrt((mass + 1) / mass): the inverse of
+    the mass matrix has no greater diagonal entry in any configuration.
+
+    Raises:
+        InputError: the number of threads is wrong.
+    """
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        fastest = speed_bound(c, starts, threads) * np.sqrt((c.mass + 1.0) / c.mass)
+        return np.asarray(fastest * dt > TURN)
+
+
+def watched(problem: Problem, starts: Floats, dt: float, threads: int | None = None) -> Problem:
+    """The problem, with turns observed where the steps of ``dt`` [s] are long enough for them.
+
+    Raises:
+        InputError: the number of threads is wrong.
+    """
+    c = problem.coefficients
+    some = c is not None and may_turn(c, starts, dt, threads).any()
+    return replace(problem, observation=TURNS) if some else problem
+
+
+def counted_turns(problem: Problem, starts: Floats, dt: Floats, turned: Floats) -> Floats:
+    """The turns (n,) of a watched problem in steps of at most ``dt`` (n,) [s], else 0.
+
+    Only those count that the energy allows in a trajectory's own steps: they do not depend on whether its
+    companions' were a reason to watch.
+    """
+    c = problem.coefficients
+    if c is None or problem.observation is not TURNS:
+        return turned
+    return np.where(may_turn(c, starts, dt), turned, 0.0)

@@ -12,7 +12,7 @@ from ensembles.references import motions_of, rest_starts
 import fastmech as fm
 from fastmech.ensembles.problem import scene_problem
 from fastmech.ensembles.run import run_ensemble
-from fastmech.ensembles.turning import TURNED, TURNS
+from fastmech.ensembles.turning import TURNED, TURNS, may_turn, watched
 from fastmech.integrators.methods import METHODS
 
 TOO_LARGE = fm.Status.STEP_TOO_LARGE
@@ -92,3 +92,16 @@ def test_turns_before_a_new_fit_count() -> None:
     once = run(scene, starts, 12.0, dt=0.3, method="dop853", fit=[0.0, 6.0])
     late = run(scene, once.y[-1], 6.0, dt=0.3, method="dop853", fit=True)
     assert ((once.status == TOO_LARGE) & (late.status == fm.Status.OK)).any()
+
+
+def test_no_body_turns_faster_than_its_energy_allows() -> None:
+    """By SciPy; and where nobody can turn too far in a step, nobody is watched."""
+    starts, times = rest_starts(24, seed=5), np.linspace(0.0, 6.0, 1201)
+    for scene in (fm.Scene(alpha=0.0), fm.Scene(m1=0.5, m2=20.0, beta=0.0), fm.Scene(F0=300.0, alpha=0.4)):
+        problem = scene_problem(scene, len(starts), {}, "lagrange")
+        assert problem.coefficients is not None
+        rates = np.abs(motions_of(scene, starts, times)[:, :, 2:]).max(axis=(0, 2))
+        assert may_turn(problem.coefficients, starts, 1.0 / rates * (1.0 + 1e-9)).all()
+        assert not may_turn(problem.coefficients, starts, 0.01 / rates).any()
+        assert watched(problem, starts, 0.01 / float(rates.max())) is problem
+        assert watched(problem, starts, 1.0 / float(rates.min()) * (1.0 + 1e-9)).observation is TURNS
