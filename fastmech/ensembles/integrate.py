@@ -118,8 +118,8 @@ def integrate(
         fit: whether each trajectory's step is fitted to its energy: ``dt`` then belongs to slow motions, and
             the faster a trajectory can become, the shorter its own step, see
             :mod:`fastmech.ensembles.fitting`. True: once, so that a trajectory's step is the same all along;
-            times [s]: at the start and at each of them, which pays where a damper slows fast motion down.
-            Scenes only.
+            times [s], none behind the end: at the start and at each of them, which pays where a damper slows
+            fast motion down. Scenes only.
         t_eval: output times [s], rising, not negative; only ``t_end`` by default.
         parameters: values of parameters, by name, that differ between trajectories, each of shape (n,).
         formulation: of a scene: "lagrange", the default, integrates angles and rates (paper (13)), "hamilton"
@@ -144,6 +144,7 @@ def integrate(
         InputError: an argument is wrong, or the states would not fit into memory.
     """
     outputs = _output_times(t_end, t_eval)
+    checks.progress_function(progress, "trajectories")
     starts, problem = _problem(scene, y0, parameters or {}, formulation)
     kept = starts.shape[1] * (outputs.size + np.size(fit) - 1 + problem.canonical)
     beside = BESIDE + OWN * sum(column.ndim for column in problem.params.columns)
@@ -170,7 +171,9 @@ def integrate(
         raise InputError(f"quantile = {quantile!r}: tells whose error tol is; give tol with it")
     formula = find_method("rk4" if method is None else method)
     step = checks.number("dt", DEFAULT_DT if dt is None else dt, "s", above=0.0)
-    settings = Settings(formula, step, _fit_times(fit, scene), _precision(dtype, problem, formula))
+    settings = Settings(
+        formula, step, _fit_times(fit, scene, outputs[-1]), _precision(dtype, problem, formula)
+    )
     if not isinstance(scene, Scene):
         return _trajectories(
             problem, outputs, solve(problem, starts, outputs, settings, threads, progress), settings
@@ -213,14 +216,18 @@ def _trajectories(
     )
 
 
-def _fit_times(fit: bool | ArrayLike, scene: Scene | System) -> tuple[float, ...]:
+def _fit_times(fit: bool | ArrayLike, scene: Scene | System, until: float) -> tuple[float, ...]:
     if isinstance(fit, bool | np.bool_) and not fit:
         return ()
     if isinstance(scene, System):
         raise InputError("fit: only for a scene, whose energy bounds its speed")
     if isinstance(fit, bool | np.bool_):
         return (0.0,)
-    return tuple(checks.rising_times("fit", fit).tolist())
+    times = checks.rising_times("fit", fit)
+    if times[-1] > until:
+        last = f"fit[{times.size - 1}] = {times[-1]:g}"
+        raise InputError(f"{last}: must not lie behind the run's end, {until:g} s")
+    return tuple(times.tolist())
 
 
 def _precision(dtype: str, problem: Problem, method: Method) -> Precision:
