@@ -145,7 +145,7 @@ def integrate(
     """
     outputs = _output_times(t_end, t_eval)
     checks.progress_function(progress, "trajectories")
-    starts, problem = _problem(scene, y0, parameters or {}, formulation)
+    starts, problem, own = _problem(scene, y0, parameters or {}, formulation)
     kept = starts.shape[1] * (outputs.size + np.size(fit) - 1 + problem.canonical)
     beside = BESIDE + OWN * sum(column.ndim for column in problem.params.columns)
     checks.memory(len(starts) * (kept + (1 if tol is None else 2) * beside), 2 if tol is None else 4)
@@ -178,11 +178,11 @@ def integrate(
         return _trajectories(
             problem, outputs, solve(problem, starts, outputs, settings, threads, progress), settings
         )
-    own, until = own_values(parameters or {}, scene.model_dump(), len(starts)), float(outputs[-1])
-    steps = StepJudge(scene, own, starts, formula.name)
-    steps.warn(extreme_scenes(scene, own), step, until / step)
+    steps, until = StepJudge(scene, own, starts, formula.name), float(outputs[-1])
+    steps.warn(extreme_scenes(scene, own, problem), step, until / step)
     solution = solve(problem, starts, outputs, settings, threads, progress)
-    taken = StepsTaken(solution.dt[0], solution.dt.max(axis=0), solution.steps, until)
+    longest = solution.dt[0] if len(solution.dt) == 1 else solution.dt.max(axis=0)
+    taken = StepsTaken(solution.dt[0], longest, solution.steps, until)
     ends = solution.y[-1] if solution.last is None else solution.last
     beyond = steps.beyond(ends, taken, lambda work, n, part: in_parts(work, n, threads, part))
     solution.status[beyond & (solution.status == Status.OK)] = Status.STEP_TOO_LARGE
@@ -256,8 +256,8 @@ def _output_times(t_end: float | None, t_eval: ArrayLike | None) -> NDArray[np.f
 
 def _problem(
     scene: Scene | System, y0: ArrayLike, parameters: Mapping[str, ArrayLike], formulation: str | None
-) -> tuple[NDArray[np.float64], Problem]:
-    """Checked starts, and what to integrate from them."""
+) -> tuple[NDArray[np.float64], Problem, dict[str, NDArray[np.float64]]]:
+    """Checked starts, what to integrate from them, and a scene's parameters that differ between them."""
     if isinstance(scene, System) and formulation is not None:
         raise InputError(f"formulation = {formulation!r}: only for a scene")
     formulation = "lagrange" if formulation is None else formulation
@@ -267,8 +267,9 @@ def _problem(
         )
     if isinstance(scene, System):
         starts = checks.states("y0", y0, len(scene.state))
-        return starts, system_problem(scene, len(starts), parameters)
+        return starts, system_problem(scene, len(starts), parameters), {}
     if not isinstance(scene, Scene):
         raise InputError(f"scene = {scene!r}: must be a Scene or a System")
     starts = checks.states("y0", y0, 4)
-    return starts, scene_problem(scene, len(starts), parameters, formulation)
+    own = own_values(parameters, scene.model_dump(), len(starts))
+    return starts, scene_problem(scene, len(starts), own, formulation), own

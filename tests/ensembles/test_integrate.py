@@ -10,6 +10,7 @@ import pytest
 from ensembles.starts import random_starts
 
 from fastmech.ensembles.integrate import integrate
+from fastmech.ensembles.problem import extreme_scenes, scene_problem
 from fastmech.ensembles.run import run_ensemble
 from fastmech.ensembles.spans import output_steps
 from fastmech.errors import InputError
@@ -170,6 +171,24 @@ def test_a_wrong_t_end_beside_t_eval_is_refused() -> None:
     for t_end in (np.nan, "1", -1.0, 0.0):
         with pytest.raises(InputError, match=r"^t_end"):
             integrate(SCENE, START, t_end, t_eval=[0.0])  # type: ignore[arg-type]
+
+
+def test_scenes_to_look_at_are_the_most_and_least_damped_and_the_stiffest() -> None:
+    own = {"beta": np.array([50.0, 1.0, 900.0, 60.0, 70.0]), "c1": np.array([1.0, 2.0, 3.0, 5e4, 4.0])}
+    problem = scene_problem(SCENE, 5, own, "lagrange")
+    chosen = [{name: values[k] for name, values in own.items()} for k in (1, 2, 3)]
+    assert extreme_scenes(SCENE, own, problem) == [SCENE.replace(**values) for values in chosen]
+    assert extreme_scenes(SCENE, {}, scene_problem(SCENE, 5, {}, "lagrange")) == [SCENE]
+    none = {"beta": np.empty(0)}
+    assert extreme_scenes(SCENE, none, scene_problem(SCENE, 0, none, "lagrange")) == [SCENE]
+
+
+def test_a_value_of_own_parameters_that_no_scene_may_have_is_told() -> None:
+    for name, value in (("m2", -1.0), ("beta", -2.0), ("c1", 1e31), ("l", 1e-31)):
+        own = {"F0": np.array([1.0, -2.0, 3.0]), name: np.array([1.0, value, 2.0])}
+        with pytest.raises(InputError, match=rf"^scene\.{name} = {re.escape(str(value))}: ") as error:
+            integrate(SCENE, np.zeros((3, 4)), 0.1, parameters=own)
+        assert "\n" not in str(error.value)
 
 
 def test_numpy_numbers_are_numbers() -> None:
