@@ -87,7 +87,7 @@ def scene_problem(scene: Scene, n: int, own: Mapping[str, Floats], formulation: 
     params = Parameters(tuple(np.asarray(c, dtype=np.float64) for c in coefficients))
     rhs = right_hand_side(coefficients, formulation)
     if own:
-        values: Any = (np.broadcast_to(value, n) for value in coefficients)
+        values: Any = (value if np.ndim(value) else np.broadcast_to(value, n) for value in coefficients)
         coefficients = Coefficients(*values)
     return Problem(rhs, params, coefficients=coefficients, canonical=formulation == "hamilton")
 
