@@ -15,6 +15,7 @@ from fastmech.atlas.axes import Floats, check_axes, grid_coefficients
 from fastmech.atlas.coincidence import coincidences
 from fastmech.atlas.sheets import SheetBuilder
 from fastmech.atlas.wells import barriers, least_speeds
+from fastmech.ensembles import checks
 from fastmech.ensembles.threads import thread_count
 from fastmech.equilibria.search import MOST
 from fastmech.equilibria.solve import solve
@@ -113,6 +114,7 @@ def map_equilibria(
     Raises:
         InputError: wrong number of axes, an unknown name, or a value that the scene refuses.
     """
+    checks.progress_function(progress, "points")
     checked = check_axes(scene, axes)
     grid = tuple(len(values) for values in checked.values())
     builder = SheetBuilder(scene, checked)

@@ -219,6 +219,7 @@ def erosion(
         InputError: an argument is wrong, the force decays, there is no damper, or wells are not certain.
     """
     require_constant_force(scene)
+    checks.progress_function(progress, "values")
     along = check_point("values", values)
     survey = survey_of(
         axes, most_shock=most_shock, t_end=t_end, labels_of=labels_of, n=n, directions=directions, seed=seed

@@ -88,6 +88,7 @@ def labels_of(
         InputError: an argument is wrong, the scene has no damper, or its wells are not certain.
     """
     require_damper(scene)
+    checks.progress_function(progress, "starts")
     begin = checks.states("starts", starts, 4)
     thread_count(threads)
     t_end = checks.number("t_end", t_end, "s", above=0.0)

@@ -100,6 +100,7 @@ def map_basins(
     """
     names = STATE if isinstance(scene, Scene) else tuple(scene.state)
     values = _checked_axes(axes, names, least=2 if isinstance(scene, Scene) else 1)
+    checks.progress_function(progress, "starts")
     held = _checked_fixed(fixed or {}, values, names)
     shape = tuple(v.size for v in values.values())
     size = math.prod(shape)

@@ -122,6 +122,7 @@ def map_snapping(
         InputError: an argument is wrong, alpha is 0, the scene has no damper, its force-free wells are not
             certain, or the start is none of them.
     """
+    checks.progress_function(progress, "motions")
     force, rate = _forces(F0), _rates(alpha)
     free, equilibria, index = force_free(scene, start)
     find_method(method)

@@ -46,7 +46,7 @@ class _SceneCommand(click.Command):
 @click.option(
     "--at",
     metavar="T",
-    type=float,
+    type=click.FloatRange(min=0.0),
     default=math.inf,
     help="Time at which the force is frozen [s; default: after all decay].",
 )

@@ -26,7 +26,7 @@ from fastmech.cli.reporting import account, reporting_options
 @click.option(
     "--out",
     metavar="DIR",
-    type=click.Path(path_type=Path),
+    type=click.Path(file_okay=False, path_type=Path),
     help="Folder for the files [default: FILE without its ending].",
 )
 @click.option("--fresh", is_flag=True, help="Replace files that exist.")

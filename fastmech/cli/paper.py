@@ -13,7 +13,7 @@ from fastmech.cli.reporting import account, reporting_options
 @click.option(
     "--out",
     metavar="DIR",
-    type=click.Path(path_type=Path),
+    type=click.Path(file_okay=False, path_type=Path),
     default=Path("results/report"),
     show_default=True,
     help="Folder for the report.",

@@ -14,13 +14,16 @@ from fastmech.cli.reporting import account, reporting_options
 @click.option(
     "--out",
     metavar="DIR",
-    type=click.Path(path_type=Path),
+    type=click.Path(file_okay=False, path_type=Path),
     help="Folder for the pictures [default: FILE without its ending].",
 )
 @reporting_options
 def command(file: Path, out: Path | None, quiet: bool, as_json: bool) -> None:
     """Draw every section of a result file as PNG pictures."""
+    from fastmech.store.read import open_results
+
     with account("plot", quiet, as_json) as told:
+        open_results(file).close()  # before kernels are compiled, which may take a minute
         with told.bars.preparing():
             from fastmech.runner import draw_results
         for picture in draw_results(file, out, stage=told.bars.stage):

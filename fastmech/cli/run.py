@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 @click.option(
     "--out",
     metavar="FILE.h5",
-    type=click.Path(path_type=Path),
+    type=click.Path(dir_okay=False, path_type=Path),
     help="Result file [default: results/SCAN.h5].",
 )
 @click.option("--fresh", is_flag=True, help="Start anew; replace the result file if it exists.")
@@ -30,7 +30,9 @@ if TYPE_CHECKING:
 @click.option("--workers", metavar="N", type=click.IntRange(min=1), help="Compute in N processes (Dask).")
 @click.option("--scheduler", metavar="ADDRESS", help="Compute on a Dask cluster: tcp://HOST:8786.")
 @click.option("--tile", metavar="SECTION:INDEX", help="Compute one tile alone.")
-@click.option("--keep", metavar="FILE.h5", type=click.Path(path_type=Path), help="Keep that tile here.")
+@click.option(
+    "--keep", metavar="FILE.h5", type=click.Path(dir_okay=False, path_type=Path), help="Keep that tile here."
+)
 @reporting_options
 def command(
     request_file: Path,
@@ -53,9 +55,11 @@ def command(
     if workers is not None and scheduler is not None:
         raise click.UsageError("--workers and --scheduler exclude each other")
     with account("run", quiet, as_json) as told:
+        from fastmech.scan_types.request import RunContext, check_outline
+
+        check_outline(request_file)  # before kernels are compiled, which may take a minute
         with told.bars.preparing():
             from fastmech.runner import run_request
-            from fastmech.scan_types.request import RunContext
             from fastmech.tiles.run import default_output
         context = RunContext(threads, told.bars.stage)
         target = out or default_output(request_file)

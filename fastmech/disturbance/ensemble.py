@@ -104,6 +104,7 @@ def disturb(
     Raises:
         InputError: an argument is wrong, or the scene's force decays.
     """
+    checks.progress_function(progress, "trajectories")
     equilibria = equilibria_to_disturb(scene)
     n = checks.whole_number("n", n, least=1, most=MOST_TRAJECTORIES)
     seed = checks.whole_number("seed", seed, least=0)

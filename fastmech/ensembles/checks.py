@@ -46,6 +46,16 @@ def whole_number(name: str, value: Any, *, least: int, most: int | None = None) 
     return int(value)
 
 
+def progress_function(progress: Any, what: str) -> None:
+    """Refuse a ``progress`` that cannot be told how many of ``what`` have finished; ``None`` is none.
+
+    Raises:
+        InputError: it cannot be called.
+    """
+    if progress is not None and not callable(progress):
+        raise InputError(f"progress = {progress!r}: must be a function of the number of finished {what}")
+
+
 def reals(name: str, values: ArrayLike, what: str, least_dimensions: int = 0) -> NDArray[np.float64]:
     """An array of doubles from numbers; texts, complex numbers, objects and hidden entries are no numbers.
 
@@ -108,6 +118,10 @@ def rising_times(name: str, values: ArrayLike) -> NDArray[np.float64]:
     times = reals(name, values, "times in s", 1).copy()  # results keep it
     if times.ndim != 1 or not times.size:
         raise InputError(f"{name}: has shape {times.shape}, must be a row of at least one time")
-    if not np.isfinite(times).all() or times[0] < 0 or (np.diff(times) <= 0).any():
-        raise InputError(f"{name}: must be finite, not negative and strictly rising times in s")
+    wrong = ~np.isfinite(times) | (times < 0.0) | (np.diff(times, prepend=-np.inf) <= 0.0)
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        raise InputError(
+            f"{name}[{k}] = {times[k]:g}: must be finite, not negative and strictly rising times in s"
+        )
     return times

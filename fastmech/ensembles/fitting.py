@@ -9,11 +9,13 @@ gains nothing from a longer step; a faster one needs a shorter one.
 from __future__ import annotations
 
 from importlib import import_module
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.ensembles.energies import is_constant
+from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.threads import in_parts
 from fastmech.kernels.passes import columns
 from fastmech.mechanism.coefficients import Coefficients
@@ -32,10 +34,17 @@ QUICK = 3.0
 #: Decay times after which a force is gone: exp(-40) is less than a double's rounding.
 GONE = 40.0
 
-#: Angle [rad] that a motion may turn through, by its bound on the speed, and steps that it may take by itself
-#: for them to be fitted to it: with more, one trajectory would keep all others waiting for many minutes, and
-#: its angles' rounding would show.
-MOST_ANGLE, MOST_FITTED = 2.0**28, 2.0**30
+#: Angle [rad] that a motion may turn through, by its bound on the speed, for steps to be fitted to it: with
+#: more its angles' rounding would show.
+MOST_ANGLE = 2.0**28
+
+#: Steps that a motion may take by itself: so many, or so many times those of slow motion where that is more.
+#: Doubles could follow more, but one trajectory has a vector of lanes to itself: these are 2 s of a core with
+#: a cheap method and 20 s with an expensive one, for which all others wait.
+MOST_FITTED, MOST_TIMES = 2.0**24, 2.0**8
+
+#: Steps beyond which not even slow motion is worth its wait: of longer runs nothing is set aside.
+MOST_ASKED = 2.0**30
 
 #: Steps of a factor 2 between the longest and the next: trajectories of equal step run in common blocks.
 RUNGS = 4
@@ -53,10 +62,58 @@ def fitted_steps(
     Raises:
         InputError: the number of threads is wrong.
     """
+    return dt * _shares(c, speed_bound(c, starts, threads), exponent)
+
+
+class Fitted(NamedTuple):
+    """Steps fitted to motions."""
+
+    shares: Floats  #: what part of the longest step each takes, (n,)
+    aside: Flags  #: finite starts to whose motions no steps can be fitted, (n,)
+
+
+def fit_steps(
+    c: Coefficients,
+    starts: Floats,
+    dt: float | Floats,
+    t_end: float,
+    exponent: float,
+    threads: int | None = None,
+) -> Fitted:
+    """Steps for the motions of states (n, 4) until ``t_end`` [s], as :func:`fitted_steps`, and who gets none.
+
+    ``dt`` [s] is the longest step of all or of each (n,). Whether a start is set aside depends on it and on
+    the settings alone.
+
+    Raises:
+        InputError: the number of threads is wrong.
+    """
+    bound = speed_bound(c, starts, threads)
+    aside = _turns_too_far(bound, t_end)
+    shares = _shares(c, bound, exponent)
+    asked = t_end / np.asarray(dt, dtype=np.float64)
+    most = np.minimum(np.maximum(MOST_FITTED, MOST_TIMES * asked), MOST_ASKED)
+    aside |= (shares * most < asked) & (asked <= MOST_ASKED)
+    return Fitted(shares, aside & finite_rows(starts))
+
+
+def _shares(c: Coefficients, bound: Floats, exponent: float) -> Floats:
+    """The part of the longest step that motions of these speed bounds take, in the place of the bounds."""
+    shares = bound
     with np.errstate(invalid="ignore", over="ignore"):
-        ratio = speed_bound(c, starts, threads) / vibration_frequency(c)
-        rungs = np.ceil(RUNGS * exponent * np.log2(np.maximum(ratio, 1.0)) - 1e-9)
-    return dt * np.exp2(np.where(np.isfinite(rungs), rungs, 0.0) / -RUNGS)
+        shares /= vibration_frequency(c)
+        np.log2(np.maximum(shares, 1.0, out=shares), out=shares)
+        shares *= RUNGS * exponent
+        shares -= 1e-9
+        np.ceil(shares, out=shares)
+    shares[~np.isfinite(shares)] = 0.0
+    shares /= -RUNGS
+    return np.exp2(shares, out=shares)
+
+
+def _turns_too_far(bound: Floats, t_end: float) -> Flags:
+    with np.errstate(invalid="ignore", over="ignore"):
+        return np.asarray(~(bound * t_end <= MOST_ANGLE))
 
 
 def is_too_fast(c: Coefficients, starts: Floats, t_end: float, threads: int | None = None) -> Flags:
@@ -65,9 +122,7 @@ def is_too_fast(c: Coefficients, starts: Floats, t_end: float, threads: int | No
     Raises:
         InputError: the number of threads is wrong.
     """
-    with np.errstate(invalid="ignore", over="ignore"):
-        followed = speed_bound(c, starts, threads) * t_end <= MOST_ANGLE
-    return np.asarray(~followed & np.isfinite(starts).all(axis=1))
+    return _turns_too_far(speed_bound(c, starts, threads), t_end) & finite_rows(starts)
 
 
 def speed_bound(c: Coefficients, starts: Floats, threads: int | None = None) -> Floats:
@@ -84,7 +139,11 @@ def speed_bound(c: Coefficients, starts: Floats, threads: int | None = None) -> 
     force = np.where(is_constant(np.asarray(c.force), np.asarray(c.decay)), c.force, 0.0)
     # U = lift sin phi - force cos phi + force sin theta - gravity cos theta - spring sin(phi + theta)
     lowest = -np.hypot(c.lift, force) - np.hypot(c.gravity, force) - np.abs(c.spring)
-    return np.asarray(np.sqrt(2.0 * np.maximum(highest - lowest, 0.0)))
+    with np.errstate(invalid="ignore", over="ignore"):
+        highest -= lowest
+        np.maximum(highest, 0.0, out=highest)
+        highest *= 2.0
+    return np.sqrt(highest, out=highest)
 
 
 def vibration_frequency(c: Coefficients) -> Floats:

@@ -119,8 +119,8 @@ def integrate(
         fit: whether each trajectory's step is fitted to its energy: ``dt`` then belongs to slow motions, and
             the faster a trajectory can become, the shorter its own step, see
             :mod:`fastmech.ensembles.fitting`. True: once, so that a trajectory's step is the same all along;
-            times [s]: at the start and at each of them, which pays where a damper slows fast motion down.
-            Scenes only.
+            times [s], none behind the end: at the start and at each of them, which pays where a damper slows
+            fast motion down. Scenes only.
         t_eval: output times [s], rising, not negative; only ``t_end`` by default.
         parameters: values of parameters, by name, that differ between trajectories, each of shape (n,).
         formulation: of a scene: "lagrange", the default, integrates angles and rates (paper (13)), "hamilton"
@@ -147,7 +147,8 @@ def integrate(
         InputError: an argument is wrong, or the states would not fit into memory.
     """
     outputs = _output_times(t_end, t_eval)
-    starts, problem = _problem(scene, y0, parameters or {}, formulation)
+    checks.progress_function(progress, "trajectories")
+    starts, problem, own = _problem(scene, y0, parameters or {}, formulation)
     kept = starts.shape[1] * (outputs.size + np.size(fit) - 1 + problem.canonical)
     beside = BESIDE + OWN * sum(column.ndim for column in problem.params.columns)
     checks.memory(len(starts) * (kept + (1 if tol is None else 2) * beside), 2 if tol is None else 4)
@@ -173,17 +174,18 @@ def integrate(
         raise InputError(f"quantile = {quantile!r}: tells whose error tol is; give tol with it")
     formula = find_method("rk4" if method is None else method)
     step = checks.number("dt", DEFAULT_DT if dt is None else dt, "s", above=0.0)
-    settings = Settings(formula, step, _fit_times(fit, scene), _precision(dtype, problem, formula))
+    settings = Settings(
+        formula, step, _fit_times(fit, scene, outputs[-1]), _precision(dtype, problem, formula)
+    )
     if not isinstance(scene, Scene):
         return _trajectories(
             problem, outputs, solve(problem, starts, outputs, settings, threads, progress), settings
         )
-    own, until = own_values(parameters or {}, scene.model_dump(), len(starts)), float(outputs[-1])
-    steps = StepJudge(scene, own, starts, formula.name)
-    steps.warn(extreme_scenes(scene, own), step, until / step)
+    steps, until = StepJudge(scene, own, starts, formula.name), float(outputs[-1])
+    steps.warn(extreme_scenes(scene, own, problem), step, until / step)
     problem = problem if isinstance(formula, Adams) else watched(problem, starts, step, threads)
     solution = solve(problem, starts, outputs, settings, threads, progress)
-    longest = solution.dt.max(axis=0)
+    longest = solution.dt[0] if len(solution.dt) == 1 else solution.dt.max(axis=0)
     turned = counted_turns(problem, starts, longest, solution.turned)
     taken = StepsTaken(solution.dt[0], longest, solution.steps, until, turned)
     ends = solution.y[-1] if solution.last is None else solution.last
@@ -219,14 +221,18 @@ def _trajectories(
     )
 
 
-def _fit_times(fit: bool | ArrayLike, scene: Scene | System) -> tuple[float, ...]:
+def _fit_times(fit: bool | ArrayLike, scene: Scene | System, until: float) -> tuple[float, ...]:
     if isinstance(fit, bool | np.bool_) and not fit:
         return ()
     if isinstance(scene, System):
         raise InputError("fit: only for a scene, whose energy bounds its speed")
     if isinstance(fit, bool | np.bool_):
         return (0.0,)
-    return tuple(checks.rising_times("fit", fit).tolist())
+    times = checks.rising_times("fit", fit)
+    if times[-1] > until:
+        last = f"fit[{times.size - 1}] = {times[-1]:g}"
+        raise InputError(f"{last}: must not lie behind the run's end, {until:g} s")
+    return tuple(times.tolist())
 
 
 def _precision(dtype: str, problem: Problem, method: Method) -> Precision:
@@ -255,8 +261,8 @@ def _output_times(t_end: float | None, t_eval: ArrayLike | None) -> NDArray[np.f
 
 def _problem(
     scene: Scene | System, y0: ArrayLike, parameters: Mapping[str, ArrayLike], formulation: str | None
-) -> tuple[NDArray[np.float64], Problem]:
-    """Checked starts, and what to integrate from them."""
+) -> tuple[NDArray[np.float64], Problem, dict[str, NDArray[np.float64]]]:
+    """Checked starts, what to integrate from them, and a scene's parameters that differ between them."""
     if isinstance(scene, System) and formulation is not None:
         raise InputError(f"formulation = {formulation!r}: only for a scene")
     formulation = "lagrange" if formulation is None else formulation
@@ -266,8 +272,9 @@ def _problem(
         )
     if isinstance(scene, System):
         starts = checks.states("y0", y0, len(scene.state))
-        return starts, system_problem(scene, len(starts), parameters)
+        return starts, system_problem(scene, len(starts), parameters), {}
     if not isinstance(scene, Scene):
         raise InputError(f"scene = {scene!r}: must be a Scene or a System")
     starts = checks.states("y0", y0, 4)
-    return starts, scene_problem(scene, len(starts), parameters, formulation)
+    own = own_values(parameters, scene.model_dump(), len(starts))
+    return starts, scene_problem(scene, len(starts), own, formulation), own

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.ensembles.lanes import rows_at
+from fastmech.ensembles.lanes import lie_together
 
 Floats = NDArray[np.float64]
 
@@ -41,8 +41,12 @@ class Parameters:
             if self.shared:
                 return np.array(self.columns, dtype=precision)
             rows = np.empty((members.size, len(self.columns)), dtype=precision)
+            together = slice(members[0], members[-1] + 1) if lie_together(members) else None
             for k, column in enumerate(self.columns):
-                rows[:, k] = rows_at(column[:, None], members)[:, 0] if column.ndim else column
+                if not column.ndim:
+                    rows[:, k] = column
+                else:
+                    rows[:, k] = column.take(members) if together is None else column[together]
         return rows
 
     def block(self, n: int) -> Floats:

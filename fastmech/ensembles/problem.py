@@ -73,43 +73,41 @@ class Problem:
         return replace(self, params=self.params.part(members), coefficients=own)
 
 
-def scene_problem(scene: Scene, n: int, parameters: Mapping[str, ArrayLike], formulation: str) -> Problem:
-    """A scene whose ``parameters`` differ between the n trajectories.
+def scene_problem(scene: Scene, n: int, own: Mapping[str, Floats], formulation: str) -> Problem:
+    """A scene of which some parameters differ between the n trajectories: ``own``, see :func:`own_values`.
 
     Raises:
-        InputError: an unknown parameter, or values that no scene may have.
+        InputError: values that no scene may have.
     """
-    own = own_values(parameters, scene.model_dump(), n)
-    for name, column in own.items():
-        for extreme in (column.min(), column.max()) if n else ():
-            scene.replace(**{name: float(extreme)})
-    scenes: Any = SimpleNamespace(**(scene.model_dump() | own))
+    # What a scene allows of one parameter depends on no other.
+    for extreme in (np.min, np.max) if n and own else ():
+        scene.replace(**{name: float(extreme(column)) for name, column in own.items()})
+    scenes: Any = SimpleNamespace(**(scene.model_dump() | dict(own)))
     coefficients: Any = reduce(scenes)
     params = Parameters(tuple(np.asarray(c, dtype=np.float64) for c in coefficients))
     rhs = right_hand_side(coefficients, formulation)
     if own:
-        values: Any = (np.broadcast_to(value, n) for value in coefficients)
+        values: Any = (value if np.ndim(value) else np.broadcast_to(value, n) for value in coefficients)
         coefficients = Coefficients(*values)
     return Problem(rhs, params, coefficients=coefficients, canonical=formulation == "hamilton")
 
 
-def extreme_scenes(scene: Scene, parameters: Mapping[str, ArrayLike]) -> list[Scene]:
-    """The scene, or those of the trajectories in which a parameter that differs is least or greatest.
+def extreme_scenes(scene: Scene, own: Mapping[str, Floats], problem: Problem) -> list[Scene]:
+    """The scene, or those of the trajectories that a damper stops soonest and latest, and of the stiffest.
 
-    With more than one that differs none of them may be the most damped or the stiffest: these are added.
+    ``own`` are the parameters that differ, (n,), of the scene's ``problem``. These three are what limits a
+    step by parameters; a look at a scene takes as long as hundreds of trajectories.
     """
-    columns = {name: np.asarray(values, dtype=np.float64) for name, values in parameters.items()}
-    rows = {
-        int(pick(column)) for column in columns.values() if column.size for pick in (np.argmin, np.argmax)
-    }
-    if rows:
-        scenes: Any = SimpleNamespace(**(scene.model_dump() | columns))
-        c: Any = reduce(scenes)
-        rows |= {int(np.argmax(rate(c))) for rate in (damping_rate, vibration_frequency)}
+    c = problem.coefficients
+    if not own or c is None or not np.size(c.damping):
+        return [scene]
+    damping = damping_rate(c)
+    rows = {int(np.argmax(damping)), int(np.argmin(damping)), int(np.argmax(vibration_frequency(c)))}
+    # The values have been checked, all of them.
     return [
-        scene.replace(**{name: float(column[row]) for name, column in columns.items()})
+        scene.model_copy(update={name: float(column[row]) for name, column in own.items()})
         for row in sorted(rows)
-    ] or [scene]
+    ]
 
 
 def system_problem(system: System, n: int, parameters: Mapping[str, ArrayLike]) -> Problem:

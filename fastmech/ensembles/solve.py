@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.ensembles.fitting import EXPONENT_AGAIN, EXPONENT_ONCE, MOST_FITTED, fitted_steps, is_too_fast
+from fastmech.ensembles.fitting import EXPONENT_AGAIN, EXPONENT_ONCE, fit_steps, fitted_steps
 from fastmech.ensembles.plausible import judge
 from fastmech.ensembles.problem import Problem
 from fastmech.ensembles.run import Ensemble, Observation, Progress, run_ensemble
@@ -80,76 +80,111 @@ def solve(
     Raises:
         InputError: the step or the number of threads are wrong.
     """
-    n = len(starts)
-    again = {t for t in settings.fit if 0.0 < t < outputs[-1]}
+    ends, again = _ends(settings, outputs)
+    fitted_to = problem.coefficients if settings.fit else None
     exponent = EXPONENT_AGAIN if again else EXPONENT_ONCE
-    sooner = {t for t, _ in settings.early if 0.0 < t < outputs[-1]}
-    ends = sorted(again | sooner | {float(outputs[-1])})
-    pieces: list[Floats] = []
-    status, failed = np.full(n, Status.OK, dtype=np.int8), np.full(n, np.nan)
-    lost: list[tuple[NDArray[np.bool_], Floats]] = []
-    steps, taken, turned = np.zeros(n, dtype=np.int64), np.empty((len(ends), n)), np.zeros(n)
-    begin, now, shares = 0.0, problem.inward(starts), np.ones(n)
+    begin, now, aside = 0.0, problem.inward(starts), np.zeros(len(starts), dtype=np.bool_)
+    dt: Any = np.asarray(settings.dt, dtype=np.float64)
+    shares: Any = 1.0
+    if fitted_to is not None:
+        shares, aside = fit_steps(fitted_to, starts, dt, float(outputs[-1]), exponent, threads)
+        if aside.any():  # they never enter a block, and their step is that of slow motion
+            now, shares[aside] = np.where(aside[:, None], np.nan, now), 1.0
     method = settings.method
     if isinstance(method, ImplicitRungeKutta):
         method = with_jacobian(method, problem.jacobian, problem.second_order)
-    aside = np.zeros(n, dtype=np.bool_)
-    if settings.fit and problem.coefficients is not None:
-        aside = is_too_fast(problem.coefficients, starts, float(outputs[-1]), threads)
-        shares = fitted_steps(problem.coefficients, starts, 1.0, exponent, threads)
-        number = outputs[-1] / np.asarray(settings.dt, dtype=np.float64)
-        aside |= (number / shares > MOST_FITTED) & (number <= MOST_FITTED) & np.isfinite(starts).all(axis=1)
-        now = np.where(aside[:, None], np.nan, now) if aside.any() else now  # they never enter a block
+    course = _Course(problem)
     for piece, end in enumerate(ends):
         inside = (outputs <= end) & ((outputs > begin) | (piece == 0))
         times = np.concatenate([[begin], outputs[inside]])
         times = times if times[-1] == end and times.size > 1 else np.append(times, end)
-        dt = np.broadcast_to(np.asarray(settings.dt, dtype=np.float64), n)
-        if piece and settings.fit and problem.coefficients is not None:
+        if piece and fitted_to is not None:
             # No motion becomes faster than its start allows: a step never shrinks where one has blown up.
-            fitted = fitted_steps(problem.coefficients, problem.outward(now), 1.0, exponent, threads)
+            fitted = fitted_steps(fitted_to, problem.outward(now), 1.0, exponent, threads)
             shares = np.maximum(fitted, shares)
-        dt = np.where(aside, dt, dt * shares) * min(
-            (share for until, share in settings.early if end <= until), default=1.0
-        )
+        steps = dt * shares * min((share for until, share in settings.early if end <= until), default=1.0)
         run = run_ensemble(
             problem.rhs,
             problem.params,
             now,
             times,
-            dt,
+            steps,
             method,
             problem.observation,
             threads=threads,
             precision=settings.precision,
             progress=progress if end == ends[-1] else None,
         )
-        turned = np.maximum(turned, turned_in(run, problem.observation))
-        pieces.append(run.states[: np.count_nonzero(inside)])
-        worse = run.status != Status.OK
-        status[worse & (status == Status.OK)] = run.status[worse & (status == Status.OK)]
-        first = np.isnan(failed) & ~np.isnan(run.failed)
-        failed[first] = run.failed[first]
-        if first.any():
-            lost.append((first, problem.outward(run.last)[first]))
-        lengths = np.unique(dt)  # a search in these few is quicker than their inverse
-        of = np.searchsorted(lengths, dt)
-        numbers = [output_steps(times, float(length)) for length in lengths]
-        steps += np.array([number.sum() for number in numbers], dtype=np.int64)[of]
-        longest = [np.max(np.diff(times) / np.maximum(number, 1)) for number in numbers]
-        taken[piece] = np.array(longest, dtype=np.float64)[of]
+        course.add(run, times, steps, int(inside.sum()))
         begin, now = end, run.states[-1]
-    y = pieces[0] if len(pieces) == 1 else np.concatenate(pieces)
-    if problem.canonical:
-        for output in y:  # one at a time: what is computed on the way takes little memory
-            output[:] = problem.outward(output)
-    status[aside] = Status.STEP_TOO_LARGE
-    y[: 1 if outputs[0] == 0.0 else 0, aside] = starts[aside]
-    judged = judge(status, starts, y[-1], problem.coefficients, threads)
-    last = None
-    if lost:
-        last = y[-1].copy()
-        for members, states in lost:
-            last[members] = states
-        last[aside] = starts[aside]
-    return Solution(y, run.records, judged, steps, taken, failed, turned, last)
+    solution = course.solution(run.records)
+    solution.status[aside] = Status.STEP_TOO_LARGE
+    solution.y[: 1 if outputs[0] == 0.0 else 0, aside] = starts[aside]
+    if solution.last is not None:
+        solution.last[aside] = starts[aside]
+    solution.status = judge(solution.status, starts, solution.y[-1], problem.coefficients, threads)
+    return solution
+
+
+def _ends(settings: Settings, outputs: Floats) -> tuple[list[float], bool]:
+    """Where the pieces of a run end [s], and whether steps are fitted again on the way."""
+    until = float(outputs[-1])
+    again = {t for t in settings.fit if 0.0 < t < until}
+    sooner = {t for t, _ in settings.early if 0.0 < t < until}
+    return sorted(again | sooner | {until}), bool(again)
+
+
+class _Course:
+    """What the pieces of a run have given so far."""
+
+    def __init__(self, problem: Problem) -> None:
+        self._problem = problem
+        self._states: list[Floats] = []
+        self._lost: list[tuple[NDArray[np.int64], Floats]] = []
+        self._status, self._failed = np.empty(0, dtype=np.int8), np.empty(0)
+        self._steps, self._dt = np.empty(0, dtype=np.int64), list[Floats]()
+        self._turned = np.empty(0)
+
+    def add(self, run: Ensemble, times: Floats, dt: Floats, outputs: int) -> None:
+        """The next piece, with steps ``dt`` [s] of all or of each (n,) and so many outputs."""
+        number, longest = _steps_taken(times, dt, len(run.status))
+        turned = turned_in(run, self._problem.observation)
+        if not self._dt:
+            self._status, self._failed, self._steps, self._lost = run.status, run.failed, number, run.lost
+            self._turned = turned
+        else:
+            np.maximum(self._turned, turned, out=self._turned)
+            for members, states in run.lost:
+                first = np.isnan(self._failed[members])
+                self._lost.append((members[first], states[first]))
+            healthy = self._status == Status.OK
+            self._status[healthy] = run.status[healthy]
+            np.copyto(self._failed, run.failed, where=np.isnan(self._failed))
+            self._steps += number
+        if outputs:  # else they need not be kept
+            self._states.append(run.states[:outputs])
+        self._dt.append(longest)
+
+    def solution(self, records: Floats) -> Solution:
+        """All pieces together, with what the last one has observed."""
+        y = self._states[0] if len(self._states) == 1 else np.concatenate(self._states)
+        if self._problem.canonical:
+            for output in y:  # one at a time: what is computed on the way takes little memory
+                output[:] = self._problem.outward(output)
+        last: Any = y[-1].copy() if self._lost else None
+        for members, states in self._lost:
+            last[members] = self._problem.part(members).outward(states)
+        dt = self._dt[0][None] if len(self._dt) == 1 else np.array(self._dt)
+        return Solution(y, records, self._status, self._steps, dt, self._failed, self._turned, last)
+
+
+def _steps_taken(times: Floats, dt: Floats, n: int) -> tuple[NDArray[np.int64], Floats]:
+    """Steps of n trajectories, none longer than ``dt`` [s] of all or of each; number and longest of each."""
+    lengths = np.unique(dt)
+    numbers = [output_steps(times, float(length)) for length in lengths]
+    total = np.array([number.sum() for number in numbers], dtype=np.int64)
+    longest = np.array([np.max(np.diff(times) / np.maximum(number, 1)) for number in numbers])
+    if not dt.ndim:
+        return np.full(n, total[0]), np.full(n, longest[0])
+    of = np.searchsorted(lengths, dt)  # in these few it is quicker than their inverse
+    return total[of], longest[of]

@@ -30,9 +30,12 @@ ROWS = 8
 def columns(c: Coefficients, members: slice) -> Floats:
     """Coefficients of some trajectories as passes are given them, shape (8, n); (8, 1) where all share."""
     values = [np.asarray(value) for value in c]
-    if any(value.ndim and value.strides[0] for value in values):
-        parts = [value[members] if value.ndim else value for value in values]
-        return np.array(np.broadcast_arrays(*parts), dtype=np.float64)
+    own = [value for value in values if value.ndim and value.strides[0]]
+    if own:
+        rows = np.empty((len(values), own[0][members].size))
+        for row, value in zip(rows, values, strict=True):
+            row[:] = value[members] if value.ndim else value
+        return rows
     return np.array([value.flat[0] for value in values], dtype=np.float64)[:, None]
 
 

@@ -12,7 +12,7 @@ from fastmech.scan_types.request import Scan
 
 @cache
 def scan_kinds() -> dict[str, type[Scan]]:
-    """Every kind of scan by its name in request files."""
+    """Every kind of scan by its name in request files; with them their kernels are loaded or compiled."""
     modules = [import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__)]
     classes = [
         value

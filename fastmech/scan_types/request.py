@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -15,7 +16,6 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 
 from fastmech.ensembles.status import failure_counts, failure_line
 from fastmech.errors import InputError
-from fastmech.integrators.methods import find_method
 from fastmech.results import Dataset, Variable, check_name
 from fastmech.scan_types.tiling import RunContext as RunContext
 from fastmech.scan_types.tiling import Tiles, Tiling
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def _known_method(name: str) -> str:
-    find_method(name)
+    import_module("fastmech.integrators.methods").find_method(name)  # with kernels, so only where it is asked
     return name
 
 
@@ -165,6 +165,24 @@ class Request:
         return [f"scan.{name}: {line}" for name, line in told.items() if line is not None]
 
 
+@dataclass(frozen=True)
+class Outline:
+    """What a request file says without the kinds of its scans: title, scene, the scans' tables by name."""
+
+    title: str
+    scene: Scene
+    scans: Mapping[str, Any]
+
+
+def check_outline(path: str | Path) -> None:
+    """Refuse what is wrong with a request file however its scans are read: that loads or compiles kernels.
+
+    Raises:
+        InputError: the file cannot be read, or its title, its scene or a scan's name is wrong.
+    """
+    _outline(read_text(path), path)
+
+
 def read_request(path: str | Path, kinds: Mapping[str, type[Scan]]) -> Request:
     """Read and validate a request file.
 
@@ -180,24 +198,15 @@ def request_of_text(text: str, path: str | Path, kinds: Mapping[str, type[Scan]]
     Raises:
         InputError: it is no TOML, or anything in it is unknown, of a wrong type or out of range.
     """
-    table = parse_toml(text, path)
-    allowed = ["title", "scene", "scan"]
-    for name in table:
-        if name not in allowed:
-            raise InputError(f"{name}: unknown name; {nearest(name, allowed)}")
-    title = table.get("title", Path(path).stem)
-    if not isinstance(title, str):
-        raise InputError(f"title = {title!r}: must be a text")
-    scene = Scene(**_table(table.get("scene", {}), "scene"))
-    scans = _table(table.get("scan", {}), "scan")
-    if not scans:
+    outline = _outline(text, path)
+    if not outline.scans:
         raise InputError(
             f"{path}: asks for no scan; write a table [scan.NAME] with kind = one of {list(kinds)}"
         )
     request = Request(
-        title=title,
-        scene=scene,
-        scans={name: _scan(name, entry, kinds) for name, entry in scans.items()},
+        title=outline.title,
+        scene=outline.scene,
+        scans={name: _scan(name, entry, kinds) for name, entry in outline.scans.items()},
         text=text,
     )
     for name, scan in request.scans.items():
@@ -208,18 +217,34 @@ def request_of_text(text: str, path: str | Path, kinds: Mapping[str, type[Scan]]
     return request
 
 
+def _outline(text: str, path: str | Path) -> Outline:
+    table = parse_toml(text, path)
+    allowed = ["title", "scene", "scan"]
+    for name in table:
+        if name not in allowed:
+            raise InputError(f"{name}: unknown name; {nearest(name, allowed)}")
+    title = table.get("title", Path(path).stem)
+    if not isinstance(title, str):
+        raise InputError(f"title = {title!r}: must be a text")
+    scene = Scene(**_table(table.get("scene", {}), "scene"))
+    scans = _table(table.get("scan", {}), "scan")
+    for name, entry in scans.items():
+        where = f"scan.{name}"
+        check_name(name, where)
+        if name in Scene.model_fields:
+            raise InputError(f"{where}: is the name of a parameter of the scene; choose another")
+        _table(entry, where)
+    return Outline(title, scene, scans)
+
+
 def _table(value: Any, where: str) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise InputError(f"{where} = {value!r}: must be a table")
     return value
 
 
-def _scan(name: str, value: Any, kinds: Mapping[str, type[Scan]]) -> Scan:
-    where = f"scan.{name}"
-    check_name(name, where)
-    if name in Scene.model_fields:
-        raise InputError(f"{where}: is the name of a parameter of the scene; choose another")
-    entry = dict(_table(value, where))
+def _scan(name: str, value: Mapping[str, Any], kinds: Mapping[str, type[Scan]]) -> Scan:
+    where, entry = f"scan.{name}", dict(value)
     kind = entry.pop("kind", None)
     if kind is None:
         raise InputError(f"{where}.kind: missing; allowed: {', '.join(kinds)}")

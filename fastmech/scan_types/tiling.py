@@ -5,11 +5,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
-from fastmech.ensembles.run import Progress
 from fastmech.results import Dataset
 from fastmech.store.stream import Stream
+
+if TYPE_CHECKING:
+    from fastmech.ensembles.run import Progress
 
 #: Gives a finished tile by its index.
 Tiles: TypeAlias = "Callable[[int], Dataset]"

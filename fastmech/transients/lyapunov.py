@@ -88,10 +88,10 @@ def largest_lyapunov(
         problem = system_problem(scene, len(starts), parameters or {})
     elif isinstance(scene, Scene):
         starts = checks.states("y0", y0, 4)
-        problem = scene_problem(scene, len(starts), parameters or {}, "lagrange")
-        values = own_values(parameters or {}, scene.model_dump(), len(starts))
-        judge_of_steps = StepJudge(scene, values, starts, METHOD)
-        judge_of_steps.warn(extreme_scenes(scene, values), dt, t_end / dt)
+        own = own_values(parameters or {}, scene.model_dump(), len(starts))
+        problem = scene_problem(scene, len(starts), own, "lagrange")
+        judge_of_steps = StepJudge(scene, own, starts, METHOD)
+        judge_of_steps.warn(extreme_scenes(scene, own, problem), dt, t_end / dt)
     else:
         raise InputError(f"scene = {scene!r}: must be a Scene or a System")
     Y = np.array(starts.T, order="C")

@@ -181,6 +181,11 @@ def test_wrong_thread_count_is_refused(threads: int) -> None:
         map_equilibria(PAPER, {"c1": [1.0]}, threads=threads)
 
 
+def test_progress_that_is_no_function_is_refused() -> None:
+    with pytest.raises(InputError, match=r"^progress = 3: .*finished points"):
+        map_equilibria(PAPER, {"c1": [1.0]}, progress=3)  # type: ignore[arg-type]
+
+
 def test_a_force_that_decays_is_no_axis() -> None:
     """F0 means the load at rest in maps and in searches for folds; where it decays each refuses it."""
     loads = [1.0, 2.0]

@@ -142,6 +142,7 @@ def test_a_well_erodes_towards_its_fold() -> None:
         ({"n": 0}, "n = 0: must be an integer not less than 1"),
         ({"scene": BISTABLE.replace(beta=0.0)}, "scene.beta = 0: must be greater than 0"),
         ({"parameter": "F1"}, "axes.F1: unknown parameter"),
+        ({"progress": 3}, "progress = 3: must be a function of the number of finished values"),
     ],
 )
 def test_wrong_arguments_are_refused(changes: dict[str, Any], message: str) -> None:

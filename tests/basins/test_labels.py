@@ -159,6 +159,11 @@ def test_without_damper_there_are_no_basins() -> None:
         np.testing.assert_array_equal(fm.trapped(scene, states).turns, turns)
 
 
+def test_progress_that_is_no_function_is_refused() -> None:
+    with pytest.raises(fm.InputError, match=r"^progress = 3: .*finished starts"):
+        fm.labels_of(CONSTANT, [1.0, 0.0, 0.0, 0.0], progress=3)  # type: ignore[arg-type]
+
+
 def test_an_end_that_cannot_be_counted_to_is_refused() -> None:
     with pytest.raises(fm.InputError, match=r"t_end = 1e\+308 s: must be at most"):
         fm.labels_of(CONSTANT, np.zeros((1, 4)), 1e308)

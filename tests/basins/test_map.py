@@ -189,6 +189,7 @@ def test_fixed_coordinates_are_starts() -> None:
         ({"axes": {"phi": [0.0, 1.0], "thta": [0.0]}}, r"axes.thta: unknown name; did you mean 'theta'"),
         ({"axes": {"phi": [1.0, 0.0], "theta": [0.0]}}, r"axes.phi: .*strictly rising"),
         ({"fixed": {"phi": 1.0}}, r"fixed.phi: must be one of the coordinates without an axis"),
+        ({"progress": 3}, "progress = 3: must be a function of the number of finished starts"),
         ({"refine": 3}, r"refine = 3: must be a power of two"),
         ({"t_end": 0.0}, r"t_end = 0.0: must be a finite number of s greater than 0"),
         ({"scene": fm.Scene(beta=0.0)}, r"scene.beta = 0"),

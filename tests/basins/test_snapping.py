@@ -182,6 +182,7 @@ def test_the_critical_impulse_is_that_of_brute_force() -> None:
         ({"alpha": [2.0, 1.0]}, "alpha: must be greater than 0 1/s and rise"),
         ({"F0": [-1.0, 1.0]}, "F0: must rise, be of one sign and nowhere be 0 N"),
         ({"scene": fm.Scene(beta=0.0)}, "scene.beta = 0: must be greater than 0"),
+        ({"progress": 3}, "progress = 3: must be a function of the number of finished motions"),
         ({"start": fm.find_equilibria(fm.Scene())[1]}, "start: is a saddle, must be a minimum"),
     ],
 )

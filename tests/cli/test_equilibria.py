@@ -70,7 +70,7 @@ def test_no_isolated_equilibria(invoke):
 def test_bad_scene_is_one_line(invoke):
     assert_refused(invoke("equilibria", "--m1", "0"), "scene.m1 = 0.0")
     assert_refused(invoke("equilibria", "--m1", "nan"), "scene.m1 = nan")
-    assert_refused(invoke("equilibria", "--at", "-1"), "at = -1.0")
+    assert_refused(invoke("equilibria", "--at", "-1"), "--at", "-1")
     assert_refused(invoke("equilibria", "none.toml"), "none.toml")
     Path("empty.toml").write_text("", encoding="utf-8")
     assert_refused(invoke("equilibria", "empty.toml"), "[scene]")

@@ -44,7 +44,7 @@ def test_plot_into_a_folder(invoke, done):
 
 def test_plot_into_what_is_no_folder(invoke, done):
     Path("file").write_text("no folder", encoding="utf-8")
-    assert_refused(invoke("plot", done, "--out", "file"), "file: cannot be made")
+    assert_refused(invoke("plot", done, "--out", "file/inner"), "file/inner: cannot be made")
 
 
 @pytest.mark.parametrize("command", ["info", "plot"])

@@ -159,6 +159,7 @@ def test_force_free_scene_with_a_decay_rate_is_welcome() -> None:
         ({"dt": "x"}, "dt = 'x': must be a finite number of s greater than 0"),
         ({"method": "rk5"}, "method = 'rk5': unknown; known: euler"),
         ({"threads": 0}, "threads = 0: must be an integer not less than 1"),
+        ({"progress": 3}, "progress = 3: must be a function of the number of finished trajectories"),
     ],
 )
 def test_wrong_arguments_are_refused(arguments: dict[str, Any], message: str) -> None:

@@ -11,7 +11,7 @@ from ensembles.references import errors, motions_of
 from ensembles.starts import Floats, random_starts
 
 import fastmech as fm
-from fastmech.ensembles.fitting import fitted_steps, speed_bound, vibration_frequency
+from fastmech.ensembles.fitting import fit_steps, fitted_steps, speed_bound, vibration_frequency
 from fastmech.ensembles.problem import scene_problem
 from fastmech.errors import InputError
 from fastmech.mechanism.coefficients import Coefficients, reduce
@@ -94,6 +94,32 @@ def test_the_ladder_of_steps() -> None:
     np.testing.assert_array_equal(fitted_steps(c, 0.0 * starts + [*BOTTOM, 0.0, 0.0], 0.1, 1.0), 0.1)
 
 
+@pytest.mark.parametrize(("asked", "halvings"), [(2.0**10, 14), (2.0**16, 8), (2.0**20, 8), (2.0**29, 1)])
+def test_motions_of_too_many_steps_get_none(asked: float, halvings: int) -> None:
+    """Of a second: 2^24 steps at most or 256 times those of slow motion, and 2^30 in any case.
+
+    theta' = w 2^k at the bottom halves a step k times; who is alone is told the same.
+    """
+    c, k = reduce(HANGING), np.arange(0, 20)
+    starts = np.tile([*BOTTOM, 0.0, 0.0], (k.size, 1))
+    starts[:, 3] = 0.999 * float(vibration_frequency(c)) * 2.0**k
+    found = fit_steps(c, starts, 1.0 / asked, 1.0, 1.0)
+    np.testing.assert_array_equal(found.shares, 0.5**k)
+    np.testing.assert_array_equal(found.aside, k > halvings)
+    each = fit_steps(c, starts, np.full(k.size, 1.0 / asked), 1.0, 1.0)
+    np.testing.assert_array_equal(each.aside, found.aside)
+    alone = [fit_steps(c, start[None], 1.0 / asked, 1.0, 1.0).aside[0] for start in starts]
+    np.testing.assert_array_equal(alone, found.aside)
+
+
+def test_nothing_is_set_aside_for_what_is_asked_of_all() -> None:
+    """More steps than 2^30 of slow motion are meant; a start that is not finite has a status of its own."""
+    c, fast = reduce(HANGING), np.array([[*BOTTOM, 0.0, 1e2], [*BOTTOM, 0.0, np.nan]])
+    assert fit_steps(c, fast, 2.0**-20, 2.0**-4, 1.0).aside.tolist() == [False, False]
+    assert fit_steps(c, fast, 2.0**-31, 1.0, 1.0).aside.tolist() == [False, False]
+    assert fit_steps(c, fast, 2.0**-29, 1.0, 1.0).aside.tolist() == [True, False]
+
+
 @pytest.mark.parametrize("scene", [SCENE, Scene(), HANGING])
 def test_steps_stand_on_the_ladder_and_depend_on_the_own_start_alone(scene: Scene) -> None:
     c, starts = reduce(scene), random_starts(300)
@@ -165,7 +191,7 @@ def test_a_second_fit_never_shortens_a_step() -> None:
         [0.1, 2.0],  # none in the second piece
         [1.3, 1.7],  # the first only in the last piece
         [0.0, 1.25],  # the last at a cut
-        [0.3],  # all before the first cut
+        [0.3],  # all before the cuts, which are none then
         [0.0],
     ],
 )
@@ -177,7 +203,7 @@ def test_outputs_of_a_run_in_pieces(scene: Scene, formulation: str, times: list[
         t_eval=times,
         dt=0.02,
         method="dop853",
-        fit=[0.0, 0.5, 1.25],
+        fit=[cut for cut in (0.0, 0.5, 1.25) if cut <= times[-1]],
         formulation=formulation,
     )
     np.testing.assert_array_equal(run.t, times)
@@ -214,10 +240,12 @@ def test_a_system_has_no_energy_to_fit_to() -> None:
 @pytest.mark.parametrize(
     ("fit", "message"),
     [
-        ([0.5, 0.2], "fit: must be finite, not negative and strictly rising times in s"),
-        ([0.0, 0.0], "fit: must be finite, not negative and strictly rising times in s"),
-        ([-0.1, 0.2], "fit: must be finite, not negative and strictly rising times in s"),
-        ([0.0, np.nan], "fit: must be finite, not negative and strictly rising times in s"),
+        ([0.5, 0.2], "fit[1] = 0.2: must be finite, not negative and strictly rising times in s"),
+        ([0.0, 0.0], "fit[1] = 0: must be finite, not negative and strictly rising times in s"),
+        ([-0.1, 0.2], "fit[0] = -0.1: must be finite, not negative and strictly rising times in s"),
+        ([0.0, np.nan], "fit[1] = nan: must be finite, not negative and strictly rising times in s"),
+        ([0.0, 0.5, 1.5], "fit[2] = 1.5: must not lie behind the run's end, 1 s"),
+        (3.0, "fit[0] = 3: must not lie behind the run's end, 1 s"),
         ([], "fit: has shape (0,), must be a row of at least one time"),
         ([[0.0, 1.0]], "fit: has shape (1, 2), must be a row of at least one time"),
         ("often", "fit: must be times in s"),

@@ -10,6 +10,7 @@ import pytest
 from ensembles.starts import random_starts
 
 from fastmech.ensembles.integrate import integrate
+from fastmech.ensembles.problem import extreme_scenes, scene_problem
 from fastmech.ensembles.run import run_ensemble
 from fastmech.ensembles.spans import output_steps
 from fastmech.errors import InputError
@@ -138,11 +139,11 @@ def test_y0_of_any_kind_of_numbers() -> None:
         ({"t_end": None}, "t_end: missing; give the end of the run in s, or output times t_eval"),
         ({"t_eval": []}, "t_eval: has shape (0,), must be a row of at least one time"),
         ({"t_eval": [[0.1, 0.2]]}, "t_eval: has shape (1, 2), must be a row of at least one time"),
-        ({"t_eval": [0.2, 0.1]}, "t_eval: must be finite, not negative and strictly rising times in s"),
-        ({"t_eval": [0.1, 0.1]}, "t_eval: must be finite, not negative and strictly rising times in s"),
-        ({"t_eval": [-0.1, 0.1]}, "t_eval: must be finite, not negative and strictly rising times in s"),
-        ({"t_eval": [0.1, np.nan]}, "t_eval: must be finite, not negative and strictly rising times in s"),
-        ({"t_eval": [0.1, np.inf], "t_end": None}, "t_eval: must be finite, not negative"),
+        ({"t_eval": [0.2, 0.1]}, "t_eval[1] = 0.1: must be finite, not negative and strictly rising"),
+        ({"t_eval": [0.1, 0.1]}, "t_eval[1] = 0.1: must be finite, not negative and strictly rising"),
+        ({"t_eval": [-0.1, 0.1]}, "t_eval[0] = -0.1: must be finite, not negative and strictly rising"),
+        ({"t_eval": [0.1, np.nan]}, "t_eval[1] = nan: must be finite, not negative and strictly rising"),
+        ({"t_eval": [0.1, np.inf], "t_end": None}, "t_eval[1] = inf: must be finite, not negative"),
         ({"t_eval": ["a"]}, "t_eval: must be times in s"),
         ({"t_eval": [0.5, 2.0]}, "t_eval: its last time 2 s lies behind t_end = 1 s"),
         ({"method": "rk5"}, "method = 'rk5': unknown; known: euler"),
@@ -152,6 +153,7 @@ def test_y0_of_any_kind_of_numbers() -> None:
         ({"dtype": [1]}, "dtype = [1]: must be one of float64, float32"),
         ({"method": ""}, "method = '': unknown; known: euler, midpoint"),
         ({"dt": 1e-13}, "dt = 1e-13 s: gives 1e+13 steps, at most 2e+10 are possible"),
+        ({"progress": 3}, "progress = 3: must be a function of the number of finished trajectories"),
         ({"threads": 0}, "threads = 0: must be an integer not less than 1"),
         ({"threads": -2}, "threads = -2: must be an integer not less than 1"),
         ({"threads": 1.5}, "threads = 1.5: must be an integer not less than 1"),
@@ -169,6 +171,24 @@ def test_a_wrong_t_end_beside_t_eval_is_refused() -> None:
     for t_end in (np.nan, "1", -1.0, 0.0):
         with pytest.raises(InputError, match=r"^t_end"):
             integrate(SCENE, START, t_end, t_eval=[0.0])  # type: ignore[arg-type]
+
+
+def test_scenes_to_look_at_are_the_most_and_least_damped_and_the_stiffest() -> None:
+    own = {"beta": np.array([50.0, 1.0, 900.0, 60.0, 70.0]), "c1": np.array([1.0, 2.0, 3.0, 5e4, 4.0])}
+    problem = scene_problem(SCENE, 5, own, "lagrange")
+    chosen = [{name: values[k] for name, values in own.items()} for k in (1, 2, 3)]
+    assert extreme_scenes(SCENE, own, problem) == [SCENE.replace(**values) for values in chosen]
+    assert extreme_scenes(SCENE, {}, scene_problem(SCENE, 5, {}, "lagrange")) == [SCENE]
+    none = {"beta": np.empty(0)}
+    assert extreme_scenes(SCENE, none, scene_problem(SCENE, 0, none, "lagrange")) == [SCENE]
+
+
+def test_a_value_of_own_parameters_that_no_scene_may_have_is_told() -> None:
+    for name, value in (("m2", -1.0), ("beta", -2.0), ("c1", 1e31), ("l", 1e-31)):
+        own = {"F0": np.array([1.0, -2.0, 3.0]), name: np.array([1.0, value, 2.0])}
+        with pytest.raises(InputError, match=rf"^scene\.{name} = {re.escape(str(value))}: ") as error:
+            integrate(SCENE, np.zeros((3, 4)), 0.1, parameters=own)
+        assert "\n" not in str(error.value)
 
 
 def test_numpy_numbers_are_numbers() -> None:
