@@ -44,8 +44,10 @@ def may_turn(c: Coefficients, starts: Floats, dt: float | Floats, threads: int |
         InputError: the number of threads is wrong.
     """
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        fastest = speed_bound(c, starts, threads) * np.sqrt((c.mass + 1.0) / c.mass)
-        return np.asarray(fastest * dt > TURN)
+        turn = speed_bound(c, starts, threads)
+        turn *= np.sqrt((c.mass + 1.0) / c.mass)
+        turn *= dt
+        return np.asarray(turn > TURN)
 
 
 def watched(problem: Problem, starts: Floats, dt: float, threads: int | None = None) -> Problem:

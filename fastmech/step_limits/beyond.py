@@ -247,4 +247,7 @@ def _coefficients(scene: Scene, own: Mapping[str, Floats]) -> Coefficients:
 def _turns_too_far(rates: Floats, first: Floats) -> NDArray[np.bool_]:
     """Which motions (n,) turn a body by more than 1 rad in a step if they stay as fast as at first."""
     with np.errstate(invalid="ignore", over="ignore"):  # starts that are not finite have their own status
-        return np.asarray(first * np.maximum(np.abs(rates[:, 0]), np.abs(rates[:, 1])) > TURN)
+        fastest = np.abs(rates[:, 0])
+        np.maximum(fastest, np.abs(rates[:, 1]), out=fastest)
+        fastest *= first
+        return np.asarray(fastest > TURN)
