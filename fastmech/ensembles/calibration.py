@@ -205,7 +205,7 @@ class _Trial(Sample):
         early = fading_force(c, float(self.outputs[-1])) if c is not None else ()
         if c is not None and isinstance(method, ImplicitRungeKutta):
             early += initial_layer(c, self.starts)
-        ladder = Ladder(self, Settings(method, dt, self.fit(), early=early), longest)
+        ladder = Ladder(self, Settings(method, dt, self.fit(), early=early, bounded=False), longest)
         ladder.affordable = affordable
         ladder.climb(1 if stable else LEAP)
         return ladder

@@ -6,34 +6,34 @@ times its error, so where the longer steps are right by luck the error is taken 
 
 A trajectory is given up where three shorter steps did not halve its error (chaos, a singularity, a start on a
 basin's border), where two resolutions disagree about whether it stops, or where the budget is spent. It keeps
-the best run that it has had, and an error that says so.
+the best run that it has had, or a typical one where rounding rules (:mod:`fastmech.ensembles.rounding`), and
+an error that says so.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from fastmech.ensembles.calibration import CALM
 from fastmech.ensembles.ladder import AIM, CHEAP
+from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.missed import missed_line
 from fastmech.ensembles.places import part_of, put_into
-from fastmech.ensembles.repeatable import Flags, Floats, Members, Repeatable, usable_starts
+from fastmech.ensembles.repeatable import Flags, Floats, Members, Repeatable
 from fastmech.ensembles.richardson import (
     LEAST_ORDER,
     RATIO,
     ROUNDING,
-    distances,
     error_of_longer,
     order_seen,
 )
+from fastmech.ensembles.rounding import typical_runs, typical_work
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.solve import Solution, mean_shares, solve
-from fastmech.ensembles.stopping import STOP_CODE
+from fastmech.ensembles.stiffness import explicit_limit
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
-from fastmech.integrators.methods import find_method
 
 #: Repetitions of trajectories at most.
 ROUNDS = 6
@@ -44,12 +44,11 @@ PATIENCE = 3
 #: Errors below this that a shorter step does not halve are rounding, magnified by the motion.
 MAGNIFIED = 1e-3
 
-#: Where rounding rules: longest step of :data:`fastmech.ensembles.calibration.CALM` in an Adams method's,
-#: runs of it, and which of them is kept, the nearest to their median being 0.
-LONGER, CALM_RUNS, TYPICAL_RUN = RATIO**3, 6, 3
-
 #: Trajectories are run again from this share of the tolerance: what two runs tell is not exact.
 KEPT = 0.75
+
+#: Two runs are rarely nearer to each other by luck than by this factor.
+LUCK = 100.0
 
 #: Trajectories of the largest estimates whose errors are measured by finer runs at the end, where a
 #: right-hand side may jump.
@@ -86,7 +85,7 @@ class Doubling(Repeatable):
     def run(self, progress: Progress | None) -> tuple[Solution, Floats, str]:
         """The solution, errors (n,), and what is to be said about those beyond the tolerance."""
         settings, n = self.settings, len(self.starts)
-        self.usable = usable_starts(self.problem, self.starts, float(self.outputs[-1]), self.threads)
+        self.usable = finite_rows(self.starts)
         self.dt = np.full(n, float(settings.dt))
         self.best = solve(self.problem, self.starts, self.outputs, settings, self.threads, progress)
         everyone = np.arange(n)
@@ -103,14 +102,12 @@ class Doubling(Repeatable):
         self.vain = np.zeros(n, dtype=np.int64)
         self.given_up, self.rounded = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
         self.unpaid = np.zeros(n, dtype=np.bool_)
-        for _ in range(ROUNDS):
-            missing = self.usable & ~(self.error <= KEPT * self.tol)
-            again = self.affordable(np.flatnonzero(missing & ~self.given_up & ~self.rounded), 4.0)
-            if not again.size:
-                break
-            self._repeat(again)
+        self._repeat_missing()
         if self.jumps:
             self._audit()
+        else:
+            self._measure_doubtful()
+            self._repeat_missing()
         jumped = self.once_rough & self.jumps
         self._resettle(np.flatnonzero(self.rounded | (self.given_up & ~jumped & ~self.unpaid)))
         return self.best, self.error, self.remark()
@@ -147,6 +144,15 @@ class Doubling(Repeatable):
             after, np.where(rough, np.where(seen < LEAST_ORDER, 0.0, 1.0), float(p))
         )
 
+    def _repeat_missing(self) -> None:
+        """Run those again that miss the tolerance, while that may help and the budget allows."""
+        for _ in range(ROUNDS):
+            missing = self.usable & ~(self.error <= KEPT * self.tol)
+            again = self.affordable(np.flatnonzero(missing & ~self.given_up & ~self.rounded), 4.0)
+            if not again.size:
+                break
+            self._repeat(again)
+
     def _repeat(self, again: Members) -> None:
         """Run trajectories with the shorter steps that their errors ask for."""
         order, error = self.settings.method.order, self.error[again]
@@ -172,7 +178,8 @@ class Doubling(Repeatable):
         implicit = isinstance(self.settings.method, ImplicitRungeKutta)  # of reduced order, where it is stiff
         rounded = in_vain & (after < (ROUNDING if implicit else MAGNIFIED))
         # A rough one's earlier error may have been small by luck: the finer run has the better odds.
-        better = ~(after > error) | (self.rough[again] & np.isfinite(run.y[-1]).all(axis=1))
+        better = ~(after > error) | self.rough[again]
+        better &= np.isfinite(run.y[-1]).all(axis=1) | ~np.isfinite(self.best.y[-1][again]).all(axis=1)
         put_into(self.best, again[better], run, better)
         self.dt[again] = own
         # Where jumps are possible, luck looks like rounding.
@@ -181,28 +188,38 @@ class Doubling(Repeatable):
         self.given_up[again[(self.vain[again] >= PATIENCE) & ~rounded]] = True
 
     def _resettle(self, which: Members) -> None:
-        """Give trajectories that shorter steps do not help the run of a one-step method, which rounds less.
+        """Give trajectories that shorter steps do not help a typical one of several runs, see `rounding`.
 
-        Where rounding rules, a run differs from another by about as much as each does from the truth, or by
-        luck far less. So the truth is taken to be the median of several runs, each state's for itself, and
-        what is kept is no run that is near it by luck, but a typical one, whose distance is its error.
+        These have a budget of their own, which is spent on the largest errors first.
         """
-        method = self.settings.method
-        if not which.size or isinstance(method, ImplicitRungeKutta):
+        if isinstance(self.settings.method, ImplicitRungeKutta):
             return
-        calm = replace(self.settings, method=find_method(CALM))
-        longest = float(self.settings.dt) * (LONGER if method.start_steps else 1.0)
-        runs = [self.solve(which, np.full(which.size, longest / RATIO**k), calm) for k in range(CALM_RUNS)]
-        truth = np.median([run.y for run in runs], axis=0)
-        errors = np.array([distances(run.y, truth) for run in runs])
-        if self.problem.observation.stops:
-            codes = np.array([run.records[STOP_CODE] for run in runs])
-            errors[:, (codes != codes[0]).any(axis=0)] = np.inf
-        typical = np.argsort(errors, axis=0, kind="stable")[TYPICAL_RUN]
-        for k, run in enumerate(runs):
-            chosen = (typical == k) & np.isfinite(errors[k])
-            put_into(self.best, which[chosen], run, chosen)
-            self.error[which[chosen]] = errors[k, chosen]
+        which = which[np.argsort(-self.error[which], kind="stable")]
+        budget = CHEAP + BUDGET * self.work(np.arange(len(self.starts)), self.dt / 2.0)
+        number = bisect_right(range(1, which.size + 1), budget, key=lambda n: typical_work(self, which[:n]))
+        for typical in typical_runs(self, np.sort(which[:number])):
+            kept = np.isfinite(typical.error)
+            put_into(self.best, typical.who[kept], typical.run, kept)
+            self.error[typical.who[kept]] = typical.error[kept]
+
+    def _measure_doubtful(self) -> None:
+        """Measure errors by runs of half the step where a run of twice the step tells of larger ones.
+
+        Rarely the runs with shorter steps are wrong by as much as the others, and in the same direction.
+        Steps that would be unstable tell nothing.
+        """
+        order, c = self.settings.method.order, self.problem.coefficients
+        open_ = self.usable & ~self.rounded & ~self.given_up & (self.error > self.tol / LUCK)
+        if c is not None:
+            open_ &= 2.0 * self.dt * self.shares <= explicit_limit(self.settings.method, c)
+        who = np.flatnonzero(open_)
+        self.left -= self.work(who, 2.0 * self.dt[who])
+        apart = self.apart(self.solve(who, 2.0 * self.dt[who]), part_of(self.best, who))
+        told = np.isfinite(apart) & (apart > (2.0**order - 1.0) * KEPT * self.tol)
+        who = self.affordable(who[told], 2.0)
+        self.left -= self.work(who, self.dt[who] / 2.0)
+        apart = self.apart(self.solve(who, self.dt[who] / 2.0), part_of(self.best, who))
+        self.error[who] = apart / (1.0 - 0.5**order)
 
     def _audit(self) -> None:
         """Measure the errors of the worst trajectories again, where the right-hand side may jump.

@@ -89,7 +89,8 @@ def fit_steps(
         InputError: the number of threads is wrong.
     """
     bound = speed_bound(c, starts, threads)
-    aside = _turns_too_far(bound, t_end)
+    with np.errstate(invalid="ignore", over="ignore"):
+        aside = np.asarray(~(bound * t_end <= MOST_ANGLE))
     shares = _shares(c, bound, exponent)
     asked = t_end / np.asarray(dt, dtype=np.float64)
     most = np.minimum(np.maximum(MOST_FITTED, MOST_TIMES * asked), MOST_ASKED)
@@ -109,20 +110,6 @@ def _shares(c: Coefficients, bound: Floats, exponent: float) -> Floats:
     shares[~np.isfinite(shares)] = 0.0
     shares /= -RUNGS
     return np.exp2(shares, out=shares)
-
-
-def _turns_too_far(bound: Floats, t_end: float) -> Flags:
-    with np.errstate(invalid="ignore", over="ignore"):
-        return np.asarray(~(bound * t_end <= MOST_ANGLE))
-
-
-def is_too_fast(c: Coefficients, starts: Floats, t_end: float, threads: int | None = None) -> Flags:
-    """Which finite starts (n, 4) are too fast for any steps to follow their motions until ``t_end`` [s].
-
-    Raises:
-        InputError: the number of threads is wrong.
-    """
-    return _turns_too_far(speed_bound(c, starts, threads), t_end) & finite_rows(starts)
 
 
 def speed_bound(c: Coefficients, starts: Floats, threads: int | None = None) -> Floats:

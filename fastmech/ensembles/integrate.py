@@ -26,7 +26,7 @@ from fastmech.ensembles.tolerance import solve_to_tolerance
 from fastmech.ensembles.turning import counted_turns, watched
 from fastmech.errors import InputError
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
-from fastmech.integrators.method import Adams, Method
+from fastmech.integrators.method import Method
 from fastmech.integrators.methods import find_method
 from fastmech.kernels.select import FORMULATIONS
 from fastmech.scene import Scene, nearest
@@ -53,7 +53,7 @@ class Trajectories:
     status: NDArray[np.int8]  #: :class:`fastmech.ensembles.status.Status` of each trajectory, shape (n,)
     steps: int  #: most steps of a trajectory that runs to the end
     dt: float  #: longest step taken [s]
-    method: str  #: name of the method
+    method: str  #: name of the method; under ``tol`` trajectories that rounding rules are run by ``dop853``
     own_steps: NDArray[np.int64]  #: steps of each trajectory that runs to the end, shape (n,)
     own_dt: NDArray[
         np.float64
@@ -183,11 +183,11 @@ def integrate(
         )
     steps, until = StepJudge(scene, own, starts, formula.name), float(outputs[-1])
     steps.warn(extreme_scenes(scene, own, problem), step, until / step)
-    problem = problem if isinstance(formula, Adams) else watched(problem, starts, step, threads)
+    problem = watched(problem, starts, step, threads)
     solution = solve(problem, starts, outputs, settings, threads, progress)
     longest = solution.dt[0] if len(solution.dt) == 1 else solution.dt.max(axis=0)
-    turned = counted_turns(problem, starts, longest, solution.turned)
-    taken = StepsTaken(solution.dt[0], longest, solution.steps, until, turned)
+    turned = counted_turns(problem, starts, longest, solution.records, threads)
+    taken = StepsTaken(solution.dt[0], longest, solution.steps, until, turned, solution.last_term)
     ends = solution.y[-1] if solution.last is None else solution.last
     beyond = steps.beyond(ends, taken, lambda work, n, part: in_parts(work, n, threads, part))
     solution.status[beyond & (solution.status == Status.OK)] = Status.STEP_TOO_LARGE

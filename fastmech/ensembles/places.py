@@ -21,8 +21,8 @@ def part_of(solution: Solution, who: NDArray[np.int64] | NDArray[np.bool_]) -> S
         s.steps[who],
         s.dt[:, who],
         s.failed[who],
-        s.turned[who],
         last,
+        s.last_term[who] if s.last_term.size else s.last_term,
     )
 
 
@@ -31,7 +31,7 @@ def put_into(best: Solution, which: Members, run: Solution, part: NDArray[np.boo
     for old, new in ((best.y, run.y), (best.records, run.records), (best.dt, run.dt)):
         old[:, which] = new[:, part]
     best.status[which], best.steps[which] = run.status[part], run.steps[part]
-    best.failed[which], best.turned[which] = run.failed[part], run.turned[part]
+    best.failed[which] = run.failed[part]
     if best.last is not None or run.last is not None:
         best.last = best.y[-1].copy() if best.last is None else best.last
         best.last[which] = (run.y[-1] if run.last is None else run.last)[part]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.ensembles.fitting import is_too_fast
+from fastmech.ensembles.fitting import EXPONENT_ONCE, fit_steps, vibration_frequency
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.problem import Problem
 from fastmech.ensembles.richardson import distances
@@ -20,15 +20,22 @@ Floats = NDArray[np.float64]
 Members = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
+#: Step times vibration frequency that small tolerances come to.
+SHORT = 0.003
+
 
 def usable_starts(problem: Problem, starts: Floats, t_end: float, threads: int | None) -> Flags:
     """Which starts (n, dim) have motions until ``t_end`` [s] that steps can follow.
+
+    That is asked once, with steps that all tolerances may come to: it depends on a start alone.
 
     Raises:
         InputError: the number of threads is wrong.
     """
     usable, c = finite_rows(starts), problem.coefficients
-    return usable if c is None else usable & ~is_too_fast(c, starts, t_end, threads)
+    if c is None:
+        return usable
+    return usable & ~fit_steps(c, starts, SHORT / vibration_frequency(c), t_end, EXPONENT_ONCE, threads).aside
 
 
 @dataclass

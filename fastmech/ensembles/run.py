@@ -53,7 +53,7 @@ class Observation:
     ``record`` holds the start value of every row of a lane's record. Where ``stops`` is set, the rows begin
     with those of :mod:`fastmech.ensembles.stopping` (its own may follow), and a lane whose code is not zero
     is taken out after about ``call_steps`` steps. With ``locate`` a stop is looked for inside the step after
-    which it was seen.
+    which it was seen. The last rows begin as so many of a lane's first states as ``states`` says.
     """
 
     observe: Any
@@ -62,6 +62,15 @@ class Observation:
     stops: bool = False
     call_steps: int = CALL_STEPS_WITH_STOPS
     locate: bool = False
+    states: int = 0
+
+    def empty(self, begin: Floats) -> Floats:
+        """The record of all lanes (rows,), or of each (n, rows) where it knows their states (n, dim)."""
+        if not self.states:
+            return self.record
+        each = np.tile(self.record, (len(begin), 1))
+        each[:, -self.states :] = begin[:, : self.states]
+        return each
 
 
 NOTHING = Observation(observe_nothing, np.zeros(0), np.zeros(0))
@@ -80,7 +89,7 @@ class Ensemble:
     status: NDArray[np.int8]
     failed: Floats
     #: Greatest last term of an Adams method's predictor in an angle [rad], see
-    #: :mod:`fastmech.kernels.last_term`; 0 of other methods; (n,).
+    #: :mod:`fastmech.kernels.last_term`, shape (n,); of other methods empty.
     last_term: Floats
     #: Members that failed together, and their last finite states.
     lost: list[tuple[NDArray[np.int64], Floats]]
@@ -128,7 +137,7 @@ def run_ensemble(
         records=np.repeat(observation.record[:, None], len(begin), axis=1),
         status=np.full(len(begin), Status.OK, dtype=np.int8),
         failed=np.full(len(begin), np.nan),
-        last_term=np.zeros(len(begin)),
+        last_term=np.zeros(len(begin) if isinstance(method, Adams) else 0),
         lost=[],
     )
     interrupted = threading.Event()
@@ -153,7 +162,7 @@ def run_ensemble(
     def run_task(task: Task) -> int:
         members, piece, passed = task.members, 0, 0
         states, params = rows_at(begin, members), own.at(members, precision)
-        lanes = Lanes(members, states, params, observation.record, block_lanes, method.carried)
+        lanes = Lanes(members, states, params, observation.empty(states), block_lanes, method.carried)
         while piece < task.way.steps.size and lanes.members.size and not interrupted.is_set():
             check()
             span, before = task.way.span(piece, most_steps(lanes, passed)), Resumption(lanes)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fastmech.ensembles.fitting import EXPONENT_AGAIN, EXPONENT_ONCE, fit_steps, fitted_steps
 from fastmech.ensembles.plausible import judge
 from fastmech.ensembles.problem import Problem
-from fastmech.ensembles.run import Ensemble, Observation, Progress, run_ensemble
+from fastmech.ensembles.run import Ensemble, Progress, run_ensemble
 from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.turning import TURNED, TURNS
@@ -31,6 +31,7 @@ class Settings:
     fit: tuple[float, ...] = ()  #: times [s] at which the steps are fitted to the energy; () for never
     precision: Precision = np.float64
     early: tuple[tuple[float, float], ...] = ()  #: until these times [s] steps are shorter by a factor
+    bounded: bool = True  #: starts to which too many steps would be fitted do not run
 
 
 @dataclass
@@ -43,16 +44,8 @@ class Solution:
     steps: NDArray[np.int64]  #: steps of each trajectory that runs to the end, shape (n,)
     dt: Floats  #: longest step of each [s], shape (pieces, n): a piece ends where steps are fitted again
     failed: Floats  #: time of the last finite state of a trajectory that failed [s], else NaN, shape (n,)
-    turned: Floats  #: what an angle did in a step, see :func:`turned_in`; shape (n,)
     last: Floats | None  #: last finite states, shape (n, dim); None: none failed, they are the final ones
-
-
-def turned_in(run: Ensemble, observation: Observation) -> Floats:
-    """What the angles of each trajectory (n,) did at most in a step of a run [rad].
-
-    That is a turn, where turns were observed, and the last term of an Adams method's predictor; else 0.
-    """
-    return run.records[TURNED] if observation is TURNS else run.last_term
+    last_term: Floats  #: of an Adams method's predictor, see :class:`Ensemble`; of other methods empty
 
 
 def mean_shares(solution: Solution, dt: float, outputs: Floats) -> Floats:
@@ -88,6 +81,7 @@ def solve(
     shares: Any = 1.0
     if fitted_to is not None:
         shares, aside = fit_steps(fitted_to, starts, dt, float(outputs[-1]), exponent, threads)
+        aside &= settings.bounded
         if aside.any():  # they never enter a block, and their step is that of slow motion
             now, shares[aside] = np.where(aside[:, None], np.nan, now), 1.0
     method = settings.method
@@ -117,13 +111,18 @@ def solve(
         )
         course.add(run, times, steps, int(inside.sum()))
         begin, now = end, run.states[-1]
-    solution = course.solution(run.records)
+    solution = course.solution()
+    tell_aside(solution, starts, outputs, aside)
+    solution.status = judge(solution.status, starts, solution.y[-1], problem.coefficients, threads)
+    return solution
+
+
+def tell_aside(solution: Solution, starts: Floats, outputs: Floats, aside: NDArray[np.bool_]) -> None:
+    """What is told of trajectories (n,) that did not run because no steps can follow them."""
     solution.status[aside] = Status.STEP_TOO_LARGE
     solution.y[: 1 if outputs[0] == 0.0 else 0, aside] = starts[aside]
     if solution.last is not None:
         solution.last[aside] = starts[aside]
-    solution.status = judge(solution.status, starts, solution.y[-1], problem.coefficients, threads)
-    return solution
 
 
 def _ends(settings: Settings, outputs: Floats) -> tuple[list[float], bool]:
@@ -143,17 +142,18 @@ class _Course:
         self._lost: list[tuple[NDArray[np.int64], Floats]] = []
         self._status, self._failed = np.empty(0, dtype=np.int8), np.empty(0)
         self._steps, self._dt = np.empty(0, dtype=np.int64), list[Floats]()
-        self._turned = np.empty(0)
+        self._records, self._last_term = np.empty((0, 0)), np.empty(0)
 
     def add(self, run: Ensemble, times: Floats, dt: Floats, outputs: int) -> None:
         """The next piece, with steps ``dt`` [s] of all or of each (n,) and so many outputs."""
         number, longest = _steps_taken(times, dt, len(run.status))
-        turned = turned_in(run, self._problem.observation)
         if not self._dt:
             self._status, self._failed, self._steps, self._lost = run.status, run.failed, number, run.lost
-            self._turned = turned
+            self._last_term = run.last_term
         else:
-            np.maximum(self._turned, turned, out=self._turned)
+            np.maximum(self._last_term, run.last_term, out=self._last_term)
+            if self._problem.observation is TURNS:
+                np.maximum(run.records[TURNED], self._records[TURNED], out=run.records[TURNED])
             for members, states in run.lost:
                 first = np.isnan(self._failed[members])
                 self._lost.append((members[first], states[first]))
@@ -164,8 +164,9 @@ class _Course:
         if outputs:  # else they need not be kept
             self._states.append(run.states[:outputs])
         self._dt.append(longest)
+        self._records = run.records
 
-    def solution(self, records: Floats) -> Solution:
+    def solution(self) -> Solution:
         """All pieces together, with what the last one has observed."""
         y = self._states[0] if len(self._states) == 1 else np.concatenate(self._states)
         if self._problem.canonical:
@@ -175,7 +176,7 @@ class _Course:
         for members, states in self._lost:
             last[members] = self._problem.part(members).outward(states)
         dt = self._dt[0][None] if len(self._dt) == 1 else np.array(self._dt)
-        return Solution(y, records, self._status, self._steps, dt, self._failed, self._turned, last)
+        return Solution(y, self._records, self._status, self._steps, dt, self._failed, last, self._last_term)
 
 
 def _steps_taken(times: Floats, dt: Floats, n: int) -> tuple[NDArray[np.int64], Floats]:

@@ -18,11 +18,12 @@ from fastmech.ensembles.calibration import CALM, calibrate
 from fastmech.ensembles.doubling import SMOOTH, Doubling
 from fastmech.ensembles.fitting import speed_bound
 from fastmech.ensembles.ladder import Calibrated
+from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.problem import Problem
 from fastmech.ensembles.repeatable import usable_starts
 from fastmech.ensembles.richardson import RATIO, ROUNDING, distances, half_over, order_statistic, unseen
 from fastmech.ensembles.run import Progress
-from fastmech.ensembles.solve import Settings, Solution, solve
+from fastmech.ensembles.solve import Settings, Solution, solve, tell_aside
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.methods import find_method
 
@@ -87,24 +88,36 @@ def solve_to_tolerance(
     """
     if problem.observation.stops:
         problem = replace(problem, observation=replace(problem.observation, locate=True))
-    usable = np.flatnonzero(usable_starts(problem, starts, float(outputs[-1]), threads))
+    usable = usable_starts(problem, starts, float(outputs[-1]), threads)
+    # None of the runs that follow, whatever their steps, asks again who can be followed.
+    begins = starts if usable.all() else np.where(usable[:, None], starts, np.nan)
+    wanted = _Wanted(problem, begins, outputs, np.flatnonzero(usable), quantile, threads)
+    estimated = _solve(wanted, tol, method, progress)
+    tell_aside(estimated.solution, starts, outputs, finite_rows(starts) & ~usable)
+    return estimated
+
+
+def _solve(wanted: _Wanted, tol: float, method: str | None, progress: Progress | None) -> Estimated:
+    """The same of starts of which all that are finite have motions that steps can follow."""
+    problem, starts, outputs, threads = wanted.problem, wanted.starts, wanted.outputs, wanted.threads
+    usable, quantile = wanted.usable, wanted.quantile
     if not usable.size:
-        fit = () if problem.coefficients is None else (0.0,)
-        settings = Settings(find_method(method or CALM), float(outputs[-1]) or 1.0, fit)
+        settings = Settings(find_method(method or CALM), float(outputs[-1]) or 1.0)
         solution = solve(problem, starts, outputs, settings, threads, progress)
         none = np.full(len(starts), np.inf) if quantile == 1.0 else None
         return Estimated(solution, settings, "no start has a motion that steps can follow", none, 0.0)
-    wanted = _Wanted(problem, starts, outputs, usable, quantile, threads)
     sample = _sample(wanted, SAMPLE_MAXIMUM if quantile == 1.0 else SAMPLE_QUANTILE)
     aim = quantile if quantile < 1.0 else TYPICAL
     part, begun = problem.part(sample), starts[sample]
     many = usable.size / max(sample.size, 1)
     found = calibrate(part, begun, outputs, tol, aim, method, threads, many)
     if quantile == 1.0:
-        doubling = Doubling(problem, starts, outputs, found.settings, tol, threads)
+        settings, reason = found.settings, found.reason
+        del found  # and with it the sample's runs
+        doubling = Doubling(problem, starts, outputs, settings, tol, threads)
         solution, errors, remark = doubling.run(progress)
         largest = float(np.max(errors[usable], initial=0.0))
-        return Estimated(solution, found.settings, found.reason + remark, errors, largest)
+        return Estimated(solution, settings, reason + remark, errors, largest)
     settings = found.settings
     implicit = isinstance(settings.method, ImplicitRungeKutta)
     if tol >= SINGLE and not implicit and not problem.observation.stops:

@@ -1,4 +1,4 @@
-"""How far a body turns in a step: what a run by a one-step method tells of its steps."""
+"""How far a body turns in a step: what a run tells of its steps."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fastmech.ensembles.problem import Problem
 from fastmech.ensembles.run import Observation
 from fastmech.jit import OBSERVER_SIGNATURE, kernel
 from fastmech.mechanism.coefficients import Coefficients
-from fastmech.step_limits.limits import TURN
+from fastmech.step_limits.limits import ROUNDED, TURN
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -23,7 +23,7 @@ TURNED, BEFORE = 0, 1
 
 @kernel(OBSERVER_SIGNATURE)
 def observe_turns(t: float, Y: Floats, params: Floats, record: Floats) -> None:
-    """Keep the greatest turn of every lane; before the first step nothing is known, which is NaN."""
+    """Keep the greatest turn of every lane."""
     for angle in range(2):
         for i in range(Y.shape[1]):
             turned = abs(Y[angle, i] - record[BEFORE + angle, i])
@@ -31,7 +31,7 @@ def observe_turns(t: float, Y: Floats, params: Floats, record: Floats) -> None:
             record[BEFORE + angle, i] = Y[angle, i]
 
 
-TURNS = Observation(observe_turns, np.zeros(0), np.array([0.0, np.nan, np.nan]))
+TURNS = Observation(observe_turns, np.zeros(0), np.zeros(3), states=2)
 
 
 def may_turn(c: Coefficients, starts: Floats, dt: float | Floats, threads: int | None = None) -> Flags:
@@ -57,17 +57,22 @@ def watched(problem: Problem, starts: Floats, dt: float, threads: int | None = N
         InputError: the number of threads is wrong.
     """
     c = problem.coefficients
-    some = c is not None and may_turn(c, starts, dt, threads).any()
+    some = c is not None and may_turn(c, starts, (1.0 + ROUNDED) * dt, threads).any()
     return replace(problem, observation=TURNS) if some else problem
 
 
-def counted_turns(problem: Problem, starts: Floats, dt: Floats, turned: Floats) -> Floats:
-    """The turns (n,) of a watched problem in steps of at most ``dt`` (n,) [s], else 0.
+def counted_turns(
+    problem: Problem, starts: Floats, dt: Floats, records: Floats, threads: int | None = None
+) -> Floats | None:
+    """The turns (n,) in the records of a watched problem with steps of at most ``dt`` (n,) [s].
 
-    Only those count that the energy allows in a trajectory's own steps: they do not depend on whether its
-    companions' were a reason to watch.
+    Only those count that the energy allows in a trajectory's own steps, else they are 0: they do not depend
+    on whether its companions' were a reason to watch. ``None``: nobody is watched.
+
+    Raises:
+        InputError: the number of threads is wrong.
     """
     c = problem.coefficients
     if c is None or problem.observation is not TURNS:
-        return turned
-    return np.where(may_turn(c, starts, dt), turned, 0.0)
+        return None
+    return np.where(may_turn(c, starts, dt, threads), records[TURNED], 0.0)

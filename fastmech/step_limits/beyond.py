@@ -1,7 +1,7 @@
 """Which trajectories of a run have steps that cannot be right for them, one by one, and the warning of it.
 
-What a run itself shows comes first. A one-step method follows no body that turns by more than 1 rad in a
-step. An Adams method lays a polynomial through its history; where the polynomial's last term moves an angle
+What a run itself shows comes first. No method follows a body that turns by more than 1 rad in a step. An
+Adams method lays a polynomial through its history; where the polynomial's last term moves an angle
 by more than 0.01 rad (:mod:`fastmech.kernels.last_term`), it does not describe the motion, or one of the
 method's spurious roots, which stand for no mode, has grown until it shows. By theory alone these are not
 judged: a motion that swings is seldom where they grow, and what does not show does no harm.
@@ -23,7 +23,7 @@ have come to rest in the right place. Only a run with shorter steps tells.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from types import SimpleNamespace
 from typing import Any
@@ -32,7 +32,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
-from fastmech.integrators.method import Adams
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.scene import Scene
@@ -83,9 +82,9 @@ class StepsTaken:
     longest: Floats  #: longest step of each [s], (n,)
     number: Floats | NDArray[np.int64]  #: steps of each, (n,)
     until: float  #: end of the run [s]
-    #: What an angle of each did at most in a step [rad], (n,): a turn, or the last term of an Adams method's
-    #: predictor; ``None``: nobody has looked.
-    turned: Floats | None = None
+    turned: Floats | None = None  #: greatest turn of a body of each in a step [rad], (n,), if somebody looked
+    last_term: Floats = field(default_factory=lambda: np.empty(0))
+    #: the same of the last term of an Adams method's predictor in an angle; empty: nobody looked
 
 
 def is_beyond(scene: Scene, dt: float, steps: float, method: str) -> bool:
@@ -182,11 +181,13 @@ class StepJudge:
             share: does the work, in threads if need be.
         """
         method, c, starts = self._method, self._coefficients, self._starts
-        beyond = _turns_too_far(starts[:, 2:], taken.first)
+        beyond = _begins_too_fast(starts[:, 2:], taken.first)
         if np.any(c.decay):
             beyond |= (c.force != 0.0) & (taken.first * c.decay > impulse_limit(method))
         if taken.turned is not None:
-            beyond |= taken.turned > (LAST_TERM if isinstance(method, Adams) else TURN)
+            beyond |= taken.turned > TURN
+        if taken.last_term.size:
+            beyond |= taken.last_term > LAST_TERM
         longest, most = taken.longest.max(initial=0.0), taken.number.max(initial=0)
         if self._is_quiet(longest, most):
             return beyond
@@ -244,7 +245,7 @@ def _coefficients(scene: Scene, own: Mapping[str, Floats]) -> Coefficients:
     return reduce(SimpleNamespace(**(scene.model_dump() | dict(own))))  # type: ignore[arg-type]
 
 
-def _turns_too_far(rates: Floats, first: Floats) -> NDArray[np.bool_]:
+def _begins_too_fast(rates: Floats, first: Floats) -> NDArray[np.bool_]:
     """Which motions (n,) turn a body by more than 1 rad in a step if they stay as fast as at first."""
     with np.errstate(invalid="ignore", over="ignore"):  # starts that are not finite have their own status
         fastest = np.abs(rates[:, 0])

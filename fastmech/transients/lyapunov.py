@@ -75,8 +75,8 @@ def largest_lyapunov(
         parameters: as in :func:`fastmech.ensembles.integrate.integrate`.
 
     Returns:
-        estimates, and the status of every motion as ``integrate`` gives it: exponents of one that failed are
-        none of the mechanism's. A step beyond a limit is warned of before the run.
+        estimates, and the status of every motion as ``integrate`` gives it, save that nobody looks at turns
+        on the way: exponents of one that failed are none of the mechanism's. A step beyond a limit is warned of before the run.
 
     Raises:
         InputError: an argument is wrong.

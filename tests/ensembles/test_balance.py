@@ -88,7 +88,7 @@ def test_lowest_potential_of_table_1() -> None:
 def test_wrong_arguments_are_refused() -> None:
     with pytest.raises(InputError, match=r"^y0: has shape \(3,\), must be \(n, 4\)"):
         energy_balance(Scene(), [0.0, 0.0, 0.0], [1.0])
-    with pytest.raises(InputError, match=r"^t_eval: must be finite"):
+    with pytest.raises(InputError, match=r"^t_eval\[0\] = -1: must be finite"):
         energy_balance(Scene(), [0.0] * 4, [-1.0])
     with pytest.raises(InputError, match=r"^dt = 0: must be a finite number of s greater than 0"):
         energy_balance(Scene(), [0.0] * 4, [1.0], dt=0)

@@ -59,14 +59,16 @@ def test_who_turns_too_far_is_told(scene: fm.Scene, dt: float) -> None:
 @pytest.mark.parametrize("formulation", ["lagrange", "hamilton"])
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 def test_turns_are_those_between_the_steps(formulation: str, dtype: str) -> None:
-    """The first is not looked at: what the record begins with is no state."""
+    """The first included, which begins at the start."""
     starts, precision = rest_starts(30), np.float32 if dtype == "float32" else np.float64
     problem = scene_problem(fm.Scene(), 30, {}, formulation)
     clock = np.linspace(0.0, 2.0, 41)
     seen = run_ensemble(
         problem.rhs, problem.params, starts, clock, 0.05, METHODS["rk4"], TURNS, precision=precision
     )
-    turns = np.abs(np.diff(seen.states[:, :, :2], axis=0)).max(axis=(0, 2))
+    states = np.concatenate([problem.inward(starts).astype(precision)[None], seen.states])
+    turns = np.abs(np.diff(states[:, :, :2], axis=0)).max(axis=(0, 2))
+    assert turns.min() > 0.0
     np.testing.assert_array_equal(seen.records[TURNED], turns)
 
 
@@ -105,3 +107,19 @@ def test_no_body_turns_faster_than_its_energy_allows() -> None:
         assert not may_turn(problem.coefficients, starts, 0.01 / rates).any()
         assert watched(problem, starts, 0.01 / float(rates.max())) is problem
         assert watched(problem, starts, 1.0 / float(rates.min()) * (1.0 + 1e-9)).observation is TURNS
+
+
+def test_runs_that_always_start_anew_are_watched() -> None:
+    """Uneven outputs leave an Adams method to its starter, and a single step is the first one."""
+    scene, starts = fm.Scene(c1=2000.0, c2=3000.0, alpha=0.0), rest_starts(200)
+    times = np.cumsum(np.random.default_rng(3).uniform(0.05, 0.1, 40))
+    for method in ("abm8", "ab6"):
+        found = run(scene, starts, float(times[-1]), t_eval=times, dt=0.1, method=method)
+        fine = run(scene, starts, float(times[-1]), dt=1e-3, method="dop853").y[-1]
+        wrong = ~(np.abs(found.y[-1] - fine)[:, :2].max(axis=1) < 1.0)
+        assert wrong.any()
+        assert (found.status[wrong] != fm.Status.OK).all()
+    step = run(scene, starts, 0.1, dt=0.1, method="rk4")
+    turned = np.abs(step.y[-1] - starts)[:, :2].max(axis=1) > 1.0
+    assert turned.any()
+    assert (step.status[turned] == TOO_LARGE).all()
