@@ -76,7 +76,8 @@ def largest_lyapunov(
 
     Returns:
         estimates, and the status of every motion as ``integrate`` gives it, save that nobody looks at turns
-        on the way: exponents of one that failed are none of the mechanism's. A step beyond a limit is warned of before the run.
+        on the way: exponents of one that failed are none of the mechanism's. A step beyond a limit is warned
+        of before the run.
 
     Raises:
         InputError: an argument is wrong.
