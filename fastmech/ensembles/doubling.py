@@ -178,8 +178,7 @@ class Doubling(Repeatable):
         implicit = isinstance(self.settings.method, ImplicitRungeKutta)  # of reduced order, where it is stiff
         rounded = in_vain & (after < (ROUNDING if implicit else MAGNIFIED))
         # A rough one's earlier error may have been small by luck: the finer run has the better odds.
-        better = ~(after > error) | self.rough[again]
-        better &= np.isfinite(run.y[-1]).all(axis=1) | ~np.isfinite(self.best.y[-1][again]).all(axis=1)
+        better = ~(after > error) | (self.rough[again] & np.isfinite(run.y[-1]).all(axis=1))
         put_into(self.best, again[better], run, better)
         self.dt[again] = own
         # Where jumps are possible, luck looks like rounding.
