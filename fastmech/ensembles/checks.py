@@ -27,10 +27,13 @@ def number(name: str, value: Any, unit: str, *, above: float = -math.inf, least:
         allowed += f" greater than {above:g}"
     if least > -math.inf:
         allowed += f" not less than {least:g}"
-    right_type = isinstance(value, Real) and not isinstance(value, bool)
-    if not right_type or not math.isfinite(value) or not value > above or not value >= least:
+    try:
+        found = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
+    except OverflowError:  # of an integer
+        found = math.inf
+    if not math.isfinite(found) or not found > above or not found >= least:
         raise InputError(f"{name} = {value!r}: {allowed}")
-    return float(value)
+    return found
 
 
 def whole_number(name: str, value: Any, *, least: int, most: int | None = None) -> int:

@@ -149,7 +149,8 @@ def integrate(
     outputs = _output_times(t_end, t_eval)
     checks.progress_function(progress, "trajectories")
     starts, problem, own = _problem(scene, y0, parameters or {}, formulation)
-    kept = starts.shape[1] * (outputs.size + np.size(fit) - 1 + problem.canonical)
+    fitted_at = _fit_times(fit, scene, outputs[-1])
+    kept = starts.shape[1] * (outputs.size + max(len(fitted_at) - 1, 0) + problem.canonical)
     beside = BESIDE + OWN * sum(column.ndim for column in problem.params.columns)
     checks.memory(len(starts) * (kept + (1 if tol is None else 2) * beside), 2 if tol is None else 4)
     if tol is not None:
@@ -174,9 +175,7 @@ def integrate(
         raise InputError(f"quantile = {quantile!r}: tells whose error tol is; give tol with it")
     formula = find_method("rk4" if method is None else method)
     step = checks.number("dt", DEFAULT_DT if dt is None else dt, "s", above=0.0)
-    settings = Settings(
-        formula, step, _fit_times(fit, scene, outputs[-1]), _precision(dtype, problem, formula)
-    )
+    settings = Settings(formula, step, fitted_at, _precision(dtype, problem, formula))
     if not isinstance(scene, Scene):
         return _trajectories(
             problem, outputs, solve(problem, starts, outputs, settings, threads, progress), settings

@@ -243,6 +243,7 @@ def test_a_system_has_no_energy_to_fit_to() -> None:
         ([0.5, 0.2], "fit[1] = 0.2: must be finite, not negative and strictly rising times in s"),
         ([0.0, 0.0], "fit[1] = 0: must be finite, not negative and strictly rising times in s"),
         ([-0.1, 0.2], "fit[0] = -0.1: must be finite, not negative and strictly rising times in s"),
+        ([[0.0], [0.1, 0.2]], "fit: must be times in s"),
         ([0.0, np.nan], "fit[1] = nan: must be finite, not negative and strictly rising times in s"),
         ([0.0, 0.5, 1.5], "fit[2] = 1.5: must not lie behind the run's end, 1 s"),
         (3.0, "fit[0] = 3: must not lie behind the run's end, 1 s"),

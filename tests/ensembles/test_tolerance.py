@@ -292,6 +292,7 @@ def test_progress_counts_every_trajectory_once() -> None:
         ({"tol": np.inf}, "tol = inf: must be a finite number greater than 0"),
         ({"tol": "1e-4"}, "tol = '1e-4': must be a finite number greater than 0"),
         ({"tol": True}, "tol = True: must be a finite number greater than 0"),
+        ({"tol": 10**400}, "tol = 1000"),
         ({"tol": 1e-4, "quantile": 0.0}, "quantile = 0.0: must be a finite number greater than 0"),
         ({"tol": 1e-4, "quantile": -0.5}, "quantile = -0.5: must be a finite number greater than 0"),
         ({"tol": 1e-4, "quantile": 1.5}, "quantile = 1.5: must not be greater than 1"),
