@@ -3,6 +3,7 @@
 The second run has steps shorter by sqrt(2), and its distance from the first is the first one's error. (The
 distance to a run with *longer* steps would cost less, but says little of a single trajectory: it is many
 times its error, so where the longer steps are right by luck the error is taken for many times too small.)
+Where a run of twice the step tells of a larger error, one of half the step measures it.
 
 A trajectory is given up where three shorter steps did not halve its error (chaos, a singularity, a start on a
 basin's border), where two resolutions disagree about whether it stops, or where the budget is spent. It keeps

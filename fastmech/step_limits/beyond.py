@@ -17,7 +17,8 @@ tells whether it has grown, which is the better judge.
 
 Each trajectory is judged by its own parameters, step and states: its companions make no difference. One that
 passes may still be wrong, by steps too long for accuracy and within these limits; one that does not may yet
-have come to rest in the right place. Only a run with shorter steps tells.
+have come to rest in the right place, or be right to many digits by a method of high order that turns it by
+more than 1 rad a step. Only a run with shorter steps tells.
 """
 
 from __future__ import annotations
