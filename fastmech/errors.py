@@ -1,6 +1,9 @@
-"""The one exception for mistakes that a user can mend, and the one warning."""
+"""The one exception for mistakes that a user can mend, the one warning, and how values are shown in both."""
 
 from __future__ import annotations
+
+#: Characters of a value that a message shows.
+LONGEST_VALUE = 80
 
 
 class InputError(ValueError):
@@ -13,3 +16,13 @@ class InputError(ValueError):
 
 class StepWarning(UserWarning):
     """A step cannot be right for a scene; the message names one that would do."""
+
+
+def shown(value: object) -> str:
+    """A value as a message shows it: at most 80 characters of one line, control characters escaped."""
+    try:
+        text = repr(value[: 2 * LONGEST_VALUE] if isinstance(value, str | bytes) else value)
+    except ValueError:  # an integer of more digits than Python writes
+        text = f"an integer of {value.bit_length():,} bits" if isinstance(value, int) else "a huge number"
+    text = " ".join(text.split())
+    return text if len(text) <= LONGEST_VALUE else f"{text[: LONGEST_VALUE - 3]}..."
