@@ -29,7 +29,7 @@ def ring(t, x, y):
 def test_the_edge_of_two_wells_is_the_saddle_between() -> None:
     track = track_edge(
         fm.System(two_wells, ["x", "y"], {}), [-0.7, -1.0], [1.6, 0.3], lambda y: (y[:, 0] > 0.0).astype(int),
-        np.eye(2), t_end=60.0, tolerance=1e-4,
+        np.eye(2), t_end=60.0, tolerance=1e-4, dt=0.02,
     )  # fmt: skip
     assert track.settled
     assert track.labels == (0, 1)
@@ -43,7 +43,7 @@ def test_the_edge_of_two_wells_is_the_saddle_between() -> None:
 def test_an_orbit_on_the_edge_never_settles() -> None:
     track = track_edge(
         fm.System(ring, ["x", "y"], {}), [0.1, 0.0], [1.9, 0.0], lambda y: (np.hypot(*y.T) > 1.0).astype(int),
-        np.eye(2), t_end=30.0,
+        np.eye(2), t_end=30.0, dt=0.02,
     )  # fmt: skip
     assert not track.settled
     assert not track.lost
