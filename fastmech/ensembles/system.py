@@ -146,6 +146,9 @@ class System:
             vars(module).update({field: inlined(whole), f"{field}_within": attempted(within)})
         try:
             run_module(module, source)
+            for made in (module.block, getattr(module, "observe", module.block)):
+                if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+                    made.make()
         except Exception as error:  # numba lets those of the code it looks at pass
             state, count = list(self.state), 1 + len(self.state)
             explain(
