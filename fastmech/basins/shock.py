@@ -24,14 +24,14 @@ from fastmech.scene import Scene
 #: Radii at which a ray is looked at before its first way out is narrowed down: at first, and once turned.
 LEVELS, TURNED_LEVELS = 24, 8
 
-#: Radii, of all those, at which rays are looked at together.
-TOGETHER = 4
+#: Radii, of all those, at which rays are looked at together, more of them where there are fewer starts.
+TOGETHER, STARTS = 4, 64
 
 #: Points between two radii at which a way out is narrowed down.
 SECTIONS = 7
 
-#: Candidates that the search refines, and directions tried round each in a round.
-CANDIDATES, TRIALS = 6, 24
+#: Candidates that the search refines, and directions tried round each in a round, for each way to turn.
+CANDIDATES, TRIALS = 6, 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +168,7 @@ class Rays:
         spread, rows = np.full(len(units), 0.5), np.arange(len(units))
         # A turn by the angle s changes the size by s^2 at a smooth minimum.
         while np.isfinite(sizes).any() and (spread > 0.5 * np.sqrt(self.tolerance)).any():
-            random = rng.standard_normal((len(units), TRIALS, units.shape[1]))
+            random = rng.standard_normal((len(units), TRIALS * (units.shape[1] - 1), units.shape[1]))
             turned = units[:, None] + spread[:, None, None] * random
             turned /= np.linalg.norm(turned, axis=2, keepdims=True)
             found, ends = self.first_exits(turned, np.minimum(sizes, most), TURNED_LEVELS, 1)
@@ -230,9 +230,10 @@ class Rays:
             inner = np.where(leaves, first, m) - 1
             lower[rays[inner >= 0]] = radii[row, inner][inner >= 0]
 
-        for level in range(0, levels, TOGETHER):
+        together = max(TOGETHER, STARTS // len(units))
+        for level in range(0, levels, together):
             rays = np.flatnonzero(np.isinf(upper) & promising())
-            look(rays, ladder[rays, level + 1 : level + TOGETHER + 1])
+            look(rays, ladder[rays, level + 1 : level + together + 1])
         while True:
             wide = np.isfinite(upper) & (upper - lower > self.tolerance * upper)
             rays = np.flatnonzero(wide & promising())

@@ -36,12 +36,12 @@ DIRECTIONS, APART, ALONE = 32, 1.04, 1.004
 #: Blows are tried up to so many times the sum of the potential's amplitudes: beyond, motions turn and turn.
 ENERGY = 30.0
 
-#: A blow is followed for so many times the slowest time constant about the well and the saddles, and for so
-#: many of its steps at most.
-LONG, STEPS = 200.0, 20_000.0
+#: A blow is followed for so many times the slowest decay about wells and saddles: until it is captured, slow
+#: modes may have to lose most of their energy. And for so many of the coarsest steps at most.
+LONG, STEPS = 5.0, 20_000.0
 
-#: Relative, of the impulse found.
-TOLERANCE = 1e-4
+#: Relative, of the impulse found, where directions are searched and where there is one alone.
+TOLERANCE, ALONE_TOLERANCE = 1e-4, 1e-5
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def shock_limit(
         on: the point that is struck, ``"M1"``, ``"M2"`` or ``"M3"``.
         direction: of the impulse, from +x [rad]; all directions by default.
         t_end: end of every run [s]; what is not captured by then is not taken to have left. By default it
-            follows from the slowest time constants about the well and the saddles.
+            follows from the slowest decay about wells and saddles.
         threads: threads to use; the result does not depend on it.
 
     Raises:
@@ -136,7 +136,8 @@ def shock_limit(
     to_state = np.zeros((len(axes), 4))
     to_state[:, 2:] = rates_after(scene, place[:2], on, axes)
     label_of = copy_labels(scene, t_end, threads=threads)
-    rays = Rays(label_of, place, int(label_of(place[None])[0]), to_state, TOLERANCE, least)
+    tolerance = TOLERANCE if everywhere else ALONE_TOLERANCE
+    rays = Rays(label_of, place, int(label_of(place[None])[0]), to_state, tolerance, least)
     if rays.label < 0:
         return ShockLimit(on, proved, nothing, None, proved.impulse, 1)
     most = float(impulse_for(high, moves.along(easiest)))
@@ -157,13 +158,13 @@ def shock_limit(
     return ShockLimit(on, proved, found, end, shock.undecided_from, shock.trajectories)
 
 
-def proved_limit(scene: Scene, equilibrium: Equilibrium, on: str) -> float:
-    """The impulse [N s] below which no blow on a point leaves, in whatever direction: the proved bound alone.
+def proved_limits(scene: Scene, equilibrium: Equilibrium) -> dict[str, float]:
+    """Of every point the impulse [N s] below which no blow leaves, in whatever direction: the bounds alone.
 
     Arguments and errors as :func:`shock_limit`.
     """
-    _, moves, depth = _well(scene, equilibrium, on)
-    return float(impulse_for(depth, moves.greatest))
+    wells = {on: _well(scene, equilibrium, on) for on in POINTS}
+    return {on: float(impulse_for(depth, moves.greatest)) for on, (_, moves, depth) in wells.items()}
 
 
 def _well(scene: Scene, equilibrium: Equilibrium, on: str) -> tuple[Floats, Mobility, float]:
@@ -190,9 +191,10 @@ def _require_point(on: str) -> None:
 
 def _long_enough(scene: Scene, equilibria: Equilibria, place: Floats) -> float:
     """For how long a blow is followed [s]."""
-    rates = [np.abs(np.linalg.eigvals(jacobian(scene, e))).min() for e in equilibria if e.morse_index < 2]
+    states = [jacobian(scene, e) for e in equilibria if e.morse_index < 2]
+    slowest = float(np.abs(np.linalg.eigvals(states).real).min())
     longest = STEPS * float(coarse_steps(reduce(scene), place[None])[0])
-    return LONG / max(float(min(rates)), LONG / longest)
+    return LONG / max(slowest, LONG / longest)
 
 
 def impulse_start(
