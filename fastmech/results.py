@@ -98,7 +98,7 @@ class Variable:
         if data.dtype == np.bool_:
             data, attrs = data.astype(np.int8), {**_FALSE_TRUE, **attrs}
         if fill is not None:
-            if data.dtype.kind not in "iu" or data.dtype.type(fill) != fill:
+            if data.dtype.kind not in "iu" or not isinstance(fill, int) or not _fits(fill, data.dtype):
                 raise InputError(f"variable.attrs.{FILL} = {shown(fill)}: must be an integer of {data.dtype}")
             attrs[FILL] = int(fill)
         object.__setattr__(self, "dims", dims)
@@ -374,6 +374,11 @@ def _shared_sizes(variables: Mapping[str, Variable]) -> dict[str, int]:
                     f"dataset.variables.{name}: has {size} points along {dim}, the others have {sizes[dim]}"
                 )
     return sizes
+
+
+def _fits(number: int, dtype: np.dtype[Any]) -> bool:
+    """Whether a type of integers has this one."""
+    return bool(np.iinfo(dtype).min <= number <= np.iinfo(dtype).max)
 
 
 def _is_utf8(text: str) -> bool:

@@ -121,7 +121,8 @@ def _write_table(
     advance = stage(f"rows over {', '.join(dims) or 'nothing'}", total)
     with path.open("w", encoding="utf-8", newline="") as file:
         file.writelines(
-            f"# {line}\n" for line in _comments(dataset, {d: dataset.variables.get(d) for d in dims} | table)
+            f"# {line}".rstrip() + "\n"
+            for line in _comments(dataset, {d: dataset.variables.get(d) for d in dims} | table)
         )
         writer = csv.writer(file)
         writer.writerow([*heads, *(_head(name, variable) for name, variable in table.items())])
