@@ -8,8 +8,8 @@ slots beyond ``count`` hold NaN in numbers and -1 in codes, which is their ``_Fi
 their units and ``root`` (rank by energy), so that a table of the map has a row for each slot of each point.
 What has other dimensions is a group. ``sheets``: ``sheet_branch`` says which sheets continue one another
 round a cusp, ``sheet_break`` where a sheet is torn. ``curves``, of a map over two parameters: its fold
-curves, cusps and vanishing-damping curves, point after point, ``fold_curve`` and ``unreached_curve`` numbering
-them; of a map over one its folds.
+curves, cusps and vanishing-damping curves, point after point, ``fold_curve`` and ``unreached_curve``
+numbering them; of a map over one its folds.
 
 A fold curve is found where it separates points of the grid: an island of six equilibria (or of four) that
 lies between the points, parting no two neighbours, is not seen. A finer grid sees it.
