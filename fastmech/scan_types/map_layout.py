@@ -9,7 +9,6 @@ from fastmech.atlas.coincidence import Coincidence
 from fastmech.atlas.map import Slab
 from fastmech.atlas.verdicts import Verdict
 from fastmech.equilibria.outcome import Outcome
-from fastmech.equilibria.search import MOST
 from fastmech.mechanism.impulse import POINTS
 from fastmech.results import NO_CODE, Variable, flags, numbers, parts
 
