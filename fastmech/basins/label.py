@@ -8,6 +8,7 @@ nearer to the stable manifold of a saddle than their error) are computed again w
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -103,9 +104,7 @@ def labels_of(
     found = Paths.empty(len(begin))
     status = np.where(finite, BasinStatus.UNDECIDED, BasinStatus.START_NOT_FINITE).astype(np.int8)
     settle = None if settle_radius is None else np.full(len(begin), np.nan)
-    pieces = max(-(-len(begin) // BATCH), min(PIECES, len(begin) // LEAST), 1)
-    for piece in range(pieces):
-        some = np.arange(piece, len(begin), pieces)
+    for some in pieces_of(len(begin)):
         for step in np.unique(coarse[some[finite[some]]]):
             members = some[finite[some] & (coarse[some] == step)]
             ladder = Ladder(certificate, t_end, float(step), formula, threads)
@@ -125,6 +124,13 @@ def labels_of(
         status,
         found.steps,
     )
+
+
+def pieces_of(n: int) -> Iterator[NDArray[np.intp]]:
+    """Indices of n starts, piece by piece."""
+    pieces = max(-(-n // BATCH), min(PIECES, n // LEAST), 1)
+    for piece in range(pieces):
+        yield np.arange(piece, n, pieces)
 
 
 def require_damper(scene: Scene) -> None:
