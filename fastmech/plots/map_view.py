@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 MOST_DRAWN = 1000
 
 #: Variables over the equilibria that pictures show; the others stay in the file.
-DRAWN = ("phi", "theta", "energy", "morse_index", "sheet", "depth", "escape_speed", "decay_time")
+DRAWN = ("phi", "theta", "energy", "morse_index", "sheet", "depth", "shock_limit_m2", "decay_time")
 
 #: Relative difference of energies that rounding may cause.
 ROUNDING = 1e-10

@@ -96,7 +96,9 @@ class EquilibriumMap(TiledScan):
     @property
     def wells(self) -> bool:
         """Whether the depths of wells are asked for."""
-        return self.variables is None or bool({"depth", "escape_speed"} & set(self.variables))
+        return self.variables is None or any(
+            name == "depth" or name.startswith("shock_limit") for name in self.variables
+        )
 
     def kept(self, variables: dict[str, Variable]) -> dict[str, Variable]:
         """Those of the variables that are asked for."""

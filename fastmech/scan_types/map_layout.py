@@ -9,6 +9,7 @@ from fastmech.atlas.coincidence import Coincidence
 from fastmech.atlas.map import Slab
 from fastmech.atlas.verdicts import Verdict
 from fastmech.equilibria.outcome import Outcome
+from fastmech.mechanism.impulse import POINTS
 from fastmech.results import NO_CODE, Variable, flags, numbers, parts
 
 CRITERIA = {
@@ -62,12 +63,16 @@ def point_variables(grid: tuple[str, ...], found: Slab) -> dict[str, Variable]:
             roots, found.decay_time, "s", "slowest linear mode falls to 1/e; inf: never, NaN: no minimum"
         ),
         "depth": Variable(roots, found.depth, "J", "energy from a minimum to the lowest way out of its well"),
-        "escape_speed": Variable(
-            roots,
-            found.escape_speed,
-            "m/s",
-            "least speed of M2 at which the kinetic energy is the depth: no slower kick leaves the well",
-        ),
+        **{
+            f"shock_limit_{on.lower()}": Variable(
+                roots,
+                getattr(found, f"shock_limit_{on.lower()}"),
+                "N s",
+                f"proved: no smaller impulse on {on} of the resting mechanism leaves the well, in whatever "
+                f"direction{'; NaN: no minimum, or M3 at a dead centre' if on == 'M3' else ''}",
+            )
+            for on in POINTS
+        },
     }
 
 

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from fastmech.basins.critical import critical_forces, critical_impulse
 from fastmech.basins.label import require_damper
-from fastmech.basins.snapping import SnappingMap, force_free, map_snapping
+from fastmech.basins.shock_limit import shock_limit
+from fastmech.basins.snapping import SnappingMap, critical_forces, force_free, map_snapping
 from fastmech.basins.status import FAILURES, BasinStatus
 from fastmech.errors import InputError
 from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers
@@ -29,9 +29,6 @@ if TYPE_CHECKING:
 
 #: Motions of the largest map.
 MOST_POINTS = 5_000_000
-
-#: The critical impulse is looked for up to so many times the smallest F0/alpha of the largest force.
-IMPULSES = 4.0
 
 #: Motions of a tile, about.
 TILE_POINTS = 1 << 12
@@ -141,7 +138,7 @@ class SnappingTiling(Tiling):
         tiles = [tile(index) for index in range(self.count)]
         order = np.argsort(np.concatenate(self.parts), kind="stable")
         joined = {name: np.concatenate([part[name].data for part in tiles])[order] for name in tiles[0]}
-        _, equilibria, start = force_free(self.scene, None)
+        free, equilibria, start = force_free(self.scene, None)
         found = SnappingMap(
             self.forces,
             self.rates,
@@ -152,8 +149,8 @@ class SnappingTiling(Tiling):
             joined["time"],
             joined["status"],
         )
-        largest = float(self.forces[np.abs(self.forces).argmax()])
-        limit = critical_impulse(self.scene, IMPULSES * largest / float(self.rates[-1]))
+        side = 0.0 if self.forces[0] > 0.0 else np.pi
+        limit = np.cos(side) * shock_limit(free, equilibria[start], "M2", side).found.impulse
         variables = _ends(found) | _windows(found) | _equilibria(found)
         variables["critical_F0"] = Variable(
             ("alpha",),
@@ -162,7 +159,7 @@ class SnappingTiling(Tiling):
             "force of least magnitude that leaves, NaN: none of those tried",
         )
         variables["critical_impulse"] = Variable(
-            (), np.array(limit), "N s", "limit of the critical F0/alpha for fast decay, NaN: none in range"
+            (), np.array(limit), "N s", "limit of the critical F0/alpha for fast decay, NaN: none was found"
         )
         attrs = {"start": start, "tolerance": self.request.tolerance, "method": self.request.method}
         return Dataset(variables, attrs | found.counts | failures(found.status, FAILURES))

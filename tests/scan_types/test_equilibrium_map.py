@@ -35,7 +35,7 @@ def mapped() -> Dataset:
 def test_padding_is_as_documented() -> None:
     dataset = mapped()
     empty = np.arange(6) >= dataset["count"].data[..., None]
-    for name in ("phi", "theta", "radius", "energy", "frequency", "decay_time", "depth", "escape_speed"):
+    for name in ("phi", "theta", "radius", "energy", "frequency", "decay_time", "depth", "shock_limit_m2"):
         assert dataset[name].dims == ("F0", "c2", "root")
         assert np.isnan(dataset[name].data[empty]).all(), name
     for name in ("hessian_phi_phi", "hessian_theta_theta", "eigenvalue_re_1", "eigenvalue_im_4"):
