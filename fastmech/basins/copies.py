@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastmech.basins.label import labels_of, require_damper
+from fastmech.basins.label import Labels, labels_of, require_damper
 from fastmech.basins.measures.labels import Floats, Integers, LabelOf, check_point
 from fastmech.basins.measures.norm import STATE, kinetic_norm
 from fastmech.ensembles import checks
@@ -16,7 +16,7 @@ from fastmech.errors import InputError
 from fastmech.scene import Scene
 
 #: Bits for the well (a scene has at most six equilibria) and for each angle's turns.
-WELL_BITS, TURN_BITS = 3, 20
+WELL_BITS, TURN_BITS = 3, 30
 _MIDDLE = 1 << (TURN_BITS - 1)
 
 
@@ -30,10 +30,7 @@ class CopyLabels:
 
     def __call__(self, starts: Floats) -> Integers:
         """Labels (n,) of starts (n, 4)."""
-        ends = labels_of(self.scene, starts, self.t_end, threads=self.threads)
-        turns = ends.turns.astype(np.int64) + _MIDDLE
-        number = (((turns[:, 0] << TURN_BITS) + turns[:, 1]) << WELL_BITS) + ends.well
-        return np.where(ends.well < 0, -1, number)
+        return copy_numbers(labels_of(self.scene, starts, self.t_end, threads=self.threads))
 
 
 def copy_labels(scene: Scene, t_end: float = 60.0, *, threads: int | None = None) -> CopyLabels:
@@ -53,6 +50,14 @@ def copy_labels(scene: Scene, t_end: float = 60.0, *, threads: int | None = None
     """
     require_damper(scene)
     return CopyLabels(scene, checks.number("t_end", t_end, "s", above=0.0), threads)
+
+
+def copy_numbers(ends: Labels) -> Integers:
+    """One number for each copy of each well (n,), -1 without a label or too many turns away to count."""
+    turns = ends.turns.astype(np.int64) + _MIDDLE
+    number = (((turns[:, 0] << TURN_BITS) + turns[:, 1]) << WELL_BITS) + ends.well
+    counted = ((turns >= 0) & (turns < 2 * _MIDDLE)).all(axis=1)
+    return np.where((ends.well < 0) | ~counted, -1, number)
 
 
 def copy_of_label(label: int) -> tuple[int, tuple[int, int]]:
