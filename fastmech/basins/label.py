@@ -19,7 +19,7 @@ from fastmech.basins.status import BasinStatus, counts
 from fastmech.basins.steps import coarse_steps
 from fastmech.capture.barriers import BarrierTree
 from fastmech.capture.certificate import Certificate, certificate_of
-from fastmech.disturbance.outcome import confining_energy
+from fastmech.disturbance.size import confining_energy
 from fastmech.ensembles import checks
 from fastmech.ensembles.plausible import breaks_energy_bounds
 from fastmech.ensembles.run import Progress

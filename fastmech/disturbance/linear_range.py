@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.disturbance.ensemble import equilibria_to_disturb, unit_directions
-from fastmech.disturbance.motion import disturbed_motion
-from fastmech.disturbance.size import Size, size_at
+from fastmech.disturbance.motion import disturbed_motion, equilibria_to_disturb
+from fastmech.disturbance.size import Size, size_at, unit_directions
 from fastmech.ensembles import checks
 from fastmech.equilibria.find import Equilibrium
 from fastmech.scene import Scene

@@ -8,10 +8,10 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.disturbance.ensemble import equilibria_to_disturb
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
-from fastmech.equilibria.find import Equilibrium
+from fastmech.equilibria.find import Equilibria, Equilibrium, find_equilibria
+from fastmech.errors import InputError
 from fastmech.scene import Scene
 from fastmech.stability.linearize import jacobian
 
@@ -59,6 +59,32 @@ def disturbed_motion(
     run = integrate(scene, center + start, dt=dt, method=method, t_eval=t, threads=threads)
     linearized = start @ propagators(jacobian(scene, equilibrium), t).mT
     return DisturbedMotion(t, run.y - center, linearized, run.status)
+
+
+def require_constant_force(scene: Scene) -> None:
+    """Refuse a scene whose force changes: nothing rests while it decays.
+
+    Raises:
+        InputError: the force decays.
+    """
+    if scene.F0 != 0 and scene.alpha != 0:
+        raise InputError(
+            f"scene.alpha = {scene.alpha:g}: must be 0 1/s for motion about an equilibrium (or F0 = 0 N); "
+            "use scene.replace(alpha=0.0) and find its equilibria anew"
+        )
+
+
+def equilibria_to_disturb(scene: Scene) -> Equilibria:
+    """The equilibria of a scene in which disturbed motion makes sense.
+
+    Raises:
+        InputError: the force decays, or no equilibrium is isolated.
+    """
+    require_constant_force(scene)
+    equilibria = find_equilibria(scene)
+    if not equilibria:
+        raise InputError(f"scene: has no equilibrium to disturb: {equilibria.certificate.sentence}")
+    return equilibria
 
 
 def propagators(matrix: Floats, times: Floats) -> Floats:

@@ -8,10 +8,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.disturbance.outcome import Outcome
+from fastmech.basins.disturbed import Outcome
 from fastmech.results import Variable, flags
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
+
+ABOUT_SHARES = {
+    "share_returned": "share that is proved to return",
+    "share_returned_at_most": "share that returned, if all whose end is not known did",
+    "share_returned_lower": "lower end of the 95 % Wilson interval, none of those returning",
+    "share_returned_upper": "upper end of the 95 % Wilson interval, all of those returning",
+}
+ABOUT_QUANTILES = "quantiles of the time to return over those that return, inf: later than the end of the run"
 
 _EACH, _EVERY = ("equilibrium",), ("equilibrium", "trajectory")
 _STATE = "phi, theta, phi', theta'"
@@ -22,22 +30,22 @@ _TRAJECTORY: dict[str, tuple[dict[str, int], str, float, str, str]] = {
     "start": ({"component": 4}, "f8", np.nan, "rad, rad/s", f"start: {_STATE}"),
     "final": ({"component": 4}, "f8", np.nan, "rad, rad/s", f"end, or last finite state: {_STATE}"),
     "failed": ({}, "f8", np.nan, "s", "time of the last finite state where it failed on the way"),
-    "outcome": ({}, "i1", -1, "1", "where it is at the end"),
-    "end_equilibrium": ({}, "i1", -1, "1", "equilibrium at which it rests at the end, -1: none"),
-    "turns": ({"angle": 2}, "i8", 0, "1", "full turns of phi and theta made until then"),
+    "outcome": ({}, "i1", -1, "1", "where it ends"),
+    "end_equilibrium": ({}, "i1", -1, "1", "stable equilibrium at which it is proved to end, -1: none"),
+    "turns": ({"angle": 2}, "i8", 0, "1", "full turns of phi and theta made on the way there"),
     "time_to_return": (
         {},
         "f8",
         np.nan,
         "s",
-        "end of the first step from which on every step ended in the ball of return",
+        "end of the first step from which on every step ended in the ball of return, NaN: none by t_end",
     ),
     "excursion": (
         {"angle": 2},
         "f8",
         np.nan,
         "rad",
-        "largest departures of phi and theta at the ends of steps",
+        "largest departures of phi and theta at the ends of steps, NaN: failed",
     ),
 }
 
@@ -79,11 +87,13 @@ def equilibrium_variables(
 
 
 def tally_variables(
-    share: NDArray[np.float64], errors: NDArray[np.float64], quantiles: NDArray[np.float64]
+    shares: Mapping[str, NDArray[np.float64]],
+    errors: NDArray[np.float64],
+    quantiles: NDArray[np.float64],
 ) -> dict[str, Variable]:
-    """What the trajectories of each equilibrium come to."""
+    """What the trajectories of each equilibrium come to; ``shares`` are those of a tally."""
     return {
-        "share_returned": Variable(_EACH, share, "1", "share that returned"),
+        **{name: Variable(_EACH, shares[name], "1", about) for name, about in ABOUT_SHARES.items()},
         "halving_difference": Variable(
             ("equilibrium", "sample"),
             errors,
@@ -94,7 +104,7 @@ def tally_variables(
             ("equilibrium", "quantile"),
             quantiles,
             "s",
-            "quantiles of the time to return over those that returned",
+            ABOUT_QUANTILES,
         ),
     }
 

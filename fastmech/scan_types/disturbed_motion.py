@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from fastmech.disturbance.ensemble import equilibria_to_disturb
-from fastmech.disturbance.motion import disturbed_motion
+from fastmech.disturbance.motion import disturbed_motion, equilibria_to_disturb
 from fastmech.ensembles.integrate import FAILURES
 from fastmech.ensembles.spans import output_steps
 from fastmech.equilibria.find import Equilibria, Equilibrium
