@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fastmech.plots.labels import logarithmic
 from fastmech.plots.map_view import View, make_view
-from fastmech.plots.style import FIELD, LINES, legend_below, new_figure, style
+from fastmech.plots.style import FIELD, LINES, PALETTE, legend_below, new_figure, style
 from fastmech.results import Dataset
 
 if TYPE_CHECKING:
@@ -22,8 +22,8 @@ Floats = NDArray[np.float64]
 #: Sheets of a picture at most, those of the lowest numbers: the stable ones first, the largest first.
 MOST_SHEETS = 4
 
-#: Colour where a sheet has no equilibrium; and of one that was refused or has failed in part, a mark.
-ABSENT, UNTOLD = "#e3e3e3", "x"
+#: Colours where there is no value, and of times later than the run's end; the mark of what is not whole.
+ABSENT, LATER, UNTOLD = "#e3e3e3", PALETTE["vermillion"], "x"
 
 KINDS = {0: "stable", 1: "saddle", 2: "maximum"}
 
@@ -77,7 +77,8 @@ def _panels(view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[
         look = _look(name, field[..., sheets])
         for axes, sheet in zip(row, sheets, strict=True):
             axes.set_facecolor(ABSENT)
-            shown = np.ma.masked_invalid(_shown(field[..., sheet], look))
+            # Infinity is beyond every colour, and so has the one for that.
+            shown = np.ma.masked_where(np.isnan(field[..., sheet]), np.minimum(field[..., sheet], 1e300))
             mesh = axes.pcolormesh(x, y, shown.T, shading="nearest", rasterized=True, **look)
             untold = _untold(view, sheet)
             if untold.any():
@@ -87,9 +88,12 @@ def _panels(view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[
             axes.label_outer()
             axes.set_title(f"{_name(view, int(sheet))}:\n{title}", fontsize=10.0)
             axes.grid(visible=False)
-        later = np.isinf(field[..., sheets]).any()
-        figure.colorbar(mesh, ax=list(row), label=label, extend="max" if later else "neither")
-    figure.legend(handles=_marks(view, sheets, fields), loc="outside lower center", ncols=2)
+        if np.isfinite(field[..., sheets]).any():
+            bar = figure.colorbar(mesh, ax=list(row), label=label)
+            if name != "share_returned":
+                logarithmic(bar.ax.yaxis)
+    if handles := _marks(view, sheets, fields):
+        figure.legend(handles=handles, loc="outside lower center", ncols=2)
     figure.suptitle(_setting(view), fontsize=10.0)
     return figure
 
@@ -124,18 +128,15 @@ def _lines(view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[s
 
 def _look(name: str, field: Floats) -> dict[str, Any]:
     """Colours: shares from 0 to 100 %, lengths and times by their logarithm."""
+    from matplotlib import colormaps
     from matplotlib.colors import LogNorm, Normalize
 
+    colors = colormaps[FIELD].with_extremes(over=LATER)
     if name == "share_returned":
-        return {"cmap": FIELD, "norm": Normalize(0.0, 100.0)}
+        return {"cmap": colors, "norm": Normalize(0.0, 100.0)}
     known = field[np.isfinite(field) & (field > 0.0)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.1, 1.0)
-    return {"cmap": FIELD, "norm": LogNorm(low, max(high, 1.001 * low))}
-
-
-def _shown(field: Floats, look: dict[str, Any]) -> Floats:
-    """Values within the colours: what is later than the run's end has the last one."""
-    return np.clip(field, look["norm"].vmin, look["norm"].vmax)
+    return {"cmap": colors, "norm": LogNorm(low, max(high, 1.001 * low))}
 
 
 def _untold(view: View, sheet: int) -> NDArray[np.bool_]:
@@ -149,18 +150,16 @@ def _marks(view: View, sheets: NDArray[np.int_], fields: list[tuple[str, Floats,
     from matplotlib.patches import Patch
 
     handles: list[Artist] = []
-    if any(np.isnan(field[..., sheets]).any() for _, field, _ in fields):
-        handles.append(
-            Patch(facecolor=ABSENT, edgecolor="#808080", label="no such equilibrium, or none returned")
-        )
+    absent = ~np.isfinite(view.data("phi")[..., sheets])
+    if absent.any():
+        handles.append(Patch(facecolor=ABSENT, edgecolor="#808080", label="no such equilibrium"))
+    if any((np.isnan(field[..., sheets]) & ~absent).any() for _, field, _ in fields):
+        handles[:] = [Patch(facecolor=ABSENT, edgecolor="#808080", label="no such equilibrium, or no value")]
     if any(np.isinf(field[..., sheets]).any() for _, field, _ in fields):
-        handles.append(Patch(facecolor="none", label="last colour: also later than the run's end"))
+        handles.append(Patch(facecolor=LATER, label="later than the end of the run"))
     if any(_untold(view, int(sheet)).any() for sheet in sheets):
-        handles.append(
-            Line2D(
-                [], [], marker=UNTOLD, color="black", ms=5, ls="none", label="failed in part, or not computed"
-            )
-        )
+        about = "failed numerically in part, or not computed"
+        handles.append(Line2D([], [], marker=UNTOLD, color="black", ms=5, ls="none", label=about))
     return handles
 
 
