@@ -8,6 +8,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.disturbance.size import size_at
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
 from fastmech.equilibria.find import Equilibria, Equilibrium, find_equilibria
@@ -17,6 +18,9 @@ from fastmech.stability.linearize import jacobian
 
 Floats = NDArray[np.float64]
 
+
+#: Default step times the highest frequency [rad].
+PHASE = 0.05
 
 #: Condition of the eigenvectors beyond which their errors would show beside those of the integration.
 _ILL_CONDITIONED = 1e4
@@ -40,14 +44,15 @@ def disturbed_motion(
     disturbance: ArrayLike,
     times: ArrayLike,
     *,
-    dt: float = 0.01,
+    dt: float | None = None,
     method: str = "dop853",
     threads: int | None = None,
 ) -> DisturbedMotion:
     """Motion after disturbances (n, 4) or (4,) of an equilibrium, at ``times`` [s].
 
-    The nonlinear motion is integrated with a fixed step; the linearized one is exact: the matrix
-    exponential of the Jacobian at the equilibrium.
+    The nonlinear motion is integrated with a fixed step of at most ``dt`` [s], by default
+    :func:`default_step`; the linearized one is exact: the matrix exponential of the Jacobian at the
+    equilibrium.
 
     Raises:
         InputError: an argument is wrong, the scene's force decays, or the equilibrium is not the scene's.
@@ -56,9 +61,15 @@ def disturbed_motion(
     start = checks.states("disturbance", disturbance, 4)
     t = checks.rising_times("times", times)
     center = np.array([equilibrium.phi, equilibrium.theta, 0.0, 0.0])
+    dt = default_step(scene, equilibrium) if dt is None else dt
     run = integrate(scene, center + start, dt=dt, method=method, t_eval=t, threads=threads)
     linearized = start @ propagators(jacobian(scene, equilibrium), t).mT
     return DisturbedMotion(t, run.y - center, linearized, run.status)
+
+
+def default_step(scene: Scene, equilibrium: Equilibrium) -> float:
+    """Longest step [s] of motion about an equilibrium: 0.05 rad of its highest frequency."""
+    return PHASE / size_at(scene, equilibrium.phi, equilibrium.theta).omega
 
 
 def require_constant_force(scene: Scene) -> None:

@@ -25,6 +25,8 @@ MOST_SHEETS = 4
 #: Colours where there is no value, and of times later than the run's end; the mark of what is not whole.
 ABSENT, LATER, UNTOLD = "#e3e3e3", PALETTE["vermillion"], "x"
 
+ABOUT_UNTOLD = "failed numerically in part, or not computed"
+
 KINDS = {0: "stable", 1: "saddle", 2: "maximum"}
 
 
@@ -112,6 +114,14 @@ def _lines(view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[s
                     100.0 * view.data(f"share_returned_{end}")[..., sheet] for end in ("lower", "upper")
                 )
                 axes.fill_between(x, low, high, color=LINES[k % len(LINES)], alpha=0.25, lw=0)
+            later = x[np.isinf(field[..., sheet])]
+            if later.size:  # on the upper edge
+                look = {"color": LINES[k % len(LINES)], "transform": axes.get_xaxis_transform()}
+                axes.plot(later, np.full(later.size, 0.97), "^", **look)
+            untold = x[_untold(view, int(sheet))]
+            if untold.size:  # on the lower edge
+                at = axes.get_xaxis_transform()
+                axes.plot(untold, np.full(untold.size, 0.04), UNTOLD, color="black", transform=at)
         if name == "share_returned":
             axes.set_ylim(0.0, 102.0)
         elif np.isfinite(field[..., sheets]).any():
@@ -120,6 +130,12 @@ def _lines(view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[s
         axes.set(ylabel=label)
         axes.set_title(title[0].upper() + title[1:])
     panels[-1].set_xlabel(view.label(view.axes[0]))
+    if x.size > 1:
+        panels[-1].set_xlim(x.min(), x.max())
+    if any(np.isinf(field[..., sheets]).any() for _, field, _ in fields):
+        panels[0].plot([], [], "^", color="#808080", label="later than the end of the run")
+    if any(_untold(view, int(sheet)).any() for sheet in sheets):
+        panels[0].plot([], [], UNTOLD, color="black", label=ABOUT_UNTOLD)
     legend_below(figure, panels[0], 2)
     band = "; band: 95 % Wilson interval, undecided ones as none or all" if name == "share_returned" else ""
     figure.suptitle(_setting(view) + band, fontsize=10.0)
@@ -158,8 +174,7 @@ def _marks(view: View, sheets: NDArray[np.int_], fields: list[tuple[str, Floats,
     if any(np.isinf(field[..., sheets]).any() for _, field, _ in fields):
         handles.append(Patch(facecolor=LATER, label="later than the end of the run"))
     if any(_untold(view, int(sheet)).any() for sheet in sheets):
-        about = "failed numerically in part, or not computed"
-        handles.append(Line2D([], [], marker=UNTOLD, color="black", ms=5, ls="none", label=about))
+        handles.append(Line2D([], [], marker=UNTOLD, color="black", ms=5, ls="none", label=ABOUT_UNTOLD))
     return handles
 
 
@@ -170,7 +185,8 @@ def _name(view: View, sheet: int) -> str:
 
 def _setting(view: View) -> str:
     attrs = view.dataset.attrs
+    more = view.dataset.sizes["sheet"] - MOST_SHEETS
     return (
         f"{attrs['trajectories']:,} disturbances up to {attrs['radius']:g} rad of each equilibrium, "
         f"runs to {attrs['t_end']:g} s\n{view.setting}"
-    )
+    ) + (f"; {more} more sheets in the file" if more > 0 else "")

@@ -89,11 +89,11 @@ class DisturbedTiling(Tiling):
         self.request, self.scene = request, scene
         self.equilibria = equilibria_to_disturb(scene)
         self.rays = _blocks(request.linear_directions, DIRECTIONS)
-        centers = np.column_stack(
+        rest = np.column_stack(
             [self.equilibria.phi, self.equilibria.theta, *np.zeros((2, len(self.equilibria)))]
         )
-        self.steps = measuring_steps(scene, centers, request.method)
-        self.parts = _blocks(request.trajectories, _tile_length(request, request.dt or self.steps.min()))
+        step = request.dt or float(measuring_steps(scene, rest, request.method).min())
+        self.parts = _blocks(request.trajectories, _tile_length(request, step))
         self.count = len(self.equilibria) * (len(self.rays) + len(self.parts))
 
     def items(self, index: int) -> int:
@@ -113,7 +113,6 @@ class DisturbedTiling(Tiling):
                 tolerance=request.linear_tolerance,
                 directions=request.linear_directions,
                 seed=request.seed,
-                dt=float(self.steps[index % len(self.equilibria)]),
                 part=self.rays[index // len(self.equilibria)],
                 threads=context.threads,
             )
