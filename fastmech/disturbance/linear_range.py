@@ -50,7 +50,8 @@ def linear_range(
     :class:`fastmech.disturbance.size.Size`. Along every direction (uniform on the sphere) sizes from 1e-6 rad
     to pi rad are tried upwards, and the first crossing of the tolerance is refined by bisection to one part
     in 10,000. ``dt`` is the longest step [s], by default that of
-    :func:`fastmech.disturbance.motion.disturbed_motion`. ``part`` says which of the directions to try, all by default.
+    :func:`fastmech.disturbance.motion.disturbed_motion`. ``part`` says which of the directions to try, all by
+    default.
 
     Raises:
         InputError: an argument is wrong, the scene's force decays, or the equilibrium is not the scene's.

@@ -154,7 +154,9 @@ def _time_to_return(dataset: Dataset) -> Figure:
     if axes.lines:
         legend_below(figure, axes, 1)
     else:
-        axes.text(0.5, 0.5, "no trajectory returned", transform=axes.transAxes, ha="center")
+        axes.text(
+            0.5, 0.5, "no trajectory was back by the end of the run", transform=axes.transAxes, ha="center"
+        )
     axes.set_title("Time after which a disturbed trajectory stays near its equilibrium")
     return figure
 

@@ -122,8 +122,8 @@ def test_a_run_that_ends_inside_by_chance_has_not_returned() -> None:
 def test_what_is_proved_to_return_need_not_be_back() -> None:
     """A well deep enough to hold nearly all, a damper that takes minutes to bring them to rest.
 
-    98.4 % return by ``labels_of``; SciPy to t = 1,000 s says so of the first sixteen, which are then so low
-    that they cannot leave their well.
+    98.4 % return by ``labels_of``. SciPy brings the first eight, and two that end elsewhere, to t = 300 s:
+    they are beside the well that they are said to end in, and too low to leave any.
     """
     scene = Scene(F0=-150.0, c1=260.0, c2=60.0, alpha=0.0)
     first = find_equilibria(scene)[0]

@@ -165,7 +165,7 @@ def test_shares_of_the_bars_sum_up():
 
 
 def test_failures_are_no_part_of_where_motions_end():
-    """Steps far too long: the bars end where the motions that were computed do, and the rest is told apart."""
+    """Steps far too long: bars hold the motions that were computed, and the rest is told apart."""
     scene = Scene(c1=2000.0, c2=8000.0, beta=20.0, alpha=0.0)
     dataset = run("disturbed", scene, trajectories=64, radius=1.0, t_end=20.0, dt=0.05, linear_directions=1)
     figures = scan_kinds()["disturbed"].draw(dataset, scene.model_dump())
