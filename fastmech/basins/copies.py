@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastmech.basins.label import labels_of, require_damper
+from fastmech.basins.label import Labels, labels_of, require_damper
 from fastmech.basins.measures.labels import Floats, Integers, LabelOf, check_point
 from fastmech.basins.measures.norm import kinetic_norm
 from fastmech.ensembles import checks
@@ -14,7 +14,7 @@ from fastmech.errors import InputError
 from fastmech.scene import Scene
 
 #: Bits for the well (a scene has at most six equilibria) and for each angle's turns.
-WELL_BITS, TURN_BITS = 3, 20
+WELL_BITS, TURN_BITS = 3, 30
 _MIDDLE = 1 << (TURN_BITS - 1)
 
 
@@ -36,13 +36,15 @@ def copy_labels(scene: Scene, t_end: float = 60.0, *, threads: int | None = None
     require_damper(scene)
     t_end = checks.number("t_end", t_end, "s", above=0.0)
 
-    def label(starts: Floats) -> Integers:
-        ends = labels_of(scene, starts, t_end, threads=threads)
-        turns = ends.turns.astype(np.int64) + _MIDDLE
-        number = (((turns[:, 0] << TURN_BITS) + turns[:, 1]) << WELL_BITS) + ends.well
-        return np.where(ends.well < 0, -1, number)
+    return lambda starts: copy_numbers(labels_of(scene, starts, t_end, threads=threads))
 
-    return label
+
+def copy_numbers(ends: Labels) -> Integers:
+    """One number for each copy of each well (n,), -1 without a label or too many turns away to count."""
+    turns = ends.turns.astype(np.int64) + _MIDDLE
+    number = (((turns[:, 0] << TURN_BITS) + turns[:, 1]) << WELL_BITS) + ends.well
+    counted = ((turns >= 0) & (turns < 2 * _MIDDLE)).all(axis=1)
+    return np.where((ends.well < 0) | ~counted, -1, number)
 
 
 def copy_of_label(label: int) -> tuple[int, tuple[int, int]]:

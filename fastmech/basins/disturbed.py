@@ -46,7 +46,7 @@ STREAM = 65_536
 MOST_TRAJECTORIES = 100_000_000
 
 #: Share of a start's coarse step, at which labels begin, that measuring takes by default.
-MEASURING = 0.5
+MEASURING = 0.6
 
 
 class Outcome(IntEnum):
@@ -263,8 +263,8 @@ def disturb(
 def measuring_steps(scene: Scene, starts: Floats, method: str) -> Floats:
     """Longest steps [s] of starts (n, 4) by default, shape (n,).
 
-    Half the coarse step at which :func:`fastmech.basins.label.labels_of` begins, and no longer than is stable
-    for the scene, as far down as that function goes.
+    Six tenths of the coarse step at which :func:`fastmech.basins.label.labels_of` begins, and no longer than
+    is stable for the scene, as far down as that function goes.
     """
     coarse = coarse_steps(reduce(scene), starts)
     finest = coarse * SUBSTEPS[0] / SUBSTEPS[-1]

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.basins.copies import copy_numbers
 from fastmech.basins.label import Labels, labels_of
 from fastmech.basins.measures.norm import STATE as STATE
 from fastmech.basins.refine import LevelProgress, refine_grid
@@ -190,9 +191,7 @@ class _Collected:
         self.time[points], self.status[points] = part.time, part.status
         if part.settle_time is not None:
             self.settle[points] = part.settle_time
-        turns = part.turns.astype(np.int64) + (1 << 20)
-        number = (part.well.astype(np.int64) << 44) + (turns[:, 0] << 22) + turns[:, 1]
-        return np.where(part.well < 0, -1, number)
+        return copy_numbers(part)
 
 
 def _checked_axes(axes: Mapping[str, ArrayLike], names: tuple[str, ...], least: int) -> dict[str, Floats]:

@@ -36,8 +36,8 @@ def draw_disturbed_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[str
     every = np.arange(dataset.sizes["sheet"])
     stable = every[dataset["sheet_morse_index"].data == 0]
     median, late = (int(np.argmin(np.abs(dataset["quantile"].data - q))) for q in (0.5, 0.95))
-    share = 100.0 * view.data("share_returned")
-    time, excursion = view.data("time_to_return_quantile"), view.data("largest_excursion")
+    share = _percent(view, "share_returned")
+    time = view.data("time_to_return_quantile").astype(np.float64)
     rows = {
         "share_returned": (
             stable,
@@ -53,12 +53,16 @@ def draw_disturbed_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[str
         "excursions": (
             every,
             [
-                (f"farthest |{symbol} - {symbol} there|", excursion[..., k], "excursion [rad]")
-                for k, symbol in enumerate("φθ")
+                (
+                    f"farthest |{symbol} - {symbol} there|",
+                    view.data(f"largest_excursion_{angle}").astype(np.float64),
+                    "excursion [rad]",
+                )
+                for angle, symbol in (("phi", "φ"), ("theta", "θ"))
             ],
         ),
     }
-    most = 100.0 * view.data("share_returned_at_most")
+    most = _percent(view, "share_returned_at_most")
     if (most > share).any():
         rows["share_returned"][1].append(("if all undecided returned", most, "share that returns [%]"))
     draw = _lines if len(view.axes) == 1 else _panels
@@ -111,7 +115,7 @@ def _lines(view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[s
             axes.plot(x, shown, "o-", ms=4, color=LINES[k % len(LINES)], label=_name(view, int(sheet)))
             if name == "share_returned" and title == fields[0][0]:
                 low, high = (
-                    100.0 * view.data(f"share_returned_{end}")[..., sheet] for end in ("lower", "upper")
+                    _percent(view, f"share_returned_{end}")[..., sheet] for end in ("lower", "upper")
                 )
                 axes.fill_between(x, low, high, color=LINES[k % len(LINES)], alpha=0.25, lw=0)
             later = x[np.isinf(field[..., sheet])]
@@ -153,6 +157,10 @@ def _look(name: str, field: Floats) -> dict[str, Any]:
     known = field[np.isfinite(field) & (field > 0.0)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.1, 1.0)
     return {"cmap": colors, "norm": LogNorm(low, max(high, 1.001 * low))}
+
+
+def _percent(view: View, name: str) -> Floats:
+    return 100.0 * view.data(name).astype(np.float64)
 
 
 def _untold(view: View, sheet: int) -> NDArray[np.bool_]:

@@ -125,7 +125,7 @@ class Disturbed(TiledScan):
         if "axes" in section.attrs:
             return section.load()
         step = -(-section.sizes.get("trajectory", 1) // DRAWN)
-        drawn = [name for name in section if name not in ("start", "final", "linear_direction")]
+        drawn = [name for name in section if not name.startswith(("start", "final", "linear_direction"))]
         return section.load(drawn, {"trajectory": slice(None, None, step)})
 
     @staticmethod

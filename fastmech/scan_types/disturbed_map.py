@@ -18,7 +18,7 @@ from fastmech.basins.disturbed import FAILURES, disturb
 from fastmech.ensembles.status import failure_counts
 from fastmech.equilibria.find import Equilibrium, find_equilibria
 from fastmech.errors import InputError
-from fastmech.results import Dataset, Variable
+from fastmech.results import Dataset, Variable, numbers
 from fastmech.scan_types.disturbed_layout import ABOUT_QUANTILES, ABOUT_SHARES, QUANTILES
 from fastmech.scan_types.request import counted_failures
 from fastmech.scan_types.tally import Tally
@@ -34,10 +34,11 @@ MOST_POINTS, MOST_TRAJECTORIES = 100_000, 65_536
 _MEASURED: dict[str, tuple[tuple[str, ...], str, str]] = {
     **{name: ((), "1", about) for name, about in ABOUT_SHARES.items()},
     "time_to_return_quantile": (("quantile",), "s", ABOUT_QUANTILES),
-    "largest_excursion": (("angle",), "rad", "largest departures of phi and theta of all trajectories"),
+    "largest_excursion_phi": ((), "rad", "largest departure of phi of all trajectories"),
+    "largest_excursion_theta": ((), "rad", "largest departure of theta of all trajectories"),
     "share_failed": ((), "1", "share whose motion could not be computed"),
 }
-_LENGTHS = {"quantile": len(QUANTILES), "angle": 2}
+_LENGTHS = {"quantile": len(QUANTILES)}
 
 
 class _Request(Protocol):
@@ -100,10 +101,12 @@ class DisturbedMap(Tiling):
         except InputError as refused:
             return self._tile({}, {"refused": str(refused)})
         tally, failed = Tally.of(found.outcome, found.time_to_return), np.isin(found.outcome, FAILURES)
+        farthest = np.full(2, np.nan) if failed.all() else found.excursion[~failed].max(axis=0)
         measured: dict[str, Any] = {
             **tally.shares(),
             "time_to_return_quantile": tally.quantiles(QUANTILES),
-            "largest_excursion": np.nan if failed.all() else found.excursion[~failed].max(axis=0),
+            "largest_excursion_phi": farthest[0],
+            "largest_excursion_theta": farthest[1],
             "share_failed": failed.mean(),
         }
         return self._tile(measured, failure_counts(found.outcome, FAILURES))
@@ -125,7 +128,7 @@ class DisturbedMap(Tiling):
         described = self.scene.described()
         variables = {name: Variable((name,), line, *described[name][1:]) for name, line in self.axes.items()}
         about = "equilibrium, continued, as the atlas of these axes numbers them"
-        variables["sheet"] = Variable(("sheet",), np.arange(grid[-1], dtype=np.int32), "1", about)
+        variables |= numbers("sheet", grid[-1], about)
         about = "negative eigenvalues of the Hessian all over a sheet, 0: stable"
         variables["sheet_morse_index"] = Variable(("sheet",), atlas.sheet_morse_index, "1", about)
         variables["quantile"] = Variable(("quantile",), np.array(QUANTILES), "1", "quantile")

@@ -16,7 +16,7 @@ from fastmech.disturbance.size import size_at
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.spans import output_steps
 from fastmech.integrators.methods import find_method
-from fastmech.results import Dataset, Variable
+from fastmech.results import Dataset, Variable, numbers
 from fastmech.scan_types.disturbed_layout import (
     QUANTILES,
     empty_trajectories,
@@ -132,7 +132,9 @@ class DisturbedTiling(Tiling):
             threads=context.threads,
             progress=lambda finished: context.check(),
         )
-        errors = _sampled_errors(self.scene, ensemble, request.method) if part.start == 0 else np.zeros(0)
+        errors = (
+            _sampled_errors(self.scene, ensemble, request.method) if part.start == 0 else np.zeros((0, 2))
+        )
         arrays = {name: getattr(ensemble, _FIELDS.get(name, name)) for name in request.kept}
         tally = Tally.of(ensemble.outcome, ensemble.time_to_return)
         return self._tile(arrays, errors, tally, [ensemble.dt.min(), ensemble.dt.max()])
@@ -142,13 +144,14 @@ class DisturbedTiling(Tiling):
         each = list(self.equilibria)
         omega = np.array([size_at(self.scene, e.phi, e.theta).omega for e in each])
         fixed = equilibrium_variables(self.equilibria.phi, self.equilibria.theta, omega)
+        fixed |= numbers("trajectory", self.request.trajectories, "number of the trajectory")
         count, request = len(each), self.request
         nothing = empty_trajectories(request.kept, 1)
         arrays = {n: np.broadcast_to(a, (1, request.trajectories, *a.shape[1:])) for n, a in nothing.items()}
         sample, rays = min(SAMPLE, request.trajectories), request.linear_directions
         plane = trajectory_variables(arrays)
         shares = dict.fromkeys(SHARES, np.zeros(1))
-        plane |= tally_variables(shares, np.zeros((1, sample)), np.zeros((1, len(QUANTILES))))
+        plane |= tally_variables(shares, np.zeros((1, sample, 2)), np.zeros((1, len(QUANTILES))))
         plane |= linear_variables(np.broadcast_to(0.0, (1, rays, 4)), np.broadcast_to(0.0, (1, rays)))
         attrs = {
             **request.settings,
@@ -166,7 +169,7 @@ class DisturbedTiling(Tiling):
             return Dataset(arrays | {"limit": Variable(("ray",), np.full(rays, np.nan))})
         sample = min(SAMPLE, self.request.trajectories) if part.start == 0 else 0
         nothing = empty_trajectories(self.request.kept, self.items(index))
-        return self._tile(nothing, np.full(sample, np.nan), Tally())
+        return self._tile(nothing, np.full((sample, 2), np.nan), Tally())
 
     def _part(self, index: int) -> slice | None:
         """The trajectories of a tile; None for a tile of directions."""
@@ -181,7 +184,7 @@ class DisturbedTiling(Tiling):
             for name, a in arrays.items()
         }
         columns |= {
-            "error": Variable(("sample",), errors),
+            "error": Variable(("sample", "error_entry"), errors),
             "step": Variable(("step_end",), np.array(steps or [])),
         }
         return Dataset(columns | tally.variables(), tally.attrs())
@@ -190,7 +193,7 @@ class DisturbedTiling(Tiling):
         for number, block in enumerate(self.rays):
             found = [tile(number * count + e) for e in range(count)]
             directions, limit = (np.stack([f[name].data for f in found]) for name in ("directions", "limit"))
-            yield (slice(0, count), block), {"linear_direction": directions, "linear_limit": limit}
+            yield (slice(0, count), block), _data(linear_variables(directions, limit))
         first = count * len(self.rays)
         tallies, errors, steps = [Tally() for _ in range(count)], [], []
         held: list[dict[str, NDArray[Any]]] = []
@@ -205,13 +208,12 @@ class DisturbedTiling(Tiling):
             held.append({n: np.stack([one[n].data for one in found]) for n in self.request.kept})
             if part is self.parts[-1] or sum(a.nbytes for h in held for a in h.values()) >= PIECE_BYTES:
                 joined = {n: np.concatenate([h[n] for h in held], axis=1) for n in self.request.kept}
-                yield (slice(0, count), slice(begun, part.stop)), joined
+                yield (slice(0, count), slice(begun, part.stop)), _data(trajectory_variables(joined))
                 begun, held = part.stop, []
         each = [t.shares() for t in tallies]
         shares = {name: np.array([share[name] for share in each]) for name in SHARES}
         quantiles = np.array([t.quantiles(QUANTILES) for t in tallies])
-        tally = tally_variables(shares, np.stack(errors), quantiles)
-        yield slice(0, count), {name: variable.data for name, variable in tally.items()}
+        yield slice(0, count), _data(tally_variables(shares, np.stack(errors), quantiles))
         attrs: dict[str, Any] = {
             "error_estimate": float(np.max(errors)),
             "error_estimate_median": float(np.median(errors)),
@@ -227,6 +229,10 @@ class DisturbedTiling(Tiling):
 _FIELDS = {"start": "starts", "end_equilibrium": "end_index"}
 
 
+def _data(variables: dict[str, Variable]) -> dict[str, NDArray[Any]]:
+    return {name: variable.data for name, variable in variables.items()}
+
+
 def _blocks(total: int, length: int) -> list[slice]:
     return [slice(k, min(k + length, total)) for k in range(0, total, length)]
 
@@ -239,10 +245,11 @@ def _tile_length(request: _Request, dt: float) -> int:
 
 
 def _sampled_errors(scene: Scene, e: DisturbedEnsemble, method: str) -> Floats:
-    """Differences of the first final states from those of half the step, shape (sample,)."""
+    """Largest differences of the first final angles and rates from those of half the step, (sample, 2)."""
     final, dt = e.final[:SAMPLE], e.dt[:SAMPLE]
     finer = np.empty_like(final)
     for step in np.unique(dt):
         some = np.flatnonzero(dt == step)
         finer[some] = integrate(scene, e.starts[some], e.t_end, 0.5 * float(step), method).y[-1]
-    return np.where(np.isnan(e.failed[:SAMPLE]), np.abs(finer - final).max(axis=1), np.nan)
+    difference = np.abs(finer - final).reshape(-1, 2, 2).max(axis=2)
+    return np.where(np.isnan(e.failed[:SAMPLE])[:, None], difference, np.nan)

@@ -170,7 +170,7 @@ def test_default_steps_are_the_scene_s() -> None:
     for e in found:
         run = disturb(scene, e, 128, radius=1.0, t_end=20.0)
         assert run.failures == ""
-        assert (run.dt * run.size.omega).max() < 0.5
+        assert (run.dt * run.size.omega).max() < 0.7
     lost = disturb(scene, found[-1], 128, radius=1.0, t_end=20.0, dt=0.05)
     failing = np.isin(lost.outcome, FAILURES)
     assert failing.sum() > 40
