@@ -1,13 +1,13 @@
 """Runs of one trajectory at a time whose steps end where the right-hand side's branches are passed.
 
-Between two switches a motion is smooth, and a method keeps its order there; so no step may pass a switch. Steps
-are those of Dormand and Prince with control of their error (Hairer, Norsett, Wanner, *Solving ODEs I*,
-sections II.4 and II.5). A step at whose end other decisions are taken than at its begin
-(:mod:`fastmech.ensembles.switches`) is shortened until the switch is known to rounding (section II.6). Where a
-decision may have turned over and back inside a step, because its value comes nearer to zero and goes away
-again so fast that the tangents of both ends meet beyond it, the step ends there: a branch however narrow is
-not stepped over. (A value that is far from zero and flat at both ends, and not between them, deceives the
-tangents, as a narrow pulse deceives any steps.)
+Between two switches a motion is smooth, and a method keeps its order there; so no step may pass a switch.
+Steps are those of Dormand and Prince with control of their error (Hairer, Norsett, Wanner, *Solving ODEs
+I*, sections II.4 and II.5). A step at whose end other decisions are taken than at its begin
+(:mod:`fastmech.ensembles.switches`) is shortened until the switch is known to rounding (section II.6).
+Where a decision may have turned over and back inside a step, because its value comes nearer to zero and
+goes away again so fast that the tangents of both ends meet beyond it, the step ends there: a branch however
+narrow is not stepped over. (A value that is far from zero and flat at both ends, and not between them,
+deceives the tangents, as a narrow pulse deceives any steps.)
 """
 
 from __future__ import annotations
@@ -162,8 +162,8 @@ def _switch(
 ) -> tuple[float, float]:
     """Lengths of two steps to both sides of a switch, which the second one passes.
 
-    ``seen`` are the decisions at the step's begin and at its end ``high`` after it, and memory; ``limits`` the
-    error of a step, and how near to each other both ends must be.
+    ``seen`` are the decisions at the step's begin and at its end ``high`` after it, and memory;
+    ``limits`` the error of a step, and how near to each other both ends must be.
     """
     before, after, at = seen
     local, resolution = limits
@@ -173,7 +173,7 @@ def _switch(
     first = _turned(before, after)
     below, above = before[first], after[first]
     while high - low > resolution:
-        # Where the straight line through both values is zero, and a little beyond: both ends are to come near.
+        # Where the straight line between both values is zero, and a little beyond: both ends must come near.
         share = below / (below - above) if below * above <= 0.0 and below != above else 0.5
         share = 0.5 if number % 3 == 2 else share
         middle = low + share * (high - low)

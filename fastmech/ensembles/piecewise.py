@@ -1,9 +1,10 @@
 """A tolerance for systems whose right-hand sides have branches.
 
-Every trajectory runs twice with steps that end where branches are passed (:mod:`fastmech.ensembles.located`),
-the second time with smaller errors of its steps. Where the two are apart by no more than the tolerance the
-second is kept, and their distance, which is nearly the error of the first, is taken for its error. Else a third
-is compared with the second, and so on. What is not settled so has no error that is known.
+Every trajectory runs twice with steps that end where branches are passed
+(:mod:`fastmech.ensembles.located`), the second time with smaller errors of its steps. Where the two are
+apart by no more than the tolerance the second is kept, and their distance, which is nearly the error of the
+first, is taken for its error. Else a third is compared with the second, and so on. What is not settled so
+has no error that is known.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ from fastmech.interrupts import check
 Floats = NDArray[np.float64]
 Members = NDArray[np.int64]
 
-#: Error of a step in the first run over the tolerance, how many times smaller it is in the next one, the least
-#: one, and runs at most.
+#: Error of a step in the first run over the tolerance, how many times smaller it is in the next one, the
+#: least one, and runs at most.
 FIRST, FINER, LEAST, RUNS = 0.01, 32.0, 1e-14, 5
 
 #: Steps of a run at least.

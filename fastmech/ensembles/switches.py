@@ -2,9 +2,9 @@
 
 A step that passes a branch of the right-hand side has another error than its method's order tells, and one
 that passes two has an error that no two runs tell. So the copy notes, at every comparison of values that
-depend on time or state, the difference of its two sides and its outcome; ``abs``, ``min``, ``floor`` and their
-like decide too. Equal outcomes at two points of a motion then mean that they lie on the same smooth piece, and
-the differences tell how near it was to being left.
+depend on time or state, the difference of its two sides and its outcome; ``abs``, ``min``, ``floor`` and
+their like decide too. Equal outcomes at two points of a motion then mean that they lie on the same smooth
+piece, and the differences tell how near it was to being left.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from typing import Any
 
 import numba
 import numpy as np
-from numba.core.registry import CPUDispatcher
 from numba import types as kinds
+from numba.core.registry import CPUDispatcher
 from numpy.typing import NDArray
 
 from fastmech.callee import CalleeType
