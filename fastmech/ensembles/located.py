@@ -46,7 +46,7 @@ COARSE = 0.01
 
 #: A slope is told by this part of a step; steps in which a decision may turn over and back are not refined
 #: below this part of the longest.
-SLOPE, FINEST = 1e-5, 1e-10
+SLOPE, FINEST = 1e-5, 1e-11
 
 #: Rounding of a state in its local error.
 ROUNDED = 1e-14
@@ -77,7 +77,7 @@ class Work(NamedTuple):
 
     y: Floats  #: state (dim,)
     trial: Floats  #: state after the step tried (dim,)
-    beyond: Floats  #: a state a little later (dim,)
+    near: Floats  #: the same from earlier stages; or a state a little later (dim,)
     stages: Floats  #: rates (7, dim)
     Y: Floats  #: as a block (dim, 1)
     rates: Floats  #: of the block
@@ -104,6 +104,8 @@ def _step(rhs: Any, t: float, h: float, w: Any, local: float) -> float:
             for k in range(stage):
                 total += _A[stage, k] * w.stages[k, d]
             w.trial[d] = w.y[d] + h * total
+            if stage == 5:
+                w.near[d] = w.trial[d]
         _rates(rhs, t + _C[stage] * h, w.trial, w, stage)
     worst = 0.0
     for d in range(w.y.size):
@@ -128,12 +130,23 @@ def _turned(a: Floats, b: Floats) -> int:
 
 
 @inlined
+def _left(switches: Any, t: float, w: Any, before: Floats, after: Floats) -> int:
+    """The same for the end ``t`` of a step; also where only its last stage sees other decisions."""
+    switches(t, w.near, w.own, after)
+    turned = _turned(before, after)
+    if not turned:
+        switches(t, w.trial, w.own, after)
+        turned = _turned(before, after)
+    return turned
+
+
+@inlined
 def _slopes(switches: Any, t: float, dt: float, row: int, w: Any, seen: Floats, slopes: Floats) -> None:
     """How fast the values of decisions change at ``t``, after it or else before; 0: not known."""
     for sign in (1.0, -1.0):
         for d in range(w.y.size):
-            w.beyond[d] = w.trial[d] + sign * dt * w.stages[row, d]
-        switches(t + sign * dt, w.beyond, w.own, slopes)
+            w.near[d] = w.trial[d] + sign * dt * w.stages[row, d]
+        switches(t + sign * dt, w.near, w.own, slopes)
         told = not _turned(seen, slopes)
         for k in range(min(int(seen[0]), MOST_NOTES)):
             slopes[1 + 2 * k] = (slopes[1 + 2 * k] - seen[1 + 2 * k]) / (sign * dt) if told else 0.0
@@ -152,6 +165,11 @@ def _meet(a: Floats, a_slopes: Floats, b: Floats, b_slopes: Floats, h: float) ->
             if down < 0.0 < up:
                 at = (sign * (first - last) + up * h) / (up - down)
                 if 0.0 < at < h and sign * first + down * at <= 0.0:
+                    return at
+            elif down < 0.0 and sign * (first - last) < -0.5 * h * max(down, up):
+                # Towards zero at both ends, and yet not nearer: stages have seen the other side.
+                at = -sign * first / down
+                if 0.0 < at < h:
                     return at
     return 0.0
 
@@ -180,8 +198,7 @@ def _switch(
         middle += 0.4 * resolution if share < 0.5 else -0.4 * resolution
         middle = min(max(middle, low + 0.4 * resolution), high - 0.4 * resolution)
         _step(rhs, t, middle, w, local)
-        switches(t + middle, w.trial, w.own, after)
-        turned = _turned(before, after)
+        turned = _left(switches, t + middle, w, before, after)
         if turned:
             high, first = middle, turned
             below, above = at[first], after[first]
@@ -233,8 +250,7 @@ def _follow(rhs: Any, switches: Any, observe: Any, course: Any, i: int) -> None:
         tried = cross if cross > 0.0 else (h if t + h < end else end - t)
         cross, resolution = 0.0, max(RESOLUTION * longest, 1e-15 * abs(end))
         error = _step(rhs, t, tried, w, local)
-        switches(t + tried, w.trial, w.own, after)
-        switched = error < np.inf and _turned(before, after) > 0
+        switched = error < np.inf and _left(switches, t + tried, w, before, after) > 0
         if switched and tried > resolution:
             near = resolution if error <= 1.0 else max(resolution, COARSE * tried)
             low, high = _switch(rhs, switches, t, tried, w, (before, after, at), (local, near))
@@ -256,7 +272,7 @@ def _follow(rhs: Any, switches: Any, observe: Any, course: Any, i: int) -> None:
             turn = _meet(before, slopes, after, after_slopes, tried)
             if turn > 0.0:
                 if tried < FINEST * longest:
-                    ended = GRAZES
+                    ended = SLIDES if short else GRAZES
                     break
                 h, cross = min(max(turn, 0.1 * tried), 0.9 * tried), 0.0
                 continue
@@ -270,6 +286,7 @@ def _follow(rhs: Any, switches: Any, observe: Any, course: Any, i: int) -> None:
         for k in range(1 + 2 * min(int(after[0]), MOST_NOTES)):
             before[k], slopes[k] = after[k], after_slopes[k]
         if switched:
+            switches(t, w.y, w.own, before)
             _slopes(switches, t, SLOPE * h, 0, w, before, slopes)
             short = short + 1 if t < last + SHORT * longest else 0
             last = t

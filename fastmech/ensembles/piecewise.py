@@ -43,7 +43,7 @@ FEW = 64.0
 METHOD = "dopri5"
 
 #: Steps that a trajectory may take, and those of all of them.
-MOST, MOST_TOGETHER = 2**17, 2**23
+MOST, MOST_TOGETHER = 2**17, 2**22
 
 #: Trajectories that a thread follows at a time.
 TOGETHER = 8
