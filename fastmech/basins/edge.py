@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastmech.basins.copies import copy_labels
+from fastmech.basins.copies import copy_labels, label_name
 from fastmech.basins.measures.labels import Floats, LabelOf, ask, check_point
 from fastmech.basins.measures.norm import kinetic_norm, norm_on
 from fastmech.basins.steps import coarse_steps
-from fastmech.disturbance.ensemble import require_constant_force
+from fastmech.disturbance.motion import require_constant_force
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.system import System
@@ -111,7 +111,8 @@ def track_edge(
     interval = checks.number("interval", interval, "s", above=0.0)
     first, second = (int(label) for label in ask(label_of, np.stack([a, b])))
     if first < 0 or second < 0 or first == second:
-        raise InputError(f"inside, outside: have the labels {first} and {second}, must have two known ones")
+        names = " and ".join(label_name(label_of, label) for label in (first, second))
+        raise InputError(f"inside, outside: lead to {names}, must lead to two different known ends")
     labels = first, second
 
     def distance(x: Floats, y: Floats) -> Floats:

@@ -12,6 +12,7 @@ moved, steps follow its decay; once its work is less than rounding, the motion g
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +25,7 @@ from fastmech.basins.status import BasinStatus, counts
 from fastmech.basins.steps import coarse_steps, gone_at_once, step_of_fading
 from fastmech.capture.barriers import BarrierTree
 from fastmech.capture.certificate import Certificate, certificate_of
-from fastmech.disturbance.outcome import confining_energy
+from fastmech.disturbance.size import confining_energy
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.plausible import breaks_energy_bounds
@@ -119,9 +120,7 @@ def labels_of(
     found = Paths.empty(len(begin))
     status = np.where(finite, BasinStatus.UNDECIDED, BasinStatus.START_NOT_FINITE).astype(np.int8)
     settle = None if settle_radius is None else np.full(len(begin), np.nan)
-    pieces = max(-(-len(begin) // BATCH), min(PIECES, len(begin) // LEAST), 1)
-    for piece in range(pieces):
-        some = np.arange(piece, len(begin), pieces)
+    for some in pieces_of(len(begin)):
         for step in np.unique(coarse[some[finite[some]]]):
             members = some[finite[some] & (coarse[some] == step)]
             ladder = Ladder(certificate, t_end, float(step), formula, threads, fading)
@@ -187,6 +186,13 @@ class Fading:
             warnings.simplefilter("ignore", StepWarning)
             run = integrate(self.scene, starts, self.span, step, self.method.name, threads=self.threads)
         return run.y[-1], run.status
+
+
+def pieces_of(n: int) -> Iterator[NDArray[np.intp]]:
+    """Indices of n starts, piece by piece."""
+    pieces = max(-(-n // BATCH), min(PIECES, n // LEAST), 1)
+    for piece in range(pieces):
+        yield np.arange(piece, n, pieces)
 
 
 def require_damper(scene: Scene) -> None:

@@ -100,7 +100,7 @@ def _mark_unsettled(axes: Axes, view: View) -> list[Artist]:
     x, y = np.meshgrid(*map(view.axis, view.axes), indexing="ij")
     codes = flag_codes(view.dataset["outcome"])
     handles: list[Artist] = []
-    for name, marker in UNSETTLED.items():
+    for name, marker in {**dict.fromkeys(codes.others({"complete"}), "P"), **UNSETTLED}.items():
         where = view.data("outcome") == codes[name]
         if where.any():
             label = f"{name.replace('_', ' ')} ({np.count_nonzero(where)})"

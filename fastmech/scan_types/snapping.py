@@ -18,7 +18,7 @@ from fastmech.basins.shock_limit import shock_limit
 from fastmech.basins.snapping import SnappingMap, critical_forces, force_free, map_snapping
 from fastmech.basins.status import FAILURES, BasinStatus
 from fastmech.errors import InputError
-from fastmech.results import Dataset, Variable, flags
+from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers
 from fastmech.scan_types.equilibrium_map import Axis
 from fastmech.scan_types.request import MethodName, TiledScan, failures
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
@@ -185,7 +185,7 @@ def _ends(found: SnappingMap) -> dict[str, Variable]:
         "F0": Variable(("F0",), found.F0, "N", "force on M2 along +x when it is switched on"),
         "alpha": Variable(("alpha",), found.alpha, "1/s", "rate at which the force decays"),
         "well": Variable(
-            grid, found.label.astype(np.int8), "1", "equilibrium that captures the motion, -1: none"
+            grid, found.label.astype(np.int8), "1", "equilibrium that captures the motion", NO_CODE
         ),
         "turns_phi": Variable(grid, found.turns[..., 0].astype(np.int32), "1", "full turns of phi"),
         "turns_theta": Variable(grid, found.turns[..., 1].astype(np.int32), "1", "full turns of theta"),
@@ -201,14 +201,14 @@ def _windows(found: SnappingMap) -> dict[str, Variable]:
     rows = [(k, window) for k in range(found.alpha.size) for window in found.windows(k)]
     each = ("window",)
 
-    def column(values: list[Any], kind: type, unit: str, about: str) -> Variable:
-        return Variable(each, np.array(values, dtype=kind), unit, about)
+    def column(values: list[Any], kind: type, unit: str, *about: Any) -> Variable:
+        return Variable(each, np.array(values, dtype=kind), unit, *about)
 
     return {
         "window_alpha": column([found.alpha[k] for k, _ in rows], np.float64, "1/s", "alpha of the window"),
         "window_first": column([w.first for _, w in rows], np.float64, "N", "least F0 of the window"),
         "window_last": column([w.last for _, w in rows], np.float64, "N", "largest F0 of the window"),
-        "window_well": column([w.label for _, w in rows], np.int8, "1", "where the window's motions end"),
+        "window_well": column([w.label for _, w in rows], np.int8, "1", "where its motions end", NO_CODE),
         "window_turns_phi": column([w.turns[0] for _, w in rows], np.int32, "1", "turns of phi they make"),
         "window_turns_theta": column(
             [w.turns[1] for _, w in rows], np.int32, "1", "turns of theta they make"
@@ -220,6 +220,7 @@ def _windows(found: SnappingMap) -> dict[str, Variable]:
 def _equilibria(found: SnappingMap) -> dict[str, Variable]:
     each, equilibria = ("equilibrium",), found.equilibria
     return {
+        **numbers("equilibrium", len(equilibria), "number of the force-free equilibrium"),
         "equilibrium_phi": Variable(each, equilibria.phi, "rad", "angle phi of the force-free equilibrium"),
         "equilibrium_theta": Variable(
             each, equilibria.theta, "rad", "angle theta of the force-free equilibrium"

@@ -80,6 +80,10 @@ def test_the_default_labels_and_norm_lead_to_the_same_saddle() -> None:
     saddle, away = saddle_at(scene, track.state)
     assert away < 1e-3
     assert saddle.energy == pytest.approx(tree.barrier[0], abs=1e-9)
+    turned = rest + np.array([0.0, 2.0 * np.pi, 0.0, 0.0])
+    told = r"lead to well 0, \+1 turn of theta and well 0, \+1 turn of theta, must lead to two different"
+    with pytest.raises(fm.InputError, match=told):
+        track_edge(scene, turned, turned + 0.01, t_end=1.0)
     with pytest.raises(fm.InputError, match=r"^label_of, norm: missing; only a scene has them"):
         track_edge(fm.System(two_wells, ["x", "y"], {}), [-1.0, 0.0], [1.0, 0.0], t_end=1.0)
 
@@ -87,7 +91,10 @@ def test_the_default_labels_and_norm_lead_to_the_same_saddle() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"label_of": lambda y: np.zeros(len(y), dtype=int)}, "inside, outside: have the labels 0 and 0"),
+        (
+            {"label_of": lambda y: np.zeros(len(y), dtype=int)},
+            "inside, outside: lead to the label 0 and the label 0, must",
+        ),
         ({"scene": fm.Scene()}, "scene.alpha = 0.7: must be 0"),
         ({"tolerance": 1e-6}, "tolerance = 1e-06: must be a finite number not less than 1e-05"),
         (
