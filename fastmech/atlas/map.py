@@ -207,7 +207,7 @@ def solve_block(
     )  # fmt: skip
     out.count_stable[:] = np.count_nonzero(out.morse_index == 0, axis=1)
     assess(
-        *places, out.radius, out.count,
+        *places, out.radius, out.morse_index, out.count,
         out.hessian, out.eigenvalues, out.frequency, out.decay_time, out.verdict,
     )  # fmt: skip
     coincidences(*places, out.radius, out.morse_index, out.count, out.outcome, out.coincidence)

@@ -15,6 +15,7 @@ from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError
 from fastmech.mechanism.lagrange import metric
 from fastmech.scene import Scene
+from fastmech.stability.arguments import require_rest
 
 #: Forces, or impulses, between two known ones that are tried at once.
 BETWEEN = 32
@@ -123,8 +124,9 @@ def impulse_start(scene: Scene, rest: Equilibrium, impulse: float) -> Floats:
         impulse: N s.
 
     Raises:
-        InputError: the impulse is no finite number.
+        InputError: the impulse is no finite number, or the scene does not rest there.
     """
+    require_rest(scene, rest)
     impulse = checks.number("impulse", impulse, "N s")
     lever = scene.l * np.array([-np.sin(rest.phi), -np.cos(rest.theta)])
     rates = np.linalg.solve(metric(scene, (rest.phi, rest.theta)), impulse * lever)

@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from fastmech.atlas.coincidence import Coincidence
 from fastmech.atlas.map import Slab
-from fastmech.atlas.verdicts import Verdict
 from fastmech.equilibria.outcome import Outcome
 from fastmech.equilibria.search import MOST
 from fastmech.results import Variable, flags
+from fastmech.stability.criteria import Verdict
 
 CRITERIA = {
     "verdict_sylvester": "verdict: Lagrange-Dirichlet",

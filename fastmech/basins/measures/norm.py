@@ -18,6 +18,7 @@ from fastmech.ensembles import checks
 from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError
 from fastmech.scene import Scene, nearest
+from fastmech.stability.arguments import require_rest
 
 #: States of the mechanism by the names of a map's axes.
 STATE = ("phi", "theta", "phi_dot", "theta_dot")
@@ -40,7 +41,11 @@ def kinetic_norm(scene: Scene, equilibrium: Equilibrium) -> Floats:
     ``size^2 = (xi' a xi + eta' a eta / omega^2) / (m2 l^2)`` for departures xi [rad] and eta [rad/s], with
     the metric ``a`` at the equilibrium, paper (11), and the highest natural frequency omega [rad/s]. The
     kinetic energy of a kick is ``size^2 omega^2 m2 l^2 / 2``. The force is the equilibrium's frozen one.
+
+    Raises:
+        InputError: an argument is wrong, or the scene does not rest there.
     """
+    require_rest(scene, equilibrium)
     frozen = scene.replace(F0=equilibrium.force, alpha=0.0)
     return size_at(frozen, equilibrium.phi, equilibrium.theta).to_ball
 
