@@ -6,7 +6,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -16,6 +15,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 
 from fastmech.ensembles.status import failure_counts, failure_line
 from fastmech.errors import InputError
+from fastmech.integrators.methods import find_method
 from fastmech.results import Dataset, Variable, check_name
 from fastmech.scan_types.tiling import RunContext as RunContext
 from fastmech.scan_types.tiling import Tiles, Tiling
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def _known_method(name: str) -> str:
-    import_module("fastmech.integrators.methods").find_method(name)  # with kernels, so only where it is asked
+    find_method(name)
     return name
 
 
