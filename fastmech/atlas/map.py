@@ -27,6 +27,9 @@ BLOCK = 4096
 #: Points that are labelled at a time while the next ones are solved.
 SLAB = 65536
 
+#: Numbers of 8 bytes that a map holds of every point, its sheets joined.
+POINT_NUMBERS = 132
+
 Codes = NDArray[np.int8]
 
 
@@ -112,11 +115,18 @@ def map_equilibria(
         progress: called in the calling thread with the number of points finished since its last call.
 
     Raises:
-        InputError: wrong number of axes, an unknown name, or a value that the scene refuses.
+        InputError: wrong number of axes, an unknown name, values that neither rise nor fall throughout or
+            that the scene refuses, or more points than memory holds.
     """
     checks.progress_function(progress, "points")
     checked = check_axes(scene, axes)
     grid = tuple(len(values) for values in checked.values())
+    checks.memory(
+        math.prod(grid) * POINT_NUMBERS,
+        1,
+        f"axes: {math.prod(grid):.3g} points",
+        'fewer, or in parts for files: fastmech run, kind = "equilibrium_map"',
+    )
     builder = SheetBuilder(scene, checked)
     whole = Slab.empty(math.prod(grid))
     for _ in solve_in_slabs(scene, checked, builder, whole.rows, wells, threads, progress):

@@ -40,6 +40,9 @@ Floats = NDArray[np.float64]
 #: Every piece takes something of everywhere, so that all take about as long and progress tells the time left.
 BATCH, PIECES, LEAST = 1 << 16, 16, 1 << 11
 
+#: Numbers of 8 bytes that memory holds of every start on the way.
+START_NUMBERS = 20
+
 
 @dataclass(frozen=True)
 class Labels:
@@ -90,6 +93,7 @@ def labels_of(
     require_damper(scene)
     checks.progress_function(progress, "starts")
     begin = checks.states("starts", starts, 4)
+    checks.memory(len(begin), START_NUMBERS, f"starts: labels of {len(begin):.3g}", "fewer")
     thread_count(threads)
     t_end = checks.number("t_end", t_end, "s", above=0.0)
     formula, certificate = find_method(method), certificate_of(scene)

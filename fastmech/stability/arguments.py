@@ -35,7 +35,8 @@ def require_rest(scene: Any, equilibrium: Any) -> None:
     alpha = 0, else one between F0 and none.
 
     Raises:
-        InputError: one of them is something else, a coordinate is not finite, or the scene does not rest there.
+        InputError: one of them is something else, a coordinate is not finite, or the scene does not rest
+            there.
     """
     require_scene(scene)
     for name in ENTRIES:

@@ -87,7 +87,11 @@ def classify(scene: Scene, equilibrium: Rest) -> Classification:
         a = assess_one(np.array(c), (equilibrium.phi, equilibrium.theta, radius, index), roots)
         errors = np.array([root_errors(root, a.p, a.roots_error) for root in roots])
         frequencies = np.sqrt(np.array(a.squares))
-    by_minors, by_hurwitz, by_spectrum = _by_minors(a, index), _by_hurwitz(a), _by_spectrum(a, roots, errors[:, 1])
+    by_minors, by_hurwitz, by_spectrum = (
+        _by_minors(a, index),
+        _by_hurwitz(a),
+        _by_spectrum(a, roots, errors[:, 1]),
+    )
 
     measures, unreached = reach(a.s, c.spring), None
     if a.sylvester == STABLE and a.hurwitz == CRITICAL and a.spectrum != ASYMPTOTIC and c.damping > 0.0:
@@ -128,7 +132,9 @@ def _by_minors(a: Assessment, index: int) -> Finding:
     elif second > error and first < 0.0:
         reason = "the Hessian is negative definite: U has a maximum"
     else:
-        reason = f"U has a {_EXTREME[index]}: its minors are near zero, their signs proved with the equilibrium"
+        reason = (
+            f"U has a {_EXTREME[index]}: its minors are near zero, their signs proved with the equilibrium"
+        )
     return Finding(_word(a.sylvester), reason)
 
 
@@ -181,9 +187,7 @@ def _explanation(
         )
     settled = f"U has a minimum and the damper reaches both modes; the slower one decays at {a.decay:.3g} 1/s"
     silent = [
-        name
-        for name, code in (("Hurwitz", a.hurwitz), ("the eigenvalues", a.spectrum))
-        if code == CRITICAL
+        name for name, code in (("Hurwitz", a.hurwitz), ("the eigenvalues", a.spectrum)) if code == CRITICAL
     ]
     if silent:
         settled += f"; that is below the rounding of {silent[0]}"

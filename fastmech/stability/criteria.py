@@ -1,4 +1,4 @@
-"""Three criteria of stability as codes, each with its own rounding bound: one source for maps and single calls.
+"""Three criteria of stability as codes with their rounding bounds: one source for maps and single calls.
 
 Lagrange-Dirichlet with Sylvester's minors looks at U alone, Hurwitz at the characteristic polynomial, and the
 eigenvalues at its roots. Each says ``CRITICAL`` where rounding hides the sign that it needs. Kernels compile
@@ -135,8 +135,8 @@ def root_errors(root: complex, p: Quadruple, e: Quadruple) -> tuple[float, float
     """How far a true eigenvalue may be from a computed one, and how far its real part may be [1/s].
 
     ``e`` bounds how far the coefficients are from those of the polynomial that has the computed roots. One at
-    which the polynomial may be off by h is within 4 h/|P'| and within h^(1/4) of a true one. To first order it
-    moves by -(sum of the coefficients' errors times root^k)/P'; only the real part of that moves its real
+    which the polynomial may be off by h is within 4 h/|P'| and within h^(1/4) of a true one. To first order
+    it moves by -(sum of the coefficients' errors times root^k)/P'; only the real part of that moves its real
     part. So errors of the stiffnesses do not hide weak damping, nor errors of strong damping what is left.
     """
     r = np.sqrt(root.real * root.real + root.imag * root.imag)

@@ -1,4 +1,4 @@
-"""Eigenvalues of small motion from its characteristic polynomial: two real quadratic factors by Newton's method.
+"""Eigenvalues of small motion: two real quadratic factors of its polynomial by Newton's method.
 
 The polynomial knows more than a state matrix in doubles: strong damping puts rates of 1e12 and 1e-12 1/s
 beside one another, and its coefficients hold both to rounding where the matrix loses the slow ones.
@@ -79,7 +79,7 @@ def sum_size(a: float, b: float) -> float:
 
 @inlined
 def factor_errors(p: Quadruple, f: Quadruple) -> Quadruple:
-    """By how much (p3, p2, p1, p0) differ at most from the polynomial whose roots those of the factors are."""
+    """By how much (p3, p2, p1, p0) differ at most from the polynomial of the factors' computed roots."""
     a, b, c, d = f
     one, two = sum_size(a, b), sum_size(c, d)
     return (

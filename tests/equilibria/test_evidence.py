@@ -47,17 +47,19 @@ def test_an_invented_equilibrium_matches_no_root() -> None:
     assert evidence.reached == 4
 
 
-#: Beside c1 = 0, F = 0, c2 = (m1 + m2) g/l, where equilibria are not isolated: U is flat to 1e-12 of the loads.
+#: Beside c1 = 0, F = 0, c2 = (m1 + m2) g/l, where equilibria are not isolated: U is nearly flat.
 BESIDE = [(2e-10, 0.0, 1e-12), (2e-10, 0.0, -1e-12), (2e-10, 0.0, 2e-12), (2e-10, 1e-12, 1e-12)]
 
 
 @pytest.mark.parametrize(("c1", "F0", "away"), BESIDE)
 def test_beside_the_degenerate_set_the_list_is_proved(c1: float, F0: float, away: float) -> None:
-    """Forty digits count four equilibria there, each in its ball; Newton's method stops all along the valley."""
+    """Forty digits count four equilibria there, each in its ball; Newton's method stops along the valley."""
     scene = Scene(c1=c1, F0=F0, c2=22 * 9.80665 / 1.25 * (1 + away), alpha=0.0)
     found = find_equilibria(scene)
     with mpmath.workdps(40):
-        m1, m2, l, g, c2, f = (mpmath.mpf(getattr(scene, name)) for name in ("m1", "m2", "l", "g", "c2", "F0"))
+        m1, m2, l, g, c2, f = (
+            mpmath.mpf(getattr(scene, name)) for name in ("m1", "m2", "l", "g", "c2", "F0")
+        )
         a, b, C = (m1 + m2) * g - c2 * l, m2 * g, mpmath.mpf(scene.c1) * l
 
         def theta(phi: Any, side: int) -> Any:
@@ -79,7 +81,10 @@ def test_beside_the_degenerate_set_the_list_is_proved(c1: float, F0: float, away
     assert (len(roots), len(found), found.certificate.outcome) == (4, 4, Outcome.COMPLETE)
     assert found.certificate.evidence.unlisted == 0
     for e in found:
-        apart = [abs(np.exp(1j * e.phi) - np.exp(1j * x)) + abs(np.exp(1j * e.theta) - np.exp(1j * y)) for x, y in roots]
+        apart = [
+            abs(np.exp(1j * e.phi) - np.exp(1j * x)) + abs(np.exp(1j * e.theta) - np.exp(1j * y))
+            for x, y in roots
+        ]
         assert min(apart) <= e.radius
 
 

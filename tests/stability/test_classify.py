@@ -175,12 +175,14 @@ def test_eigenvalues_and_their_verdict_against_fifty_digits(name: str, beta: flo
     for e in find_equilibria(scene):
         c = classify(scene, e)
         with mpmath.workdps(50):
-            root = mpmath.findroot(lambda x, y: oracle().gradient(params, (x, y), F=scene.F0), (e.phi, e.theta))
+            root = mpmath.findroot(
+                lambda x, y: oracle().gradient(params, (x, y), F=scene.F0), (e.phi, e.theta)
+            )
             polynomial = oracle().characteristic_polynomial(params, tuple(root), F=scene.F0)
             roots = mpmath.polyroots(polynomial, maxsteps=2000, extraprec=600)
             for value, error in zip(c.eigenvalues, c.eigenvalue_errors, strict=True):
                 assert min(float(abs(mpmath.mpc(value) - z)) for z in roots) <= error
-            # At the minima of the second scene damping misses a mode exactly: only rounding is left of the sign.
+            # At the minima of the second scene damping misses a mode: rounding is left of the sign.
             noise = mpmath.mpf(10) ** -30
             growing = sum(mpmath.re(z) > noise for z in roots)
             silent = sum(abs(mpmath.re(z)) <= noise for z in roots)
@@ -262,12 +264,14 @@ def test_an_equilibrium_of_another_scene_is_refused(name: str, change: dict[str,
 
 
 def test_only_the_force_of_a_weightless_scene_differs() -> None:
-    """With phi = 0, theta = pi/2 and no weights the force pulls along both rods: every force has rest there."""
+    """With phi = 0, theta = pi/2 and no weights the force pulls along both rods: any force has rest there."""
     scene = Scene(g=0.0, c1=100.0, c2=0.0, F0=50.0, alpha=0.0)
     there = next(e for e in find_equilibria(scene) if abs(e.phi) + abs(e.theta - np.pi / 2) < 1e-9)
     assert classify(scene, there).verdict != "critical"
     for other in (scene.replace(F0=-50.0), scene.replace(F0=0.0)):
-        with pytest.raises(InputError, match=r"F = 50 N: this scene \(F0 = -?\d+ N, alpha = 0 1/s\) does not"):
+        with pytest.raises(
+            InputError, match=r"F = 50 N: this scene \(F0 = -?\d+ N, alpha = 0 1/s\) does not"
+        ):
             classify(other, there)
 
 

@@ -24,6 +24,23 @@ from fastmech.stability.arguments import require_rest
 STATE = ("phi", "theta", "phi_dot", "theta_dot")
 
 
+#: Angles lie within so many turns of zero: what is beyond was meant in degrees.
+MOST_TURNS = 4
+
+
+def check_angles(field: str, name: str, values: ArrayLike) -> None:
+    """Refuse angles that must be degrees; ``name`` is that of a state, of which rates are no angles.
+
+    Raises:
+        InputError: one is beyond ``MOST_TURNS`` turns.
+    """
+    largest = float(np.abs(values).max())
+    if name in STATE[:2] and largest > 2.0 * np.pi * MOST_TURNS:
+        raise InputError(
+            f"{field}: reaches {largest:g}, beyond {MOST_TURNS} turns; angles are in radians (numpy.deg2rad)"
+        )
+
+
 def state_index(name: str) -> int:
     """Which state of the mechanism an axis of this name is.
 
