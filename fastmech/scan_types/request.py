@@ -174,22 +174,22 @@ class Outline:
     scans: Mapping[str, Any]
 
 
-def check_outline(path: str | Path) -> None:
+def check_outline(path: str | Path, text: str | None = None) -> None:
     """Refuse what is wrong with a request file however its scans are read: that loads or compiles kernels.
 
     Raises:
         InputError: the file cannot be read, or its title, its scene or a scan's name is wrong.
     """
-    _outline(read_text(path), path)
+    _outline(read_text(path) if text is None else text, path)
 
 
-def read_request(path: str | Path, kinds: Mapping[str, type[Scan]]) -> Request:
-    """Read and validate a request file.
+def read_request(path: str | Path, kinds: Mapping[str, type[Scan]], text: str | None = None) -> Request:
+    """Read and validate a request file, or the text that is given as its own.
 
     Raises:
         InputError: the file cannot be read, or anything in it is unknown, of a wrong type or out of range.
     """
-    return request_of_text(read_text(path), path, kinds)
+    return request_of_text(read_text(path) if text is None else text, path, kinds)
 
 
 def request_of_text(text: str, path: str | Path, kinds: Mapping[str, type[Scan]]) -> Request:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from pydantic import Field
 
-from fastmech.atlas.snap import MOVING, find_snap
+from fastmech.atlas.snap import MOVING, find_snap, stable_at
 from fastmech.equilibria.find import Equilibrium, find_equilibria
 from fastmech.results import Dataset, Variable
 from fastmech.scan_types.each import Each
@@ -38,12 +38,19 @@ class SnapScan(TiledScan):
 
     def tiling(self, scene: Scene) -> Tiling:
         """The stable positions one by one."""
-        stable: list[Any] = [e for e in find_equilibria(scene) if e.morse_index == 0]
+        found = find_equilibria(scene)
+        stable = [e for e in found if e.morse_index == 0]
         if self.position is not None:
-            stable = [self.position]
-        return Each("stable positions", len(stable), lambda k: self._one(scene, stable[k]), self._joined)
+            stable = [stable_at(found, self.position)]
+        which = [found.index_of(e) for e in stable]
+        return Each(
+            "stable positions",
+            len(stable),
+            lambda k: self._one(scene, stable[k]),
+            lambda tiles: self._joined(which, tiles),
+        )
 
-    def _one(self, scene: Scene, position: Equilibrium | list[float]) -> Dataset:
+    def _one(self, scene: Scene, position: Equilibrium) -> Dataset:
         """Follow one stable position as the parameter changes; NaN stands for no value."""
         limits = (self.searched[0], self.searched[1]) if self.searched is not None else None
         found = find_snap(scene, position, limits, parameter=self.parameter)
@@ -54,7 +61,7 @@ class SnapScan(TiledScan):
             {"sentence": found.sentence, "unit": found.unit},
         )
 
-    def _joined(self, tiles: list[Dataset]) -> Dataset:
+    def _joined(self, which: list[int], tiles: list[Dataset]) -> Dataset:
         rows = np.array([tile["row"].data for tile in tiles]).reshape(-1, 6)
         unstable = np.array([tile["unstable"].data for tile in tiles], dtype=np.bool_).reshape(-1, 2)
         each = ("equilibrium",)
@@ -64,6 +71,8 @@ class SnapScan(TiledScan):
         gone = f"it ends when {name} {{}} to; NaN: at no value searched"
         return Dataset(
             {
+                "equilibrium": Variable(each, np.array(which, np.int32), "1", "number of the equilibrium"),
+                "end": Variable(("end",), np.array(["lowest", "highest"], object), "1", "end of the search"),
                 "phi": Variable(each, rows[:, 0], "rad", "angle phi"),
                 "theta": Variable(each, rows[:, 1], "rad", "angle theta"),
                 "snap_below": Variable(each, rows[:, 2], unit, gone.format("falls")),
