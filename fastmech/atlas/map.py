@@ -28,6 +28,9 @@ BLOCK = 4096
 #: Points that are labelled at a time while the next ones are solved.
 SLAB = 65536
 
+#: Numbers of 8 bytes that a map holds of every point, its sheets joined.
+POINT_NUMBERS = 132
+
 Codes = NDArray[np.int8]
 
 
@@ -117,11 +120,18 @@ def map_equilibria(
         progress: called in the calling thread with the number of points finished since its last call.
 
     Raises:
-        InputError: wrong number of axes, an unknown name, or a value that the scene refuses.
+        InputError: wrong number of axes, an unknown name, values that neither rise nor fall throughout or
+            that the scene refuses, or more points than memory holds.
     """
     checks.progress_function(progress, "points")
     checked = check_axes(scene, axes)
     grid = tuple(len(values) for values in checked.values())
+    checks.memory(
+        math.prod(grid) * POINT_NUMBERS,
+        1,
+        f"axes: {math.prod(grid):.3g} points",
+        'fewer, or in parts for files: fastmech run, kind = "equilibrium_map"',
+    )
     builder = SheetBuilder(scene, checked)
     whole = Slab.empty(math.prod(grid))
     for _ in solve_in_slabs(scene, checked, builder, whole.rows, wells, threads, progress):
@@ -212,7 +222,7 @@ def solve_block(
     )  # fmt: skip
     out.count_stable[:] = np.count_nonzero(out.morse_index == 0, axis=1)
     assess(
-        *places, out.radius, out.count,
+        *places, out.radius, out.morse_index, out.count,
         out.hessian, out.eigenvalues, out.frequency, out.decay_time, out.verdict,
     )  # fmt: skip
     coincidences(*places, out.radius, out.morse_index, out.count, out.outcome, out.coincidence)

@@ -183,6 +183,16 @@ def test_snap_scan() -> None:
         SnapScan(searched=[0.0, 1.0]).run(SCENE, RunContext())
 
 
+def test_snap_scan_of_a_spring_and_a_place() -> None:
+    scene = Scene(F0=0.0, c1=20.0, c2=92.85, alpha=0.0)
+    dataset = SnapScan(parameter="c1", position=[-1.57, 0.0]).run(scene, RunContext())
+    assert (dataset.sizes["equilibrium"], dataset["snap_above"].units) == (1, "N/m")
+    assert dataset["snap_above"].data == pytest.approx(43.17473449, abs=1e-7)
+    assert dataset["turns_unstable"].data.tolist() == [[False, True]]
+    with pytest.raises(InputError, match="moves equilibria"):
+        SnapScan(parameter="beta").run(scene, RunContext())
+
+
 def test_a_map_too_large_for_any_machine_is_refused_at_once() -> None:
     axis = {"start": 0.0, "stop": 1.0, "num": 100_000}
     scan = EquilibriumMap(axes={"F0": axis, "c1": axis})
