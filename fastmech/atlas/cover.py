@@ -20,11 +20,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from fastmech.atlas.continuation import Curve
-from fastmech.atlas.enclosure import System
+from fastmech.atlas.enclosure import ROUNDING, System
+from fastmech.jit import CUBE, MATRIX, inlined, kernel
 
 Floats = NDArray[np.float64]
 
@@ -38,16 +40,13 @@ MOST_BOXES, SMALLEST = 400_000, 1e-8
 CONTRACTION, RIPE = 0.75, 0.5
 
 #: Neighbourhoods: longest and shortest half length tried [rad and parts], their ratios; width over length.
-WIDEST, NARROWEST, SHORTER, THIN = 0.15, 1e-5, 0.6, 0.03
+WIDEST, NARROWEST, SHORTER, THIN = 0.05, 1e-5, 0.5, 0.1
 
 #: Largest distance of a curve's points over the reach of their neighbourhoods, and halvings to get there.
-SPACING, MOST_HALVINGS = 0.7, 12
+SPACING, MOST_HALVINGS = 1.0, 12
 
 #: Periods of the unknowns, 0: none.
 TURNS = np.array([2.0 * np.pi, 2.0 * np.pi, 0.0, 0.0])
-
-#: Allowance for rounding of equations of order one.
-ROUNDING = 1e-14
 
 
 def apart(a: Floats, b: Floats) -> Floats:
@@ -57,20 +56,51 @@ def apart(a: Floats, b: Floats) -> Floats:
     return gap
 
 
-def inverses(slope: Floats) -> tuple[Floats, Floats]:
-    """M (boxes, n, n) and t (boxes, n) of Jacobians (boxes, 3, n); NaN where they are singular."""
-    boxes, m, n = slope.shape
-    t = np.zeros((boxes, n))
-    square = slope
-    if n > m:
+@inlined
+def minor(A: Floats, i: int, k: int) -> float:
+    """The cofactor of an entry of a matrix (4, 4)."""
+    r, q, s = (i + 1) % 4, (i + 2) % 4, (i + 3) % 4
+    x, y, z = (k + 1) % 4, (k + 2) % 4, (k + 3) % 4
+    size = (
+        A[r, x] * (A[q, y] * A[s, z] - A[q, z] * A[s, y])
+        - A[r, y] * (A[q, x] * A[s, z] - A[q, z] * A[s, x])
+        + A[r, z] * (A[q, x] * A[s, y] - A[q, y] * A[s, x])
+    )
+    return size if (i + k) % 2 == 0 else -size
+
+
+@kernel(types.void(CUBE, CUBE, MATRIX))
+def invert(slope: Floats, inverse: Floats, tangent: Floats) -> None:
+    """Write M (boxes, n, 3) and t (boxes, n) of Jacobians (boxes, 3, n); NaN where they are singular."""
+    n = slope.shape[2]
+    A = np.zeros((4, 4))
+    A[3, 3] = 1.0
+    for p in range(slope.shape[0]):
+        for i in range(3):
+            for k in range(n):
+                A[i, k] = slope[p, i, k]
+        if n == 4:
+            for k in range(4):
+                tangent[p, k] = minor(A, 3, k)
+            size = np.sqrt(tangent[p, 0] ** 2 + tangent[p, 1] ** 2 + tangent[p, 2] ** 2 + tangent[p, 3] ** 2)
+            for k in range(4):
+                tangent[p, k] /= size
+                A[3, k] = tangent[p, k]
+        determinant = 0.0
+        for k in range(4):
+            determinant += A[3, k] * minor(A, 3, k)
         for k in range(n):
-            t[:, k] = (-1.0) ** k * np.linalg.det(np.delete(slope, k, axis=2))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            t /= np.linalg.norm(t, axis=1)[:, None]
-        square = np.concatenate([slope, t[:, None]], axis=1)
-    lost = ~(np.abs(np.linalg.det(square)) > 1e-200)
-    inverse = np.linalg.inv(np.where(lost[:, None, None], np.eye(n), square))
-    inverse[lost] = np.nan
+            for i in range(3):
+                inverse[p, k, i] = minor(A, i, k) / determinant
+
+
+def inverses(slope: Floats) -> tuple[Floats, Floats]:
+    """M (boxes, n, 3) and t (boxes, n), zero for points, of Jacobians (boxes, 3, n)."""
+    boxes, _, n = slope.shape
+    inverse, t = np.empty((boxes, n, 3)), np.zeros((boxes, n))
+    invert(slope, inverse, t)
+    lost = ~np.isfinite(inverse).all(axis=(1, 2))
+    inverse[lost], t[lost] = np.nan, 0.0
     return inverse, t
 
 
@@ -105,8 +135,8 @@ class Neighbourhoods:
     def _at(self, points: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """Points, tangents, radius and reach."""
         inverse, t = inverses(self.system.over(points, np.zeros_like(points)).slope)
-        size = np.abs(inverse[:, :, : self.system.left])
-        shape = np.abs(t) + (THIN if points.shape[1] > self.system.left else 1.0)
+        size = np.abs(inverse)
+        shape = np.abs(t) + (THIN if t.any() else 1.0)
         radius, change = np.zeros_like(shape), np.ones((len(points), 1))
         long, todo = WIDEST, np.arange(len(points))
         while todo.size and long > NARROWEST:
@@ -130,14 +160,16 @@ class Neighbourhoods:
     def hold(self, centre: Floats, half: Floats) -> NDArray[np.bool_]:
         """Whether boxes (boxes, n) lie within one neighbourhood."""
         held = np.zeros(len(centre), dtype=bool)
-        if not len(centre):
+        small = np.flatnonzero((half <= self.radius.max(axis=0)).all(axis=1))
+        if not small.size:
             return held
+        centre, half = centre[small], half[small]
         nearest = self._tree.query(wrapped(centre), k=min(2, len(self.points)))[1]
-        for near in nearest.reshape(len(centre), -1).T:
+        for near in nearest.reshape(small.size, -1).T:
             gap, t = apart(centre, self.points[near]), self.tangents[near]
             within = (np.abs(gap) + half <= self.radius[near]).all(axis=1)
             along = np.abs((gap * t).sum(axis=1)) + (np.abs(t) * half).sum(axis=1)
-            held |= within & (along <= self.reach[near])
+            held[small] |= within & (along <= self.reach[near])
         return held
 
 
@@ -145,7 +177,7 @@ def polished(system: System, points: Floats) -> Floats:
     """Solutions near points (points, n) by Newton's method, the nearest ones of curves."""
     for _ in range(4):
         found = system.over(points, np.zeros_like(points))
-        inverse = inverses(found.slope)[0][:, :, : system.left]
+        inverse = inverses(found.slope)[0]
         points = points - np.nan_to_num(inverse @ found.value[:, :, None])[:, :, 0]
     return points
 
@@ -220,11 +252,10 @@ def start(n: int) -> tuple[Floats, Floats]:
 def pruned(system: System, centre: Floats, half: Floats) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
     """What is left of boxes: centres, halves, slopes, and whether at most one arc can pass through."""
     value, slope, bend = system.over(centre, half)
+    kept = ~np.isnan(value[:, 0])
+    centre, half, value, slope, bend = (x[kept] for x in (centre, half, value, slope, bend))
     rest = 0.5 * (bend @ half[:, :, None])[:, :, 0] + ROUNDING
-    kept = (np.abs(value) <= (np.abs(slope) @ half[:, :, None])[:, :, 0] + rest).all(axis=1)
-    centre, half, value, slope, bend, rest = (x[kept] for x in (centre, half, value, slope, bend, rest))
     inverse, t = inverses(slope)
-    inverse = inverse[:, :, : system.left]
     lost = np.isnan(inverse[:, 0, 0])
     inverse[lost] = 0.0
     step = -(inverse @ value[:, :, None])[:, :, 0]

@@ -22,6 +22,9 @@ Floats = NDArray[np.float64]
 
 CONSTANT, VARIABLE, ADD, SUBTRACT, MULTIPLY, SINE, COSINE = range(7)
 
+#: Allowance for rounding of expressions of order one.
+ROUNDING = 1e-14
+
 OPERATIONS = types.Array(types.int64, 2, "C")
 
 
@@ -36,46 +39,57 @@ def enclose(
     slope: Floats,
     bend: Floats,
 ) -> None:
-    """Write v (boxes, m), d and e (boxes, m, n) of the m ``wanted`` operations over boxes (boxes, n)."""
+    """Write v (boxes, m), d and e (boxes, m, n) of the m ``wanted`` operations over boxes (boxes, n).
+
+    As soon as one of them cannot vanish in a box all are NaN there.
+    """
     steps, n = tape.shape[0], centre.shape[1]
     v, r, d, e = np.zeros(steps), np.zeros(steps), np.zeros((steps, n)), np.zeros((steps, n))
     for p in range(centre.shape[0]):
-        for k in range(steps):
-            kind, x, y = tape[k, 0], tape[k, 1], tape[k, 2]
-            if kind == CONSTANT:
-                v[k] = constants[k]
-                continue
-            if kind == VARIABLE:
-                v[k], r[k], d[k, x] = centre[p, x], half[p, x], 1.0
-                continue
-            if kind in (ADD, SUBTRACT):
-                sign = 1.0 if kind == ADD else -1.0
-                v[k] = v[x] + sign * v[y]
-                for i in range(n):
-                    d[k, i] = d[x, i] + sign * d[y, i]
-                    e[k, i] = e[x, i] + e[y, i]
-            elif kind == MULTIPLY:
-                v[k] = v[x] * v[y]
-                most_x, most_y = abs(v[x]) + r[x], abs(v[y]) + r[y]
-                for i in range(n):
-                    d[k, i] = d[x, i] * v[y] + d[y, i] * v[x]
-                    e[k, i] = e[x, i] * most_y + abs(d[x, i]) * r[y]
-                    e[k, i] += e[y, i] * most_x + abs(d[y, i]) * r[x]
-            else:
-                v[k], along = np.sin(v[x]), np.cos(v[x])
-                if kind == COSINE:
-                    v[k], along = along, -v[k]
-                change = abs(v[k]) * r[x] + 0.5 * abs(along) * r[x] * r[x]
-                for i in range(n):
-                    d[k, i] = along * d[x, i]
-                    e[k, i] = abs(d[x, i]) * change + e[x, i] * (abs(along) + change)
-            r[k] = 0.0
-            for i in range(n):
-                r[k] += (abs(d[k, i]) + 0.5 * e[k, i]) * half[p, i]
+        done, possible = 0, True
         for m in range(wanted.shape[0]):
-            value[p, m] = v[wanted[m]]
+            for k in range(done, wanted[m] + 1):
+                kind, x, y = tape[k, 0], tape[k, 1], tape[k, 2]
+                if kind == CONSTANT:
+                    v[k] = constants[k]
+                    continue
+                if kind == VARIABLE:
+                    v[k], r[k], d[k, x] = centre[p, x], half[p, x], 1.0
+                    continue
+                if kind in (ADD, SUBTRACT):
+                    sign = 1.0 if kind == ADD else -1.0
+                    v[k] = v[x] + sign * v[y]
+                    for i in range(n):
+                        d[k, i] = d[x, i] + sign * d[y, i]
+                        e[k, i] = e[x, i] + e[y, i]
+                elif kind == MULTIPLY:
+                    v[k] = v[x] * v[y]
+                    most_x, most_y = abs(v[x]) + r[x], abs(v[y]) + r[y]
+                    for i in range(n):
+                        d[k, i] = d[x, i] * v[y] + d[y, i] * v[x]
+                        e[k, i] = e[x, i] * most_y + abs(d[x, i]) * r[y]
+                        e[k, i] += e[y, i] * most_x + abs(d[y, i]) * r[x]
+                else:
+                    v[k], along = np.sin(v[x]), np.cos(v[x])
+                    if kind == COSINE:
+                        v[k], along = along, -v[k]
+                    change = abs(v[k]) * r[x] + 0.5 * abs(along) * r[x] * r[x]
+                    for i in range(n):
+                        d[k, i] = along * d[x, i]
+                        e[k, i] = abs(d[x, i]) * change + e[x, i] * (abs(along) + change)
+                r[k] = 0.0
+                for i in range(n):
+                    r[k] += (abs(d[k, i]) + 0.5 * e[k, i]) * half[p, i]
+            done = max(done, wanted[m] + 1)
+            last = wanted[m]
+            if r[last] > 0.0 and abs(v[last]) > r[last] + ROUNDING:
+                possible = False
+                break
+        for m in range(wanted.shape[0]):
+            value[p, m] = v[wanted[m]] if possible else np.nan
             for i in range(n):
-                slope[p, m, i], bend[p, m, i] = d[wanted[m], i], e[wanted[m], i]
+                slope[p, m, i] = d[wanted[m], i] if possible else np.nan
+                bend[p, m, i] = e[wanted[m], i] if possible else np.nan
 
 
 class Enclosure(NamedTuple):
