@@ -209,8 +209,8 @@ def solutions(system: System, follow: Callable[[Floats], Curve | None]) -> Found
     centre, half = start(system.unknowns)
     curves: list[Curve] = []
     known: list[Neighbourhoods] = []
-    looked_at = 0
-    while len(centre) and looked_at < MOST_BOXES and half.max(axis=1).min() > SMALLEST:
+    tiny, looked_at = [centre[:0]], 0
+    while len(centre) and looked_at < MOST_BOXES:
         looked_at += len(centre)
         centre, half, slope, ripe = pruned(system, centre, half)
         left = ~held_by(known, centre, half)
@@ -228,8 +228,11 @@ def solutions(system: System, follow: Callable[[Floats], Curve | None]) -> Found
             z = z[1:]
             z = z[~held_by(known[-1:], z, np.zeros_like(z))]
         left = ~held_by(known[before:], centre, half)
+        small = half.max(axis=1) < SMALLEST
+        tiny.append(centre[left & small])
+        left &= ~small
         centre, half = split(centre[left], half[left], slope[left])
-    return Found(curves, centre, looked_at)
+    return Found(curves, np.concatenate([*tiny, centre]), looked_at)
 
 
 def held_by(known: list[Neighbourhoods], centre: Floats, half: Floats) -> NDArray[np.bool_]:

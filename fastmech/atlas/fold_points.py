@@ -12,8 +12,8 @@ from fastmech.atlas.axes import check_axis
 from fastmech.atlas.continuation import Curve, newton
 from fastmech.atlas.cover import apart, solutions
 from fastmech.atlas.enclosure import System
-from fastmech.atlas.folds import RESIDUAL, merging, unproved
-from fastmech.atlas.systems import Plane, families, fold, point_at
+from fastmech.atlas.folds import is_fold, merging, unproved
+from fastmech.atlas.systems import Plane, families, fold, point_at, suited
 from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -66,15 +66,15 @@ def find_folds(scene: Scene, name: str, values: ArrayLike) -> FoldPoints:
         InputError: an unknown name, values that neither rise nor fall or that the scene refuses.
     """
     axis = check_axis(scene, name, values)
-    plane = Plane(scene, (name,), (float(axis[0]),), (float(axis[-1]),))
+    plane = suited(Plane(scene, (name,), (float(axis[0]),), (float(axis[-1]),)))
     points, reasons = [], []
     for family in families(plane):
         found = solutions(family.system, _alone(family.system))
-        points += [_point(plane, curve.points[0], family.kind) for curve in found.curves]
+        places = [(curve.points[0], family.kind) for curve in found.curves]
+        places += [(z, _singular(plane, z)) for z in _together(found.open)]
+        points += [_point(plane, z, kind) for z, kind in places if is_fold(plane, z[None])]
         reasons += unproved(plane, found)
-        points += [_point(plane, z, _singular(plane, z)) for z in _together(found.open)]
-    kept = sorted((p for p in points if p.residual < RESIDUAL), key=lambda p: p.value)
-    return FoldPoints(kept, "; ".join(reasons))
+    return FoldPoints(sorted(points, key=lambda point: point.value), "; ".join(reasons))
 
 
 def _alone(system: System) -> Callable[[Floats], Curve | None]:
@@ -87,9 +87,9 @@ def _alone(system: System) -> Callable[[Floats], Curve | None]:
 
 def _point(plane: Plane, z: Floats, kind: str) -> FoldPoint:
     p = point_at(plane, z)
-    phi, theta = np.mod(z[:2] + np.pi, 2.0 * np.pi) - np.pi
+    phi, theta = (float(np.mod(angle + np.pi, 2.0 * np.pi) - np.pi) for angle in (p.phi, p.theta))
     value = float(plane.values(z[2:])[plane.names[0]])
-    return FoldPoint(value, float(phi), float(theta), merging(p), kind, p.residual)
+    return FoldPoint(value, phi, theta, merging(p), kind, p.residual)
 
 
 def _together(places: Floats) -> list[Floats]:

@@ -14,7 +14,7 @@ from fastmech.atlas.continuation import LONGEST, Curve, newton, trace
 from fastmech.atlas.cover import TURNS, Found, apart, solutions, wrapped
 from fastmech.atlas.enclosure import System
 from fastmech.atlas.margin import margins
-from fastmech.atlas.systems import Plane, Point, cusp, families, point_at
+from fastmech.atlas.systems import Plane, Point, cusp, families, point_at, suited
 from fastmech.errors import InputError
 from fastmech.scene import Scene
 
@@ -29,11 +29,11 @@ PIECE, HALVINGS = 1 << 18, 24
 #: Scaled residual of a fold; solutions of the equations of a symmetry that are none have much larger ones.
 RESIDUAL = 1e-9
 
+#: How near to a side that it touches a curve ends.
+TOUCHING = 1e-9
+
 #: Third derivative over the loads at an end of a curve below which a cusp is looked for there.
 NEARLY = 1e-2
-
-#: Pulls, over the loads, below which equilibria are not isolated within rounding.
-VANISHING = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,24 +90,41 @@ def trace_folds(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike]
         InputError: an unknown or repeated name, values that neither rise nor fall or that the scene refuses.
     """
     axes = checked_plane(scene, x, y)
-    plane = plane_of(scene, axes)
+    plane = suited(plane_of(scene, axes))
     lines: list[Curve] = []
-    curves: list[FoldCurve] = []
-    cusps: list[Floats] = []
+    kinds: list[str] = []
     reasons: list[str] = []
+    followers = []
     for family in families(plane):
-        found = solutions(family.system, follower(family.system, lines))
+        follow = follower(family.system, lines)
+        found = solutions(family.system, follow)
         reasons += unproved(plane, found)
         for line in found.curves:
-            if point_at(plane, line.points.T).residual > RESIDUAL:
-                continue
-            lines.append(line)
-            points = with_cusps(plane, line, cusps) if family.kind == "fold" else line.points
-            curves.append(fold_curve(plane, points, line.closed, family.kind))
-    crossings, unexplained = unexplained_edges(plane, axes, lines)
+            if is_fold(plane, line.points):
+                lines.append(line)
+                kinds.append(family.kind)
+        followers.append((family.kind, follow))
+    crossings = crossed_edges(plane, axes)
+    missed, unexplained = crossings[away_from(lines, crossings)], 0
+    while len(missed):
+        # What the search could not prove is searched for from the grid.
+        for kind, follow in followers:
+            line = follow(missed[0], 0.05)
+            if line is not None and is_fold(plane, line.points):
+                lines.append(line)
+                kinds.append(kind)
+        left = away_from(lines, missed)
+        unexplained += int(left[0])
+        left[0] = False
+        missed = missed[left]
+    cusps: list[Floats] = []
+    curves = []
+    for line, kind in zip(lines, kinds, strict=True):
+        points = with_cusps(plane, line, cusps) if kind == "fold" else line.points
+        curves.append(fold_curve(plane, points, line.closed, kind))
     unfinished = sum(not line.finished for line in lines)
     if unexplained:
-        reasons.append(f"{unexplained} of {crossings} changes of the count lie on no curve")
+        reasons.append(f"{unexplained} of {len(crossings)} changes of the count lie on no curve")
     if unfinished:
         reasons.append(f"{unfinished} curves could not be followed to their ends")
     return FoldSet(
@@ -116,7 +133,7 @@ def trace_folds(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike]
         tuple(cusp_point(plane, z) for z in cusps),
         not reasons,
         "; ".join(reasons),
-        crossings,
+        len(crossings),
         unexplained,
         unfinished,
     )
@@ -143,13 +160,13 @@ def plane_of(scene: Scene, axes: dict[str, Floats]) -> Plane:
     )
 
 
-def follower(system: System, before: list[Curve]) -> Callable[[Floats], Curve | None]:
+def follower(system: System, before: list[Curve]) -> Callable[..., Curve | None]:
     """Follows a system's curves within the rectangle, until all have ``MOST_POINTS``."""
     total = sum(len(line.points) for line in before)
 
-    def follow(z: Floats) -> Curve | None:
+    def follow(z: Floats, reach: float = 1e-3) -> Curve | None:
         nonlocal total
-        start = newton(system, z, reach=1e-3)
+        start = newton(system, z, reach)
         if start is None or not inside(start) or total > MOST_POINTS:
             return None
         line = trace(system, start, inside, finish_on_edge(system), apart)
@@ -159,6 +176,16 @@ def follower(system: System, before: list[Curve]) -> Callable[[Floats], Curve | 
     return follow
 
 
+def is_fold(plane: Plane, points: Floats) -> bool:
+    """Whether a solution of a family's equations is a curve of folds.
+
+    The equations of a symmetry have other solutions too, and where equilibria are not isolated every place
+    is one.
+    """
+    p = point_at(plane, points.T)
+    return bool(np.any(p.isolated)) and p.residual < RESIDUAL
+
+
 def unproved(plane: Plane, found: Found) -> list[str]:
     """Why a search is no proof, in words; empty if it is one."""
     if not len(found.open):
@@ -166,8 +193,7 @@ def unproved(plane: Plane, found: Found) -> list[str]:
     z = found.open[0]
     units = {name: plane.scene.described()[name][1] for name in plane.names}
     place = ", ".join(f"{name} = {value:.6g} {units[name]}" for name, value in plane.values(z[2:]).items())
-    a, C, b, f = plane.loads(z[2:])
-    if sum(abs(A) < VANISHING for A in (np.hypot(a, f), np.hypot(b, f), C)) >= 2:
+    if not point_at(plane, z).isolated:
         return [f"equilibria are not isolated near {place}"]
     if point_at(plane, z).residual < 1e-3:
         return [f"not proved near {place}: folds meet or touch there"]
@@ -194,6 +220,12 @@ def finish_on_edge(equations: System) -> Callable[[Floats, Floats], Floats]:
             if end is not None and inside(np.where(np.arange(last.size) == last.size + k, side, end)):
                 end[k] = side
                 return end
+        # Where the curve only touches the side its end is halved down to rounding.
+        while np.linalg.norm(beyond - last) > TOUCHING:
+            middle = newton(equations, 0.5 * (last + beyond), LONGEST)
+            if middle is None or np.linalg.norm(middle - last) > 0.9 * np.linalg.norm(beyond - last):
+                break
+            last, beyond = (middle, beyond) if inside(middle) else (last, middle)
         return last
 
     return finish
@@ -237,7 +269,7 @@ def fold_curve(plane: Plane, points: Floats, closed: bool, kind: str) -> FoldCur
     p = point_at(plane, points.T)
     values = plane.values(points[:, 2:].T)
     x, y = (np.asarray(values[name]) for name in plane.names)
-    phi, theta = (np.mod(points[:, k] + np.pi, 2.0 * np.pi) - np.pi for k in (0, 1))
+    phi, theta = (np.mod(angle + np.pi, 2.0 * np.pi) - np.pi for angle in (p.phi, p.theta))
     return FoldCurve(x, y, phi, theta, closed, merging(p), kind, p.residual)
 
 
@@ -250,14 +282,14 @@ def cusp_point(plane: Plane, z: Floats) -> CuspPoint:
     """A cusp in the parameters' units."""
     p = point_at(plane, z)
     x, y = (float(value) for value in plane.values(z[2:]).values())
-    phi, theta = np.mod(z[:2] + np.pi, 2.0 * np.pi) - np.pi
+    phi, theta = (np.mod(angle + np.pi, 2.0 * np.pi) - np.pi for angle in (p.phi, p.theta))
     return CuspPoint(x, y, float(phi), float(theta), max(p.residual, float(np.abs(p.third / p.size))))
 
 
-def unexplained_edges(plane: Plane, axes: dict[str, Floats], lines: list[Curve]) -> tuple[int, int]:
-    """Edges of the grid along which the number of equilibria changes, and how many no curve crosses.
+def crossed_edges(plane: Plane, axes: dict[str, Floats]) -> Floats:
+    """Folds (n, 4) on the edges of the grid along which the number of equilibria changes.
 
-    The change is located by bisection on the closed-form margin to the fold.
+    They are located by bisection on the closed-form margin to the fold.
     """
     (x, first), (y, second) = axes.items()
     six = np.empty((first.size, second.size))
@@ -276,12 +308,17 @@ def unexplained_edges(plane: Plane, axes: dict[str, Floats], lines: list[Curve])
         middle = 0.5 * (low + high)
         same = (_margins_at(plane, middle)[0] >= 0.0)[:, None] == (side > 0.5)
         low, high = np.where(same, middle, low), np.where(same, high, middle)
-    if not len(high) or not lines:
-        return len(high), len(high)
     _, _, phi, theta = _margins_at(plane, high)
+    return np.column_stack([phi, theta + phi if plane.sheared else theta, plane.parts(high)])
+
+
+def away_from(lines: list[Curve], places: Floats) -> NDArray[np.bool_]:
+    """Which places (n, 4) lie on none of the curves."""
+    if not len(places) or not lines:
+        return np.ones(len(places), dtype=bool)
     tree = cKDTree(wrapped(np.concatenate([line.points for line in lines])), boxsize=TURNS)
-    away = tree.query(wrapped(np.column_stack([phi, theta, plane.parts(high)])))[0]
-    return len(high), int(np.count_nonzero(away > LONGEST))
+    away: Floats = tree.query(wrapped(places))[0]
+    return away > LONGEST
 
 
 def _margins_at(plane: Plane, values: Floats) -> tuple[Floats, Floats, Floats, Floats]:

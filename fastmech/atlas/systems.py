@@ -9,7 +9,7 @@ vector has the parts 1/x1 : 1/x2 : 1/x3 along y1, y2, y3.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,10 @@ ROUNDING = 1e-14
 SYMMETRIC = 1e-12
 
 
+#: An amplitude over the largest load of a plane below which it is zero within rounding.
+VANISHING = 1e-9
+
+
 @dataclass(frozen=True)
 class Plane:
     """One or two parameters of a scene and the ranges in which they are looked at, rising or falling."""
@@ -37,6 +41,7 @@ class Plane:
     names: tuple[str, ...]
     low: tuple[float, ...]
     high: tuple[float, ...]
+    sheared: bool = False  #: the second unknown is phi + theta instead of theta: where the spring is stiff
     parts_of_loads: Floats = field(init=False)  #: (4, 2^parameters), see ``loads``
 
     def __post_init__(self) -> None:
@@ -125,24 +130,39 @@ class Point:
     @property
     def residual(self) -> float:
         """Largest one of gradient and determinant, over the loads."""
-        left = [*(g / self.size for g in self.gradient), self.determinant / self.size**2]
+        size = self.size + (self.size == 0.0)
+        left = [*(g / size for g in self.gradient), self.determinant / size**2]
         return float(np.max(np.abs(left)))
+
+    @property
+    def isolated(self) -> Any:
+        """Whether equilibria are: no two of the three amplitudes are zero within rounding."""
+        a, C, b, f = self.loads
+        amplitudes = np.array(np.broadcast_arrays(np.hypot(a, f), np.hypot(b, f), C))
+        return np.sort(amplitudes, axis=0)[1] > VANISHING
 
 
 def point_at(plane: Plane, z: Any) -> Point:
     """Everything at z, a sequence of numbers, vectors or terms that are recorded."""
     a, C, b, f = plane.loads(z[2:])
-    s1, c1, s2, c2 = np.sin(z[0]), np.cos(z[0]), np.sin(z[1]), np.cos(z[1])
-    s12, c12 = np.sin(z[0] + z[1]), np.cos(z[0] + z[1])
+    phi, theta, psi = (z[0], z[1] - z[0], z[1]) if plane.sheared else (z[0], z[1], z[0] + z[1])
+    s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
+    s12, c12 = np.sin(psi), np.cos(psi)
     return Point(
-        z[0],
-        z[1],
+        phi,
+        theta,
         potential_gradient(s1, c1, s2, c2, c12, a, C, b, f),
         potential_hessian(s1, c1, s2, c2, s12, a, C, b, f),
         C * c12,
         C,
         (a, C, b, f),
     )
+
+
+def suited(plane: Plane) -> Plane:
+    """The plane with the unknowns that its stiffest pull is a function of one of."""
+    _, C, b, f = plane.loads(np.indices((2,) * len(plane.names)).reshape(len(plane.names), -1))
+    return replace(plane, sheared=bool(np.max(C) > np.max(np.hypot(b, f))))
 
 
 def system(plane: Plane, equations: Callable[[Point], tuple[Any, ...]]) -> System:
