@@ -175,7 +175,7 @@ def seeds(plane: Plane, atlas: EquilibriumMap, name: str) -> tuple[Floats, list[
         size = {
             SIN_PHI: np.sin(phi),
             SIN_PSI: np.sin(phi + theta),
-            UNLOADED: np.where(np.isnan(phi), np.nan, (p.hessian[2] - p.spring).reshape(phi.shape)),
+            UNLOADED: np.where(np.isnan(phi), np.nan, (p.hessian[2] - p.loads[1]).reshape(phi.shape)),
         }[name]
         flat = all_over(np.abs(size) < ZERO)
         if flat.any():

@@ -237,7 +237,7 @@ def with_cusps(plane: Plane, line: Curve, found: list[Floats]) -> Floats:
     At a cusp the pulls change their sign, or two of the three xk (see ``fastmech.atlas.systems``).
     """
     p = point_at(plane, line.points.T)
-    sides = np.array([*p.bent, p.pull]) >= 0.0
+    sides = np.array([*p.bent, p.pulls[2]]) >= 0.0
     turned = sides[:, 1:] != sides[:, :-1]
     tried: list[tuple[int, Floats, int | None]] = []
     for k in np.flatnonzero(turned.any(axis=0)):

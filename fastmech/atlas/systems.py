@@ -90,28 +90,26 @@ class Point:
 
     phi: Any
     theta: Any
-    gradient: tuple[Any, Any]
-    hessian: tuple[Any, Any, Any]
-    pull: Any  #: C cos(phi + theta), at an equilibrium the common pull, paper (17)
-    spring: Any
+    pulls: tuple[Any, Any, Any]  #: A1 cos y1, A2 cos y2, A3 cos y3: equal at an equilibrium, paper (17)
+    bent: tuple[Any, Any, Any]  #: x1, x2, x3
     loads: tuple[Any, Any, Any, Any]
 
     @property
-    def bent(self) -> tuple[Any, Any, Any]:
-        """x1, x2, x3."""
-        h11, h12, h22 = self.hessian
-        return h11 - h12, h22 - h12, h12
+    def gradient(self) -> tuple[Any, Any]:
+        """Of U."""
+        return self.pulls[0] - self.pulls[2], self.pulls[1] - self.pulls[2]
 
     @property
-    def pulls(self) -> tuple[Any, Any, Any]:
-        """A1 cos y1, A2 cos y2, A3 cos y3."""
-        return self.gradient[0] + self.pull, self.gradient[1] + self.pull, self.pull
+    def hessian(self) -> tuple[Any, Any, Any]:
+        """Of U: phi phi, phi theta, theta theta."""
+        x1, x2, x3 = self.bent
+        return x1 + x3, x3, x2 + x3
 
     @property
     def determinant(self) -> Any:
-        """Of the Hessian."""
-        h11, h12, h22 = self.hessian
-        return h11 * h22 - h12 * h12
+        """Of the Hessian, without cancellation where one pull is stiff."""
+        x1, x2, x3 = self.bent
+        return x1 * x2 + (x1 + x2) * x3
 
     @property
     def third(self) -> Any:
@@ -120,7 +118,7 @@ class Point:
         flat = np.abs(h11) > np.abs(h22)
         v1, v2 = np.where(flat, h12, h22), np.where(flat, -h11, -h12)
         size = np.sqrt(v1 * v1 + v2 * v2)
-        return 3.0 * self.pull * v1 * v2 * (v1 + v2) / size**3
+        return 3.0 * self.pulls[2] * v1 * v2 * (v1 + v2) / size**3
 
     @property
     def size(self) -> Any:
@@ -148,15 +146,10 @@ def point_at(plane: Plane, z: Any) -> Point:
     phi, theta, psi = (z[0], z[1] - z[0], z[1]) if plane.sheared else (z[0], z[1], z[0] + z[1])
     s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
     s12, c12 = np.sin(psi), np.cos(psi)
-    return Point(
-        phi,
-        theta,
-        potential_gradient(s1, c1, s2, c2, c12, a, C, b, f),
-        potential_hessian(s1, c1, s2, c2, s12, a, C, b, f),
-        C * c12,
-        C,
-        (a, C, b, f),
-    )
+    # Without the spring the gradient is what balances its pull.
+    p1, p2 = potential_gradient(s1, c1, s2, c2, 0.0, a, 0.0, b, f)
+    x1, _, x2 = potential_hessian(s1, c1, s2, c2, 0.0, a, 0.0, b, f)
+    return Point(phi, theta, (p1, p2, C * c12), (x1, x2, C * s12), (a, C, b, f))
 
 
 def suited(plane: Plane) -> Plane:
@@ -172,7 +165,12 @@ def system(plane: Plane, equations: Callable[[Point], tuple[Any, ...]]) -> Syste
 
 def fold(plane: Plane) -> System:
     """gradient = 0, det Hessian = 0."""
-    return system(plane, lambda p: (*p.gradient, p.determinant))
+
+    def equations(p: Point) -> tuple[Any, ...]:
+        first, second = p.gradient
+        return first, p.pulls[0] - p.pulls[1] if plane.sheared else second, p.determinant
+
+    return system(plane, equations)
 
 
 def rest(plane: Plane) -> System:
@@ -192,13 +190,13 @@ def straight(plane: Plane) -> System:
 
 def unloaded(plane: Plane) -> System:
     """An equilibrium with U_theta,theta = C: the rod M1M2 is unloaded and M2 swings by itself."""
-    return system(plane, lambda p: (*p.gradient, p.hessian[2] - p.spring))
+    return system(plane, lambda p: (*p.gradient, p.hessian[2] - p.loads[1]))
 
 
 def cusp(plane: Plane, other: int | None) -> System:
     """Three equilibria merge: the null vector has no part along y ``other``, or (None) the pulls are zero."""
     if other is None:
-        return system(plane, lambda p: (*p.gradient, p.pull, p.determinant))
+        return system(plane, lambda p: (*p.pulls, p.determinant))
     one, two = ((other + k) % 3 for k in (1, 2))
     return system(plane, lambda p: (*p.gradient, p.bent[one], p.bent[two]))
 
