@@ -34,7 +34,7 @@ Floats = NDArray[np.float64]
 ANGLES, PARTS = 16, 4
 
 #: Boxes that are looked at in all, and size of a box that is not split any more.
-MOST_BOXES, SMALLEST = 400_000, 1e-8
+MOST_BOXES, SMALLEST = 1_200_000, 1e-8
 
 #: Largest q of a neighbourhood, and of a box in which Newton's method is tried.
 CONTRACTION, RIPE = 0.75, 0.5
@@ -149,7 +149,7 @@ class Neighbourhoods:
             good = now[:, 0] < CONTRACTION
             radius[todo[good]], change[todo[good]] = tried[good], now[good]
             long, todo = SHORTER * long, todo[~good]
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore"):
             reach = (1.0 - change)[:, 0] * (radius / np.abs(t)).min(axis=1)
         return points, t, radius, reach
 
@@ -196,7 +196,7 @@ class Found:
 
     curves: list[Curve]
     open: Floats  #: (places, n) of boxes that are left; none: complete
-    looked_at: int  #: boxes
+    cut_short: bool  #: at ``MOST_BOXES``
 
 
 def solutions(system: System, follow: Callable[[Floats], Curve | None]) -> Found:
@@ -232,7 +232,7 @@ def solutions(system: System, follow: Callable[[Floats], Curve | None]) -> Found
         tiny.append(centre[left & small])
         left &= ~small
         centre, half = split(centre[left], half[left], slope[left])
-    return Found(curves, np.concatenate([*tiny, centre]), looked_at)
+    return Found(curves, np.concatenate([*tiny, centre]), looked_at >= MOST_BOXES and len(centre) > 0)
 
 
 def held_by(known: list[Neighbourhoods], centre: Floats, half: Floats) -> NDArray[np.bool_]:

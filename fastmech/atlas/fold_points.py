@@ -12,7 +12,7 @@ from fastmech.atlas.axes import check_axis
 from fastmech.atlas.continuation import Curve, newton
 from fastmech.atlas.cover import apart, solutions
 from fastmech.atlas.enclosure import System
-from fastmech.atlas.folds import is_fold, merging, unproved
+from fastmech.atlas.folds import RESIDUAL, merging, sifted
 from fastmech.atlas.systems import Plane, families, fold, point_at, suited
 from fastmech.scene import Scene
 
@@ -70,10 +70,10 @@ def find_folds(scene: Scene, name: str, values: ArrayLike) -> FoldPoints:
     points, reasons = [], []
     for family in families(plane):
         found = solutions(family.system, _alone(family.system))
-        places = [(curve.points[0], family.kind) for curve in found.curves]
-        places += [(z, _singular(plane, z)) for z in _together(found.open)]
-        points += [_point(plane, z, kind) for z, kind in places if is_fold(plane, z[None])]
-        reasons += unproved(plane, found)
+        folds, doubts = sifted(plane, found)
+        points += [_point(plane, curve.points[0], family.kind) for curve in folds]
+        points += [point for z in _together(found.open) if (point := _singular(plane, z)).residual < RESIDUAL]
+        reasons += doubts
     return FoldPoints(sorted(points, key=lambda point: point.value), "; ".join(reasons))
 
 
@@ -102,12 +102,13 @@ def _together(places: Floats) -> list[Floats]:
     return middles
 
 
-def _singular(plane: Plane, z: Floats) -> str:
-    """What kind of merging it is where the equations of a fold are singular."""
+def _singular(plane: Plane, z: Floats) -> FoldPoint:
+    """The merging where the equations of a fold are singular, by its normal form."""
     p = point_at(plane, z)
     moved = fold(plane)(z)[1][:2, 2]
     h11, h12, h22 = p.hessian
     null = np.array([h12, -h11]) if abs(h11) > abs(h22) else np.array([h22, -h12])
     along = abs(moved @ null) / (np.linalg.norm(null) * np.linalg.norm(moved))
     flat = abs(p.third) < FLAT * p.size
-    return ("cusp" if flat else "fold") if along > FLAT else ("pitchfork" if flat else "transcritical")
+    kind = ("cusp" if flat else "fold") if along > FLAT else ("pitchfork" if flat else "transcritical")
+    return _point(plane, z, kind)

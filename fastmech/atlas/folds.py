@@ -98,11 +98,10 @@ def trace_folds(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike]
     for family in families(plane):
         follow = follower(family.system, lines)
         found = solutions(family.system, follow)
-        reasons += unproved(plane, found)
-        for line in found.curves:
-            if is_fold(plane, line.points):
-                lines.append(line)
-                kinds.append(family.kind)
+        folds, doubts = sifted(plane, found)
+        lines += folds
+        kinds += [family.kind] * len(folds)
+        reasons += doubts
         followers.append((family.kind, follow))
     crossings = crossed_edges(plane, axes)
     missed, unexplained = crossings[away_from(lines, crossings)], 0
@@ -110,7 +109,7 @@ def trace_folds(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike]
         # What the search could not prove is searched for from the grid.
         for kind, follow in followers:
             line = follow(missed[0], 0.05)
-            if line is not None and is_fold(plane, line.points):
+            if line is not None and point_at(plane, line.points.T).residual < RESIDUAL:
                 lines.append(line)
                 kinds.append(kind)
         left = away_from(lines, missed)
@@ -176,28 +175,35 @@ def follower(system: System, before: list[Curve]) -> Callable[..., Curve | None]
     return follow
 
 
-def is_fold(plane: Plane, points: Floats) -> bool:
-    """Whether a solution of a family's equations is a curve of folds.
+def sifted(plane: Plane, found: Found) -> tuple[list[Curve], list[str]]:
+    """The curves of folds among solutions of a family's equations, and why these may not be all, in words.
 
     The equations of a symmetry have other solutions too, and where equilibria are not isolated every place
     is one.
     """
-    p = point_at(plane, points.T)
-    return bool(np.any(p.isolated)) and p.residual < RESIDUAL
+    folds, doubts = [], []
+    for line in found.curves:
+        p = point_at(plane, line.points.T)
+        if not np.any(p.isolated):
+            doubts = [f"equilibria are not isolated near {told(plane, line.points[0])}"]
+        elif p.residual < RESIDUAL:
+            folds.append(line)
+    if len(found.open):
+        p, place = point_at(plane, found.open[0]), told(plane, found.open[0])
+        if not p.isolated:
+            doubts = [f"equilibria are not isolated near {place}"]
+        elif found.cut_short:
+            doubts.append(f"the search was cut short; not proved near {place} and elsewhere")
+        else:
+            doubts.append(f"not proved near {place}: folds meet or touch there")
+    return folds, doubts
 
 
-def unproved(plane: Plane, found: Found) -> list[str]:
-    """Why a search is no proof, in words; empty if it is one."""
-    if not len(found.open):
-        return []
-    z = found.open[0]
-    units = {name: plane.scene.described()[name][1] for name in plane.names}
-    place = ", ".join(f"{name} = {value:.6g} {units[name]}" for name, value in plane.values(z[2:]).items())
-    if not point_at(plane, z).isolated:
-        return [f"equilibria are not isolated near {place}"]
-    if point_at(plane, z).residual < 1e-3:
-        return [f"not proved near {place}: folds meet or touch there"]
-    return [f"not proved near {place} after {found.looked_at} boxes"]
+def told(plane: Plane, z: Floats) -> str:
+    """The parameters at a place, in words."""
+    units = plane.scene.described()
+    values = plane.values(z[2:]).items()
+    return ", ".join(f"{name} = {value:.6g} {units[name][1]}" for name, value in values)
 
 
 def inside(z: Floats) -> bool:
