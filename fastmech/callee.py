@@ -29,6 +29,7 @@ class Callee:
 
     def __init__(self, kernel: Any) -> None:
         """Of a kernel of one signature, which it keeps alive."""
+        kernel.make()
         (compiled,) = kernel.overloads.values()
         self._kernel = kernel
         self._numba_type_ = CalleeType(compiled.signature)

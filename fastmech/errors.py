@@ -18,6 +18,11 @@ class StepWarning(UserWarning):
     """A step cannot be right for a scene; the message names one that would do."""
 
 
+def printable(text: str, kept: str = "") -> str:
+    """A text for a terminal: characters that cannot be printed are escaped, but for those kept."""
+    return "".join(c if c.isprintable() or c in kept else ascii(c)[1:-1] for c in text)
+
+
 def shown(value: object) -> str:
     """A value as a message shows it: at most 80 characters of one line, control characters escaped."""
     try:

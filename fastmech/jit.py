@@ -4,6 +4,9 @@ Flags. ``error_model="numpy"`` is what lets LLVM vectorize at all (with Python's
 division is a branch that may raise). Of the fast-math flags only ``contract`` is set: a product and a sum
 may fuse, nothing may be reordered, and NaN and infinity keep their meaning because statuses are decided
 by them.
+
+Laziness. A kernel is loaded from the disk, or compiled, at its first use and not when its module is imported:
+a process pays for the kernels that it calls. ``listeners`` are told which one is being made.
 """
 
 from __future__ import annotations
@@ -13,12 +16,13 @@ from collections.abc import Callable
 from functools import wraps
 from typing import Any, TypeVar
 
-import numba
 import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import config as numba_config
 from numba.core.caching import FunctionCache
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic, overload, register_jitable
 
 from fastmech.callee import CalleeType
@@ -133,22 +137,73 @@ class _Kept(FunctionCache):
             super().save_overload(sig, data)  # type: ignore[no-untyped-call]
 
 
+#: Told the name of every kernel before it is loaded or compiled, and None when it is there.
+listeners: list[Callable[[str | None], None]] = []
+
+
+class Kernel(CPUDispatcher):
+    """A function compiled for one explicit signature, which is loaded from the disk or made at its first use.
+
+    A use is a call, a call of it in another kernel that is being made, and handing it to a kernel as a
+    :func:`fastmech.callee.callee`. Importing a module with kernels costs nothing of that.
+    """
+
+    declared: Any = None  #: the signature, until the kernel is there
+
+    def make(self) -> None:
+        """Load or compile it, unless it is there; any thread may.
+
+        Raises:
+            Interrupt: a command is to stop: this is the one place between two compilations.
+        """
+        if self.declared is not None:
+            check()
+            self._make()
+
+    def _make(self) -> None:
+        with global_compiler_lock:
+            signature = self.declared
+            if signature is None:
+                return
+            for tell in listeners:
+                tell(self.py_func.__name__)
+            self._cache = _Kept.of(self.py_func)
+            self.compile(signature)
+            self.disable_compile()
+            self.declared = None
+        for tell in listeners:
+            tell(None)
+
+    @property
+    def signatures(self) -> list[Any]:
+        """The one signature."""
+        return [self.declared.args] if self.declared is not None else list(self.overloads)
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Numba asks for it where another kernel that is being made calls this one."""
+        self._make()
+        return super().get_call_template(args, kws)
+
+    def _compile_for_args(self, *args: Any, **kws: Any) -> Any:
+        """Numba asks for it where Python calls a kernel that is not there; what is given back is called."""
+        self.make()
+        return self
+
+
 def kernel(signature: Any, **options: Any) -> Callable[[F], Any]:
-    """Compile a function for one explicit signature, without the interpreter's lock, kept on disk.
+    """A kernel of one explicit signature, without the interpreter's lock, kept on disk, see :class:`Kernel`.
 
     Explicit signatures make the disk entry usable in every later process even where an argument is a
     first-class function. The user's own kernels keep their cache directory, and any thread may compile.
     """
 
     def decorate(function: F) -> Any:
-        check()  # the one place where a command can stop between two compilations
         settings: Any = numba_config
-        dispatcher = numba.njit(nogil=True, **FLAGS, **options)(function)
-        if not settings.DISABLE_JIT:
-            dispatcher._cache = _Kept.of(function)
-            dispatcher.compile(signature)
-            dispatcher.disable_compile()
-        return dispatcher
+        if settings.DISABLE_JIT:
+            return function
+        made = Kernel(function, targetoptions={"nopython": True, "nogil": True, **FLAGS, **options})
+        made.declared = signature
+        return made
 
     return decorate
 

@@ -8,13 +8,13 @@ gains nothing from a longer step; a faster one needs a shorter one.
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.ensembles.energies import is_constant
+from fastmech.ensembles.highest import highest_energies
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.threads import in_parts
 from fastmech.kernels.passes import columns
@@ -118,7 +118,6 @@ def speed_bound(c: Coefficients, starts: Floats, threads: int | None = None) -> 
     Raises:
         InputError: the number of threads is wrong.
     """
-    highest_energies = import_module("fastmech.ensembles.highest").highest_energies  # few runs need it
     starts, highest = np.ascontiguousarray(starts, dtype=np.float64), np.empty(len(starts))
     in_parts(
         lambda part: highest_energies(starts[part], columns(c, part), highest[part]), len(starts), threads

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from importlib import import_module
 from types import SimpleNamespace
 from typing import Any
 
@@ -22,6 +21,7 @@ from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.ensembles.stiffness import damping_rate
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError
+from fastmech.kernels.jacobians import canonical_jacobian, lagrange_jacobian
 from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.mechanism.equations import momenta_from_rates, rates_from_momenta
@@ -48,11 +48,10 @@ class Problem:
 
     @property
     def jacobian(self) -> Any:
-        """Block Jacobian for implicit methods, loaded when asked for; ``None``: they take differences."""
+        """Block Jacobian for implicit methods; ``None``: they take differences."""
         if self.coefficients is None:
             return None
-        jacobians = import_module("fastmech.kernels.jacobians")
-        return jacobians.canonical_jacobian if self.canonical else jacobians.lagrange_jacobian
+        return canonical_jacobian if self.canonical else lagrange_jacobian
 
     def inward(self, y: Floats) -> Floats:
         """Integrated states from public ones (..., n, dim)."""

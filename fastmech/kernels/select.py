@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 
+from fastmech.kernels import canonical, lagrange
 from fastmech.mechanism.coefficients import Coefficients
 
-#: Formulations, and the modules of their kernels: each is compiled, or loaded, on first use.
-FORMULATIONS = {"lagrange": "lagrange", "hamilton": "canonical"}
+#: Formulations, and the modules of their kernels.
+FORMULATIONS = {"lagrange": lagrange, "hamilton": canonical}
 
 
 def terms(coefficients: Coefficients) -> str:
@@ -29,4 +29,4 @@ def terms(coefficients: Coefficients) -> str:
 def right_hand_side(coefficients: Coefficients, formulation: str = "lagrange") -> Any:
     """Block right-hand side of a formulation, ``"lagrange"`` or ``"hamilton"``, with these terms."""
     module = FORMULATIONS[formulation]
-    return getattr(import_module(f"fastmech.kernels.{module}"), f"{module}_{terms(coefficients)}")
+    return getattr(module, f"{module.__name__.rpartition('.')[2]}_{terms(coefficients)}")

@@ -147,7 +147,7 @@ def _sheets(
     if x[0] > x[-1]:
         sheet, values, x = sheet[::-1], values[::-1], x[::-1]
     curves = []
-    for number, index in enumerate(view.dataset["sheet_morse_index"].data):
+    for number, index in enumerate(view.variable("sheet_morse_index").data):
         there = sheet == number
         line = np.where(there.any(axis=-1), np.where(there, values, 0.0).sum(axis=-1), np.nan)
         curves.append((int(index), x.copy(), np.asarray(line, dtype=np.float64)))

@@ -25,10 +25,12 @@ LEFT_OVER = {
     "step_too_large": ("step too large", "#5a5a5a"),
     "not_converged": ("not converged", "#8c6d46"),
 }
+#: Colour of outcomes that only another version knows.
+UNKNOWN = "#b3a2c7"
 #: What a picture of outcomes cannot show without a variable, the one that leaves out most first.
 NOT_KEPT = {
     "end_equilibrium": "(which other equilibrium was not kept)",
-    "turns": "(full turns on the way to another equilibrium were not kept)",
+    "turns_phi": "(full turns on the way to another equilibrium were not kept)",
 }
 #: Without ``end_equilibrium``; yellow is no equilibrium's colour.
 ANOTHER = ("rest at another, or full turns further", {"color": PALETTE["yellow"]})
@@ -46,7 +48,7 @@ def draw_disturbed(dataset: Dataset) -> dict[str, Figure]:
     pictures = {
         "outcomes": (_outcomes, {"outcome"}),
         "time_to_return": (_time_to_return, {"time_to_return"}),
-        "excursions": (_excursions, {"excursion"}),
+        "excursions": (_excursions, {"excursion_phi", "excursion_theta"}),
         "linear_range": (_linear_range, {"linear_limit"}),
     }
     with style():
@@ -97,6 +99,10 @@ def _segments(dataset: Dataset, row: int) -> list[tuple[float, str, dict[str, An
     else:
         parts.append((elsewhere, *ANOTHER))
     parts += [(outcome == codes[name], label, {"color": grey}) for name, (label, grey) in LEFT_OVER.items()]
+    parts += [
+        (outcome == codes[name], name.replace("_", " "), {"color": UNKNOWN})
+        for name in codes.others({"returned", "elsewhere", *LEFT_OVER})
+    ]
     return [(100.0 * float(np.mean(where)), label, look) for where, label, look in parts if where.any()]
 
 
@@ -106,7 +112,8 @@ def _resting_elsewhere(
     """Those at rest at each other equilibrium, or at their own some turns further."""
     end = dataset["end_equilibrium"].data[row]
     # Elsewhere and yet at its own equilibrium is full turns further, known without the turns themselves.
-    turned = (dataset["turns"].data[row] != 0).any(axis=1) if "turns" in dataset else end == row
+    turns = [dataset[f"turns_{angle}"].data[row] for angle in ("phi", "theta") if f"turns_{angle}" in dataset]
+    turned = np.any(turns, axis=0) if turns else end == row
     parts: list[tuple[Flags, str, dict[str, Any]]] = []
     for other in range(dataset.sizes["equilibrium"]):
         there = elsewhere & (end == other)
@@ -145,10 +152,8 @@ def _time_to_return(dataset: Dataset) -> Figure:
 
 def _excursions(dataset: Dataset) -> Figure:
     figure, axes = _rows_of_equilibria(dataset, 0.85)
-    excursion = dataset["excursion"].data
-    for column, (symbol, shift) in enumerate((("φ", -0.18), ("θ", 0.18))):
-        for row in range(len(excursion)):
-            values = excursion[row, :, column]
+    for column, (angle, symbol, shift) in enumerate((("phi", "φ", -0.18), ("theta", "θ", 0.18))):
+        for row, values in enumerate(dataset[f"excursion_{angle}"].data):
             values = values[np.isfinite(values)]
             if values.size:
                 _box(axes, row + shift, np.quantile(values, BOX), LINES[column])

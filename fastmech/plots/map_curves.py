@@ -76,6 +76,7 @@ def _line(
     """Some of the curves in one look, each one with a point more that breaks the line."""
     from matplotlib.patheffects import Normal, Stroke
 
+<<<<<<< HEAD
     points = np.flatnonzero(chosen)
     if not points.size:
         return []
@@ -84,3 +85,37 @@ def _line(
     lines = [np.insert(view.axis(f"{what}_{name}")[points], ends, np.nan) for name in view.axes]
     effects = [Stroke(linewidth=width + 1.6, foreground="white", alpha=0.9), Normal()]
     return list(axes.plot(*lines, color=color, ls=dash, lw=width, label=label, path_effects=effects))
+=======
+    variable = view.variable(kind)
+    number = view.variable(f"{what}_curve").data
+    x, y = (view.axis(f"{what}_{name}") for name in view.axes)
+    handles: list[Artist] = []
+    others = {name: ("#777777", "-.", 1.2, f"{what}: {name}") for name in flag_codes(variable).others(looks)}
+    for name, (color, dash, width, label) in {**looks, **others}.items():
+        chosen = _broken(variable, name, number)
+        if not chosen[0].size:
+            continue
+        effects = [Stroke(linewidth=width + 1.6, foreground="white", alpha=0.9), Normal()]
+        handles += axes.plot(
+            np.where(chosen[1], np.nan, x[chosen[0]]),
+            np.where(chosen[1], np.nan, y[chosen[0]]),
+            color=color,
+            ls=dash,
+            lw=width,
+            label=label,
+            path_effects=effects,
+        )
+    return handles
+
+
+def _broken(
+    variable: Variable, name: str, number: NDArray[np.int32]
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Points of one kind's curves, each curve with one more that breaks the line, and where these are."""
+    of_kind = np.flatnonzero(variable.data == flag_codes(variable)[name])
+    ends = np.flatnonzero(np.diff(number[of_kind], append=-1))
+    return (
+        np.insert(of_kind, ends + 1, of_kind[ends]),
+        np.insert(np.zeros(of_kind.size, dtype=bool), ends + 1, True),
+    )
+>>>>>>> main

@@ -79,7 +79,7 @@ class Disturbed(TiledScan):
     def read(section: Section, scene: Mapping[str, float]) -> Dataset:
         """What is drawn, of very many trajectories evenly spaced ones."""
         step = -(-section.sizes.get("trajectory", 1) // DRAWN)
-        drawn = [name for name in section if name not in ("start", "final", "linear_direction")]
+        drawn = [name for name in section if not name.startswith(("start", "final", "linear_direction"))]
         return section.load(drawn, {"trajectory": slice(None, None, step)})
 
     @staticmethod

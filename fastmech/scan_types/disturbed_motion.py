@@ -14,7 +14,7 @@ from fastmech.disturbance.motion import disturbed_motion
 from fastmech.ensembles.integrate import FAILURES
 from fastmech.ensembles.spans import output_steps
 from fastmech.equilibria.find import Equilibria, Equilibrium
-from fastmech.results import Dataset, Variable
+from fastmech.results import STATE_UNITS, Dataset, Variable, numbers, parts
 from fastmech.scan_types.each import Each
 from fastmech.scan_types.request import HALVING, MethodName, TiledScan, failures
 from fastmech.scan_types.tiling import Tiling
@@ -84,21 +84,16 @@ class DisturbedMotionScan(TiledScan):
         )
 
     def _joined(self, equilibria: Equilibria, tiles: list[Dataset]) -> Dataset:
-        dims = ("equilibrium", "time", "component")
+        dims = ("equilibrium", "time")
         variables = {
+            **numbers("equilibrium", len(equilibria), "number of the equilibrium"),
             "time": Variable(("time",), self._times, "s", "time"),
             "phi": Variable(("equilibrium",), equilibria.phi, "rad", "angle phi of the equilibrium"),
             "theta": Variable(("equilibrium",), equilibria.theta, "rad", "angle theta of the equilibrium"),
-            **{
-                kind: Variable(
-                    dims,
-                    np.stack([tile[kind].data for tile in tiles]),
-                    "rad, rad/s",
-                    f"disturbance of phi, theta, phi', theta', {kind} motion",
-                )
-                for kind in ("nonlinear", "linearized")
-            },
         }
+        for kind in ("nonlinear", "linearized"):
+            motion = np.stack([tile[kind].data for tile in tiles])
+            variables |= parts(kind, dims, motion, STATE_UNITS, f"disturbance of {{}}, {kind} motion")
         attrs = self.model_dump(exclude={"scene"}) | {
             "error_estimate": float(np.max([tile["difference"].data for tile in tiles])),
             "error_estimate_is": HALVING,

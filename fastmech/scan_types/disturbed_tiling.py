@@ -17,7 +17,7 @@ from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.status import failure_counts
 from fastmech.integrators.methods import find_method
-from fastmech.results import Dataset, Variable
+from fastmech.results import Dataset, Variable, numbers
 from fastmech.scan_types.disturbed_layout import (
     QUANTILES,
     empty_trajectories,
@@ -129,7 +129,9 @@ class DisturbedTiling(Tiling):
             threads=context.threads,
             progress=lambda finished: context.check(),
         )
-        errors = _sampled_errors(self.scene, ensemble, request.method) if part.start == 0 else np.zeros(0)
+        errors = (
+            _sampled_errors(self.scene, ensemble, request.method) if part.start == 0 else np.zeros((0, 2))
+        )
         arrays = {name: getattr(ensemble, _FIELDS.get(name, name)) for name in request.kept}
         tally = Tally.of(ensemble.time_to_return, failure_counts(ensemble.outcome, FAILURES))
         return self._tile(arrays, errors, tally)
@@ -139,12 +141,13 @@ class DisturbedTiling(Tiling):
         each = list(self.equilibria)
         omega = np.array([size_at(self.scene, e.phi, e.theta).omega for e in each])
         fixed = equilibrium_variables(self.equilibria.phi, self.equilibria.theta, omega)
+        fixed |= numbers("trajectory", self.request.trajectories, "number of the trajectory")
         count, request = len(each), self.request
         nothing = empty_trajectories(request.kept, 1)
         arrays = {n: np.broadcast_to(a, (1, request.trajectories, *a.shape[1:])) for n, a in nothing.items()}
         sample, rays = min(SAMPLE, request.trajectories), request.linear_directions
         plane = trajectory_variables(arrays)
-        plane |= tally_variables(np.zeros(1), np.zeros((1, sample)), np.zeros((1, len(QUANTILES))))
+        plane |= tally_variables(np.zeros(1), np.zeros((1, sample, 2)), np.zeros((1, len(QUANTILES))))
         plane |= linear_variables(np.broadcast_to(0.0, (1, rays, 4)), np.broadcast_to(0.0, (1, rays)))
         attrs = {
             **request.settings,
@@ -162,7 +165,7 @@ class DisturbedTiling(Tiling):
             return Dataset(arrays | {"limit": Variable(("ray",), np.full(rays, np.nan))})
         sample = min(SAMPLE, self.request.trajectories) if part.start == 0 else 0
         nothing = empty_trajectories(self.request.kept, self.items(index))
-        return self._tile(nothing, np.full(sample, np.nan), Tally())
+        return self._tile(nothing, np.full((sample, 2), np.nan), Tally())
 
     def _part(self, index: int) -> slice | None:
         """The trajectories of a tile; None for a tile of directions."""
@@ -174,13 +177,16 @@ class DisturbedTiling(Tiling):
             name: Variable(("trajectory", *(f"{name}_entry" for _ in a.shape[1:])), a)
             for name, a in arrays.items()
         }
-        return Dataset(columns | {"error": Variable(("sample",), errors)} | tally.variables(), tally.attrs())
+        return Dataset(
+            columns | {"error": Variable(("sample", "error_entry"), errors)} | tally.variables(),
+            tally.attrs(),
+        )
 
     def _pieces(self, tile: Tiles, count: int) -> Iterator[Piece]:
         for number, block in enumerate(self.rays):
             found = [tile(number * count + e) for e in range(count)]
             directions, limit = (np.stack([f[name].data for f in found]) for name in ("directions", "limit"))
-            yield (slice(0, count), block), {"linear_direction": directions, "linear_limit": limit}
+            yield (slice(0, count), block), _data(linear_variables(directions, limit))
         first = count * len(self.rays)
         tallies, errors = [Tally() for _ in range(count)], []
         held: list[dict[str, NDArray[Any]]] = []
@@ -194,12 +200,12 @@ class DisturbedTiling(Tiling):
             held.append({n: np.stack([one[n].data for one in found]) for n in self.request.kept})
             if part is self.parts[-1] or sum(a.nbytes for h in held for a in h.values()) >= PIECE_BYTES:
                 joined = {n: np.concatenate([h[n] for h in held], axis=1) for n in self.request.kept}
-                yield (slice(0, count), slice(begun, part.stop)), joined
+                yield (slice(0, count), slice(begun, part.stop)), _data(trajectory_variables(joined))
                 begun, held = part.stop, []
         share = np.array([t.share for t in tallies])
         quantiles = np.array([t.quantiles(QUANTILES) for t in tallies])
         tally = tally_variables(share, np.stack(errors), quantiles)
-        yield slice(0, count), {name: variable.data for name, variable in tally.items()}
+        yield slice(0, count), _data(tally)
         attrs: dict[str, Any] = {
             "error_estimate": float(np.max(errors)),
             "error_estimate_median": float(np.median(errors)),
@@ -211,6 +217,10 @@ class DisturbedTiling(Tiling):
 
 #: Names of variables in `fastmech.disturbance.ensemble.DisturbedEnsemble`, where they are others.
 _FIELDS = {"start": "starts", "end_equilibrium": "end_index"}
+
+
+def _data(variables: dict[str, Variable]) -> dict[str, NDArray[Any]]:
+    return {name: variable.data for name, variable in variables.items()}
 
 
 def _blocks(total: int, length: int) -> list[slice]:
@@ -225,7 +235,8 @@ def _tile_length(request: _Request) -> int:
 
 
 def _sampled_errors(scene: Scene, e: DisturbedEnsemble, method: str) -> Floats:
-    """Differences of the first final states from those of half the step, shape (sample,)."""
+    """Largest differences of the first final angles and rates from those of half the step, (sample, 2)."""
     final = e.final[:SAMPLE]
     finer = integrate(scene, e.starts[: len(final)], e.t_end, 0.5 * e.dt, method).y[-1]
-    return np.where(np.isnan(e.failed[:SAMPLE]), np.abs(finer - final).max(axis=1), np.nan)
+    difference = np.abs(finer - final).reshape(-1, 2, 2).max(axis=2)
+    return np.where(np.isnan(e.failed[:SAMPLE])[:, None], difference, np.nan)

@@ -6,7 +6,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -16,6 +15,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 
 from fastmech.ensembles.status import failure_counts, failure_line
 from fastmech.errors import InputError
+from fastmech.integrators.methods import find_method
 from fastmech.results import Dataset, Variable, check_name
 from fastmech.scan_types.tiling import RunContext as RunContext
 from fastmech.scan_types.tiling import Tiles, Tiling
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def _known_method(name: str) -> str:
-    import_module("fastmech.integrators.methods").find_method(name)  # with kernels, so only where it is asked
+    find_method(name)
     return name
 
 
@@ -174,22 +174,22 @@ class Outline:
     scans: Mapping[str, Any]
 
 
-def check_outline(path: str | Path) -> None:
+def check_outline(path: str | Path, text: str | None = None) -> None:
     """Refuse what is wrong with a request file however its scans are read: that loads or compiles kernels.
 
     Raises:
         InputError: the file cannot be read, or its title, its scene or a scan's name is wrong.
     """
-    _outline(read_text(path), path)
+    _outline(read_text(path) if text is None else text, path)
 
 
-def read_request(path: str | Path, kinds: Mapping[str, type[Scan]]) -> Request:
-    """Read and validate a request file.
+def read_request(path: str | Path, kinds: Mapping[str, type[Scan]], text: str | None = None) -> Request:
+    """Read and validate a request file, or the text that is given as its own.
 
     Raises:
         InputError: the file cannot be read, or anything in it is unknown, of a wrong type or out of range.
     """
-    return request_of_text(read_text(path), path, kinds)
+    return request_of_text(read_text(path) if text is None else text, path, kinds)
 
 
 def request_of_text(text: str, path: str | Path, kinds: Mapping[str, type[Scan]]) -> Request:

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from fractions import Fraction
 from functools import cache
-from importlib import import_module
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Adams, Method, RungeKutta
 from fastmech.step_limits.circle import history_weight
+from fastmech.step_limits.many_roots import find_roots, tell_outside
 
 Floats = NDArray[np.float64]
 
@@ -69,13 +68,8 @@ def principal_root(method: Adams, z: ArrayLike) -> NDArray[np.complex128]:
     """The root for exp(z), of the shape of ``z``, by Newton's method from there; NaN: none is near."""
     points = np.asarray(z, dtype=np.complex128)
     found = np.empty((2, points.size))
-    _many_roots().find_roots(*_parts(points), method.predictor, method.corrector, *found)
+    find_roots(*_parts(points), method.predictor, method.corrector, *found)
     return (found[0] + 1j * found[1]).reshape(points.shape)
-
-
-def _many_roots() -> Any:
-    """Kernels that Runge-Kutta methods do not need."""
-    return import_module("fastmech.step_limits.many_roots")
 
 
 def _parts(points: NDArray[np.complex128]) -> tuple[Floats, Floats]:
@@ -109,5 +103,5 @@ def amplifies(method: Method, z: ArrayLike, factor: ArrayLike) -> NDArray[np.boo
     points = np.asarray(z, dtype=np.complex128)
     radius = np.array(np.broadcast_to(factor, points.shape), dtype=np.float64).ravel()
     outside = np.empty(points.size, dtype=np.bool_)
-    _many_roots().tell_outside(*_parts(points), radius, method.predictor, method.corrector, outside)
+    tell_outside(*_parts(points), radius, method.predictor, method.corrector, outside)
     return outside.reshape(points.shape)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from functools import cache
-from importlib import import_module
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +26,7 @@ from fastmech.step_limits.limits import (
 from fastmech.step_limits.local import eigenvalue_bound, eigenvalues, local_motion, part, state_matrices
 from fastmech.step_limits.predict import GROWTH_PER_RADIAN
 from fastmech.step_limits.region import region, size_within
+from fastmech.step_limits.verdicts import judge_modes, judge_states
 
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.float64] | NDArray[np.int64]
@@ -110,7 +109,7 @@ def _judged(
     """What :func:`fastmech.step_limits.verdicts.judge_states` gives."""
     table = region(method.name)
     most = np.ceil(float(number.max())) * (1.0 + ROUNDED)
-    place, closer = _kernels().judge_states(
+    place, closer = judge_states(
         np.ascontiguousarray(states, dtype=np.float64),
         columns(c, slice(0, len(states))),
         np.ascontiguousarray(dt),
@@ -123,11 +122,6 @@ def _judged(
         verdicts,
     )
     return place, closer
-
-
-def _kernels() -> Any:
-    """Kernels that quiet steps do not need."""
-    return import_module("fastmech.step_limits.verdicts")
 
 
 @cache
@@ -161,7 +155,7 @@ def _settle(
     there = steps_there(local_motion(own, at).time, dt[unsure], number[unsure])[which]
     z = dt[unsure][which] * values
     grow = np.empty(z.size, dtype=np.bool_)
-    _kernels().judge_modes(
+    judge_modes(
         z.real.copy(), z.imag.copy(), there, number[unsure][which], *_formula(method.name), spurious, grow
     )
     verdicts[unsure] = INNOCENT

@@ -169,7 +169,7 @@ def test_shares_of_the_bars_sum_up():
     [
         ({"outcome", "end_equilibrium"}, "full turns on the way"),
         ({"outcome"}, "which other equilibrium"),
-        ({"outcome", "turns"}, "which other equilibrium"),
+        ({"outcome", "turns_phi", "turns_theta"}, "which other equilibrium"),
     ],
 )
 def test_outcomes_are_drawn_from_what_was_kept(kept: set[str], told: str):
@@ -183,7 +183,8 @@ def test_outcomes_are_drawn_from_what_was_kept(kept: set[str], told: str):
         "outcome": replace(dataset["outcome"], data=np.tile(outcome, (6, 1)).astype(np.int8)),
         "end_equilibrium": replace(dataset["end_equilibrium"], data=end.astype(np.int8)),
     }
-    left_out = {"outcome", "end_equilibrium", "turns", "time_to_return", "excursion"} - kept
+    apart = {f"{of}_{angle}" for of in ("turns", "excursion") for angle in ("phi", "theta")}
+    left_out = {"outcome", "end_equilibrium", "time_to_return", *apart} - kept
     variables = {n: v for n, v in {**dataset.variables, **changed}.items() if n not in left_out}
     figures = scan_kinds()["disturbed"].draw(Dataset(variables, dataset.attrs), BISTABLE.model_dump())
     assert set(figures) == {"outcomes", "linear_range"}

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import binomtest
 
-from fastmech.basins.measures.labels import Floats, Integers, check_labels, known_labels
+from fastmech.basins.measures.labels import Floats, Integers, LabelsLike, check_labels, known_labels
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
 
@@ -51,7 +51,7 @@ def wilson(count: ArrayLike, n: int, confidence: float = 0.95) -> tuple[Floats, 
     return ends[..., 0], ends[..., 1]
 
 
-def basin_fractions(labels: ArrayLike, *, confidence: float = 0.95) -> tuple[Integers, Shares]:
+def basin_fractions(labels: LabelsLike, *, confidence: float = 0.95) -> tuple[Integers, Shares]:
     """Share of every label in a map or a sample.
 
     Args:
@@ -71,7 +71,7 @@ def basin_fractions(labels: ArrayLike, *, confidence: float = 0.95) -> tuple[Int
     return which, _shares(count, array, confidence)
 
 
-def basin_stability(labels: ArrayLike, label: int, *, confidence: float = 0.95) -> Shares:
+def basin_stability(labels: LabelsLike, label: int, *, confidence: float = 0.95) -> Shares:
     """Basin stability of one attractor: the probability that a random start returns to it.
 
     S_B = integral of 1_B(x) rho(x) dx, with B the basin and rho the density that the starts were drawn from
@@ -92,7 +92,7 @@ def basin_stability(labels: ArrayLike, label: int, *, confidence: float = 0.95) 
 
 
 def finite_time_basin_stability(
-    labels: ArrayLike, times: ArrayLike, label: int, horizons: ArrayLike, *, confidence: float = 0.95
+    labels: LabelsLike, times: ArrayLike, label: int, horizons: ArrayLike, *, confidence: float = 0.95
 ) -> Shares:
     """Probability that a random start has returned to an attractor within a given time.
 
