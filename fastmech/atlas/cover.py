@@ -44,7 +44,7 @@ MOST_VAIN = 50
 CONTRACTION, RIPE = 0.75, 0.5
 
 #: Neighbourhoods: longest and shortest half length tried [rad and parts], their ratios; width over length.
-WIDEST, NARROWEST, SHORTER, THIN = 0.05, 1e-5, 0.5, 0.1
+WIDEST, NARROWEST, SHORTER, THIN = 0.05, 1e-8, 0.5, 0.1
 
 #: Largest distance of a curve's points over the reach of their neighbourhoods, and halvings to get there.
 SPACING, MOST_HALVINGS = 1.0, 12
@@ -225,14 +225,13 @@ def solutions(system: System, follow: Callable[[Floats], Curve | None]) -> Found
         z = z[~held_by(known, z, np.zeros_like(z))]
         before = len(known)
         while len(z) and vain < MOST_VAIN:
-            curve = follow(z[0])
+            seed, z = z[:1], z[1:]
+            curve = follow(seed[0])
             if curve is not None and held_by(known, curve.points, np.zeros_like(curve.points)).mean() < 0.5:
                 curves.append(curve)
                 known.append(Neighbourhoods(system, curve.points))
                 z = z[~held_by(known[-1:], z, np.zeros_like(z))]
-            else:
-                vain += 1
-                z = z[1:]
+            vain += not held_by(known[-1:], seed, np.zeros_like(seed))[0]
         left = ~held_by(known[before:], centre, half)
         small = half.max(axis=1) < SMALLEST
         tiny.append(centre[left & small])

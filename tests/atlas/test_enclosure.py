@@ -19,8 +19,8 @@ PLANE = Plane(Scene(c1=294.9, alpha=0.0), ("F0", "l"), (-400.0, 0.3), (400.0, 2.
 def test_values_and_slopes_stay_within_their_bounds() -> None:
     system = fold(PLANE)
     rng = np.random.default_rng(5)
-    centre = np.column_stack([rng.uniform(-np.pi, np.pi, (300, 2)), rng.random((300, 2))])
-    half = rng.random((300, 4)) * 10.0 ** rng.uniform(-4.0, -0.3, (300, 1))
+    centre = np.column_stack([rng.uniform(-np.pi, np.pi, (4000, 2)), rng.random((4000, 2))])
+    half = rng.random((4000, 4)) * 10.0 ** rng.uniform(-4.0, -0.3, (4000, 1))
     at = system.over(centre, np.zeros_like(half))
     found = system.over(centre, half)
     known = ~np.isnan(found.value[:, 0])
@@ -32,11 +32,11 @@ def test_values_and_slopes_stay_within_their_bounds() -> None:
         assert (np.abs(there.slope - at.slope)[known] <= found.bend[known] + 1e-13).all()
         room = ((np.abs(at.slope) + 0.5 * found.bend) * half[:, None]).sum(axis=2)
         assert (np.abs(there.value - at.value)[known] <= room[known] + 1e-13).all()
-    assert 50 < known.sum() < 290
+    assert 100 < known.sum() < 3900
 
 
 def test_slopes_are_derivatives() -> None:
-    """Against complex steps of the potential's own gradient."""
+    """Against central differences."""
     z = np.array([0.3, -1.1, 0.7, 0.2])
     slope = fold(PLANE)(z)[1]
     for k in range(4):
@@ -76,7 +76,7 @@ def test_islands_of_any_size_are_found_and_nothing_else() -> None:
 
 
 def test_where_curves_cross_there_is_no_proof(monkeypatch: pytest.MonkeyPatch) -> None:
-    """sin phi = theta = u v - 1/16 ... : two lines that cross are singular where they do."""
+    """Two lines that cross are singular where they do."""
     cross = System(lambda z: (np.sin(0.5 * z[0]), np.sin(0.5 * z[1]), (z[2] - 0.4) * (z[3] - 0.3)), 4)
     found = solutions(cross, lambda z: trace(cross, z, inside, finish_on_edge(cross), apart))
     assert len(found.open)
