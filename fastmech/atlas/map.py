@@ -227,15 +227,17 @@ def solve_block(
     )  # fmt: skip
     coincidences(*places, out.radius, out.morse_index, out.count, out.outcome, out.coincidence)
     limits = out.shock_limit_m1, out.shock_limit_m2, out.shock_limit_m3
+    for array in (out.depth, *limits):
+        array[:] = np.nan
     if wells:
         barriers(*places, out.energy, out.morse_index, out.count, out.outcome, out.depth)
         out.depth[:] = out.depth - out.energy
+        known = np.nonzero(np.isfinite(out.depth))
+        wells_at = coefficients[known[0]], out.phi[known], out.theta[known], out.depth[known]
+        masses = mass[known[0]], weight[known[0]]
         for on, limit in zip(POINTS, limits, strict=True):
-            limit[:] = least_impulses(*places, out.depth, np.stack([mass, weight], axis=1), on)
+            limit[known] = least_impulses(*wells_at, masses, on)
         out.depth[:] = out.depth * weight[:, None]
-    else:
-        for array in (out.depth, *limits):
-            array[:] = np.nan
     with np.errstate(divide="ignore"):
         np.divide(1.0, out.decay_time, out=out.decay_time)
     out.energy[:] = out.energy * weight[:, None] + constant[:, None]

@@ -25,7 +25,7 @@ from fastmech.basins.status import BasinStatus, counts
 from fastmech.basins.steps import coarse_steps, gone_at_once, step_of_fading
 from fastmech.capture.barriers import BarrierTree
 from fastmech.capture.certificate import Certificate, certificate_of
-from fastmech.disturbance.outcome import confining_energy
+from fastmech.disturbance.size import confining_energy
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.plausible import breaks_energy_bounds

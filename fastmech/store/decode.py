@@ -29,8 +29,8 @@ _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FL
 #: Environment variable: the factor by which a file may exceed the limits below.
 LIMITS = "FASTMECH_FILE_LIMITS"
 
-#: Groups and variables of a file.
-MOST_OBJECTS = 10_000
+#: Groups of a file, and variables.
+MOST_GROUPS, MOST_VARIABLES = 1_000, 20_000
 
 #: Attributes of a group or variable, and bytes of each.
 MOST_ATTRS, MOST_ATTR_BYTES = 1_000, 1 << 24
@@ -64,7 +64,7 @@ class TooMuchError(InputError):
 
 
 class Allowance:
-    """What a file may ask for: its groups and variables, and the bytes of their values, are taken off it.
+    """What a file may ask for: its groups, its variables and the bytes of their values are taken off it.
 
     Args:
         path: the file.
@@ -72,27 +72,27 @@ class Allowance:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._objects = self._most_objects = raised(MOST_OBJECTS)
-        self._bytes = self._most_bytes = raised(max(FREE_BYTES, UNPACKED * path.stat().st_size))
+        limits = {
+            "groups": MOST_GROUPS,
+            "variables": MOST_VARIABLES,
+            "bytes of unpacked values": max(FREE_BYTES, UNPACKED * path.stat().st_size),
+        }
+        self._limits = {what: raised(limit) for what, limit in limits.items()}
+        self._left = dict(self._limits)
 
-    def take(self, objects: int, nbytes: int = 0) -> None:
-        """Take off so many groups and variables, and bytes.
+    def take(self, groups: int = 0, variables: int = 0, nbytes: int = 0) -> None:
+        """Take off so much.
 
         Raises:
             TooMuchError: more than is left.
         """
-        self._objects -= objects
-        self._bytes -= nbytes
-        if self._objects < 0:
-            self._refuse(f"{self._most_objects:,} groups and variables")
-        if self._bytes < 0:
-            self._refuse(f"{self._most_bytes:,} bytes of unpacked values")
-
-    def _refuse(self, limit: str) -> None:
-        raise TooMuchError(
-            f"{self._path}: has more than {limit}; {LIMITS}=10 in the environment allows ten times as much,"
-            " of a file that you trust"
-        )
+        for what, amount in zip(self._left, (groups, variables, nbytes), strict=True):
+            self._left[what] -= amount
+            if self._left[what] < 0:
+                raise TooMuchError(
+                    f"{self._path}: has more than {self._limits[what]:,} {what}; {LIMITS}=10 in the"
+                    " environment allows ten times as much, of a file that you trust"
+                )
 
 
 @contextmanager
@@ -113,14 +113,15 @@ def members(group: h5py.Group, where: str, left: Allowance) -> dict[str, h5py.Gr
     Raises:
         InputError: more than the file may have, in number or size, or one whose name is not plain.
     """
-    left.take(len(group))
     found = {}
     for name in group:
         if isinstance(group.get(name, getlink=True), h5py.HardLink):
             check_name(name, where)
             found[name] = group[name]
             if isinstance(found[name], h5py.Dataset):
-                left.take(0, found[name].size * found[name].dtype.itemsize)
+                left.take(variables=1, nbytes=found[name].size * found[name].dtype.itemsize)
+                continue
+        left.take(groups=1)
     return found
 
 

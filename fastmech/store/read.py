@@ -97,15 +97,20 @@ class Results:
         )
 
     def __getitem__(self, name: str) -> Section:
-        if name not in self:
+        found = self._find(name)
+        if found is None:
             raise InputError(
                 f"section {shown(name)}: is not in {self.path}; it has {', '.join(self.groups) or 'none'}"
             )
-        section, _, group = name.partition("/")
-        return self._sections[section].groups[group] if group else self._sections[section]
+        return found
 
     def __contains__(self, name: object) -> bool:
-        return name in self.groups
+        return isinstance(name, str) and self._find(name) is not None
+
+    def _find(self, name: str) -> Section | None:
+        section, slash, group = name.partition("/")
+        found = self._sections.get(section)
+        return found if found is None or not slash else found.groups.get(group)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._sections)

@@ -53,6 +53,8 @@ def test_curves_come_with_the_map() -> None:
     dataset = mapped().groups["curves"]
     assert dataset["fold_crossings"].data[0] > 10
     assert dataset["fold_crossings"].data[1] == 0
+    assert list(dataset["fold_proof"].data) == ["complete"]
+    assert set(dataset["fold_kind"].data) == {0}
     assert dataset["cusp_F0"].data.size >= 4
     assert set(np.unique(dataset["unreached_vanishes"].data)) >= {0, 2}
     line = EquilibriumMap(axes={"F0": {"start": -800.0, "stop": 800.0, "num": 99}}).run(SCENE, RunContext())

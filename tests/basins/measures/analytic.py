@@ -17,7 +17,7 @@ def disc(y: Floats) -> Integers:
     return (y[:, 0] ** 2 + y[:, 1] ** 2 < 0.49).astype(np.int64)
 
 
-def gaps(x: Floats, ratio: float = 1.0 / 3.0, depth: int = 60) -> Integers:
+def gaps(x: Floats, ratio: float = 1.0 / 3.0, depth: int = 40) -> Integers:
     """Order of the gap of a Cantor set on [0, 1] that points are in; 0 outside.
 
     Each piece has two left, ``ratio`` as long, at its ends: the dimension is ln 2/ln(1/ratio). Every point of
