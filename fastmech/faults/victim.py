@@ -63,7 +63,7 @@ THREADS = 2
 IN_HAND = THREADS + 1
 
 #: Attributes that say when and where a result was made, not what it is.
-CIRCUMSTANCES = ("created", "wall_time_s")
+CIRCUMSTANCES = ("created", "history", "wall_time_s")
 
 
 scan_kinds()  # loads all kernels: a process forked from here starts at once
