@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from fastmech.atlas.map import map_equilibria
     from fastmech.atlas.snap import find_snap
     from fastmech.basins.copies import copy_labels, copy_of_label
+    from fastmech.basins.disturbed import Outcome, disturb
     from fastmech.basins.edge import saddle_at, track_edge
     from fastmech.basins.erosion import erosion
     from fastmech.basins.label import labels_of
@@ -39,10 +40,8 @@ if TYPE_CHECKING:
     from fastmech.basins.status import BasinStatus
     from fastmech.capture.barriers import barrier_tree
     from fastmech.capture.certificate import trapped
-    from fastmech.disturbance.ensemble import disturb
     from fastmech.disturbance.linear_range import linear_range
     from fastmech.disturbance.motion import disturbed_motion
-    from fastmech.disturbance.outcome import Outcome
     from fastmech.ensembles.integrate import integrate
     from fastmech.ensembles.status import Status
     from fastmech.ensembles.system import System
@@ -66,7 +65,7 @@ except metadata.PackageNotFoundError:  # run from its sources, not installed
 _MODULES = {
     "BasinStatus": "fastmech.basins.status",
     "InputError": "fastmech.errors",
-    "Outcome": "fastmech.disturbance.outcome",
+    "Outcome": "fastmech.basins.disturbed",
     "Scene": "fastmech.scene",
     "Status": "fastmech.ensembles.status",
     "StepWarning": "fastmech.errors",
@@ -82,7 +81,7 @@ _MODULES = {
     "copy_of_label": "fastmech.basins.copies",
     "cos": "fastmech.kernels.sincos",
     "critical_forces": "fastmech.basins.snapping",
-    "disturb": "fastmech.disturbance.ensemble",
+    "disturb": "fastmech.basins.disturbed",
     "disturbed_motion": "fastmech.disturbance.motion",
     "erosion": "fastmech.basins.erosion",
     "find_equilibria": "fastmech.equilibria.find",

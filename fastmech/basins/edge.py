@@ -17,7 +17,7 @@ from fastmech.basins.copies import copy_labels, label_name
 from fastmech.basins.measures.labels import Floats, LabelOf, ask, check_point
 from fastmech.basins.measures.norm import kinetic_norm, norm_on
 from fastmech.basins.steps import coarse_steps
-from fastmech.disturbance.ensemble import require_constant_force
+from fastmech.disturbance.motion import require_constant_force
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.system import System

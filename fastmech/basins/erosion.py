@@ -20,14 +20,14 @@ from fastmech.basins.label import labels_of as labels_by_capture
 from fastmech.basins.label import require_damper
 from fastmech.basins.measures.fractions import basin_stability
 from fastmech.basins.measures.integrity import integrity
-from fastmech.basins.measures.labels import Floats, Integers, check_point
-from fastmech.basins.measures.norm import kinetic_norm, norm_on, state_index
+from fastmech.basins.measures.labels import Floats, Integers, check_axes, check_point
+from fastmech.basins.measures.norm import check_angles, kinetic_norm, norm_on, state_index
 from fastmech.basins.shock import minimal_shock
-from fastmech.disturbance.ensemble import require_constant_force
+from fastmech.disturbance.motion import require_constant_force
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
 from fastmech.equilibria.find import Equilibria, find_equilibria
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown
 from fastmech.scene import Scene
 
 #: Relative tolerance of shocks: what a profile shows.
@@ -64,8 +64,9 @@ class ErosionProfile:
     phi: Floats  #: where the well is [rad]
     theta: Floats  #: rad
     stability: Floats  #: basin stability: share of random starts in the window that end in the well
-    lower: Floats  #: lower end of its 95 % Wilson interval
-    upper: Floats  #: upper end
+    stability_at_most: Floats  #: the same if all random starts without a label ended in the well
+    lower: Floats  #: lower end of the 95 % Wilson interval, with none of these
+    upper: Floats  #: upper end, with all of them
     gim: Floats  #: global integrity measure: share of the map
     gim_at_most: Floats  #: the same if all starts of the map without a label ended in the well
     lim: Floats  #: local integrity measure on the map [rad]; NaN also where the well is outside the window
@@ -145,6 +146,7 @@ class Survey:
             "phi": e.phi,
             "theta": e.theta,
             "stability": float(share.fraction),
+            "stability_at_most": float(share.at_most),
             "lower": float(share.lower),
             "upper": float(share.upper),
             "undecided": share.missing / share.n,
@@ -221,6 +223,7 @@ def erosion(
     require_constant_force(scene)
     checks.progress_function(progress, "values")
     along = check_point("values", values)
+    checks.one_way("values", values, along)
     survey = survey_of(
         axes, most_shock=most_shock, t_end=t_end, labels_of=labels_of, n=n, directions=directions, seed=seed
     )
@@ -245,17 +248,19 @@ def survey_of(
     seed: int,
 ) -> Survey:
     """What to measure, checked; arguments and errors as for :func:`erosion`."""
+    if not isinstance(axes, Mapping) or not axes:
+        raise InputError(f"axes = {shown(axes)}: must map at least one state to its values")
     states = tuple(state_index(name) for name in axes)
-    if not states:
-        raise InputError("axes: must name at least one state")
-    lines = tuple(check_point(f"axes.{name}", line) for name, line in axes.items())
+    lines = check_axes(axes, tuple(np.size(line) for line in axes.values()))
+    for name, line in zip(axes, lines, strict=True):
+        check_angles(f"axes.{name}", name, line)
     rng = np.random.default_rng(checks.whole_number("seed", seed, least=0))
     low, high = np.array([[line.min(), line.max()] for line in lines]).T
     n = checks.whole_number("n", n, least=1)
     t_end = checks.number("t_end", t_end, "s", above=0.0)
     return Survey(
         states,
-        lines,
+        tuple(lines),
         low + (high - low) * rng.random((n, len(lines))),
         labels_of or partial(labels_by_capture, t_end=t_end),
         most_shock,

@@ -25,7 +25,7 @@ from fastmech.basins.status import BasinStatus, counts
 from fastmech.basins.steps import coarse_steps, gone_at_once, step_of_fading
 from fastmech.capture.barriers import BarrierTree
 from fastmech.capture.certificate import Certificate, certificate_of
-from fastmech.disturbance.outcome import confining_energy
+from fastmech.disturbance.size import confining_energy
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.plausible import breaks_energy_bounds
@@ -53,6 +53,9 @@ TURN = (_FIRST, _SECOND, 2.0 * np.pi - _FIRST - _SECOND + 2.4492935982947064e-16
 #: Starts that are followed together, at most; and so many pieces, if they are not smaller than the least.
 #: Every piece takes something of everywhere, so that all take about as long and progress tells the time left.
 BATCH, PIECES, LEAST = 1 << 16, 16, 1 << 11
+
+#: Numbers of 8 bytes that memory holds of every start on the way.
+START_NUMBERS = 20
 
 
 @dataclass(frozen=True)
@@ -103,7 +106,9 @@ def labels_of(
     """
     require_damper(scene)
     checks.progress_function(progress, "starts")
-    begin, turned = _unwound(checks.states("starts", starts, 4))
+    states = checks.states("starts", starts, 4)
+    checks.memory(len(states), START_NUMBERS, f"starts: labels of {len(states):.3g}", "fewer")
+    begin, turned = _unwound(states)
     thread_count(threads)
     t_end = checks.number("t_end", t_end, "s", above=0.0)
     formula, certificate = find_method(method), certificate_of(scene)

@@ -18,7 +18,7 @@ from fastmech.basins.measures.labels import Floats
 from fastmech.basins.shock import Rays
 from fastmech.basins.steps import coarse_steps
 from fastmech.capture.certificate import certificate_of
-from fastmech.disturbance.ensemble import require_constant_force
+from fastmech.disturbance.motion import require_constant_force
 from fastmech.ensembles import checks
 from fastmech.equilibria.find import Equilibria, Equilibrium
 from fastmech.errors import InputError, shown
@@ -212,8 +212,9 @@ def impulse_start(
         direction: of the impulse, from +x [rad].
 
     Raises:
-        InputError: an argument is wrong.
+        InputError: an argument is wrong, or the scene does not rest there.
     """
+    require_rest(scene, rest)
     _require_point(on)
     impulse = checks.number("impulse", impulse, "N s")
     direction = checks.number("direction", direction, "rad")

@@ -31,6 +31,7 @@ def _grid_variables(found: BasinMap) -> dict[str, Variable]:
     names = tuple(found.axes)
     label, table = found.labels
     share = np.array([np.mean(label == i) for i in range(len(table))])
+    unknown = np.mean(label < 0)
     variables = {
         "label": Variable(names, label.astype(np.int32), "1", "basin of the start", NO_CODE),
         "well": Variable(names, found.well, "1", "equilibrium that captures the start", NO_CODE),
@@ -48,6 +49,9 @@ def _grid_variables(found: BasinMap) -> dict[str, Variable]:
             ("basin",), table[:, 2].astype(np.int32), "1", "its full turns of theta"
         ),
         "basin_share": Variable(("basin",), share, "1", "share of the starts"),
+        "basin_share_at_most": Variable(
+            ("basin",), share + unknown, "1", "share of the starts if all without a label ended there"
+        ),
     }
     if found.settle_time is not None:
         variables["settle_time"] = Variable(

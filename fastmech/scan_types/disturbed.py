@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from itertools import product
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+import numpy as np
 from pydantic import AfterValidator, Field
 
-from fastmech.disturbance.ensemble import equilibria_to_disturb
+from fastmech.basins.label import require_damper
+from fastmech.disturbance.motion import equilibria_to_disturb, require_constant_force
+from fastmech.errors import InputError
 from fastmech.results import Dataset
 from fastmech.scan_types.disturbed_layout import TRAJECTORY_VARIABLES
+from fastmech.scan_types.disturbed_map import MOST_POINTS, MOST_TRAJECTORIES, DisturbedMap
 from fastmech.scan_types.disturbed_tiling import DisturbedTiling
+from fastmech.scan_types.equilibrium_map import Axis, known_parameters
 from fastmech.scan_types.request import MethodName, TiledScan
 from fastmech.scan_types.tiling import Tiling
 from fastmech.scene import Scene, nearest
@@ -32,17 +39,27 @@ def _known_variables(names: list[str]) -> list[str]:
     return names
 
 
+#: Fields of what a map over parameters does not hold.
+_NOT_OF_A_MAP = ("variables", "linear_horizon", "linear_tolerance", "linear_directions")
+
+
 class Disturbed(TiledScan):
     """Ensembles about every equilibrium, uniform in a ball of the kinetic-energy norm."""
 
     kind: ClassVar[str] = "disturbed"
+
+    axes: Annotated[dict[str, Axis], Field(max_length=3), AfterValidator(known_parameters)] = Field(
+        default={}, description="parameters over which all equilibria are disturbed; none: the scene's alone"
+    )
 
     trajectories: Annotated[int, Field(ge=1, le=100_000_000)] = 4096
     radius: Annotated[float, Field(gt=0, description="largest size of a disturbance [rad]")] = 0.5
     return_radius: Annotated[float, Field(gt=0, description="radius of the ball of return [rad]")] = 0.01
     seed: Annotated[int, Field(ge=0)] = 0
     t_end: Annotated[float, Field(gt=0)] = 120.0
-    dt: Annotated[float, Field(gt=0)] = 0.05
+    dt: Annotated[float | None, Field(gt=0)] = Field(
+        None, description="longest step [s]; by default each start's own, from the scene and its energy"
+    )
     method: MethodName = "dop853"
     linear_horizon: Annotated[float, Field(gt=0, description="horizon of the comparison [s]")] = 1.0
     linear_tolerance: Annotated[float, Field(gt=0, description="deviation allowed, relative")] = 0.05
@@ -53,15 +70,41 @@ class Disturbed(TiledScan):
     )
 
     def check(self, scene: Scene) -> None:
-        """There must be something to disturb, and a constant force."""
-        equilibria_to_disturb(scene)
+        """There must be something to disturb, a constant force and a damper, all over a map."""
+        for corner in self._corners(scene):
+            require_constant_force(corner)
+            require_damper(corner)
+        if not self.axes:
+            equilibria_to_disturb(scene)
+            return
+        for name in _NOT_OF_A_MAP:
+            if name in self.model_fields_set:
+                raise InputError(f"{name}: is nothing of a map; leave it out, or the axes")
+        total = math.prod(axis.num for axis in self.axes.values())
+        if total > MOST_POINTS:
+            raise InputError(f"axes: ask for {total:.3g} points, at most {MOST_POINTS:.0e} are allowed")
+        if self.trajectories > MOST_TRAJECTORIES:
+            raise InputError(
+                f"trajectories = {self.trajectories}: must be at most {MOST_TRAJECTORIES} on a map"
+            )
 
     def step_warning(self, scene: Scene) -> str | None:
-        """By the scene's limit and the decaying force."""
-        return step_warning(scene, self.dt, self.method)
+        """By the scene's limit; without ``dt`` each start's step is chosen."""
+        if self.dt is None:
+            return None
+        told = [step_warning(corner, self.dt, self.method) for corner in self._corners(scene)]
+        return next((line for line in told if line is not None), None)
+
+    def _corners(self, scene: Scene) -> list[Scene]:
+        """The scene with the first and last values of all axes; itself where there are none."""
+        ends = [(axis.start, axis.stop) for axis in self.axes.values()]
+        return [scene.replace(**dict(zip(self.axes, values, strict=True))) for values in product(*ends)]
 
     def tiling(self, scene: Scene) -> Tiling:
-        """Blocks of directions and of trajectories."""
+        """Blocks of directions and of trajectories; of a map the equilibria one by one."""
+        if self.axes:
+            axes = {name: np.linspace(axis.start, axis.stop, axis.num) for name, axis in self.axes.items()}
+            return DisturbedMap(self, scene, axes)
         return DisturbedTiling(self, scene)
 
     @property
@@ -73,18 +116,25 @@ class Disturbed(TiledScan):
     @property
     def settings(self) -> dict[str, Any]:
         """What a section says of its request."""
-        return self.model_dump(exclude={"scene", "variables"})
+        left_out = {"scene", "axes", *(_NOT_OF_A_MAP if self.axes else ["variables"])}
+        return self.model_dump(exclude=left_out, exclude_none=True)
 
     @staticmethod
     def read(section: Section, scene: Mapping[str, float]) -> Dataset:
         """What is drawn, of very many trajectories evenly spaced ones."""
+        if "axes" in section.attrs:
+            return section.load()
         step = -(-section.sizes.get("trajectory", 1) // DRAWN)
         drawn = [name for name in section if not name.startswith(("start", "final", "linear_direction"))]
         return section.load(drawn, {"trajectory": slice(None, None, step)})
 
     @staticmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
-        """Outcomes, times to return, excursions and the linearized motion's range."""
+        """Outcomes, times to return, excursions and the linearized motion's range; those of a map over it."""
+        if "axes" in dataset.attrs:
+            from fastmech.plots.disturbed_map import draw_disturbed_map
+
+            return draw_disturbed_map(dataset, scene)
         from fastmech.plots.disturbed import draw_disturbed
 
         return draw_disturbed(dataset)

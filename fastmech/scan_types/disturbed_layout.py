@@ -8,10 +8,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.disturbance.outcome import Outcome
+from fastmech.basins.disturbed import Outcome
 from fastmech.results import ANGLE_UNITS, NO_CODE, STATE_UNITS, Variable, flags, numbers, parts
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
+
+ABOUT_SHARES = {
+    "share_returned": "share that is proved to return",
+    "share_returned_at_most": "share that returned, if all whose end is not known did",
+    "share_returned_lower": "lower end of the 95 % Wilson interval, none of those returning",
+    "share_returned_upper": "upper end of the 95 % Wilson interval, all of those returning",
+}
+ABOUT_QUANTILES = "quantiles of the time to return over those that return, inf: later than the end of the run"
 
 _EACH, _EVERY = ("equilibrium",), ("equilibrium", "trajectory")
 _TURNS = dict.fromkeys(ANGLE_UNITS, "1")
@@ -22,16 +30,16 @@ _TRAJECTORY: dict[str, tuple[str, float, str | Mapping[str, str], str]] = {
     "start": ("f8", np.nan, STATE_UNITS, "{} at the start"),
     "final": ("f8", np.nan, STATE_UNITS, "{} at the end, or of the last finite state"),
     "failed": ("f8", np.nan, "s", "time of the last finite state where it failed on the way"),
-    "outcome": ("i1", -1, "1", "where it is at the end"),
-    "end_equilibrium": ("i1", -1, "1", "equilibrium at which it rests at the end"),
-    "turns": ("i8", 0, _TURNS, "full turns of {} made until then"),
+    "outcome": ("i1", -1, "1", "where it ends"),
+    "end_equilibrium": ("i1", -1, "1", "stable equilibrium at which it is proved to end"),
+    "turns": ("i8", 0, _TURNS, "full turns of {} made on the way there"),
     "time_to_return": (
         "f8",
         np.nan,
         "s",
-        "end of the first step from which on every step ended in the ball of return",
+        "end of the first step from which on every step ended in the ball of return, NaN: none by t_end",
     ),
-    "excursion": ("f8", np.nan, ANGLE_UNITS, "largest departure of {} at the ends of steps"),
+    "excursion": ("f8", np.nan, ANGLE_UNITS, "largest departure of {} at the ends of steps, NaN: failed"),
 }
 
 #: Names of what is known of every trajectory.
@@ -75,11 +83,13 @@ def equilibrium_variables(
 
 
 def tally_variables(
-    share: NDArray[np.float64], errors: NDArray[np.float64], quantiles: NDArray[np.float64]
+    shares: Mapping[str, NDArray[np.float64]],
+    errors: NDArray[np.float64],
+    quantiles: NDArray[np.float64],
 ) -> dict[str, Variable]:
-    """What the trajectories of each equilibrium come to."""
+    """What the trajectories of each equilibrium come to; ``shares`` are those of a tally."""
     return {
-        "share_returned": Variable(_EACH, share, "1", "share that returned"),
+        **{name: Variable(_EACH, shares[name], "1", about) for name, about in ABOUT_SHARES.items()},
         **parts(
             "halving_difference",
             ("equilibrium", "sample"),
@@ -91,7 +101,7 @@ def tally_variables(
             ("equilibrium", "quantile"),
             quantiles,
             "s",
-            "quantiles of the time to return over those that returned",
+            ABOUT_QUANTILES,
         ),
     }
 

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from fastmech.disturbance.ensemble import equilibria_to_disturb
-from fastmech.disturbance.motion import disturbed_motion
+from fastmech.disturbance.motion import default_step, disturbed_motion, equilibria_to_disturb
 from fastmech.ensembles.integrate import FAILURES
 from fastmech.ensembles.spans import output_steps
 from fastmech.equilibria.find import Equilibria, Equilibrium
@@ -38,7 +37,9 @@ class DisturbedMotionScan(TiledScan):
     eta_theta: float = Field(default=0.0, description="disturbance of theta' [rad/s]")
     t_end: Annotated[float, Field(gt=0)] = 20.0
     outputs: Annotated[int, Field(ge=2, le=10_000_000)] = 1001
-    dt: Annotated[float, Field(gt=0)] = 0.01
+    dt: Annotated[float | None, Field(gt=0)] = Field(
+        None, description="longest step [s]; by default 0.05 rad of each equilibrium's highest frequency"
+    )
     method: MethodName = "dop853"
 
     def check(self, scene: Scene) -> None:
@@ -46,8 +47,8 @@ class DisturbedMotionScan(TiledScan):
         equilibria_to_disturb(scene)
 
     def step_warning(self, scene: Scene) -> str | None:
-        """By the scene's limit and the decaying force."""
-        return step_warning(scene, self.dt, self.method)
+        """By the scene's limit; without ``dt`` each equilibrium's step is chosen."""
+        return None if self.dt is None else step_warning(scene, self.dt, self.method)
 
     def tiling(self, scene: Scene) -> Tiling:
         """The equilibria one by one."""
@@ -68,7 +69,7 @@ class DisturbedMotionScan(TiledScan):
         t = self._times
         disturbance = [self.xi_phi, self.xi_theta, self.eta_phi, self.eta_theta]
         # The step taken: what divides the intervals between outputs.
-        step = t[1] / output_steps(t[:2], self.dt)[0]
+        step = t[1] / output_steps(t[:2], self.dt or default_step(scene, equilibrium))[0]
         motion, halved = (
             disturbed_motion(scene, equilibrium, disturbance, t, dt=dt, method=self.method)
             for dt in (step, 0.5 * step)
@@ -79,6 +80,7 @@ class DisturbedMotionScan(TiledScan):
                 "nonlinear": Variable(("time", "component"), motion.nonlinear[:, 0]),
                 "linearized": Variable(("time", "component"), motion.linearized[:, 0]),
                 "difference": Variable((), difference),
+                "step": Variable((), step),
                 "status": Variable((), motion.status[0]),
             }
         )
@@ -94,7 +96,10 @@ class DisturbedMotionScan(TiledScan):
         for kind in ("nonlinear", "linearized"):
             motion = np.stack([tile[kind].data for tile in tiles])
             variables |= parts(kind, dims, motion, STATE_UNITS, f"disturbance of {{}}, {kind} motion")
-        attrs = self.model_dump(exclude={"scene"}) | {
+        steps = [float(tile["step"].data) for tile in tiles]
+        attrs = self.model_dump(exclude={"scene"}, exclude_none=True) | {
+            "shortest_step": min(steps),
+            "longest_step": max(steps),
             "error_estimate": float(np.max([tile["difference"].data for tile in tiles])),
             "error_estimate_is": HALVING,
         }

@@ -11,8 +11,8 @@ round a cusp, ``sheet_break`` where a sheet is torn. ``curves``, of a map over t
 curves, cusps and vanishing-damping curves, point after point, ``fold_curve`` and ``unreached_curve``
 numbering them; of a map over one its folds.
 
-A fold curve is found where it separates points of the grid: an island of six equilibria (or of four) that
-lies between the points, parting no two neighbours, is not seen. A finer grid sees it.
+Folds do not depend on the grid: ``fold_proof`` tells that none is missing, or where that is not proved;
+``fold_kind`` names folds and the pitchforks of symmetric scenes.
 """
 
 from __future__ import annotations
@@ -53,7 +53,8 @@ class Axis(BaseModel):
     num: Annotated[int, Field(ge=1, le=100_000)]
 
 
-def _known_parameters(axes: dict[str, Axis]) -> dict[str, Axis]:
+def known_parameters(axes: dict[str, Axis]) -> dict[str, Axis]:
+    """Refuse axes that are no parameters of a scene."""
     for name in axes:
         if name not in Scene.model_fields:
             raise ValueError(f"unknown parameter {name!r}; {nearest(name, list(Scene.model_fields))}")
@@ -73,7 +74,7 @@ class EquilibriumMap(TiledScan):
 
     kind: ClassVar[str] = "equilibrium_map"
 
-    axes: Annotated[dict[str, Axis], Field(min_length=1, max_length=3), AfterValidator(_known_parameters)]
+    axes: Annotated[dict[str, Axis], Field(min_length=1, max_length=3), AfterValidator(known_parameters)]
     variables: Annotated[list[str], AfterValidator(_known_variables)] | None = Field(
         None, description="what to keep of every point (all by default); large maps are smaller with less"
     )

@@ -20,6 +20,9 @@ SHIPPED = Path(__file__).parents[2] / "data" / "small.h5"
 
 BINS = 5
 
+#: Outcomes that say nothing of where a motion ends.
+FAILED = ("not_finite", "step_too_large", "not_converged")
+
 
 def main(path: str | Path = SHIPPED) -> None:
     with fm.open_results(path) as results:
@@ -35,9 +38,10 @@ def main(path: str | Path = SHIPPED) -> None:
             outcome = one["outcome"].data
             print(f"phi = {one['phi'].data:.4f} rad, theta = {one['theta'].data:.4f} rad")
             for value in np.unique(outcome):
-                print(f"  {names[int(value)]:14s} {np.mean(outcome == value):7.2%}")
+                failed = "failed, no end known: " if names[int(value)] in FAILED else ""
+                print(f"  {failed}{names[int(value)]:14s} {np.mean(outcome == value):7.2%}")
             largest = np.maximum(one["excursion_phi"].data, one["excursion_theta"].data)
-            edges = np.quantile(largest, np.linspace(0.0, 1.0, BINS + 1))
+            edges = np.nanquantile(largest, np.linspace(0.0, 1.0, BINS + 1))  # failed ones are no numbers
             back = outcome == codes["returned"]
             if not back.any():
                 continue

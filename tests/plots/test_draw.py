@@ -164,6 +164,27 @@ def test_shares_of_the_bars_sum_up():
     assert widths == pytest.approx(dict.fromkeys(range(6), 100.0))
 
 
+def test_failures_are_no_part_of_where_motions_end():
+    """Steps far too long: bars hold the motions that were computed, and the rest is told apart."""
+    scene = Scene(c1=2000.0, c2=8000.0, beta=20.0, alpha=0.0)
+    dataset = run("disturbed", scene, trajectories=64, radius=1.0, t_end=20.0, dt=0.05, linear_directions=1)
+    figures = scan_kinds()["disturbed"].draw(dataset, scene.model_dump())
+    for figure in figures.values():
+        assert_legible(figure)
+    codes = flag_codes(dataset["outcome"])
+    failing = [codes[name] for name in ("not_finite", "step_too_large", "not_converged")]
+    axes = figures["outcomes"].axes[0]
+    told = {round(text.xy[1]): text.get_text() for text in axes.texts if hasattr(text, "xy")}
+    lost = 100.0 * np.isin(dataset["outcome"].data, failing).mean(axis=1)
+    assert lost.max() > 20.0
+    for row, share in enumerate(lost):
+        bars = [bar for bar in axes.patches if round(bar.get_y() + bar.get_height() / 2) == row]
+        assert sum(bar.get_width() for bar in bars) == pytest.approx(100.0 - share)
+        assert told[row].startswith("failed, no end known:" if share else "")
+    known = {text.get_text() for text in figures["outcomes"].legends[0].get_texts()}
+    assert not known & {"not finite", "step too large", "not converged"}
+
+
 @pytest.mark.parametrize(
     ("kept", "told"),
     [
@@ -246,6 +267,26 @@ def test_pictures_tell_their_scene():
         "Equilibria over F0; folds at -671.163, 671.163 N\nTable 1 with c1 = 294.9 N/m, c2 = 92.85 N/m"
     )
     assert {"stable, number 1", "stable, number 2"} <= {curve.get_label() for curve in line.lines}
+
+
+def test_pitchforks_are_named_and_missing_proofs_told():
+    """C = a b / (a + b): see ``tests/atlas/test_folds.py``."""
+    unforced = Scene(alpha=0.0, F0=0.0, c2=92.85)
+    falling = {"c1": axis(120.0, 1.0, 60)}
+    axes = draw("equilibrium_map", unforced, axes=falling)["branches"].axes[0]
+    assert axes.get_title().startswith("Equilibria over c1; pitchfork at 43.1747 N/m\n")
+    marks = [line for line in axes.lines if line.get_label() == "pitchfork (symmetric)"]
+    assert [float(x) for x in marks[0].get_xdata()] == pytest.approx([43.17473449000661])
+    grid = {"c1": axis(1.0, 400.0, 8), "c2": axis(1.0, 800.0, 9)}
+    dataset = run("equilibrium_map", unforced, axes=grid)
+    figure = scan_kinds()["equilibrium_map"].draw(dataset, unforced.model_dump())["count"]
+    (legend,) = figure.legends
+    assert {text.get_text() for text in legend.get_texts()} >= {
+        "pitchfork (symmetric) of resting positions", "pitchfork (symmetric) of unstable equilibria"
+    }  # fmt: skip
+    dataset["fold_proof"].data[0] = "not proved near c1 = 1 N/m"
+    figure = scan_kinds()["equilibrium_map"].draw(dataset, unforced.model_dump())["count"]
+    assert "not proved that these are all folds" in figure.get_suptitle()
 
 
 def test_stable_branches_are_solid_and_unstable_dashed():
