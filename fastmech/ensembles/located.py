@@ -67,9 +67,8 @@ class Course(NamedTuple):
     ended: NDArray[np.int64]  #: what became of each (n,)
 
 
-COURSE: Any = types.NamedTuple(
-    [MATRIX, MATRIX, VECTOR, VECTOR, VECTOR, VECTOR, CUBE, MATRIX, MATRIX, INTEGERS], Course
-)
+_tuple: Any = types.NamedTuple
+COURSE = _tuple([MATRIX, MATRIX, VECTOR, VECTOR, VECTOR, VECTOR, CUBE, MATRIX, MATRIX, INTEGERS], Course)
 
 
 class Work(NamedTuple):
