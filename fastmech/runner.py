@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from fastmech.ensembles.run import Progress
-from fastmech.errors import InputError, StepWarning
+from fastmech.errors import InputError, StepWarning, shown
 from fastmech.plots.style import save
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import RunContext, read_request
@@ -88,7 +88,9 @@ def draw_results(
                 )
             if results[name].attrs.get("kind") not in kinds:
                 kind = results[name].attrs.get("kind")
-                raise InputError(f"{path}: {name}: kind = {kind!r} is unknown; known: {', '.join(kinds)}")
+                raise InputError(
+                    f"{path}: {name}: kind = {shown(kind)} is unknown; known: {', '.join(kinds)}"
+                )
         folder = Path(out) if out is not None else Path(path).with_suffix("")
         _make_folder(folder)
         for name in results:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown
 
 #: Bytes for which the machine is not asked whether it has them: the question takes longer than a small run.
 UNASKED = 2**26
@@ -32,7 +32,7 @@ def number(name: str, value: Any, unit: str, *, above: float = -math.inf, least:
     except OverflowError:  # of an integer
         found = math.inf
     if not math.isfinite(found) or not found > above or not found >= least:
-        raise InputError(f"{name} = {value!r}: {allowed}")
+        raise InputError(f"{name} = {shown(value)}: {allowed}")
     return found
 
 
@@ -43,9 +43,9 @@ def whole_number(name: str, value: Any, *, least: int, most: int | None = None) 
         InputError: it is something else.
     """
     if not isinstance(value, Integral) or isinstance(value, bool) or value < least:
-        raise InputError(f"{name} = {value!r}: must be an integer not less than {least}")
+        raise InputError(f"{name} = {shown(value)}: must be an integer not less than {least}")
     if most is not None and int(value) > most:
-        raise InputError(f"{name} = {value!r}: must be an integer not greater than {most}")
+        raise InputError(f"{name} = {shown(value)}: must be an integer not greater than {most}")
     return int(value)
 
 
@@ -56,7 +56,7 @@ def progress_function(progress: Any, what: str) -> None:
         InputError: it cannot be called.
     """
     if progress is not None and not callable(progress):
-        raise InputError(f"progress = {progress!r}: must be a function of the number of finished {what}")
+        raise InputError(f"progress = {shown(progress)}: must be a function of the number of finished {what}")
 
 
 def reals(name: str, values: ArrayLike, what: str, least_dimensions: int = 0) -> NDArray[np.float64]:
@@ -88,8 +88,15 @@ def states(name: str, values: ArrayLike, columns: int) -> NDArray[np.float64]:
     return array
 
 
-def memory(numbers: int, copies: int) -> None:
+def memory(
+    numbers: int,
+    copies: int,
+    what: str = "y0, t_eval: the states",
+    fewer: str = "fewer trajectories or output times",
+) -> None:
     """Refuse results of so many numbers, held ``copies`` times on the way, before anything is allocated.
+
+    ``what`` they are, and what needs less, is for the message.
 
     Raises:
         InputError: the machine has not as much free memory.
@@ -98,8 +105,8 @@ def memory(numbers: int, copies: int) -> None:
     free = free_memory() if needed > UNASKED else math.inf
     if needed > free:
         raise InputError(
-            f"y0, t_eval: the states would take {needed / 2**30:.3g} GiB on the way, {free / 2**30:.3g} GiB "
-            "are free; ask for fewer trajectories or output times"
+            f"{what} would take {needed / 2**30:.3g} GiB on the way, {free / 2**30:.3g} GiB are free; "
+            f"ask for {fewer}"
         )
 
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.errors import InputError, StepWarning
+from fastmech.errors import InputError, StepWarning, shown
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import potential_energy, potential_gradient, potential_hessian
@@ -152,7 +152,7 @@ def step_warning(scene: Scene, dt: float, method: str, starts: ArrayLike | None 
     require_scene(scene)
     fastest = 0.0 if starts is None else _fastest(starts)
     if not isinstance(dt, Real) or isinstance(dt, bool) or not 0.0 < dt < np.inf:
-        raise InputError(f"dt = {dt!r}: must be a finite number of s greater than 0")
+        raise InputError(f"dt = {shown(dt)}: must be a finite number of s greater than 0")
     return _told(_first_limit(scene, dt, method, fastest), dt, method)
 
 

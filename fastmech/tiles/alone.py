@@ -6,7 +6,7 @@ import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown
 from fastmech.results import Dataset
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import Request, RunContext, read_request
@@ -80,7 +80,9 @@ def compute_alone(path: Path, tile: str, context: RunContext, target: Path) -> L
     sections = {s.name: s for s in sections_of(request, identity_of(asked_for(request)))}
     name, _, number = tile.partition(":")
     if name not in sections:
-        raise InputError(f"--tile {tile}: the request has no section {name!r}; it has {', '.join(sections)}")
+        raise InputError(
+            f"--tile {tile}: the request has no section {shown(name)}; it has {', '.join(sections)}"
+        )
     section = sections[name]
     if not (number.isascii() and number.isdigit()) or int(number) >= section.tiling.count:
         raise InputError(f"--tile {tile}: {name} has the tiles 0 to {section.tiling.count - 1}")
