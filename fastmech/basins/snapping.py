@@ -128,7 +128,7 @@ def map_snapping(
     find_method(method)
     if dt is not None:
         dt = checks.number("dt", dt, "s", above=0.0)
-    end = 200.0 + np.log(1e6) / rate if t_end is None else checks.number("t_end", t_end, "s", above=0.0)
+    end = default_end(rate) if t_end is None else checks.number("t_end", t_end, "s", above=0.0)
     rest = equilibria[index]
     shape = rate.size, force.size
     certificate = certificate_of(free)
@@ -156,6 +156,11 @@ def map_snapping(
         np.where(captured, found.time, np.nan).reshape(shape),
         status.reshape(shape),
     )
+
+
+def default_end(alpha: ArrayLike) -> Floats:
+    """End of a run [s] by default: when the force has fallen to a millionth, and 200 s."""
+    return 200.0 + np.log(1e6) / np.asarray(alpha, dtype=np.float64)
 
 
 def force_free(scene: Scene, start: Equilibrium | None) -> tuple[Scene, Equilibria, int]:

@@ -61,6 +61,16 @@ def fastest_rate(c: Coefficients, starts: Floats) -> Floats:
         return np.asarray(np.sqrt(2.0 * np.maximum(total - lowest + 4.0 * abs(c.force), 0.0) / least))
 
 
+def fastest_followed(c: Coefficients) -> float:
+    """Largest turning [rad/s] for which the shortest of the steps by default is short enough."""
+    return TURNING / shortest_step(c)
+
+
+def shortest_step(c: Coefficients) -> float:
+    """Shortest of the coarse steps by default [s]."""
+    return 0.5**MOST_OCTAVES * PHASE / highest_frequency(c)
+
+
 def coarse_steps(c: Coefficients, starts: Floats) -> Floats:
     """Coarse step [s] of each start, shape (n,): the scene's own, halved until it is small enough.
 

@@ -55,11 +55,9 @@ def command(
     if workers is not None and scheduler is not None:
         raise click.UsageError("--workers and --scheduler exclude each other")
     with account("run", quiet, as_json) as told:
-        from fastmech.scan_types.request import RunContext, check_outline
-
-        check_outline(request_file)  # before kernels are compiled, which may take a minute
         with told.bars.preparing():
             from fastmech.runner import run_request
+            from fastmech.scan_types.request import RunContext
             from fastmech.tiles.run import default_output
         context = RunContext(threads, told.bars.stage)
         target = out or default_output(request_file)
@@ -70,6 +68,7 @@ def command(
             report = run_request(
                 request_file, target, fresh=fresh, context=context, hire=hire, tell=told.bars.tell
             )
+        told.done = str(target)
         told.facts |= report.summary()
         _show(told, report)
 
@@ -89,8 +88,11 @@ def _hiring(workers: int | None, scheduler: str | None) -> Iterator[Hiring | Non
 def _run_tile(
     told: Account, request_file: Path, tile: str, target: Path, keep: Path | None, context: RunContext
 ) -> None:
+    from fastmech.store.write import check_writable
     from fastmech.tiles.alone import compute_alone
 
+    if keep is not None:
+        check_writable(keep)
     alone = compute_alone(request_file, tile, context, target)
     told.facts |= {"tile": tile, "content": alone.content, "same": alone.same}
     told.say(f"{alone.seconds:9.2f} s  {tile}: {alone.items:,} {alone.what}")

@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+import numpy as np
 from pydantic import AfterValidator, Field
 
-from fastmech.disturbance.ensemble import equilibria_to_disturb
+from fastmech.disturbance.ensemble import require_constant_force
+from fastmech.ensembles.spans import output_steps
+from fastmech.errors import InputError, shown
+from fastmech.integrators.methods import find_method
 from fastmech.results import Dataset
 from fastmech.scan_types.disturbed_layout import TRAJECTORY_VARIABLES
 from fastmech.scan_types.disturbed_tiling import DisturbedTiling
-from fastmech.scan_types.request import MethodName, TiledScan
+from fastmech.scan_types.request import MethodName, Seed, TiledScan
 from fastmech.scan_types.tiling import Tiling
 from fastmech.scene import Scene, nearest
 from fastmech.step_limits.warning import step_warning
@@ -21,6 +25,9 @@ if TYPE_CHECKING:
 
     from fastmech.store.read import Section
 
+#: Right-hand sides of the largest ensemble: a year of a hundred cores.
+MOST_WORK = 1e17
+
 #: Trajectories of each equilibrium that are drawn at most: they are random, so some stand for all.
 DRAWN = 1 << 20
 
@@ -28,7 +35,7 @@ DRAWN = 1 << 20
 def _known_variables(names: list[str]) -> list[str]:
     for name in names:
         if name not in TRAJECTORY_VARIABLES:
-            raise ValueError(f"unknown variable {name!r}; {nearest(name, list(TRAJECTORY_VARIABLES))}")
+            raise ValueError(f"unknown variable {shown(name)}; {nearest(name, list(TRAJECTORY_VARIABLES))}")
     return names
 
 
@@ -40,7 +47,7 @@ class Disturbed(TiledScan):
     trajectories: Annotated[int, Field(ge=1, le=100_000_000)] = 4096
     radius: Annotated[float, Field(gt=0, description="largest size of a disturbance [rad]")] = 0.5
     return_radius: Annotated[float, Field(gt=0, description="radius of the ball of return [rad]")] = 0.01
-    seed: Annotated[int, Field(ge=0)] = 0
+    seed: Seed = 0
     t_end: Annotated[float, Field(gt=0)] = 120.0
     dt: Annotated[float, Field(gt=0)] = 0.05
     method: MethodName = "dop853"
@@ -53,8 +60,15 @@ class Disturbed(TiledScan):
     )
 
     def check(self, scene: Scene) -> None:
-        """There must be something to disturb, and a constant force."""
-        equilibria_to_disturb(scene)
+        """The force must be constant, and so much work possible."""
+        require_constant_force(scene)
+        steps = int(output_steps(np.array([0.0, self.t_end]), 0.5 * self.dt).sum())
+        work = float(self.trajectories) * find_method(self.method).evaluations(steps)
+        if work > MOST_WORK:
+            raise InputError(
+                f"trajectories, t_end, dt: ask for {work:.3g} right-hand sides about every equilibrium, "
+                f"at most {MOST_WORK:.0e} are possible"
+            )
 
     def step_warning(self, scene: Scene) -> str | None:
         """By the scene's limit and the decaying force."""

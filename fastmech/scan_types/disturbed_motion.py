@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from fastmech.disturbance.ensemble import equilibria_to_disturb
+from fastmech.disturbance.ensemble import equilibria_to_disturb, require_constant_force
 from fastmech.disturbance.motion import disturbed_motion
+from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import FAILURES
 from fastmech.ensembles.spans import output_steps
 from fastmech.equilibria.find import Equilibria, Equilibrium
+from fastmech.equilibria.search import MOST
 from fastmech.results import Dataset, Variable
 from fastmech.scan_types.each import Each
 from fastmech.scan_types.request import HALVING, MethodName, TiledScan, failures
@@ -42,8 +44,11 @@ class DisturbedMotionScan(TiledScan):
     method: MethodName = "dop853"
 
     def check(self, scene: Scene) -> None:
-        """There must be something to disturb, and a constant force."""
-        equilibria_to_disturb(scene)
+        """The force must be constant, so many steps possible, and the outputs fit into memory."""
+        require_constant_force(scene)
+        output_steps(self._times, 0.5 * self.dt)
+        numbers = self.outputs * 2 * 4 * MOST
+        checks.memory(numbers, 3, "outputs: the motions about equilibria", "fewer outputs")
 
     def step_warning(self, scene: Scene) -> str | None:
         """By the scene's limit and the decaying force."""

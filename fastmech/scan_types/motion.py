@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from fastmech.ensembles import checks
 from fastmech.ensembles.balance import energy_balance
 from fastmech.ensembles.integrate import FAILURES, integrate
 from fastmech.ensembles.spans import output_steps
@@ -25,6 +26,9 @@ from fastmech.step_limits.warning import step_warning
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+#: Numbers of a section for every output.
+OUTPUT_NUMBERS = 30
 
 _STATE = {
     "phi": ("rad", "angle phi"),
@@ -60,6 +64,11 @@ class Motion(TiledScan):
     outputs: Annotated[int, Field(ge=2, le=10_000_000)] = 2001
     dt: Annotated[float, Field(gt=0)] = 0.01
     method: MethodName = "dop853"
+
+    def check(self, scene: Scene) -> None:
+        """So many steps must be possible, and what is kept of every output fit into memory."""
+        output_steps(self._times, 0.5 * self.dt)
+        checks.memory(self.outputs * OUTPUT_NUMBERS, 3, "outputs: the motion", "fewer outputs")
 
     def step_warning(self, scene: Scene) -> str | None:
         """By the scene's limit, the decaying force and the rates of the start."""
