@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from fastmech.basins.ladder import SUBSTEPS
 from fastmech.basins.runs import rounds_until
 from fastmech.basins.steps import fastest_followed, shortest_step
 from fastmech.ensembles import checks
+from fastmech.ensembles.spans import MOST_STEPS
 from fastmech.errors import InputError
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Number, Scene
@@ -89,25 +91,39 @@ def arrays(axes: Mapping[str, Axis]) -> dict[str, NDArray[np.float64]]:
     return {name: axis.array for name, axis in axes.items()}
 
 
-def check_size(axes: Mapping[str, Axis], what: str, most: int, numbers: int) -> None:
+def check_size(where: str, axes: Mapping[str, Axis], what: str, most: int, numbers: int) -> None:
     """Refuse grids of more points than can be, or than fit into memory at so many ``numbers`` a point.
 
     Raises:
         InputError: there are too many.
     """
-    where, total = ", ".join(axes), math.prod(axis.size for axis in axes.values())
+    total = math.prod(axis.size for axis in axes.values())
     if total > most:
         raise InputError(f"{where}: ask for {total:.3g} {what}, at most {most:.0e} are allowed")
     checks.memory(total * numbers, 1, f"{where}: {total:.3g} {what}", f"fewer {what}")
 
 
-def check_duration(scene: Scene, t_end: float, dt: float | None) -> None:
-    """Refuse runs of basins that take more steps than can be counted.
+def check_steps(where: str, t_end: float, dt: float) -> None:
+    """Refuse runs of more fixed steps than are possible, with half the step too.
 
     Raises:
-        InputError: they do.
+        InputError: they take more.
     """
-    rounds_until(t_end, shortest_step(reduce(scene)) if dt is None else dt)
+    if not 2.0 * t_end <= MOST_STEPS * dt:
+        raise InputError(
+            f"{where} = {t_end:g} s: takes {t_end / dt:.3g} steps of {dt:g} s, at most {MOST_STEPS / 2:.0e} "
+            "are possible"
+        )
+
+
+def check_duration(scene: Scene, t_end: float, dt: float | None) -> None:
+    """Refuse runs of basins whose finest computation would take more steps than are possible.
+
+    Raises:
+        InputError: it would.
+    """
+    coarse = shortest_step(reduce(scene)) if dt is None else dt
+    rounds_until(t_end, coarse * SUBSTEPS[0] / SUBSTEPS[-1])
 
 
 def check_rising(name: str, axis: Axis) -> None:

@@ -21,7 +21,7 @@ from fastmech.scan_types.axis import Axis, arrays, check_duration, check_rising,
 from fastmech.scan_types.basin_tiling import BasinTiling
 from fastmech.scan_types.request import MethodName, TiledScan
 from fastmech.scan_types.tiling import Tiling
-from fastmech.scene import Scene, nearest
+from fastmech.scene import Number, Scene, nearest
 from fastmech.step_limits.warning import step_warning
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ class Basins(TiledScan):
     refine: Annotated[int | None, Field(ge=2, le=1024), AfterValidator(_power_of_two)] = Field(
         None, description="compute so coarse a grid first, then only near boundaries (a heuristic)"
     )
-    settle_radius: Annotated[float | None, Field(gt=0)] = Field(
+    settle_radius: Annotated[Number, Field(gt=0)] | None = Field(
         None, description="also the time from which on a motion stays so near to its well [rad]"
     )
     dt: Annotated[float | None, Field(gt=0)] = Field(None, description="coarsest step [s]")
@@ -66,7 +66,7 @@ class Basins(TiledScan):
     def check(self, scene: Scene) -> None:
         """Without a damper there are no basins; and a map has its limits."""
         require_damper(scene)
-        check_size(self.axes, "starts", MOST_POINTS, POINT_NUMBERS)
+        check_size("axes", self.axes, "starts", MOST_POINTS, POINT_NUMBERS)
         for name, axis in self.axes.items():
             if name in self.fixed:
                 raise InputError(f"fixed.{name}: is an axis of the map; give one or the other")

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-import numpy as np
 from pydantic import AfterValidator, Field
 
 from fastmech.disturbance.ensemble import require_constant_force
-from fastmech.ensembles.spans import output_steps
 from fastmech.errors import InputError, shown
 from fastmech.integrators.methods import find_method
 from fastmech.results import Dataset
+from fastmech.scan_types.axis import check_steps
 from fastmech.scan_types.disturbed_layout import TRAJECTORY_VARIABLES
 from fastmech.scan_types.disturbed_tiling import DisturbedTiling
 from fastmech.scan_types.request import MethodName, Seed, TiledScan
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 #: Right-hand sides of the largest ensemble: a year of a hundred cores.
 MOST_WORK = 1e17
+
+#: Step of the linearized motion's comparison [s], as `fastmech.disturbance.linear_range` has it by default.
+LINEAR_DT = 0.02
 
 #: Trajectories of each equilibrium that are drawn at most: they are random, so some stand for all.
 DRAWN = 1 << 20
@@ -62,8 +65,10 @@ class Disturbed(TiledScan):
     def check(self, scene: Scene) -> None:
         """The force must be constant, and so much work possible."""
         require_constant_force(scene)
-        steps = int(output_steps(np.array([0.0, self.t_end]), 0.5 * self.dt).sum())
-        work = float(self.trajectories) * find_method(self.method).evaluations(steps)
+        check_steps("t_end", self.t_end, self.dt)
+        check_steps("linear_horizon", self.linear_horizon, LINEAR_DT)
+        steps = math.ceil(self.t_end / self.dt)
+        work = self.trajectories * find_method(self.method).evaluations(steps)
         if work > MOST_WORK:
             raise InputError(
                 f"trajectories, t_end, dt: ask for {work:.3g} right-hand sides about every equilibrium, "
@@ -87,7 +92,8 @@ class Disturbed(TiledScan):
     @property
     def settings(self) -> dict[str, Any]:
         """What a section says of its request."""
-        return self.model_dump(exclude={"scene", "variables"})
+        settings = self.model_dump(exclude={"scene", "variables"})
+        return settings | {"seed": self.seed if self.seed < 2**64 else str(self.seed)}  # no integer of HDF5's
 
     @staticmethod
     def read(section: Section, scene: Mapping[str, float]) -> Dataset:

@@ -17,6 +17,7 @@ from fastmech.ensembles.spans import output_steps
 from fastmech.equilibria.find import Equilibria, Equilibrium
 from fastmech.equilibria.search import MOST
 from fastmech.results import Dataset, Variable
+from fastmech.scan_types.axis import check_steps
 from fastmech.scan_types.each import Each
 from fastmech.scan_types.request import HALVING, MethodName, TiledScan, failures
 from fastmech.scan_types.tiling import Tiling
@@ -46,7 +47,7 @@ class DisturbedMotionScan(TiledScan):
     def check(self, scene: Scene) -> None:
         """The force must be constant, so many steps possible, and the outputs fit into memory."""
         require_constant_force(scene)
-        output_steps(self._times, 0.5 * self.dt)
+        check_steps("t_end", self.t_end, self.dt)
         numbers = self.outputs * 2 * 4 * MOST
         checks.memory(numbers, 3, "outputs: the motions about equilibria", "fewer outputs")
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fastmech.disturbance.ensemble import STREAM, DisturbedEnsemble, disturb, equilibria_to_disturb
 from fastmech.disturbance.linear_range import linear_range
-from fastmech.disturbance.outcome import FAILURES
+from fastmech.disturbance.outcome import FAILURES, resting_place
 from fastmech.disturbance.size import size_at
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.spans import output_steps
@@ -89,6 +89,9 @@ class DisturbedTiling(Tiling):
     def __init__(self, request: _Request, scene: Scene) -> None:
         self.request, self.scene = request, scene
         self.equilibria = equilibria_to_disturb(scene)
+        resting_place(
+            scene, self.equilibria, np.zeros((0, 4)), request.return_radius
+        )  # refuses too large balls
         self.rays = _blocks(request.linear_directions, DIRECTIONS)
         self.parts = _blocks(request.trajectories, _tile_length(request))
         self.count = len(self.equilibria) * (len(self.rays) + len(self.parts))

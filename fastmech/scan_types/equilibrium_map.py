@@ -73,11 +73,11 @@ class EquilibriumMap(TiledScan):
         """Every value of every axis must be one the scene accepts, and every axis must matter."""
         refuse_decaying_load(scene, self.axes)
         check_parameters(scene, self.axes, "axes")
-        check_size(self.axes, "points", MOST_POINTS, SHEET_NUMBERS)
+        check_size("axes", self.axes, "points", MOST_POINTS, SHEET_NUMBERS)
         first, *others = self.axes
         plane = {name: self.axes[name] for name in others} or {first: self.axes[first]}
         if others:
-            check_size(plane, f"points in a plane of {first}", MOST_POINTS, POINT_NUMBERS)
+            check_size("axes", plane, f"points in a plane of {first}", MOST_POINTS, POINT_NUMBERS)
 
     def tiling(self, scene: Scene) -> Tiling:
         """Planes of the first axis, and the curves as a tile of their own."""

@@ -116,7 +116,7 @@ class Erosion(TiledScan):
         check_rising(f"along.{name}", axis)
         check_parameters(scene, self.along, "along")
         ends = [scene.replace(**{name: float(value)}) for value in self.values[[0, -1]]]
-        check_size(self.axes, "starts", MOST_POINTS, 1)
+        check_size("axes", self.axes, "starts", MOST_POINTS, 1)
         for end in ends:
             require_damper(end)
             check_starts(end, {f"axes.{state}": line for state, line in arrays(self.axes).items()})

@@ -18,6 +18,7 @@ from fastmech.mechanism.geometry import constraints, positions
 from fastmech.mechanism.hamilton import momenta
 from fastmech.mechanism.reactions import reactions
 from fastmech.results import Dataset, Variable
+from fastmech.scan_types.axis import check_steps
 from fastmech.scan_types.each import Each
 from fastmech.scan_types.request import HALVING, MethodName, TiledScan, failures
 from fastmech.scan_types.tiling import Tiling
@@ -67,7 +68,7 @@ class Motion(TiledScan):
 
     def check(self, scene: Scene) -> None:
         """So many steps must be possible, and what is kept of every output fit into memory."""
-        output_steps(self._times, 0.5 * self.dt)
+        check_steps("t_end", self.t_end, self.dt)
         checks.memory(self.outputs * OUTPUT_NUMBERS, 3, "outputs: the motion", "fewer outputs")
 
     def step_warning(self, scene: Scene) -> str | None:

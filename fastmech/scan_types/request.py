@@ -29,8 +29,10 @@ if TYPE_CHECKING:
 
 
 def _known_method(name: str) -> str:
-    find_method(name)
-    return name
+    try:
+        return find_method(name).name
+    except InputError as error:
+        raise ValueError(str(error).removeprefix(f"method = {shown(name)}: ")) from None
 
 
 #: A field that names an integration method.
@@ -228,7 +230,8 @@ def _scan(name: str, value: Any, kinds: Mapping[str, type[Scan]]) -> Scan:
     if kind is None:
         raise InputError(f"{where}.kind: missing; allowed: {', '.join(kinds)}")
     if not isinstance(kind, str) or kind not in kinds:
-        raise InputError(f"{where}.kind = {shown(kind)}: unknown; {nearest(shown_name(kind), list(kinds))}")
+        hint = nearest(kind if isinstance(kind, str) else "", list(kinds))
+        raise InputError(f"{where}.kind = {shown(kind)}: unknown; {hint}")
     try:
         return kinds[kind](**entry)
     except ValidationError as error:

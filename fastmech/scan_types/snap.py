@@ -10,11 +10,12 @@ from pydantic import Field
 
 from fastmech.atlas.snap import find_snap
 from fastmech.equilibria.find import Equilibrium, find_equilibria
+from fastmech.errors import InputError
 from fastmech.results import Dataset, Variable
 from fastmech.scan_types.each import Each
 from fastmech.scan_types.request import TiledScan
 from fastmech.scan_types.tiling import Tiling
-from fastmech.scene import Scene
+from fastmech.scene import Number, Scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,7 +26,15 @@ class SnapScan(TiledScan):
 
     kind: ClassVar[str] = "snap"
 
-    searched: list[float] | None = Field(None, min_length=2, max_length=2, description="loads to search [N]")
+    searched: list[Number] | None = Field(None, min_length=2, max_length=2, description="loads to search [N]")
+
+    def check(self, scene: Scene) -> None:
+        """The range must hold the present load."""
+        present = scene.F0 if scene.alpha == 0.0 else 0.0
+        if self.searched is not None and not self.searched[0] <= present <= self.searched[1]:
+            raise InputError(
+                f"searched = {self.searched}: must be a range of forces that holds {present:g} N"
+            )
 
     def tiling(self, scene: Scene) -> Tiling:
         """The stable positions one by one."""

@@ -33,6 +33,9 @@ MOST_POINTS, POINT_NUMBERS = 5_000_000, 20
 #: The critical impulse is looked for up to so many times the smallest F0/alpha of the largest force.
 IMPULSES = 4.0
 
+#: Least tolerance of a critical force over the force: doubles between two such forces.
+ROUNDING = 2.0**-44
+
 #: Motions of a tile, about.
 TILE_POINTS = 1 << 12
 
@@ -77,9 +80,14 @@ class Snapping(TiledScan):
         slowest = float(self.rates[0])
         if slowest <= 0.0:
             raise InputError(f"alpha: begins at {slowest:g} 1/s: must be greater than 0 1/s")
+        least = ROUNDING * float(np.abs(self.forces).max())
+        if self.tolerance < least:
+            raise InputError(
+                f"tolerance = {self.tolerance:g}: must not be less than {least:.2g} N, for rounding"
+            )
         axes = {"F0": self.F0, "alpha": self.alpha}
         check_parameters(scene, axes, "axes")
-        check_size(axes, "motions", MOST_POINTS, POINT_NUMBERS)
+        check_size("F0, alpha", axes, "motions", MOST_POINTS, POINT_NUMBERS)
         end = float(default_end(slowest)) if self.t_end is None else self.t_end
         for force in (first, last):
             check_duration(scene.replace(F0=force, alpha=slowest), end, None)
