@@ -33,6 +33,7 @@ _HEAD = '''"""Made by fastmech: block kernels of {name!r}, whose functions are `
 from fastmech.ensembles.stopping import note_stop
 from fastmech.jit import OBSERVER_SIGNATURE, RHS_SIGNATURE, kernel
 from fastmech.kernels.attempt import attempt
+from fastmech.kernels.bits import NO_LANE, noted
 
 '''
 
@@ -50,10 +51,10 @@ def block(t, Y, dY, p):
 _TEMPLATE_WITHIN = """
 @kernel(RHS_SIGNATURE)
 def block(t, Y, dY, p):
-    beyond = 0
+    beyond = NO_LANE
     for i in range(Y.shape[1]):
         raised, ({rates},) = attempt(rhs_within, ({arguments},))
-        beyond |= raised
+        beyond = noted(beyond, raised)
 {stores}
     if beyond:
         for i in range(Y.shape[1]):

@@ -1,4 +1,4 @@
-"""The bits of a double as an integer and back: no instruction, so that integer masks select lanes."""
+"""The bits of a double as an integer and back, and flags of a loop over lanes: what keeps loops packed."""
 
 from __future__ import annotations
 
@@ -46,3 +46,30 @@ def _to_bits(x: Any) -> Any:
 @overload(from_bits, jit_options=INLINED, strict=False)
 def _from_bits(bits: Any) -> Any:
     return lambda bits: _double(bits)
+
+
+#: What a loop over lanes begins with where it asks whether any lane has something. LLVM packs as many lanes
+#: as numbers of the loop's widest type fit into a vector: a flag of 64 bits would halve loops of float32.
+NO_LANE = np.int32(0)
+
+
+def _either(typingctx: Any, flag: Any, condition: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.or_(
+            args[0], builder.zext(context.cast(builder, args[1], condition, types.boolean), args[0].type)
+        )
+
+    return types.int32(types.int32, condition), generate
+
+
+_either_of: Any = intrinsic(_either)
+
+
+def noted(flag: Any, condition: Any) -> Any:
+    """``flag`` of 32 bits, or 1 where the condition (a bool) holds."""
+    return flag | np.int32(condition)
+
+
+@overload(noted, jit_options=INLINED, strict=False)
+def _noted(flag: Any, condition: Any) -> Any:
+    return lambda flag, condition: _either_of(flag, condition)

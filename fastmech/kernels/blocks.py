@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.jit import inlined
+from fastmech.kernels.bits import NO_LANE, noted
 from fastmech.kernels.sincos import reduction_limit, sincos
 from fastmech.mechanism.equations import canonical_rates, lagrange_accelerations
 
@@ -76,13 +77,13 @@ def lagrange_block(
     compiled code. The first row of ``dY`` serves as scratch for the force's decay.
     """
     write_decay(t, p, decay, dY)
-    beyond = 0
+    beyond = NO_LANE
     for i in range(Y.shape[1]):
         s1, c1 = sincos(Y[0, i])
         s2, c2 = sincos(Y[1, i])
         phi_dot, theta_dot = Y[2, i], Y[3, i]
         push, damp = lane_force(p, i, force, decay, dY), lane_damping(p, i, damping)
-        beyond |= is_beyond(Y, i)
+        beyond = noted(beyond, is_beyond(Y, i))
         dY[0, i] = phi_dot
         dY[1, i] = theta_dot
         dY[2, i], dY[3, i] = lagrange_accelerations(
@@ -109,12 +110,12 @@ def canonical_block(
     Arguments as those of ``lagrange_block``.
     """
     write_decay(t, p, decay, dY)
-    beyond = 0
+    beyond = NO_LANE
     for i in range(Y.shape[1]):
         s1, c1 = sincos(Y[0, i])
         s2, c2 = sincos(Y[1, i])
         push, damp = lane_force(p, i, force, decay, dY), lane_damping(p, i, damping)
-        beyond |= is_beyond(Y, i)
+        beyond = noted(beyond, is_beyond(Y, i))
         dY[0, i], dY[1, i], dY[2, i], dY[3, i] = canonical_rates(
             s1, c1, s2, c2, Y[2, i], Y[3, i], p[0, i], p[1, i], p[2, i], p[3, i], p[4, i], push, damp
         )

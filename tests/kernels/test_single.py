@@ -148,17 +148,6 @@ def test_lanes_are_packed_float32(name: str) -> None:
     assert not LIBRARY.search(loop)
 
 
-@needs_fma
-def test_machine_code_of_the_loop_is_packed_float32() -> None:
-    code = "".join(compiled_anew("lagrange", "damped_constant").inspect_asm().values())
-    loops = [b for b in basic_blocks(code) if re.search(r"\bv(?:round|rndscale)ps\s.*%[yz]mm", b)]
-    loops = [b for b in loops if re.search(r"\bvsqrtps\s.*%[yz]mm|\bvrsqrt", b)]
-    assert loops
-    for loop in loops:
-        assert len(re.findall(r"\bv(?:f?n?m(?:add|sub)\d*|mul)\w*ps\s.*%[yz]mm", loop)) >= 40
-        assert not re.search(r"\bv\w+[ps]d\s|\bcall", loop)
-
-
 @cache
 def magnification() -> NDArray[np.float64]:
     """How far a change of 1e-6 of any component of the start goes in 5 s, over 1e-6: by abm12 in float64."""

@@ -1,0 +1,84 @@
+"""Machine code of some kernels for a processor that this machine may not be, told by a process of its own.
+
+Numba compiles for one processor in a process: ``NUMBA_CPU_NAME`` and ``NUMBA_CPU_FEATURES`` say for which.
+Nothing of it is run.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from functools import cache
+
+#: The processor, features beside those that LLVM knows it has, and the width [bit] of its loops.
+PROCESSORS = {
+    "haswell": ("haswell", "", 256),
+    "skylake-avx512": ("skylake-avx512", "", 256),
+    "skylake-avx512 told to use 512 bit": ("skylake-avx512", "-prefer-256-bit", 512),
+    "cascadelake": ("cascadelake", "", 256),
+    "sapphirerapids": ("sapphirerapids", "", 256),
+    "znver3": ("znver3", "", 256),
+    "znver4": ("znver4", "", 512),
+}
+
+#: Kernels by name and precision, and how many packed products and sums their loop has at least.
+KERNELS = {
+    "lagrange float64": 60,
+    "hamilton float64": 60,
+    "rk4 float64": 240,
+    "abm8 float64": 160,
+    "own float64": 20,
+    "lagrange float32": 40,
+    "hamilton float32": 40,
+    "own float32": 20,
+}
+
+SCRIPT = """
+import json
+import numba
+import fastmech as fm
+from fastmech.integrators.methods import METHODS
+from fastmech.integrators.tableaus import TABLEAUS
+from fastmech.jit import FLAGS
+from fastmech.kernels.canonical import canonical_damped_decaying
+from fastmech.kernels.lagrange import lagrange_damped_constant
+from fastmech.kernels.single import in_single
+from fastmech.kernels.whole_adams import whole_adams_steps
+from fastmech.kernels.whole_steps import whole_step
+
+def pendulum(t, x, v, damping):
+    return v, -damping * v - fm.sin(x)
+
+own = fm.System(pendulum, ["x", "v"], {"damping": 0.1}).kernel
+kernels = {
+    "lagrange float64": lagrange_damped_constant,
+    "hamilton float64": canonical_damped_decaying,
+    "rk4 float64": whole_step(lagrange_damped_constant, TABLEAUS["rk4"]),
+    "abm8 float64": whole_adams_steps(lagrange_damped_constant, METHODS["abm8"]),
+    "own float64": own,
+    "lagrange float32": in_single(lagrange_damped_constant),
+    "hamilton float32": in_single(canonical_damped_decaying),
+    "own float32": in_single(own),
+}
+told = {}
+for name, kernel in kernels.items():
+    (signature,) = kernel.signatures
+    compiled = numba.njit(signature, nogil=True, **FLAGS)(kernel.py_func)
+    told[name] = "".join(compiled.inspect_asm().values())
+print(json.dumps(told))
+"""
+
+
+@cache
+def machine_code(processor: str) -> dict[str, str]:
+    """Assembler text of every kernel of ``KERNELS`` for one of ``PROCESSORS``."""
+    name, features, _ = PROCESSORS[processor]
+    environment = os.environ | {"NUMBA_CPU_NAME": name, "NUMBA_CPU_FEATURES": features}
+    environment["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT], env=environment, capture_output=True, text=True, check=True
+    )
+    told: dict[str, str] = json.loads(done.stdout)
+    return told
