@@ -14,7 +14,7 @@ T = TypeVar("T")
 LONGEST_VALUE = 80
 
 #: What is longer than any file's name.
-_TOO_LONG = re.compile(r"[^\s/]{256,}")
+_TOO_LONG = re.compile(r"[^\s/:]{256,}")
 
 
 class InputError(ValueError):

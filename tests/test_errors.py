@@ -33,7 +33,7 @@ def test_a_message_is_one_line_whatever_is_in_it() -> None:
     path = "/".join(["folder" * 10] * 20)  # longer than a name, no name of it too long
     assert str(InputError(f"{path}: cannot be read")) == f"{path}: cannot be read"
     assert str(InputError("a\n\x1b[31mb")) == r"a \x1b[31mb"
-    assert str(InputError("z" * 300 + ".h5: cannot be read")) == "z" * 77 + "... cannot be read"
+    assert str(InputError("z" * 300 + ".h5: cannot be read")) == "z" * 77 + "...: cannot be read"
 
 
 def test_other_libraries_names_are_told() -> None:

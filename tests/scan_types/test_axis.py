@@ -89,13 +89,13 @@ def test_a_map_is_over_the_values_asked_for() -> None:
 
 def test_rates_that_steps_follow_end_where_steps_become_no_shorter() -> None:
     c = reduce(fm.Scene())
-    rates = np.array([0.5, 0.99, 1.5, 100.0]) * fastest_followed(c)
+    rates = np.array([0.2, 1.0, 1.5, 100.0]) * fastest_followed(c)
     steps = coarse_steps(c, np.outer(rates, [0.0, 0.0, 0.0, 1.0]))
     assert steps[0] > steps[1] == steps[2] == steps[3] == shortest_step(c)
 
 
 SCENE = "[scene]\nalpha = 0.0\n"
-PHI, THETA = ("axes.{} = {{start = 0.0, stop = 1.0, num = 3}}\n".format(name) for name in ("phi", "theta"))
+PHI, THETA = (f"axes.{name} = {{start = 0.0, stop = 1.0, num = 3}}\n" for name in ("phi", "theta"))
 ALONG = "along.F0 = {start = 0.0, stop = 1.0, num = 3}\n"
 FORCES, RATES = "F0 = {start = 1.0, stop = 2.0, num = 3}\n", "alpha = {start = 1.0, stop = 2.0, num = 3}\n"
 
@@ -177,7 +177,8 @@ def test_what_cannot_be_computed_is_refused(tmp_path: Path, what: str) -> None:
         (
             "equilibrium_map",
             "axes.F0 = {values = [0.0]}\n"
-            "axes.c1 = {start = 1.0, stop = 2.0, num = 5000}\naxes.c2 = {start = 1.0, stop = 2.0, num = 5000}",
+            "axes.c1 = {start = 1.0, stop = 2.0, num = 5000}\n"
+            "axes.c2 = {start = 1.0, stop = 2.0, num = 5000}",
         ),
     ],
 )
