@@ -27,6 +27,9 @@ LEVELS, TURNED_LEVELS = 24, 8
 #: Radii, of all those, at which rays are looked at together.
 TOGETHER = 4
 
+#: Directions of the largest search: some hundred bytes of memory each.
+MOST_DIRECTIONS = 10_000_000
+
 #: Points between two radii at which a way out is narrowed down.
 SECTIONS = 7
 
@@ -83,7 +86,7 @@ def minimal_shock(
     """
     search = _Search(label_of, attractor, norm, coordinates, most, tolerance)
     rng = np.random.default_rng(checks.whole_number("seed", seed, least=0))
-    number = checks.whole_number("directions", directions, least=1)
+    number = checks.whole_number("directions", directions, least=1, most=MOST_DIRECTIONS)
     units = _random_units(rng, number, len(search.matrix))
     if guess is not None:
         units = np.concatenate([search.directions_of(guess), units])
@@ -124,7 +127,8 @@ def brute_force_shock(
     """
     search = _Search(label_of, attractor, norm, coordinates, most, tolerance)
     rng = np.random.default_rng(checks.whole_number("seed", seed, least=0))
-    units = _random_units(rng, checks.whole_number("directions", directions, least=1), len(search.matrix))
+    number = checks.whole_number("directions", directions, least=1, most=MOST_DIRECTIONS)
+    units = _random_units(rng, number, len(search.matrix))
     sizes, labels = search.first_exits(units[None], np.array([search.most]), LEVELS, 1)
     return search.result(units, sizes[0], labels[0])
 

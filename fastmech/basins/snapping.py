@@ -26,7 +26,7 @@ from fastmech.capture.certificate import certificate_of
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
 from fastmech.equilibria.find import Equilibria, Equilibrium, find_equilibria
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown
 from fastmech.integrators.methods import find_method
 from fastmech.scene import Scene
 
@@ -175,6 +175,8 @@ def force_free(scene: Scene, start: Equilibrium | None) -> tuple[Scene, Equilibr
     minima = [i for i, e in enumerate(equilibria) if e.kind == "minimum"]
     if not minima:
         raise InputError(f"scene: has no well without force: {equilibria.certificate.sentence}")
+    if not isinstance(start, Equilibrium | None):
+        raise InputError(f"start = {shown(start)}: must be a minimum that find_equilibria gives")
     index = minima[0] if start is None else equilibria.index_of(start)
     if index not in minima:
         raise InputError(f"start: is a {equilibria[index].kind}, must be a minimum of the force-free scene")

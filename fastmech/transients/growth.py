@@ -15,6 +15,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from fastmech.ensembles import checks
+from fastmech.errors import InputError
 from fastmech.scene import Scene
 from fastmech.stability.arguments import require_rest
 from fastmech.stability.linearize import Rest, jacobian, linearized
@@ -60,6 +61,8 @@ def transient_growth(scene: Scene, equilibrium: Rest, until: float = 10.0) -> Tr
     sizes = [1.0]
     for _ in times[1:]:
         flow = step @ flow
+        if not np.isfinite(flow).all():
+            raise InputError(f"until = {until:g} s: by then disturbances are beyond doubles")
         sizes.append(float(np.linalg.norm(flow, 2)))
     best = int(np.argmax(sizes))
     return TransientGrowth(reactivity, sizes[best], float(times[best]), until)
