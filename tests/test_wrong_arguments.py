@@ -29,7 +29,7 @@ WRONG = [
     "x" * 3_000_000,
 ]
 
-#: Public functions, what they are given otherwise, and the arguments for which none of the values above will do.
+#: Public functions, what they are given otherwise, and arguments for which none of the values above will do.
 CALLS: list[tuple[Callable[..., Any], dict[str, Any], tuple[str, ...]]] = [
     (fm.integrate, {"scene": SCENE, "y0": STARTS, "t_end": 1.0}, ("scene",)),
     (fm.labels_of, {"scene": SCENE, "starts": STARTS}, ("scene",)),
@@ -50,7 +50,7 @@ CALLS: list[tuple[Callable[..., Any], dict[str, Any], tuple[str, ...]]] = [
 
 
 @pytest.mark.nojit
-@pytest.mark.parametrize("function, given, names", CALLS, ids=[call[0].__name__ for call in CALLS])
+@pytest.mark.parametrize(("function", "given", "names"), CALLS, ids=[call[0].__name__ for call in CALLS])
 def test_arguments_of_a_wrong_kind(
     function: Callable[..., Any], given: dict[str, Any], names: tuple[str, ...]
 ) -> None:
