@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from fastmech.atlas.map import map_equilibria
     from fastmech.atlas.snap import find_snap
     from fastmech.basins.copies import copy_labels, copy_of_label
-    from fastmech.basins.critical import critical_forces, critical_impulse, impulse_start
+    from fastmech.basins.disturbed import Outcome, disturb
     from fastmech.basins.edge import saddle_at, track_edge
     from fastmech.basins.erosion import erosion
     from fastmech.basins.label import labels_of
@@ -35,14 +35,13 @@ if TYPE_CHECKING:
     from fastmech.basins.measures.uncertainty import uncertainty_exponent
     from fastmech.basins.measures.wada import wada_merge_test
     from fastmech.basins.shock import brute_force_shock, minimal_shock
-    from fastmech.basins.snapping import map_snapping
+    from fastmech.basins.shock_limit import impulse_start, shock_limit
+    from fastmech.basins.snapping import critical_forces, map_snapping
     from fastmech.basins.status import BasinStatus
     from fastmech.capture.barriers import barrier_tree
     from fastmech.capture.certificate import trapped
-    from fastmech.disturbance.ensemble import disturb
     from fastmech.disturbance.linear_range import linear_range
     from fastmech.disturbance.motion import disturbed_motion
-    from fastmech.disturbance.outcome import Outcome
     from fastmech.ensembles.integrate import integrate
     from fastmech.ensembles.status import Status
     from fastmech.ensembles.system import System
@@ -66,7 +65,7 @@ except metadata.PackageNotFoundError:  # run from its sources, not installed
 _MODULES = {
     "BasinStatus": "fastmech.basins.status",
     "InputError": "fastmech.errors",
-    "Outcome": "fastmech.disturbance.outcome",
+    "Outcome": "fastmech.basins.disturbed",
     "Scene": "fastmech.scene",
     "Status": "fastmech.ensembles.status",
     "StepWarning": "fastmech.errors",
@@ -81,9 +80,8 @@ _MODULES = {
     "copy_labels": "fastmech.basins.copies",
     "copy_of_label": "fastmech.basins.copies",
     "cos": "fastmech.kernels.sincos",
-    "critical_forces": "fastmech.basins.critical",
-    "critical_impulse": "fastmech.basins.critical",
-    "disturb": "fastmech.disturbance.ensemble",
+    "critical_forces": "fastmech.basins.snapping",
+    "disturb": "fastmech.basins.disturbed",
     "disturbed_motion": "fastmech.disturbance.motion",
     "erosion": "fastmech.basins.erosion",
     "find_equilibria": "fastmech.equilibria.find",
@@ -91,7 +89,7 @@ _MODULES = {
     "find_snap": "fastmech.atlas.snap",
     "finite_time_basin_stability": "fastmech.basins.measures.fractions",
     "fractal_boundary_test": "fastmech.basins.measures.entropy",
-    "impulse_start": "fastmech.basins.critical",
+    "impulse_start": "fastmech.basins.shock_limit",
     "integrate": "fastmech.ensembles.integrate",
     "integrity": "fastmech.basins.measures.integrity",
     "kinetic_norm": "fastmech.basins.measures.norm",
@@ -107,6 +105,7 @@ _MODULES = {
     "open_results": "fastmech.store.read",
     "reactions": "fastmech.mechanism.reactions",
     "saddle_at": "fastmech.basins.edge",
+    "shock_limit": "fastmech.basins.shock_limit",
     "sin": "fastmech.kernels.sincos",
     "step_warning": "fastmech.step_limits.warning",
     "trace_folds": "fastmech.atlas.folds",
@@ -138,7 +137,6 @@ __all__ = [
     "copy_of_label",
     "cos",
     "critical_forces",
-    "critical_impulse",
     "disturb",
     "disturbed_motion",
     "erosion",
@@ -163,6 +161,7 @@ __all__ = [
     "open_results",
     "reactions",
     "saddle_at",
+    "shock_limit",
     "sin",
     "step_warning",
     "trace_folds",

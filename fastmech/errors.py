@@ -32,6 +32,11 @@ class StepWarning(UserWarning):
     """A step cannot be right for a scene; the message names one that would do."""
 
 
+def printable(text: str, kept: str = "") -> str:
+    """A text for a terminal: characters that cannot be printed are escaped, but for those kept."""
+    return "".join(c if c.isprintable() or c in kept else ascii(c)[1:-1] for c in text)
+
+
 def shown(value: object) -> str:
     """A value as a message shows it: at most 80 characters of one line, control characters escaped."""
     try:
@@ -52,11 +57,6 @@ def shown_name(name: object) -> str:
 def one_line(message: str) -> str:
     """A message on one line that a terminal shows as it is; what can be no file's name is cut as a value."""
     return _TOO_LONG.sub(lambda word: shown_name(word[0]), printable(" ".join(message.splitlines())))
-
-
-def printable(text: str) -> str:
-    """A text with its control characters escaped."""
-    return text if text.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
 def called_here(**names: str) -> Callable[[Callable[P, T]], Callable[P, T]]:

@@ -2,10 +2,12 @@
 
 A `Variable` is an array with named dimensions, a unit and a description; a `Dataset` is a set of variables
 that agree on the sizes of their dimensions. A variable named like its only dimension is the coordinate of it.
+What would multiply the rows of a table by dimensions of its own is a group: a dataset within a dataset.
 
-Conventions: booleans become int8 with the flags "false true"; statuses and kinds are int8 with the attributes
-that `flags` makes; complex numbers are two variables, `NAME_re` and `NAME_im`; strings are object arrays of
-`str`.
+Conventions are those of CF 1.11: one unit a variable, which UDUNITS reads (`parts` makes several variables of
+an array of several units); booleans become int8 with the flags "false true"; statuses and kinds are int8 with
+the attributes that `flags` makes; what stands for no value among integers is the attribute `_FillValue`;
+complex numbers are two variables, `NAME_re` and `NAME_im`; strings are object arrays of `str`.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown
 
 if TYPE_CHECKING:
     import xarray
@@ -35,6 +37,18 @@ RESERVED_ATTRS = frozenset(
     # what would make a netCDF reader change the values
     | {"missing_value", "scale_factor", "add_offset", "coordinates", "dtype", "calendar"}
 )
+
+FILL = "_FillValue"
+"""Attribute of integers: the one that stands for no value. Of floats that is NaN."""
+
+NO_CODE: Mapping[str, int] = {FILL: -1}
+"""The attributes of integers of which -1 stands for none."""
+
+STATE_UNITS: Mapping[str, str] = {"phi": "rad", "theta": "rad", "phi_dot": "rad/s", "theta_dot": "rad/s"}
+"""Components of a state and their units."""
+
+ANGLE_UNITS: Mapping[str, str] = {"phi": "rad", "theta": "rad"}
+"""The angles and their units."""
 
 MAX_ATTR_BYTES = 8192
 """Larger arrays belong in a variable: an HDF5 object keeps its attributes in a header of at most 64 KiB."""
@@ -56,7 +70,8 @@ class Variable:
             strings.
         units: unit of the values, "1" for a pure number.
         long_name: what the values are, in a few words.
-        attrs: further attributes: strings, numbers, short 1-D arrays of numbers, tuples of strings.
+        attrs: further attributes: strings, numbers, short 1-D arrays of numbers, tuples of strings; of
+            integers also `_FillValue`.
 
     Raises:
         InputError: the dimensions do not match the shape, or a type or a name that result files cannot hold.
@@ -77,9 +92,15 @@ class Variable:
             raise InputError(f'variable.units = {self.units!r}: must be a unit, "1" for a pure number')
         check_text(self.units, "variable.units")
         check_text(self.long_name, "variable.long_name")
-        attrs = checked_attrs(self.attrs, "variable.attrs", reserved={"units", "long_name"})
+        given = dict(self.attrs)
+        fill = given.pop(FILL, None)
+        attrs = checked_attrs(given, "variable.attrs", reserved={"units", "long_name"})
         if data.dtype == np.bool_:
             data, attrs = data.astype(np.int8), {**_FALSE_TRUE, **attrs}
+        if fill is not None:
+            if data.dtype.kind not in "iu" or not isinstance(fill, int) or not _fits(fill, data.dtype):
+                raise InputError(f"variable.attrs.{FILL} = {shown(fill)}: must be an integer of {data.dtype}")
+            attrs[FILL] = int(fill)
         object.__setattr__(self, "dims", dims)
         object.__setattr__(self, "data", _checked_data(data))
         object.__setattr__(self, "attrs", attrs)
@@ -89,10 +110,24 @@ class Variable:
         """Length of each dimension."""
         return dict(zip(self.dims, self.data.shape, strict=True))
 
+    @property
+    def codes(self) -> dict[str, int]:
+        """Meanings and values of flags, as the variable itself explains them; none of other variables.
+
+        Raises:
+            InputError: the explanation does not fit together.
+        """
+        return codes_of(self.attrs)
+
 
 @dataclass(frozen=True, eq=False)
 class Dataset:
     """Variables that share dimensions, with attributes of the whole.
+
+    Attributes:
+        variables: by name.
+        attrs: of the whole.
+        groups: further datasets by name, with dimensions of their own.
 
     Raises:
         InputError: two variables disagree on the length of a dimension, a variable is named like a dimension
@@ -101,9 +136,14 @@ class Dataset:
 
     variables: Mapping[str, Variable]
     attrs: Mapping[str, Any] = field(default_factory=dict)
+    groups: Mapping[str, Dataset] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         variables = dict(self.variables)
+        for name in self.groups:
+            check_name(name, "dataset.groups")
+            if name in variables:
+                raise InputError(f"dataset.groups.{name}: is the name of a variable too")
         for name, variable in variables.items():
             check_name(name, "dataset.variables")
             if not isinstance(variable, Variable):
@@ -140,7 +180,9 @@ class Dataset:
         return len(self.variables)
 
     def to_xarray(self) -> xarray.Dataset:
-        """The same as an `xarray.Dataset` (no copy of the data).
+        """The same as an `xarray.Dataset` (no copy of the data), groups left out.
+
+        Codes stay integers: ``xarray.decode_cf`` puts NaN where `_FillValue` stands for none.
 
         Raises:
             InputError: xarray is not installed.
@@ -150,7 +192,7 @@ class Dataset:
         except ImportError:
             raise no_xarray() from None
         arrays = {
-            name: (v.dims, v.data, {"units": v.units, "long_name": v.long_name, **v.attrs})
+            name: (v.dims, v.data, cf_attrs(v.units, v.long_name, v.attrs, v.data.dtype))
             for name, v in self.variables.items()
         }
         coordinates = self.variables.keys() & self.sizes.keys()
@@ -166,33 +208,80 @@ def no_xarray() -> InputError:
     return InputError("to_xarray: needs xarray; install it with: pip install 'fastmech[xarray]'")
 
 
-def flags(members: type[IntEnum]) -> dict[str, Any]:
+def cf_attrs(units: str, long_name: str, attrs: Mapping[str, Any], dtype: np.dtype[Any]) -> dict[str, Any]:
+    """All attributes of a variable as netCDF has them: `_FillValue` is of the variable's type."""
+    own = {FILL: dtype.type(attrs[FILL])} if FILL in attrs else {}
+    return {"units": units, "long_name": long_name, **attrs, **own}
+
+
+def parts(
+    name: str, dims: tuple[str, ...], data: npt.NDArray[Any], units: Mapping[str, str], about: str
+) -> dict[str, Variable]:
+    """An array along whose last axis the unit changes as one variable for each of its entries, `NAME_ENTRY`.
+
+    Args:
+        name: what the variables' names begin with.
+        dims: dimensions of all axes but the last.
+        data: shape (..., entries).
+        units: names of the entries, with their units.
+        about: the variables' long name, with `{}` for the entry's name.
+    """
+    return {
+        f"{name}_{entry}": Variable(dims, data[..., k], unit, about.format(entry))
+        for k, (entry, unit) in enumerate(units.items())
+    }
+
+
+def numbers(dim: str, count: int, about: str) -> dict[str, Variable]:
+    """The coordinate that numbers the places of a dimension from 0."""
+    return {dim: Variable((dim,), np.arange(count, dtype=np.int32), "1", about)}
+
+
+def codes_of(attrs: Mapping[str, Any]) -> dict[str, int]:
+    """Meanings and values of flags by the attributes that explain them.
+
+    Raises:
+        InputError: these do not fit together.
+    """
+    if "flag_values" not in attrs or "flag_meanings" not in attrs:
+        return {}
+    try:
+        values = [int(value) for value in np.atleast_1d(attrs["flag_values"])]
+        return dict(zip(str(attrs["flag_meanings"]).split(), values, strict=True))
+    except (TypeError, ValueError):
+        raise InputError("flag_values, flag_meanings: do not fit together") from None
+
+
+def flags(members: type[IntEnum], fill: int | None = None) -> dict[str, Any]:
     """The attributes that explain int8 codes by the CF conventions.
 
     Args:
         members: the codes; their values must fit into int8.
+        fill: the code that stands for none, whether or not it is a member.
 
     Returns:
         `flag_values` (int8, one for each member) and `flag_meanings` (the members' names in lower case, in
-        the same order, separated by blanks).
+        the same order, separated by blanks); `_FillValue` if there is one, which is no flag then.
 
     Raises:
         InputError: no members, or a value beyond int8.
     """
-    values = [int(member) for member in members]
+    members_left = [member for member in members if member != fill]
+    values = [int(member) for member in members_left]
     if not values or min(values) < -128 or max(values) > 127:
         raise InputError(
             f"flags of {members.__name__} = {values}: must be one or more values from -128 to 127"
         )
-    meanings = " ".join(member.name.lower() for member in members)
-    return {"flag_values": np.array(values, dtype=np.int8), "flag_meanings": meanings}
+    meanings = " ".join(member.name.lower() for member in members_left)
+    none = {} if fill is None else {FILL: fill}
+    return {"flag_values": np.array(values, dtype=np.int8), "flag_meanings": meanings, **none}
 
 
 def check_name(name: object, where: str) -> None:
     """Refuse what is not a plain name: a letter or underscore, then letters, digits and underscores."""
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         raise InputError(
-            f"{where}: the name {name!r} must be ASCII letters, digits and underscores, no digit first"
+            f"{where}: the name {shown(name)} must be ASCII letters, digits and underscores, no digit first"
         )
 
 
@@ -285,6 +374,11 @@ def _shared_sizes(variables: Mapping[str, Variable]) -> dict[str, int]:
                     f"dataset.variables.{name}: has {size} points along {dim}, the others have {sizes[dim]}"
                 )
     return sizes
+
+
+def _fits(number: int, dtype: np.dtype[Any]) -> bool:
+    """Whether a type of integers has this one."""
+    return bool(np.iinfo(dtype).min <= number <= np.iinfo(dtype).max)
 
 
 def _is_utf8(text: str) -> bool:

@@ -11,8 +11,8 @@ from fastmech.errors import InputError, StepWarning, shown
 from fastmech.plots.style import save
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import RunContext, read_request
-from fastmech.store.read import Results, open_results
-from fastmech.tiles.assemble import CHANGE
+from fastmech.store.older import as_today
+from fastmech.store.read import open_results
 from fastmech.tiles.report import RunReport
 from fastmech.tiles.run import ScanRun, default_output
 from fastmech.tiles.work import Hiring, ThreadHiring
@@ -26,6 +26,7 @@ def run_request(
     context: RunContext | None = None,
     hire: Hiring | None = None,
     tell: Callable[[str], None] = lambda line: None,
+    text: str | None = None,
 ) -> RunReport:
     """Run every scan of a request file and write one result file; an interrupted run goes on.
 
@@ -41,13 +42,14 @@ def run_request(
         context: threads to use and where progress is told.
         hire: who computes, threads of this process by default; see :mod:`fastmech.tiles.cluster`.
         tell: is given lines for the user.
+        text: of the request, by default that of the file; ``path`` then is its name.
 
     Raises:
         InputError: the request is wrong, the result cannot be written, or it exists and ``fresh`` is False.
         CrashedTilesError: some tiles could not be computed; the others are kept.
         Stopped: by Ctrl-C or SIGTERM; finished tiles are kept.
     """
-    request = read_request(path, scan_kinds())
+    request = read_request(path, scan_kinds(), text)
     target = Path(out) if out is not None else default_output(path)
     run = ScanRun(request, Path(path), target, context or RunContext(), hire or ThreadHiring(), tell)
     for line in request.step_warnings:
@@ -57,30 +59,32 @@ def run_request(
         return run.run(fresh)
 
 
-def scene_of_section(results: Results, name: str) -> dict[str, float]:
-    """Parameters of the scene of one section: the file's with the section's changes."""
-    attrs = results[name].attrs
-    return {key: float(attrs.get(f"{CHANGE}{key}", value)) for key, value in results.scene.items()}
-
-
 def draw_results(
     path: str | Path,
     out: str | Path | None = None,
     stage: Callable[[str, int], Progress] = lambda name, total: lambda finished: None,
+    *,
+    section: str | None = None,
+    form: str = "png",
 ) -> Iterator[Path]:
-    """Draw every section of a result file and yield the pictures (PNG) as they are written.
+    """Draw every section of a result file and yield the pictures as they are written.
+
+    Names and meanings of codes are those that the file itself tells, whatever version wrote it.
 
     Args:
         path: result file.
         out: folder for the pictures, made if it is missing; by default the file's name without its ending.
         stage: is told how many pictures have been drawn.
+        section: draw only this one.
+        form: "png", "pdf" or "svg".
 
     Raises:
         InputError: the file cannot be read, has a section of unknown kind or a tile, or the folder is bad.
     """
     kinds = scan_kinds()
     with open_results(path) as results:
-        for name in results:
+        names = list(results) if section is None else [section.partition("/")[0]]
+        for name in names:
             if "tile" in results[name].attrs:
                 raise InputError(
                     f"{path}: {name}: is a tile, which holds a piece of a section; plot the result, or a"
@@ -93,12 +97,13 @@ def draw_results(
                 )
         folder = Path(out) if out is not None else Path(path).with_suffix("")
         _make_folder(folder)
-        for name in results:
-            kind, scene = kinds[results[name].attrs["kind"]], scene_of_section(results, name)
-            figures = kind.draw(kind.read(results[name], scene), scene)
+        for name in names:
+            kind, scene = kinds[results[name].attrs["kind"]], results.scene_of(name)
+            dataset = as_today(kind.read(results[name], scene), int(results.attrs["schema_version"]))
+            figures = kind.draw(dataset, scene)
             advance = stage(f"{name}: pictures", len(figures))
             for what, figure in figures.items():
-                picture = folder / f"{name}_{what}.png"
+                picture = folder / f"{name}_{what}.{form}"
                 try:
                     save(figure, picture)
                 except OSError as error:

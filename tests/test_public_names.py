@@ -27,7 +27,7 @@ def test_public_names() -> None:
     promised |= {"integrity", "kinetic_norm", "minimal_shock", "brute_force_shock", "erosion"}
     promised |= {"uncertainty_exponent", "boundary_dimension", "basin_entropy", "fractal_boundary_test"}
     promised |= {"wada_merge_test", "track_edge", "saddle_at"}
-    promised |= {"map_snapping", "critical_forces", "critical_impulse", "impulse_start"}
+    promised |= {"map_snapping", "critical_forces", "shock_limit", "impulse_start"}
     assert promised <= set(fm.__all__)
     assert fm.__all__ == sorted(fm.__all__)
 

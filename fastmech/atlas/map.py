@@ -14,11 +14,12 @@ from fastmech.atlas.assess import assess
 from fastmech.atlas.axes import Floats, check_axes, grid_coefficients
 from fastmech.atlas.coincidence import coincidences
 from fastmech.atlas.sheets import SheetBuilder
-from fastmech.atlas.wells import barriers, least_speeds
+from fastmech.atlas.wells import barriers, least_impulses
 from fastmech.ensembles import checks
 from fastmech.ensembles.threads import thread_count
 from fastmech.equilibria.search import MOST
 from fastmech.equilibria.solve import solve
+from fastmech.mechanism.impulse import POINTS
 from fastmech.scene import Scene
 
 #: Points that one task solves; each but the first of them starts from the one before.
@@ -53,7 +54,11 @@ class Slab:
     frequency: Floats  #: lowest undamped natural frequency [rad/s], (n, 6); NaN where U falls
     decay_time: Floats  #: slowest linear mode falls to 1/e [s], (n, 6), inf: it does not; NaN: no minimum
     depth: Floats  #: energy from a minimum to the lowest way out of its well [J], (n, 6)
-    escape_speed: Floats  #: of M2, below which no kick leaves the well [m/s], (n, 6); see ``least_speeds``
+    shock_limit_m1: (
+        Floats  #: impulse on M1 below which no blow leaves the well [N s], (n, 6); NaN: cannot be struck
+    )
+    shock_limit_m2: Floats  #: the same of M2, in whatever direction it is struck
+    shock_limit_m3: Floats  #: the same of the slider M3
 
     @classmethod
     def empty(cls, n: int) -> Slab:
@@ -211,12 +216,16 @@ def solve_block(
         out.hessian, out.eigenvalues, out.frequency, out.decay_time, out.verdict,
     )  # fmt: skip
     coincidences(*places, out.radius, out.morse_index, out.count, out.outcome, out.coincidence)
+    limits = out.shock_limit_m1, out.shock_limit_m2, out.shock_limit_m3
     if wells:
         barriers(*places, out.energy, out.morse_index, out.count, out.outcome, out.depth)
-        out.depth[:] = (out.depth - out.energy) * weight[:, None]
+        out.depth[:] = out.depth - out.energy
+        for on, limit in zip(POINTS, limits, strict=True):
+            limit[:] = least_impulses(*places, out.depth, np.stack([mass, weight], axis=1), on)
+        out.depth[:] = out.depth * weight[:, None]
     else:
-        out.depth[:] = np.nan
-    out.escape_speed[:] = least_speeds(*places, out.depth, mass)
+        for array in (out.depth, *limits):
+            array[:] = np.nan
     with np.errstate(divide="ignore"):
         np.divide(1.0, out.decay_time, out=out.decay_time)
     out.energy[:] = out.energy * weight[:, None] + constant[:, None]

@@ -13,12 +13,15 @@ from fastmech.equilibria.descent import convex_radius, descend, step_off
 from fastmech.equilibria.outcome import Outcome
 from fastmech.equilibria.solve import INDICES
 from fastmech.jit import MATRIX, STATUSES, kernel
-from fastmech.mechanism.reduced import metric_determinant, slider_ratio
+from fastmech.mechanism.impulse import impulse_for, mobility
 
 Floats = NDArray[np.float64]
 Codes = NDArray[np.int8]
 
 COMPLETE = int(Outcome.COMPLETE)
+
+#: Share of the potential's amplitudes by which what is proved lies below the barriers: far above rounding.
+ROUNDING = 1e-12
 
 
 @kernel(types.void(MATRIX, MATRIX, MATRIX, MATRIX, INDICES, STATUSES, STATUSES, MATRIX))
@@ -61,35 +64,32 @@ def barriers(
             p2, t2 = step_off(c, phi[row, i], theta[row, i], -1.0)
             first, a1, a2 = descend(c, p1, t1, phis, thetas, radii, minima)
             second, b1, b2 = descend(c, p2, t2, phis, thetas, radii, minima)
-            if first >= 0 and second >= 0 and (first != second or a1 != b1 or a2 != b2):
+            if first < 0 or second < 0:
+                break  # a way out that is not known may be lower than those that follow
+            if first != second or a1 != b1 or a2 != b2:
                 for well in (first, second):
                     if np.isnan(barrier[row, slot[well]]):
                         barrier[row, slot[well]] = energy[row, i]
 
 
-def least_speeds(coefficients: Floats, phi: Floats, theta: Floats, depth: Floats, mass: Floats) -> Floats:
-    """Least speed of M2 [m/s] at which the mechanism's kinetic energy is ``depth`` [J], (n, 6).
+def least_impulses(
+    coefficients: Floats, phi: Floats, theta: Floats, depth: Floats, mass: Floats, on: str
+) -> Floats:
+    """Impulse on a point [N s] below which no blow on the resting mechanism leaves the well, (n, 6).
 
-    At rest's position the velocity v of M2 determines both rates, v = J q', hence the energy of the whole
-    mechanism: T = v.W^-1 v / 2 with the mobility W = J M^-1 J^T, M the metric of paper (11). Since M2 hangs
-    at M1 by a rod, W has the eigenvalues 1/m2 across the rod M1M2, where M2 swings alone, and 1/m along it,
-    where it drags M1 and the slider with it:
-
-        m = m2 + (m1 + m3 k^2) / cos^2(phi + theta),    k = -(dx3/dphi)/l.
-
-    So T lies between m2 v^2/2 and m v^2/2, and a kick that gives M2 less than sqrt(2 depth / m) leaves T
-    below the depth: it does not leave the well, in whatever direction, and with damping still less. The
-    bound is reached along the rod; a blow across it needs sqrt(2 depth / m2), and an impulse on M2 in any
-    direction at least sqrt(2 m2 depth), which depends on the depth alone. Where cos(phi + theta) = 0 crank
-    and rod are in line, M1 can move while M2 rests, and the bound is 0: M2's speed tells nothing there.
+    Energy does not grow under a constant force. So no blow that gives less than the well's depth leaves, and
+    none gives more than along the direction in which the point moves most easily. What rounding may make of
+    the depth is taken off. NaN where the depth is, and for M3 at its dead centres.
 
     Args:
         coefficients: (n, 8) rows as ``solve`` takes them.
-        phi, theta, depth: (n, 6) [rad], [rad], [J].
-        mass: (n,) m2 [kg].
+        phi, theta: (n, 6) [rad].
+        depth: (n, 6), over m2 l^2 [1/s^2].
+        mass: (n, 2) of m2 [kg] and m2 l^2 [kg m2].
+        on: one of :data:`fastmech.mechanism.impulse.POINTS`.
     """
-    ratio, slider = coefficients[:, 0, None], coefficients[:, 1, None]
-    k, _ = slider_ratio(np.sin(phi), np.cos(phi))
-    cosine = np.cos(phi + theta)
-    mobility = cosine**2 / (metric_determinant(ratio, slider, k, cosine) * mass[:, None])
-    return np.asarray(np.sqrt(2.0 * depth * mobility))
+    _, _, lift, spring, gravity, force, *_ = np.abs(coefficients.T)
+    rounding = ROUNDING * (lift + spring + gravity + 2.0 * force)
+    easiest = mobility(mass[:, :1], coefficients[:, :1], coefficients[:, 1:2], phi, theta, on).greatest
+    sure = np.maximum(depth - rounding[:, None], 0.0) * mass[:, 1:]
+    return impulse_for(sure, easiest)

@@ -2,23 +2,38 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastmech.basins.label import labels_of, require_damper
+from fastmech.basins.label import Labels, labels_of, require_damper
 from fastmech.basins.measures.labels import Floats, Integers, LabelOf, check_point
-from fastmech.basins.measures.norm import kinetic_norm
+from fastmech.basins.measures.norm import STATE, kinetic_norm
 from fastmech.ensembles import checks
 from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError
 from fastmech.scene import Scene
 
 #: Bits for the well (a scene has at most six equilibria) and for each angle's turns.
-WELL_BITS, TURN_BITS = 3, 20
+WELL_BITS, TURN_BITS = 3, 30
 _MIDDLE = 1 << (TURN_BITS - 1)
 
 
-def copy_labels(scene: Scene, t_end: float = 60.0, *, threads: int | None = None) -> LabelOf:
+@dataclass(frozen=True)
+class CopyLabels:
+    """Labels starts (n, 4) with one number for each copy of each well, -1 where not proved."""
+
+    scene: Scene
+    t_end: float  #: s
+    threads: int | None
+
+    def __call__(self, starts: Floats) -> Integers:
+        """Labels (n,) of starts (n, 4)."""
+        return copy_numbers(labels_of(self.scene, starts, self.t_end, threads=self.threads))
+
+
+def copy_labels(scene: Scene, t_end: float = 60.0, *, threads: int | None = None) -> CopyLabels:
     """A function that labels starts (n, 4) with one number for each copy of each well, -1 where not proved.
 
     It is what :func:`fastmech.basins.shock.minimal_shock`, :func:`fastmech.basins.edge.track_edge` and
@@ -34,15 +49,15 @@ def copy_labels(scene: Scene, t_end: float = 60.0, *, threads: int | None = None
         InputError: the scene has no damper, or ``t_end`` is wrong.
     """
     require_damper(scene)
-    t_end = checks.number("t_end", t_end, "s", above=0.0)
+    return CopyLabels(scene, checks.number("t_end", t_end, "s", above=0.0), threads)
 
-    def label(starts: Floats) -> Integers:
-        ends = labels_of(scene, starts, t_end, threads=threads)
-        turns = ends.turns.astype(np.int64) + _MIDDLE
-        number = (((turns[:, 0] << TURN_BITS) + turns[:, 1]) << WELL_BITS) + ends.well
-        return np.where(ends.well < 0, -1, number)
 
-    return label
+def copy_numbers(ends: Labels) -> Integers:
+    """One number for each copy of each well (n,), -1 without a label or too many turns away to count."""
+    turns = ends.turns.astype(np.int64) + _MIDDLE
+    number = (((turns[:, 0] << TURN_BITS) + turns[:, 1]) << WELL_BITS) + ends.well
+    counted = ((turns >= 0) & (turns < 2 * _MIDDLE)).all(axis=1)
+    return np.where((ends.well < 0) | ~counted, -1, number)
 
 
 def copy_of_label(label: int) -> tuple[int, tuple[int, int]]:
@@ -54,6 +69,17 @@ def copy_of_label(label: int) -> tuple[int, tuple[int, int]]:
     label = checks.whole_number("label", label, least=0)
     turns = label >> WELL_BITS
     return label % (1 << WELL_BITS), ((turns >> TURN_BITS) - _MIDDLE, turns % (1 << TURN_BITS) - _MIDDLE)
+
+
+def label_name(label_of: LabelOf, label: int) -> str:
+    """What a label means, in words: of ``copy_labels`` the well and its turns, else the number itself."""
+    if label < 0:
+        return "no label"
+    if not isinstance(label_of, CopyLabels):
+        return f"the label {label}"
+    well, turns = copy_of_label(label)
+    made = [f"{t:+d} turn{'s' * (abs(t) > 1)} of {name}" for t, name in zip(turns, STATE, strict=False) if t]
+    return ", ".join([f"well {well}", *made])
 
 
 def with_defaults(

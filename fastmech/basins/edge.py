@@ -13,15 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastmech.basins.copies import copy_labels
+from fastmech.basins.copies import copy_labels, label_name
 from fastmech.basins.measures.labels import Floats, LabelOf, ask, check_point
 from fastmech.basins.measures.norm import kinetic_norm, norm_on
-from fastmech.disturbance.ensemble import require_constant_force
+from fastmech.basins.steps import coarse_steps
+from fastmech.disturbance.motion import require_constant_force
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.system import System
 from fastmech.equilibria.find import Equilibrium, find_equilibria
 from fastmech.errors import InputError
+from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 from fastmech.stability.arguments import require_scene
 
@@ -30,6 +32,9 @@ SECTIONS = 15
 
 #: Doublings of their distance by which two starts that came to be on one side are drawn apart.
 DOUBLINGS = 24
+
+#: Share of a basin map's coarsest step with which the boundary is followed: errors are to stay below ``far``.
+FINER = 0.2
 
 #: Outputs of a stretch, after which two starts that have not parted are followed further.
 OUTPUTS = 64
@@ -61,7 +66,7 @@ def track_edge(
     far: float = 1e-5,
     tolerance: float = 1e-3,
     interval: float = 0.25,
-    dt: float = 0.02,
+    dt: float | None = None,
     method: str = "dop853",
 ) -> EdgeTrack:
     """Follow the boundary between two starts until it comes to rest.
@@ -81,7 +86,7 @@ def track_edge(
         far: distance at which the two have parted.
         tolerance: the edge state rests if a whole stretch moves by no more than this, ``far`` or more.
         interval: time between looks at their distance [s].
-        dt: longest step [s].
+        dt: longest step [s]. By default, of a scene, it follows from frequencies and the starts' energies.
         method: name of the method.
 
     Raises:
@@ -95,6 +100,10 @@ def track_edge(
         raise InputError("label_of, norm: missing; only a scene has them by default")
     a = check_point("inside", inside)
     b = check_point("outside", outside, a.size)
+    if dt is None:
+        if not isinstance(scene, Scene):
+            raise InputError("dt: missing; a system needs its longest step in s")
+        dt = FINER * float(coarse_steps(reduce(scene), np.stack([a, b])).min())
     matrix = norm_on(norm, a.size)
     t_end = checks.number("t_end", t_end, "s", above=0.0)
     near = checks.number("near", near, "", above=0.0)
@@ -103,7 +112,8 @@ def track_edge(
     interval = checks.number("interval", interval, "s", above=0.0)
     first, second = (int(label) for label in ask(label_of, np.stack([a, b])))
     if first < 0 or second < 0 or first == second:
-        raise InputError(f"inside, outside: have the labels {first} and {second}, must have two known ones")
+        names = " and ".join(label_name(label_of, label) for label in (first, second))
+        raise InputError(f"inside, outside: lead to {names}, must lead to two different known ends")
     labels = first, second
 
     def distance(x: Floats, y: Floats) -> Floats:

@@ -23,7 +23,7 @@ from fastmech.basins.measures.integrity import integrity
 from fastmech.basins.measures.labels import Floats, Integers, check_point
 from fastmech.basins.measures.norm import kinetic_norm, norm_on, state_index
 from fastmech.basins.shock import minimal_shock
-from fastmech.disturbance.ensemble import require_constant_force
+from fastmech.disturbance.motion import require_constant_force
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
 from fastmech.equilibria.find import Equilibria, find_equilibria
@@ -65,8 +65,9 @@ class ErosionProfile:
     phi: Floats  #: where the well is [rad]
     theta: Floats  #: rad
     stability: Floats  #: basin stability: share of random starts in the window that end in the well
-    lower: Floats  #: lower end of its 95 % Wilson interval
-    upper: Floats  #: upper end
+    stability_at_most: Floats  #: the same if all random starts without a label ended in the well
+    lower: Floats  #: lower end of the 95 % Wilson interval, with none of these
+    upper: Floats  #: upper end, with all of them
     gim: Floats  #: global integrity measure: share of the map
     gim_at_most: Floats  #: the same if all starts of the map without a label ended in the well
     lim: Floats  #: local integrity measure on the map [rad]; NaN also where the well is outside the window
@@ -146,6 +147,7 @@ class Survey:
             "phi": e.phi,
             "theta": e.theta,
             "stability": float(share.fraction),
+            "stability_at_most": float(share.at_most),
             "lower": float(share.lower),
             "upper": float(share.upper),
             "undecided": share.missing / share.n,

@@ -4,28 +4,35 @@ The certificate is about the path as it was computed, so every path is computed 
 two thirds of it, and a label counts only if both are captured by the same copy of the same well at the same
 time, so near to each other that what lies between them is captured too. Paths that run apart (they passed
 nearer to the stable manifold of a saddle than their error) are computed again with ever smaller steps.
+
+Angles are reduced to one turn first, exactly. As long as a force acts that dies out before the mechanism has
+moved, steps follow its decay; once its work is less than rounding, the motion goes on without it.
 """
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.atlas.wells import ROUNDING
 from fastmech.basins.ladder import SUBSTEPS, climb, lingering, tell_the_same
 from fastmech.basins.runs import Paths, follow, rounds_until
 from fastmech.basins.status import BasinStatus, counts
-from fastmech.basins.steps import coarse_steps
+from fastmech.basins.steps import coarse_steps, gone_at_once, step_of_fading
 from fastmech.capture.barriers import BarrierTree
 from fastmech.capture.certificate import Certificate, certificate_of
-from fastmech.disturbance.outcome import confining_energy
+from fastmech.disturbance.size import confining_energy
 from fastmech.ensembles import checks
+from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.plausible import breaks_energy_bounds
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.threads import thread_count
-from fastmech.errors import InputError
+from fastmech.errors import InputError, StepWarning
 from fastmech.integrators.method import Method
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
@@ -36,6 +43,13 @@ from fastmech.step_limits.beyond import is_beyond
 from fastmech.step_limits.warning import warn_of_step
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+#: Most full turns from which a start is brought back, and 2 pi in parts of 24 bits and a rest.
+MOST_TURNS = 2.0**29 - 1.0
+_FIRST = float(np.float32(2.0 * np.pi))
+_SECOND = float(np.float32(2.0 * np.pi - _FIRST))
+TURN = (_FIRST, _SECOND, 2.0 * np.pi - _FIRST - _SECOND + 2.4492935982947064e-16)
 
 #: Starts that are followed together, at most; and so many pieces, if they are not smaller than the least.
 #: Every piece takes something of everywhere, so that all take about as long and progress tells the time left.
@@ -90,13 +104,16 @@ def labels_of(
     """
     require_damper(scene)
     checks.progress_function(progress, "starts")
-    begin = checks.states("starts", starts, 4)
+    begin, turned = _unwound(checks.states("starts", starts, 4))
     thread_count(threads)
     t_end = checks.number("t_end", t_end, "s", above=0.0)
     formula, certificate = find_method(method), certificate_of(scene)
+    fading = Fading.of(certificate, formula, threads, t_end)
+    if fading is not None:
+        certificate, t_end = fading.rest, t_end - fading.span
     if dt is not None:
         dt = checks.number("dt", dt, "s", above=0.0)
-        warn_of_step([scene], dt, method)
+        warn_of_step([certificate.scene], dt, method)
     if settle_radius is not None:
         settle_radius = checks.number("settle_radius", settle_radius, "rad", above=0.0)
     finite = np.asarray(np.isfinite(begin)).all(axis=1).reshape(-1)
@@ -104,12 +121,10 @@ def labels_of(
     found = Paths.empty(len(begin))
     status = np.where(finite, BasinStatus.UNDECIDED, BasinStatus.START_NOT_FINITE).astype(np.int8)
     settle = None if settle_radius is None else np.full(len(begin), np.nan)
-    pieces = max(-(-len(begin) // BATCH), min(PIECES, len(begin) // LEAST), 1)
-    for piece in range(pieces):
-        some = np.arange(piece, len(begin), pieces)
+    for some in pieces_of(len(begin)):
         for step in np.unique(coarse[some[finite[some]]]):
             members = some[finite[some] & (coarse[some] == step)]
-            ladder = Ladder(certificate, t_end, float(step), formula, threads)
+            ladder = Ladder(certificate, t_end, float(step), formula, threads, fading)
             ladder.label(begin, members, found, status)
             if settle is not None and settle_radius is not None:
                 settle[members] = ladder.settle_times(begin, members, found, status, settle_radius)
@@ -120,12 +135,65 @@ def labels_of(
     return Labels(
         certificate.tree,
         np.where(captured, np.append(-1, certificate.tree.wells)[found.code], -1).astype(np.int8),
-        np.where(captured[:, None], found.turns, 0).astype(np.int32),
+        np.where(captured[:, None], found.turns + turned, 0).astype(np.int32),
         np.where(captured, found.time, np.nan),
         settle,
         status,
         found.steps,
     )
+
+
+def _unwound(starts: Floats) -> tuple[Floats, Integers]:
+    """Starts (n, 4) with their angles in one turn, and the full turns taken away (n, 2).
+
+    Too many turns to count make a start NaN.
+    """
+    angles = starts[:, :2]
+    with np.errstate(invalid="ignore"):
+        turns = np.where(np.abs(angles) > np.pi, np.rint(angles / (2.0 * np.pi)), 0.0)
+    turns = np.where(np.abs(turns) <= MOST_TURNS, turns, np.nan)
+    begin = starts.copy()
+    for part in TURN:  # their products with the number of turns are exact
+        begin[:, :2] -= turns * part
+    return begin, np.nan_to_num(turns).astype(np.int64)
+
+
+@dataclass(frozen=True)
+class Fading:
+    """A force that dies out at once: the motion until it is gone."""
+
+    scene: Scene
+    rest: Certificate  #: without force
+    span: float  #: s, after which all work that the force can still do is less than rounding
+    step: float  #: coarsest [s]
+    method: Method
+    threads: int | None
+
+    @classmethod
+    def of(cls, certificate: Certificate, method: Method, threads: int | None, t_end: float) -> Fading | None:
+        """Of a scene whose force is gone long before ``t_end`` [s], else none."""
+        scene, c = certificate.scene, reduce(certificate.scene)
+        if not certificate.decays or not gone_at_once(c):
+            return None
+        rest = Certificate(scene.replace(F0=0.0, alpha=0.0), certificate.tree)
+        span = np.log(40.0 * abs(c.force) / (ROUNDING * rest.amplitudes)) / c.decay
+        if not 0.0 < span < t_end:
+            return None
+        return cls(scene, rest, float(span), step_of_fading(c), method, threads)
+
+    def after(self, starts: Floats, step: float) -> tuple[Floats, NDArray[np.int8]]:
+        """States (n, 4) and statuses (n,) when the force is gone, with no longer step than ``step`` [s]."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", StepWarning)
+            run = integrate(self.scene, starts, self.span, step, self.method.name, threads=self.threads)
+        return run.y[-1], run.status
+
+
+def pieces_of(n: int) -> Iterator[NDArray[np.intp]]:
+    """Indices of n starts, piece by piece."""
+    pieces = max(-(-n // BATCH), min(PIECES, n // LEAST), 1)
+    for piece in range(pieces):
+        yield np.arange(piece, n, pieces)
 
 
 def require_damper(scene: Scene) -> None:
@@ -151,6 +219,7 @@ class Ladder:
     coarse: float  #: s
     method: Method
     threads: int | None
+    fading: Fading | None = None  #: what comes before
     steps: int = 0
 
     def __post_init__(self) -> None:
@@ -168,15 +237,27 @@ class Ladder:
             paths = Paths.empty(len(starts))
             paths.status[:] = Status.STEP_TOO_LARGE
             return paths
+        begin, status = self.begin(starts, substeps)
         paths = follow(
-            self.certificate, observer, starts, self.t_end, self.rounds, substeps, self.method, self.threads
+            self.certificate, observer, begin, self.t_end, self.rounds, substeps, self.method, self.threads
         )
+        if self.fading is not None:
+            paths.time += self.fading.span
+            failed = status != Status.OK
+            paths.code[failed], paths.status[failed] = 0, status[failed]
         self.steps += paths.steps
         return paths
 
+    def begin(self, starts: Floats, substeps: int) -> tuple[Floats, NDArray[np.int8]]:
+        """States from which on the certificate holds, and the statuses of the motions until then."""
+        if self.fading is None:
+            return starts, np.zeros(len(starts), dtype=np.int8)
+        step = min(self.fading.step, self.coarse) * SUBSTEPS[0] / substeps
+        return self.fading.after(starts, step)
+
     def label(self, begin: Floats, members: NDArray[np.intp], found: Paths, status: NDArray[np.int8]) -> None:
         """Find labels and statuses of some starts."""
-        c = reduce(self.certificate.scene)
+        c = reduce(self.certificate.scene if self.fading is None else self.fading.scene)
         push = c.force if self.certificate.decays else 0.0
         climb(
             self.certificate,
@@ -194,7 +275,8 @@ class Ladder:
         finest = self.coarse * SUBSTEPS[0] / SUBSTEPS[-1]
         if self.grows(SUBSTEPS[-1]):
             return np.zeros(len(starts), dtype=np.bool_)
-        return lingering(self.certificate, starts, self.t_end, finest, self.method.name, self.threads)
+        begin, _ = self.begin(starts, SUBSTEPS[-1])
+        return lingering(self.certificate, begin, self.t_end, finest, self.method.name, self.threads)
 
     def settle_times(
         self, begin: Floats, members: NDArray[np.intp], found: Paths, status: NDArray[np.int8], radius: float

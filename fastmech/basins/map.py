@@ -9,7 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.basins.copies import copy_numbers
 from fastmech.basins.label import Labels, labels_of
+from fastmech.basins.measures.labels import number_turns
 from fastmech.basins.measures.norm import STATE as STATE
 from fastmech.basins.refine import LevelProgress, refine_grid
 from fastmech.basins.status import BasinStatus, counts
@@ -54,12 +56,7 @@ class BasinMap:
 
         The table is sorted by well, then turns of phi, then of theta.
         """
-        rows = np.column_stack([self.well.ravel(), self.turns.reshape(-1, 2)]).astype(np.int64)
-        known = rows[:, 0] >= 0
-        table, index = np.unique(rows[known], axis=0, return_inverse=True)
-        label = np.full(len(rows), -1, dtype=np.int64)
-        label[known] = index.ravel()
-        return label.reshape(self.well.shape), table
+        return number_turns(self.well, self.turns)
 
 
 def map_basins(
@@ -69,6 +66,7 @@ def map_basins(
     *,
     fixed: Mapping[str, float] | None = None,
     refine: int | None = None,
+    parameters: Mapping[str, ArrayLike] | None = None,
     dt: float | None = None,
     method: str = "dop853",
     settle_radius: float | None = None,
@@ -88,6 +86,8 @@ def map_basins(
             what is near boundaries, see :mod:`fastmech.basins.refine`. This is a heuristic: a part of a
             basin thinner than that which touches no boundary seen otherwise is missed. Points that were not
             computed have no times.
+        parameters: of a system, values of parameters by name that differ between starts, each of a shape that
+            broadcasts to the map's: ``values[:, None]`` changes along the first of two axes.
         dt: coarsest step [s], see :func:`fastmech.basins.label.labels_of`; a system needs one.
         method: name of the integration method.
         settle_radius: see there; a scene's only.
@@ -108,6 +108,7 @@ def map_basins(
     size = math.prod(shape)
     if size > MOST_POINTS:
         raise InputError(f"axes: ask for {size:.3g} starts, at most {MOST_POINTS:.0e} are allowed")
+    own = _checked_parameters(scene, parameters or {}, shape)
     collected = _Collected(size)
 
     def compute(points: NDArray[np.intp], tell: Progress | None) -> NDArray[np.int64]:
@@ -125,7 +126,14 @@ def map_basins(
             )
         else:
             part = system_labels_of(
-                scene, starts, t_end, dt=dt, method=method, threads=threads, progress=tell
+                scene,
+                starts,
+                t_end,
+                dt=dt,
+                method=method,
+                parameters={name: value.ravel()[points] for name, value in own.items()},
+                threads=threads,
+                progress=tell,
             )
         return collected.put(points, part)
 
@@ -192,9 +200,7 @@ class _Collected:
         self.time[points], self.status[points] = part.time, part.status
         if part.settle_time is not None:
             self.settle[points] = part.settle_time
-        turns = part.turns.astype(np.int64) + (1 << 20)
-        number = (part.well.astype(np.int64) << 44) + (turns[:, 0] << 22) + turns[:, 1]
-        return np.where(part.well < 0, -1, number)
+        return copy_numbers(part)
 
 
 def _checked_axes(axes: Mapping[str, ArrayLike], names: tuple[str, ...], least: int) -> dict[str, Floats]:
@@ -218,6 +224,29 @@ def _checked_axes(axes: Mapping[str, ArrayLike], names: tuple[str, ...], least: 
         if array.ndim != 1 or not array.size or not np.isfinite(array).all() or (np.diff(array) <= 0.0).any():
             raise InputError(f"axes.{name}: must be a row of finite, strictly rising values")
         checked[name] = array
+    return checked
+
+
+def _checked_parameters(
+    scene: Scene | System, parameters: Mapping[str, ArrayLike], shape: tuple[int, ...]
+) -> dict[str, Floats]:
+    """Values of parameters at every point of a map.
+
+    Raises:
+        InputError: they are a scene's, unknown, no numbers, or of another shape.
+    """
+    checked = {}
+    for name, values in parameters.items():
+        if isinstance(scene, Scene):
+            raise InputError("parameters: only a system's may differ between starts; a map is of one scene")
+        if name not in scene.parameters:
+            raise InputError(f"parameters.{name}: unknown name; {nearest(name, list(scene.parameters))}")
+        try:
+            checked[name] = np.broadcast_to(np.asarray(values, dtype=np.float64), shape)
+        except (TypeError, ValueError):
+            raise InputError(
+                f"parameters.{name}: must be numbers of a shape that broadcasts to the map's, {shape}"
+            ) from None
     return checked
 
 

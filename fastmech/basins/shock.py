@@ -7,7 +7,7 @@ touches.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,8 +24,8 @@ from fastmech.scene import Scene
 #: Radii at which a ray is looked at before its first way out is narrowed down: at first, and once turned.
 LEVELS, TURNED_LEVELS = 24, 8
 
-#: Radii, of all those, at which rays are looked at together.
-TOGETHER = 4
+#: Radii, of all those, at which rays are looked at together, more of them where there are fewer starts.
+TOGETHER, STARTS = 4, 64
 
 #: Directions of the largest search: some hundred bytes of memory each.
 MOST_DIRECTIONS = 10_000_000
@@ -33,8 +33,8 @@ MOST_DIRECTIONS = 10_000_000
 #: Points between two radii at which a way out is narrowed down.
 SECTIONS = 7
 
-#: Candidates that the search refines, and directions tried round each in a round.
-CANDIDATES, TRIALS = 6, 24
+#: Candidates that the search refines, and directions tried round each in a round, for each way to turn.
+CANDIDATES, TRIALS = 6, 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,29 +84,13 @@ def minimal_shock(
     Raises:
         InputError: an argument is wrong or missing, or the attractor itself has no label.
     """
-    search = _Search(label_of, attractor, norm, coordinates, most, tolerance)
+    rays, most = _rays_in_a_norm(label_of, attractor, norm, coordinates, most, tolerance)
     rng = np.random.default_rng(checks.whole_number("seed", seed, least=0))
     number = checks.whole_number("directions", directions, least=1, most=MOST_DIRECTIONS)
-    units = _random_units(rng, number, len(search.matrix))
+    units = _random_units(rng, number, len(rays.to_state))
     if guess is not None:
-        units = np.concatenate([search.directions_of(guess), units])
-    found, ends = search.first_exits(units[None], np.array([search.most]), LEVELS, CANDIDATES)
-    best = np.argsort(found[0], kind="stable")[:CANDIDATES]
-    units, sizes, labels = units[best], found[0, best], ends[0, best]
-    spread, rows = np.full(len(units), 0.5), np.arange(len(units))
-    # A turn by the angle s changes the size by s^2 at a smooth minimum.
-    while np.isfinite(sizes).any() and (spread > 0.5 * np.sqrt(search.tolerance)).any():
-        random = rng.standard_normal((len(units), TRIALS, units.shape[1]))
-        turned = units[:, None] + spread[:, None, None] * random
-        turned /= np.linalg.norm(turned, axis=2, keepdims=True)
-        found, ends = search.first_exits(turned, np.minimum(sizes, search.most), TURNED_LEVELS, 1)
-        column = found.argmin(axis=1)
-        better = found[rows, column] < sizes * (1.0 - search.tolerance)
-        units[better] = turned[rows, column][better]
-        labels[better] = ends[rows, column][better]
-        sizes[better] = found[rows, column][better]
-        spread[~better] *= 0.5
-    return search.result(units, sizes, labels)
+        units = np.concatenate([_directions_of(guess, rays), units])
+    return rays.result(*rays.turned(units, most, LEVELS, rng))
 
 
 def brute_force_shock(
@@ -125,54 +109,88 @@ def brute_force_shock(
     Arguments, result and errors as :func:`minimal_shock`. It approaches the minimum from above as the number
     of directions grows.
     """
-    search = _Search(label_of, attractor, norm, coordinates, most, tolerance)
+    rays, most = _rays_in_a_norm(label_of, attractor, norm, coordinates, most, tolerance)
     rng = np.random.default_rng(checks.whole_number("seed", seed, least=0))
     number = checks.whole_number("directions", directions, least=1, most=MOST_DIRECTIONS)
-    units = _random_units(rng, number, len(search.matrix))
-    sizes, labels = search.first_exits(units[None], np.array([search.most]), LEVELS, 1)
-    return search.result(units, sizes[0], labels[0])
+    units = _random_units(rng, number, len(rays.to_state))
+    sizes, labels = rays.first_exits(units[None], np.array([most]), LEVELS, 1)
+    return rays.result(units, sizes[0], labels[0])
 
 
-class _Search:
-    """Rays from an attractor in a norm, and the labels along them."""
+def _rays_in_a_norm(
+    label_of: LabelOf | Scene,
+    attractor: ArrayLike | Equilibrium,
+    norm: ArrayLike | None,
+    coordinates: Sequence[int] | None,
+    most: float,
+    tolerance: float,
+) -> tuple[Rays, float]:
+    """Rays of all disturbances of some coordinates in a norm, and the largest size."""
+    label_of, place, norm = with_defaults(label_of, attractor, norm)
+    matrix = norm_on(norm, place.size, coordinates)
+    to_state = np.zeros((len(matrix), place.size))
+    to_state[:, list(range(place.size) if coordinates is None else coordinates)] = np.linalg.inv(matrix)
+    most = checks.number("most", most, "", above=0.0)
+    tolerance = checks.number("tolerance", tolerance, "", above=0.0)
+    own = int(ask(label_of, place[None])[0])
+    if own < 0:
+        raise InputError("attractor: has no label itself; it must be in a basin")
+    return Rays(label_of, place, own, to_state, tolerance), most
 
-    def __init__(
-        self,
-        label_of: LabelOf | Scene,
-        attractor: ArrayLike | Equilibrium,
-        norm: ArrayLike | None,
-        coordinates: Sequence[int] | None,
-        most: float,
-        tolerance: float,
-    ) -> None:
-        self.label_of, self.attractor, norm = with_defaults(label_of, attractor, norm)
-        self.dim = self.attractor.size
-        self.matrix = norm_on(norm, self.dim, coordinates)
-        self.chosen = list(range(self.dim) if coordinates is None else coordinates)
-        self.most = checks.number("most", most, "", above=0.0)
-        self.tolerance = checks.number("tolerance", tolerance, "", above=0.0)
-        self.label = int(ask(self.label_of, self.attractor[None])[0])
-        if self.label < 0:
-            raise InputError("attractor: has no label itself; it must be in a basin")
-        self.trajectories, self.undecided = 1, np.inf
+
+def _directions_of(guess: ArrayLike, rays: Rays) -> Floats:
+    """Unit points (n, k) in the directions of disturbances (n, dim)."""
+    given = checks.states("guess", guess, rays.place.size) @ np.linalg.pinv(rays.to_state)
+    length = np.linalg.norm(given, axis=1, keepdims=True)
+    if not (np.isfinite(length) & (length > 0.0)).all():
+        raise InputError("guess: must be finite and differ from 0 in the chosen coordinates")
+    return np.asarray(given / length)
+
+
+@dataclass
+class Rays:
+    """Rays of disturbances from a resting state, the labels along them, and where they leave its basin."""
+
+    label_of: LabelOf
+    place: Floats  #: (dim,)
+    label: int  #: of its own basin
+    to_state: Floats  #: (k, dim): ``point @ to_state`` is the disturbance whose size is the point's length
+    tolerance: float  #: relative, of the size along a ray
+    least: Callable[[Floats], Floats] = lambda units: np.zeros(
+        len(units)
+    )  #: no smaller size leaves along units
+    trajectories: int = 1
+    undecided: float = np.inf  #: smallest size tried whose end is not known
+
+    def turned(
+        self, units: Floats, most: float, levels: int, rng: np.random.Generator
+    ) -> tuple[Floats, Floats, Integers]:
+        """The rays that leave first, turned for as long as it helps; their sizes and labels."""
+        found, ends = self.first_exits(units[None], np.array([most]), levels, CANDIDATES)
+        best = np.argsort(found[0], kind="stable")[:CANDIDATES]
+        units, sizes, labels = units[best], found[0, best], ends[0, best]
+        spread, rows = np.full(len(units), 0.5), np.arange(len(units))
+        # A turn by the angle s changes the size by s^2 at a smooth minimum.
+        while np.isfinite(sizes).any() and (spread > 0.5 * np.sqrt(self.tolerance)).any():
+            random = rng.standard_normal((len(units), TRIALS * (units.shape[1] - 1), units.shape[1]))
+            turned = units[:, None] + spread[:, None, None] * random
+            turned /= np.linalg.norm(turned, axis=2, keepdims=True)
+            found, ends = self.first_exits(turned, np.minimum(sizes, most), TURNED_LEVELS, 1)
+            column = found.argmin(axis=1)
+            better = found[rows, column] < sizes * (1.0 - self.tolerance)
+            units[better] = turned[rows, column][better]
+            labels[better] = ends[rows, column][better]
+            sizes[better] = found[rows, column][better]
+            spread[~better] *= 0.5
+        return units, sizes, labels
 
     def disturbances(self, points: Floats) -> Floats:
-        """Disturbances (n, dim) whose images in the ball are ``points`` (n, k)."""
-        full = np.zeros((len(points), self.dim))
-        full[:, self.chosen] = points @ np.linalg.inv(self.matrix)
-        return full
-
-    def directions_of(self, guess: ArrayLike) -> Floats:
-        """Unit points (n, k) in the directions of disturbances (n, dim)."""
-        given = checks.states("guess", guess, self.dim)[:, self.chosen] @ self.matrix
-        length = np.linalg.norm(given, axis=1, keepdims=True)
-        if not (np.isfinite(length) & (length > 0.0)).all():
-            raise InputError("guess: must be finite and differ from 0 in the chosen coordinates")
-        return np.asarray(given / length)
+        """Disturbances (n, dim) of ``points`` (n, k)."""
+        return np.asarray(points @ self.to_state)
 
     def labels(self, units: Floats, radii: Floats) -> Integers:
         """Labels (n,) of the starts at ``radii`` along ``units``."""
-        found = ask(self.label_of, self.attractor + self.disturbances(units * radii[:, None]))
+        found = ask(self.label_of, self.place + self.disturbances(units * radii[:, None]))
         self.trajectories += len(units)
         self.undecided = min(self.undecided, float(radii[found < 0].min(initial=np.inf)))
         return found
@@ -183,7 +201,7 @@ class _Search:
         Args:
             units: directions of rays in groups (groups, rays, k).
             limit: largest size to look at (groups,).
-            levels: radii to look at.
+            levels: radii to look at, evenly spaced, in their logarithm where a least size is known.
             keep: so many of each group's shortest rays are narrowed down to the tolerance; the others only
                 until they are known not to be among them.
 
@@ -192,15 +210,17 @@ class _Search:
         """
         shape = units.shape[:2]
         units = units.reshape(-1, units.shape[2])
-        step = np.repeat(limit / levels, shape[1])
-        lower, upper = np.zeros(len(units)), np.full(len(units), np.inf)
+        top = np.repeat(limit, shape[1])[:, None]
+        floor, share = self.least(units)[:, None], np.arange(levels + 1) / levels
+        ladder = np.where(floor > 0.0, floor ** (1.0 - share) * top**share, top * share)
+        lower, upper = np.minimum(floor, top)[:, 0], np.full(len(units), np.inf)
         label = np.full(len(units), -1, dtype=np.int64)
 
         def promising() -> Floats:
             """Of the rays, which might still be among the shortest."""
             last = min(keep, shape[1]) - 1
             worst = np.partition(upper.reshape(shape), last, axis=1)[:, last]
-            return np.asarray(lower < np.repeat(worst, shape[1]))
+            return np.asarray(lower < np.minimum(np.repeat(worst, shape[1]), top[:, 0]))
 
         def look(rays: Integers, radii: Floats) -> None:
             """Narrow down where rays leave by their labels at rising radii (rays, m)."""
@@ -214,10 +234,10 @@ class _Search:
             inner = np.where(leaves, first, m) - 1
             lower[rays[inner >= 0]] = radii[row, inner][inner >= 0]
 
-        for level in range(0, levels, TOGETHER):
+        together = max(TOGETHER, STARTS // len(units))
+        for level in range(0, levels, together):
             rays = np.flatnonzero(np.isinf(upper) & promising())
-            several = np.arange(level + 1, min(level + TOGETHER, levels) + 1)
-            look(rays, step[rays, None] * several)
+            look(rays, ladder[rays, level + 1 : level + together + 1])
         while True:
             wide = np.isfinite(upper) & (upper - lower > self.tolerance * upper)
             rays = np.flatnonzero(wide & promising())
@@ -230,7 +250,7 @@ class _Search:
         """The smallest of shocks along ``units``."""
         best = int(np.argmin(sizes))
         found = bool(np.isfinite(sizes[best]))
-        shock = np.full(self.dim, np.nan)
+        shock = np.full(self.place.size, np.nan)
         if found:
             shock = self.disturbances(sizes[best] * units[best : best + 1])[0]
         return Shock(

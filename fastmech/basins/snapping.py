@@ -4,13 +4,14 @@ The mechanism rests in a well of Pi, then F0 exp(-alpha t) acts on M2 along +x. 
 another well, or in the same one with another number of full turns. The force's limit is none, so wells, start
 and end are those of the force-free scene for every alpha > 0.
 
-Two limits. alpha -> infinity at a fixed impulse F0/alpha is a kick, see
-:func:`fastmech.basins.critical.critical_impulse`. alpha = 0 stands apart: a constant force has another
+Two limits. alpha -> infinity at a fixed impulse F0/alpha is a blow on M2, see
+:func:`fastmech.basins.shock_limit.shock_limit`. alpha = 0 stands apart: a constant force has another
 potential, whose wells are other ones, and no end to compare; it is refused here.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
@@ -29,6 +30,9 @@ from fastmech.equilibria.find import Equilibria, Equilibrium, find_equilibria
 from fastmech.errors import InputError, shown
 from fastmech.integrators.methods import find_method
 from fastmech.scene import Scene
+
+#: Forces between two known ones that are tried at once.
+BETWEEN = 32
 
 
 class Window(NamedTuple):
@@ -161,6 +165,64 @@ def map_snapping(
 def default_end(alpha: ArrayLike) -> Floats:
     """End of a run [s] by default: when the force has fallen to a millionth, and 200 s."""
     return 200.0 + np.log(1e6) / np.asarray(alpha, dtype=np.float64)
+
+
+def critical_forces(
+    snapping: SnappingMap,
+    scene: Scene,
+    *,
+    tolerance: float = 0.1,
+    t_end: float | None = None,
+    dt: float | None = None,
+    method: str = "dop853",
+    threads: int | None = None,
+) -> Floats:
+    """The least force that leaves at every alpha of a map [N], narrowed down between its forces (alphas,).
+
+    NaN where none of the map's forces leaves. A window narrower than the map's steps, below the first force
+    that leaves, is not seen.
+
+    Args:
+        snapping: a map of the same scene.
+        scene: the mechanism.
+        tolerance: N.
+        t_end, dt, method, threads: as for :func:`map_snapping`.
+
+    Raises:
+        InputError: an argument is wrong.
+    """
+    tolerance = checks.number("tolerance", tolerance, "N", above=0.0)
+    start = snapping.equilibria[snapping.start]
+    sign = float(np.sign(snapping.F0[0]))
+    order = np.argsort(np.abs(snapping.F0))
+    size = np.append(0.0, np.abs(snapping.F0)[order])
+    found = np.full(snapping.alpha.size, np.nan)
+    for k, rate in enumerate(snapping.alpha):
+        leaves = np.flatnonzero(snapping.left[k, order])
+        if not leaves.size:
+            continue
+
+        def left(sizes: Floats, rate: float = float(rate)) -> NDArray[np.bool_]:
+            forces = np.sort(sign * sizes)
+            part = map_snapping(
+                scene, forces, [rate], start=start, t_end=t_end, dt=dt, method=method, threads=threads
+            )
+            return part.left[0, :: int(sign)]
+
+        first = int(leaves[0])
+        found[k] = sign * _narrowed(left, float(size[first]), float(size[first + 1]), tolerance)
+    return found
+
+
+def _narrowed(
+    left: Callable[[Floats], NDArray[np.bool_]], low: float, high: float, tolerance: float
+) -> float:
+    """The first size that leaves between one that does not and one that does, to a tolerance."""
+    while high - low > tolerance:
+        line = np.linspace(low, high, BETWEEN + 2)
+        first = int(np.argmax([*left(line[1:-1]), True])) + 1
+        low, high = float(line[first - 1]), float(line[first])
+    return high
 
 
 def force_free(scene: Scene, start: Equilibrium | None) -> tuple[Scene, Equilibria, int]:

@@ -35,14 +35,15 @@ FAILURES = (
 
 _ADVICE = {
     BasinStatus.CAPTURED: "proved to end in its well: energy and position leave no other way",
-    BasinStatus.UNDECIDED: "not captured by t_end (use a larger one), or the finest steps disagree",
+    BasinStatus.UNDECIDED: "not captured by t_end (use a larger one), or too fast or too near a boundary for "
+    "the finest steps to agree (no t_end helps)",
     BasinStatus.AT_SADDLE: "comes to an unstable equilibrium, and the finest steps disagree on what follows",
     BasinStatus.NOT_FINITE: "became NaN or infinite with every step tried; use a smaller dt",
     BasinStatus.STEP_TOO_LARGE: "every step tried is beyond the method's limit, or brings the motion to an "
     "energy that it cannot have; use a smaller dt",
     BasinStatus.NOT_CONVERGED: "Newton's iteration found no solution of a step, with every step tried; "
     "use a smaller dt",
-    BasinStatus.START_NOT_FINITE: "the start is NaN or infinite",
+    BasinStatus.START_NOT_FINITE: "the start is NaN, infinite or more than 500 million turns away",
 }
 
 

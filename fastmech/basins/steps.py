@@ -19,6 +19,10 @@ PHASE, TURNING = 1.0, 2.5
 #: faster still comes out as what that step makes of it.
 MOST_OCTAVES = 7.0
 
+#: A force whose decay rate is so many times the scene's highest frequency is gone at once: while it acts, it
+#: falls by ``exp(-FALL)`` in the coarsest step.
+AT_ONCE, FALL = 4.0, 0.5
+
 #: Points along a turn at which the scene's frequencies are looked up.
 GRID = 48
 
@@ -48,7 +52,8 @@ def fastest_rate(c: Coefficients, starts: Floats) -> Floats:
     """Bound on the angular rates [rad/s] that the energy of each start (n, 4) allows, shape (n,).
 
     The metric's smaller eigenvalue is at least its determinant over its trace. A force, decaying or not, can
-    add at most what it does from one end of its reach to the other.
+    add at most what it does from one end of its reach to the other, and one that decays at most its impulse
+    F0/alpha, to no less mass than m2.
     """
     angles = np.linspace(-np.pi, np.pi, 8 * GRID)
     k, _ = slider_ratio(np.sin(angles), np.cos(angles))
@@ -58,7 +63,21 @@ def fastest_rate(c: Coefficients, starts: Floats) -> Floats:
     lowest = -(abs(c.lift) + c.gravity + c.spring)
     with np.errstate(invalid="ignore", over="ignore"):
         total, _ = energy(c, starts, np.zeros(len(starts)))
-        return np.asarray(np.sqrt(2.0 * np.maximum(total - lowest + 4.0 * abs(c.force), 0.0) / least))
+        room, push = np.maximum(total - lowest, 0.0), abs(c.force)
+        speed = np.sqrt(2.0 * (room + 4.0 * push))
+        if c.decay > 0.0:
+            speed = np.minimum(speed, np.sqrt(2.0 * room) + push / c.decay)
+        return np.asarray(speed / np.sqrt(least))
+
+
+def gone_at_once(c: Coefficients) -> bool:
+    """Whether a force decays before the mechanism has moved on its own."""
+    return c.force != 0.0 and c.decay > AT_ONCE * highest_frequency(c._replace(force=0.0))
+
+
+def step_of_fading(c: Coefficients) -> float:
+    """Coarse step [s] for as long as such a force acts."""
+    return min(FALL / c.decay, PHASE / highest_frequency(c))
 
 
 def fastest_followed(c: Coefficients) -> float:
@@ -75,9 +94,9 @@ def coarse_steps(c: Coefficients, starts: Floats) -> Floats:
     """Coarse step [s] of each start, shape (n,): the scene's own, halved until it is small enough.
 
     Steps come in octaves, so that starts of about the same speed run together; a start's step depends on
-    nothing but the start and the scene.
+    nothing but the start and the scene. Where the force is gone at once, they are those for the time after.
     """
-    slow = highest_frequency(c)
+    slow = highest_frequency(c._replace(force=0.0) if gone_at_once(c) else c)
     with np.errstate(invalid="ignore", divide="ignore"):
         octaves = np.ceil(np.log2(fastest_rate(c, starts) * PHASE / (TURNING * slow)) - 1e-9)
     return np.asarray(PHASE / slow * 0.5 ** np.clip(np.nan_to_num(octaves), 0.0, MOST_OCTAVES))

@@ -20,7 +20,7 @@ from scipy.integrate import solve_ivp
 
 from fastmech.basins.label import Labels, labels_of
 from fastmech.bench.plain import scalar_rhs
-from fastmech.disturbance.outcome import confining_energy, excess_energy
+from fastmech.disturbance.size import confining_energy, excess_energy
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.threads import thread_count
 from fastmech.equilibria.find import find_equilibria

@@ -167,6 +167,7 @@ def speed_dataset(rows: list[Row], problems: list[Problem]) -> Dataset:
     errors = np.full((len(rows), max(len(problem.starts) for problem in problems)), np.nan)
     for line, row in zip(errors, rows, strict=True):
         line[: row.errors.size] = row.errors
+    worst = "of the worst component of a final state in rad and rad/s"
     columns = {
         "problem": (_strings([r.problem for r in rows]), "1", "problem"),
         "family": (_strings([r.family for r in rows]), "1", "integrator"),
@@ -176,12 +177,11 @@ def speed_dataset(rows: list[Row], problems: list[Problem]) -> Dataset:
         "wall": (np.array([r.wall for r in rows]), "s", "wall time of a call, median"),
         "processor": (np.array([r.processor for r in rows]), "s", "processor time of a call, median"),
         "first_call": (np.array([r.first_call for r in rows]), "s", "preparing and the first call"),
-        "max_error": (np.array([r.max_error() for r in rows]), "rad or rad/s", "largest error"),
-        "median_error": (np.array([r.median_error for r in rows]), "rad or rad/s", "median error"),
+        "max_error": (np.array([r.max_error() for r in rows]), "1", f"largest error, {worst}"),
+        "median_error": (np.array([r.median_error for r in rows]), "1", f"median error, {worst}"),
     }
     variables = {name: Variable(("row",), *column) for name, column in columns.items()}
-    about = "largest error of a component of the final state, by trajectory"
-    return Dataset(variables | {"error": Variable(("row", "trajectory"), errors, "rad or rad/s", about)})
+    return Dataset(variables | {"error": Variable(("row", "trajectory"), errors, "1", f"error, {worst}")})
 
 
 def throughput_dataset(peak: float, found: list[Throughput]) -> Dataset:

@@ -13,6 +13,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.atlas.wells import ROUNDING
 from fastmech.capture.barriers import BarrierTree, barrier_tree, frozen_coefficients
 from fastmech.capture.locate import FIRST_WELL, INTERVAL, fill_cells, pack
 from fastmech.capture.observe import (
@@ -32,9 +33,6 @@ from fastmech.scene import Scene
 from fastmech.stability.arguments import require_scene
 
 Floats = NDArray[np.float64]
-
-#: Share of the potential's amplitudes by which levels lie below the barriers: far above rounding.
-ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)

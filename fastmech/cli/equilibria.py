@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 import shutil
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from fastmech.cli.reporting import account, reporting_options
+from fastmech.errors import InputError
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -20,6 +22,9 @@ if TYPE_CHECKING:
     from fastmech.scene import Scene
     from fastmech.stability.classify import Classification
 
+
+#: Of stable positions by their numbers: least impulses on M1, M2 and M3 that may leave the well [N s].
+Limits = dict[int, dict[str, float]]
 
 #: Columns that the table needs: in a narrower terminal lines break, but no digit is lost.
 LEAST_WIDTH = 84
@@ -56,9 +61,9 @@ def command(
 ) -> None:
     """List every equilibrium of a scene and its stability.
 
-    For every stable one a sentence tells the constant loads F0 at which it disappears, and one for all says
-    whether the list is proved to be complete. The scene is that of SCENE.toml (its table [scene]), else the
-    paper's Table 1; the options change it.
+    For every stable one sentences tell the constant loads F0 at which it disappears and how hard it may be
+    struck without leaving its well, and one for all says whether the list is proved to be complete. The scene
+    is that of SCENE.toml (its table [scene]), else the paper's Table 1; the options change it.
     """
     from fastmech.scene import Scene
 
@@ -67,6 +72,7 @@ def command(
     with account("equilibria", quiet, as_json) as told:
         with told.bars.preparing():
             from fastmech.atlas.snap import find_snap
+            from fastmech.basins.shock_limit import proved_limits
             from fastmech.equilibria.find import find_equilibria
             from fastmech.stability.classify import classify
         found = find_equilibria(scene, at)
@@ -78,16 +84,20 @@ def command(
         loaded = scene.replace(F0=found.force, alpha=0.0)
         stable = [k for k, equilibrium in enumerate(found) if equilibrium.morse_index == 0]
         advance = told.bars.stage("loads at which they disappear", len(stable))
-        snaps = {}
+        snaps, limits = {}, {}
         for k in stable:
             snaps[k] = find_snap(loaded, found[k])
+            with suppress(InputError):  # wells that are not certain have no limits
+                limits[k] = proved_limits(loaded, found[k])
             advance(1)
-        told.facts |= _facts(found, results, snaps)
+        told.facts |= _facts(found, results, snaps, limits)
     if not as_json:
-        _show(scene, at, found, results, snaps)
+        _show(scene, at, found, results, snaps, limits)
 
 
-def _facts(found: Equilibria, results: list[Classification], snaps: dict[int, Snap]) -> dict[str, Any]:
+def _facts(
+    found: Equilibria, results: list[Classification], snaps: dict[int, Snap], limits: Limits
+) -> dict[str, Any]:
     """The list for other programs."""
     equilibria = []
     for k, (equilibrium, result) in enumerate(zip(found, results, strict=True)):
@@ -96,12 +106,19 @@ def _facts(found: Equilibria, results: list[Classification], snaps: dict[int, Sn
         about["eigenvalues"] = [[value.real, value.imag] for value in map(complex, result.eigenvalues)]
         if k in snaps:
             about |= {"snap_below": snaps[k].below, "snap_above": snaps[k].above}
+        if k in limits:
+            about["shock_limit"] = {on: limit for on, limit in limits[k].items() if math.isfinite(limit)}
         equilibria.append(about)
     return {"force": found.force, "certificate": found.certificate.sentence, "equilibria": equilibria}
 
 
 def _show(
-    scene: Scene, at: float, found: Equilibria, results: list[Classification], snaps: dict[int, Snap]
+    scene: Scene,
+    at: float,
+    found: Equilibria,
+    results: list[Classification],
+    snaps: dict[int, Snap],
+    limits: Limits,
 ) -> None:
     """The table and the sentences."""
     from rich.console import Console
@@ -115,6 +132,9 @@ def _show(
         console.print(f"{number}: {result.explanation}.")
     for k, snap in snaps.items():
         console.print(f"{k + 1}: as the load F0 changes, it {snap.answer}.")
+    for k, limit in limits.items():
+        blows = ", ".join(f"{size:.4g} N s on {on}" for on, size in limit.items() if math.isfinite(size))
+        console.print(f"{k + 1}: no blow at rest leaves its well with less than {blows}.")
     sentence = found.certificate.sentence
     console.print(f"{sentence[0].upper()}{sentence[1:]}.")
 

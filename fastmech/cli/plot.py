@@ -17,14 +17,20 @@ from fastmech.cli.reporting import account, reporting_options
     type=click.Path(file_okay=False, path_type=Path),
     help="Folder for the pictures [default: FILE without its ending].",
 )
+@click.option("--section", metavar="NAME", help="Only this section.")
+@click.option(
+    "--format", "form", type=click.Choice(["png", "pdf", "svg"]), default="png", help="Format [default: png]."
+)
 @reporting_options
-def command(file: Path, out: Path | None, quiet: bool, as_json: bool) -> None:
-    """Draw every section of a result file as PNG pictures."""
+def command(file: Path, out: Path | None, section: str | None, form: str, quiet: bool, as_json: bool) -> None:
+    """Draw every section of a result file as pictures."""
     from fastmech.store.read import open_results
 
     with account("plot", quiet, as_json) as told:
-        open_results(file).close()  # before kernels are compiled, which may take a minute
+        with open_results(file) as results:  # before kernels are compiled, which may take a minute
+            if section is not None:
+                results[section]  # says what there is
         with told.bars.preparing():
             from fastmech.runner import draw_results
-        for picture in draw_results(file, out, stage=told.bars.stage):
+        for picture in draw_results(file, out, stage=told.bars.stage, section=section, form=form):
             told.wrote(picture)

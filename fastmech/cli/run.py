@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -18,7 +18,14 @@ if TYPE_CHECKING:
 
 
 @click.command(name="run")
-@click.argument("request_file", metavar="SCAN.toml", type=click.Path(path_type=Path))
+@click.argument("request_file", metavar="[SCAN.toml]", required=False, type=click.Path(path_type=Path))
+@click.option(
+    "--from",
+    "source",
+    metavar="FILE.h5",
+    type=click.Path(path_type=Path),
+    help="Compute a result again: the request is the one that FILE.h5 holds.",
+)
 @click.option(
     "--out",
     metavar="FILE.h5",
@@ -35,7 +42,8 @@ if TYPE_CHECKING:
 )
 @reporting_options
 def command(
-    request_file: Path,
+    request_file: Path | None,
+    source: Path | None,
     out: Path | None,
     fresh: bool,
     threads: int | None,
@@ -48,13 +56,20 @@ def command(
 ) -> None:
     """Run every scan of a request, write one HDF5 file.
 
+    The request is SCAN.toml, or with --from that of an older result; nothing in a result is executed.
     Finished work is kept: after an interruption the same command goes on.
     """
+    if (request_file is None) == (source is None):
+        raise click.UsageError("give a request, SCAN.toml, or --from FILE.h5")
     if keep is not None and tile is None:
         raise click.UsageError("--keep needs --tile")
     if workers is not None and scheduler is not None:
         raise click.UsageError("--workers and --scheduler exclude each other")
     with account("run", quiet, as_json) as told:
+        text = before = None
+        if source is not None:
+            request_file, text, before = _asked_in(source)
+        assert request_file is not None
         with told.bars.preparing():
             from fastmech.runner import run_request
             from fastmech.scan_types.request import RunContext
@@ -62,15 +77,36 @@ def command(
         context = RunContext(threads, told.bars.stage)
         target = out or default_output(request_file)
         if tile is not None:
-            _run_tile(told, request_file, tile, target, keep, context)
+            _run_tile(told, request_file, text, tile, target, keep, context)
             return
         with _hiring(workers, scheduler) as hire:
-            report = run_request(
-                request_file, target, fresh=fresh, context=context, hire=hire, tell=told.bars.tell
-            )
+            settings: dict[str, Any] = {"fresh": fresh, "context": context, "hire": hire}
+            report = run_request(request_file, target, **settings, tell=told.bars.tell, text=text)
         told.done = str(target)
         told.facts |= report.summary()
         _show(told, report)
+        if before is not None:
+            _compare(told, before, report.path)
+
+
+def _asked_in(source: Path) -> tuple[Path, str, str | None]:
+    """Name and text of the request that a result was made from, and all that decided its values."""
+    from fastmech.store.read import open_results
+    from fastmech.tiles.identity import asked_of_result
+
+    with open_results(source) as results:
+        name = Path(str(results.attrs.get("request_file", ""))).name
+        plain = "".join(c if c.isalnum() or c in "._- " else "_" for c in name)
+        return Path(plain or source.name), results.request, asked_of_result(source)
+
+
+def _compare(told: Account, before: str, target: Path) -> None:
+    """Say what else than the request decides the values, and differs."""
+    from fastmech.tiles.identity import asked_of_result, differences
+
+    now = asked_of_result(target)
+    if now is not None and now != before:
+        told.say(f"Bits may differ from the older result: {differences(before, now)}")
 
 
 @contextmanager
@@ -86,14 +122,20 @@ def _hiring(workers: int | None, scheduler: str | None) -> Iterator[Hiring | Non
 
 
 def _run_tile(
-    told: Account, request_file: Path, tile: str, target: Path, keep: Path | None, context: RunContext
+    told: Account,
+    request_file: Path,
+    text: str | None,
+    tile: str,
+    target: Path,
+    keep: Path | None,
+    context: RunContext,
 ) -> None:
     from fastmech.store.write import check_writable
     from fastmech.tiles.alone import compute_alone
 
     if keep is not None:
         check_writable(keep)
-    alone = compute_alone(request_file, tile, context, target)
+    alone = compute_alone(request_file, tile, context, target, text)
     told.facts |= {"tile": tile, "content": alone.content, "same": alone.same}
     told.say(f"{alone.seconds:9.2f} s  {tile}: {alone.items:,} {alone.what}")
     told.say(f"Content: {alone.content}")

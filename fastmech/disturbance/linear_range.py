@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.disturbance.ensemble import equilibria_to_disturb, unit_directions
-from fastmech.disturbance.motion import disturbed_motion
-from fastmech.disturbance.size import Size, size_at
+from fastmech.disturbance.motion import disturbed_motion, equilibria_to_disturb
+from fastmech.disturbance.size import Size, size_at, unit_directions
 from fastmech.ensembles import checks
 from fastmech.equilibria.find import Equilibrium
 from fastmech.scene import Scene
@@ -40,7 +39,7 @@ def linear_range(
     tolerance: float = 0.05,
     directions: int = 256,
     seed: int = 0,
-    dt: float = 0.02,
+    dt: float | None = None,
     part: slice | None = None,
     threads: int | None = None,
 ) -> LinearRange:
@@ -50,7 +49,9 @@ def linear_range(
     size(nonlinear), both over 201 evenly spaced times of [0, horizon], in the norm of
     :class:`fastmech.disturbance.size.Size`. Along every direction (uniform on the sphere) sizes from 1e-6 rad
     to pi rad are tried upwards, and the first crossing of the tolerance is refined by bisection to one part
-    in 10,000. ``part`` says which of the directions to try, all by default.
+    in 10,000. ``dt`` is the longest step [s], by default that of
+    :func:`fastmech.disturbance.motion.disturbed_motion`. ``part`` says which of the directions to try, all by
+    default.
 
     Raises:
         InputError: an argument is wrong, the scene's force decays, or the equilibrium is not the scene's.

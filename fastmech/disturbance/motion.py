@@ -8,15 +8,19 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.disturbance.ensemble import equilibria_to_disturb
+from fastmech.disturbance.size import size_at
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
-from fastmech.equilibria.find import Equilibrium
+from fastmech.equilibria.find import Equilibria, Equilibrium, find_equilibria
+from fastmech.errors import InputError
 from fastmech.scene import Scene
 from fastmech.stability.linearize import jacobian
 
 Floats = NDArray[np.float64]
 
+
+#: Default step times the highest frequency [rad].
+PHASE = 0.05
 
 #: Condition of the eigenvectors beyond which their errors would show beside those of the integration.
 _ILL_CONDITIONED = 1e4
@@ -40,14 +44,15 @@ def disturbed_motion(
     disturbance: ArrayLike,
     times: ArrayLike,
     *,
-    dt: float = 0.01,
+    dt: float | None = None,
     method: str = "dop853",
     threads: int | None = None,
 ) -> DisturbedMotion:
     """Motion after disturbances (n, 4) or (4,) of an equilibrium, at ``times`` [s].
 
-    The nonlinear motion is integrated with a fixed step; the linearized one is exact: the matrix
-    exponential of the Jacobian at the equilibrium.
+    The nonlinear motion is integrated with a fixed step of at most ``dt`` [s], by default
+    :func:`default_step`; the linearized one is exact: the matrix exponential of the Jacobian at the
+    equilibrium.
 
     Raises:
         InputError: an argument is wrong, the scene's force decays, or the equilibrium is not the scene's.
@@ -56,9 +61,41 @@ def disturbed_motion(
     start = checks.states("disturbance", disturbance, 4)
     t = checks.rising_times("times", times)
     center = np.array([equilibrium.phi, equilibrium.theta, 0.0, 0.0])
+    dt = default_step(scene, equilibrium) if dt is None else dt
     run = integrate(scene, center + start, dt=dt, method=method, t_eval=t, threads=threads)
     linearized = start @ propagators(jacobian(scene, equilibrium), t).mT
     return DisturbedMotion(t, run.y - center, linearized, run.status)
+
+
+def default_step(scene: Scene, equilibrium: Equilibrium) -> float:
+    """Longest step [s] of motion about an equilibrium: 0.05 rad of its highest frequency."""
+    return PHASE / size_at(scene, equilibrium.phi, equilibrium.theta).omega
+
+
+def require_constant_force(scene: Scene) -> None:
+    """Refuse a scene whose force changes: nothing rests while it decays.
+
+    Raises:
+        InputError: the force decays.
+    """
+    if scene.F0 != 0 and scene.alpha != 0:
+        raise InputError(
+            f"scene.alpha = {scene.alpha:g}: must be 0 1/s for motion about an equilibrium (or F0 = 0 N); "
+            "use scene.replace(alpha=0.0) and find its equilibria anew"
+        )
+
+
+def equilibria_to_disturb(scene: Scene) -> Equilibria:
+    """The equilibria of a scene in which disturbed motion makes sense.
+
+    Raises:
+        InputError: the force decays, or no equilibrium is isolated.
+    """
+    require_constant_force(scene)
+    equilibria = find_equilibria(scene)
+    if not equilibria:
+        raise InputError(f"scene: has no equilibrium to disturb: {equilibria.certificate.sentence}")
+    return equilibria
 
 
 def propagators(matrix: Floats, times: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""How large a disturbance is: one norm for angles and rates together."""
+"""How large a disturbance is: one norm for angles and rates together; random ones, and what confines them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from fastmech.mechanism.lagrange import metric, potential_hessian, unit
+from fastmech.equilibria.find import Equilibrium
+from fastmech.mechanism.lagrange import kinetic_energy, metric, potential_energy, potential_hessian, unit
 from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -54,3 +55,31 @@ def size_at(scene: Scene, phi: float, theta: float) -> Size:
     curvature = np.max(np.abs(scipy.linalg.eigvalsh(hessian, a)))
     # Without any stiffness (all curvature gone) there is no frequency; 1 rad/s keeps the norm defined.
     return Size(a / unit(scene), float(np.sqrt(curvature)) or 1.0)
+
+
+def excess_energy(scene: Scene, e: Equilibrium, y: Floats) -> Floats:
+    """T + U of states (n, 4) above U at an equilibrium [J]."""
+    with np.errstate(invalid="ignore", over="ignore"):  # states that are not finite are nowhere at rest
+        return kinetic_energy(scene, y) + potential_energy(scene, y[:, :2], scene.F0) - e.energy
+
+
+def confining_energy(scene: Scene, e: Equilibrium, radius: float) -> float:
+    """Energy [J] with which a motion about a minimum stays in the ball of the given radius [rad].
+
+    With the lowest squared frequency s the energy is at least s m2 l^2 size^2 / 2 (the norm's omega is the
+    highest frequency), to second order.
+    """
+    lowest = float(scipy.linalg.eigvalsh(e.hessian, metric(scene, (e.phi, e.theta)))[0])
+    return 0.5 * lowest * unit(scene) * radius * radius
+
+
+def uniform_ball(rng: np.random.Generator, n: int) -> Floats:
+    """Points uniform in the unit ball of four dimensions, shape (n, 4)."""
+    directions = unit_directions(rng, n)
+    return directions * rng.random((n, 1)) ** 0.25
+
+
+def unit_directions(rng: np.random.Generator, n: int) -> Floats:
+    """Points uniform on the unit sphere of four dimensions, shape (n, 4)."""
+    normal = rng.standard_normal((n, 4))
+    return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))

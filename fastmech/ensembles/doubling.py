@@ -51,15 +51,8 @@ KEPT = 0.75
 #: Two runs are rarely nearer to each other by luck than by this factor.
 LUCK = 100.0
 
-#: Trajectories of the largest estimates whose errors are measured by finer runs at the end, where a
-#: right-hand side may jump.
-AUDITED = 64
-
 #: Share of the method's order that a trajectory must show to be taken for smooth again.
 SMOOTH = 2.0 / 3.0
-
-#: The second of the two finer runs that measure has steps so many times shorter.
-FINER = 2.0 * RATIO
 
 #: Right-hand sides that repetitions may take in those of the two first runs; CHEAP more are always allowed.
 BUDGET = 4.0
@@ -77,7 +70,6 @@ class Doubling(Repeatable):
     left: float = field(init=False)  #: right-hand sides that may still be taken
     usable: Flags = field(init=False)  #: the start is
     rough: Flags = field(init=False)  #: shows less than the method's order
-    once_rough: Flags = field(init=False)  #: has shown less
     rounded: Flags = field(init=False)  #: rounding rules
     given_up: Flags = field(init=False)
     unpaid: Flags = field(init=False)  #: its shorter steps would exceed the budget
@@ -94,23 +86,15 @@ class Doubling(Repeatable):
         self.finer = self.solve(everyone, self.dt / RATIO)
         self.distance = self.apart(self.best, self.finer)
         self.error = error_of_longer(self.distance, settings.method.order)
-        self.rough, self.once_rough = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
-        if self.jumps:
-            # A third run tells each one's order.
-            longer = self.apart(self.solve(everyone, self.dt * RATIO), self.best)
-            self._reckon(everyone, longer, self.distance, np.full(n, RATIO))
+        self.rough = np.zeros(n, dtype=np.bool_)
         self.left = CHEAP + BUDGET * self.work(everyone, self.dt / 2.0)
         self.vain = np.zeros(n, dtype=np.int64)
         self.given_up, self.rounded = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
         self.unpaid = np.zeros(n, dtype=np.bool_)
         self._repeat_missing()
-        if self.jumps:
-            self._audit()
-        else:
-            self._measure_doubtful()
-            self._repeat_missing()
-        jumped = self.once_rough & self.jumps
-        self._resettle(np.flatnonzero(self.rounded | (self.given_up & ~jumped & ~self.unpaid)))
+        self._measure_doubtful()
+        self._repeat_missing()
+        self._resettle(np.flatnonzero(self.rounded | (self.given_up & ~self.unpaid)))
         return self.best, self.error, self.remark()
 
     def affordable(self, who: Members, finer: float) -> Members:
@@ -136,7 +120,6 @@ class Doubling(Repeatable):
             smooth = np.log(before / after) / np.log(shorter) >= SMOOTH * p
         # Steps that were too long to show any order may become short enough.
         self.rough[who] = (self.rough[who] & ~smooth) | (seen < p)
-        self.once_rough |= self.rough
         rough = self.rough[who]
         lasting = np.fmax(after, np.where(np.isfinite(before), before / shorter, 0.0))
         after = np.where(rough, lasting, after)
@@ -182,8 +165,6 @@ class Doubling(Repeatable):
         better = ~(after > error) | (self.rough[again] & np.isfinite(run.y[-1]).all(axis=1))
         put_into(self.best, again[better], run, better)
         self.dt[again] = own
-        # Where jumps are possible, luck looks like rounding.
-        rounded &= ~(self.once_rough & self.jumps)[again]
         self.rounded[again[rounded]] = True
         self.given_up[again[(self.vain[again] >= PATIENCE) & ~rounded]] = True
 
@@ -221,59 +202,17 @@ class Doubling(Repeatable):
         apart = self.apart(self.solve(who, self.dt[who] / 2.0), part_of(self.best, who))
         self.error[who] = apart / (1.0 - 0.5**order)
 
-    def _audit(self) -> None:
-        """Measure the errors of the worst trajectories again, where the right-hand side may jump.
-
-        One difference of two runs may be small by luck. Two finer runs tell three, and if these do not fall
-        as the order says, the finest run is kept and the largest difference taken for its error. Where one is
-        above the tolerance the finer run is kept, and measured in its turn while that helps.
-        """
-        open_ = self.usable & ~self.rounded & ~self.given_up
-        who = np.concatenate([self._worst(open_ & ~self.rough)[:AUDITED], self._worst(open_ & self.rough)])
-        last, falls = np.full(who.size, np.inf), 0.5 ** (SMOOTH * self.settings.method.order)
-        for turn in range(ROUNDS):
-            number = self._audited(who, turn)
-            who, last = who[:number], last[:number]
-            if not number:
-                return
-            middle = self.solve(who, self.dt[who] / 2.0)
-            first, own = self.apart(middle, part_of(self.best, who)), self.dt[who] / FINER
-            run = self.solve(who, own)
-            between = self.apart(run, middle)
-            error = np.maximum(first, self.apart(run, part_of(self.best, who)))
-            rough = ~(between <= np.maximum(ROUNDING, falls * first))
-            error = np.where(rough, np.maximum(error, between), error)
-            self.error[who] = error
-            missing, helps = ~(error <= self.tol), error <= 0.5 * last
-            # Two resolutions may disagree about a stop: the finer one has the better view.
-            helps &= np.isfinite(error) | (turn < 2)
-            kept = (rough | (missing & helps)) & np.isfinite(run.y[-1]).all(axis=1)
-            put_into(self.best, who[kept], run, kept)
-            self.dt[who[kept]] = own[kept]
-            again = kept & missing & helps
-            who, last = who[again], error[again]
-
-    def _worst(self, which: Flags) -> Members:
-        """Trajectories in the order of their errors, largest first."""
-        members = np.flatnonzero(which)
-        return members[np.argsort(-self.error[members], kind="stable")]
-
-    def _audited(self, who: Members, turn: int) -> int:
-        """How many of the trajectories, worst first, the budget gives finer runs; some in any case."""
-        number = who.size
-        while number:
-            part = who[:number]
-            cost = self.work(part, self.dt[part] / 2.0) + self.work(part, self.dt[part] / FINER)
-            if cost <= self.left or (not turn and number <= AUDITED):
-                self.left -= cost
-                break
-            self.unpaid[part[number // 2 :]] = True
-            number //= 2
-        return number
-
     def remark(self) -> str:
         """Why trajectories have missed the tolerance; empty where none has."""
         missed = self.usable & ~(self.error <= self.tol)
         ended = np.isfinite(self.best.y[-1]).all(axis=1)
-        grazing = ended & ~np.isfinite(self.error) & self.problem.observation.stops
-        return missed_line(missed, grazing, ~ended, self.unpaid)
+        grazing = missed & ended & ~np.isfinite(self.error) & self.problem.observation.stops
+        unpaid = missed & self.unpaid & ended & ~grazing
+        causes = {
+            "two resolutions disagree about their stop": grazing,
+            "not finite at any step tried": missed & ~ended,
+            "shorter steps would cost too much": unpaid,
+            "shorter steps do not reduce their errors as the order says (chaos, a singularity of the "
+            "right-hand side, rounding)": missed & ended & ~grazing & ~unpaid,
+        }
+        return missed_line(missed, causes)

@@ -116,7 +116,8 @@ def integrate(
             an implicit method where stability, not accuracy, would set an explicit one's step.
         quantile: whose error ``tol`` is: 1.0, the default, the largest of all trajectories, for which every
             one runs twice or three times and bad ones again; less: that quantile, estimated from a
-            sample.
+            sample. Where a system's right-hand side has branches, of the largest each error is within
+            ``tol`` or infinite, see :mod:`fastmech.ensembles.piecewise`; of a quantile none is known.
         fit: whether each trajectory's step is fitted to its energy: ``dt`` then belongs to slow motions, and
             the faster a trajectory can become, the shorter its own step, see
             :mod:`fastmech.ensembles.fitting`. True: once, so that a trajectory's step is the same all along;

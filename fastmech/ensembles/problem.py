@@ -40,6 +40,7 @@ class Problem:
     observation: Observation = NOTHING
     coefficients: Coefficients | None = None  #: of a scene: numbers, or one a trajectory
     canonical: bool = False  #: momenta are integrated in place of rates
+    system: System | None = None  #: of the user's own
 
     @property
     def second_order(self) -> bool:
@@ -117,7 +118,7 @@ def system_problem(system: System, n: int, parameters: Mapping[str, ArrayLike]) 
     """
     own = own_values(parameters, system.parameters, n)
     columns = (np.asarray(own.get(k, v), dtype=np.float64) for k, v in system.parameters.items())
-    return Problem(system.kernel, Parameters(tuple(columns)), system.observation)
+    return Problem(system.kernel, Parameters(tuple(columns)), system.observation, system=system)
 
 
 def own_values(parameters: Mapping[str, ArrayLike], known: Mapping[str, float], n: int) -> dict[str, Floats]:

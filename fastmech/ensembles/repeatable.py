@@ -50,11 +50,6 @@ class Repeatable:
     threads: int | None
     shares: Floats = field(init=False)  #: mean fitted steps over the settings', (n,)
 
-    @property
-    def jumps(self) -> bool:
-        """Whether the right-hand side may jump: of a user's nobody knows."""
-        return self.problem.coefficients is None
-
     def solve(self, who: Members, dt: Floats, settings: Settings | None = None) -> Solution:
         """A run of some of the trajectories with their own steps."""
         own = replace(settings or self.settings, dt=dt)

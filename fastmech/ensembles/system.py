@@ -19,6 +19,7 @@ from fastmech.ensembles.rebuilding import compiled_callees, raises, reaches, reb
 from fastmech.ensembles.refusals import explain, reason
 from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
+from fastmech.ensembles.switches import UnclearError, decides_nothing, watching
 from fastmech.errors import InputError, shown
 from fastmech.generated import new_module, run_module
 from fastmech.jit import inlined
@@ -77,6 +78,18 @@ def observe(t, Y, params, record):
             note_stop(stop({arguments}) + 0.0, t, Y, record, i)
 """
 
+_SWITCHES = '''"""Made by fastmech: notes the decisions of {name!r}."""
+
+from fastmech.ensembles.switches import SWITCHES_SIGNATURE
+from fastmech.jit import kernel
+
+
+@kernel(SWITCHES_SIGNATURE)
+def switches(t, y, p, seen):
+    seen[0] = 0.0
+    rhs(seen, {arguments})
+'''
+
 
 @dataclass(frozen=True, eq=False)
 class System:
@@ -129,6 +142,44 @@ class System:
         return Observation(self._compiled.observe, np.zeros(0), record, stops=True)
 
     @cached_property
+    def switches(self) -> Any:
+        """The kernel that notes where the right-hand side decides, see :mod:`fastmech.ensembles.switches`.
+
+        ``None`` where it does not: then it is smooth, as far as its operations are. A stopping condition's
+        decisions are noted behind its own.
+
+        Raises:
+            UnclearError: it cannot be told where.
+        """
+        functions: dict[str, Any] = {}
+        time = next(iter(inspect.signature(self.rhs).parameters))
+        try:
+            functions["rhs"], places = watching(self.rhs, {time, *self.state})
+        except UnclearError:
+            if decides_nothing(self.rhs):
+                return None
+            raise
+        if not places:
+            return None
+        states = [f"y[{d}]" for d in range(len(self.state))]
+        own = [f"p[{list(self.parameters).index(name)}]" for name in self._parameter_order]
+        name, arguments = getattr(self.rhs, "__name__", "rhs"), ", ".join(["t", *states, *own])
+        source = _SWITCHES.format(name=name, arguments=arguments)
+        if self.stop is not None:
+            names = inspect.signature(self.stop).parameters
+            functions["stop"], _ = watching(self.stop, set(names))
+            source += f"    stop(seen, {', '.join(['t', *states])})\n"
+        prints = [fingerprint(function) for function in (self.rhs, self.stop) if function is not None]
+        module = new_module("system", source, prints)
+        vars(module).update({field: inlined(function) for field, function in functions.items()})
+        return run_module(module, source).switches
+
+    @property
+    def _parameter_order(self) -> list[str]:
+        """Parameters in the order in which the right-hand side takes them."""
+        return list(inspect.signature(self.rhs).parameters)[1 + len(self.state) :]
+
+    @cached_property
     def _compiled(self) -> types.ModuleType:
         """The system's kernels, loaded from the disk cache where they are there."""
         functions: dict[str, Any] = {"rhs": self.rhs} | ({"stop": self.stop} if self.stop else {})
@@ -164,8 +215,7 @@ class System:
         """The kernels' text; ``trigonometry``: whether the right-hand side has any that may raise."""
         dim = len(self.state)
         states = [f"Y[{d}, i]" for d in range(dim)]
-        order = list(inspect.signature(self.rhs).parameters)[1 + dim :]
-        given = [f"p[{list(self.parameters).index(name)}, i]" for name in order]
+        given = [f"p[{list(self.parameters).index(name)}, i]" for name in self._parameter_order]
         stores = [f"        dY[{d}, i] = rate{d}" for d in range(dim)]
         text = (_HEAD + (_TEMPLATE_WITHIN if trigonometry else _TEMPLATE)).format(
             name=getattr(self.rhs, "__name__", "rhs"),

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +20,13 @@ from fastmech.ensembles.doubling import SMOOTH, Doubling
 from fastmech.ensembles.fitting import speed_bound
 from fastmech.ensembles.ladder import Calibrated
 from fastmech.ensembles.lanes import finite_rows
+from fastmech.ensembles.piecewise import METHOD, follow_to_tolerance
 from fastmech.ensembles.problem import Problem
 from fastmech.ensembles.repeatable import usable_starts
 from fastmech.ensembles.richardson import RATIO, ROUNDING, distances, half_over, order_statistic, unseen
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.solve import Settings, Solution, solve, tell_aside
+from fastmech.ensembles.switches import UnclearError
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.methods import find_method
 
@@ -46,6 +49,11 @@ CALM_STEPS = 2.0
 #: Least tolerance for which lanes of float32 are tried, for quantiles: in the worst trajectories rounding is
 #: magnified more than the distance of two runs tells.
 SINGLE = 3e-5
+
+
+#: What is said of systems whose right-hand sides have branches.
+LOCATED = "the right-hand side has branches: steps end where they are passed"
+UNKNOWN = "; the right-hand side may have branches: errors of single trajectories are not known"
 
 
 @dataclass(frozen=True)
@@ -88,13 +96,44 @@ def solve_to_tolerance(
     """
     if problem.observation.stops:
         problem = replace(problem, observation=replace(problem.observation, locate=True))
+    switches, unclear = _switches(problem)
+    if switches is not None and quantile == 1.0 and method is None:
+        solution, error, remark = follow_to_tolerance(
+            problem, switches, starts, outputs, tol, threads, progress
+        )
+        largest = float(np.max(error[finite_rows(starts)], initial=0.0))
+        return Estimated(solution, Settings(find_method(METHOD), 0.0), LOCATED + remark, error, largest)
     usable = usable_starts(problem, starts, float(outputs[-1]), threads)
     # None of the runs that follow, whatever their steps, asks again who can be followed.
     begins = starts if usable.all() else np.where(usable[:, None], starts, np.nan)
     wanted = _Wanted(problem, begins, outputs, np.flatnonzero(usable), quantile, threads)
     estimated = _solve(wanted, tol, method, progress)
     tell_aside(estimated.solution, starts, outputs, finite_rows(starts) & ~usable)
-    return estimated
+    if switches is None and not unclear:
+        return estimated
+    if quantile < 1.0:
+        return replace(estimated, reason=estimated.reason + UNKNOWN)
+    if switches is None:
+        return replace(
+            estimated,
+            reason=f"{estimated.reason}; no error is known: {unclear}",
+            error=np.full(len(starts), np.inf),
+            estimate=np.inf if usable.any() else 0.0,
+        )
+    other, error, remark = follow_to_tolerance(problem, switches, starts, outputs, tol, threads, None)
+    error += distances(other.y, estimated.solution.y)
+    largest = float(np.max(error[usable], initial=0.0))
+    return replace(estimated, reason=estimated.reason + remark, error=error, estimate=largest)
+
+
+def _switches(problem: Problem) -> tuple[Any, str]:
+    """The kernel that notes the branches of a user's system, if it has any, or why they are not known."""
+    if problem.system is None:
+        return None, ""
+    try:
+        return problem.system.switches, ""
+    except UnclearError as why:
+        return None, str(why)
 
 
 def _solve(wanted: _Wanted, tol: float, method: str | None, progress: Progress | None) -> Estimated:

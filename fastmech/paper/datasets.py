@@ -169,8 +169,8 @@ def rows_dataset(rows: Sequence[Row]) -> Dataset:
     return Dataset(
         {
             **{name: Variable(along, np.array(data), "1", about) for name, (about, data) in texts.items()},
-            "computed": Variable(along, np.array(numbers), "see unit", "computed value, NaN for words"),
-            "difference": Variable(along, np.array(differences), "see unit", "computed less printed"),
+            "computed": Variable(along, np.array(numbers), "1", "value in its unit, NaN for words"),
+            "difference": Variable(along, np.array(differences), "1", "computed less printed in that unit"),
         },
         {"disagreeing": sum(row.verdict == Verdict.DIFFERS for row in rows)},
     )

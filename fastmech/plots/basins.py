@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fastmech.plots.basin_colors import FURTHER, basin_color
 from fastmech.plots.basin_marks import SYMBOLS, Slice, decisive, mark
 from fastmech.plots.basin_names import basin_name
-from fastmech.plots.labels import flag_codes
+from fastmech.plots.labels import Codes, flag_codes
 from fastmech.plots.style import FIELD, new_figure, style
 from fastmech.results import Dataset
 from fastmech.scene import Scene
@@ -91,7 +91,7 @@ def _labels(view: Slice) -> Figure:
     if grey.any():
         text = f"further away (basins: {np.count_nonzero(grey)}): {_share(np.isin(label, order[grey]))}"
         handles.append(Patch(facecolor=FURTHER, label=text))
-    for name, (color, marker, meaning) in UNLABELLED.items():
+    for name, (color, marker, meaning) in unlabelled(codes).items():
         where = status == codes[name]
         if where.any():
             picture[where] = len(colors)
@@ -118,6 +118,12 @@ def _labels(view: Slice) -> Figure:
     figure.legend(handles=handles, loc="outside lower center", ncols=2)
     _describe(axes, view, "Where starts come to rest")
     return figure
+
+
+def unlabelled(codes: Codes) -> dict[str, tuple[str, str, str]]:
+    """Colour, marker and meaning of every status without a label, also of those that only the file knows."""
+    others = codes.others({"captured", *UNLABELLED})
+    return {**UNLABELLED, **{name: ("#b3a2c7", "P", name.replace("_", " ")) for name in others}}
 
 
 def _copy(view: Slice, basin: int) -> tuple[int, tuple[int, int]]:

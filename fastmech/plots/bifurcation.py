@@ -120,7 +120,7 @@ def _sheets(
     """Morse index, parameter and a variable of every sheet; angles lead to its folds and break at +-pi."""
     sheet, values, x = view.data("sheet"), view.data(variable), view.axis(name)
     curves = []
-    for number, index in enumerate(view.dataset["sheet_morse_index"].data):
+    for number, index in enumerate(view.variable("sheet_morse_index").data):
         there = sheet == number
         line = np.where(there.any(axis=-1), np.where(there, values, 0.0).sum(axis=-1), np.nan)
         curves.append((int(index), x.copy(), np.asarray(line, dtype=np.float64)))

@@ -20,15 +20,20 @@ Flags = NDArray[np.bool_]
 
 LEFT_OVER = {
     "at_unstable": ("still at an unstable one", "#8c8c8c"),
-    "undecided": ("still moving", "#d0d0d0"),
-    "not_finite": ("not finite", "#000000"),
-    "step_too_large": ("step too large", "#5a5a5a"),
-    "not_converged": ("not converged", "#8c6d46"),
+    "undecided": ("not decided", "#d0d0d0"),
 }
+#: Outcomes that tell nothing of the motion, in words.
+FAILED = {
+    "not_finite": "not finite",
+    "step_too_large": "step too large",
+    "not_converged": "not converged",
+}
+#: Colour of outcomes that only another version knows.
+UNKNOWN = "#b3a2c7"
 #: What a picture of outcomes cannot show without a variable, the one that leaves out most first.
 NOT_KEPT = {
     "end_equilibrium": "(which other equilibrium was not kept)",
-    "turns": "(full turns on the way to another equilibrium were not kept)",
+    "turns_phi": "(full turns on the way to another equilibrium were not kept)",
 }
 #: Without ``end_equilibrium``; yellow is no equilibrium's colour.
 ANOTHER = ("rest at another, or full turns further", {"color": PALETTE["yellow"]})
@@ -46,7 +51,7 @@ def draw_disturbed(dataset: Dataset) -> dict[str, Figure]:
     pictures = {
         "outcomes": (_outcomes, {"outcome"}),
         "time_to_return": (_time_to_return, {"time_to_return"}),
-        "excursions": (_excursions, {"excursion"}),
+        "excursions": (_excursions, {"excursion_phi", "excursion_theta"}),
         "linear_range": (_linear_range, {"linear_limit"}),
     }
     with style():
@@ -63,7 +68,7 @@ def _outcomes(dataset: Dataset) -> Figure:
             look = {"height": 0.62, "edgecolor": "white", **look}
             axes.barh(row, share, left=left, label=None if known else label, **look)
             if share >= 8.0:
-                dark = look["color"] in (LINES[0], LINES[1], LINES[2], "#000000")
+                dark = look["color"] in (LINES[0], LINES[1], LINES[2])
                 box = {"facecolor": look["color"], "edgecolor": "none", "pad": 1.5}
                 axes.text(
                     left + share / 2,
@@ -75,6 +80,9 @@ def _outcomes(dataset: Dataset) -> Figure:
                     bbox=box,
                 )
             left += share
+        axes.annotate(
+            _failed(dataset, row), (1.01, row), xycoords=("axes fraction", "data"), va="center", fontsize=9
+        )
     axes.set(xlim=(0.0, 100.0), xlabel="share of the disturbed trajectories [%]")
     axes.grid(visible=False)
     elsewhere = (dataset["outcome"].data == flag_codes(dataset["outcome"])["elsewhere"]).any()
@@ -86,8 +94,16 @@ def _outcomes(dataset: Dataset) -> Figure:
     return figure
 
 
+def _failed(dataset: Dataset, row: int) -> str:
+    """How much of an equilibrium's bar is missing, and why; empty where nothing has failed."""
+    codes, outcome = flag_codes(dataset["outcome"]), dataset["outcome"].data[row]
+    counts = {text: np.count_nonzero(outcome == codes[name]) for name, text in FAILED.items()}
+    lines = [f"{100.0 * count / outcome.size:.3g} % {text}" for text, count in counts.items() if count]
+    return "\n".join(["failed, no end known:", *lines]) if lines else ""
+
+
 def _segments(dataset: Dataset, row: int) -> list[tuple[float, str, dict[str, Any]]]:
-    """Share [%], label and look of each part of an equilibrium's bar."""
+    """Share [%], label and look of each part of an equilibrium's bar; who has failed has none."""
     codes = flag_codes(dataset["outcome"])
     outcome = dataset["outcome"].data[row]
     elsewhere = outcome == codes["elsewhere"]
@@ -97,6 +113,10 @@ def _segments(dataset: Dataset, row: int) -> list[tuple[float, str, dict[str, An
     else:
         parts.append((elsewhere, *ANOTHER))
     parts += [(outcome == codes[name], label, {"color": grey}) for name, (label, grey) in LEFT_OVER.items()]
+    parts += [
+        (outcome == codes[name], name.replace("_", " "), {"color": UNKNOWN})
+        for name in codes.others({"returned", "elsewhere", *LEFT_OVER, *FAILED})
+    ]
     return [(100.0 * float(np.mean(where)), label, look) for where, label, look in parts if where.any()]
 
 
@@ -106,7 +126,8 @@ def _resting_elsewhere(
     """Those at rest at each other equilibrium, or at their own some turns further."""
     end = dataset["end_equilibrium"].data[row]
     # Elsewhere and yet at its own equilibrium is full turns further, known without the turns themselves.
-    turned = (dataset["turns"].data[row] != 0).any(axis=1) if "turns" in dataset else end == row
+    turns = [dataset[f"turns_{angle}"].data[row] for angle in ("phi", "theta") if f"turns_{angle}" in dataset]
+    turned = np.any(turns, axis=0) if turns else end == row
     parts: list[tuple[Flags, str, dict[str, Any]]] = []
     for other in range(dataset.sizes["equilibrium"]):
         there = elsewhere & (end == other)
@@ -123,32 +144,47 @@ def _time_to_return(dataset: Dataset) -> Figure:
     level = dataset["quantile"].data[marked]
     share = np.linspace(0.0, 1.0, POINTS)
     for row, name in enumerate(equilibrium_names(dataset)):
-        times = dataset["time_to_return"].data[row]
-        times = times[np.isfinite(times)]
+        every = dataset["time_to_return"].data[row]
+        times = every[np.isfinite(every)]
         if not times.size:
             continue
         at = dataset["time_to_return_quantile"].data[row, marked]
-        texts = ", ".join(f"{100 * q:g} %: {time:.3g} s" for q, time in zip(level, at, strict=True))
+        texts = ", ".join(f"{100 * q:g} %: {_seconds(time)}" for q, time in zip(level, at, strict=True))
         returned = float(dataset["share_returned"].data[row])
-        label = f"{name}, {100.0 * returned:.3g} % return\n({texts})"
-        axes.plot(np.quantile(times, share), 100.0 * share, color=LINES[row], label=label)
+        label = f"{name}, {_returned(dataset, row)} return\n({texts})"
+        # Who returns after the run's end counts, so that a curve may end below 100 %.
+        known = 100.0 * min(1.0, times.size / (returned * every.size))
+        axes.plot(np.quantile(times, share), known * share, color=LINES[row], label=label)
         axes.plot(at, 100.0 * level, "o", color=LINES[row], mec="white", ms=7)
     axes.set(xlabel="time to return t [s]", ylabel="share of those that return [%]", ylim=(0.0, 103.0))
     axes.set_xlim(left=0.0)
     if axes.lines:
         legend_below(figure, axes, 1)
     else:
-        axes.text(0.5, 0.5, "no trajectory returned", transform=axes.transAxes, ha="center")
+        axes.text(
+            0.5, 0.5, "no trajectory was back by the end of the run", transform=axes.transAxes, ha="center"
+        )
     axes.set_title("Time after which a disturbed trajectory stays near its equilibrium")
     return figure
 
 
+def _seconds(time: float) -> str:
+    return f"{time:.3g} s" if np.isfinite(time) else "later"
+
+
+def _returned(dataset: Dataset, row: int) -> str:
+    """Share that returns, as a range where not every end is known."""
+    share = 100.0 * float(dataset["share_returned"].data[row])
+    most = share
+    if "share_returned_at_most" in dataset:
+        most = 100.0 * float(dataset["share_returned_at_most"].data[row])
+    return f"{share:.3g} %" if most == share else f"{share:.3g} to {most:.3g} %"
+
+
 def _excursions(dataset: Dataset) -> Figure:
     figure, axes = _rows_of_equilibria(dataset, 0.85)
-    excursion = dataset["excursion"].data
-    for column, (symbol, shift) in enumerate((("φ", -0.18), ("θ", 0.18))):
-        for row in range(len(excursion)):
-            values = excursion[row, :, column]
+    for column, (angle, symbol, shift) in enumerate((("phi", "φ", -0.18), ("theta", "θ", 0.18))):
+        for row, values in enumerate(dataset[f"excursion_{angle}"].data):
             values = values[np.isfinite(values)]
             if values.size:
                 _box(axes, row + shift, np.quantile(values, BOX), LINES[column])

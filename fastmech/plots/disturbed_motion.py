@@ -19,6 +19,9 @@ Floats = NDArray[np.float64]
 
 TIME = "time t [s]"
 
+#: What the variables of the two motions begin with.
+MOTIONS = ("nonlinear", "linearized")
+
 
 def draw_disturbed_motion(dataset: Dataset) -> dict[str, Figure]:
     """Pictures of a dataset of the scan type ``disturbed_motion``; none where there is no equilibrium."""
@@ -29,16 +32,15 @@ def draw_disturbed_motion(dataset: Dataset) -> dict[str, Figure]:
 
 
 def _angles(dataset: Dataset) -> Figure:
-    nonlinear, linearized = dataset["nonlinear"].data, dataset["linearized"].data
-    count = len(nonlinear)
+    count = dataset.sizes["equilibrium"]
     figure = new_figure(8.4, 1.9 * count + 0.8)
     panels = figure.subplots(count, 2, sharex=True, squeeze=False)
     for row, name in enumerate(equilibrium_names(dataset)):
-        for column, symbol in enumerate(("φ", "θ")):
+        for column, (angle, symbol) in enumerate((("phi", "φ"), ("theta", "θ"))):
             axes = panels[row, column]
-            pair = nonlinear[row, :, column], linearized[row, :, column]
-            _plot_pair(axes, dataset["time"].data, *pair)
-            _limit(axes, pair[0])
+            nonlinear, linearized = (dataset[f"{which}_{angle}"].data[row] for which in MOTIONS)
+            _plot_pair(axes, dataset["time"].data, nonlinear, linearized)
+            _limit(axes, nonlinear)
             axes.set_ylabel(f"ξ of {symbol} [rad]")
         panels[row, 0].set_title(f"Equilibrium {name}", loc="left")
     for axes in panels[-1]:
@@ -49,7 +51,7 @@ def _angles(dataset: Dataset) -> Figure:
 
 def _norm(dataset: Dataset) -> Figure:
     nonlinear, linearized = (
-        np.linalg.norm(dataset[name].data[..., :2], axis=-1) for name in ("nonlinear", "linearized")
+        np.hypot(*(dataset[f"{which}_{angle}"].data for angle in ("phi", "theta"))) for which in MOTIONS
     )
     rows = -(-len(nonlinear) // 2)
     figure = new_figure(8.4, 2.5 * rows + 0.5)

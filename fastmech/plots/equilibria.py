@@ -43,7 +43,7 @@ def _potential(dataset: Dataset, scene: Scene) -> Figure:
     axes.contour(angle, angle, energy, levels=24, colors="white", linewidths=0.4, alpha=0.6)
     figure.colorbar(filled, ax=axes, label="potential energy Π - F x2 [J]")
     codes = flag_codes(dataset["kind"])
-    for kind, marker in MARKERS.items():
+    for kind, marker in {**dict.fromkeys(codes.others(MARKERS), "P"), **MARKERS}.items():
         of_kind = dataset["kind"].data == codes[kind]
         if of_kind.any():
             place = dataset["phi"].data[of_kind], dataset["theta"].data[of_kind]
@@ -81,8 +81,7 @@ def _eigenvalues(dataset: Dataset) -> Figure:
     axes = figure.subplots()
     for i, name in enumerate(equilibrium_names(dataset)):
         axes.plot(
-            dataset["eigenvalue_re"].data[i],
-            dataset["eigenvalue_im"].data[i],
+            *([dataset[f"eigenvalue_{part}_{k}"].data[i] for k in "1234"] for part in ("re", "im")),
             SHAPES[i],
             color=LINES[i],
             mec="white",
@@ -115,5 +114,5 @@ def _positions(dataset: Dataset, scene: Scene) -> Figure:
         axes = panels.flat[i]
         phi, theta = float(dataset["phi"].data[i]), float(dataset["theta"].data[i])
         draw_mechanism(axes, scene, phi, theta, float(dataset.attrs["force"]))
-        axes.set_title(f"{name} ({kinds[int(dataset['kind'].data[i])]})", fontsize=10)
+        axes.set_title(f"{name} ({kinds.get(int(dataset['kind'].data[i]), 'unknown')})", fontsize=10)
     return figure

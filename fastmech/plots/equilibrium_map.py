@@ -42,9 +42,6 @@ SLOWEST = 1e4
 #: What part of the deepest well colours still tell; towards a fold depths vanish.
 SHALLOWEST = 1e-2
 
-#: Part of the largest speed a root of energy below which crank and rod M1M2 count as in line.
-IN_LINE = 1e-2
-
 #: Marks of points whose count is not an ordinary proved one.
 UNSETTLED = {"at_fold": "|", "degenerate": "x", "unproved": "+"}
 
@@ -103,7 +100,7 @@ def _mark_unsettled(axes: Axes, view: View) -> list[Artist]:
     x, y = np.meshgrid(*map(view.axis, view.axes), indexing="ij")
     codes = flag_codes(view.dataset["outcome"])
     handles: list[Artist] = []
-    for name, marker in UNSETTLED.items():
+    for name, marker in {**dict.fromkeys(codes.others({"complete"}), "P"), **UNSETTLED}.items():
         where = view.data("outcome") == codes[name]
         if where.any():
             label = f"{name.replace('_', ' ')} ({np.count_nonzero(where)})"
@@ -144,10 +141,10 @@ def _angle_look(fields: list[Floats]) -> dict[str, object]:
 
 
 def _barrier(view: View) -> Figure:
-    """Depth of each well, and the speed of M2 that a kick needs at least to leave it."""
+    """Depth of each well, and the impulse on M2 that a blow needs at least to leave it."""
     rows = [("depth", "Energy to leave the {} well", "depth [J]")]
-    if view.has("escape_speed"):
-        rows.append(("escape_speed", "No slower kick of M2 leaves the {} well", "speed of M2 [m/s]"))
+    if view.has("shock_limit_m2"):
+        rows.append(("shock_limit_m2", "No smaller blow on M2 leaves the {} well", "impulse on M2 [N s]"))
     figure = new_figure(0.6 + 5.4 * len(view.ranks), 1.4 + 4.2 * len(rows))
     panels = figure.subplots(len(rows), len(view.ranks), squeeze=False, sharex=True, sharey=True)
     handles: list[Artist] = []
@@ -161,21 +158,8 @@ def _barrier(view: View) -> Figure:
                 mesh = _field(axes, view, field, low, float(known.max()))
                 _bar(figure, mesh, [axes], label, "min" if float(np.nanmin(field)) < low else "neither")
             handles = draw_curves(axes, view) + _mark_own(axes, view)
-    _finish(figure, view, handles + _in_line(view) + _nothing(view))
+    _finish(figure, view, handles + _nothing(view))
     return figure
-
-
-def _in_line(view: View) -> list[Artist]:
-    """Why the least speed may vanish though the well is deep."""
-    from matplotlib.patches import Patch
-
-    if not view.has("escape_speed"):
-        return []
-    with np.errstate(invalid="ignore", divide="ignore"):
-        lightness = view.data("escape_speed") / np.sqrt(view.data("depth"))
-    if not np.nanmin(lightness) < IN_LINE * np.nanmax(lightness):
-        return []
-    return [Patch(color="#00224e", label="speed near 0 in a deep well: crank and rod in line")]
 
 
 def _decay(view: View) -> Figure:

@@ -37,7 +37,7 @@ def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figu
             handles.append(Line2D([], [], color=color, lw=3.0, label=_name(dataset, well)))
         _axes(panels, dataset, name)
         handles += [
-            Patch(facecolor="#bdbdbd", label="95 % Wilson interval (of the stability)"),
+            Patch(facecolor="#bdbdbd", label="95 % Wilson interval, undecided starts as none or all"),
             Line2D([], [], color="black", lw=1.0, ls=":", label="if all undecided starts ended there"),
             Line2D(
                 [], [], color="black", marker="o", ms=5, label="about the well: LIM; shock of all four states"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +11,9 @@ from fastmech.results import Dataset, Variable
 
 if TYPE_CHECKING:
     from matplotlib.axis import Axis
+
+#: A code that no variable has.
+NOWHERE = 1 << 40
 
 #: Places and labels of the ticks of an angle's axis over one turn.
 PI_TICKS = ([-np.pi, -np.pi / 2, 0.0, np.pi / 2, np.pi], ["-π", "-π/2", "0", "π/2", "π"])
@@ -24,10 +28,20 @@ def equilibrium_names(dataset: Dataset) -> list[str]:
     ]
 
 
-def flag_codes(variable: Variable) -> dict[str, int]:
-    """Meaning and code of a variable of flags."""
-    meanings = str(variable.attrs["flag_meanings"]).split()
-    return dict(zip(meanings, (int(value) for value in variable.attrs["flag_values"]), strict=True))
+class Codes(dict[str, int]):
+    """Codes by their meanings; a meaning that the file does not know is no code."""
+
+    def __missing__(self, meaning: str) -> int:
+        return NOWHERE
+
+    def others(self, known: Container[str]) -> list[str]:
+        """Meanings that the file knows and this version does not: it is older or newer."""
+        return [meaning for meaning in self if meaning not in known]
+
+
+def flag_codes(variable: Variable) -> Codes:
+    """Meanings and codes of a variable of flags, as the file explains them itself."""
+    return Codes(variable.codes)
 
 
 def logarithmic(axis: Axis) -> None:

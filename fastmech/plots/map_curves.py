@@ -55,11 +55,12 @@ def _lines(
 ) -> list[Artist]:
     from matplotlib.patheffects import Normal, Stroke
 
-    variable = view.dataset[kind]
-    number = view.dataset[f"{what}_curve"].data
+    variable = view.variable(kind)
+    number = view.variable(f"{what}_curve").data
     x, y = (view.axis(f"{what}_{name}") for name in view.axes)
     handles: list[Artist] = []
-    for name, (color, dash, width, label) in looks.items():
+    others = {name: ("#777777", "-.", 1.2, f"{what}: {name}") for name in flag_codes(variable).others(looks)}
+    for name, (color, dash, width, label) in {**looks, **others}.items():
         chosen = _broken(variable, name, number)
         if not chosen[0].size:
             continue

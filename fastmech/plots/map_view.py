@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.results import Dataset
+from fastmech.results import Dataset, Variable
 from fastmech.scene import Scene
 from fastmech.store.read import Section
 
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 MOST_DRAWN = 1000
 
 #: Variables over the equilibria that pictures show; the others stay in the file.
-DRAWN = ("phi", "theta", "energy", "morse_index", "sheet", "depth", "escape_speed", "decay_time")
+DRAWN = ("phi", "theta", "energy", "morse_index", "sheet", "depth", "shock_limit_m2", "decay_time")
 
 #: Relative difference of energies that rounding may cause.
 ROUNDING = 1e-10
@@ -60,7 +60,12 @@ class View:
 
     def axis(self, name: str) -> Floats:
         """Values along an axis."""
-        return np.asarray(self.dataset[name].data, dtype=np.float64)
+        return np.asarray(self.variable(name).data, dtype=np.float64)
+
+    def variable(self, name: str) -> Variable:
+        """A variable of the map or of a group in it."""
+        among = [self.dataset, *self.dataset.groups.values()]
+        return next((one for one in among if name in one), self.dataset)[name]
 
     def label(self, name: str) -> str:
         """Name and unit of an axis."""
@@ -93,8 +98,9 @@ class View:
         return range(int(self.data("count_stable").max()))
 
     def has(self, *names: str) -> bool:
-        """Whether the map kept these variables."""
-        return all(name in self.dataset for name in names)
+        """Whether the map kept these variables, or a group in it has them."""
+        among = [self.dataset, *self.dataset.groups.values()]
+        return all(any(name in one for one in among) for name in names)
 
 
 def free_axes(names: tuple[str, ...], sizes: Mapping[str, int]) -> tuple[str, ...]:
@@ -130,7 +136,9 @@ def load_drawn(section: Section, scene: Mapping[str, float]) -> Dataset:
             left_out += f"; 1 in {step} values of {name}"
     wanted = [name for name in section if name in DRAWN or not _over_equilibria(section, name)]
     dataset = section.load(wanted, part)
-    return Dataset(dataset.variables, {**dataset.attrs, **({"drawn": left_out} if left_out else {})})
+    attrs = {**dataset.attrs, **({"drawn": left_out} if left_out else {})}
+    groups = {name: group.load() for name, group in section.groups.items()}
+    return Dataset(dataset.variables, attrs, groups)
 
 
 def _over_equilibria(section: Section, name: str) -> bool:

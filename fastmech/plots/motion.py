@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fastmech.plots.labels import logarithmic
 from fastmech.plots.style import new_figure, style
-from fastmech.results import Dataset
+from fastmech.results import STATE_UNITS, Dataset
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -115,12 +115,14 @@ def _energies(dataset: Dataset) -> Figure:
 def _residuals(dataset: Dataset) -> Figure:
     t = dataset["time"].data
     figure, (formulations, constraints, energy) = _rows(3)
-    difference = dataset["formulation_difference"].data
-    for i, name in enumerate(("φ [rad]", "θ [rad]", "φ' [rad/s]", "θ' [rad/s]")):
-        _log_plot(formulations, t, difference[:, i], name)
+    symbols = ("φ", "θ", "φ'", "θ'")
+    for symbol, (entry, unit) in zip(symbols, STATE_UNITS.items(), strict=True):
+        difference = dataset[f"formulation_difference_{entry}"].data
+        _log_plot(formulations, t, difference, f"{symbol} [{unit}]")
     formulations.set(ylabel="difference [rad], [rad/s]", title="Canonical equations less Lagrange's")
-    for number, residual in enumerate(dataset["constraint_residual"].data, start=1):
-        _log_plot(constraints, t, residual, f"{number} [{'m' if number == 3 else 'm²'}]")
+    for number, unit in {2: "m²", 3: "m²", 4: "m", 5: "m²"}.items():
+        residual = dataset[f"constraint_residual_{number}"].data
+        _log_plot(constraints, t, residual, f"({number}) [{unit}]")
     constraints.set(ylabel="residual [m²], [m]", title="Constraints, paper (2)-(5)")
     _log_plot(energy, t, dataset["energy_residual"].data, "[J]")
     energy.set(ylabel="residual [J]", title="Change of T + Π less the works of damper and force")

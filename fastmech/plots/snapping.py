@@ -9,7 +9,7 @@ import numpy as np
 
 from fastmech.plots.basin_colors import FURTHER, basin_color
 from fastmech.plots.basin_names import basin_name
-from fastmech.plots.basins import FEW, NAMED, UNLABELLED
+from fastmech.plots.basins import FEW, NAMED, unlabelled
 from fastmech.plots.labels import flag_codes
 from fastmech.plots.style import new_figure, style
 from fastmech.results import Dataset
@@ -104,7 +104,7 @@ def _unlabelled(axes: Axes, dataset: Dataset) -> list[Artist]:
 
     status, codes = dataset["status"].data, flag_codes(dataset["status"])
     handles: list[Artist] = []
-    for name, (_, marker, meaning) in UNLABELLED.items():
+    for name, (_, marker, meaning) in unlabelled(codes).items():
         where = status == codes[name]
         number = int(np.count_nonzero(where))
         if not number:

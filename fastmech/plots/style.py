@@ -51,6 +51,7 @@ _SETTINGS: dict[Any, Any] = {
     "axes.unicode_minus": True,
     "image.cmap": FIELD,
     "savefig.facecolor": "white",
+    "svg.hashsalt": "fastmech",
 }
 
 
@@ -78,9 +79,10 @@ def legend_below(figure: Figure, axes: Axes, columns: int) -> None:
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG (150 dots an inch) or in the format that the file's name says."""
+    """Write a figure as PNG (150 dots an inch), or in the format that the file's name says, undated."""
     with style():
-        figure.savefig(path, dpi=DPI)
+        metadata = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}.get(path.suffix)
+        figure.savefig(path, dpi=DPI, metadata=metadata)
 
 
 def png(figure: Figure) -> bytes:

@@ -4,17 +4,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from itertools import product
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import AfterValidator, Field
 
-from fastmech.disturbance.ensemble import require_constant_force
+from fastmech.basins.label import require_damper
+from fastmech.basins.steps import shortest_step
+from fastmech.disturbance.motion import require_constant_force
 from fastmech.errors import InputError, shown
 from fastmech.integrators.methods import find_method
+from fastmech.mechanism.coefficients import reduce
 from fastmech.results import Dataset
-from fastmech.scan_types.axis import check_steps
+from fastmech.scan_types.axis import (
+    Axis,
+    arrays,
+    check_duration,
+    check_parameters,
+    check_size,
+    check_steps,
+)
 from fastmech.scan_types.disturbed_layout import TRAJECTORY_VARIABLES
+from fastmech.scan_types.disturbed_map import MOST_POINTS, MOST_TRAJECTORIES, DisturbedMap
 from fastmech.scan_types.disturbed_tiling import DisturbedTiling
+from fastmech.scan_types.equilibrium_map import known_parameters
 from fastmech.scan_types.request import MethodName, Seed, TiledScan
 from fastmech.scan_types.tiling import Tiling
 from fastmech.scene import Scene, nearest
@@ -28,8 +41,8 @@ if TYPE_CHECKING:
 #: Right-hand sides of the largest ensemble: a year of a hundred cores.
 MOST_WORK = 1e17
 
-#: Step of the linearized motion's comparison [s], as `fastmech.disturbance.linear_range` has it by default.
-LINEAR_DT = 0.02
+#: Numbers of 8 bytes that memory holds of every point of a map.
+POINT_NUMBERS = 250
 
 #: Trajectories of each equilibrium that are drawn at most: they are random, so some stand for all.
 DRAWN = 1 << 20
@@ -42,17 +55,27 @@ def _known_variables(names: list[str]) -> list[str]:
     return names
 
 
+#: Fields of what a map over parameters does not hold.
+_NOT_OF_A_MAP = ("variables", "linear_horizon", "linear_tolerance", "linear_directions")
+
+
 class Disturbed(TiledScan):
     """Ensembles about every equilibrium, uniform in a ball of the kinetic-energy norm."""
 
     kind: ClassVar[str] = "disturbed"
+
+    axes: Annotated[dict[str, Axis], Field(max_length=3), AfterValidator(known_parameters)] = Field(
+        default={}, description="parameters over which all equilibria are disturbed; none: the scene's alone"
+    )
 
     trajectories: Annotated[int, Field(ge=1, le=100_000_000)] = 4096
     radius: Annotated[float, Field(gt=0, description="largest size of a disturbance [rad]")] = 0.5
     return_radius: Annotated[float, Field(gt=0, description="radius of the ball of return [rad]")] = 0.01
     seed: Seed = 0
     t_end: Annotated[float, Field(gt=0)] = 120.0
-    dt: Annotated[float, Field(gt=0)] = 0.05
+    dt: Annotated[float | None, Field(gt=0)] = Field(
+        None, description="longest step [s]; by default each start's own, from the scene and its energy"
+    )
     method: MethodName = "dop853"
     linear_horizon: Annotated[float, Field(gt=0, description="horizon of the comparison [s]")] = 1.0
     linear_tolerance: Annotated[float, Field(gt=0, description="deviation allowed, relative")] = 0.05
@@ -63,24 +86,47 @@ class Disturbed(TiledScan):
     )
 
     def check(self, scene: Scene) -> None:
-        """The force must be constant, and so much work possible."""
-        require_constant_force(scene)
-        check_steps("t_end", self.t_end, self.dt)
-        check_steps("linear_horizon", self.linear_horizon, LINEAR_DT)
-        steps = math.ceil(self.t_end / self.dt)
-        work = self.trajectories * find_method(self.method).evaluations(steps)
-        if work > MOST_WORK:
+        """A constant force and a damper all over a map, and no more work than is possible."""
+        check_parameters(scene, self.axes, "axes")
+        for corner in self._corners(scene):
+            require_constant_force(corner)
+            require_damper(corner)
+            check_duration(corner, self.t_end, self.dt)
+            check_steps("linear_horizon", self.linear_horizon, shortest_step(reduce(corner)))
+        if not self.axes:
+            steps = math.ceil(self.t_end / (self.dt or shortest_step(reduce(scene))))
+            work = self.trajectories * find_method(self.method).evaluations(steps)
+            if work > MOST_WORK:
+                raise InputError(
+                    f"trajectories, t_end, dt: ask for {work:.3g} right-hand sides about every equilibrium, "
+                    f"at most {MOST_WORK:.0e} are possible"
+                )
+            return
+        for name in _NOT_OF_A_MAP:
+            if name in self.model_fields_set:
+                raise InputError(f"{name}: is nothing of a map; leave it out, or the axes")
+        check_size("axes", self.axes, "points", MOST_POINTS, POINT_NUMBERS)
+        if self.trajectories > MOST_TRAJECTORIES:
             raise InputError(
-                f"trajectories, t_end, dt: ask for {work:.3g} right-hand sides about every equilibrium, "
-                f"at most {MOST_WORK:.0e} are possible"
+                f"trajectories = {self.trajectories}: must be at most {MOST_TRAJECTORIES} on a map"
             )
 
     def step_warning(self, scene: Scene) -> str | None:
-        """By the scene's limit and the decaying force."""
-        return step_warning(scene, self.dt, self.method)
+        """By the scene's limit; without ``dt`` each start's step is chosen."""
+        if self.dt is None:
+            return None
+        told = [step_warning(corner, self.dt, self.method) for corner in self._corners(scene)]
+        return next((line for line in told if line is not None), None)
+
+    def _corners(self, scene: Scene) -> list[Scene]:
+        """The scene with the first and last values of all axes; itself where there are none."""
+        ends = [axis.array[[0, -1]].tolist() for axis in self.axes.values()]
+        return [scene.replace(**dict(zip(self.axes, values, strict=True))) for values in product(*ends)]
 
     def tiling(self, scene: Scene) -> Tiling:
-        """Blocks of directions and of trajectories."""
+        """Blocks of directions and of trajectories; of a map the equilibria one by one."""
+        if self.axes:
+            return DisturbedMap(self, scene, arrays(self.axes))
         return DisturbedTiling(self, scene)
 
     @property
@@ -92,19 +138,26 @@ class Disturbed(TiledScan):
     @property
     def settings(self) -> dict[str, Any]:
         """What a section says of its request."""
-        settings = self.model_dump(exclude={"scene", "variables"})
+        left_out = {"scene", "axes", *(_NOT_OF_A_MAP if self.axes else ["variables"])}
+        settings = self.model_dump(exclude=left_out, exclude_none=True)
         return settings | {"seed": self.seed if self.seed < 2**64 else str(self.seed)}  # no integer of HDF5's
 
     @staticmethod
     def read(section: Section, scene: Mapping[str, float]) -> Dataset:
         """What is drawn, of very many trajectories evenly spaced ones."""
+        if "axes" in section.attrs:
+            return section.load()
         step = -(-section.sizes.get("trajectory", 1) // DRAWN)
-        drawn = [name for name in section if name not in ("start", "final", "linear_direction")]
+        drawn = [name for name in section if not name.startswith(("start", "final", "linear_direction"))]
         return section.load(drawn, {"trajectory": slice(None, None, step)})
 
     @staticmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
-        """Outcomes, times to return, excursions and the linearized motion's range."""
+        """Outcomes, times to return, excursions and the linearized motion's range; those of a map over it."""
+        if "axes" in dataset.attrs:
+            from fastmech.plots.disturbed_map import draw_disturbed_map
+
+            return draw_disturbed_map(dataset, scene)
         from fastmech.plots.disturbed import draw_disturbed
 
         return draw_disturbed(dataset)

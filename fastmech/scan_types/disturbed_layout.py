@@ -8,37 +8,38 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.disturbance.outcome import Outcome
-from fastmech.results import Variable, flags
+from fastmech.basins.disturbed import Outcome
+from fastmech.results import ANGLE_UNITS, NO_CODE, STATE_UNITS, Variable, flags, numbers, parts
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
 
-_EACH, _EVERY = ("equilibrium",), ("equilibrium", "trajectory")
-_STATE = "phi, theta, phi', theta'"
+ABOUT_SHARES = {
+    "share_returned": "share that is proved to return",
+    "share_returned_at_most": "share that returned, if all whose end is not known did",
+    "share_returned_lower": "lower end of the 95 % Wilson interval, none of those returning",
+    "share_returned_upper": "upper end of the 95 % Wilson interval, all of those returning",
+}
+ABOUT_QUANTILES = "quantiles of the time to return over those that return, inf: later than the end of the run"
 
-#: What is known of every trajectory: dimensions behind ``trajectory`` with their lengths, type, what stands
-#: for one that is not computed yet, unit, meaning.
-_TRAJECTORY: dict[str, tuple[dict[str, int], str, float, str, str]] = {
-    "start": ({"component": 4}, "f8", np.nan, "rad, rad/s", f"start: {_STATE}"),
-    "final": ({"component": 4}, "f8", np.nan, "rad, rad/s", f"end, or last finite state: {_STATE}"),
-    "failed": ({}, "f8", np.nan, "s", "time of the last finite state where it failed on the way"),
-    "outcome": ({}, "i1", -1, "1", "where it is at the end"),
-    "end_equilibrium": ({}, "i1", -1, "1", "equilibrium at which it rests at the end, -1: none"),
-    "turns": ({"angle": 2}, "i8", 0, "1", "full turns of phi and theta made until then"),
+_EACH, _EVERY = ("equilibrium",), ("equilibrium", "trajectory")
+_TURNS = dict.fromkeys(ANGLE_UNITS, "1")
+
+#: What is known of every trajectory: type, what stands for one that is not computed yet, unit, meaning. What
+#: has several units is a variable for each of them.
+_TRAJECTORY: dict[str, tuple[str, float, str | Mapping[str, str], str]] = {
+    "start": ("f8", np.nan, STATE_UNITS, "{} at the start"),
+    "final": ("f8", np.nan, STATE_UNITS, "{} at the end, or of the last finite state"),
+    "failed": ("f8", np.nan, "s", "time of the last finite state where it failed on the way"),
+    "outcome": ("i1", -1, "1", "where it ends"),
+    "end_equilibrium": ("i1", -1, "1", "stable equilibrium at which it is proved to end"),
+    "turns": ("i8", 0, _TURNS, "full turns of {} made on the way there"),
     "time_to_return": (
-        {},
         "f8",
         np.nan,
         "s",
-        "end of the first step from which on every step ended in the ball of return",
+        "end of the first step from which on every step ended in the ball of return, NaN: none by t_end",
     ),
-    "excursion": (
-        {"angle": 2},
-        "f8",
-        np.nan,
-        "rad",
-        "largest departures of phi and theta at the ends of steps",
-    ),
+    "excursion": ("f8", np.nan, ANGLE_UNITS, "largest departure of {} at the ends of steps, NaN: failed"),
 }
 
 #: Names of what is known of every trajectory.
@@ -47,23 +48,25 @@ TRAJECTORY_VARIABLES = tuple(_TRAJECTORY)
 
 def empty_trajectories(names: list[str], count: int) -> dict[str, NDArray[Any]]:
     """Arrays of so many trajectories that have not been computed."""
-    return {
-        name: np.full((count, *_TRAJECTORY[name][0].values()), _TRAJECTORY[name][2], _TRAJECTORY[name][1])
-        for name in names
-    }
+    found = {}
+    for name in names:
+        dtype, nothing, unit, _ = _TRAJECTORY[name]
+        found[name] = np.full((count,) if isinstance(unit, str) else (count, len(unit)), nothing, dtype)
+    return found
 
 
 def trajectory_variables(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Variable]:
     """Arrays over (equilibrium, trajectory, ...) as variables."""
-    return {
-        name: Variable((*_EVERY, *dims), arrays[name], unit, about, _flags(name))
-        for name, (dims, _, _, unit, about) in _TRAJECTORY.items()
-        if name in arrays
-    }
-
-
-def _flags(name: str) -> dict[str, Any]:
-    return flags(Outcome) if name == "outcome" else {}
+    codes: dict[str, Any] = {"outcome": flags(Outcome, fill=-1), "end_equilibrium": NO_CODE}
+    found: dict[str, Variable] = {}
+    for name, (_, _, unit, about) in _TRAJECTORY.items():
+        if name not in arrays:
+            continue
+        if isinstance(unit, str):
+            found[name] = Variable(_EVERY, arrays[name], unit, about, codes.get(name, {}))
+        else:
+            found |= parts(name, _EVERY, arrays[name], unit, about)
+    return found
 
 
 def equilibrium_variables(
@@ -71,6 +74,7 @@ def equilibrium_variables(
 ) -> dict[str, Variable]:
     """The disturbed equilibria."""
     return {
+        **numbers("equilibrium", len(phi), "number of the equilibrium"),
         "phi": Variable(_EACH, phi, "rad", "angle phi of the disturbed equilibrium"),
         "theta": Variable(_EACH, theta, "rad", "angle theta of the disturbed equilibrium"),
         "omega": Variable(_EACH, omega, "rad/s", "frequency in the norm"),
@@ -79,22 +83,25 @@ def equilibrium_variables(
 
 
 def tally_variables(
-    share: NDArray[np.float64], errors: NDArray[np.float64], quantiles: NDArray[np.float64]
+    shares: Mapping[str, NDArray[np.float64]],
+    errors: NDArray[np.float64],
+    quantiles: NDArray[np.float64],
 ) -> dict[str, Variable]:
-    """What the trajectories of each equilibrium come to."""
+    """What the trajectories of each equilibrium come to; ``shares`` are those of a tally."""
     return {
-        "share_returned": Variable(_EACH, share, "1", "share that returned"),
-        "halving_difference": Variable(
+        **{name: Variable(_EACH, shares[name], "1", about) for name, about in ABOUT_SHARES.items()},
+        **parts(
+            "halving_difference",
             ("equilibrium", "sample"),
             errors,
-            "rad or rad/s",
-            "difference of a final state from that with half the step, first trajectories; NaN: failed",
+            {"angle": "rad", "rate": "rad/s"},
+            "largest difference of a final {} from that with half the step, first trajectories; NaN: failed",
         ),
         "time_to_return_quantile": Variable(
             ("equilibrium", "quantile"),
             quantiles,
             "s",
-            "quantiles of the time to return over those that returned",
+            ABOUT_QUANTILES,
         ),
     }
 
@@ -102,8 +109,12 @@ def tally_variables(
 def linear_variables(directions: NDArray[np.float64], limit: NDArray[np.float64]) -> dict[str, Variable]:
     """How far the linearized motion can be trusted."""
     return {
-        "linear_direction": Variable(
-            ("equilibrium", "direction", "component"), directions, "rad, rad/s", "disturbance of size 1 rad"
+        **parts(
+            "linear_direction",
+            ("equilibrium", "direction"),
+            directions,
+            STATE_UNITS,
+            "{} of a disturbance of size 1 rad",
         ),
         "linear_limit": Variable(
             ("equilibrium", "direction"),

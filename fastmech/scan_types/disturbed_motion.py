@@ -9,14 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from fastmech.disturbance.ensemble import equilibria_to_disturb, require_constant_force
-from fastmech.disturbance.motion import disturbed_motion
+from fastmech.basins.steps import highest_frequency
+from fastmech.disturbance.motion import (
+    PHASE,
+    default_step,
+    disturbed_motion,
+    equilibria_to_disturb,
+    require_constant_force,
+)
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import FAILURES
 from fastmech.ensembles.spans import output_steps
 from fastmech.equilibria.find import Equilibria, Equilibrium
 from fastmech.equilibria.search import MOST
-from fastmech.results import Dataset, Variable
+from fastmech.mechanism.coefficients import reduce
+from fastmech.results import STATE_UNITS, Dataset, Variable, numbers, parts
 from fastmech.scan_types.axis import check_steps
 from fastmech.scan_types.each import Each
 from fastmech.scan_types.request import HALVING, MethodName, TiledScan, failures
@@ -41,19 +48,22 @@ class DisturbedMotionScan(TiledScan):
     eta_theta: float = Field(default=0.0, description="disturbance of theta' [rad/s]")
     t_end: Annotated[float, Field(gt=0)] = 20.0
     outputs: Annotated[int, Field(ge=2, le=10_000_000)] = 1001
-    dt: Annotated[float, Field(gt=0)] = 0.01
+    dt: Annotated[float | None, Field(gt=0)] = Field(
+        None, description="longest step [s]; by default 0.05 rad of each equilibrium's highest frequency"
+    )
     method: MethodName = "dop853"
 
     def check(self, scene: Scene) -> None:
         """The force must be constant, so many steps possible, and the outputs fit into memory."""
         require_constant_force(scene)
-        check_steps("t_end", self.t_end, self.dt)
-        numbers = self.outputs * 2 * 4 * MOST
-        checks.memory(numbers, 3, "outputs: the motions about equilibria", "fewer outputs")
+        check_steps("t_end", self.t_end, self.dt or PHASE / highest_frequency(reduce(scene)))
+        checks.memory(
+            self.outputs * 2 * 4 * MOST, 3, "outputs: the motions about equilibria", "fewer outputs"
+        )
 
     def step_warning(self, scene: Scene) -> str | None:
-        """By the scene's limit and the decaying force."""
-        return step_warning(scene, self.dt, self.method)
+        """By the scene's limit; without ``dt`` each equilibrium's step is chosen."""
+        return None if self.dt is None else step_warning(scene, self.dt, self.method)
 
     def tiling(self, scene: Scene) -> Tiling:
         """The equilibria one by one."""
@@ -74,7 +84,7 @@ class DisturbedMotionScan(TiledScan):
         t = self._times
         disturbance = [self.xi_phi, self.xi_theta, self.eta_phi, self.eta_theta]
         # The step taken: what divides the intervals between outputs.
-        step = t[1] / output_steps(t[:2], self.dt)[0]
+        step = t[1] / output_steps(t[:2], self.dt or default_step(scene, equilibrium))[0]
         motion, halved = (
             disturbed_motion(scene, equilibrium, disturbance, t, dt=dt, method=self.method)
             for dt in (step, 0.5 * step)
@@ -85,27 +95,26 @@ class DisturbedMotionScan(TiledScan):
                 "nonlinear": Variable(("time", "component"), motion.nonlinear[:, 0]),
                 "linearized": Variable(("time", "component"), motion.linearized[:, 0]),
                 "difference": Variable((), difference),
+                "step": Variable((), step),
                 "status": Variable((), motion.status[0]),
             }
         )
 
     def _joined(self, equilibria: Equilibria, tiles: list[Dataset]) -> Dataset:
-        dims = ("equilibrium", "time", "component")
+        dims = ("equilibrium", "time")
         variables = {
+            **numbers("equilibrium", len(equilibria), "number of the equilibrium"),
             "time": Variable(("time",), self._times, "s", "time"),
             "phi": Variable(("equilibrium",), equilibria.phi, "rad", "angle phi of the equilibrium"),
             "theta": Variable(("equilibrium",), equilibria.theta, "rad", "angle theta of the equilibrium"),
-            **{
-                kind: Variable(
-                    dims,
-                    np.stack([tile[kind].data for tile in tiles]),
-                    "rad, rad/s",
-                    f"disturbance of phi, theta, phi', theta', {kind} motion",
-                )
-                for kind in ("nonlinear", "linearized")
-            },
         }
-        attrs = self.model_dump(exclude={"scene"}) | {
+        for kind in ("nonlinear", "linearized"):
+            motion = np.stack([tile[kind].data for tile in tiles])
+            variables |= parts(kind, dims, motion, STATE_UNITS, f"disturbance of {{}}, {kind} motion")
+        steps = [float(tile["step"].data) for tile in tiles]
+        attrs = self.model_dump(exclude={"scene"}, exclude_none=True) | {
+            "shortest_step": min(steps),
+            "longest_step": max(steps),
             "error_estimate": float(np.max([tile["difference"].data for tile in tiles])),
             "error_estimate_is": HALVING,
         }

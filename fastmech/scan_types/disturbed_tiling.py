@@ -9,15 +9,14 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.disturbance.ensemble import STREAM, DisturbedEnsemble, disturb, equilibria_to_disturb
+from fastmech.basins.disturbed import FAILURES, STREAM, DisturbedEnsemble, disturb, measuring_steps
 from fastmech.disturbance.linear_range import linear_range
-from fastmech.disturbance.outcome import FAILURES, resting_place
+from fastmech.disturbance.motion import equilibria_to_disturb
 from fastmech.disturbance.size import size_at
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.spans import output_steps
-from fastmech.ensembles.status import failure_counts
 from fastmech.integrators.methods import find_method
-from fastmech.results import Dataset, Variable
+from fastmech.results import Dataset, Variable, numbers
 from fastmech.scan_types.disturbed_layout import (
     QUANTILES,
     empty_trajectories,
@@ -27,7 +26,7 @@ from fastmech.scan_types.disturbed_layout import (
     trajectory_variables,
 )
 from fastmech.scan_types.request import HALVING, counted_failures
-from fastmech.scan_types.tally import Tally
+from fastmech.scan_types.tally import SHARES, Tally
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
 from fastmech.scene import Scene
 from fastmech.store.stream import Piece, Stream
@@ -59,7 +58,7 @@ class _Request(Protocol):
     @property
     def t_end(self) -> float: ...
     @property
-    def dt(self) -> float: ...
+    def dt(self) -> float | None: ...
     @property
     def method(self) -> str: ...
     @property
@@ -89,11 +88,12 @@ class DisturbedTiling(Tiling):
     def __init__(self, request: _Request, scene: Scene) -> None:
         self.request, self.scene = request, scene
         self.equilibria = equilibria_to_disturb(scene)
-        resting_place(
-            scene, self.equilibria, np.zeros((0, 4)), request.return_radius
-        )  # refuses too large balls
         self.rays = _blocks(request.linear_directions, DIRECTIONS)
-        self.parts = _blocks(request.trajectories, _tile_length(request))
+        rest = np.column_stack(
+            [self.equilibria.phi, self.equilibria.theta, *np.zeros((2, len(self.equilibria)))]
+        )
+        step = request.dt or float(measuring_steps(scene, rest, request.method).min())
+        self.parts = _blocks(request.trajectories, _tile_length(request, step))
         self.count = len(self.equilibria) * (len(self.rays) + len(self.parts))
 
     def items(self, index: int) -> int:
@@ -132,22 +132,26 @@ class DisturbedTiling(Tiling):
             threads=context.threads,
             progress=lambda finished: context.check(),
         )
-        errors = _sampled_errors(self.scene, ensemble, request.method) if part.start == 0 else np.zeros(0)
+        errors = (
+            _sampled_errors(self.scene, ensemble, request.method) if part.start == 0 else np.zeros((0, 2))
+        )
         arrays = {name: getattr(ensemble, _FIELDS.get(name, name)) for name in request.kept}
-        tally = Tally.of(ensemble.time_to_return, failure_counts(ensemble.outcome, FAILURES))
-        return self._tile(arrays, errors, tally)
+        tally = Tally.of(ensemble.outcome, ensemble.time_to_return)
+        return self._tile(arrays, errors, tally, [ensemble.dt.min(), ensemble.dt.max()])
 
     def assemble(self, tile: Tiles) -> Stream:
         """Join the blocks and count."""
         each = list(self.equilibria)
         omega = np.array([size_at(self.scene, e.phi, e.theta).omega for e in each])
         fixed = equilibrium_variables(self.equilibria.phi, self.equilibria.theta, omega)
+        fixed |= numbers("trajectory", self.request.trajectories, "number of the trajectory")
         count, request = len(each), self.request
         nothing = empty_trajectories(request.kept, 1)
         arrays = {n: np.broadcast_to(a, (1, request.trajectories, *a.shape[1:])) for n, a in nothing.items()}
         sample, rays = min(SAMPLE, request.trajectories), request.linear_directions
         plane = trajectory_variables(arrays)
-        plane |= tally_variables(np.zeros(1), np.zeros((1, sample)), np.zeros((1, len(QUANTILES))))
+        shares = dict.fromkeys(SHARES, np.zeros(1))
+        plane |= tally_variables(shares, np.zeros((1, sample, 2)), np.zeros((1, len(QUANTILES))))
         plane |= linear_variables(np.broadcast_to(0.0, (1, rays, 4)), np.broadcast_to(0.0, (1, rays)))
         attrs = {
             **request.settings,
@@ -165,70 +169,87 @@ class DisturbedTiling(Tiling):
             return Dataset(arrays | {"limit": Variable(("ray",), np.full(rays, np.nan))})
         sample = min(SAMPLE, self.request.trajectories) if part.start == 0 else 0
         nothing = empty_trajectories(self.request.kept, self.items(index))
-        return self._tile(nothing, np.full(sample, np.nan), Tally())
+        return self._tile(nothing, np.full((sample, 2), np.nan), Tally())
 
     def _part(self, index: int) -> slice | None:
         """The trajectories of a tile; None for a tile of directions."""
         block = index // len(self.equilibria) - len(self.rays)
         return None if block < 0 else self.parts[block]
 
-    def _tile(self, arrays: dict[str, NDArray[Any]], errors: Floats, tally: Tally) -> Dataset:
+    def _tile(
+        self, arrays: dict[str, NDArray[Any]], errors: Floats, tally: Tally, steps: list[float] | None = None
+    ) -> Dataset:
         columns = {
             name: Variable(("trajectory", *(f"{name}_entry" for _ in a.shape[1:])), a)
             for name, a in arrays.items()
         }
-        return Dataset(columns | {"error": Variable(("sample",), errors)} | tally.variables(), tally.attrs())
+        columns |= {
+            "error": Variable(("sample", "error_entry"), errors),
+            "step": Variable(("step_end",), np.array(steps or [])),
+        }
+        return Dataset(columns | tally.variables(), tally.attrs())
 
     def _pieces(self, tile: Tiles, count: int) -> Iterator[Piece]:
         for number, block in enumerate(self.rays):
             found = [tile(number * count + e) for e in range(count)]
             directions, limit = (np.stack([f[name].data for f in found]) for name in ("directions", "limit"))
-            yield (slice(0, count), block), {"linear_direction": directions, "linear_limit": limit}
+            yield (slice(0, count), block), _data(linear_variables(directions, limit))
         first = count * len(self.rays)
-        tallies, errors = [Tally() for _ in range(count)], []
+        tallies, errors, steps = [Tally() for _ in range(count)], [], []
         held: list[dict[str, NDArray[Any]]] = []
         begun = 0
         for number, part in enumerate(self.parts):
             found = [tile(first + number * count + e) for e in range(count)]
             for e, one in enumerate(found):
                 tallies[e].add(one)
+                steps += one["step"].data.tolist()
             if number == 0:
                 errors = [one["error"].data for one in found]
             held.append({n: np.stack([one[n].data for one in found]) for n in self.request.kept})
             if part is self.parts[-1] or sum(a.nbytes for h in held for a in h.values()) >= PIECE_BYTES:
                 joined = {n: np.concatenate([h[n] for h in held], axis=1) for n in self.request.kept}
-                yield (slice(0, count), slice(begun, part.stop)), joined
+                yield (slice(0, count), slice(begun, part.stop)), _data(trajectory_variables(joined))
                 begun, held = part.stop, []
-        share = np.array([t.share for t in tallies])
+        each = [t.shares() for t in tallies]
+        shares = {name: np.array([share[name] for share in each]) for name in SHARES}
         quantiles = np.array([t.quantiles(QUANTILES) for t in tallies])
-        tally = tally_variables(share, np.stack(errors), quantiles)
-        yield slice(0, count), {name: variable.data for name, variable in tally.items()}
+        yield slice(0, count), _data(tally_variables(shares, np.stack(errors), quantiles))
         attrs: dict[str, Any] = {
             "error_estimate": float(np.max(errors)),
             "error_estimate_median": float(np.median(errors)),
             "error_estimate_is": f"{HALVING}; final states of the first {len(errors[0])} of each",
         }
-        failed = sum((t.failed for t in tallies), Counter[str]())
-        yield Dataset({}, attrs | counted_failures(failed, sum(t.total for t in tallies)))
+        attrs |= {"shortest_step": min(steps), "longest_step": max(steps)} if steps else {}
+        ended = sum((t.ended for t in tallies), Counter[str]())
+        failed = {k.name.lower(): ended[k.name.lower()] for k in FAILURES if ended[k.name.lower()]}
+        yield Dataset({}, attrs | counted_failures(failed, ended.total()))
 
 
-#: Names of variables in `fastmech.disturbance.ensemble.DisturbedEnsemble`, where they are others.
+#: Names of variables in `fastmech.basins.disturbed.DisturbedEnsemble`, where they are others.
 _FIELDS = {"start": "starts", "end_equilibrium": "end_index"}
+
+
+def _data(variables: dict[str, Variable]) -> dict[str, NDArray[Any]]:
+    return {name: variable.data for name, variable in variables.items()}
 
 
 def _blocks(total: int, length: int) -> list[slice]:
     return [slice(k, min(k + length, total)) for k in range(0, total, length)]
 
 
-def _tile_length(request: _Request) -> int:
+def _tile_length(request: _Request, dt: float) -> int:
     """Trajectories of a tile, by what they cost: a power of two, which divides a stream of random numbers."""
-    steps = int(output_steps(np.array([0.0, request.t_end]), request.dt).sum())
+    steps = int(output_steps(np.array([0.0, request.t_end]), dt).sum())
     affordable = EVALUATIONS // find_method(request.method).evaluations(steps)
     return int(min(STREAM, max(SAMPLE, 1 << max(0, affordable.bit_length() - 1))))
 
 
 def _sampled_errors(scene: Scene, e: DisturbedEnsemble, method: str) -> Floats:
-    """Differences of the first final states from those of half the step, shape (sample,)."""
-    final = e.final[:SAMPLE]
-    finer = integrate(scene, e.starts[: len(final)], e.t_end, 0.5 * e.dt, method).y[-1]
-    return np.where(np.isnan(e.failed[:SAMPLE]), np.abs(finer - final).max(axis=1), np.nan)
+    """Largest differences of the first final angles and rates from those of half the step, (sample, 2)."""
+    final, dt = e.final[:SAMPLE], e.dt[:SAMPLE]
+    finer = np.empty_like(final)
+    for step in np.unique(dt):
+        some = np.flatnonzero(dt == step)
+        finer[some] = integrate(scene, e.starts[some], e.t_end, 0.5 * float(step), method).y[-1]
+    difference = np.abs(finer - final).reshape(-1, 2, 2).max(axis=2)
+    return np.where(np.isnan(e.failed[:SAMPLE])[:, None], difference, np.nan)

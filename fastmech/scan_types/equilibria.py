@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.equilibria.find import KINDS, find_equilibria
-from fastmech.results import Dataset, Variable, flags
+from fastmech.results import Dataset, Variable, flags, numbers, parts
+from fastmech.scan_types.map_layout import HESSIAN, eigenvalue_variables
 from fastmech.scan_types.request import RunContext, Scan
 from fastmech.scene import Scene
 from fastmech.stability.classify import classify
@@ -51,6 +52,12 @@ class EquilibriaScan(Scan):
         def column(values: list[object], *shape: int) -> NDArray[np.float64]:
             return np.array(values, dtype=np.float64).reshape(len(found), *shape)
 
+        def columns(
+            name: str, values: list[object], units: tuple[str, ...], about: str
+        ) -> dict[str, Variable]:
+            entries = {str(k): unit for k, unit in enumerate(units, start=1)}
+            return parts(name, each, column(values, len(units)), entries, about)
+
         def verdicts(values: list[str], criterion: str) -> Variable:
             codes = [StabilityVerdict[value.upper().replace(" ", "_")] for value in values]
             return Variable(
@@ -60,43 +67,40 @@ class EquilibriaScan(Scan):
         eigenvalues = np.array([f.eigenvalues for f in found]).reshape(-1, 4)
         kinds = np.array([Kind[KINDS[int(index)].upper()] for index in equilibria.morse_index], dtype=np.int8)
         variables = {
+            **numbers("equilibrium", len(found), "number of the equilibrium"),
             "phi": Variable(each, equilibria.phi, "rad", "angle phi"),
             "theta": Variable(each, equilibria.theta, "rad", "angle theta"),
             "energy": Variable(each, equilibria.energy, "J", "potential energy Pi - F x2"),
             "kind": Variable(each, kinds, "1", "kind of equilibrium", flags(Kind)),
             "morse_index": Variable(each, equilibria.morse_index, "1", "negative eigenvalues of the Hessian"),
-            "hessian": Variable(
-                ("equilibrium", "row", "column"), equilibria.hessian, "J", "Hessian of Pi - F x2, paper (19)"
+            **parts(
+                "hessian",
+                each,
+                equilibria.hessian.reshape(-1, 4)[:, [0, 1, 3]],
+                HESSIAN,
+                "Hessian of Pi - F x2, paper (19): {}",
             ),
-            "minor": Variable(
-                ("equilibrium", "minor_order"),
-                column([f.minors for f in found], 2),
-                "J^order",
-                "Sylvester's leading minors of the Hessian",
+            **columns(
+                "minor", [f.minors for f in found], ("J", "J2"), "Sylvester's leading minor {} of the Hessian"
             ),
-            "polynomial": Variable(
-                ("equilibrium", "coefficient"),
-                column([f.polynomial for f in found], 5),
-                "1/s^k, k = 0 to 4",
-                "monic characteristic polynomial, powers falling",
+            **columns(
+                "polynomial",
+                [f.polynomial[1:] for f in found],
+                ("s-1", "s-2", "s-3", "s-4"),
+                "monic characteristic polynomial of degree 4: coefficient of power 4 - {}",
             ),
-            "hurwitz": Variable(
-                ("equilibrium", "hurwitz_order"),
-                column([f.hurwitz_determinants for f in found], 4),
-                "1/s^(k(k+1)/2), k = 1 to 4",
-                "Hurwitz determinants",
+            **columns(
+                "hurwitz",
+                [f.hurwitz_determinants for f in found],
+                ("s-1", "s-3", "s-6", "s-10"),
+                "Hurwitz determinant {}",
             ),
-            "eigenvalue_re": Variable(
-                ("equilibrium", "mode"), eigenvalues.real, "1/s", "eigenvalue, real part"
-            ),
-            "eigenvalue_im": Variable(
-                ("equilibrium", "mode"), eigenvalues.imag, "rad/s", "eigenvalue, imaginary part"
-            ),
-            "natural_frequency": Variable(
-                ("equilibrium", "degree_of_freedom"),
-                column([f.natural_frequencies for f in found], 2),
-                "rad/s",
-                "undamped natural frequency, NaN for a direction that grows",
+            **eigenvalue_variables(each, eigenvalues),
+            **columns(
+                "natural_frequency",
+                [f.natural_frequencies for f in found],
+                ("rad/s", "rad/s"),
+                "undamped natural frequency {}, NaN for a direction that grows",
             ),
             "decay_time": Variable(
                 each,

@@ -1,14 +1,15 @@
 """Equilibria over one to three parameters: how many, how many stable, where, how deep, how fast they settle.
 
 Layout: a point has four or six equilibria, and six slots along ``root``, the deepest equilibrium first;
-slots beyond ``count`` hold NaN in numbers and -1 in codes. So reductions over ``root`` that skip NaN need no
-mask, and ``map.phi.where(map.morse_index == 0)`` leaves the stable ones. ``sheet`` says which slots of
-different points are one equilibrium, continued: ``map.phi.where(map.sheet == 3).max("root")`` is one of them
-over the whole map; ``sheet_branch`` which sheets continue one another round a cusp; ``sheet_break`` where a
-sheet is torn. Coordinates: the axes in their units, ``root`` (rank by energy), ``mode`` (rank by real part)
-and ``entry`` (which second derivative). A map over two parameters also holds its fold curves, cusps and
-vanishing-damping curves, point after point, ``fold_curve`` and ``unreached_curve`` numbering them; a map over
-one its folds.
+slots beyond ``count`` hold NaN in numbers and -1 in codes, which is their ``_FillValue``. So reductions over
+``root`` that skip NaN need no mask, and ``map.phi.where(map.morse_index == 0)`` leaves the stable ones.
+``sheet`` says which slots of different points are one equilibrium, continued:
+``map.phi.where(map.sheet == 3).max("root")`` is one of them over the whole map. Coordinates: the axes in
+their units and ``root`` (rank by energy), so that a table of the map has a row for each slot of each point.
+What has other dimensions is a group. ``sheets``: ``sheet_branch`` says which sheets continue one another
+round a cusp, ``sheet_break`` where a sheet is torn. ``curves``, of a map over two parameters: its fold
+curves, cusps and vanishing-damping curves, point after point, ``fold_curve`` and ``unreached_curve``
+numbering them; of a map over one its folds.
 
 A fold curve is found where it separates points of the grid: an island of six equilibria (or of four) that
 lies between the points, parting no two neighbours, is not seen. A finer grid sees it.
@@ -26,7 +27,7 @@ from fastmech.atlas.map import Slab
 from fastmech.errors import shown
 from fastmech.results import Dataset, Variable
 from fastmech.scan_types.axis import Axis, arrays, check_parameters, check_size
-from fastmech.scan_types.map_layout import point_variables
+from fastmech.scan_types.map_layout import TOGETHER, point_variables
 from fastmech.scan_types.map_tiling import MapTiling
 from fastmech.scan_types.request import TiledScan
 from fastmech.scan_types.tiling import Tiling
@@ -44,7 +45,8 @@ MOST_POINTS = 50_000_000
 SHEET_NUMBERS, POINT_NUMBERS = 3, 250
 
 
-def _known_parameters(axes: dict[str, Axis]) -> dict[str, Axis]:
+def known_parameters(axes: dict[str, Axis]) -> dict[str, Axis]:
+    """Refuse axes that are no parameters of a scene."""
     for name in axes:
         if name not in Scene.model_fields:
             raise ValueError(f"unknown parameter {shown(name)}; {nearest(name, list(Scene.model_fields))}")
@@ -52,7 +54,7 @@ def _known_parameters(axes: dict[str, Axis]) -> dict[str, Axis]:
 
 
 def _known_variables(names: list[str]) -> list[str]:
-    known = list(point_variables(("x",), Slab.empty(1)))
+    known = [*point_variables(("x",), Slab.empty(1)), *TOGETHER]
     for name in names:
         if name not in known:
             raise ValueError(f"unknown variable {shown(name)}; {nearest(name, known)}")
@@ -64,7 +66,7 @@ class EquilibriumMap(TiledScan):
 
     kind: ClassVar[str] = "equilibrium_map"
 
-    axes: Annotated[dict[str, Axis], Field(min_length=1, max_length=3), AfterValidator(_known_parameters)]
+    axes: Annotated[dict[str, Axis], Field(min_length=1, max_length=3), AfterValidator(known_parameters)]
     variables: Annotated[list[str], AfterValidator(_known_variables)] | None = Field(
         None, description="what to keep of every point (all by default); large maps are smaller with less"
     )
@@ -86,13 +88,16 @@ class EquilibriumMap(TiledScan):
     @property
     def wells(self) -> bool:
         """Whether the depths of wells are asked for."""
-        return self.variables is None or bool({"depth", "escape_speed"} & set(self.variables))
+        return self.variables is None or any(
+            name == "depth" or name.startswith("shock_limit") for name in self.variables
+        )
 
     def kept(self, variables: dict[str, Variable]) -> dict[str, Variable]:
         """Those of the variables that are asked for."""
         if self.variables is None:
             return variables
-        return {name: variable for name, variable in variables.items() if name in self.variables}
+        wanted = {one for name in self.variables for one in TOGETHER.get(name, (name,))}
+        return {name: variable for name, variable in variables.items() if name in wanted}
 
     @staticmethod
     def read(section: Section, scene: Mapping[str, float]) -> Dataset:

@@ -17,7 +17,7 @@ from fastmech.basins.erosion import FLAGS, MEASURES, Ends, survey_of, wells_alon
 from fastmech.basins.label import labels_of, require_damper
 from fastmech.basins.measures.norm import STATE
 from fastmech.basins.steps import MOST_OCTAVES, TURNING
-from fastmech.disturbance.ensemble import require_constant_force
+from fastmech.disturbance.motion import require_constant_force
 from fastmech.errors import InputError, shown
 from fastmech.results import Dataset, Variable
 from fastmech.scan_types.axis import (
@@ -47,8 +47,9 @@ _ABOUT = {
     "phi": ("rad", "angle phi of the well"),
     "theta": ("rad", "angle theta of the well"),
     "stability": ("1", "basin stability: share of random starts in the window that end in the well"),
-    "lower": ("1", "lower end of its 95 % Wilson interval"),
-    "upper": ("1", "upper end of its 95 % Wilson interval"),
+    "stability_at_most": ("1", "basin stability if all random starts without a label ended there"),
+    "lower": ("1", "lower end of its 95 % Wilson interval, none of those ending there"),
+    "upper": ("1", "upper end of its 95 % Wilson interval, all of those ending there"),
     "gim": ("1", "global integrity measure: share of the window that ends there without a turn"),
     "gim_at_most": ("1", "global measure if all starts of the map without a label ended there"),
     "lim": ("rad", "local integrity measure: largest ball about the well in its basin on the map"),

@@ -9,8 +9,8 @@ from fastmech.atlas.coincidence import Coincidence
 from fastmech.atlas.map import Slab
 from fastmech.atlas.verdicts import Verdict
 from fastmech.equilibria.outcome import Outcome
-from fastmech.equilibria.search import MOST
-from fastmech.results import Variable, flags
+from fastmech.mechanism.impulse import POINTS
+from fastmech.results import NO_CODE, Variable, flags, numbers, parts
 
 CRITERIA = {
     "verdict_sylvester": "verdict: Lagrange-Dirichlet",
@@ -20,10 +20,13 @@ CRITERIA = {
 }
 
 
+#: Entries of a Hessian and their unit.
+HESSIAN = dict.fromkeys(("phi_phi", "phi_theta", "theta_theta"), "J")
+
+
 def point_variables(grid: tuple[str, ...], found: Slab) -> dict[str, Variable]:
     """Everything known at every point; the arrays have the grid's dimensions ``grid`` in front."""
     roots = (*grid, "root")
-    modes = (*roots, "mode")
     return {
         "count": Variable(grid, found.count, "1", "number of equilibria"),
         "count_stable": Variable(grid, found.count_stable, "1", "number of stable equilibria (minima)"),
@@ -44,19 +47,13 @@ def point_variables(grid: tuple[str, ...], found: Slab) -> dict[str, Variable]:
             roots,
             found.morse_index,
             "1",
-            "negative eigenvalues of the Hessian, -1: no equilibrium, -2: Hessian singular",
+            "negative eigenvalues of the Hessian, -2: Hessian singular",
+            NO_CODE,
         ),
-        "hessian": Variable(
-            (*roots, "entry"), found.hessian, "J", "Hessian: phi phi, phi theta, theta theta, paper (19)"
-        ),
-        "eigenvalue_re": Variable(
-            modes, found.eigenvalues.real, "1/s", "eigenvalues of the motion, real part"
-        ),
-        "eigenvalue_im": Variable(
-            modes, found.eigenvalues.imag, "rad/s", "eigenvalues of the motion, imaginary part"
-        ),
+        **parts("hessian", roots, found.hessian, HESSIAN, "Hessian, paper (19): {}"),
+        **eigenvalue_variables(roots, found.eigenvalues),
         **{
-            name: Variable(roots, found.verdict[..., k], "1", about, flags(Verdict))
+            name: Variable(roots, found.verdict[..., k], "1", about, flags(Verdict, fill=Verdict.NONE))
             for k, (name, about) in enumerate(CRITERIA.items())
         },
         "frequency": Variable(
@@ -66,45 +63,52 @@ def point_variables(grid: tuple[str, ...], found: Slab) -> dict[str, Variable]:
             roots, found.decay_time, "s", "slowest linear mode falls to 1/e; inf: never, NaN: no minimum"
         ),
         "depth": Variable(roots, found.depth, "J", "energy from a minimum to the lowest way out of its well"),
-        "escape_speed": Variable(
-            roots,
-            found.escape_speed,
-            "m/s",
-            "least speed of M2 at which the kinetic energy is the depth: no slower kick leaves the well",
-        ),
+        **{
+            f"shock_limit_{on.lower()}": Variable(
+                roots,
+                getattr(found, f"shock_limit_{on.lower()}"),
+                "N s",
+                f"proved: no smaller impulse on {on} of the resting mechanism leaves the well, in whatever "
+                f"direction{'; NaN: no minimum, or M3 at a dead centre' if on == 'M3' else ''}",
+            )
+            for on in POINTS
+        },
     }
 
 
-def slot_variables(kept: list[str] | None) -> dict[str, Variable]:
-    """Coordinates of the dimensions that are no parameters and that the variables kept (None: all) have."""
-    variables = {
-        "root": Variable(("root",), np.arange(MOST, dtype=np.int8), "1", "rank of the equilibrium by energy")
-    }
-    if kept is None or {"eigenvalue_re", "eigenvalue_im"} & set(kept):
-        modes = np.arange(4, dtype=np.int8)
-        variables["mode"] = Variable(("mode",), modes, "1", "rank of the eigenvalue by real part")
-    if kept is None or "hessian" in kept:
-        entries = np.array(["phi phi", "phi theta", "theta theta"], dtype=object)
-        variables["entry"] = Variable(("entry",), entries, "1", "which second derivative")
-    return variables
+def eigenvalue_variables(dims: tuple[str, ...], values: NDArray[np.complex128]) -> dict[str, Variable]:
+    """The four eigenvalues of the motion, ranked by real part, each in two variables."""
+    about = "eigenvalue {} of the motion by real part"
+    real, imaginary = (dict.fromkeys("1234", unit) for unit in ("1/s", "rad/s"))
+    return parts("eigenvalue_re", dims, values.real, real, f"real part of {about}") | parts(
+        "eigenvalue_im", dims, values.imag, imaginary, f"imaginary part of {about}"
+    )
+
+
+#: Names in requests that stand for several variables.
+TOGETHER = {
+    "hessian": tuple(f"hessian_{entry}" for entry in HESSIAN),
+    **{name: tuple(f"{name}_{k}" for k in "1234") for name in ("eigenvalue_re", "eigenvalue_im")},
+}
 
 
 def sheet_variables(grid: tuple[str, ...], sheet: NDArray[np.int32]) -> dict[str, Variable]:
     """The sheet of every slot."""
-    about = "equal numbers at neighbours: one equilibrium, continued, but for sheet_break; -1: none"
-    return {"sheet": Variable((*grid, "root"), sheet, "1", about)}
+    about = "equal numbers at neighbours: one equilibrium, continued, but for sheet_break"
+    return {"sheet": Variable((*grid, "root"), sheet, "1", about, NO_CODE)}
 
 
 def sheet_table(
     morse_index: NDArray[np.int8], branch: NDArray[np.int32], breaks: NDArray[np.int32]
 ) -> dict[str, Variable]:
     """What is known of every sheet, and where a sheet is torn."""
-    each = ("sheet_number",)
+    each = ("sheet",)
     torn = (
         "where a sheet does not continue between neighbours: index along every axis of the second of them, "
         "the axis along which the first is before it (0: first axis), the sheet"
     )
     return {
+        **numbers("sheet", len(branch), "number of the sheet"),
         "sheet_morse_index": Variable(
             each, morse_index, "1", "negative eigenvalues of the Hessian all over a sheet"
         ),

@@ -14,9 +14,10 @@ from fastmech.atlas.axes import grid_coefficients
 from fastmech.atlas.map import BLOCK, Slab, solve_block
 from fastmech.atlas.sheets import SheetBuilder
 from fastmech.ensembles.threads import thread_count
-from fastmech.results import Dataset, Variable
+from fastmech.equilibria.search import MOST
+from fastmech.results import Dataset, Variable, numbers
 from fastmech.scan_types.map_curves import curve_variables
-from fastmech.scan_types.map_layout import point_variables, sheet_table, sheet_variables, slot_variables
+from fastmech.scan_types.map_layout import point_variables, sheet_table, sheet_variables
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
 from fastmech.scene import Scene
 from fastmech.store.stream import Piece, Stream
@@ -94,13 +95,14 @@ class MapTiling(Tiling):
         }
         attrs = {
             "axes": tuple(self.axes),
-            "layout": "six slots along root, the deepest first; beyond count NaN, codes -1",
+            "layout": "six slots along root, the deepest first; beyond count NaN, codes _FillValue",
             "curves": "all fold curves that part neighbouring points; islands between them are not seen",
         }
         one = self._shaped(Slab.empty(self.plane))
         one |= sheet_variables(tuple(self.axes), np.zeros((1, *self.others, 6), dtype=np.int32))
-        slots = slot_variables(self.request.variables)
-        fixed = Dataset({**about, **tile(0).variables, **slots}, attrs)
+        about |= numbers("root", MOST, "rank of the equilibrium by energy")
+        curves = tile(0)
+        fixed = Dataset(about, attrs, {"curves": curves} if len(curves) else {})
         rows = min(8, self.parts[0].stop)
         return Stream(fixed, one, self.first, lambda: self._pieces(tile), rows)
 
@@ -132,7 +134,8 @@ class MapTiling(Tiling):
         sheets = builder.finish()
         for part, sheet in zip(self.parts, sheets.labels, strict=True):
             yield part, {"sheet": sheet.reshape(-1, *self.others, sheet.shape[-1])}
-        yield Dataset(sheet_table(sheets.morse_index, sheets.branch, sheets.breaks))
+        table = sheet_table(sheets.morse_index, sheets.branch, sheets.breaks)
+        yield Dataset({}, groups={"sheets": Dataset(table)})
 
     def _coefficients(self, index: int) -> tuple[NDArray[np.float64], ...]:
         values = self.axes[self.first][self.parts[index - 1]]

@@ -17,7 +17,7 @@ from fastmech.mechanism.coefficients import force
 from fastmech.mechanism.geometry import constraints, positions
 from fastmech.mechanism.hamilton import momenta
 from fastmech.mechanism.reactions import reactions
-from fastmech.results import Dataset, Variable
+from fastmech.results import STATE_UNITS, Dataset, Variable, parts
 from fastmech.scan_types.axis import check_steps
 from fastmech.scan_types.each import Each
 from fastmech.scan_types.request import HALVING, MethodName, TiledScan, failures
@@ -31,12 +31,7 @@ if TYPE_CHECKING:
 #: Numbers of a section for every output.
 OUTPUT_NUMBERS = 30
 
-_STATE = {
-    "phi": ("rad", "angle phi"),
-    "theta": ("rad", "angle theta"),
-    "phi_dot": ("rad/s", "rate of phi"),
-    "theta_dot": ("rad/s", "rate of theta"),
-}
+_STATE = {"phi": "angle phi", "theta": "angle theta", "phi_dot": "rate of phi", "theta_dot": "rate of theta"}
 _REACTIONS = {
     "rod_om1": "axial force in rod O-M1, tension positive",
     "rod_m1m2": "axial force in rod M1-M2, tension positive",
@@ -126,26 +121,27 @@ class Motion(TiledScan):
         along = ("time",)
         variables = {
             "time": Variable(along, t, "s", "time"),
-            **{name: Variable(along, y[:, i], *about) for i, (name, about) in enumerate(_STATE.items())},
+            **{
+                name: Variable(along, y[:, i], STATE_UNITS[name], about)
+                for i, (name, about) in enumerate(_STATE.items())
+            },
             "p_phi": Variable(along, p[:, 0], "kg m2/s", "generalized momentum of phi, canonical equations"),
             "p_theta": Variable(
                 along, p[:, 1], "kg m2/s", "generalized momentum of theta, canonical equations"
             ),
-            "formulation_difference": Variable(
-                ("time", "component"),
-                canonical - y,
-                "rad or rad/s",
-                "canonical less Lagrangian phi, theta, phi', theta'",
+            **parts(
+                "formulation_difference", along, canonical - y, STATE_UNITS, "{}, canonical less Lagrangian"
             ),
             **{
                 name: Variable(along, value, "m", f"coordinate {name[0]} of M{name[1]}")
                 for name, value in points._asdict().items()
             },
-            "constraint_residual": Variable(
-                ("constraint", "time"),
-                constraints(scene, points),
-                "m2 (third: m)",
-                "left sides of the constraints (2)-(5)",
+            **parts(
+                "constraint_residual",
+                along,
+                np.moveaxis(constraints(scene, points), 0, -1),
+                {"2": "m2", "3": "m2", "4": "m", "5": "m2"},
+                "left side of the constraint ({})",
             ),
             "force": Variable(along, force(scene, t), "N", "force on M2 along +x"),
             **{

@@ -174,13 +174,13 @@ class Request:
         return [f"scan.{name}: {line}" for name, line in told.items() if line is not None]
 
 
-def read_request(path: str | Path, kinds: Mapping[str, type[Scan]]) -> Request:
-    """Read and validate a request file.
+def read_request(path: str | Path, kinds: Mapping[str, type[Scan]], text: str | None = None) -> Request:
+    """Read and validate a request file, or the text that is given as its own.
 
     Raises:
         InputError: the file cannot be read, or anything in it is unknown, of a wrong type or out of range.
     """
-    return request_of_text(read_text(path), path, kinds)
+    return request_of_text(read_text(path) if text is None else text, path, kinds)
 
 
 def request_of_text(text: str, path: str | Path, kinds: Mapping[str, type[Scan]]) -> Request:

@@ -38,8 +38,14 @@ class SnapScan(TiledScan):
 
     def tiling(self, scene: Scene) -> Tiling:
         """The stable positions one by one."""
-        stable = [e for e in find_equilibria(scene) if e.morse_index == 0]
-        return Each("stable positions", len(stable), lambda k: self._one(scene, stable[k]), _joined)
+        stable = {k: e for k, e in enumerate(find_equilibria(scene)) if e.morse_index == 0}
+        each = list(stable.values())
+        return Each(
+            "stable positions",
+            len(each),
+            lambda k: self._one(scene, each[k]),
+            lambda tiles: _joined(list(stable), tiles),
+        )
 
     def _one(self, scene: Scene, equilibrium: Equilibrium) -> Dataset:
         """Follow one stable position as the load changes; NaN stands for no load."""
@@ -55,13 +61,15 @@ class SnapScan(TiledScan):
         return {}
 
 
-def _joined(tiles: list[Dataset]) -> Dataset:
+def _joined(which: list[int], tiles: list[Dataset]) -> Dataset:
     rows = np.array([tile["row"].data for tile in tiles]).reshape(-1, 6)
     each = ("equilibrium",)
     sentences = np.array([tile.attrs["sentence"] for tile in tiles], dtype=object)
     gone = "it disappears when the load {} to; NaN: at no load searched"
     return Dataset(
         {
+            "equilibrium": Variable(each, np.array(which, np.int32), "1", "number of the equilibrium"),
+            "end": Variable(("end",), np.array(["lowest", "highest"], object), "1", "end of the search"),
             "phi": Variable(each, rows[:, 0], "rad", "angle phi"),
             "theta": Variable(each, rows[:, 1], "rad", "angle theta"),
             "snap_below": Variable(each, rows[:, 2], "N", gone.format("falls")),

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from fastmech.basins.critical import critical_forces, critical_impulse
 from fastmech.basins.label import require_damper
-from fastmech.basins.snapping import SnappingMap, default_end, force_free, map_snapping
+from fastmech.basins.shock_limit import shock_limit
+from fastmech.basins.snapping import SnappingMap, critical_forces, default_end, force_free, map_snapping
 from fastmech.basins.status import FAILURES, BasinStatus
 from fastmech.errors import InputError
-from fastmech.results import Dataset, Variable, flags
+from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers
 from fastmech.scan_types.axis import Axis, check_duration, check_parameters, check_rising, check_size
 from fastmech.scan_types.request import MethodName, TiledScan, failures
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
@@ -29,9 +29,6 @@ if TYPE_CHECKING:
 
 #: Motions of the largest map, and numbers of 8 bytes of each in memory.
 MOST_POINTS, POINT_NUMBERS = 5_000_000, 20
-
-#: The critical impulse is looked for up to so many times the smallest F0/alpha of the largest force.
-IMPULSES = 4.0
 
 #: Least tolerance of a critical force over the force: doubles between two such forces.
 ROUNDING = 2.0**-44
@@ -151,7 +148,7 @@ class SnappingTiling(Tiling):
         tiles = [tile(index) for index in range(self.count)]
         order = np.argsort(np.concatenate(self.parts), kind="stable")
         joined = {name: np.concatenate([part[name].data for part in tiles])[order] for name in tiles[0]}
-        _, equilibria, start = force_free(self.scene, None)
+        free, equilibria, start = force_free(self.scene, None)
         found = SnappingMap(
             self.forces,
             self.rates,
@@ -162,8 +159,8 @@ class SnappingTiling(Tiling):
             joined["time"],
             joined["status"],
         )
-        largest = float(self.forces[np.abs(self.forces).argmax()])
-        limit = critical_impulse(self.scene, IMPULSES * largest / float(self.rates[-1]))
+        side = 0.0 if self.forces[0] > 0.0 else np.pi
+        limit = np.cos(side) * shock_limit(free, equilibria[start], "M2", side).found.impulse
         variables = _ends(found) | _windows(found) | _equilibria(found)
         variables["critical_F0"] = Variable(
             ("alpha",),
@@ -172,7 +169,7 @@ class SnappingTiling(Tiling):
             "force of least magnitude that leaves, NaN: none of those tried",
         )
         variables["critical_impulse"] = Variable(
-            (), np.array(limit), "N s", "limit of the critical F0/alpha for fast decay, NaN: none in range"
+            (), np.array(limit), "N s", "limit of the critical F0/alpha for fast decay, NaN: none was found"
         )
         attrs = {"start": start, "tolerance": self.request.tolerance, "method": self.request.method}
         return Dataset(variables, attrs | found.counts | failures(found.status, FAILURES))
@@ -198,7 +195,7 @@ def _ends(found: SnappingMap) -> dict[str, Variable]:
         "F0": Variable(("F0",), found.F0, "N", "force on M2 along +x when it is switched on"),
         "alpha": Variable(("alpha",), found.alpha, "1/s", "rate at which the force decays"),
         "well": Variable(
-            grid, found.label.astype(np.int8), "1", "equilibrium that captures the motion, -1: none"
+            grid, found.label.astype(np.int8), "1", "equilibrium that captures the motion", NO_CODE
         ),
         "turns_phi": Variable(grid, found.turns[..., 0].astype(np.int32), "1", "full turns of phi"),
         "turns_theta": Variable(grid, found.turns[..., 1].astype(np.int32), "1", "full turns of theta"),
@@ -214,14 +211,14 @@ def _windows(found: SnappingMap) -> dict[str, Variable]:
     rows = [(k, window) for k in range(found.alpha.size) for window in found.windows(k)]
     each = ("window",)
 
-    def column(values: list[Any], kind: type, unit: str, about: str) -> Variable:
-        return Variable(each, np.array(values, dtype=kind), unit, about)
+    def column(values: list[Any], kind: type, unit: str, *about: Any) -> Variable:
+        return Variable(each, np.array(values, dtype=kind), unit, *about)
 
     return {
         "window_alpha": column([found.alpha[k] for k, _ in rows], np.float64, "1/s", "alpha of the window"),
         "window_first": column([w.first for _, w in rows], np.float64, "N", "least F0 of the window"),
         "window_last": column([w.last for _, w in rows], np.float64, "N", "largest F0 of the window"),
-        "window_well": column([w.label for _, w in rows], np.int8, "1", "where the window's motions end"),
+        "window_well": column([w.label for _, w in rows], np.int8, "1", "where its motions end", NO_CODE),
         "window_turns_phi": column([w.turns[0] for _, w in rows], np.int32, "1", "turns of phi they make"),
         "window_turns_theta": column(
             [w.turns[1] for _, w in rows], np.int32, "1", "turns of theta they make"
@@ -233,6 +230,7 @@ def _windows(found: SnappingMap) -> dict[str, Variable]:
 def _equilibria(found: SnappingMap) -> dict[str, Variable]:
     each, equilibria = ("equilibrium",), found.equilibria
     return {
+        **numbers("equilibrium", len(equilibria), "number of the force-free equilibrium"),
         "equilibrium_phi": Variable(each, equilibria.phi, "rad", "angle phi of the force-free equilibrium"),
         "equilibrium_theta": Variable(
             each, equilibria.theta, "rad", "angle theta of the force-free equilibrium"

@@ -1,26 +1,98 @@
 """HDF5 groups back into labelled data; the counterpart of `fastmech.store.encode`.
 
 A file may come from anywhere, so nothing in it is trusted: only what the store itself writes is followed.
-That leaves out links to other files, data kept in other files, and filters that HDF5 would load as plugins.
+That leaves out links to other files, data kept in other files, filters that HDF5 would load as plugins, texts
+of variable length and names that are not plain. What a file may ask of memory and time is limited, too; the
+environment variable ``FASTMECH_FILE_LIMITS`` raises all of these limits by its factor.
 """
 
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 import numpy.typing as npt
 
-from fastmech.errors import InputError
-from fastmech.results import RESERVED_ATTRS, Variable
+from fastmech.errors import InputError, shown
+from fastmech.results import FILL, RESERVED_ATTRS, Variable, check_name
 from fastmech.store.schema import DIM_NUMBER, DIM_NUMBERS, DIMENSION_ONLY
 
 _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
+
+#: Environment variable: the factor by which a file may exceed the limits below.
+LIMITS = "FASTMECH_FILE_LIMITS"
+
+#: Groups of a file, and variables.
+MOST_GROUPS, MOST_VARIABLES = 1_000, 20_000
+
+#: Attributes of a group or variable, and bytes of each.
+MOST_ATTRS, MOST_ATTR_BYTES = 1_000, 1 << 24
+
+#: Bytes of a chunk, which HDF5 unpacks as a whole: the store's own have about a megabyte.
+MOST_CHUNK_BYTES = 1 << 27
+
+#: Bytes of all values once they are unpacked: so many anyway, and so many for each byte of the file. What
+#: deflate packs a thousandfold holds next to nothing; results of fastmech are packed a few times.
+FREE_BYTES, UNPACKED = 1 << 28, 200
+
+
+def raised(limit: int) -> int:
+    """A limit times the factor that the user allows.
+
+    Raises:
+        InputError: the environment variable is no positive number.
+    """
+    text = os.environ.get(LIMITS, "1")
+    try:
+        factor = float(text)
+    except ValueError:
+        factor = math.nan
+    if not 0.0 < factor < math.inf:
+        raise InputError(f"{LIMITS} = {shown(text)}: must be a positive number, such as 10")
+    return int(limit * factor)
+
+
+class TooMuchError(InputError):
+    """A file asks for more than a file may that need not be trusted."""
+
+
+class Allowance:
+    """What a file may ask for: its groups, its variables and the bytes of their values are taken off it.
+
+    Args:
+        path: the file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        limits = {
+            "groups": MOST_GROUPS,
+            "variables": MOST_VARIABLES,
+            "bytes of unpacked values": max(FREE_BYTES, UNPACKED * path.stat().st_size),
+        }
+        self._limits = {what: raised(limit) for what, limit in limits.items()}
+        self._left = dict(self._limits)
+
+    def take(self, groups: int = 0, variables: int = 0, nbytes: int = 0) -> None:
+        """Take off so much.
+
+        Raises:
+            TooMuchError: more than is left.
+        """
+        for what, amount in zip(self._left, (groups, variables, nbytes), strict=True):
+            self._left[what] -= amount
+            if self._left[what] < 0:
+                raise TooMuchError(
+                    f"{self._path}: has more than {self._limits[what]:,} {what}; {LIMITS}=10 in the"
+                    " environment allows ten times as much, of a file that you trust"
+                )
 
 
 @contextmanager
@@ -28,14 +100,29 @@ def named_damage(what: str) -> Iterator[None]:
     """Turn whatever h5py raises on damaged contents into one line that names them."""
     try:
         yield
+    except TooMuchError:
+        raise
     except (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
         reason = " ".join(str(part) for part in error.args) or type(error).__name__
         raise InputError(f"{what}: is damaged or not written by fastmech: {reason}") from error
 
 
-def members(group: h5py.Group) -> dict[str, h5py.Group | h5py.Dataset]:
-    """The objects of a group, in the order in which they were written, links to elsewhere left out."""
-    return {name: group[name] for name in group if isinstance(group.get(name, getlink=True), h5py.HardLink)}
+def members(group: h5py.Group, where: str, left: Allowance) -> dict[str, h5py.Group | h5py.Dataset]:
+    """The objects of a group, in the order in which they were written, links to elsewhere left out.
+
+    Raises:
+        InputError: more than the file may have, in number or size, or one whose name is not plain.
+    """
+    found = {}
+    for name in group:
+        if isinstance(group.get(name, getlink=True), h5py.HardLink):
+            check_name(name, where)
+            found[name] = group[name]
+            if isinstance(found[name], h5py.Dataset):
+                left.take(variables=1, nbytes=found[name].size * found[name].dtype.itemsize)
+                continue
+        left.take(groups=1)
+    return found
 
 
 def is_dimension_only(stored: h5py.Dataset) -> bool:
@@ -79,7 +166,7 @@ def about_variable(stored: h5py.Dataset, dims: Mapping[int, str], where: str) ->
     """
     with named_damage(where):
         _check_storage(stored)
-        attrs = get_attrs(stored)
+        attrs = _variable_attrs(stored)
         text = h5py.check_string_dtype(stored.dtype) is not None
         return About(
             dict(zip(own_dimensions(stored, dims), stored.shape, strict=True)),
@@ -111,7 +198,7 @@ def get_variable(
     with named_damage(where):
         _check_storage(stored)
         text = h5py.check_string_dtype(stored.dtype) is not None
-        attrs = get_attrs(stored)
+        attrs = _variable_attrs(stored)
         own_dims = own_dimensions(stored, dims)
         wanted = [(part or {}).get(dim, slice(None)) for dim in own_dims]
         if text:
@@ -135,11 +222,22 @@ def _read_part(stored: h5py.Dataset, part: list[slice]) -> npt.NDArray[Any]:
 
 def get_attrs(stored: h5py.Group | h5py.Dataset) -> dict[str, Any]:
     """The attributes of a group or variable, those of HDF5 and netCDF themselves left out."""
-    return {
-        name: _python_value(stored.attrs[name])
-        for name in stored.attrs
-        if name not in RESERVED_ATTRS and not name.startswith("_")
-    }
+    if len(stored.attrs) > raised(MOST_ATTRS):
+        raise ValueError(f"has {len(stored.attrs):,} attributes")
+    attrs = {}
+    for name in stored.attrs:
+        if name not in RESERVED_ATTRS and not name.startswith("_"):
+            check_name(name, "attribute")
+            if stored.attrs.get_id(name).get_storage_size() > raised(MOST_ATTR_BYTES):
+                raise ValueError(f"the attribute {name} is too long")
+            attrs[name] = _python_value(stored.attrs[name])
+    return attrs
+
+
+def _variable_attrs(stored: h5py.Dataset) -> dict[str, Any]:
+    """The attributes of a variable, with the one value that stands for none, of integers."""
+    fill = {FILL: int(stored.attrs[FILL])} if FILL in stored.attrs and stored.dtype.kind in "iu" else {}
+    return {**get_attrs(stored), **fill}
 
 
 def _python_value(value: Any) -> Any:
@@ -159,3 +257,7 @@ def _check_storage(stored: h5py.Dataset) -> None:
     filters = {properties.get_filter(i)[0] for i in range(properties.get_nfilters())}
     if stored.is_virtual or stored.external or not filters <= _FILTERS:
         raise ValueError("its data lie elsewhere or need a plugin")
+    if stored.dtype.kind == "O":
+        raise ValueError("its values are of variable length")
+    if stored.chunks and math.prod(stored.chunks) * stored.dtype.itemsize > raised(MOST_CHUNK_BYTES):
+        raise ValueError(f"its chunks have more than {raised(MOST_CHUNK_BYTES):,} bytes")

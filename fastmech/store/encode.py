@@ -9,12 +9,14 @@ import h5py
 import numpy as np
 import numpy.typing as npt
 
-from fastmech.results import Dataset, Variable
+from fastmech.results import Dataset, Variable, cf_attrs
 from fastmech.store.schema import COMPACT_BYTES, DIM_NUMBER, DIM_NUMBERS, DIMENSION_ONLY
 
 
 def put_dataset(group: h5py.Group, dataset: Dataset, numbers: Iterator[int]) -> None:
-    """Write a dataset into an empty group, its dimensions first, so that all variables can refer to them.
+    """Write a dataset with its groups into an empty group.
+
+    Its dimensions come first, so that all variables can refer to them.
 
     Args:
         group: where to.
@@ -35,6 +37,13 @@ def put_dataset(group: h5py.Group, dataset: Dataset, numbers: Iterator[int]) -> 
         if variable.dims:
             stored.attrs[DIM_NUMBERS] = np.array([dim_numbers[dim] for dim in variable.dims])
     put_attrs(group, dataset.attrs)
+    for name, inner in dataset.groups.items():
+        put_dataset(group.create_group(name, track_order=True), inner, numbers)
+
+
+def put_variable_attrs(stored: h5py.Dataset, variable: Variable) -> None:
+    """Write what is said of a variable."""
+    put_attrs(stored, cf_attrs(variable.units, variable.long_name, variable.attrs, variable.data.dtype))
 
 
 def put_attrs(target: h5py.Group | h5py.Dataset, attrs: Mapping[str, Any]) -> None:
@@ -81,7 +90,7 @@ def _put_variable(group: h5py.Group, name: str, variable: Variable) -> h5py.Data
         stored[...] = data
     if text:
         put_attrs(stored, {"_Encoding": "utf-8"})
-    put_attrs(stored, {"units": variable.units, "long_name": variable.long_name, **variable.attrs})
+    put_variable_attrs(stored, variable)
     return stored
 
 

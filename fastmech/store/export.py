@@ -1,24 +1,37 @@
-"""Result files in other formats: CSV, netCDF and npz."""
+"""Result files in other formats: CSV, netCDF and npz.
+
+Each file says all that the result file says of its section: title, request, scene, versions, command line,
+settings, and of every variable unit, meaning and codes. In netCDF these are attributes, in CSV comments
+before the table (``pandas.read_csv(FILE, comment="#")``), in npz a member of JSON, ``attributes.json``.
+"""
 
 from __future__ import annotations
 
 import csv
+import json
 import os
-from collections.abc import Callable, Iterator, Sequence
+import zipfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace as replaced
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 
-from fastmech.errors import InputError
-from fastmech.results import Dataset, Variable
-from fastmech.store.read import open_results
+from fastmech.errors import InputError, printable
+from fastmech.results import FILL, Dataset, Variable
+from fastmech.store.provenance import history_line
+from fastmech.store.read import Results, open_results
+from fastmech.store.schema import CHANGE, CONVENTIONS, OWN_ATTRS
 from fastmech.store.select import choose, parse_selections, take
 from fastmech.store.write import _aside, _readable_reasons
 
 #: Announces a piece of work with its items and gives who is told of finished ones.
 Stages: TypeAlias = "Callable[[str, int], Callable[[int], None]]"
+
+#: Member of an npz file that explains the others.
+ATTRIBUTES = "attributes.json"
 
 #: Rows of a table that are turned into text at a time.
 ROWS = 65536
@@ -42,7 +55,7 @@ def export_results(
         path: result file.
         folder: for the files, made if it is missing.
         form: "csv", "nc" or "npz".
-        section: only this one.
+        section: only this one, with its groups; or one group, ``SECTION/GROUP``.
         variables: only these.
         selections: ``NAME=VALUE`` or ``NAME=LOW:HIGH``, see `fastmech.store.read.Section.select`.
         replace: whether files of these names may be replaced.
@@ -54,16 +67,35 @@ def export_results(
     """
     wanted = parse_selections(selections)
     with open_results(path) as results:
-        names = [section] if section is not None else list(results)
+        names = list(results) if section is None else [section]
+        if not (wanted or variables):
+            names = [
+                g for g in results.groups if section is None or f"{g}/".startswith(f"{section}/")
+            ] or names
         # All before the first file is written: what one section refuses leaves no other behind.
         chosen = {name: choose(results[name], wanted) for name in names}
         for name in names:
+            selected = tuple(one.told for one in chosen[name].values())
+            for one in selected:
+                tell(f"{name}: {one}")
             dataset = take(results[name], chosen[name], variables or None)
-            for one in chosen[name].values():
-                tell(f"{name}: {one.told}")
+            dataset = replaced(dataset, attrs=_told(results, name, selected))
             for target, write in _WRITERS[form](dataset, folder / name, stage):
                 _publish(target, write, replace)
                 yield target
+
+
+def _told(results: Results, name: str, selected: tuple[str, ...]) -> dict[str, Any]:
+    """All that a result file says of a section or of a group in it, the file's own attributes included."""
+    scene = results.scene_of(name)
+    units = ", ".join(f"{key}: {parameter.units}" for key, parameter in results.parameters.items())
+    attrs: dict[str, Any] = {key: v for key, v in results.attrs.items() if key not in OWN_ATTRS[:2]}
+    attrs |= {"section": name, **{f"{CHANGE}{key}": value for key, value in scene.items()}}
+    attrs |= {"scene_units": units} | results[name.partition("/")[0]].attrs | results[name].attrs
+    if selected:
+        attrs["selected"] = selected
+    before = str(results.attrs.get("history", f"{results.attrs.get('created')}: written"))
+    return attrs | {"Conventions": CONVENTIONS, "history": f"{before}\n{history_line()}"}
 
 
 Writer = Callable[[Path], None]
@@ -88,6 +120,10 @@ def _write_table(
     total = int(np.prod(sizes, dtype=np.int64))
     advance = stage(f"rows over {', '.join(dims) or 'nothing'}", total)
     with path.open("w", encoding="utf-8", newline="") as file:
+        file.writelines(
+            f"# {line}".rstrip() + "\n"
+            for line in _comments(dataset, {d: dataset.variables.get(d) for d in dims} | table)
+        )
         writer = csv.writer(file)
         writer.writerow([*heads, *(_head(name, variable) for name, variable in table.items())])
         for start in range(0, total, ROWS):
@@ -103,20 +139,45 @@ def _write_table(
         os.fsync(file.fileno())
 
 
+def _comments(dataset: Dataset, columns: Mapping[str, Variable | None]) -> Iterator[str]:
+    """What is said of the section and of the columns of a table, line by line."""
+    for name, value in dataset.attrs.items():
+        lines = [printable(line, "\t") for line in str(_plain(value)).splitlines()] or [""]
+        yield from (
+            [f"{name}: {lines[0]}"] if len(lines) == 1 else [f"{name}:", *(f"    {line}" for line in lines)]
+        )
+    for name, variable in columns.items():
+        if variable is not None:
+            codes = [f"{code}: {meaning}" for meaning, code in variable.codes.items()]
+            codes += [f"{variable.attrs[FILL]}: none"] if FILL in variable.attrs else []
+            explained = f" ({', '.join(codes)})" if codes else ""
+            yield printable(f"{_head(name, variable)} = {variable.long_name}{explained}")
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+
+
 def _head(name: str, variable: Variable | None) -> str:
     return name if variable is None or variable.units == "1" else f"{name} [{variable.units}]"
 
 
 def _as_npz(dataset: Dataset, stem: Path, stage: Stages) -> Iterator[tuple[Path, Writer]]:
     def write(path: Path) -> None:
-        arrays: dict[str, Any] = {
-            name: v.data.astype(str) if v.data.dtype == object else v.data
+        about = {
+            name: {"dims": v.dims, "units": v.units, "long_name": v.long_name, **v.attrs}
             for name, v in dataset.variables.items()
         }
-        advance = stage(f"{stem.name}.npz", 1)
-        with path.open("wb") as file:
-            np.savez_compressed(file, **arrays)
-        advance(1)
+        advance = stage(f"{stem.name}.npz", len(about))
+        # Not by NumPy's savez, which takes some names of variables for its own arguments.
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, v in dataset.variables.items():
+                with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
+                    data = v.data.astype(str) if v.data.dtype == object else v.data
+                    np.lib.format.write_array(file, data, allow_pickle=False)
+                advance(1)
+            text = json.dumps({"attributes": dataset.attrs, "variables": about}, default=_plain, indent=1)
+            archive.writestr(ATTRIBUTES, text)
 
     yield stem.with_name(f"{stem.name}.npz"), write
 
@@ -125,7 +186,9 @@ def _as_netcdf(dataset: Dataset, stem: Path, stage: Stages) -> Iterator[tuple[Pa
     def write(path: Path) -> None:
         advance = stage(f"{stem.name}.nc", 1)
         try:
-            dataset.to_xarray().to_netcdf(path, engine="h5netcdf")
+            found = dataset.to_xarray()
+            whole = {name: {"_FillValue": None} for name in found.coords}  # a coordinate lacks no value
+            found.to_netcdf(path, engine="h5netcdf", encoding=whole)
             advance(1)
         except ImportError:
             raise InputError(

@@ -28,6 +28,7 @@ def dataset_image(dataset: Dataset) -> list[NDArray[np.uint8]]:
 
     The chunks are views of its arrays where these are contiguous.
     """
+    assert not dataset.groups  # no tile has any
     arrays = {name: _numbers(variable.data) for name, variable in dataset.variables.items()}
     about = {
         "attrs": _plain(dataset.attrs),

@@ -8,6 +8,8 @@ from xarray import Dataset
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
+from fastmech.results import cf_attrs
+
 if TYPE_CHECKING:
     from fastmech.store.read import Section
 
@@ -58,7 +60,7 @@ def lazy_dataset(section: Section) -> Dataset:
     coordinates: dict[str, Any] = {}
     for name in section:
         about = section.about(name)
-        attrs = {"units": about.units, "long_name": about.long_name, **about.attrs}
+        attrs = cf_attrs(about.units, about.long_name, about.attrs, about.dtype)
         if name in section.sizes:
             coordinates[name] = (tuple(about.sizes), section[name].data, attrs)
         else:

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import platform
+import shlex
+import sys
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 
 import h5py
+
+#: Characters of a command line that are kept.
+MOST_COMMAND = 2000
 
 
 def provenance(threads: int) -> dict[str, str | int]:
@@ -17,7 +22,8 @@ def provenance(threads: int) -> dict[str, str | int]:
         threads: number of threads that computed it.
     """
     return {
-        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "created": _now(),
+        "history": history_line(),
         "fastmech_version": _version("fastmech"),
         "python_version": platform.python_version(),
         "numba_version": _version("numba"),
@@ -29,6 +35,19 @@ def provenance(threads: int) -> dict[str, str | int]:
         "processor": processor_name(),
         "threads": threads,
     }
+
+
+def history_line() -> str:
+    """Time and command line of this process, as CF's attribute ``history`` has them."""
+    program, *arguments = sys.argv or [""]
+    name = Path(program).name
+    line = shlex.join(["fastmech" if name == "__main__.py" else name, *arguments])
+    shown = "".join(c if c.isprintable() else "?" for c in line)[:MOST_COMMAND]
+    return f"{_now()}: {shown} (fastmech {_version('fastmech')})"
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 def processor_name() -> str:

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any, Self
 
 import h5py
 
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown
 from fastmech.results import Dataset, Variable, no_xarray
 from fastmech.store.decode import (
     About,
+    Allowance,
     about_variable,
     dimensions,
     get_attrs,
@@ -23,7 +24,7 @@ from fastmech.store.decode import (
     named_damage,
     own_dimensions,
 )
-from fastmech.store.schema import FORMAT, SCHEMA_VERSION
+from fastmech.store.schema import CHANGE, FORMAT, SCHEMA_VERSION
 from fastmech.store.select import Wanted, choose, take
 
 if TYPE_CHECKING:
@@ -43,7 +44,8 @@ def open_results(path: str | Path) -> Results:
 class Results:
     """An open result file.
 
-    `results["equilibria"]` is the `Section` of that name; iterating gives the names.
+    `results["equilibria"]` is the `Section` of that name, `results["map/curves"]` the group `curves` within
+    the section `map`; iterating gives the names of the sections.
 
     Attributes:
         path: the file.
@@ -61,8 +63,9 @@ class Results:
             with named_damage(str(path)):
                 self.attrs = get_attrs(self._file)
             _check_schema(self.attrs, path)
+            left = Allowance(self.path)
             with named_damage(str(path)):
-                root = members(self._file)
+                root = members(self._file, str(path), left)
             self.parameters = {
                 name: get_variable(member, {}, f"{path}: parameter {name!r}")
                 for name, member in root.items()
@@ -71,7 +74,7 @@ class Results:
             with named_damage(f"{path}: the scene's parameters"):
                 self.scene = {name: float(parameter.data) for name, parameter in self.parameters.items()}
             self._sections = {
-                name: Section(member, f"{path}: {name}")
+                name: Section(member, f"{path}: {name}", left)
                 for name, member in root.items()
                 if isinstance(member, h5py.Group)
             }
@@ -84,20 +87,54 @@ class Results:
         """Names of the sections, in the order of the request."""
         return tuple(self._sections)
 
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Names of the sections and, after each, of the groups in it: ``SECTION/GROUP``."""
+        return tuple(
+            place
+            for name, one in self._sections.items()
+            for place in (name, *(f"{name}/{g}" for g in one.groups))
+        )
+
     def __getitem__(self, name: str) -> Section:
-        if name not in self._sections:
-            known = ", ".join(self._sections) or "none"
-            raise InputError(f"section {name!r}: is not in {self.path}; it has {known}")
-        return self._sections[name]
+        found = self._find(name)
+        if found is None:
+            raise InputError(
+                f"section {shown(name)}: is not in {self.path}; it has {', '.join(self.groups) or 'none'}"
+            )
+        return found
 
     def __contains__(self, name: object) -> bool:
-        return name in self._sections
+        return isinstance(name, str) and self._find(name) is not None
+
+    def _find(self, name: str) -> Section | None:
+        section, slash, group = name.partition("/")
+        found = self._sections.get(section)
+        return found if found is None or not slash else found.groups.get(group)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._sections)
 
     def __len__(self) -> int:
         return len(self._sections)
+
+    @property
+    def request(self) -> str:
+        """The text of the request file that the file was made from.
+
+        Raises:
+            InputError: the file does not hold it.
+        """
+        text = self.attrs.get("request")
+        if not isinstance(text, str):
+            raise InputError(f"{self.path}: does not hold the request that it was made from")
+        return text
+
+    def scene_of(self, name: str) -> dict[str, float]:
+        """The scene of a section, or of a group in it: the file's with the section's changes."""
+        attrs = self[name.partition("/")[0]].attrs
+        with named_damage(f"{self.path}: {name}: its scene"):
+            return {key: float(attrs.get(f"{CHANGE}{key}", value)) for key, value in self.scene.items()}
 
     def close(self) -> None:
         """Close the file; what was read stays usable."""
@@ -120,23 +157,30 @@ class Section:
         attrs: the section's attributes.
         sizes: length of each dimension.
         variables: the variables by name, each read anew whenever it is asked for.
+        groups: sections within this one, with dimensions of their own.
     """
 
-    def __init__(self, group: h5py.Group, where: str) -> None:
+    def __init__(self, group: h5py.Group, where: str, left: Allowance, inner: bool = False) -> None:
         self.where = where
         with named_damage(where):
-            stored = {n: member for n, member in members(group).items() if isinstance(member, h5py.Dataset)}
+            all_members = members(group, where, left)
+            stored = {n: member for n, member in all_members.items() if isinstance(member, h5py.Dataset)}
             variables = {name: member for name, member in stored.items() if not is_dimension_only(member)}
             dims = dimensions(stored.values())
             self.sizes = {dim: int(stored[dim].size) for dim in dims.values()}
             self.attrs: dict[str, Any] = get_attrs(group)
+        self.groups = {
+            name: Section(member, f"{where}/{name}", left, inner=True)
+            for name, member in all_members.items()
+            if isinstance(member, h5py.Group) and not inner
+        }
         self._stored = _StoredVariables(variables, dims, where)
         self.variables: Mapping[str, Variable] = self._stored
 
     def __getitem__(self, name: str) -> Variable:
         if name not in self.variables:
             known = ", ".join(self.variables) or "none"
-            raise InputError(f"variable {name!r}: is not in {self.where}; it has {known}")
+            raise InputError(f"variable {shown(name)}: is not in {self.where}; it has {known}")
         return self.variables[name]
 
     def __contains__(self, name: object) -> bool:
@@ -164,14 +208,15 @@ class Section:
         """Read variables.
 
         Args:
-            names: which; None: all.
+            names: which; None: all, and the groups too.
             part: what to take along some dimensions, with steps of 1 or more; nothing else is kept in memory.
 
         Raises:
             InputError: a variable's data are damaged; the message names it.
         """
         chosen = [name for name in self.variables if names is None or name in names]
-        return Dataset({name: self._stored.read(name, part) for name in chosen}, self.attrs)
+        groups = {name: group.load() for name, group in self.groups.items()} if names is None else {}
+        return Dataset({name: self._stored.read(name, part) for name in chosen}, self.attrs, groups)
 
     def select(self, names: Collection[str] | None = None, **values: Wanted) -> Dataset:
         """The section at one value, or in a range, of some coordinates: ``results["map"].select(F0=100.0)``.
@@ -268,8 +313,9 @@ def _open_file(path: Path) -> h5py.File:
 def _check_schema(attrs: Mapping[str, Any], path: str | Path) -> None:
     if attrs.get("format") != FORMAT:
         raise InputError(f"{path}: is an HDF5 file, but not a result file of fastmech")
-    if attrs.get("schema_version") != SCHEMA_VERSION:
+    version = attrs.get("schema_version")
+    if not isinstance(version, int) or not 1 <= version <= SCHEMA_VERSION:
         raise InputError(
-            f"{path}: has schema version {attrs.get('schema_version')}, but this fastmech reads version"
+            f"{path}: has schema version {shown(version)}, but this fastmech reads versions 1 to"
             f" {SCHEMA_VERSION}; open it with the fastmech that wrote it or a newer one"
         )

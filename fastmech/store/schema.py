@@ -3,15 +3,17 @@
 A result file is an HDF5 file that netCDF-4 readers open:
 
 - The root holds the scene's parameters: one float64 scalar for each, with `units` and `long_name`.
-- Each section of the request is a group of the root and holds one `fastmech.results.Dataset`.
+- Each section of the request is a group of the root and holds one `fastmech.results.Dataset`, whose groups
+  are groups within: the curves and the table of sheets of a map.
 - A variable is an HDF5 dataset with the attributes `units` and `long_name` and any others of its own. Its
   dimensions are HDF5 dimension scales of the same group: the coordinate variable of that name or, where
   there is none, an empty dataset with netCDF's own mark (`DIMENSION_ONLY`). They are attached as HDF5 asks,
   and by number as netCDF-4 does (`DIM_NUMBER`, `DIM_NUMBERS`), unique in the file.
 - Texts, in attributes and in variables, are UTF-8 of fixed length; string variables say so to xarray by the
   attribute `_Encoding`.
-- The root's attributes are `format`, `schema_version`, all of `PROVENANCE`, `title` and whatever the run
-  adds, such as `request` (the TOML text), `seed`, `wall_time_s`, `method`.
+- The root's attributes are `format`, `schema_version`, `Conventions` (CF), all of `PROVENANCE`, `title` and
+  whatever the run adds, such as `request` (the TOML text), `seed`, `wall_time_s`, `method`.
+- A variable has one unit, which UDUNITS reads; integers that stand for no value are its `_FillValue`.
 
 All values and attributes are under a checksum: arrays are chunked, shuffled, compressed by gzip and summed by
 Fletcher-32; scalars, arrays up to `COMPACT_BYTES` and attributes lie in their object's header, which has a
@@ -25,14 +27,25 @@ from __future__ import annotations
 FORMAT = "fastmech results"
 """Value of the root attribute `format`, by which a result file is known."""
 
-SCHEMA_VERSION = 1
-"""Value of the root attribute `schema_version`: raised when an older reader would misread a newer file."""
+SCHEMA_VERSION = 2
+"""Value of the root attribute `schema_version`: raised when an older reader would misread a newer file.
 
-OWN_ATTRS = ("format", "schema_version")
+1: states as one variable with several units along `component`, curves among the variables of their map, no
+coordinates of `equilibrium` and `trajectory`.
+"""
+
+CONVENTIONS = "CF-1.11"
+"""Value of the root attribute `Conventions`."""
+
+OWN_ATTRS = ("format", "schema_version", "Conventions")
 """Root attributes that the store writes itself."""
+
+CHANGE = "scene_"
+"""Prefix of the attributes of a section that hold its changes of the scene."""
 
 PROVENANCE = (
     "created",
+    "history",
     "fastmech_version",
     "python_version",
     "numba_version",

@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 from fastmech.results import Dataset, Variable
 from fastmech.store import write
 from fastmech.store.chunks import LEVEL, ChunkWriter
-from fastmech.store.encode import put_attrs, put_dataset
+from fastmech.store.encode import put_attrs, put_dataset, put_variable_attrs
 from fastmech.store.guarded import GuardedFile
 from fastmech.store.schema import DIM_NUMBER, DIM_NUMBERS, DIMENSION_ONLY, LIBRARY_VERSIONS
 
 #: Where a part of the streamed variables lies: along the first dimension, or along several from the first on.
 Place: TypeAlias = "slice | tuple[slice, ...]"
 
-#: Part of the streamed variables, or small variables and attributes that are known only then.
+#: Part of the streamed variables, or small variables, groups and attributes that are known only then.
 Piece: TypeAlias = "tuple[Place, Mapping[str, NDArray[Any]]] | Dataset"
 
 #: Bytes of a chunk of a streamed variable, about: read as a whole, kept while it is filled.
@@ -64,11 +64,12 @@ def in_memory(stream: Stream) -> Dataset:
         for name, variable in stream.plane.items()
     }
     late: dict[str, Variable] = {}
-    attrs = dict(stream.fixed.attrs)
+    attrs, groups = dict(stream.fixed.attrs), dict(stream.fixed.groups)
     for piece in stream.pieces():
         if isinstance(piece, Dataset):
             late |= piece.variables
             attrs |= piece.attrs
+            groups |= piece.groups
             continue
         place, parts = piece
         for name, part in parts.items():
@@ -77,7 +78,7 @@ def in_memory(stream: Stream) -> Dataset:
         name: Variable(about.dims, arrays[name], about.units, about.long_name, about.attrs)
         for name, about in stream.plane.items()
     }
-    return Dataset({**stream.fixed.variables, **streamed, **late}, attrs)
+    return Dataset({**stream.fixed.variables, **streamed, **late}, attrs, groups)
 
 
 def write_stream(
@@ -187,7 +188,7 @@ def _create(
     for axis, dim in enumerate(variable.dims):
         stored.dims[axis].attach_scale(group[dim])
     stored.attrs[DIM_NUMBERS] = np.array([group[dim].attrs[DIM_NUMBER] for dim in variable.dims])
-    put_attrs(stored, {"units": variable.units, "long_name": variable.long_name, **variable.attrs})
+    put_variable_attrs(stored, variable)
     return stored
 
 

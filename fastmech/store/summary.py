@@ -1,13 +1,16 @@
-"""What a result file holds, on one page: for `fastmech info FILE`."""
+"""What a result file holds, on one page: for `fastmech info FILE`.
+
+A file may come from anywhere, so its texts are cut and their control characters escaped.
+"""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from fastmech.results import Variable
+from fastmech.errors import printable
+from fastmech.results import FILL, Variable
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -18,21 +21,33 @@ if TYPE_CHECKING:
 
 _MAX_TEXTS = 4
 
+#: Characters of a text that are shown.
+_LONGEST = 400
 
-def summarize(results: Results) -> RenderableType:
+
+def summarize(results: Results, section: str | None = None) -> RenderableType:
     """Provenance, the scene's parameters and a table of the variables of each section, in 100 columns.
 
     Reads every variable, one at a time.
 
+    Args:
+        results: the file.
+        section: show only this section (or ``SECTION/GROUP``), without provenance and parameters.
+
     Raises:
-        InputError: a variable's data are damaged.
+        InputError: there is no such section, or a variable's data are damaged.
     """
     from rich.console import Group
 
-    parts: list[RenderableType] = [_attributes(results.attrs, str(results.path)), "", _parameters(results)]
-    for name in results:
-        parts += ["", _section(name, results[name])]
-    return Group(*parts)
+    parts: list[RenderableType] = []
+    if section is None:
+        parts = [_attributes(results.attrs, str(results.path)), "", _parameters(results), ""]
+    else:
+        results[section]  # says what there is
+    for name in results.groups:
+        if section is None or name == section or name.startswith(f"{section}/"):
+            parts += [_section(name, results[name]), ""]
+    return Group(*parts[:-1])
 
 
 def describe_values(variable: Variable) -> str:
@@ -40,25 +55,28 @@ def describe_values(variable: Variable) -> str:
     data = variable.data
     if data.size == 0:
         return "empty"
-    if "flag_values" in variable.attrs and "flag_meanings" in variable.attrs:
-        return _flag_counts(data, variable.attrs)
+    if variable.codes:
+        return _flag_counts(variable)
     if data.dtype == object:
         distinct = list(dict.fromkeys(data.flat))
         shown = ", ".join(distinct[:_MAX_TEXTS])
         return shown if len(distinct) <= _MAX_TEXTS else f"{shown}, ... ({len(distinct)} distinct)"
-    known = data[~np.isnan(data)] if data.dtype.kind == "f" else data
+    none = np.isnan(data) if data.dtype.kind == "f" else data == variable.attrs.get(FILL)
+    known = data[~none]
     missing = data.size - known.size
     if known.size == 0:
-        return f"{missing} nan"
+        return f"{missing} {'nan' if data.dtype.kind == 'f' else 'none'}"
     low, high = known.min(), known.max()
     text = f"{low:.6g}" if low == high else f"{low:.6g} .. {high:.6g}"
-    return f"{text}, {missing} nan" if missing else text
+    return f"{text}, {missing} {'nan' if data.dtype.kind == 'f' else 'none'}" if missing else text
 
 
-def _flag_counts(data: npt.NDArray[Any], attrs: Any) -> str:
+def _flag_counts(variable: Variable) -> str:
+    data = variable.data
     counts = []
     unexplained = data.size
-    for value, meaning in zip(attrs["flag_values"], attrs["flag_meanings"].split(), strict=True):
+    fill = {"none": variable.attrs[FILL]} if FILL in variable.attrs else {}
+    for meaning, value in (fill | variable.codes).items():
         count = int(np.count_nonzero(data == value))
         unexplained -= count
         if count:
@@ -125,4 +143,5 @@ def _text(value: Any) -> Text:
     """A value as plain text: brackets are no markup, control characters no commands to a terminal."""
     from rich.text import Text
 
-    return Text("".join(character if character.isprintable() else "?" for character in str(value)))
+    text = str(value)
+    return Text(printable(text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."))

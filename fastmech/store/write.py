@@ -16,7 +16,14 @@ import h5py
 from fastmech.errors import InputError
 from fastmech.results import Dataset, Variable, check_name, checked_attrs
 from fastmech.store.encode import put_attrs, put_dataset
-from fastmech.store.schema import FORMAT, LIBRARY_VERSIONS, OWN_ATTRS, REQUIRED_ATTRS, SCHEMA_VERSION
+from fastmech.store.schema import (
+    CONVENTIONS,
+    FORMAT,
+    LIBRARY_VERSIONS,
+    OWN_ATTRS,
+    REQUIRED_ATTRS,
+    SCHEMA_VERSION,
+)
 
 
 def check_writable(path: str | Path, replace: bool = False) -> None:
@@ -111,7 +118,8 @@ def _checked_root_attrs(attrs: Mapping[str, Any]) -> dict[str, Any]:
     for name in OWN_ATTRS:
         if name in attrs:
             raise InputError(f"attrs.{name}: is written by the store itself")
-    return {"format": FORMAT, "schema_version": SCHEMA_VERSION, **checked_attrs(attrs, "attrs")}
+    own = dict(zip(OWN_ATTRS, (FORMAT, SCHEMA_VERSION, CONVENTIONS), strict=True))
+    return {**own, **checked_attrs(attrs, "attrs")}
 
 
 def _target(path: str | Path, replace: bool) -> Path:

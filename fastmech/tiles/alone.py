@@ -64,7 +64,9 @@ class LoneTile:
         )
 
 
-def compute_alone(path: Path, tile: str, context: RunContext, target: Path) -> LoneTile:
+def compute_alone(
+    path: Path, tile: str, context: RunContext, target: Path, text: str | None = None
+) -> LoneTile:
     """Compute one tile.
 
     Args:
@@ -72,11 +74,12 @@ def compute_alone(path: Path, tile: str, context: RunContext, target: Path) -> L
         tile: ``SECTION:INDEX``.
         context: threads to use.
         target: the request's result file, whose finished tiles it is compared with.
+        text: of the request, by default that of the file.
 
     Raises:
         InputError: the request is wrong or has no such tile.
     """
-    request = read_request(path, scan_kinds())
+    request = read_request(path, scan_kinds(), text)
     sections = {s.name: s for s in sections_of(request, identity_of(asked_for(request)))}
     name, _, number = tile.partition(":")
     where = f"--tile {shown_name(tile)}"

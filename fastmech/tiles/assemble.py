@@ -9,12 +9,10 @@ from typing import Any
 
 from fastmech.results import Dataset, Variable
 from fastmech.scan_types.tiling import Tiles
+from fastmech.store.schema import CHANGE
 from fastmech.store.stream import Stream, in_memory, write_stream
 from fastmech.store.write import write_results
 from fastmech.tiles.section import TiledSection
-
-#: Prefix of the attributes of a section that hold its changes of the scene.
-CHANGE = "scene_"
 
 #: Bytes of streamed variables up to which a section is made in memory.
 IN_MEMORY_BYTES = 64 << 20
@@ -41,8 +39,8 @@ def assembled(
         own["step_warning"] = told
     if isinstance(result, Stream):
         attrs = {**own, **result.fixed.attrs, "wall_time_s": seconds}
-        return replace(result, fixed=Dataset(result.fixed.variables, attrs))
-    return Dataset(result.variables, {**own, **result.attrs, "wall_time_s": seconds})
+        return replace(result, fixed=replace(result.fixed, attrs=attrs))
+    return replace(result, attrs={**own, **result.attrs, "wall_time_s": seconds})
 
 
 def write_assembled(

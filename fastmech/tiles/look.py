@@ -13,6 +13,7 @@ from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import Request, request_of_text
 from fastmech.scan_types.tiling import Tiles
 from fastmech.store.provenance import provenance
+from fastmech.store.read import open_results
 from fastmech.tiles.assemble import assembled, write_assembled
 from fastmech.tiles.identity import asked_for, identity_of
 from fastmech.tiles.parts import Manifest, Parts
@@ -75,8 +76,13 @@ class ScanLook:
         manifest = self.parts.manifest()
         self.manifest: Manifest | None = manifest
         if manifest is None:
-            if not target.is_file():
+            if not target.exists():
                 raise InputError(f"{target}: there is neither a result nor a scan in progress")
+            with open_results(target) as results:  # says what it is if it is no result
+                for note in ("partial", "tile"):
+                    if note in results.attrs or any(note in results[name].attrs for name in results):
+                        what = {"partial": "a snapshot of a scan in progress", "tile": "one tile"}[note]
+                        raise InputError(f"{target}: is {what}, not the result of a scan")
             return
         self.request: Request = request_of_text(manifest.request, manifest.request_file, scan_kinds())
         self.sections = sections_of(self.request, identity_of(manifest.asked))

@@ -20,25 +20,29 @@ SHIPPED = Path(__file__).parents[2] / "data" / "small.h5"
 
 BINS = 5
 
+#: Outcomes that say nothing of where a motion ends.
+FAILED = ("not_finite", "step_too_large", "not_converged")
+
 
 def main(path: str | Path = SHIPPED) -> None:
     with fm.open_results(path) as results:
         section = results["disturbed"]
         radius = section.attrs["radius"]
-        values, meanings = section["outcome"].attrs["flag_values"], section["outcome"].attrs["flag_meanings"]
-        names = dict(zip(values.tolist(), meanings.split(), strict=True))
+        codes = section["outcome"].codes  # as the file itself names them
+        names = {code: meaning for meaning, code in codes.items()}
         for index in range(section.sizes["equilibrium"]):
             # One equilibrium at a time: nothing of the others is read.
             one = section.select(
-                ["phi", "theta", "outcome", "excursion", "time_to_return"], equilibrium=index
+                ["phi", "theta", "outcome", "excursion_phi", "excursion_theta"], equilibrium=index
             )
             outcome = one["outcome"].data
             print(f"phi = {one['phi'].data:.4f} rad, theta = {one['theta'].data:.4f} rad")
             for value in np.unique(outcome):
-                print(f"  {names[int(value)]:14s} {np.mean(outcome == value):7.2%}")
-            largest = one["excursion"].data.max(axis=1)
-            edges = np.quantile(largest, np.linspace(0.0, 1.0, BINS + 1))
-            back = outcome == values[meanings.split().index("returned")]
+                failed = "failed, no end known: " if names[int(value)] in FAILED else ""
+                print(f"  {failed}{names[int(value)]:14s} {np.mean(outcome == value):7.2%}")
+            largest = np.maximum(one["excursion_phi"].data, one["excursion_theta"].data)
+            edges = np.nanquantile(largest, np.linspace(0.0, 1.0, BINS + 1))  # failed ones are no numbers
+            back = outcome == codes["returned"]
             if not back.any():
                 continue
             for low, high in pairwise(edges):

@@ -29,7 +29,7 @@ def ring(t, x, y):
 def test_the_edge_of_two_wells_is_the_saddle_between() -> None:
     track = track_edge(
         fm.System(two_wells, ["x", "y"], {}), [-0.7, -1.0], [1.6, 0.3], lambda y: (y[:, 0] > 0.0).astype(int),
-        np.eye(2), t_end=60.0, tolerance=1e-4,
+        np.eye(2), t_end=60.0, tolerance=1e-4, dt=0.02,
     )  # fmt: skip
     assert track.settled
     assert track.labels == (0, 1)
@@ -43,7 +43,7 @@ def test_the_edge_of_two_wells_is_the_saddle_between() -> None:
 def test_an_orbit_on_the_edge_never_settles() -> None:
     track = track_edge(
         fm.System(ring, ["x", "y"], {}), [0.1, 0.0], [1.9, 0.0], lambda y: (np.hypot(*y.T) > 1.0).astype(int),
-        np.eye(2), t_end=30.0,
+        np.eye(2), t_end=30.0, dt=0.02,
     )  # fmt: skip
     assert not track.settled
     assert not track.lost
@@ -74,12 +74,16 @@ def test_the_default_labels_and_norm_lead_to_the_same_saddle() -> None:
     tree = fm.barrier_tree(scene)
     well = tree.equilibria[0]
     rest = np.array([well.phi, well.theta, 0.0, 0.0])
-    track = track_edge(scene, rest, rest + np.array([0.0, 2.0 * np.pi, 0.0, 0.0]), t_end=60.0, dt=0.05)
+    track = track_edge(scene, rest, rest + np.array([0.0, 2.0 * np.pi, 0.0, 0.0]), t_end=60.0)
     assert track.settled
     assert [copy_of_label(label) for label in track.labels] == [(0, (0, 0)), (0, (0, 1))]
     saddle, away = saddle_at(scene, track.state)
     assert away < 1e-3
     assert saddle.energy == pytest.approx(tree.barrier[0], abs=1e-9)
+    turned = rest + np.array([0.0, 2.0 * np.pi, 0.0, 0.0])
+    told = r"lead to well 0, \+1 turn of theta and well 0, \+1 turn of theta, must lead to two different"
+    with pytest.raises(fm.InputError, match=told):
+        track_edge(scene, turned, turned + 0.01, t_end=1.0)
     with pytest.raises(fm.InputError, match=r"^label_of, norm: missing; only a scene has them"):
         track_edge(fm.System(two_wells, ["x", "y"], {}), [-1.0, 0.0], [1.0, 0.0], t_end=1.0)
 
@@ -87,9 +91,16 @@ def test_the_default_labels_and_norm_lead_to_the_same_saddle() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"label_of": lambda y: np.zeros(len(y), dtype=int)}, "inside, outside: have the labels 0 and 0"),
+        (
+            {"label_of": lambda y: np.zeros(len(y), dtype=int)},
+            "inside, outside: lead to the label 0 and the label 0, must",
+        ),
         ({"scene": fm.Scene()}, "scene.alpha = 0.7: must be 0"),
         ({"tolerance": 1e-6}, "tolerance = 1e-06: must be a finite number not less than 1e-05"),
+        (
+            {"scene": fm.System(two_wells, ["x", "y"], {}), "inside": np.zeros(2), "outside": np.ones(2)},
+            "dt: missing; a system needs its longest step in s",
+        ),
         ({"near": 1e-3}, "far = 1e-05: must be a finite number greater than 0.001"),
         ({"outside": [0.0, 0.0]}, "outside: has shape (2,), must be (4,)"),
     ],

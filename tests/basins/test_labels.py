@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import mpmath
 import numpy as np
 import pytest
 from scan_types.values import scipy_motion
 
 import fastmech as fm
 from fastmech.atlas.fold_points import find_folds
+from fastmech.basins.copies import copy_labels, copy_of_label
 from fastmech.basins.status import BasinStatus
+from fastmech.mechanism.lagrange import metric
 
 TURN = 2.0 * np.pi
 CONSTANT = fm.Scene(alpha=0.0)
@@ -84,6 +87,51 @@ def test_steps_do_not_matter() -> None:
     large = fm.labels_of(CONSTANT, starts, dt=0.4)  # useless at first: what counts is that they agree
     known = large.well >= 0
     np.testing.assert_array_equal(large.turns[known], usual.turns[known])
+
+
+@pytest.mark.parametrize(("F0", "alpha"), [(1e5, 1e9), (1e7, 1e6), (-1e5, 1e4)])
+def test_a_force_that_dies_out_at_once_is_a_blow(F0: float, alpha: float) -> None:
+    """SciPy after the impulse F0/alpha on M2 along x, in the limit: 1e-4, 10 and -10 N s."""
+    scene = fm.Scene(F0=F0, alpha=alpha)
+    starts = random_starts(400, 2.0)
+    found = fm.labels_of(scene, starts)
+    assert found.counts["captured"] >= 398
+    some = starts[:60]
+    B = np.zeros((60, 2))
+    B[:, 0], B[:, 1] = -scene.l * np.sin(some[:, 0]), -scene.l * np.cos(some[:, 1])
+    jump = np.linalg.solve(metric(scene, some[:, :2]), (F0 / alpha * B)[..., None])[..., 0]
+    kicked = some + np.concatenate([np.zeros((60, 2)), jump], axis=1)
+    free = scene.replace(F0=0.0, alpha=0.0)
+    final = scipy_motion(free.model_dump(), kicked, np.array([0.0, 30.0]))[-1]
+    turns = np.round((final[:, :2] - [np.pi / 2, 0.0]) / TURN)
+    same = (found.turns[:60] == turns).all(axis=1)
+    # What the position moves while the force acts is of order 1/alpha: only beside a boundary does it matter.
+    assert same.mean() > (0.97 if alpha < 1e5 else 0.999)
+    # The same motions with steps of the user's own, and capture times that count from the start.
+    own = fm.labels_of(scene, some, dt=0.05)
+    np.testing.assert_array_equal(own.turns, found.turns[:60])
+    assert (found.time > 0.0).all()
+
+
+def test_a_start_many_turns_away_is_brought_back_exactly() -> None:
+    """5e5 turns: pi to 50 digits says where in its turn the start is."""
+    turns = (500_000, -300_000, 2**28)
+    with mpmath.workdps(50):
+        away = [float(2 * mpmath.pi * n) for n in turns]
+        beside = [float(x - 2 * mpmath.pi * n) for x, n in zip(away, turns, strict=True)]
+    starts = random_starts(200, 3.0)
+    # Doubles this large are multiples of 2^-32: with places that are, too, sums are exact.
+    starts[:, :2] = np.round(starts[:, :2] * 2.0**20) / 2.0**20
+    moved = starts + np.array([away[0], away[1], 0.0, 0.0])
+    near = fm.labels_of(CONSTANT, starts + np.array([beside[0], beside[1], 0.0, 0.0]))
+    far = fm.labels_of(CONSTANT, moved)
+    assert far.counts["captured"] == 200
+    np.testing.assert_array_equal(far.turns - near.turns, np.tile([500_000, -300_000], (200, 1)))
+    lone = fm.labels_of(CONSTANT, [[away[2] + 1.0, 0.0, 0.0, 0.0], [1e300, 0.0, 0.0, 0.0]])
+    assert lone.status.tolist() == [BasinStatus.CAPTURED, BasinStatus.START_NOT_FINITE]
+    assert lone.turns[0, 0] == 2**28
+    numbers = copy_labels(CONSTANT)(np.array([[away[2] + 1.0, 0.0, 0.0, 0.0]]))
+    assert copy_of_label(int(numbers[0])) == (0, (2**28, 0))
 
 
 def test_capture_long_before_rest() -> None:

@@ -43,6 +43,45 @@ def test_a_basin_in_closed_form(refine: int | None) -> None:
     assert found.counts["captured"] >= np.count_nonzero(clear)
 
 
+def test_measures_take_maps_and_starts_as_they_take_labels() -> None:
+    x = np.linspace(-2.0, 2.0, 65)
+    found = fm.map_basins(BENT, {"x": x, "y": x}, 30.0, dt=0.1)
+    which, shares = fm.basin_fractions(found)
+    assert which.tolist() == [1, 2]
+    assert shares.count.tolist() == [np.count_nonzero(found.well == code) for code in which]
+    assert fm.basin_stability(found, 2).count == shares.count[1]
+    assert fm.finite_time_basin_stability(found, found.time, 2, 1e3).count == shares.count[1]
+    assert fm.basin_entropy(found) == fm.basin_entropy(found.well)
+    assert fm.boundary_dimension(found).dimension == fm.boundary_dimension(found.well).dimension
+    assert fm.wada_merge_test(found).labels.tolist() == [1, 2]
+    assert (
+        fm.fractal_boundary_test(found, balls=500).reason
+        == fm.fractal_boundary_test(found.well, balls=500).reason
+    )
+    place = [1.0, 0.0]
+    by_map = fm.integrity(found, found.axes, 2, place, np.eye(2))
+    assert by_map.lim == fm.integrity(found.well, found.axes, 2, place, np.eye(2)).lim
+
+
+def test_parameters_of_starts_own_bend_their_own_boundaries() -> None:
+    """Basins meet where x + bend y^2 = 0, with a bend for each row of the map; progress is told in pieces."""
+    x, bend, told = np.linspace(-2.0, 2.0, 801), np.array([-0.8, -0.1, 0.0, 0.4, 0.7, 1.2]), []
+    found = fm.map_basins(
+        BENT, {"y": [0.9, 0.91, 0.92, 0.93, 0.94, 0.95], "x": x}, 30.0, fixed={}, dt=0.1,
+        parameters={"bend": bend[:, None]}, progress=told.append,
+    )  # fmt: skip
+    side = x + bend[:, None] * (np.linspace(0.9, 0.95, 6) ** 2)[:, None]
+    clear = np.abs(side) > 1e-9
+    np.testing.assert_array_equal(found.well[clear], np.where(side > 0.0, 2, 1)[clear])
+    assert sum(told) == found.well.size
+    assert len(told) >= 2
+    whole = fm.map_basins(
+        BENT, {"y": [0.9, 1.4], "x": x[::8]}, 30.0, dt=0.1, refine=8, parameters={"bend": 0.4}
+    )
+    side = x[::8] + 0.4 * np.array([[0.81], [1.96]])
+    assert (whole.well == np.where(side > 0.0, 2, 1))[np.abs(side) > 1e-9].all()
+
+
 def test_a_start_on_the_boundary_of_a_system_is_undecided() -> None:
     found = fm.map_basins(BENT, {"x": [-1.0, 0.0, 1.0]}, 20.0, dt=0.1)
     assert found.status.tolist() == [BasinStatus.CAPTURED, BasinStatus.UNDECIDED, BasinStatus.CAPTURED]
@@ -194,6 +233,12 @@ def test_fixed_coordinates_are_starts() -> None:
         ({"t_end": 0.0}, r"t_end = 0.0: must be a finite number of s greater than 0"),
         ({"scene": fm.Scene(beta=0.0)}, r"scene.beta = 0"),
         ({"scene": BENT, "axes": {"x": [0.0]}}, r"dt: missing"),
+        ({"parameters": {"F0": 3.0}}, r"parameters: only a system's may differ"),
+        ({"scene": BENT, "axes": {"x": [0.0]}, "parameters": {"bnd": 1.0}}, r"parameters.bnd: .* 'bend'"),
+        (
+            {"scene": BENT, "axes": {"x": [0.0]}, "parameters": {"bend": [1.0, 2.0]}},
+            r"parameters.bend: .* \(1,\)",
+        ),
     ],
 )
 def test_wrong_requests(change: dict[str, Any], message: str) -> None:

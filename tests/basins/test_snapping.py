@@ -7,8 +7,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import fastmech as fm
-from fastmech.basins.critical import critical_forces, critical_impulse, impulse_start
-from fastmech.basins.snapping import SnappingMap, Window, map_snapping
+from fastmech.basins.shock_limit import impulse_start
+from fastmech.basins.snapping import SnappingMap, Window, critical_forces, map_snapping
 from fastmech.basins.status import BasinStatus
 from fastmech.ensembles.integrate import integrate
 from fastmech.mechanism.lagrange import angular_accelerations, kinetic_energy, metric, potential_energy
@@ -159,17 +159,16 @@ def test_a_force_that_drives_onto_a_saddle_is_not_given_a_label() -> None:
     pytest.fail("every force has a label")
 
 
-def test_the_critical_impulse_is_that_of_brute_force() -> None:
-    """The first of evenly spaced impulses that leaves, by SciPy."""
+@pytest.mark.parametrize(("side", "bracket"), [(0.0, (150.0, 170.0)), (np.pi, (145.0, 165.0))])
+def test_the_least_blow_on_m2_is_that_of_scipy(side: float, bracket: tuple[float, float]) -> None:
+    """The limit of critical forces, to either side: no even impulse below it turns anything over."""
     scene = fm.Scene(F0=0.0, alpha=0.0)
-    found = critical_impulse(scene, 400.0, n=40, tolerance=0.5)
     rest = fm.find_equilibria(scene)[0]
-    for impulse, leaves in [(found - 0.5, False), (found, True)]:
-        assert scipy_turns(scene, impulse_start(scene, rest, impulse)).any() == leaves
-    assert np.isnan(critical_impulse(scene, 0.9 * found, n=40))
-    assert critical_impulse(scene, -400.0, n=40) < 0.0
-    with pytest.raises(fm.InputError, match=r"^most = 0\.0: must not be 0 N s"):
-        critical_impulse(scene, 0.0)
+    found = fm.shock_limit(scene, rest, "M2", side).found.impulse
+    assert bracket[0] < found < bracket[1]
+    for impulse in np.linspace(bracket[0], bracket[1], 9):
+        turned = scipy_turns(scene, fm.impulse_start(scene, rest, impulse, "M2", side)).any()
+        assert turned == (impulse >= found)
 
 
 @pytest.mark.parametrize(

@@ -49,6 +49,14 @@ def test_scene_of_a_file_with_changes(invoke):
     assert "force F = -30 N" in invoke("equilibria", "scene.toml", "--F0", "-30").stdout
 
 
+def test_how_hard_each_stable_position_may_be_struck(invoke):
+    """Upright: sqrt(2 m depth) with m2 = 12 kg and m1 + m3 = 18 kg, depth 2 (m2 g l + c1 l^2) = 802.012 J."""
+    text = " ".join(invoke("equilibria").stdout.split())
+    limits = "less than 169.9 N s on M1, 138.7 N s on M2, 169.9 N s on M3."
+    assert f"1: no blow at rest leaves its well with {limits}" in text
+    assert text.count("no blow at rest") == 1
+
+
 def test_the_load_at_which_each_position_disappears(invoke):
     bistable = ["--alpha", "0", "--F0", "85.3", "--c1", "294.9", "--c2", "92.85"]
     # The folds of data/folds.toml.

@@ -5,8 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import h5py
+import numpy as np
 import pytest
 from cli.refusal import assert_refused
+
+from fastmech import Scene, open_results
+from fastmech.plots.equilibria import _potential
 
 PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -68,3 +72,65 @@ def test_plot_of_an_unknown_kind(invoke, done):
         file["rest"].attrs["kind"] = "later"
     assert_refused(invoke("plot", done), "rest", "'later'", "motion")
     assert not Path("results/tiny").exists()
+
+
+def test_info_of_a_section(invoke, done):
+    shown = invoke("info", done, "--section", "rest")
+    assert shown.exit_code == 0
+    assert "natural_frequency_1" in shown.stdout
+    assert "swing" not in shown.stdout
+    assert_refused(invoke("info", done, "--section", "rset"), "section 'rset'", "swing, rest")
+
+
+def test_info_prints_the_request_as_it_was(invoke, done, tiny):
+    shown = invoke("info", "--request", done)
+    assert (shown.exit_code, shown.stderr) == (0, "")
+    assert shown.stdout == tiny.read_text(encoding="utf-8")
+    with h5py.File(done, "r+") as file:
+        file.attrs["request"] = np.bytes_("a\x1b[2J\n")
+    assert invoke("info", "--request", done).stdout == "a\\x1b[2J\n"
+    with h5py.File(done, "r+") as file:
+        del file.attrs["request"]
+    assert_refused(invoke("info", "--request", done), "does not hold the request")
+
+
+@pytest.mark.parametrize(("form", "begin"), [("png", PNG), ("pdf", b"%PDF"), ("svg", b"<?xml")])
+def test_plot_of_a_section_in_a_format(invoke, done, form, begin):
+    assert invoke("plot", done, "--section", "rest", "--format", form, "--out", "p").exit_code == 0
+    pictures = sorted(Path("p").iterdir())
+    names = ("eigenvalues", "positions", "potential")
+    assert [path.name for path in pictures] == [f"rest_{name}.{form}" for name in names]
+    assert all(path.read_bytes().startswith(begin) for path in pictures)
+    assert_refused(invoke("plot", done, "--section", "none", "--out", "q"), "section 'none'")
+
+
+def test_every_shipped_and_every_older_file_is_plotted(invoke):
+    """By the names of codes that the file itself has, whatever version wrote it."""
+    root = Path(__file__).parents[2]
+    files = [root / "data" / "small.h5", *sorted((root / "tests" / "older").glob("*.h5"))]
+    assert len(files) >= 2
+    for file in files:
+        assert invoke("plot", file, "--out", file.stem).exit_code == 0, file
+        names = {path.name for path in Path(file.stem).iterdir()}
+        assert {"basins_labels.png", "disturbed_outcomes.png", "map_F0_c1_count.png"} <= names, file
+        assert len(names) >= 21, file
+
+
+def test_codes_are_named_by_the_file(invoke, done):
+    """A code that today's enumeration lacks, or has under another number, is drawn as the file calls it."""
+    with h5py.File(done, "r+") as file:
+        kind = file["rest/kind"]
+        kind.attrs["flag_meanings"] = np.bytes_("maximum novel minimum")
+        kind.attrs["flag_values"] = np.array([0, 1, 2], np.int8)
+        del file["rest/eigenvalue_re_1"], file["swing"]
+    with open_results(done) as results:
+        dataset = results["rest"].load()
+        scene = results.scene_of("rest")
+    figure = _potential(dataset, Scene(**scene))
+    (axes,) = [axes for axes in figure.axes if axes.get_lines()]
+    labels = {line.get_label(): len(line.get_xdata()) for line in axes.get_lines()}
+    # Of the four equilibria one is a minimum (0), two are saddles (1), one is a maximum (2).
+    assert {name: labels.get(name) for name in ("maximum", "novel", "minimum")} == {
+        "maximum": 1, "novel": 2, "minimum": 1,
+    }  # fmt: skip
+    assert "saddle" not in labels

@@ -6,11 +6,15 @@ import csv
 import json
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from cli.refusal import assert_refused
 
 from fastmech import open_results
+from fastmech.results import Dataset, Variable
+from fastmech.store.provenance import provenance
+from fastmech.store.write import write_results
 
 MAP = """
 [scene]
@@ -53,7 +57,7 @@ def test_csv(invoke, result):
     done = invoke("export", result, "--to", "csv", "--out", "tables", "--section", "map")
     assert done.exit_code == 0
     with Path("tables/map_F0_c1_root.csv").open(newline="", encoding="utf-8") as file:
-        head, *rows = csv.reader(file)
+        head, *rows = csv.reader(line for line in file if not line.startswith("#"))
     assert head[:4] == ["F0 [N]", "c1 [N/m]", "root", "phi [rad]"]
     with open_results(result) as results:
         phi = results["map"]["phi"].data
@@ -65,8 +69,8 @@ def test_csv(invoke, result):
 def test_npz(invoke, result):
     assert invoke("export", result, "--to", "npz", "--out", "arrays").exit_code == 0
     with open_results(result) as results, np.load("arrays/map.npz") as arrays:
-        assert set(arrays) == set(results["map"])
-        for name in arrays:
+        assert set(arrays) == {*results["map"], "attributes.json"}
+        for name in results["map"]:
             np.testing.assert_array_equal(arrays[name], results["map"][name].data)
 
 
@@ -121,7 +125,7 @@ def test_a_range(invoke, result):
         (["--select", "F0=20:10"], "must not be above"),
         (["--select", "F0=1", "--select", "F0=2"], "twice"),
         (["--select", "F1=1"], "F1"),
-        (["--select", "cusp=99"], "cusp = 99"),
+        (["--select", "cusp=99", "--section", "map/curves"], "cusp = 99"),
         (["--variable", "phii"], "phii"),
         (["--section", "none"], "none"),
     ],
@@ -137,3 +141,92 @@ def test_existing_files_are_kept(invoke, result):
     assert_refused(invoke("export", result, "--to", "npz", "--out", "out"), "exists already", "--fresh")
     assert Path("out/map.npz").read_text() == "mine"
     assert invoke("export", result, "--to", "npz", "--out", "out", "--fresh").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("content", "fragment"),
+    [
+        (b"", "is empty"),
+        (np.random.default_rng(5).bytes(4000), "is not an HDF5 file"),
+        (b"\x89HDF\r\n\x1a\n" + np.random.default_rng(6).bytes(4000), "is damaged"),
+    ],
+)
+def test_status_of_what_is_no_result(invoke, content, fragment):
+    Path("x.h5").write_bytes(content)
+    assert_refused(invoke("status", "x.h5"), f"x.h5: {fragment}")
+
+
+@pytest.mark.parametrize("kept", [0.1, 0.5, 0.999])
+def test_status_of_a_truncated_result(invoke, result, kept):
+    content = result.read_bytes()
+    result.write_bytes(content[: int(kept * len(content))])
+    assert_refused(invoke("status", result), f"{result}: is damaged", "truncated")
+
+
+def test_status_of_a_snapshot_and_of_a_tile(invoke, tiny):
+    assert invoke("run", tiny, "--tile", "swing:1", "--keep", "t1.h5").exit_code == 0
+    assert_refused(invoke("status", "t1.h5"), "t1.h5: is one tile, not the result of a scan")
+
+
+def everything_told(text: str) -> list[str]:
+    """What an export has to say of the map: one fragment for each thing."""
+    assert 'kind = "equilibrium_map"' in text  # the request
+    return [
+        "alpha = 0.0", "fastmech_version", "numba_version", "scene_c1", "162.5", "N/m", "history",
+        "fastmech", "CF-1.11", "what is proved of the count", "at_fold", "negative eigenvalues",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("form", ["csv", "npz", "nc"])
+def test_exports_keep_everything(invoke, result, form):
+    if form == "nc":
+        pytest.importorskip("h5netcdf")
+    assert invoke("export", result, "--to", form, "--out", "out", "--select", "F0=150").exit_code == 0
+    if form == "csv":
+        text = "".join(Path(f"out/map_c1{root}.csv").read_text(encoding="utf-8") for root in ("", "_root"))
+        assert "# outcome = what is proved of the count (0: complete, 1: at_fold" in text
+        assert "# selected: " in text
+    elif form == "npz":
+        with np.load("out/map.npz") as arrays:
+            text = arrays["attributes.json"].decode()
+        about = json.loads(text)
+        assert about["attributes"]["scene_c1"] == 162.5
+        assert about["variables"]["outcome"]["flag_values"] == [0, 1, 2, 3]
+        assert about["variables"]["morse_index"]["_FillValue"] == -1
+        text = text.replace('\\"', '"')
+    else:
+        with h5py.File("out/map.nc") as file:
+            attrs = {**file.attrs}
+            attrs |= {f"{name}.{key}": v for name in file for key, v in file[name].attrs.items()}
+        assert attrs["scene_c1"] == 162.5
+        assert attrs["morse_index._FillValue"] == -1
+        assert attrs["outcome.flag_values"].tolist() == [0, 1, 2, 3]
+        text = "\n".join(f"{key}: {value}" for key, value in attrs.items())
+    for fragment in everything_told(text):
+        assert fragment in text, fragment
+
+
+def test_pandas_reads_a_table_below_its_comments(invoke, result):
+    pandas = pytest.importorskip("pandas")
+    assert invoke("export", result, "--to", "csv", "--out", "tables").exit_code == 0
+    table = pandas.read_csv("tables/map_F0_c1.csv", comment="#")
+    with open_results(result) as results:
+        np.testing.assert_array_equal(table["count"], results["map"]["count"].data.ravel())
+    curves = pandas.read_csv("tables/map/curves_fold_point.csv", comment="#")
+    assert {"fold_F0 [N]", "fold_c1 [N/m]"} <= set(curves)
+
+
+def test_variables_named_like_arguments_of_numpy(invoke):
+    awkward = Dataset(
+        {name: Variable(("n",), np.arange(3.0), "1", name) for name in ("file", "allow_pickle", "args")}
+    )
+    attrs = {**provenance(1), "title": "awkward names"}
+    write_results("a.h5", scene_parameters={}, sections={"one": awkward}, attrs=attrs)
+    assert invoke("export", "a.h5", "--to", "npz", "--out", "out").exit_code == 0
+    with np.load("out/one.npz") as arrays:
+        assert arrays["file"].tolist() == arrays["allow_pickle"].tolist() == [0.0, 1.0, 2.0]
+
+
+def test_a_group_is_exported_alone(invoke, result):
+    assert invoke("export", result, "--to", "npz", "--out", "out", "--section", "map/curves").exit_code == 0
+    assert [str(path) for path in Path("out").rglob("*.*")] == ["out/map/curves.npz"]

@@ -164,12 +164,33 @@ def test_shares_of_the_bars_sum_up():
     assert widths == pytest.approx(dict.fromkeys(range(6), 100.0))
 
 
+def test_failures_are_no_part_of_where_motions_end():
+    """Steps far too long: bars hold the motions that were computed, and the rest is told apart."""
+    scene = Scene(c1=2000.0, c2=8000.0, beta=20.0, alpha=0.0)
+    dataset = run("disturbed", scene, trajectories=64, radius=1.0, t_end=20.0, dt=0.05, linear_directions=1)
+    figures = scan_kinds()["disturbed"].draw(dataset, scene.model_dump())
+    for figure in figures.values():
+        assert_legible(figure)
+    codes = flag_codes(dataset["outcome"])
+    failing = [codes[name] for name in ("not_finite", "step_too_large", "not_converged")]
+    axes = figures["outcomes"].axes[0]
+    told = {round(text.xy[1]): text.get_text() for text in axes.texts if hasattr(text, "xy")}
+    lost = 100.0 * np.isin(dataset["outcome"].data, failing).mean(axis=1)
+    assert lost.max() > 20.0
+    for row, share in enumerate(lost):
+        bars = [bar for bar in axes.patches if round(bar.get_y() + bar.get_height() / 2) == row]
+        assert sum(bar.get_width() for bar in bars) == pytest.approx(100.0 - share)
+        assert told[row].startswith("failed, no end known:" if share else "")
+    known = {text.get_text() for text in figures["outcomes"].legends[0].get_texts()}
+    assert not known & {"not finite", "step too large", "not converged"}
+
+
 @pytest.mark.parametrize(
     ("kept", "told"),
     [
         ({"outcome", "end_equilibrium"}, "full turns on the way"),
         ({"outcome"}, "which other equilibrium"),
-        ({"outcome", "turns"}, "which other equilibrium"),
+        ({"outcome", "turns_phi", "turns_theta"}, "which other equilibrium"),
     ],
 )
 def test_outcomes_are_drawn_from_what_was_kept(kept: set[str], told: str):
@@ -183,7 +204,8 @@ def test_outcomes_are_drawn_from_what_was_kept(kept: set[str], told: str):
         "outcome": replace(dataset["outcome"], data=np.tile(outcome, (6, 1)).astype(np.int8)),
         "end_equilibrium": replace(dataset["end_equilibrium"], data=end.astype(np.int8)),
     }
-    left_out = {"outcome", "end_equilibrium", "turns", "time_to_return", "excursion"} - kept
+    apart = {f"{of}_{angle}" for of in ("turns", "excursion") for angle in ("phi", "theta")}
+    left_out = {"outcome", "end_equilibrium", "time_to_return", *apart} - kept
     variables = {n: v for n, v in {**dataset.variables, **changed}.items() if n not in left_out}
     figures = scan_kinds()["disturbed"].draw(Dataset(variables, dataset.attrs), BISTABLE.model_dump())
     assert set(figures) == {"outcomes", "linear_range"}

@@ -25,7 +25,7 @@ AXES = {
 def test_layout(tmp_path: Path) -> None:
     section = stored(Basins(axes=AXES, fixed={"theta_dot": 1.0}, settle_radius=0.01), CONSTANT, tmp_path)
     one = dict.fromkeys(("label", "well", "turns_phi", "turns_theta", "status", "computed"), "1")
-    one |= {f"basin_{name}": "1" for name in ("well", "turns_phi", "turns_theta", "share")}
+    one |= {f"basin_{name}": "1" for name in ("well", "turns_phi", "turns_theta", "share", "share_at_most")}
     one |= {"equilibrium_phi": "rad", "equilibrium_theta": "rad", "equilibrium_energy": "J", "barrier": "J"}
     one |= {"equilibrium_morse_index": "1", "force": "N", "phi": "rad", "theta": "rad"}
     check_labels(section, one | {"capture_time": "s", "settle_time": "s"})
@@ -37,6 +37,7 @@ def test_layout(tmp_path: Path) -> None:
     np.testing.assert_array_equal(section["capture_time"].data.ravel(), expected.time)
     assert set(np.ravel(decoded(section["status"]))) == {"captured"}
     assert section["basin_share"].data.sum() == pytest.approx(1.0)
+    np.testing.assert_array_equal(section["basin_share_at_most"].data, section["basin_share"].data)
     label = section["label"].data
     np.testing.assert_array_equal(section["basin_turns_theta"].data[label], section["turns_theta"].data)
     assert section.attrs["captured"] == label.size
@@ -76,6 +77,16 @@ def test_tiles_are_the_whole_bit_for_bit(
     np.testing.assert_array_equal(look["computed"].data, np.repeat(there[:, None], 17, axis=1))
     np.testing.assert_array_equal(look["well"].data[there], whole.well[there])
     assert set(look["well"].data[~there].ravel()) == {-1}
+
+
+def test_shares_say_what_they_are_at_most(tmp_path: Path) -> None:
+    section = stored(Basins(axes=AXES, t_end=3.0), BISTABLE, tmp_path)
+    label = section["label"].data
+    unknown = np.count_nonzero(label < 0) / label.size
+    assert 0.1 < unknown < 1.0
+    share = [np.count_nonzero(label == k) / label.size for k in range(section.sizes["basin"])]
+    np.testing.assert_allclose(section["basin_share"].data, share, rtol=1e-14)
+    np.testing.assert_allclose(section["basin_share_at_most"].data, np.add(share, unknown), rtol=1e-14)
 
 
 def test_a_refined_map_is_one_tile() -> None:

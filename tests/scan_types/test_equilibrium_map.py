@@ -35,26 +35,30 @@ def mapped() -> Dataset:
 def test_padding_is_as_documented() -> None:
     dataset = mapped()
     empty = np.arange(6) >= dataset["count"].data[..., None]
-    for name in ("phi", "theta", "radius", "energy", "frequency", "decay_time", "depth", "escape_speed"):
+    for name in ("phi", "theta", "radius", "energy", "frequency", "decay_time", "depth", "shock_limit_m2"):
         assert dataset[name].dims == ("F0", "c2", "root")
         assert np.isnan(dataset[name].data[empty]).all(), name
-    for name in ("hessian", "eigenvalue_re", "eigenvalue_im"):
+    for name in ("hessian_phi_phi", "hessian_theta_theta", "eigenvalue_re_1", "eigenvalue_im_4"):
         assert np.isnan(dataset[name].data[empty]).all(), name
     codes = ("morse_index", "sheet", "verdict", "verdict_sylvester", "verdict_hurwitz", "verdict_eigenvalues")
     for name in codes:
         assert (dataset[name].data[empty] == -1).all(), name
+        assert dataset[name].attrs["_FillValue"] == -1, name
+        assert -1 not in dataset[name].codes.values(), name
         assert (dataset[name].data[~empty] >= 0).all(), name
     assert "NaN" in dataset.attrs["layout"]
 
 
 def test_curves_come_with_the_map() -> None:
-    dataset = mapped()
+    dataset = mapped().groups["curves"]
     assert dataset["fold_crossings"].data[0] > 10
     assert dataset["fold_crossings"].data[1] == 0
     assert dataset["cusp_F0"].data.size >= 4
     assert set(np.unique(dataset["unreached_vanishes"].data)) >= {0, 2}
     line = EquilibriumMap(axes={"F0": {"start": -800.0, "stop": 800.0, "num": 99}}).run(SCENE, RunContext())
-    assert line["fold_F0"].data == pytest.approx([-671.1627073982018, 671.1627073982018], abs=1e-9)
+    assert line.groups["curves"]["fold_F0"].data == pytest.approx(
+        [-671.1627073982018, 671.1627073982018], abs=1e-9
+    )
 
 
 def test_xarray_opens_a_map_with_names_and_units(tmp_path: Path) -> None:
@@ -67,16 +71,24 @@ def test_xarray_opens_a_map_with_names_and_units(tmp_path: Path) -> None:
         assert opened["c2"].attrs["units"] == "N/m"
         assert opened["phi"].sel(F0=300.0, c2=0.0).dims == ("root",)
         assert all("units" in variable.attrs for variable in opened.variables.values())
-        assert set(opened.coords) == {"F0", "c2", "root", "mode", "entry"}
+        assert set(opened.coords) == {"F0", "c2", "root"}
         assert list(opened["root"]) == list(range(6))
         count = opened["phi"].notnull().sum("root")
         assert count.equals(opened["count"].astype(count.dtype))
         # What the layout's text promises: the deepest first, reductions without a mask, entries by name.
         first = opened["energy"].isel(root=0)
         assert bool((first == opened["energy"].min("root")).all())
-        stiff = opened["hessian"].sel(entry="theta theta").where(opened["morse_index"] == 0)
+        stiff = opened["hessian_theta_theta"].where(opened["morse_index"] == 0)
         assert float(stiff.min()) > 0.0
-        assert opened["eigenvalue_re"].sel(mode=0).dims == ("F0", "c2", "root")
+        assert bool(
+            (opened["eigenvalue_re_1"] >= opened["eigenvalue_re_4"])
+            .where(opened["phi"].notnull(), True)
+            .all()
+        )
+        # A row for each slot of each point, whatever curves there are, and codes that are none are missing.
+        table = opened.to_dataframe()
+        assert len(table) == 31 * 23 * 6
+        assert table["verdict"].isna().sum() == (6 - opened["count"]).sum()
         # One identity across the map: pick a sheet and there is one value at a point.
         one = opened["phi"].where(opened["sheet"] == 0)
         assert one.max("root").dims == ("F0", "c2")
@@ -98,6 +110,9 @@ def test_tiles_agree_with_the_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     with open_results(path) as results:
         streamed = results["map"].load()
     assert set(streamed) == set(whole)
+    for group in ("curves", "sheets"):
+        for name, variable in whole.groups[group].variables.items():
+            np.testing.assert_array_equal(streamed.groups[group][name].data, variable.data)
     for name in whole:
         one, two = whole[name], streamed[name]
         assert (one.dims, one.units, one.long_name) == (two.dims, two.units, two.long_name), name
@@ -125,8 +140,9 @@ def test_pictures_read_a_part_of_a_large_map(tmp_path: Path, monkeypatch: pytest
                      for d in whole[name].dims)  # fmt: skip
         np.testing.assert_array_equal(drawn[name].data, whole[name].data[part], err_msg=name)
         assert drawn[name].dims == whole[name].dims
-    assert {"phi", "sheet", "count", "fold_F0", "unreached_c2"} <= set(drawn)
-    assert not {"hessian", "eigenvalue_re", "radius"} & set(drawn)
+    assert {"phi", "sheet", "count"} <= set(drawn)
+    assert {"fold_F0", "unreached_c2"} <= set(drawn.groups["curves"])
+    assert not {"hessian_phi_phi", "eigenvalue_re_1", "radius"} & set(drawn)
     figures = EquilibriumMap.draw(drawn, SCENE.model_dump())
     assert figures["count"].get_suptitle().endswith("; 1 in 4 values of F0; 1 in 3 values of c2")
 

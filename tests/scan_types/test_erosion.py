@@ -39,12 +39,20 @@ def test_a_file_holds_what_the_function_gives(section: Dataset) -> None:
     units = dict.fromkeys(("phi", "theta", "lim", "factor", "shock", "kick"), "rad")
     units |= dict.fromkeys(("shock_undecided", "kick_undecided"), "rad")
     units |= dict.fromkeys(("lim_at_most", "factor_at_most"), "rad")
-    units |= dict.fromkeys(("stability", "lower", "upper", "gim", "gim_at_most", "undecided"), "1")
+    units |= dict.fromkeys(
+        ("stability", "stability_at_most", "lower", "upper", "gim", "gim_at_most", "undecided"), "1"
+    )
     units |= dict.fromkeys(("lim_at_window", "factor_at_window"), "1")
     check_labels(section, {f"well_{k}": u for k, u in units.items()} | {"c2": "N/m", "sheet": "1"})
     for name in units:
         np.testing.assert_array_equal(section[f"well_{name}"].data, getattr(own, name), err_msg=name)
     np.testing.assert_array_equal(section["sheet"].data, own.sheet)
+    most, share = own.stability_at_most, own.stability
+    there = np.isfinite(share)
+    np.testing.assert_allclose(most[there], (share + own.undecided)[there], rtol=1e-14)
+    assert (own.undecided[there] > 0.1).any(), "10 s do not decide all here"
+    assert (own.lower[there] <= share[there] + 1e-15).all()
+    assert (own.upper[there] >= most[there] - 1e-15).all()
     shallow = int(np.flatnonzero(np.isnan(own.phi[-1]))[0])
     assert own.shock[1, shallow] > 0.0
 

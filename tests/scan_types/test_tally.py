@@ -1,4 +1,4 @@
-"""Quantiles of blocks that are never together: NumPy's of all of them."""
+"""Shares and quantiles of blocks that are never together: NumPy's of all of them."""
 
 from __future__ import annotations
 
@@ -7,24 +7,45 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fastmech.basins.disturbed import Outcome
 from fastmech.results import Dataset
 from fastmech.scan_types.tally import Tally
 
 pytestmark = pytest.mark.nojit
 
-TIMES = st.lists(st.one_of(st.just(np.nan), st.integers(0, 9).map(lambda k: 0.05 * k)), max_size=30)
+ENDS = st.sampled_from([Outcome.RETURNED, Outcome.ELSEWHERE, Outcome.UNDECIDED, Outcome.NOT_FINITE])
+#: Outcome and time to return, which only those that returned may have.
+LANES = st.lists(
+    st.tuples(ENDS, st.one_of(st.none(), st.integers(0, 9).map(lambda k: 0.05 * k))), max_size=30
+)
 
 
-@given(st.lists(TIMES, max_size=5))
-def test_quantiles_and_shares(blocks: list[list[float]]) -> None:
+@given(st.lists(LANES, max_size=5))
+def test_quantiles_and_shares(blocks: list[list[tuple[Outcome, float | None]]]) -> None:
     tally = Tally()
     for block in blocks:
-        one = Tally.of(np.array(block, dtype=np.float64), {"not_finite": int(np.isnan(block).sum())})
+        outcome = np.array([end for end, _ in block], dtype=np.int8)
+        times = np.array(
+            [t if end == Outcome.RETURNED and t is not None else np.nan for end, t in block], dtype=np.float64
+        )
+        one = Tally.of(outcome, times)
         tally.add(Dataset(one.variables(), one.attrs()))
-    times = np.array([t for block in blocks for t in block], dtype=np.float64)
-    back = times[np.isfinite(times)]
-    assert (tally.total, tally.failed["not_finite"]) == (times.size, times.size - back.size)
+    lanes = [lane for block in blocks for lane in block]
+    ends = [end for end, _ in lanes]
+    back = [np.inf if t is None else t for end, t in lanes if end == Outcome.RETURNED]
+    assert tally.ended["not_finite"] == ends.count(Outcome.NOT_FINITE)
     wanted = (0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
-    right = np.quantile(back, wanted) if back.size else np.full(len(wanted), np.nan)
+    # NumPy makes infinity less infinity, and 0 times infinity, no number: it is asked about neighbours.
+    ranks = [q * (len(back) - 1) for q in wanted]
+    upper = np.array([sorted(back)[int(np.ceil(k))] if back else np.nan for k in ranks])
+    finite = np.quantile(np.minimum(back, 1e9), wanted) if back else upper
+    right = np.where(np.isinf(upper), np.inf, finite)
     np.testing.assert_allclose(tally.quantiles(wanted), right, rtol=1e-14, atol=1e-16)
-    np.testing.assert_equal(tally.share, back.size / times.size if times.size else np.nan)
+    shares = tally.shares()
+    if not lanes:
+        assert np.isnan(list(shares.values())).all()
+        return
+    assert shares["share_returned"] == len(back) / len(lanes)
+    assert shares["share_returned_at_most"] == pytest.approx(1.0 - ends.count(Outcome.ELSEWHERE) / len(lanes))
+    assert shares["share_returned_lower"] <= shares["share_returned"] + 1e-15
+    assert shares["share_returned_upper"] >= shares["share_returned_at_most"] - 1e-15

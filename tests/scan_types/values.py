@@ -43,11 +43,16 @@ def check_labels(section: Dataset, units: Mapping[str, str]) -> None:
     assert len(set(names)) == len(names)
 
 
+def together(section: Dataset, name: str) -> Floats:
+    """The entries of a quantity, each a variable NAME_ENTRY, along a last axis."""
+    entries = [section[entry].data for entry in section if entry.startswith(f"{name}_")]
+    return np.stack(entries, axis=-1)
+
+
 def decoded(variable: Variable) -> list[Any]:
     """The meanings of a variable's codes."""
     assert variable.data.dtype == np.int8
-    values, meanings = variable.attrs["flag_values"].tolist(), variable.attrs["flag_meanings"].split()
-    table = dict(zip(values, meanings, strict=True))
+    table = {code: meaning for meaning, code in variable.codes.items()}
     return np.vectorize(table.__getitem__, otypes=[object])(variable.data).tolist()
 
 

@@ -11,7 +11,7 @@ import pytest
 import sympy
 
 import fastmech as fm
-from fastmech.disturbance.outcome import Outcome
+from fastmech.basins.disturbed import Outcome
 from fastmech.equilibria.find import find_equilibria
 from fastmech.errors import InputError
 from fastmech.integrators.implicit_method import ImplicitRungeKutta

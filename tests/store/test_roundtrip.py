@@ -82,7 +82,9 @@ def test_xarray_opens_the_root(write: Callable[[], Path]) -> None:
     with xarray.open_dataset(write(), engine="h5netcdf") as root:
         assert float(root.m1) == 10.0
         assert root.m1.attrs == {"units": "kg", "long_name": "mass of M1"}
-        assert root.attrs["schema_version"] == 1
+        assert root.attrs["schema_version"] == 2
+        assert root.attrs["Conventions"] == "CF-1.11"
+        assert root.attrs["history"].startswith(root.attrs["created"])
         assert root.attrs["request"] == "[scene]\nm1 = 10\n"
 
 

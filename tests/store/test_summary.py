@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from fastmech.results import Variable
+from fastmech.results import NO_CODE, Variable
 from fastmech.store.read import open_results
 from fastmech.store.summary import describe_values, summarize
 
@@ -44,7 +44,7 @@ def test_markup_and_control_characters_are_shown_not_obeyed(
 ) -> None:
     content["attrs"]["title"] = "[red]x[/red] \x1b[2J"
     text = page(write())
-    assert "[red]x[/red] ?[2J" in text
+    assert r"[red]x[/red] \x1b[2J" in text
     assert "\x1b" not in text
 
 
@@ -56,6 +56,8 @@ def test_markup_and_control_characters_are_shown_not_obeyed(
         (Variable(("n",), np.full(2, np.nan)), "2 nan"),
         (Variable(("n",), np.zeros(0)), "empty"),
         (Variable(("n",), np.array([0, 0, 7], np.int8), attrs=FLAGS), "stable 2, unexplained 1"),
+        (Variable(("n",), np.array([0, -1], np.int8), attrs=FLAGS | NO_CODE), "none 1, stable 1"),
+        (Variable(("n",), np.array([3, -1, 5], np.int32), attrs=NO_CODE), "3 .. 5, 1 none"),
         (Variable(("n",), ["b", "a", "b"]), "b, a"),
         (Variable(("n",), list("abcdef")), "a, b, c, d, ... (6 distinct)"),
         (Variable(("n",), np.array([-np.inf, 1.0])), "-inf .. 1"),

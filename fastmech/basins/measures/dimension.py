@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.ndimage import maximum_filter, minimum_filter
-from scipy.stats import t
 
 from fastmech.basins.measures.jackknife import PARTS, half_width, part_of
-from fastmech.basins.measures.labels import Floats, Integers, check_map
+from fastmech.basins.measures.labels import Floats, Integers, LabelsLike, check_map
+from fastmech.basins.measures.slopes import is_smooth, line
 from fastmech.errors import InputError
 
 
@@ -21,18 +21,27 @@ class BoundaryDimension:
     edge: Integers  #: edges of the boxes [steps of the grid] (sizes,)
     mixed: Floats  #: share of the boxes' places with more than one label (sizes,)
     dimension: float  #: NaN: no boundary
-    error: float  #: half width of its 95 % interval
+    error: float  #: half width of its interval, of 95 % or more
     local_dimensions: Floats  #: between neighbouring sizes (sizes - 1,)
+    local_errors: Floats  #: half widths of their 95 % intervals by parts of the map (sizes - 1,)
 
     codimension: float  #: the map's dimension less that of the boundary: the uncertainty exponent
 
     @property
-    def smooth(self) -> bool:
-        """Whether the dimension of a smooth boundary, one less than the map's, lies within the error bar."""
-        return bool(abs(self.codimension - 1.0) <= self.error + 1e-9)  # rounding
+    def mixed_powers(self) -> Floats:
+        """Powers of the edge with which the share grows between neighbouring sizes (sizes - 1,)."""
+        return np.asarray(self.dimension + self.codimension - self.local_dimensions)
+
+    @property
+    def smooth(self) -> bool | None:
+        """Whether the dimension of a smooth boundary, one less than the map's, lies within the error bar.
+
+        None: the error bar is too wide to tell, there is no boundary, or one is in most of the finest boxes.
+        """
+        return None if self.mixed[0] > 0.5 else is_smooth(self.codimension, self.error)
 
 
-def boundary_dimension(labels: ArrayLike, edges: ArrayLike | None = None) -> BoundaryDimension:
+def boundary_dimension(labels: LabelsLike, edges: ArrayLike | None = None) -> BoundaryDimension:
     """Box-counting dimension d of the boundaries on a map.
 
     A box of edge e (in steps of the grid, so e + 1 points an axis) is mixed if it holds two different labels.
@@ -40,39 +49,46 @@ def boundary_dimension(labels: ArrayLike, edges: ArrayLike | None = None) -> Bou
     offset of the boxes instead of one. At the map's edge the map is mirrored, lest boundaries in its middle
     count for more. Missing labels are passed over: a box is judged by those it has.
 
-    The exponent is a least-squares line through log p over log e. Its error bar joins two parts: the scatter
-    between parts of the map (each of 4 parts along every axis left out in turn, the jackknife) and that of
-    the local slopes about the line. It does not know of structure finer than the map or the bias that all
-    sizes share.
+    The exponent is a least-squares line through log p over log e. Its error bar joins the scatter between
+    parts of the map (each of 5 parts along every axis left out in turn, the jackknife) and the largest
+    difference between local dimensions, continued at both ends by half of their last change: coarse boxes
+    hold more than one smooth boundary, and fine ones miss structure of a fractal between the points of the
+    map, so that the true dimension may be at either end.
 
     Args:
         labels: on a grid of any number of axes, with equal steps in one metric; negative: no label.
-        edges: of the boxes, rising; 1, 2, 4, ... up to a sixteenth of the shortest axis by default.
+        edges: of the boxes, rising; 1, 2, 4, ... up to a sixteenth of the shortest axis, at least 8, by
+            default.
 
     Raises:
         InputError: the labels are no map, or the edges do not rise or are too large for it.
     """
     array = check_map(labels)
     shortest = min(array.shape)
-    given = 2 ** np.arange(int(np.log2(max(shortest / 16, 1))) + 1) if edges is None else np.asarray(edges)
-    if given.ndim != 1 or given.size < 2 or not np.issubdtype(given.dtype, np.integer):
-        raise InputError("edges: must be two or more integers; a map needs 32 points an axis for its own")
+    given = 2 ** np.arange(max(int(np.log2(shortest / 16)), 3) + 1) if edges is None else np.asarray(edges)
+    if given.ndim != 1 or given.size < 3 or not np.issubdtype(given.dtype, np.integer):
+        raise InputError("edges: must be three or more integers")
+    if edges is None and shortest < 32:
+        raise InputError(f"labels: has shape {array.shape}; without edges, 32 points an axis are needed")
     if given[0] < 1 or (np.diff(given) < 1).any() or given[-1] > shortest // 4:
         raise InputError(f"edges: must rise from 1 or more to at most a quarter of {shortest} points")
     counts = np.array([_count(array, int(edge)) for edge in given])
     mixed, places = counts[:, 0], counts[:, 1]
     x, share = np.log(given), mixed.sum(axis=1) / places.sum(axis=1)
-    slope, scatter = _line(x, share[:, None])
     rest = places.sum(axis=1, keepdims=True) - places
-    others, _ = _line(x, (mixed.sum(axis=1, keepdims=True) - mixed) / rest)
-    error = np.hypot(half_width(others), scatter[0])
+    without = _log((mixed.sum(axis=1, keepdims=True) - mixed) / rest)
+    weight = np.ones_like(x)
+    slope, local = line(x, _log(share), weight)[0], np.diff(_log(share)) / np.diff(x)
+    beyond = 1.5 * local[[0, -1]] - 0.5 * local[[1, -2]]
+    error = np.hypot(half_width(line(x, without, weight)[0]), np.ptp([*local, *beyond]))
     return BoundaryDimension(
         edge=given.astype(np.int64),
         mixed=share,
-        dimension=float(array.ndim - slope[0]),
+        dimension=float(array.ndim - slope),
         error=float(error),
-        local_dimensions=array.ndim - np.diff(_log(share)) / np.diff(x),
-        codimension=float(slope[0]),
+        local_dimensions=array.ndim - local,
+        local_errors=np.array([half_width(part) for part in np.diff(without, axis=0) / np.diff(x)[:, None]]),
+        codimension=float(slope),
     )
 
 
@@ -90,15 +106,3 @@ def _count(labels: Integers, edge: int) -> Floats:
 def _log(share: Floats) -> Floats:
     """Logarithm, NaN where there is nothing."""
     return np.log(np.where(share > 0.0, share, np.nan))
-
-
-def _line(x: Floats, shares: Floats) -> tuple[Floats, Floats]:
-    """Slopes of log shares (sizes, lines) over x, and half widths of their 95 % intervals by scatter."""
-    y = _log(shares)
-    away = (x - x.mean())[:, None]
-    slope = (away * y).sum(axis=0) / (away**2).sum()
-    if len(x) < 3:
-        return slope, np.zeros_like(slope)
-    rest = y - y.mean(axis=0) - slope * away
-    free = len(x) - 2
-    return slope, t.ppf(0.975, free) * np.sqrt((rest**2).sum(axis=0) / free / (away**2).sum())

@@ -11,7 +11,8 @@ Two tests tell a fractal boundary from a smooth one by the boundary basin entrop
   the criterion can never fire, and says nothing.
 - that of Puy, Daza, Wagemakers, Sanjuan, Commun. Nonlinear Sci. Numer. Simul. 95 (2021) 105588, which works
   for two labels too: over balls at random places that meet a smooth boundary the mean has a known value,
-  0.4395093 for discs; a mean that differs from it speaks for a fractal boundary.
+  0.4395093 for discs; a mean that differs from it speaks for a fractal boundary, if the balls are smaller
+  than whatever scale a smooth boundary has, which :func:`fractal_boundary_test` finds out by several sizes.
 """
 
 from __future__ import annotations
@@ -23,8 +24,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import entr
 
+from fastmech.basins.measures.dimension import BoundaryDimension, boundary_dimension
 from fastmech.basins.measures.jackknife import PARTS, half_width, part_of
-from fastmech.basins.measures.labels import Floats, Integers, check_map, known_labels
+from fastmech.basins.measures.labels import (
+    Floats,
+    Integers,
+    LabelsLike,
+    check_map,
+    check_point,
+    known_labels,
+)
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
 
@@ -43,7 +52,7 @@ class BasinEntropy:
     fractal: bool | None  #: the ln 2 criterion; None: it cannot tell, no box has more than two labels
 
 
-def basin_entropy(labels: ArrayLike, edge: int = 5) -> BasinEntropy:
+def basin_entropy(labels: LabelsLike, edge: int = 5) -> BasinEntropy:
     """Basin entropy and boundary basin entropy of a map, by boxes that do not overlap.
 
     Args:
@@ -84,73 +93,115 @@ def basin_entropy(labels: ArrayLike, edge: int = 5) -> BasinEntropy:
 
 @dataclass(frozen=True)
 class FractalTest:
-    """Boundary basin entropy over balls against its value for smooth boundaries."""
+    """What balls and boxes of several sizes see of a map's boundaries."""
 
-    entropy: float  #: mean over the balls that hold more than one label; NaN: in one part of the map at most
-    error: float  #: half width of its 95 % interval
-    smooth_value: float  #: of flat boundaries at random, over the same points of the grid
-    balls: int  #: balls with more than one label
-
-    @property
-    def fractal(self) -> bool:
-        """Whether the entropy differs from that of a smooth boundary by more than its error."""
-        return bool(abs(self.entropy - self.smooth_value) > self.error)
+    fractal: bool | None  #: None: the map cannot tell
+    reason: str  #: why, one line
+    radius: Floats  #: of the balls [steps of the grid], rising (radii,)
+    entropy: Floats  #: boundary basin entropy over the balls (radii,); NaN: in one part of the map at most
+    error: Floats  #: half widths of its 95 % intervals (radii,)
+    smooth_value: Floats  #: that of flat boundaries in random directions, over the same points (radii,)
+    balls: Integers  #: balls with more than one label (radii,)
+    boxes: BoundaryDimension  #: how many boxes of rising size hold a boundary
 
 
 def fractal_boundary_test(
-    labels: ArrayLike, radius: float = 8.0, *, balls: int = 20_000, seed: int = 0
+    labels: LabelsLike, radii: ArrayLike | None = None, *, balls: int = 20_000, seed: int = 0
 ) -> FractalTest:
-    """Test of Puy et al. whether a map's boundaries are fractal, for any number of labels from two on.
+    """Test whether a map's boundaries are fractal, for any number of labels from two on.
 
-    Balls are put round random points of the map, wholly on it, and the entropies of those with more than one
-    label are averaged. The value to compare with is that of flat boundaries with all directions and distances
-    alike, cut by the very points of the ball on the grid, so that a coarse ball is no disadvantage. A
-    boundary that is curved on the scale of the ball, or two that meet in one, change the mean too: take the
-    ball small.
+    Two witnesses are heard at several scales. The *share* of boxes that hold a boundary grows like e^1 where
+    it is smooth and its pieces lie apart, and by one lesser power at all scales where it is fractal
+    (:func:`fastmech.basins.measures.dimension.boundary_dimension`). The *boundary basin entropy* over balls
+    round random points, that of Puy et al., is the same for balls of all sizes where boundaries are similar
+    to themselves, and changes with the size where they have a scale of their own.
 
-    The error is found by leaving out each of 4 parts of the map along every axis in turn, so that balls that
-    overlap do not feign certainty.
+    Puy et al. take one size of balls and call a boundary fractal where the entropy differs from that of flat
+    boundaries. That alone errs both ways: stripes narrower than the ball and corners where three basins meet
+    differ too, and boundaries of two labels on a Cantor set do not. The value is given for comparison.
+
+    - False: boxes up to 4 steps see smooth boundaries (powers of 0.95 and 0.9 at least).
+    - True: all powers are less than 0.95 by more than their errors and alike within a factor of 2.5,
+      entropies within one of 1.25, and at most half of the finest boxes hold a boundary.
+    - None: neither; a finer map, or one of a smaller window, can tell.
+
+    The errors are found by leaving out each of 5 parts of the map along every axis in turn, so that balls
+    that overlap do not feign certainty.
 
     Args:
-        labels: on a grid of two or more axes with equal steps in one metric; negative: no label, and a ball
-            with such points is not used.
-        radius: of the balls [steps of the grid], 2 or more.
-        balls: places to try.
+        labels: on a grid of two or more axes with 36 points or more and equal steps in one metric; negative:
+            no label, and a ball with such points is not used.
+        radii: of the balls [steps of the grid], rising, 2 or more; by default 4, 8 and 16, as far as they are
+            at most an eighth of the shortest axis.
+        balls: places to try at every radius.
         seed: of NumPy's ``default_rng``.
 
     Raises:
         InputError: the labels are no map, a ball does not fit, or a number is wrong.
     """
     array = check_map(labels)
-    radius = checks.number("radius", radius, "steps of the grid", least=2.0)
+    if array.ndim < 2 or min(array.shape) < 36:
+        raise InputError(f"labels: has shape {array.shape}, must have two or more axes of 36 or more points")
+    usual = np.array([4.0, 8.0, 16.0])
+    sizes = usual[8 * usual <= max(min(array.shape), 32)] if radii is None else check_point("radii", radii)
+    if sizes[0] < 2.0 or (np.diff(sizes) <= 0.0).any() or 2 * int(sizes[-1]) + 1 > min(array.shape):
+        raise InputError(f"radii: must rise from 2 or more, and the balls fit the map {array.shape}")
     balls = checks.whole_number("balls", balls, least=1)
     rng = np.random.default_rng(checks.whole_number("seed", seed, least=0))
-    reach = int(radius)
-    if array.ndim < 2 or 2 * reach + 1 > min(array.shape):
-        raise InputError(f"radius = {radius:g}: a ball must fit the map, of two or more axes: {array.shape}")
-    points = _ball(array.ndim, radius)
-    centres = rng.integers(reach, np.array(array.shape) - reach, (balls, array.ndim))
     which, numbers = known_labels(array), np.full(array.shape, -1)
     numbers[array >= 0] = np.searchsorted(which, array[array >= 0])
-    counts = np.zeros((max(which.size, 1), balls), dtype=np.int64)
+    found = [_over_balls(numbers, float(radius), balls, rng) for radius in sizes]
+    entropy, error, number = (np.array(column) for column in zip(*found, strict=True))
+    boxes = boundary_dimension(array)
+    fractal, reason = _judge(boxes, entropy)
+    smooth_value = np.array([smooth_boundary_entropy(array.ndim, float(radius)) for radius in sizes])
+    return FractalTest(fractal, reason, sizes, entropy, error, smooth_value, number, boxes)
+
+
+def _over_balls(
+    numbers: Integers, radius: float, balls: int, rng: np.random.Generator
+) -> tuple[float, float, int]:
+    """Boundary basin entropy over balls, half width of its interval, and how many hold a boundary."""
+    shape, reach = numbers.shape, int(radius)
+    centres = rng.integers(reach, np.array(shape) - reach, (balls, len(shape)))
+    counts = np.zeros((max(int(numbers.max()) + 1, 1), balls), dtype=np.int64)
     missing = np.zeros(balls, dtype=bool)
     lanes = np.arange(balls)
-    for point in points:
+    for point in _ball(len(shape), radius):
         found = numbers[tuple((centres + point).T)]
         missing |= found < 0
         counts[found, lanes] += found >= 0
-    counts = counts[:, ~missing]
-    centres = centres[~missing]
-    mixed = (counts > 0).sum(axis=0) > 1
-    values, part = entropies(counts[:, mixed]), part_of(centres[mixed].T, array.shape)
-    sums = np.bincount(part, values, PARTS**array.ndim)
-    number = np.bincount(part, minlength=PARTS**array.ndim)
+    mixed = ~missing & ((counts > 0).sum(axis=0) > 1)
+    values, part = entropies(counts[:, mixed]), part_of(centres[mixed].T, shape)
+    sums = np.bincount(part, values, PARTS ** len(shape))
+    number = np.bincount(part, minlength=PARTS ** len(shape))
     used = number > 0
-    mean, error = np.nan, np.nan
-    if np.count_nonzero(used) > 1:
-        mean = float(values.mean())
-        error = half_width(((sums.sum() - sums) / (number.sum() - number))[used])
-    return FractalTest(mean, error, smooth_boundary_entropy(array.ndim, radius), int(values.size))
+    if np.count_nonzero(used) < 2:
+        return np.nan, np.nan, int(values.size)
+    without = ((sums.sum() - sums) / (number.sum() - number))[used]
+    return float(values.mean()), half_width(without), int(values.size)
+
+
+def _judge(boxes: BoundaryDimension, entropy: Floats) -> tuple[bool | None, str]:
+    """Whether a boundary is fractal, and why; see :func:`fractal_boundary_test`."""
+    power, error = boxes.mixed_powers, boxes.local_errors
+    told = ", ".join(f"{p:.2f} +- {e:.2f}" for p, e in zip(power, error, strict=True))
+    powers = f"the share of boxes with a boundary grows from {boxes.edge[0]} to {boxes.edge[-1]} steps"
+    powers += f" by the powers {told}"
+    if not np.isfinite(entropy).all() or not np.isfinite(error).all():
+        return None, "there is no boundary, or in too small a part of the map"
+    if power[0] >= 0.95 and power[1] >= 0.9:
+        if max(error[:2]) > 0.15:
+            return None, f"too few places have a boundary: {powers}"
+        return False, f"smooth at the finest scales: {powers}"
+    if boxes.mixed[0] > 0.5:
+        share = f"{100.0 * boxes.mixed[0]:.0f} %"
+        return None, f"a boundary is in {share} of the finest boxes: a finer map can tell"
+    steady = power.min() >= 0.4 * power.max() and entropy.max() <= 1.25 * entropy.min()
+    sizes = f"{powers}, the entropy over balls is {entropy.min():.2f} to {entropy.max():.2f}"
+    if entropy.size > 1 and steady and (power + error < 0.95).all():
+        return True, f"the same at all scales: {sizes}"
+    return None, f"neither smooth at the finest scales nor the same at all, a finer map can tell: {sizes}"
 
 
 def entropies(counts: Integers) -> Floats:

@@ -3,8 +3,9 @@
 Every share comes with its Wilson interval (E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209): for k of n
 independent starts and the normal quantile z of the confidence,
 ``(k + z^2/2 -+ z sqrt(k (n - k)/n + z^2/4)) / (n + z^2)``. It stays within [0, 1] and is honest at k = 0 and
-k = n, where the usual k/n -+ z sqrt(k (n - k)/n^3) has no width. For a grid, whose points are more even than
-random ones, it is wider than it need be.
+k = n, where the usual k/n -+ z sqrt(k (n - k)/n^3) has no width. Its lower end counts starts without a label
+as ending elsewhere, its upper end as ending there. For a grid, whose points are more even than random ones,
+it is wider than it need be.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import binomtest
 
-from fastmech.basins.measures.labels import Floats, Integers, check_labels, known_labels
+from fastmech.basins.measures.labels import Floats, Integers, LabelsLike, check_labels, known_labels
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
 
@@ -28,8 +29,8 @@ class Shares:
     n: int  #: all starts
     missing: int  #: starts without a label: they belong to none, and are counted in ``n``
     fraction: Floats  #: count / n
-    lower: Floats  #: lower end of the Wilson interval
-    upper: Floats  #: upper end of the Wilson interval
+    lower: Floats  #: lower end of the Wilson interval of ``fraction``
+    upper: Floats  #: upper end of the Wilson interval of ``at_most``
     at_most: Floats  #: the fraction if every start without a label belonged there
 
 
@@ -51,7 +52,7 @@ def wilson(count: ArrayLike, n: int, confidence: float = 0.95) -> tuple[Floats, 
     return ends[..., 0], ends[..., 1]
 
 
-def basin_fractions(labels: ArrayLike, *, confidence: float = 0.95) -> tuple[Integers, Shares]:
+def basin_fractions(labels: LabelsLike, *, confidence: float = 0.95) -> tuple[Integers, Shares]:
     """Share of every label in a map or a sample.
 
     Args:
@@ -71,7 +72,7 @@ def basin_fractions(labels: ArrayLike, *, confidence: float = 0.95) -> tuple[Int
     return which, _shares(count, array, confidence)
 
 
-def basin_stability(labels: ArrayLike, label: int, *, confidence: float = 0.95) -> Shares:
+def basin_stability(labels: LabelsLike, label: int, *, confidence: float = 0.95) -> Shares:
     """Basin stability of one attractor: the probability that a random start returns to it.
 
     S_B = integral of 1_B(x) rho(x) dx, with B the basin and rho the density that the starts were drawn from
@@ -92,7 +93,7 @@ def basin_stability(labels: ArrayLike, label: int, *, confidence: float = 0.95) 
 
 
 def finite_time_basin_stability(
-    labels: ArrayLike, times: ArrayLike, label: int, horizons: ArrayLike, *, confidence: float = 0.95
+    labels: LabelsLike, times: ArrayLike, label: int, horizons: ArrayLike, *, confidence: float = 0.95
 ) -> Shares:
     """Probability that a random start has returned to an attractor within a given time.
 
@@ -123,13 +124,12 @@ def finite_time_basin_stability(
 
 def _shares(count: Integers, labels: Integers, confidence: float) -> Shares:
     n, missing = labels.size, int(np.count_nonzero(labels < 0))
-    lower, upper = wilson(count, n, confidence)
     return Shares(
         count=count,
         n=n,
         missing=missing,
         fraction=count / n,
-        lower=lower,
-        upper=upper,
+        lower=wilson(count, n, confidence)[0],
+        upper=wilson(count + missing, n, confidence)[1],
         at_most=(count + missing) / n,
     )

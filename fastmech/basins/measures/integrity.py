@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import KDTree
 
-from fastmech.basins.measures.labels import Floats, check_axes, check_map, check_point
+from fastmech.basins.measures.labels import Floats, LabelsLike, check_axes, check_map, check_point
 from fastmech.basins.measures.norm import kinetic_norm, norm_on, state_index
 from fastmech.ensembles import checks
 from fastmech.equilibria.find import Equilibrium
@@ -50,7 +50,7 @@ class Integrity:
 
 
 def integrity(
-    labels: ArrayLike,
+    labels: LabelsLike,
     axes: Sequence[ArrayLike] | Mapping[str, ArrayLike],
     label: int,
     attractor: ArrayLike | Equilibrium,

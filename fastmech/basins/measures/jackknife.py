@@ -14,8 +14,8 @@ from scipy.stats import t
 
 from fastmech.basins.measures.labels import Floats, Integers
 
-#: Parts of a map along every axis.
-PARTS = 4
+#: Parts of a map along every axis; odd, for many a map has a boundary in its middle.
+PARTS = 5
 
 
 def part_of(indices: Sequence[NDArray[np.int64]], shape: tuple[int, ...]) -> Integers:

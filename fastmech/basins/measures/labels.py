@@ -7,7 +7,7 @@ counted in every total and never taken for a basin.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,23 +17,36 @@ from fastmech.errors import InputError
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
+
+class Labelled(Protocol):
+    """Where starts end: what :func:`fastmech.map_basins` and :func:`fastmech.labels_of` give."""
+
+    @property
+    def well(self) -> NDArray[np.integer[Any]]:
+        """Index of the well (of a system of your own its stop code), negative: none."""
+
+
+#: Labels, or what holds them: then its wells, whatever the turns on the way to them. ``map.labels[0]`` tells
+#: the copies of a well apart.
+LabelsLike: TypeAlias = ArrayLike | Labelled
+
 #: Labels (n,) of starts (n, dim).
 LabelOf = Callable[[Floats], NDArray[np.integer[Any]]]
 
 
-def check_labels(labels: ArrayLike, name: str = "labels") -> Integers:
+def check_labels(labels: LabelsLike, name: str = "labels") -> Integers:
     """Labels of any shape as integers.
 
     Raises:
         InputError: there are none, or they are not integers.
     """
-    array = np.asarray(labels)
+    array = np.asarray(getattr(labels, "well", labels))
     if not array.size or not np.issubdtype(array.dtype, np.integer):
         raise InputError(f"{name}: must be integers, at least one; is {array.dtype} of shape {array.shape}")
     return array.astype(np.int64)
 
 
-def check_map(labels: ArrayLike) -> Integers:
+def check_map(labels: LabelsLike) -> Integers:
     """Labels on a grid, at least two points along every axis.
 
     Raises:

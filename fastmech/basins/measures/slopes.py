@@ -1,8 +1,15 @@
-"""A power law's exponent from counts at several scales: fit, local slopes, error bar."""
+"""A power law's exponent from what is counted at several scales: fit, local slopes, error bar.
+
+The error bar joins what counting leaves open to what the law itself does: few scales, a window that cuts
+structure off, and the oscillation of a fractal that is similar to itself only at certain ratios make an
+exponent depend on the scales that it is fitted to. Its measure is the largest difference between exponents
+of parts of the scales.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,22 +17,34 @@ from scipy.stats import norm, t
 
 from fastmech.basins.measures.labels import Floats
 
+#: Half width above which an error bar round 1 does not tell a smooth boundary from a fractal one.
+TELLING = 0.15
+
 
 @dataclass(frozen=True)
 class PowerLaw:
     """f(scale) ~ scale^exponent. Slopes belong to neighbouring scales, the last two of which fix the last."""
 
     exponent: float  #: weighted least squares of log f over log scale; NaN: fewer than two scales with f > 0
-    error: float  #: half width of the exponent's 95 % confidence interval
+    error: float  #: half width of the exponent's interval, of 95 % or more; inf: fewer than five scales
     local_slopes: Floats  #: between neighbouring scales (scales - 1,), NaN where f = 0
-    local_errors: Floats  #: half widths of their 95 % intervals (scales - 1,)
+    local_errors: Floats  #: half widths of their 95 % intervals by counting alone (scales - 1,)
+
+
+def is_smooth(exponent: float, error: float) -> bool | None:
+    """Whether an uncertainty exponent is that of a smooth boundary, 1; None: the error bar is too wide."""
+    if abs(exponent - 1.0) > error + 1e-9:  # rounding
+        return False
+    return True if error <= TELLING else None
 
 
 def fit_counts(scales: Floats, hits: NDArray[np.int64], trials: NDArray[np.int64]) -> PowerLaw:
     """Fit shares ``hits / trials`` of independent trials at rising ``scales``, all of shape (scales,).
 
-    The logarithm of a share f has the variance (1 - f)/hits. Scatter about the line beyond that widens the
-    error (by the root of chi^2 over its degrees of freedom, with Student's quantile).
+    The logarithm of a share f has the variance (1 - f)/hits. Scatter about the line beyond that is added to
+    every scale's variance (DerSimonian and Laird, Control. Clin. Trials 7 (1986) 177), so that coarse scales,
+    where most is counted, do not outweigh the others where the law is not exact. To that error comes the
+    largest difference between exponents of parts that span half of the scales or more, less its own noise.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         y = np.log(hits / trials)
@@ -39,14 +58,30 @@ def fit_counts(scales: Floats, hits: NDArray[np.int64], trials: NDArray[np.int64
     known = hits > 0
     if np.count_nonzero(known) < 2:
         return PowerLaw(np.nan, np.nan, local, local_errors)
-    x, y, weight = np.log(scales[known]), y[known], 1.0 / variance[known]
-    x = x - np.average(x, weights=weight)
-    spread = np.sum(weight * x * x)
-    exponent = float(np.sum(weight * x * y) / spread)
-    rest = y - np.average(y, weights=weight) - exponent * x
-    error = norm.ppf(0.975) / np.sqrt(spread)
-    free = len(x) - 2
-    if free > 0:
-        excess = np.sum(weight * rest * rest) / free
-        error = max(error, t.ppf(0.975, free) * np.sqrt(excess / spread))
-    return PowerLaw(exponent, float(error), local, local_errors)
+    x, y, variance = np.log(scales[known]), y[known], variance[known]
+    weight, free = 1.0 / variance, len(x) - 2
+    exponent, of_counting = line(x, y, weight)
+    if len(x) < 5:  # two parts of three can agree by chance
+        return PowerLaw(float(exponent), np.inf, local, local_errors)
+    design = np.stack([np.ones_like(x), x], axis=1)
+    hat = np.linalg.inv(design.T @ (weight[:, None] * design)) @ (design.T @ (weight[:, None] ** 2 * design))
+    rest = y - np.average(y, weights=weight) - exponent * (x - np.average(x, weights=weight))
+    beyond = (np.sum(weight * rest * rest) - free) / (weight.sum() - np.trace(hat))
+    exponent, spread = line(x, y, 1.0 / (variance + max(beyond, 0.0)))
+    quantile = t.ppf(0.975, free) if beyond > 0.0 else norm.ppf(0.975)
+    ends = combinations(range(len(x)), 2)
+    halves = [slice(i, j + 1) for i, j in ends if j > i + 1 and x[j] - x[i] >= 0.5 * (x[-1] - x[0]) - 1e-9]
+    fits = [line(x[part], y[part], weight[part]) for part in halves]
+    apart = [(a - b) ** 2 - (u + v - 2.0 * of_counting) for (a, u), (b, v) in combinations(fits, 2)]
+    error = np.sqrt(quantile**2 * spread + max(apart, default=0.0))
+    return PowerLaw(float(exponent), float(error), local, local_errors)
+
+
+def line(x: Floats, y: Floats, weight: Floats) -> tuple[Floats, float]:
+    """Least-squares slope of ``y`` over ``x``, for weights that are inverse variances also its variance.
+
+    ``y`` may have further axes, one line for each; then so has the slope.
+    """
+    away = x - np.average(x, weights=weight)
+    square = np.sum(weight * away * away)
+    return np.asarray(np.tensordot(weight * away, y, 1) / square), float(1.0 / square)

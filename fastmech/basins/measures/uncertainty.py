@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fastmech.basins.measures.labels import Floats, Integers, LabelOf, ask, check_point
-from fastmech.basins.measures.slopes import PowerLaw, fit_counts
+from fastmech.basins.measures.slopes import PowerLaw, fit_counts, is_smooth
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
 
@@ -32,9 +32,9 @@ class UncertaintyExponent:
     dimension: float  #: D - alpha; its error is that of alpha
 
     @property
-    def smooth(self) -> bool:
-        """Whether alpha = 1 lies within the error bar."""
-        return bool(abs(self.law.exponent - 1.0) <= self.law.error)
+    def smooth(self) -> bool | None:
+        """Whether alpha = 1 lies within the error bar; None: that is too wide to tell, or there is none."""
+        return is_smooth(self.law.exponent, self.law.error)
 
 
 def uncertainty_exponent(
@@ -49,14 +49,17 @@ def uncertainty_exponent(
     """Uncertainty exponent of the boundaries in a box, from fresh random starts at every distance.
 
     Starts are uniform in the box; each has two neighbours, at -eps and +eps times the box's edges along a
-    random direction of the box scaled to a unit cube. States whose edges have no length stay fixed and do
-    not count in D. Starts of different distances are independent, so the fit's error bar is one.
+    random direction of the box scaled to a unit cube. States whose edges have no length stay fixed and do not
+    count in D. Starts of different distances are independent. The error bar joins counting and the largest
+    difference between exponents of half of the distances (:mod:`fastmech.basins.measures.slopes`), so it
+    needs five of them, and is the narrower the more decades they span; keep the largest well below the box.
 
     Args:
         label_of: labels (n,) of starts (n, dim); negative: none.
         low: lower corner of the box (dim,).
         high: upper corner (dim,).
-        epsilon: distances, greater than 0 and at most 0.5, rising, two or more; in units of the box's edges.
+        epsilon: distances, greater than 0 and at most 0.5, rising, two or more, five for an error bar; in
+            units of the box's edges.
         n: starts at every distance (each costs three trajectories).
         seed: of NumPy's ``default_rng([seed, scale])``.
 

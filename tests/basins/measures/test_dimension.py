@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from analytic import cantor, newton
+from analytic import ANGLES, along, cantor, gaps, koch, newton, round_spots, smooth_map, stripes
 
 from fastmech.basins.measures.dimension import boundary_dimension
 from fastmech.errors import InputError
@@ -38,7 +38,7 @@ def test_a_sphere_has_dimension_two() -> None:
 def test_a_cantor_set_has_their_known_dimension() -> None:
     """A row of points in the middle of 3^-11 cells; edges by factors of 3 show the set's similarity."""
     x = (np.arange(3**11) + 0.5) / 3**11
-    result = boundary_dimension(cantor(x[:, None], 11), [27, 81, 243, 729, 2187])
+    result = boundary_dimension(cantor(x[:, None]), [27, 81, 243, 729, 2187])
     assert abs(result.dimension - np.log(2) / np.log(3)) <= result.error < 0.1
     assert not result.smooth
 
@@ -56,8 +56,50 @@ def test_missing_labels_make_no_boundary() -> None:
     assert np.isnan(boundary_dimension(np.where(labels == 0, 0, -1)).dimension)
 
 
+def known_dimensions() -> list[tuple[str, float, np.ndarray]]:
+    """Names, dimensions and maps of 4 to 9 sizes of boxes."""
+    rng = np.random.default_rng(2)
+    maps = [("three colours", 1.0, smooth_map(int(rng.integers(100, 500)), 3, k)) for k in range(40)]
+    for angle in ANGLES:
+        n = int(rng.integers(200, 500))
+        maps += [
+            ("straight", 1.0, (along(n, angle, 3.3) > 0.0).astype(int)),
+            ("stripes", 1.0, stripes(n, angle, rng.uniform(5, 60), 3)),
+            ("spots", 1.0, round_spots(n, rng.uniform(5, 60))),
+            ("Koch", np.log(4) / np.log(3), koch(n, angle, rng.uniform(0.5, 0.85))),
+        ]
+        for ratio in (0.2, 0.25, 1 / 3, 0.4, 0.45):
+            labels = gaps(along(n, angle) / (0.9 * n) + 0.5, ratio) % 2
+            maps.append((f"Cantor {ratio:.2f}", 1.0 + np.log(2) / np.log(1 / ratio), labels))
+    return maps
+
+
+def test_error_bars_cover_known_dimensions() -> None:
+    """Of all maps nine in ten, of every kind four in five; and they are no wider than need be."""
+    covered: dict[str, list[bool]] = {}
+    width: dict[str, list[float]] = {}
+    for name, true, labels in known_dimensions():
+        result = boundary_dimension(labels)
+        covered.setdefault(name, []).append(abs(result.dimension - true) <= result.error)
+        width.setdefault(name, []).append(result.error)
+        assert not (result.smooth is False and true == 1.0)
+        assert not (result.smooth and true > 1.2)
+    assert np.mean(np.concatenate(list(covered.values()))) >= 0.9
+    assert min(np.mean(kind) for kind in covered.values()) >= 0.8
+    assert np.median(width["three colours"]) < 0.12
+    assert np.median(width["Koch"]) < 0.2
+
+
+@pytest.mark.parametrize("angle", ANGLES)
+def test_stripes_two_steps_wide_are_not_called_fractal(angle: float) -> None:
+    result = boundary_dimension(stripes(200, angle, 2, 3))
+    assert result.smooth is None
+
+
 def test_wrong_edges_are_refused() -> None:
     with pytest.raises(InputError, match=r"^edges: must rise from 1 or more to at most a quarter of 40"):
-        boundary_dimension(np.zeros((40, 40), int), [1, 11])
-    with pytest.raises(InputError, match=r"^edges: must be two or more integers; a map needs 32"):
+        boundary_dimension(np.zeros((40, 40), int), [1, 2, 11])
+    with pytest.raises(InputError, match=r"^edges: must be three or more integers"):
+        boundary_dimension(np.zeros((40, 40), int), [1, 2])
+    with pytest.raises(InputError, match=r"^labels: has shape \(20, 20\); without edges, 32 points"):
         boundary_dimension(np.zeros((20, 20), int))

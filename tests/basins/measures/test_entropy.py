@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from analytic import newton
+from analytic import ANGLES, along, duffing, gaps, koch, newton, round_spots, smooth_map, stripes
 from scipy.integrate import quad
 from scipy.special import betainc, entr
 
@@ -45,7 +45,6 @@ def test_two_labels_never_reach_the_ln_2_criterion() -> None:
     assert result.basin == pytest.approx(LN2, abs=1e-15)
     assert result.boundary == pytest.approx(LN2, abs=1e-15)
     assert result.fractal is None
-    assert fractal_boundary_test(board, 3.0, balls=100).fractal
 
 
 def test_three_smooth_stripes_are_not_fractal() -> None:
@@ -61,7 +60,10 @@ def test_a_pure_map_has_no_entropy() -> None:
     assert result.basin == 0.0
     assert np.isnan(result.boundary)
     assert result.fractal is None
-    assert np.isnan(fractal_boundary_test(np.full((10, 10), 7), 2.0, balls=10).entropy)
+    test = fractal_boundary_test(np.full((40, 40), 7), balls=10)
+    assert np.isnan(test.entropy).all()
+    assert test.fractal is None
+    assert test.reason.startswith("there is no boundary")
 
 
 def test_missing_labels_have_no_share() -> None:
@@ -87,16 +89,83 @@ def test_smooth_boundaries_have_the_known_entropy(dim: int, radius: float, near:
     assert abs(smooth_boundary_entropy(dim, radius) - true) < near
 
 
-def test_the_test_for_two_labels_tells_smooth_from_fractal() -> None:
+#: Straight and round boundaries, eight steps apart or more.
+SMOOTH = (
+    [
+        (f"stripes of {w}, {k}, {a:.1f}", stripes(256, a, w, k))
+        for w in (8, 13, 30)
+        for k in (2, 3)
+        for a in ANGLES
+    ]
+    + [(f"one straight line, {a:.1f}", (along(256, a, 3.3) > 0.0).astype(int)) for a in ANGLES]
+    + [
+        (f"one stripe of {w}, {a:.1f}", (np.abs(along(256, a)) < w / 2).astype(int))
+        for w in (8, 20)
+        for a in ANGLES
+    ]
+    + [(f"spots of {radius}", round_spots(256, radius)) for radius in (5.0, 8.0, 20.0, 60.0)]
+    + [(f"{k} labels, {seed}", smooth_map(256, k, seed)) for k in (2, 3, 5) for seed in range(3)]
+)
+
+
+@pytest.mark.parametrize("labels", [labels for _, labels in SMOOTH], ids=[name for name, _ in SMOOTH])
+def test_smooth_boundaries_are_not_fractal(labels: np.ndarray) -> None:
+    result = fractal_boundary_test(labels, balls=2000)
+    assert result.fractal is False, result.reason
+    assert result.boxes.smooth is not False
+
+
+NARROW = [(w, k, a) for w in (1, 1.5, 2, 3, 4, 5, 6) for k in (2, 3) for a in ANGLES]
+
+
+@pytest.mark.parametrize(("width", "labels", "angle"), NARROW)
+def test_stripes_as_narrow_as_the_map_s_steps_are_never_fractal(
+    width: float, labels: int, angle: float
+) -> None:
+    for picture in (stripes(200, angle, width, labels), (np.abs(along(200, angle)) < width / 2).astype(int)):
+        result = fractal_boundary_test(picture, balls=2000)
+        assert not result.fractal
+        assert result.fractal is False or "finer map" in result.reason or "too few" in result.reason
+
+
+FRACTAL = {
+    "Newton's three": newton(400),
+    "Newton's three, another window": newton(300, 0.3, 0.6, 0.2),
+    "Newton's, one against two": np.minimum(newton(400), 1),
+    "Koch's snowflake": koch(400, 0.2),
+    "Koch's snowflake, turned and smaller": koch(300, 0.5, 0.6),
+    "stripes on the Cantor set": gaps(along(400, 0.3) / 360 + 0.5) % 2,
+    "stripes on another Cantor set": gaps(along(400, 1.1) / 360 + 0.5, 0.25) % 2,
+    "stripes on a third, of three labels": gaps(along(400, 2.0) / 360 + 0.5, 0.4) % 3,
+    "Duffing's two wells": duffing(160),
+}
+
+
+@pytest.mark.parametrize("labels", FRACTAL.values(), ids=FRACTAL)
+def test_fractal_boundaries_are_fractal(labels: np.ndarray) -> None:
+    result = fractal_boundary_test(labels, balls=5000)
+    assert result.fractal is True, result.reason
+    assert result.boxes.smooth is False
+
+
+def test_a_map_finer_than_its_points_is_undecided() -> None:
+    for labels in (
+        np.indices((200, 200)).sum(axis=0) % 2,
+        np.random.default_rng(0).integers(0, 3, (200, 200)),
+    ):
+        result = fractal_boundary_test(labels, balls=2000)
+        assert result.fractal is None
+        assert "% of the finest boxes: a finer map can tell" in result.reason
+
+
+def test_balls_on_a_smooth_boundary_have_its_entropy() -> None:
+    """A circle has all directions alike, as the value to compare with."""
     x = np.linspace(-1, 1, 600)
-    smooth = np.where(np.hypot(x[:, None], x) < 0.7, 2, 5)
-    result = fractal_boundary_test(smooth, 5.0, balls=30_000)
-    assert not result.fractal
-    assert abs(result.entropy - result.smooth_value) < 0.02
-    two = np.where(newton(600) == 0, 0, 1)
-    fractal = fractal_boundary_test(two, 5.0, balls=5000)
-    assert fractal.fractal
-    assert basin_entropy(two).fractal is None
+    result = fractal_boundary_test(np.where(np.hypot(x[:, None], x) < 0.7, 2, 5), balls=30_000)
+    assert result.radius.tolist() == [4.0, 8.0, 16.0]
+    np.testing.assert_allclose(result.entropy, result.smooth_value, atol=0.03)
+    assert (np.abs(result.entropy - result.smooth_value) < result.error + 0.01).all()
+    assert basin_entropy(np.minimum(newton(600), 1)).fractal is None
     assert basin_entropy(newton(600)).fractal is True
 
 
@@ -105,5 +174,8 @@ def test_wrong_arguments_are_refused() -> None:
         basin_entropy(np.full((6, 6), -1))
     with pytest.raises(InputError, match=r"^edge = 7: must be an integer not greater than 6"):
         basin_entropy(np.zeros((6, 6), int), 7)
-    with pytest.raises(InputError, match=r"^radius = 4: a ball must fit"):
-        fractal_boundary_test(np.zeros((6, 6), int), 4.0)
+    with pytest.raises(InputError, match=r"^labels: has shape \(6, 6\), must have two or more axes of 36"):
+        fractal_boundary_test(np.zeros((6, 6), int))
+    for radii in ([1.0, 4.0], [8.0, 4.0], [4.0, 20.0]):
+        with pytest.raises(InputError, match=r"^radii: must rise from 2 or more, and the balls fit the map"):
+            fractal_boundary_test(np.zeros((40, 40), int), radii)

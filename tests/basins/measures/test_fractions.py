@@ -49,8 +49,20 @@ def test_missing_labels_are_counted() -> None:
     assert (shares.n, shares.missing) == (6, 2)
     np.testing.assert_array_equal(shares.fraction, [3 / 6, 1 / 6])
     np.testing.assert_array_equal(shares.at_most, [5 / 6, 3 / 6])
+    np.testing.assert_array_equal(shares.lower, wilson(np.array([3, 1]), 6)[0])
+    np.testing.assert_array_equal(shares.upper, wilson(np.array([5, 3]), 6)[1])
     alone = basin_stability([4, 4, -1, 9, -2, 4], 9)
     assert (alone.lower, alone.upper) == (shares.lower[1], shares.upper[1])
+
+
+@pytest.mark.parametrize("hidden", [0, 1])
+def test_intervals_cover_whichever_labels_are_missing(hidden: int) -> None:
+    """Of 300 starts, half of which return, a third of one kind is not decided: the truth stays inside."""
+    rng = np.random.default_rng(5)
+    labels = rng.integers(0, 2, (2000, 300))
+    labels = np.where((labels == hidden) & (rng.random(labels.shape) < 0.33), -1, labels)
+    shares = [basin_stability(row, 0) for row in labels]
+    assert np.mean([s.lower <= 0.5 <= s.upper for s in shares]) > 0.95
 
 
 def test_a_map_without_labels_has_no_fractions() -> None:

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from analytic import newton
+from analytic import ANGLES, along, gaps, newton, smooth_map, stripes
 from own_ends import ends
 
 import fastmech as fm
@@ -22,24 +22,25 @@ def way_out(t, x, y, vx, vy):
 
 @pytest.mark.nojit
 def test_stripes_done_by_hand() -> None:
-    """Boundaries of 5, 2 and 9 against the rest: columns 3|4 and 7|8."""
+    """Boundaries of 5, 2 and 9 against the rest: between columns 3 and 4, and 7 and 8, 4 steps apart."""
     labels = np.repeat(np.repeat([5, 2, 9], 4)[None], 6, axis=0)
     result = wada_merge_test(labels, 3)
     assert result.labels.tolist() == [2, 5, 9]
-    # That of 2 has both lines, columns 3, 4, 7, 8; column 8 is 4 from that of 5, which is columns 3, 4.
     np.testing.assert_array_equal(result.distance, [[0, 4, 4], [0, 0, 4], [0, 4, 0]])
-    np.testing.assert_array_equal(result.far_share, [[0, 0.25, 0.25], [0, 0, 0.5], [0, 0.5, 0]])
-    assert result.boundary_points.tolist() == [24, 12, 12]
+    np.testing.assert_array_equal(result.far_share, [[0, 0.5, 0.5], [0, 0, 1], [0, 1, 0]])
+    assert result.boundary_points.tolist() == [12, 6, 6]
     assert result.least_fattening == 4
-    assert not result.wada
-    assert wada_merge_test(labels, 4).wada  # fattened beyond the stripes everything is near everything
+    # On every 4th point a stripe is a single one: still 4 steps. Mean distances: half of the places, and all.
+    np.testing.assert_array_equal(result.apart, [4, 4, 4])
+    assert result.wada is False
+    assert wada_merge_test(labels, 4).wada is False  # however much they are fattened
 
 
 @pytest.mark.nojit
 def test_missing_labels_make_no_boundary() -> None:
     labels = np.array([[0, -1, 1, 1], [0, -1, 1, 1], [0, -1, 1, 2]])
     result = wada_merge_test(labels)
-    assert result.boundary_points.tolist() == [0, 3, 3]
+    assert result.boundary_points.tolist() == [0, 2, 2]
     assert result.missing == 3
     assert np.isinf(result.least_fattening)
     assert not result.wada
@@ -62,10 +63,48 @@ def test_labels_may_have_any_numbers() -> None:
 
 
 @pytest.mark.nojit
-@pytest.mark.parametrize("n", [300, 600])
-def test_newton_s_basins_are_wada_at_every_resolution(n: int) -> None:
+@pytest.mark.parametrize("n", [150, 300, 600])
+@pytest.mark.parametrize("window", [(0.0, 1.5, 0.0), (0.3, 0.6, 0.2), (2.0, 0.5, 0.4)])
+def test_newton_s_basins_are_wada_at_every_resolution(n: int, window: tuple) -> None:
     """The boundary of each basin of a rational map is its Julia set: one set for all three."""
-    assert wada_merge_test(newton(n)).wada
+    result = wada_merge_test(newton(n, *window), 6)
+    assert result.wada is True, result.reason
+
+
+@pytest.mark.nojit
+def test_gaps_of_a_cantor_set_in_three_colours_are_wada() -> None:
+    """Every point of the set is a limit of gaps of all orders."""
+    for angle in (0.3, 1.2, 2.5):
+        result = wada_merge_test(gaps(along(400, angle) / 360 + 0.5) % 3, 6)
+        assert result.wada is True, result.reason
+    for n in (200, 300, 400, 500):  # along an axis all rows are the same: too few points, but never apart
+        assert wada_merge_test(gaps(along(n, 0.0) / (0.9 * n) + 0.5) % 3, 6).wada is not False
+
+
+@pytest.mark.nojit
+@pytest.mark.parametrize("width", [2, 2.5, 3, 5, 12])
+@pytest.mark.parametrize("angle", ANGLES)
+def test_touching_bands_are_not_wada(width: float, angle: float) -> None:
+    for fattening in (5, 50):
+        result = wada_merge_test(stripes(240, angle, width, 3), fattening)
+        assert not result.wada
+        if width > 2.5:
+            assert result.wada is False
+            assert result.reason.startswith("boundaries lie apart")
+
+
+@pytest.mark.nojit
+def test_smooth_maps_are_not_wada_and_what_is_finer_than_points_is_undecided() -> None:
+    for seed in range(4):
+        assert wada_merge_test(smooth_map(200, 3, seed), 200).wada is False
+    for labels in (
+        stripes(200, 0.0, 1, 3),
+        stripes(200, 0.3, 1, 3),
+        np.random.default_rng(0).integers(0, 3, (200, 200)),
+    ):
+        result = wada_merge_test(labels)
+        assert result.wada is None
+        assert "a finer map can tell" in result.reason
 
 
 @pytest.mark.parametrize("n", [150, 300])

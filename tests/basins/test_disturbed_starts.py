@@ -7,7 +7,8 @@ import pytest
 from disturbance.known import center, equilibria, known, oracle_size
 from scipy.stats import kstest
 
-from fastmech.disturbance.ensemble import disturb, uniform_ball, unit_directions
+from fastmech.basins.disturbed import disturb
+from fastmech.disturbance.size import uniform_ball, unit_directions
 from fastmech.ensembles.integrate import integrate
 
 SCENE = known("table_1")[0]
@@ -64,7 +65,7 @@ def test_starts_of_a_last_block_with_a_single_lane() -> None:
 @pytest.mark.nojit
 def test_a_part_is_that_part_of_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     """Parts within and across streams of random numbers, of which an ensemble of 20 has three here."""
-    monkeypatch.setattr("fastmech.disturbance.ensemble.STREAM", 8)
+    monkeypatch.setattr("fastmech.basins.disturbed.STREAM", 8)
     (e,) = equilibria("table_1", 0)
     whole = disturb(SCENE, e, 20, **SHORT)
     assert len(np.unique(whole.starts, axis=0)) == 20

@@ -1,0 +1,301 @@
+"""``fm.disturb``: what becomes of thousands of random disturbances of one equilibrium.
+
+Where a disturbance ends is what :func:`fastmech.basins.label.labels_of` proves. How long it takes and how far
+it swings is measured in a run of its own to the end.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.basins.label import labels_of, require_damper
+from fastmech.basins.ladder import SUBSTEPS
+from fastmech.basins.measures.fractions import Shares, basin_stability
+from fastmech.basins.status import BasinStatus
+from fastmech.basins.steps import coarse_steps
+from fastmech.disturbance.motion import equilibria_to_disturb
+from fastmech.disturbance.observe import EXCURSION_PHI, EXCURSION_THETA, LAST_OUTSIDE, observe_departure
+from fastmech.disturbance.size import Size, confining_energy, excess_energy, size_at, uniform_ball
+from fastmech.ensembles import checks
+from fastmech.ensembles.plausible import judge
+from fastmech.ensembles.run import Observation, Progress, run_ensemble
+from fastmech.ensembles.spans import output_steps
+from fastmech.ensembles.status import Status, failure_counts, failure_line
+from fastmech.equilibria.find import Equilibria, Equilibrium
+from fastmech.errors import InputError, StepWarning
+from fastmech.integrators.implicit_method import with_jacobian
+from fastmech.integrators.methods import find_method
+from fastmech.kernels.jacobians import lagrange_jacobian
+from fastmech.kernels.select import right_hand_side
+from fastmech.mechanism.coefficients import reduce
+from fastmech.scene import Scene
+from fastmech.step_limits.beyond import drives_rest
+from fastmech.step_limits.warning import step_limit, warn_of_step
+
+Floats = NDArray[np.float64]
+
+#: Starts that one stream of random numbers gives; the next ones have a stream of their own.
+STREAM = 65_536
+
+#: Trajectories of the largest ensemble: its results take about 150 bytes each in memory.
+MOST_TRAJECTORIES = 100_000_000
+
+#: Share of a start's coarse step, at which labels begin, that measuring takes by default.
+MEASURING = 0.6
+
+
+class Outcome(IntEnum):
+    """Where a disturbed trajectory ends."""
+
+    RETURNED = 0
+    ELSEWHERE = 1
+    AT_UNSTABLE = 2
+    UNDECIDED = 3
+    NOT_FINITE = 4
+    STEP_TOO_LARGE = 5
+    NOT_CONVERGED = 6
+
+    @property
+    def advice(self) -> str:
+        """What it means and what to do."""
+        return _ADVICE[self]
+
+
+#: Outcomes of trajectories that have failed.
+FAILURES = (Outcome.NOT_FINITE, Outcome.STEP_TOO_LARGE, Outcome.NOT_CONVERGED)
+
+_ADVICE = {
+    Outcome.RETURNED: "proved to end at its equilibrium without a full turn",
+    Outcome.ELSEWHERE: "proved to end at another stable equilibrium, or at its own some turns further",
+    Outcome.AT_UNSTABLE: "comes to an unstable equilibrium, and what follows is not decided; "
+    "use a larger t_end",
+    Outcome.UNDECIDED: "nothing is proved by t_end (use a larger one), or the finest steps disagree",
+    Outcome.NOT_FINITE: "became NaN or infinite on the way; use a smaller dt",
+    Outcome.NOT_CONVERGED: "Newton's iteration found no solution of a step; use a smaller dt",
+    Outcome.STEP_TOO_LARGE: "has energy that it cannot have, or dt is beyond the limit; use a smaller dt",
+}
+
+#: What the label's status and that of the measured run say; those captured are told apart by where.
+_BY_LABEL = {
+    BasinStatus.CAPTURED: Outcome.ELSEWHERE,
+    BasinStatus.AT_SADDLE: Outcome.AT_UNSTABLE,
+    BasinStatus.NOT_FINITE: Outcome.NOT_FINITE,
+    BasinStatus.START_NOT_FINITE: Outcome.NOT_FINITE,
+    BasinStatus.STEP_TOO_LARGE: Outcome.STEP_TOO_LARGE,
+    BasinStatus.NOT_CONVERGED: Outcome.NOT_CONVERGED,
+}
+_BY_RUN = {
+    Status.NOT_FINITE: Outcome.NOT_FINITE,
+    Status.START_NOT_FINITE: Outcome.NOT_FINITE,
+    Status.STEP_TOO_LARGE: Outcome.STEP_TOO_LARGE,
+    Status.NOT_CONVERGED: Outcome.NOT_CONVERGED,
+}
+
+
+@dataclass(frozen=True)
+class DisturbedEnsemble:
+    """Random disturbances of one equilibrium and what became of them; arrays over n trajectories."""
+
+    equilibria: Equilibria  #: all equilibria of the scene
+    index: int  #: which of them was disturbed
+    size: Size  #: the norm in which radius and ball are measured
+    t_end: float  #: s
+    dt: Floats  #: steps taken [s], shape (n,)
+    starts: Floats  #: states at t = 0, shape (n, 4)
+    final: Floats  #: states at t_end, of those that failed the last finite ones, shape (n, 4)
+    failed: Floats  #: time of the last finite state of those that failed on the way [s], else NaN; shape (n,)
+    outcome: NDArray[np.int8]  #: :class:`Outcome`, shape (n,)
+    end_index: NDArray[np.int8]  #: the stable equilibrium at which it is proved to end, -1: none; shape (n,)
+    turns: NDArray[np.int64]  #: full turns of phi and theta on the way there, 0 where none; shape (n, 2)
+    time_to_return: Floats  #: s, first step from which on it was in the ball; NaN: not by t_end; (n,)
+    excursion: Floats  #: largest departures of phi and theta [rad], NaN of those that failed; shape (n, 2)
+
+    @property
+    def failures(self) -> str:
+        """One line: how many trajectories have failed, and how; empty where none has."""
+        return failure_line(failure_counts(self.outcome, FAILURES), self.outcome.size)
+
+    @property
+    def returned(self) -> Shares:
+        """Share that returned, with its 95 % Wilson interval: the basin stability in the ball.
+
+        Whose end is not known, be it undecided or failed, is without a label: not returned at the lower end,
+        returned in ``at_most`` and at the upper end.
+        """
+        known = (self.outcome == Outcome.RETURNED) | (self.outcome == Outcome.ELSEWHERE)
+        return basin_stability(np.where(known, self.outcome, -1), int(Outcome.RETURNED))
+
+    @property
+    def share_returned(self) -> float:
+        """Share of the trajectories that are proved to return."""
+        return float(self.returned.fraction)
+
+    @property
+    def share_returned_at_most(self) -> float:
+        """The same if all whose end is not known returned."""
+        return float(self.returned.at_most)
+
+
+def disturb(
+    scene: Scene,
+    equilibrium: Equilibrium,
+    n: int = 4096,
+    *,
+    radius: float = 0.5,
+    seed: int = 0,
+    t_end: float = 120.0,
+    dt: float | None = None,
+    method: str = "dop853",
+    return_radius: float = 0.01,
+    part: slice | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> DisturbedEnsemble:
+    """Disturb an equilibrium at random and follow every disturbance.
+
+    Starts are uniform in the ball of the given ``radius`` about the equilibrium, in the norm of
+    :class:`fastmech.disturbance.size.Size`; the k-th 65,536 of them (k = 0, 1, ...) are drawn by NumPy's
+    ``default_rng([seed, index, 0, k])``, so any part of an ensemble can be had without the rest. Where they
+    end is proved by capture, see :func:`fastmech.basins.label.labels_of`; a trajectory that has returned may
+    need longer than ``t_end`` to come to rest. It is back when it is within ``return_radius``, in the
+    equilibrium's norm, without the energy to leave that ball.
+
+    Args:
+        scene: a scene with a damper and a constant force (``alpha = 0`` or ``F0 = 0``).
+        equilibrium: one of ``find_equilibria(scene)``.
+        n: number of disturbances.
+        radius: size of the largest disturbance [rad].
+        seed: seed of the starts.
+        t_end: end of the run [s].
+        dt: longest step [s]; by default each start's own, from the scene's frequencies, its damping and the
+            start's energy, see :func:`measuring_steps`.
+        method: name of the method.
+        return_radius: radius of the ball of return [rad].
+        part: which of the n disturbances to follow, with a step of 1; all by default.
+        threads: threads to use; the result does not depend on it.
+        progress: is told how many trajectories have finished since its last call.
+
+    Raises:
+        InputError: an argument is wrong, the scene's force decays, it has no damper, or its wells are not
+            certain.
+    """
+    checks.progress_function(progress, "trajectories")
+    equilibria = equilibria_to_disturb(scene)
+    require_damper(scene)
+    n = checks.whole_number("n", n, least=1, most=MOST_TRAJECTORIES)
+    seed = checks.whole_number("seed", seed, least=0)
+    radius = checks.number("radius", radius, "rad", above=0.0)
+    return_radius = checks.number("return_radius", return_radius, "rad", above=0.0)
+    times = np.array([0.0, checks.number("t_end", t_end, "s", above=0.0)])
+    if dt is not None:
+        dt = checks.number("dt", dt, "s", above=0.0)
+        warn_of_step([scene], dt, method)
+    index = equilibria.index_of(equilibrium)
+    center = np.array([equilibrium.phi, equilibrium.theta, 0.0, 0.0])
+    size = size_at(scene, equilibrium.phi, equilibrium.theta)
+    _refuse_meeting_balls(equilibria, index, size, return_radius)
+    chosen = range(*(part or slice(None)).indices(n))
+    starts = center + size.from_ball(radius * _starts_in_ball(seed, index, n, chosen))
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", StepWarning)  # it has been told
+        ends = labels_of(scene, starts, times[1], dt=dt, method=method, threads=threads)
+    longest = measuring_steps(scene, starts, method) if dt is None else np.full(len(starts), dt)
+    steps, which = np.unique(longest, return_inverse=True)
+    number = np.array([output_steps(times, float(step))[0] for step in steps])
+    taken = (times[1] / number)[which]
+    departure = np.abs(starts - center)
+    run = run_ensemble(
+        right_hand_side(reduce(scene)),
+        reduce(scene),
+        starts,
+        times,
+        longest,
+        with_jacobian(find_method(method), lagrange_jacobian, True),
+        _observation(center, size, return_radius),
+        threads=threads,
+        progress=progress,
+    )
+    final = run.states[-1]
+    status = judge(run.status, starts, final, reduce(scene), threads)
+    driven = [drives_rest(scene, float(times[1] / k), float(k), method) for k in number]
+    status[np.array(driven)[which] & (status == Status.OK)] = Status.STEP_TOO_LARGE
+
+    outcome = np.full(len(starts), Outcome.UNDECIDED, dtype=np.int8)
+    for kind, told in _BY_LABEL.items():
+        outcome[ends.status == kind] = told
+    outcome[(ends.well == index) & ~ends.turns.any(axis=1)] = Outcome.RETURNED
+    for reached, told in _BY_RUN.items():
+        outcome[status == reached] = told
+    failing = np.isin(outcome, FAILURES)
+    last_outside = run.records[LAST_OUTSIDE]
+    left = (size(starts - center) > return_radius) | (last_outside > 0.0)
+    inside_since = np.where(left, last_outside + taken, 0.0)
+    returned = outcome == Outcome.RETURNED
+    back = np.zeros(len(starts), dtype=np.bool_)
+    back[returned] = (size(final[returned] - center) <= return_radius) & (
+        excess_energy(scene, equilibrium, final[returned])
+        <= confining_energy(scene, equilibrium, return_radius)
+    )
+    excursion = np.maximum(departure[:, :2], run.records[[EXCURSION_PHI, EXCURSION_THETA]].T)
+    return DisturbedEnsemble(
+        equilibria=equilibria,
+        index=index,
+        size=size,
+        t_end=float(times[1]),
+        dt=taken,
+        starts=starts,
+        final=run.last,
+        failed=run.failed,
+        outcome=outcome,
+        end_index=np.where(failing, -1, ends.well).astype(np.int8),
+        turns=np.where(failing[:, None], 0, ends.turns).astype(np.int64),
+        time_to_return=np.where(back, inside_since, np.nan),
+        excursion=np.where(failing[:, None], np.nan, excursion),
+    )
+
+
+def measuring_steps(scene: Scene, starts: Floats, method: str) -> Floats:
+    """Longest steps [s] of starts (n, 4) by default, shape (n,).
+
+    Six tenths of the coarse step at which :func:`fastmech.basins.label.labels_of` begins, and no longer than
+    is stable for the scene, as far down as that function goes.
+    """
+    coarse = coarse_steps(reduce(scene), starts)
+    finest = coarse * SUBSTEPS[0] / SUBSTEPS[-1]
+    return np.asarray(np.clip(0.9 * step_limit(scene, method), finest, MEASURING * coarse))
+
+
+def _refuse_meeting_balls(equilibria: Equilibria, index: int, size: Size, radius: float) -> None:
+    """Refuse a ball of return that reaches half way to another equilibrium."""
+    angles = np.column_stack([equilibria.phi, equilibria.theta])
+    away = np.delete(angles, index, axis=0) - angles[index]
+    away -= 2.0 * np.pi * np.round(away / (2.0 * np.pi))
+    nearest = float(size(np.concatenate([away, np.zeros_like(away)], axis=1)).min(initial=np.inf))
+    if radius > 0.5 * nearest:
+        raise InputError(
+            f"return_radius = {radius:g} rad: must not exceed {0.5 * nearest:.3g} rad, "
+            "half the distance of two equilibria"
+        )
+
+
+def _starts_in_ball(seed: int, index: int, n: int, chosen: range) -> Floats:
+    """Points ``chosen`` of n in the unit ball, from streams that no other seed or equilibrium has."""
+    first, last = chosen.start // STREAM, max(chosen.start, chosen.stop - 1) // STREAM
+    streams = [
+        uniform_ball(np.random.default_rng([seed, index, 0, k]), min(STREAM, n - k * STREAM))
+        for k in range(first, last + 1)
+    ]
+    offset = first * STREAM
+    return np.concatenate(streams)[chosen.start - offset : chosen.stop - offset]
+
+
+def _observation(center: Floats, size: Size, return_radius: float) -> Observation:
+    a = size.metric
+    params = [center[0], center[1], a[0, 0], a[0, 1], a[1, 1], 1.0 / size.omega**2, return_radius**2]
+    return Observation(observe_departure, np.array(params), np.zeros(3))

@@ -1,0 +1,159 @@
+"""A tolerance for systems whose right-hand sides have branches.
+
+Every trajectory runs twice with steps that end where branches are passed
+(:mod:`fastmech.ensembles.located`), the second time with smaller errors of its steps. Where the two are
+apart by no more than the tolerance the second is kept, and their distance, which is nearly the error of the
+first, is taken for its error. Else a third is compared with the second, and so on. What is not settled so
+has no error that is known.
+"""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.callee import callee
+from fastmech.ensembles.lanes import finite_rows
+from fastmech.ensembles.located import COSTS, ENDED, GRAZES, SINGULAR, SLIDES, UNCLEAR, Course, follow
+from fastmech.ensembles.missed import missed_line
+from fastmech.ensembles.places import part_of, put_into
+from fastmech.ensembles.problem import Problem
+from fastmech.ensembles.richardson import distances
+from fastmech.ensembles.run import Progress
+from fastmech.ensembles.solve import Settings, Solution, solve
+from fastmech.ensembles.stopping import STOP_CODE
+from fastmech.ensembles.threads import in_threads, thread_count
+from fastmech.integrators.methods import find_method
+from fastmech.interrupts import check
+
+Floats = NDArray[np.float64]
+Members = NDArray[np.int64]
+
+#: Error of a step in the first run over the tolerance, how many times smaller it is in the next one, the
+#: least one, and runs at most.
+FIRST, FINER, LEAST, RUNS = 0.01, 32.0, 1e-14, 5
+
+#: Steps of a run at least.
+FEW = 64.0
+
+#: What steps where branches are located.
+METHOD = "dopri5"
+
+#: Steps that a trajectory may take, and those of all of them.
+MOST, MOST_TOGETHER = 2**17, 2**22
+
+#: Trajectories that a thread follows at a time.
+TOGETHER = 8
+
+#: Steps of a run, at least and at most, of trajectories that cannot be followed through their branches.
+GIVEN_UP = (2.0**10, 2.0**17)
+
+WHY = {
+    ENDED: "finer runs stay apart (chaos, a start on a basin's border)",
+    SLIDES: "slides along a branch's border",
+    GRAZES: "touches a branch's border",
+    COSTS: "shorter steps would cost too much",
+    SINGULAR: "no step is short enough",
+    UNCLEAR: "too many decisions in one call",
+}
+
+
+def follow_to_tolerance(
+    problem: Problem,
+    switches: Any,
+    starts: Floats,
+    outputs: Floats,
+    tol: float,
+    threads: int | None,
+    progress: Progress | None,
+) -> tuple[Solution, Floats, str]:
+    """The solution, errors (n,), infinite where none is known, and what is to be said about those.
+
+    ``switches`` notes the decisions of the right-hand side, see :mod:`fastmech.ensembles.switches`.
+    """
+    n, usable = len(starts), finite_rows(starts)
+    error, ended = np.full(n, np.inf), np.full(n, ENDED)
+    last, best = None, _nothing(problem, starts, outputs)
+    who = np.flatnonzero(usable)
+    if progress is not None:
+        progress(n - who.size)
+    for k in range(RUNS):
+        local = max(FIRST * tol / FINER**k, LEAST)
+        finer, ended[who] = _follow(problem, switches, starts, outputs, local, who, threads, progress)
+        put_into(best, who, finer, np.ones(who.size, dtype=np.bool_))
+        open_ = ended[who] == ENDED
+        if last is not None:
+            apart = distances(last.y, finer.y)
+            if problem.observation.stops:
+                apart[last.records[STOP_CODE] != finer.records[STOP_CODE]] = np.inf
+            kept = open_ & (apart <= tol)
+            error[who[kept]] = apart[kept]
+            open_ &= ~kept
+        who, last, progress = who[open_], part_of(finer, open_), None
+        if not who.size:
+            break
+    lost = np.flatnonzero(ended != ENDED)
+    if lost.size or not usable.all():
+        # What cannot be followed is integrated as if there were no branches.
+        other = np.union1d(lost, np.flatnonzero(~usable))
+        steps = np.exp2(np.ceil(np.log2(np.clip(best.steps[other], *GIVEN_UP))))
+        settings = Settings(find_method(METHOD), float(outputs[-1]) / steps)
+        given_up = solve(problem.part(other), starts[other], outputs, settings, threads)
+        put_into(best, other, given_up, np.ones(other.size, dtype=np.bool_))
+    missed = usable & np.isinf(error)
+    return best, error, missed_line(missed, {why: missed & (ended == code) for code, why in WHY.items()})
+
+
+def _nothing(problem: Problem, starts: Floats, outputs: Floats) -> Solution:
+    """A solution to put trajectories into."""
+    n, dim = starts.shape
+    records = np.repeat(problem.observation.record[:, None], n, axis=1)
+    steps, dt = np.zeros(n, dtype=np.int64), np.zeros((1, n))
+    y, failed = np.zeros((outputs.size, n, dim)), np.full(n, np.nan)
+    return Solution(y, records, np.zeros(n, dtype=np.int8), steps, dt, failed, None, np.zeros(0))
+
+
+def _follow(
+    problem: Problem,
+    switches: Any,
+    starts: Floats,
+    outputs: Floats,
+    local: float,
+    who: Members,
+    threads: int | None,
+    progress: Progress | None,
+) -> tuple[Solution, Members]:
+    """Some of the trajectories with so large errors of their steps, and what became of each."""
+    solution, n, seen = _nothing(problem, starts[who], outputs), who.size, problem.observation
+    steps = min(MOST, max(MOST_TOGETHER // max(n, 1), int(GIVEN_UP[0])))
+    course = Course(
+        starts=np.ascontiguousarray(starts[who]),
+        params=np.ascontiguousarray(problem.params.part(who).block(n).T),
+        outputs=outputs,
+        observer_params=seen.params,
+        empty=seen.record,
+        limits=np.array([float(outputs[-1]) / FEW, steps, local]),
+        y=solution.y,
+        records=np.ascontiguousarray(solution.records.T),
+        told=np.zeros((n, 2)),
+        ended=np.full(n, ENDED),
+    )
+    called = callee(problem.rhs), callee(switches), callee(seen.observe)
+
+    def part(first: int) -> int:
+        check()
+        last = min(first + TOGETHER, n)
+        follow(*called, course, first, last)
+        return last - first
+
+    firsts = list(range(0, n, TOGETHER))
+    workers = min(thread_count(threads), len(firsts))
+    for finished in in_threads(part, firsts, workers, threading.Event()):
+        if progress is not None:
+            progress(finished)
+    solution.records[...] = course.records.T
+    solution.steps[...], solution.dt[0] = course.told.T
+    return solution, course.ended

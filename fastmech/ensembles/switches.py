@@ -1,0 +1,323 @@
+"""Where a user's function decides: a copy of it that notes how far each decision is from turning over.
+
+A step that passes a branch of the right-hand side has another error than its method's order tells, and one
+that passes two has an error that no two runs tell. So the copy notes, at every comparison of values that
+depend on time or state, the difference of its two sides and its outcome; ``abs``, ``min``, ``floor`` and
+their like decide too. Equal outcomes at two points of a motion then mean that they lie on the same smooth
+piece, and the differences tell how near it was to being left.
+"""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import dis
+import linecache
+import math
+import types
+from collections.abc import Iterator
+from typing import Any
+
+import numba
+import numpy as np
+from numba import types as kinds
+from numba.core.registry import CPUDispatcher
+from numpy.typing import NDArray
+
+from fastmech.callee import CalleeType
+from fastmech.ensembles.fingerprint import enclosed
+from fastmech.jit import INLINED, VECTOR, inlined
+from fastmech.kernels.sincos import WITHIN
+
+Floats = NDArray[np.float64]
+
+#: Decisions of a call that are noted at most.
+MOST_NOTES = 64
+
+#: ``switches(t, y, params, seen)`` notes the decisions of one trajectory in state ``y`` (dim,).
+SWITCHES_SIGNATURE = kinds.void(kinds.float64, VECTOR, VECTOR, VECTOR)
+SWITCHES = CalleeType(SWITCHES_SIGNATURE)
+
+
+@inlined
+def note(seen: Floats, value: float, outcome: float) -> None:
+    """Add a decision to ``seen``: [number, value, outcome, value, outcome, ...]."""
+    k = int(seen[0])
+    seen[0] = k + 1
+    if k < MOST_NOTES:
+        seen[1 + 2 * k], seen[2 + 2 * k] = value, outcome
+
+
+@inlined
+def _less(seen: Floats, a: float, b: float) -> bool:
+    outcome = a < b
+    note(seen, a - b + 0.0, outcome + 0.0)
+    return outcome
+
+
+@inlined
+def _at_most(seen: Floats, a: float, b: float) -> bool:
+    outcome = a <= b
+    note(seen, a - b + 0.0, outcome + 0.0)
+    return outcome
+
+
+@inlined
+def _equal(seen: Floats, a: float, b: float) -> bool:
+    note(seen, a - b + 0.0, (a < b) + 0.0)
+    return a == b
+
+
+@inlined
+def _beside(seen: Floats, a: float, b: float) -> float:
+    """``a``, noted as less than ``b`` or not."""
+    note(seen, a - b + 0.0, (a < b) + 0.0)
+    return a
+
+
+@inlined
+def _whole(seen: Floats, x: float) -> float:
+    """``x``, noted as a number that changes sides at integers and half way between them."""
+    note(seen, math.sin(2.0 * math.pi * x), (math.sin(2.0 * math.pi * x) < 0.0) + 0.0)
+    return x
+
+
+#: What the copy calls in its own globals.
+_HELPERS = {f"_fastmech{f.__name__}": f for f in (_less, _at_most, _equal, _beside, _whole)}
+
+_COMPARED = {
+    ast.Lt: ("_less", 1),
+    ast.Gt: ("_less", -1),
+    ast.LtE: ("_at_most", 1),
+    ast.GtE: ("_at_most", -1),
+    ast.Eq: ("_equal", 1),
+    ast.NotEq: ("_equal", 1),
+}
+
+#: Functions by what they decide: the sign of an argument, between arguments, the integer below; and those
+#: that decide nothing, or nothing that their arguments' decisions do not tell.
+_SIGN = {"abs": 0, "absolute": 0, "fabs": 0, "sign": 0, "heaviside": 0, "copysign": 1, "signbit": 0}
+_EXTREME = {"min", "max", "minimum", "maximum", "fmin", "fmax"}
+_INTEGER = {"floor", "ceil", "trunc", "rint", "round", "int", "fix"}
+_RATIO = {"fmod", "mod", "remainder"}
+_SMOOTH = {
+    *("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "arcsin", "arccos", "arctan", "arctan2"),
+    *("sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "arcsinh", "arccosh", "arctanh", "sinc"),
+    *("exp", "exp2", "expm1", "log", "log2", "log10", "log1p", "sqrt", "cbrt", "pow", "power", "square"),
+    *("hypot", "erf", "erfc", "gamma", "lgamma", "radians", "degrees", "deg2rad", "rad2deg", "float"),
+    *("bool", "len", "range", "where", "isnan", "isfinite", "isinf", "zeros", "ones", "empty", "array"),
+    *("dot", "sum", "add", "subtract", "multiply", "divide", "negative", "reciprocal"),
+}
+
+
+class UnclearError(Exception):
+    """A function of which it cannot be told where it decides."""
+
+
+def watching(function: types.FunctionType, depend: set[str]) -> tuple[types.FunctionType, int]:
+    """A copy that takes the array of its notes as first argument, and how many places of it note.
+
+    ``depend`` names the arguments that change on the way; what depends on others alone is no decision.
+
+    Raises:
+        UnclearError: the source is not at hand, or it calls what is not known to be smooth.
+    """
+    node = _definition(function)
+    known = {**function.__globals__, **enclosed(function)}
+    watch = _Watch(known, _depending(node, depend))
+    body = [watch.visit(part) for part in node.body]
+    copy = ast.FunctionDef(node.name, node.args, body, [], None, None)
+    copy.args.args.insert(0, ast.arg("_fastmech_seen"))
+    for argument in copy.args.args:
+        argument.annotation = None
+    module: Any = ast.fix_missing_locations(ast.Module([copy], []))
+    place = {**known, **_HELPERS, **watch.callees}
+    exec(compile(module, function.__code__.co_filename, "exec"), place)
+    made = place[node.name]
+    made.__defaults__, made.__module__ = function.__defaults__, __name__
+    return made, watch.places
+
+
+def decides_nothing(function: types.FunctionType) -> bool:
+    """Whether a function whose source is not at hand has no decision in its instructions, and calls none."""
+    code = function.__code__
+    if any(
+        instruction.opname == "COMPARE_OP"
+        or "JUMP_IF" in instruction.opname
+        or instruction.argrepr in ("%", "//")
+        for instruction in dis.get_instructions(code)
+    ):
+        return False
+    known = {**vars(builtins), **function.__globals__, **enclosed(function)}
+    names = [*code.co_names, *code.co_freevars]
+    found = [known[name] for name in names if name in known]
+    called = [value for value in found if callable(value)]
+    attributes = [name for name in names if name not in known]
+    return all(_kind(value) == "smooth" for value in called) and set(attributes) <= _SMOOTH | {"pi", "e"}
+
+
+def _kind(value: Any) -> str:
+    """What a function that is called decides: ``smooth``: nothing, ``""``: unknown, else its name."""
+    name = getattr(value, "__name__", "")
+    home = str(getattr(value, "__module__", None) or "").split(".")[0]
+    if value in WITHIN:
+        return "smooth"
+    if not (isinstance(value, np.ufunc) or home in ("math", "numpy", "builtins")):
+        return ""
+    if name in _SMOOTH:
+        return "smooth"
+    return name if name in {*_SIGN, *_EXTREME, *_INTEGER, *_RATIO, "clip"} else ""
+
+
+def _definition(function: types.FunctionType) -> ast.FunctionDef:
+    """The part of the source that defines a function; of a lambda the function that it is."""
+    code = function.__code__
+    try:
+        tree = ast.parse("".join(linecache.getlines(code.co_filename, function.__globals__)))
+    except SyntaxError:
+        raise UnclearError("its source cannot be read") from None
+    names = list(code.co_varnames[: code.co_argcount])
+    found = [node for node in _functions(tree) if _begins(node) == code.co_firstlineno]
+    found = [
+        node
+        for node in found
+        if getattr(node, "name", "<lambda>") == code.co_name and [a.arg for a in node.args.args] == names
+    ]
+    if len(found) != 1:
+        raise UnclearError("its source is not at hand")
+    node = found[0]
+    if isinstance(node, ast.Lambda):
+        return ast.FunctionDef("lambda_", node.args, [ast.Return(node.body)], [], None, None)
+    return node
+
+
+def _functions(tree: ast.Module) -> Iterator[ast.FunctionDef | ast.Lambda]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.Lambda):
+            yield node
+
+
+def _begins(node: ast.FunctionDef | ast.Lambda) -> int:
+    return min([node.lineno, *(d.lineno for d in getattr(node, "decorator_list", []))])
+
+
+def _names(node: ast.AST) -> set[str]:
+    return {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}
+
+
+def _depending(node: ast.FunctionDef, depend: set[str]) -> set[str]:
+    """Names whose values depend on the arguments ``depend``."""
+    found, before = set(depend), -1
+    while len(found) != before:
+        before = len(found)
+        for part in ast.walk(node):
+            if isinstance(part, ast.Assign) and _names(part.value) & found:
+                found |= set().union(*(_names(target) for target in part.targets))
+            elif isinstance(part, ast.AugAssign | ast.AnnAssign | ast.NamedExpr):
+                if part.value is not None and _names(part.value) & found:
+                    found |= _names(part.target)
+            elif isinstance(part, ast.For) and _names(part.iter) & found:
+                found |= _names(part.target)
+            elif isinstance(part, ast.If | ast.While) and _names(part.test) & found:
+                # What is assigned in a branch depends on who took it.
+                inside = ast.walk(ast.Module([*part.body, *part.orelse], []))
+                found |= {n.id for n in inside if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+    return found
+
+
+class _Watch(ast.NodeTransformer):
+    """Puts notes into a function."""
+
+    def __init__(self, known: dict[str, Any], depending: set[str]) -> None:
+        """``known`` are its globals, ``depending`` its names that change on the way."""
+        self._known, self._depending = known, depending
+        self.callees: dict[str, Any] = {}
+        self.places = 0
+
+    def _noting(self, helper: str, *arguments: ast.expr) -> ast.Call:
+        self.places += 1
+        seen: list[ast.expr] = [ast.Name("_fastmech_seen", ast.Load()), *arguments]
+        return ast.Call(ast.Name(f"_fastmech{helper}", ast.Load()), seen, [])
+
+    def _depends(self, node: ast.AST) -> bool:
+        return bool(_names(node) & self._depending)
+
+    def visit_Compare(self, node: ast.Compare) -> ast.expr:
+        """Each comparison of a chain, whose middle parts are computed twice."""
+        depends = self._depends(node)
+        self.generic_visit(node)
+        if not depends:
+            return node
+        pairs: list[ast.expr] = []
+        for a, op, b in zip([node.left, *node.comparators], node.ops, node.comparators, strict=False):
+            if type(op) not in _COMPARED:
+                raise UnclearError(f"it compares in a way that is not known, line {node.lineno}")
+            helper, sign = _COMPARED[type(op)]
+            one: ast.expr = self._noting(helper, *((a, b) if sign > 0 else (b, a)))
+            pairs.append(ast.UnaryOp(ast.Not(), one) if isinstance(op, ast.NotEq) else one)
+        return pairs[0] if len(pairs) == 1 else ast.BoolOp(ast.And(), pairs)
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
+        """Remainders and whole quotients jump."""
+        depends = self._depends(node)
+        self.generic_visit(node)
+        if depends and isinstance(node.op, ast.Mod | ast.FloorDiv):
+            return self._ratio(node, "left", node.left, node.right)
+        return node
+
+    def _ratio(self, node: Any, place: str, a: ast.expr, b: ast.expr) -> Any:
+        whole = self._noting("_whole", ast.BinOp(a, ast.Div(), b))
+        return ast.BinOp(node, ast.Add(), ast.BinOp(ast.Constant(0.0), ast.Mult(), whole))
+
+    def visit_Call(self, node: ast.Call) -> ast.expr:
+        """What is called decides by its arguments, or is a compiled function of the user's."""
+        depends = [self._depends(argument) for argument in node.args]
+        if not any(depends) and not any(self._depends(keyword.value) for keyword in node.keywords):
+            return node
+        value = self._value(node.func)
+        kind = _kind(value)
+        if isinstance(value, CPUDispatcher | types.FunctionType) and not kind:
+            return self._watched(node, getattr(value, "py_func", value), depends)
+        if not kind:
+            raise UnclearError(
+                f"it calls {ast.unparse(node.func)}, of which it is not known whether it is smooth"
+            )
+        self.generic_visit(node)
+        args = node.args
+        if kind in _SIGN and len(args) > _SIGN[kind]:
+            args[_SIGN[kind]] = self._noting("_beside", args[_SIGN[kind]], ast.Constant(0.0))
+        elif kind in _INTEGER:
+            args[0] = self._noting("_whole", args[0])
+        elif kind in _RATIO:
+            return self._ratio(node, "args", *args)
+        elif kind in _EXTREME and len(args) > 1:
+            folded = args[0]
+            for other in args[1:]:
+                folded = ast.Call(node.func, [folded, self._noting("_beside", other, folded)], [])
+            return folded
+        elif kind == "clip" and len(args) == 3:
+            args[0] = self._noting("_beside", self._noting("_beside", *args[:2]), args[2])
+        elif kind != "smooth":
+            raise UnclearError(f"it calls {ast.unparse(node.func)} in a way that is not known")
+        return node
+
+    def _value(self, node: ast.expr) -> Any:
+        """What a name, or an attribute of one, is before the function runs."""
+        if isinstance(node, ast.Name):
+            return self._known.get(node.id, vars(builtins).get(node.id))
+        if isinstance(node, ast.Attribute):
+            return getattr(self._value(node.value), node.attr, None)
+        return None
+
+    def _watched(self, node: ast.Call, function: Any, depends: list[bool]) -> ast.expr:
+        """The call of a compiled function whose decisions are noted too."""
+        if node.keywords:
+            raise UnclearError(f"it calls {ast.unparse(node.func)} with names of arguments")
+        names = function.__code__.co_varnames
+        changing = {name for name, one in zip(names, depends, strict=False) if one}
+        copy, places = watching(function, changing)
+        self.places += places
+        name = f"_fastmech_callee{len(self.callees)}"
+        self.callees[name] = numba.njit(**INLINED)(copy)
+        self.generic_visit(node)
+        return ast.Call(ast.Name(name, ast.Load()), [ast.Name("_fastmech_seen", ast.Load()), *node.args], [])

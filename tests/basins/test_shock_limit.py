@@ -1,0 +1,197 @@
+"""The shock limit against closed forms, SciPy and brute force."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from own_ends import depths, ends
+from scan_types.values import scipy_motion
+
+import fastmech as fm
+from fastmech.atlas.fold_points import find_folds
+from fastmech.basins.shock_limit import ShockLimit
+from fastmech.mechanism.geometry import positions
+from fastmech.mechanism.lagrange import kinetic_energy, metric, potential_energy
+
+Floats = NDArray[np.float64]
+
+BISTABLE = fm.Scene(F0=85.3, c1=294.9, c2=92.85, alpha=0.0)
+FRICTIONLESS = BISTABLE.replace(beta=0.0)
+FREE = fm.Scene(F0=0.0, alpha=0.0)
+TURN = 2.0 * np.pi
+
+
+@cache
+def limit(scene: fm.Scene, well: int, on: str, direction: float | None = None) -> ShockLimit:
+    return fm.shock_limit(scene, fm.find_equilibria(scene)[well], on, direction)
+
+
+def struck(scene: fm.Scene, well: int, on: str, impulse: Floats, angle: Floats) -> Floats:
+    """States (n, 4) after impulses (n,) at angles (n,): B by differences of positions."""
+    e = fm.find_equilibria(scene)[well]
+    place, h, number = np.array([e.phi, e.theta]), 1e-6, on[1]
+    B = np.empty((2, 2))
+    for k in range(2):
+        one, two = (positions(scene, [*(place + s * h * np.eye(2)[k]), 0.0, 0.0]) for s in (1.0, -1.0))
+        for row, name in enumerate("xy"):
+            B[row, k] = (getattr(one, name + number) - getattr(two, name + number)) / (2.0 * h)
+    J = impulse[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    rates = np.linalg.solve(metric(scene, place), B.T @ J.T).T
+    return np.concatenate([np.tile(place, (len(J), 1)), rates], axis=1)
+
+
+def stays(scene: fm.Scene, well: int, starts: Floats, t_end: float) -> NDArray[np.bool_]:
+    """Whether motions by SciPy's DOP853 at 1e-12 end where they began, their energy below the way out."""
+    e = fm.find_equilibria(scene)[well]
+    final = scipy_motion(scene.model_dump(), starts, np.array([0.0, t_end]))[-1]
+    energy = kinetic_energy(scene, final) + potential_energy(scene, final[:, :2], scene.F0)
+    assert (energy < e.energy + depths(scene)[well]).all()
+    # Below every way out the angles are nearer to their own minimum than to any other.
+    others = np.array([[m.phi, m.theta] for m in fm.find_equilibria(scene) if m.kind == "minimum"])
+    turns = np.stack(np.meshgrid([-2, -1, 0, 1, 2], [-2, -1, 0, 1, 2]), axis=-1).reshape(-1, 1, 2)
+    copies = (others + TURN * turns).reshape(-1, 2)
+    nearest = copies[np.linalg.norm(final[:, None, :2] - copies, axis=2).argmin(axis=1)]
+    return np.linalg.norm(nearest - [e.phi, e.theta], axis=1) < 1e-6
+
+
+def test_closed_forms_with_the_crank_upright() -> None:
+    """Unforced, Table 1 rests at phi = pi/2, theta = 0; M2 turned over is 2 (m2 g l + c1 l^2) higher."""
+    s = FREE
+    depth = 2.0 * (s.m2 * s.g * s.l + s.c1 * s.l**2)
+    for on, mass in (("M1", s.m1 + s.m3), ("M2", s.m2), ("M3", s.m1 + s.m3)):
+        proved = limit(s, 0, on).proved
+        assert proved.energy == pytest.approx(depth, rel=1e-10)
+        assert proved.impulse == pytest.approx(np.sqrt(2.0 * mass * depth), rel=1e-10)
+        assert proved.velocity == pytest.approx(np.sqrt(2.0 * depth / mass), rel=1e-10)
+        assert np.sin(proved.direction) == pytest.approx(0.0, abs=1e-12)
+        oblique = limit(s, 0, on, 1.0)
+        assert oblique.proved.impulse == pytest.approx(proved.impulse / np.cos(1.0), rel=1e-10)
+        assert oblique.proved.energy == pytest.approx(depth, rel=1e-10)
+        upwards = limit(s, 0, on, 0.5 * np.pi)  # M1 along OM1, M2 along the rods, M3 across its rail
+        for blow in (upwards.proved, upwards.found):
+            assert np.isnan([blow.impulse, blow.velocity, blow.energy]).all()
+
+
+def test_the_slider_cannot_be_struck_at_its_dead_centre() -> None:
+    """Springs and load such that the mechanism rests at phi = 0, theta = 0.3."""
+    s, theta = fm.Scene(), 0.3
+    C, b = s.c1 * s.l**2, s.m2 * s.g * s.l
+    c2 = ((s.m1 + s.m2) * s.g * s.l - C * np.cos(theta)) / s.l**2
+    scene = s.replace(F0=(C - b * np.tan(theta)) / s.l, c2=c2, alpha=0.0)
+    e = next(e for e in fm.find_equilibria(scene) if abs(e.phi) < 1e-12)
+    assert e.kind == "minimum"
+    told = fm.shock_limit(scene, e, "M3")
+    assert np.isnan([told.proved.impulse, told.proved.energy, told.found.impulse]).all()
+    assert told.end is None
+    assert fm.shock_limit(scene, e, "M1").proved.impulse > 0.0
+    atlas = fm.map_equilibria(scene, {"F0": [scene.F0]}, wells=True)
+    slot = int(np.abs(atlas.phi[0]).argmin())
+    assert np.isnan(atlas.shock_limit_m3[0, slot])
+
+
+@pytest.mark.parametrize("on", ["M1", "M2", "M3"])
+@pytest.mark.parametrize("well", [0, 1])
+def test_no_blow_below_the_proved_bound_leaves(well: int, on: str) -> None:
+    """Random directions, each up to its own bound, with and without damper."""
+    rng = np.random.default_rng(17 + well)
+    angle = rng.uniform(-np.pi, np.pi, 10)
+    unit_energy = kinetic_energy(BISTABLE, struck(BISTABLE, well, on, np.ones(10), angle))
+    bound = np.sqrt(depths(BISTABLE)[well] / unit_energy)
+    told = np.array([limit(FRICTIONLESS, well, on, float(a)).proved.impulse for a in angle])
+    assert told == pytest.approx(bound, rel=1e-8)
+    assert limit(FRICTIONLESS, well, on).proved.impulse <= bound.min()
+    size = bound * np.append(np.full(5, 0.999), rng.uniform(0.2, 0.999, 5))
+    starts = struck(BISTABLE, well, on, size, angle)
+    for scene in (BISTABLE, FRICTIONLESS):
+        y = scipy_motion(scene.model_dump(), starts, np.linspace(0.0, 15.0, 61))
+        assert (fm.trapped(scene, y.reshape(-1, 4)).well == well).all()
+        assert (fm.trapped(scene, y.reshape(-1, 4)).turns == 0).all()
+
+
+@pytest.mark.parametrize("on", ["M1", "M2", "M3"])
+@pytest.mark.parametrize(("scene", "well"), [(BISTABLE, 0), (BISTABLE, 1), (FREE, 0)])
+def test_a_blow_one_percent_above_the_one_found_leaves(scene: fm.Scene, well: int, on: str) -> None:
+    told = limit(scene, well, on)
+    found = told.found
+    assert found.impulse > told.proved.impulse
+    assert found.energy > told.proved.energy
+    start = struck(scene, well, on, np.array([found.impulse]), np.array([found.direction]))
+    assert kinetic_energy(scene, start[0]) == pytest.approx(found.energy, rel=1e-8)
+    np.testing.assert_allclose(
+        fm.impulse_start(scene, fm.find_equilibria(scene)[well], found.impulse, on, found.direction),
+        start[0], rtol=1e-8, atol=1e-8,
+    )  # fmt: skip
+    both = struck(scene, well, on, found.impulse * np.array([1.01, 0.99]), np.full(2, found.direction))
+    np.testing.assert_array_equal(stays(scene, well, both, 60.0 if scene is FREE else 150.0), [False, True])
+
+
+@pytest.mark.parametrize("well", [0, 1])
+def test_brute_force_finds_nothing_smaller(well: int) -> None:
+    """1,000 blows of random directions and sizes, from the proved bound to 2 % below the one found."""
+    told, rng = limit(BISTABLE, well, "M2"), np.random.default_rng(2)
+    size = np.exp(rng.uniform(*np.log([told.proved.impulse, 0.98 * told.found.impulse]), 1000))
+    starts = struck(BISTABLE, well, "M2", size, rng.uniform(-np.pi, np.pi, 1000))
+    label, turns, _ = ends(BISTABLE, starts, 600.0)
+    known = label >= 0
+    assert known.sum() > 950
+    assert (label[known] == well).all()
+    assert not turns[known].any()
+    assert (fm.trapped(BISTABLE, starts).well != well).sum() > 300  # the energy of so many would do
+
+
+def test_a_flat_well_beside_a_fold() -> None:
+    """A newton before the fold: less than a thousandth of the other well's depth, and slow to settle."""
+    fold = find_folds(BISTABLE, "F0", np.linspace(600.0, 750.0, 16))[0]
+    scene = BISTABLE.replace(F0=fold.value - 1.0)
+    depth = depths(scene)[1]
+    assert depth < 0.03
+    told = limit(scene, 1, "M2")
+    assert told.proved.impulse == pytest.approx(np.sqrt(2.0 * scene.m2 * depth), rel=1e-6)
+    assert told.proved.impulse < told.found.impulse
+    assert told.end == (0, (0, 0))
+    size = told.found.impulse * np.array([1.01, 0.99])
+    label, turns, _ = ends(scene, struck(scene, 1, "M2", size, np.full(2, told.found.direction)), 1200.0)
+    assert label.tolist() == [0, 1]
+    assert not turns.any()
+
+
+def test_the_force_free_impulse_along_x() -> None:
+    """The limit of fast forces at Table 1 as SciPy brackets it in tests of snapping: 158.56 N s."""
+    told = limit(FREE, 0, "M2", 0.0)
+    assert told.found.impulse == pytest.approx(158.558, abs=2e-3)
+    assert told.found.direction == 0.0
+    assert told.end is not None
+    assert told.end[1] != (0, 0)
+    assert limit(FREE, 0, "M2").found.impulse <= told.found.impulse * (1.0 + 1e-3)
+
+
+def test_without_damper_the_bound_is_all() -> None:
+    told = limit(FRICTIONLESS, 0, "M2")
+    assert told.proved == limit(BISTABLE, 0, "M2").proved
+    assert np.isnan(told.found.impulse)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"scene": fm.Scene()}, "scene.alpha = 0.7: must be 0 1/s"),
+        ({"equilibrium": fm.find_equilibria(FREE)[1]}, "equilibrium: is a saddle, must be a minimum"),
+        (
+            {"equilibrium": fm.find_equilibria(BISTABLE)[0]},
+            "equilibrium = (0.708161, 0.498745) rad: must be one of",
+        ),
+        ({"on": "M4"}, "on = 'M4': must be one of M1, M2, M3"),
+        ({"direction": np.inf}, "direction = inf: must be a finite number of rad"),
+        ({"t_end": 0.0}, "t_end = 0.0: must be a finite number of s greater than 0"),
+    ],
+)
+def test_wrong_arguments_are_refused(changes: dict[str, Any], message: str) -> None:
+    arguments: dict[str, Any] = {"scene": FREE, "equilibrium": fm.find_equilibria(FREE)[0]}
+    with pytest.raises(fm.InputError) as refusal:
+        fm.shock_limit(**(arguments | changes))
+    assert str(refusal.value).startswith(message)
+    assert "\n" not in str(refusal.value)
