@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.errors import InputError
+from fastmech.ensembles.checks import one_way
+from fastmech.errors import InputError, shown
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene, nearest
+from fastmech.stability.arguments import require_scene
 
 Floats = NDArray[np.float64]
 
@@ -20,11 +22,13 @@ def check_axes(scene: Scene, axes: Mapping[str, ArrayLike], most: int = 3) -> di
     """The axes as float64 vectors, every value one that the scene accepts.
 
     Raises:
-        InputError: no mapping, none or more than ``most`` axes, an unknown name, values that are no numbers
-            or that the scene refuses, or F0 where the scene's force decays.
+        InputError: no scene or no mapping, none or more than ``most`` axes, an unknown name, values that are
+            no numbers, that neither rise nor fall throughout or that the scene refuses, or F0 where the
+            scene's force decays.
     """
+    require_scene(scene)
     if not isinstance(axes, Mapping):
-        raise InputError(f"axes = {_short(axes)}: must map parameter names to their values")
+        raise InputError(f"axes = {shown(axes)}: must map parameter names to their values")
     if not 1 <= len(axes) <= most:
         raise InputError(f"axes: {len(axes)} given; one to {_WORDS[most]} parameters are allowed")
     checked = {name: _check_values(scene, name, values) for name, values in axes.items()}
@@ -51,12 +55,16 @@ def check_axis(scene: Scene, name: str, values: ArrayLike) -> Floats:
     """One axis of a search for folds as a float64 vector.
 
     Raises:
-        InputError: as ``check_axes``, or the parameter is alpha, which moves no fold.
+        InputError: as ``check_axes``, the parameter is alpha, which moves no fold, or values turn back.
     """
+    require_scene(scene)
     vector = _check_values(scene, name, values)
     if name == "alpha":
         raise InputError("axes.alpha: equilibria do not depend on how fast a force decays; choose another")
     refuse_decaying_load(scene, (name,))
+    steps = np.diff(vector)
+    if vector.size < 2 or not ((steps > 0.0).all() or (steps < 0.0).all()):
+        raise InputError(f"axes.{name}: must be two or more values that rise, or fall, throughout")
     return vector
 
 
@@ -70,7 +78,7 @@ def _check_values(scene: Scene, name: str, values: ArrayLike) -> Floats:
     except (TypeError, ValueError):
         array = np.array(None)
     if array.size and array.dtype.kind not in "iuf":
-        raise InputError(f"axes.{name} = {_short(values)}: must be a sequence of numbers")
+        raise InputError(f"axes.{name} = {shown(values)}: must be a sequence of numbers")
     vector = np.ascontiguousarray(array, dtype=np.float64)
     if array.ndim != 1 or array.size == 0:
         raise InputError(f"axes.{name}: shape {array.shape}: must be one-dimensional and not empty")
@@ -80,12 +88,8 @@ def _check_values(scene: Scene, name: str, values: ArrayLike) -> Floats:
             scene.replace(**{name: float(value)})
         except InputError:
             _name_the_value(scene, name, vector)
+    one_way(f"axes.{name}", values, vector)
     return vector
-
-
-def _short(value: object) -> str:
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def _name_the_value(scene: Scene, name: str, vector: Floats) -> None:

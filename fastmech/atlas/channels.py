@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.atlas.axes import coefficient_columns
-from fastmech.atlas.fold_seeds import margins
+from fastmech.atlas.margin import margins
 from fastmech.atlas.regions import RANKS, label_points
 from fastmech.equilibria.outcome import Outcome
 from fastmech.equilibria.search import MOST

@@ -12,10 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from fastmech.atlas.enclosure import System
 
-#: F and its Jacobian at a point.
-System = Callable[[Floats], tuple[Floats, Floats]]
+Floats = NDArray[np.float64]
 
 #: Longest and shortest step along a curve, in radians and in parts of the parameters' ranges.
 LONGEST, SHORTEST = 0.02, 1e-8

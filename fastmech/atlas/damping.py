@@ -12,16 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.atlas.continuation import LONGEST, System, distance, newton, regular, trace
-from fastmech.atlas.folds import (
-    EXPLAINED,
-    MOST_POINTS,
-    apart,
-    checked_plane,
-    finish_on_edge,
-    inside,
-    plane_of,
-)
+from fastmech.atlas.continuation import LONGEST, distance, newton, regular, trace
+from fastmech.atlas.cover import apart
+from fastmech.atlas.enclosure import System
+from fastmech.atlas.folds import MOST_POINTS, checked_plane, finish_on_edge, inside, plane_of
 from fastmech.atlas.map import EquilibriumMap, map_equilibria
 from fastmech.atlas.systems import Plane, dead_centre, point_at, straight, unloaded
 from fastmech.scene import Scene
@@ -37,6 +31,9 @@ SYSTEMS: dict[str, Callable[[Plane], System]] = {
 
 #: A quantity this small, over its own scale, is zero within rounding.
 ZERO = 1e-9
+
+#: A seed this near to a traced curve is explained by it: a tenth of the longest step.
+EXPLAINED = 0.1 * LONGEST
 
 #: A curve ends this near to where its equilibrium stops being stable [rad and parts of the ranges].
 END = 1e-3
@@ -178,7 +175,7 @@ def seeds(plane: Plane, atlas: EquilibriumMap, name: str) -> tuple[Floats, list[
         size = {
             SIN_PHI: np.sin(phi),
             SIN_PSI: np.sin(phi + theta),
-            UNLOADED: np.where(np.isnan(phi), np.nan, (p.hessian[2] - p.spring).reshape(phi.shape)),
+            UNLOADED: np.where(np.isnan(phi), np.nan, (p.hessian[2] - p.loads[1]).reshape(phi.shape)),
         }[name]
         flat = all_over(np.abs(size) < ZERO)
         if flat.any():

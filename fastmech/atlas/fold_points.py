@@ -1,77 +1,114 @@
-"""Folds over one parameter."""
+"""Folds and pitchforks over one parameter, all of them, with the proof."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.atlas.axes import check_axis, coefficient_columns, grid_coefficients
-from fastmech.atlas.continuation import newton
-from fastmech.atlas.fold_seeds import HALVINGS, margins
-from fastmech.atlas.systems import Plane, fold, point_at
-from fastmech.errors import InputError
+from fastmech.atlas.axes import check_axis
+from fastmech.atlas.continuation import Curve, newton
+from fastmech.atlas.cover import apart, solutions
+from fastmech.atlas.enclosure import System
+from fastmech.atlas.folds import RESIDUAL, merging, sifted
+from fastmech.atlas.systems import Plane, families, fold, point_at, suited
 from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
 
+#: Places this near to one another [rad and parts] that the search could not tell apart count as one.
+TOGETHER = 1e-3
+
+#: Third derivative, and derivative by the parameter, over the loads, that count as zero at such a place.
+FLAT = 1e-3
+
 
 @dataclass(frozen=True)
 class FoldPoint:
-    """A value of a parameter at which two equilibria merge."""
+    """A value of a parameter at which equilibria merge."""
 
     value: float
     phi: float  #: where they merge [rad]
     theta: float
     merges: str  #: what merges with a saddle: ``minimum`` or ``maximum``
+    kind: str
+    """``fold``: two vanish; ``pitchfork``: by symmetry one splits into three. Only where another parameter is
+    right to rounding: ``cusp``: three merge into one; ``transcritical``: two meet and part again."""
     residual: float  #: scaled residual of gradient and Hessian's determinant
 
 
-def find_folds(scene: Scene, name: str, values: ArrayLike) -> tuple[FoldPoint, ...]:
-    """Folds of ``scene`` over one parameter, in rising order.
+class FoldPoints(tuple[FoldPoint, ...]):
+    """The folds of a range, in rising order."""
+
+    complete: bool  #: it is proved that the range holds no other one
+    reason: str  #: why it is not; empty if it is
+
+    def __new__(cls, points: Iterable[FoldPoint], reason: str) -> FoldPoints:
+        """The points and why they may not be all."""
+        self = super().__new__(cls, points)
+        self.complete, self.reason = not reason, reason
+        return self
+
+
+def find_folds(scene: Scene, name: str, values: ArrayLike) -> FoldPoints:
+    """All folds of ``scene`` over a range of one parameter, in rising order.
+
+    They are found by branch and prune (``fastmech.atlas.cover``), which proves that none is missing.
 
     Args:
         scene: gives every other parameter.
         name: the parameter.
-        values: rising; a fold is found wherever the number of equilibria changes between neighbours.
+        values: rising or falling; the first and the last one are the ends of the range.
 
     Raises:
-        InputError: an unknown name, values that do not rise or that the scene refuses.
+        InputError: an unknown name, values that neither rise nor fall or that the scene refuses.
     """
     axis = check_axis(scene, name, values)
-    if axis.size < 2 or not (np.diff(axis) > 0.0).all():
-        raise InputError(f"axes.{name}: must be two or more values that rise")
-    margin = margins(grid_coefficients(scene, {name: axis})[0])[0]
-    plane = Plane(scene, (name,), (float(axis[0]),), (float(axis[-1]),))
-    change = np.flatnonzero((margin[:-1] >= 0.0) != (margin[1:] >= 0.0))
-    found = []
-    for k in change[np.isfinite(margin[change]) & np.isfinite(margin[change + 1])]:
-        low, high = float(axis[k]), float(axis[k + 1])
-        for _ in range(HALVINGS):
-            middle = 0.5 * (low + high)
-            if (_at(scene, name, middle)[0] >= 0.0) == (margin[k] >= 0.0):
-                low = middle
-            else:
-                high = middle
-        _, _, phi, theta = _at(scene, name, high)
-        z = np.array([phi, theta, *plane.parts([high])])
-        # Where symmetry makes the fold a branching the Jacobian is singular and the bisection has to do.
-        polished = newton(fold(plane), z, reach=0.01)
-        z = z if polished is None else polished
-        p = point_at(plane, z[:, None])
-        residual = float(np.max(np.abs([*p.gradient, p.determinant])))
-        stable = float(p.hessian[0][0] + p.hessian[2][0]) > 0.0
-        angles = np.mod(z[:2] + np.pi, 2.0 * np.pi) - np.pi
-        value = float(plane.values(z[2:])[name])
-        found.append(
-            FoldPoint(value, float(angles[0]), float(angles[1]), "minimum" if stable else "maximum", residual)
-        )
-    return tuple(found)
+    plane = suited(Plane(scene, (name,), (float(axis[0]),), (float(axis[-1]),)))
+    points, reasons = [], []
+    for family in families(plane):
+        found = solutions(family.system, _alone(family.system))
+        folds, doubts = sifted(plane, found)
+        points += [_point(plane, curve.points[0], family.kind) for curve in folds]
+        points += [point for z in _together(found.open) if (point := _singular(plane, z)).residual < RESIDUAL]
+        reasons += doubts
+    return FoldPoints(sorted(points, key=lambda point: point.value), "; ".join(reasons))
 
 
-def _at(scene: Scene, name: str, value: float) -> tuple[float, float, float, float]:
-    columns = coefficient_columns(scene, {name: value})
-    row = np.array([[float(column) for column in columns]])
-    margin, symmetry, phi, theta = (float(array[0]) for array in margins(row))
-    return margin, symmetry, phi, theta
+def _alone(system: System) -> Callable[[Floats], Curve | None]:
+    def follow(z: Floats) -> Curve | None:
+        there = newton(system, z, reach=1e-3)
+        return None if there is None else Curve(there[None], np.zeros((1, z.size)), False)
+
+    return follow
+
+
+def _point(plane: Plane, z: Floats, kind: str) -> FoldPoint:
+    p = point_at(plane, z)
+    phi, theta = (float(np.mod(angle + np.pi, 2.0 * np.pi) - np.pi) for angle in (p.phi, p.theta))
+    value = float(plane.values(z[2:])[plane.names[0]])
+    return FoldPoint(value, phi, theta, merging(p), kind, p.residual)
+
+
+def _together(places: Floats) -> list[Floats]:
+    """Middles of places (n, 3) that lie together."""
+    middles = []
+    while len(places):
+        near = np.linalg.norm(apart(places, places[0]), axis=1) < TOGETHER
+        middles.append(places[0] + apart(places[near], places[0]).mean(axis=0))
+        places = places[~near]
+    return middles
+
+
+def _singular(plane: Plane, z: Floats) -> FoldPoint:
+    """The merging where the equations of a fold are singular, by its normal form."""
+    p = point_at(plane, z)
+    moved = fold(plane)(z)[1][:2, 2]
+    h11, h12, h22 = p.hessian
+    null = np.array([h12, -h11]) if abs(h11) > abs(h22) else np.array([h22, -h12])
+    along = abs(moved @ null) / (np.linalg.norm(null) * np.linalg.norm(moved))
+    flat = abs(p.third) < FLAT * p.size
+    kind = ("cusp" if flat else "fold") if along > FLAT else ("pitchfork" if flat else "transcritical")
+    return _point(plane, z, kind)

@@ -1,4 +1,4 @@
-"""Fold curves and cusps over two parameters, every one that a grid of points gives a sign of."""
+"""Fold curves, pitchfork curves and cusps over two parameters, all of them, with the proof."""
 
 from __future__ import annotations
 
@@ -7,26 +7,38 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
 
-from fastmech.atlas.axes import check_axis
-from fastmech.atlas.continuation import LONGEST, Curve, System, distance, newton, trace
-from fastmech.atlas.fold_seeds import fold_seeds, margins_at, settled
-from fastmech.atlas.systems import Plane, cusp, fold, point_at
+from fastmech.atlas.axes import check_axis, coefficient_columns, grid_coefficients
+from fastmech.atlas.continuation import LONGEST, Curve, newton, trace
+from fastmech.atlas.cover import TURNS, Found, apart, solutions, wrapped
+from fastmech.atlas.enclosure import System
+from fastmech.atlas.margin import margins
+from fastmech.atlas.systems import Plane, Point, cusp, families, point_at, suited
 from fastmech.errors import InputError
 from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
 
-#: A seed this near to a traced curve is explained by it: a tenth of the longest step.
-EXPLAINED = 0.1 * LONGEST
-
-#: Points after which no further curve is begun; the edges that are left count as unexplained.
+#: Points after which no further curve is begun.
 MOST_POINTS = 40_000
+
+#: Points whose margins are computed at a time, and bisections of an edge of the grid.
+PIECE, HALVINGS = 1 << 18, 24
+
+#: Scaled residual of a fold; solutions of the equations of a symmetry that are none have much larger ones.
+RESIDUAL = 1e-9
+
+#: How near to a side that it touches a curve ends.
+TOUCHING = 1e-9
+
+#: Third derivative over the loads at an end of a curve below which a cusp is looked for there.
+NEARLY = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
 class FoldCurve:
-    """A curve on which two equilibria merge; arrays over its points, in order."""
+    """A curve on which equilibria merge; arrays over its points, in order."""
 
     x: Floats  #: values of the first parameter
     y: Floats  #: values of the second one
@@ -34,7 +46,7 @@ class FoldCurve:
     theta: Floats  #: [rad]
     closed: bool  #: the last point is the first one
     merges: str  #: what merges with a saddle: ``minimum`` (a resting position disappears) or ``maximum``
-    branching: bool  #: by symmetry one equilibrium splits into three instead of two vanishing
+    kind: str  #: ``fold``: two vanish; ``pitchfork``: by symmetry one splits into three
     residual: float  #: largest scaled residual of gradient and Hessian's determinant on the curve
 
 
@@ -51,61 +63,78 @@ class CuspPoint:
 
 @dataclass(frozen=True, eq=False)
 class FoldSet:
-    """All folds found in a plane of two parameters."""
+    """The folds of a plane of two parameters."""
 
     names: tuple[str, str]
     curves: tuple[FoldCurve, ...]
     cusps: tuple[CuspPoint, ...]
+    complete: bool  #: it is proved that the rectangle holds no other curve
+    reason: str  #: why it is not; empty if it is
     crossings: int  #: edges of the grid between whose ends the number of equilibria changes
     unexplained: int  #: of these, how many no curve crosses
     unfinished: int  #: curves that end where they could not be followed any further
 
 
 def trace_folds(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike]) -> FoldSet:
-    """Fold curves of ``scene`` in the plane of two parameters, with their cusps.
+    """All fold curves of ``scene`` in a rectangle of two parameters, with their cusps.
 
-    The values are the grid that seeds the curves: wherever the number of equilibria changes between
-    neighbours there is a fold, which is located by bisection on the closed-form margin and, unless a curve
-    goes through it already, continued in both directions until it closes or leaves the rectangle.
+    They are found by branch and prune over positions and parameters (``fastmech.atlas.cover``), which proves
+    that none is missing; so the grid of the values does not matter. That every change of the number of
+    equilibria between neighbours of the grid is crossed by a curve is checked besides.
 
     Args:
         scene: gives every other parameter.
-        x, y: name and rising values of a parameter.
+        x, y: name and values of a parameter, rising or falling; the first and the last one are the ends.
 
     Raises:
-        InputError: an unknown or repeated name, values that do not rise or that the scene refuses.
+        InputError: an unknown or repeated name, values that neither rise nor fall or that the scene refuses.
     """
     axes = checked_plane(scene, x, y)
-    plane = plane_of(scene, axes)
-    seeds, symmetry = fold_seeds(plane, axes)
+    plane = suited(plane_of(scene, axes))
     lines: list[Curve] = []
-    branches: list[bool] = []
-    unexplained = 0
-    for seed in seeds:
-        if any(distance(line.points, seed, apart)[0] < EXPLAINED for line in lines):
-            continue
-        if sum(len(line.points) for line in lines) > MOST_POINTS:
-            unexplained += 1
-            continue
-        special = symmetry.branching(plane, seed)
-        line = trace_branching(plane, seed, *special) if special else trace_fold(plane, seed)
-        if line is None:
-            unexplained += 1
-        else:
-            lines.append(line)
-            branches.append(special is not None)
+    kinds: list[str] = []
+    reasons: list[str] = []
+    followers = []
+    for family in families(plane):
+        follow = follower(family.system, lines)
+        found = solutions(family.system, follow)
+        folds, doubts = sifted(plane, found)
+        lines += folds
+        kinds += [family.kind] * len(folds)
+        reasons += doubts
+        followers.append((family.kind, follow))
+    crossings = crossed_edges(plane, axes)
+    missed, unexplained = crossings[away_from(lines, crossings)], 0
+    while len(missed):
+        # What the search could not prove is searched for from the grid.
+        for kind, follow in followers:
+            line = follow(missed[0], 0.05)
+            if line is not None and point_at(plane, line.points.T).residual < RESIDUAL:
+                lines.append(line)
+                kinds.append(kind)
+        left = away_from(lines, missed)
+        unexplained += int(left[0])
+        left[0] = False
+        missed = missed[left]
     cusps: list[Floats] = []
     curves = []
-    for line, branch in zip(lines, branches, strict=True):
-        points = line.points if branch else with_cusps(plane, line, cusps)
-        curves.append(fold_curve(plane, points, line.closed, branch))
+    for line, kind in zip(lines, kinds, strict=True):
+        points = with_cusps(plane, line, cusps) if kind == "fold" else line.points
+        curves.append(fold_curve(plane, points, line.closed, kind))
+    unfinished = sum(not line.finished for line in lines)
+    if unexplained:
+        reasons.append(f"{unexplained} of {len(crossings)} changes of the count lie on no curve")
+    if unfinished:
+        reasons.append(f"{unfinished} curves could not be followed to their ends")
     return FoldSet(
         (x[0], y[0]),
         tuple(curves),
         tuple(cusp_point(plane, z) for z in cusps),
-        len(seeds),
+        not reasons,
+        "; ".join(reasons),
+        len(crossings),
         unexplained,
-        sum(not line.finished for line in lines),
+        unfinished,
     )
 
 
@@ -117,15 +146,7 @@ def checked_plane(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLik
     """
     if x[0] == y[0]:
         raise InputError(f"axes: {x[0]} is given twice; two different parameters are needed")
-    axes = {name: check_axis(scene, name, values) for name, values in (x, y)}
-    for name, values in axes.items():
-        if name == "alpha":
-            raise InputError(
-                "axes.alpha: equilibria do not depend on how fast a force decays; choose another"
-            )
-        if values.size < 2 or not (np.diff(values) > 0.0).all():
-            raise InputError(f"axes.{name}: must be two or more values that rise")
-    return axes
+    return {name: check_axis(scene, name, values) for name, values in (x, y)}
 
 
 def plane_of(scene: Scene, axes: dict[str, Floats]) -> Plane:
@@ -138,29 +159,51 @@ def plane_of(scene: Scene, axes: dict[str, Floats]) -> Plane:
     )
 
 
-def apart(a: Floats, b: Floats) -> Floats:
-    """Difference of points (phi, theta, u, v), angles the short way."""
-    gap = a - b
-    gap[..., :2] = np.mod(gap[..., :2] + np.pi, 2.0 * np.pi) - np.pi
-    return gap
+def follower(system: System, before: list[Curve]) -> Callable[..., Curve | None]:
+    """Follows a system's curves within the rectangle, until all have ``MOST_POINTS``."""
+    total = sum(len(line.points) for line in before)
+
+    def follow(z: Floats, reach: float = 1e-3) -> Curve | None:
+        nonlocal total
+        start = newton(system, z, reach)
+        if start is None or not inside(start) or total > MOST_POINTS:
+            return None
+        line = trace(system, start, inside, finish_on_edge(system), apart)
+        total += len(line.points)
+        return line
+
+    return follow
 
 
-def trace_fold(plane: Plane, seed: Floats) -> Curve | None:
-    """The fold curve through a seed, None if Newton's method finds none there."""
-    equations = fold(plane)
-    start = newton(equations, seed, reach=0.05)
-    return None if start is None else trace(equations, start, inside, finish_on_edge(equations), apart)
+def sifted(plane: Plane, found: Found) -> tuple[list[Curve], list[str]]:
+    """The curves of folds among solutions of a family's equations, and why these may not be all, in words.
+
+    The equations of a symmetry have other solutions too, and where equilibria are not isolated every place
+    is one.
+    """
+    folds, doubts = [], []
+    for line in found.curves:
+        p = point_at(plane, line.points.T)
+        if not np.any(p.isolated):
+            doubts = [f"equilibria are not isolated near {told(plane, line.points[0])}"]
+        elif p.residual < RESIDUAL:
+            folds.append(line)
+    if len(found.open):
+        p, place = point_at(plane, found.open[0]), told(plane, found.open[0])
+        if not p.isolated:
+            doubts = [f"equilibria are not isolated near {place}"]
+        elif found.cut_short:
+            doubts.append(f"the search was cut short; not proved near {place} and elsewhere")
+        else:
+            doubts.append(f"not proved near {place}: folds meet or touch there")
+    return folds, doubts
 
 
-def trace_branching(plane: Plane, seed: Floats, equations: System, largest: int) -> Curve | None:
-    """The branching curve through a seed, None if Newton's method finds none there."""
-    start = newton(equations, seed[2:], reach=0.05)
-    if start is None:
-        return None
-    flat = trace(equations, start, inside, finish_on_edge(equations), lambda a, b: a - b)
-    _, _, phi, theta = margins_at(plane, flat.points)
-    angles = settled(plane, np.unwrap(np.column_stack([phi, theta]), axis=0), flat.points, largest)
-    return Curve(np.column_stack([angles, flat.points]), flat.tangents, flat.closed, flat.finished)
+def told(plane: Plane, z: Floats) -> str:
+    """The parameters at a place, in words."""
+    units = plane.scene.described()
+    values = plane.values(z[2:]).items()
+    return ", ".join(f"{name} = {value:.6g} {units[name][1]}" for name, value in values)
 
 
 def inside(z: Floats) -> bool:
@@ -183,6 +226,12 @@ def finish_on_edge(equations: System) -> Callable[[Floats, Floats], Floats]:
             if end is not None and inside(np.where(np.arange(last.size) == last.size + k, side, end)):
                 end[k] = side
                 return end
+        # Where the curve only touches the side its end is halved down to rounding.
+        while np.linalg.norm(beyond - last) > TOUCHING:
+            middle = newton(equations, 0.5 * (last + beyond), LONGEST)
+            if middle is None or np.linalg.norm(middle - last) > 0.9 * np.linalg.norm(beyond - last):
+                break
+            last, beyond = (middle, beyond) if inside(middle) else (last, middle)
         return last
 
     return finish
@@ -191,37 +240,94 @@ def finish_on_edge(equations: System) -> Callable[[Floats, Floats], Floats]:
 def with_cusps(plane: Plane, line: Curve, found: list[Floats]) -> Floats:
     """The curve's points with its cusps among them; new ones are added to ``found``.
 
-    At a cusp the curve stands still in the plane of the parameters and turns back.
+    At a cusp the pulls change their sign, or two of the three xk (see ``fastmech.atlas.systems``).
     """
-    t = line.tangents[:, 2:]
-    pieces = [line.points[:1]]
-    for k in range(len(line.points) - 1):
-        if t[k] @ t[k + 1] < 0.0:
-            middle = 0.5 * (line.points[k] + line.points[k + 1])
-            z = newton(cusp(plane), middle, reach=2.0 * LONGEST)
-            if z is not None:
-                pieces.append(z[None])
-                if inside(z) and all(np.linalg.norm(apart(z, other)) > 1e-6 for other in found):
-                    found.append(z)
-        pieces.append(line.points[k + 1 : k + 2])
-    return np.concatenate(pieces)
+    p = point_at(plane, line.points.T)
+    sides = np.array([*p.bent, p.pulls[2]]) >= 0.0
+    turned = sides[:, 1:] != sides[:, :-1]
+    tried: list[tuple[int, Floats, int | None]] = []
+    for k in np.flatnonzero(turned.any(axis=0)):
+        middle = 0.5 * (line.points[k] + line.points[k + 1])
+        if turned[3, k]:
+            tried.append((int(k), middle, None))
+        if turned[:3, k].sum() == 2:
+            tried.append((int(k), middle, int(np.argmin(turned[:3, k]))))
+    if not line.closed:
+        nearly = np.abs(p.third / p.size) < NEARLY
+        ends = [k for k in (0, len(line.points) - 1) if nearly[k]]
+        tried += [(k, line.points[k], other) for k in ends for other in (None, 0, 1, 2)]
+    places, points = [], [line.points[:0]]
+    for k, near, other in tried:
+        z = newton(cusp(plane, other), near, reach=2.0 * LONGEST)
+        if z is None or np.abs(z[2:] - np.clip(z[2:], 0.0, 1.0)).max() > 1e-9:
+            continue
+        z[2:] = np.clip(z[2:], 0.0, 1.0)
+        if all(np.linalg.norm(apart(z, one)) > 1e-6 for one in found):
+            found.append(z)
+        if 0 < k + 1 < len(line.points) and not np.array_equal(near, line.points[k]):
+            points.append(z[None])
+            places.append(k + 1)
+    return np.insert(line.points, places, np.concatenate(points), axis=0)
 
 
-def fold_curve(plane: Plane, points: Floats, closed: bool, symmetric: bool) -> FoldCurve:
+def fold_curve(plane: Plane, points: Floats, closed: bool, kind: str) -> FoldCurve:
     """A traced curve in the parameters' units."""
     p = point_at(plane, points.T)
     values = plane.values(points[:, 2:].T)
     x, y = (np.asarray(values[name]) for name in plane.names)
-    residual = np.max(np.abs([*p.gradient, p.determinant]))
-    stable = float(np.median(p.hessian[0] + p.hessian[2])) > 0.0
-    phi, theta = (np.mod(points[:, k] + np.pi, 2.0 * np.pi) - np.pi for k in (0, 1))
-    return FoldCurve(x, y, phi, theta, closed, "minimum" if stable else "maximum", symmetric, float(residual))
+    phi, theta = (np.mod(angle + np.pi, 2.0 * np.pi) - np.pi for angle in (p.phi, p.theta))
+    return FoldCurve(x, y, phi, theta, closed, merging(p), kind, p.residual)
+
+
+def merging(p: Point) -> str:
+    """What merges with a saddle at folds."""
+    return "minimum" if float(np.median(p.hessian[0] + p.hessian[2])) > 0.0 else "maximum"
 
 
 def cusp_point(plane: Plane, z: Floats) -> CuspPoint:
     """A cusp in the parameters' units."""
-    p = point_at(plane, z[:, None])
-    residual = float(np.max(np.abs([*p.gradient, p.determinant, p.third])))
+    p = point_at(plane, z)
     x, y = (float(value) for value in plane.values(z[2:]).values())
-    phi, theta = np.mod(z[:2] + np.pi, 2.0 * np.pi) - np.pi
-    return CuspPoint(x, y, float(phi), float(theta), residual)
+    phi, theta = (np.mod(angle + np.pi, 2.0 * np.pi) - np.pi for angle in (p.phi, p.theta))
+    return CuspPoint(x, y, float(phi), float(theta), max(p.residual, float(np.abs(p.third / p.size))))
+
+
+def crossed_edges(plane: Plane, axes: dict[str, Floats]) -> Floats:
+    """Folds (n, 4) on the edges of the grid along which the number of equilibria changes.
+
+    They are located by bisection on the closed-form margin to the fold.
+    """
+    (x, first), (y, second) = axes.items()
+    six = np.empty((first.size, second.size))
+    planes = max(1, PIECE // second.size)
+    for k in range(0, first.size, planes):
+        part = margins(grid_coefficients(plane.scene, {x: first[k : k + planes], y: second})[0])[0]
+        six[k : k + planes] = np.where(np.isnan(part), np.nan, part >= 0.0).reshape(-1, second.size)
+    grid = np.stack(np.meshgrid(first, second, indexing="ij"), axis=-1)
+    ends = []
+    every, but_last, but_first = slice(None), slice(None, -1), slice(1, None)
+    for one, two in (((but_last,), (but_first,)), ((every, but_last), (every, but_first))):
+        change = np.abs(six[one] - six[two]) == 1.0
+        ends.append(np.stack([grid[one][change], grid[two][change], six[one][change][:, None] * [1.0, 1.0]]))
+    low, high, side = np.concatenate(ends, axis=1)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        same = (_margins_at(plane, middle)[0] >= 0.0)[:, None] == (side > 0.5)
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    _, _, phi, theta = _margins_at(plane, high)
+    return np.column_stack([phi, theta + phi if plane.sheared else theta, plane.parts(high)])
+
+
+def away_from(lines: list[Curve], places: Floats) -> NDArray[np.bool_]:
+    """Which places (n, 4) lie on none of the curves."""
+    if not len(places) or not lines:
+        return np.ones(len(places), dtype=bool)
+    tree = cKDTree(wrapped(np.concatenate([line.points for line in lines])), boxsize=TURNS)
+    away: Floats = tree.query(wrapped(places))[0]
+    return away > LONGEST
+
+
+def _margins_at(plane: Plane, values: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    columns = coefficient_columns(plane.scene, dict(zip(plane.names, values.T, strict=True)))
+    rows = [np.broadcast_to(np.asarray(column, dtype=np.float64), len(values)) for column in columns]
+    return margins(np.ascontiguousarray(np.stack(rows, axis=1)))

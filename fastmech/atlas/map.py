@@ -28,6 +28,9 @@ BLOCK = 4096
 #: Points that are labelled at a time while the next ones are solved.
 SLAB = 65536
 
+#: Numbers of 8 bytes that a map holds of every point, its sheets joined.
+POINT_NUMBERS = 132
+
 Codes = NDArray[np.int8]
 
 
@@ -117,11 +120,18 @@ def map_equilibria(
         progress: called in the calling thread with the number of points finished since its last call.
 
     Raises:
-        InputError: wrong number of axes, an unknown name, or a value that the scene refuses.
+        InputError: wrong number of axes, an unknown name, values that neither rise nor fall throughout or
+            that the scene refuses, or more points than memory holds.
     """
     checks.progress_function(progress, "points")
     checked = check_axes(scene, axes)
     grid = tuple(len(values) for values in checked.values())
+    checks.memory(
+        math.prod(grid) * POINT_NUMBERS,
+        1,
+        f"axes: {math.prod(grid):.3g} points",
+        'fewer, or in parts for files: fastmech run, kind = "equilibrium_map"',
+    )
     builder = SheetBuilder(scene, checked)
     whole = Slab.empty(math.prod(grid))
     for _ in solve_in_slabs(scene, checked, builder, whole.rows, wells, threads, progress):
@@ -212,20 +222,22 @@ def solve_block(
     )  # fmt: skip
     out.count_stable[:] = np.count_nonzero(out.morse_index == 0, axis=1)
     assess(
-        *places, out.radius, out.count,
+        *places, out.radius, out.morse_index, out.count,
         out.hessian, out.eigenvalues, out.frequency, out.decay_time, out.verdict,
     )  # fmt: skip
     coincidences(*places, out.radius, out.morse_index, out.count, out.outcome, out.coincidence)
     limits = out.shock_limit_m1, out.shock_limit_m2, out.shock_limit_m3
+    for array in (out.depth, *limits):
+        array[:] = np.nan
     if wells:
         barriers(*places, out.energy, out.morse_index, out.count, out.outcome, out.depth)
         out.depth[:] = out.depth - out.energy
+        known = np.nonzero(np.isfinite(out.depth))
+        wells_at = coefficients[known[0]], out.phi[known], out.theta[known], out.depth[known]
+        masses = mass[known[0]], weight[known[0]]
         for on, limit in zip(POINTS, limits, strict=True):
-            limit[:] = least_impulses(*places, out.depth, np.stack([mass, weight], axis=1), on)
+            limit[known] = least_impulses(*wells_at, masses, on)
         out.depth[:] = out.depth * weight[:, None]
-    else:
-        for array in (out.depth, *limits):
-            array[:] = np.nan
     with np.errstate(divide="ignore"):
         np.divide(1.0, out.decay_time, out=out.decay_time)
     out.energy[:] = out.energy * weight[:, None] + constant[:, None]

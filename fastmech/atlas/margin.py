@@ -38,3 +38,10 @@ def fold_margins(coefficients: Floats, margin: Floats, symmetry: Floats, phi: Fl
         if sign < 0.0:
             d += np.pi
         phi[row], theta[row] = angles(p, n, d, sign, sign)
+
+
+def margins(coefficients: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Margin, symmetry, phi and theta of rows of reduced coefficients; see ``fold_margins``."""
+    out = np.empty((4, len(coefficients)))
+    fold_margins(coefficients, *out)
+    return out[0], out[1], out[2], out[3]

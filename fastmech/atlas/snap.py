@@ -1,143 +1,304 @@
-"""The load at which the present resting position disappears."""
+"""The load, or any other parameter's value, at which the present resting position ends."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.atlas.continuation import newton, tangent_at
+from fastmech.atlas.continuation import System, newton, tangent_at
 from fastmech.atlas.systems import Plane, fold, point_at, rest
-from fastmech.equilibria.find import Equilibrium, find_equilibria
-from fastmech.errors import InputError
-from fastmech.scene import Scene
+from fastmech.equilibria.find import Equilibria, Equilibrium, find_equilibria
+from fastmech.errors import InputError, shown
+from fastmech.scene import Scene, nearest
+from fastmech.stability.arguments import require_scene
 
 Floats = NDArray[np.float64]
 
-#: Longest step along the branch [rad, and parts of the range].
-STEP = 0.02
+#: Longest step along the branch [rad, and parts of the range], and the shortest.
+STEP, SHORTEST = 0.02, 1e-9
+
+#: How far past a branch that turns back its successor is looked for [parts of the range].
+PAST = 2e-3
+
+#: Parameters that move equilibria; the others (m3, beta, alpha) do not.
+MOVING = ("F0", "c1", "c2", "m1", "m2", "l", "g")
+
+#: A position that is given by its angles is the stable one within so many rad.
+NEAR = 0.1
+
+#: A range by default ends so many times the present value (or one as large as the weights') above zero.
+FAR = 100.0
+
+#: Part of the largest singular value below which the fold's equations are singular: the branch goes on there.
+CROSSING = 1e-3
 
 
 @dataclass(frozen=True)
 class Snap:
-    """Loads at which a resting position disappears; forces in N, angles in rad."""
+    """Values of a parameter at which a resting position ends; angles in rad."""
 
-    phi: float  #: the position at the present load
+    parameter: str
+    unit: str  #: of the parameter
+    phi: float  #: the position at the present value
     theta: float
-    force: float  #: the present load
-    below: float | None  #: load at which it disappears when the load is lowered; None: at no load
-    above: float | None  #: load at which it disappears when the load is raised; None: at no load
-    searched: tuple[float, float]  #: loads that were searched
+    value: float  #: the present value
+    below: float | None  #: value at which it ends when the parameter is lowered; None: at no value
+    above: float | None  #: value at which it ends when the parameter is raised; None: at no value
+    unstable: tuple[bool, bool]  #: whether it turns unstable there, below and above, and does not disappear
+    searched: tuple[float, float]  #: values that were searched
     exhaustive: bool  #: beyond the range there is no fold, so None means never
 
     @property
     def answer(self) -> str:
-        """Where it disappears, in words."""
-        loads = [f"{load:.6g} N" for load in (self.below, self.above) if load is not None]
-        gone = " and at ".join(loads) or ("no load whatever" if self.exhaustive else "no load in that range")
+        """Where it ends, in words."""
+        ends = [
+            f"{'turns unstable' if unstable else 'disappears'} at {value:.6g} {self.unit}"
+            for value, unstable in zip((self.below, self.above), self.unstable, strict=True)
+            if value is not None
+        ]
+        nowhere = "no load whatever" if self.parameter == "F0" else f"no {self.parameter} whatever"
+        if not self.exhaustive:
+            nowhere = (
+                "no load in that range" if self.parameter == "F0" else f"no {self.parameter} in that range"
+            )
         low, high = self.searched
         beyond = "; no position merges with another beyond" if self.exhaustive else ""
-        return f"disappears at {gone} (searched from {low:.6g} to {high:.6g} N{beyond})"
+        return (
+            f"{' and '.join(ends) or f'disappears at {nowhere}'} "
+            f"(searched from {low:.6g} to {high:.6g} {self.unit}{beyond})"
+        )
 
     @property
     def sentence(self) -> str:
-        """The position, its load and the answer in words."""
-        return f"the position ({self.phi:z.4f}, {self.theta:z.4f}) rad at {self.force:g} N {self.answer}"
+        """The position, the present value and the answer in words."""
+        at = (
+            f"{self.value:g} {self.unit}"
+            if self.parameter == "F0"
+            else f"{self.parameter} = {self.value:g} {self.unit}"
+        )
+        return f"the position ({self.phi:z.4f}, {self.theta:z.4f}) rad at {at} {self.answer}"
 
 
 def find_snap(
     scene: Scene,
-    equilibrium: Equilibrium | None = None,
+    equilibrium: Equilibrium | Sequence[float] | None = None,
     searched: tuple[float, float] | None = None,
+    *,
+    parameter: str = "F0",
 ) -> Snap:
-    """The constant loads F0, below and above the present one, at which a stable position disappears.
+    """The values of a parameter, below and above the present one, at which a stable position ends.
 
-    The position is followed as the load changes, until it merges with a saddle. The present load is F0 where
-    alpha = 0 and 0 where alpha > 0, as in ``find_equilibria``; the loads searched are constant ones. (A map
-    or a search for folds over F0 asks for alpha = 0, since there F0 would be no load at all.)
+    The position is followed as the parameter changes, until it merges with a saddle and disappears, or passes
+    through other equilibria and is unstable from there on (as symmetric ones do). The present load is F0
+    where alpha = 0 and 0 where alpha > 0, as in ``find_equilibria``; the loads searched are constant ones.
+    (A map or a search for folds over F0 asks for alpha = 0, since there F0 would be no load at all.)
 
     Args:
         scene: the mechanism at its present load.
-        equilibrium: a stable one of the scene; by default the deepest.
-        searched: loads to search [N]; by default all at which a fold is possible. With |F| >= 2 c1 l there
-            is none: then A1/A2 + A1/A3 <= 1 for the amplitudes of ``fastmech.equilibria.balance``.
+        equilibrium: a stable one of the scene, or about where it is, (phi, theta) [rad]; by default the
+            deepest.
+        searched: values to search; by default all at which a fold is possible, see ``fold_free``, but not
+            more than 100 times the present ones.
+        parameter: one of F0, c1, c2, m1, m2, l, g; SI units.
 
     Raises:
-        InputError: the equilibrium is not stable or not one of the scene, there is no stable one, or the
-            range does not hold the present load.
+        InputError: the equilibrium is not stable or not one of the scene, there is no stable one, the
+            parameter moves no equilibrium, or the range does not hold its present value.
     """
+    require_scene(scene)
+    if parameter not in MOVING:
+        hint = (
+            nearest(parameter, list(MOVING))
+            if isinstance(parameter, str)
+            else f"allowed: {', '.join(MOVING)}"
+        )
+        raise InputError(f"parameter = {shown(parameter)}: must be one that moves equilibria; {hint}")
     found = find_equilibria(scene)
-    present = found.force
-    everywhere = 2.0 * scene.c1 * scene.l
-    limit = 1.01 * max(everywhere, abs(present)) + 1.0
-    low, high = (-limit, limit) if searched is None else _range(searched, present)
-    chosen = _chosen(found.items, equilibrium)
-    plane = Plane(scene.replace(F0=present, alpha=0.0), ("F0",), (low,), (high,))
+    held = scene.replace(F0=found.force, alpha=0.0)
+    chosen = stable_at(found, equilibrium)
+    present, unit, _ = held.described()[parameter]
+    below, above = fold_free(held, parameter)
+    if searched is None:
+        far = FAR * max(abs(present), _natural(held, parameter))
+        high = min(1.01 * max(above, abs(present)) + (parameter == "F0"), max(far, 1.01 * abs(present)))
+        low = -high if parameter == "F0" else 1e-6 * present if below > 0.0 else 0.0
+    else:
+        low, high = _range(held, searched, parameter, f"{present:g} {unit}")
+    plane = Plane(held, (parameter,), (low,), (high,))
     start = np.array([chosen.phi, chosen.theta, *plane.parts([present])])
+    ends = [_ending(plane, start, direction) for direction in (-1.0, 1.0)]
     return Snap(
+        parameter,
+        unit,
         chosen.phi,
         chosen.theta,
         present,
-        _merging(plane, start, -1.0),
-        _merging(plane, start, 1.0),
+        ends[0][0],
+        ends[1][0],
+        (ends[0][1], ends[1][1]),
         (low, high),
-        low <= -everywhere and high >= everywhere,
+        low <= below and high >= above,
     )
 
 
-def _range(searched: object, present: float) -> tuple[float, float]:
+def fold_free(scene: Scene, parameter: str) -> tuple[float, float]:
+    """Values of a parameter beyond which, on either side, the scene has no fold; the force is constant.
+
+    With the amplitudes of ``fastmech.equilibria.balance`` over m2 l, B1 = |((m1 + m2) g - c2 l, F)|,
+    B2 = |(m2 g, F)| and B3 = c1 l, there is none where one of 1/B1, 1/B2, 1/B3 is at least the sum of the
+    others. The lower value is 0 where the parameter may be 0, and more than 0 where it may not: what is
+    between is for the search.
+    """
+    weight, pull, spring = (scene.m1 + scene.m2) * scene.g, scene.c2 * scene.l, scene.c1 * scene.l
+    one, two = math.hypot(weight - pull, scene.F0), math.hypot(scene.m2 * scene.g, scene.F0)
+
+    def apart(a: float, b: float) -> float:
+        """The third amplitude from which on its inverse is less than the difference of the others'."""
+        return a * b / abs(a - b) if a != b else math.inf
+
+    def over(a: float, b: float) -> float:
+        return a / b if b > 0.0 else math.inf if a > 0.0 else 0.0
+
+    if parameter == "F0":
+        return -2.0 * spring, 2.0 * spring
+    if parameter == "c1":
+        return 0.0, apart(one, two) / scene.l
+    if parameter == "c2":
+        return 0.0, (weight + apart(two, spring)) / scene.l
+    if parameter == "g":
+        return 0.0, max(over(2.0 * spring, scene.m2), over(pull + 2.0 * spring, scene.m1 + scene.m2))
+    tiny = np.nextafter(0.0, 1.0)
+    if parameter == "m1":
+        return tiny, over(pull + apart(two, spring), scene.g) - scene.m2
+    if parameter == "m2":
+        return tiny, max(over(2.0 * spring, scene.g), over(pull + 2.0 * spring, scene.g) - scene.m1)
+    return tiny, max(over(2.0 * two, scene.c1), over(weight + 2.0 * two, scene.c2))
+
+
+def _natural(scene: Scene, parameter: str) -> float:
+    """A value of a parameter that may be 0 at which it matters as much as the weights, or the spring."""
+    weight = (scene.m1 + scene.m2) * scene.g
+    return {"F0": 2.0 * scene.c1 * scene.l, "c1": weight / scene.l, "c2": weight / scene.l, "g": 10.0}.get(
+        parameter, 0.0
+    )
+
+
+def _range(scene: Scene, searched: object, parameter: str, present: str) -> tuple[float, float]:
     try:
         ends = np.asarray(searched)
     except ValueError:
         ends = np.array(None)
     if ends.dtype.kind in "iuf" and ends.shape == (2,) and np.isfinite(ends).all():
         low, high = (float(end) for end in ends)
-        if low < high and low <= present <= high:
+        if low < high and low <= getattr(scene, parameter) <= high:
+            for end in (low, high):
+                scene.replace(**{parameter: end})
             return low, high
-    raise InputError(f"searched = {searched!r}: must be a range of forces [N] that holds {present:g} N")
+    raise InputError(f"searched = {shown(searched)}: must be a range of {parameter} that holds {present}")
 
 
-def _chosen(items: tuple[Equilibrium, ...], wanted: Equilibrium | None) -> Equilibrium:
-    stable = [item for item in items if item.morse_index == 0]
+def stable_at(found: Equilibria, wanted: Equilibrium | Sequence[float] | None) -> Equilibrium:
+    """The stable equilibrium that is given, or that is about (phi, theta) [rad]; by default the deepest.
+
+    Raises:
+        InputError: it is none of them, or not stable.
+    """
+    stable = [item for item in found if item.morse_index == 0]
     if not stable:
         raise InputError("equilibrium: the scene has no stable one")
     if wanted is None:
         return stable[0]
-    if not isinstance(wanted, Equilibrium):
-        raise InputError(f"equilibrium = {wanted!r}: must be one that find_equilibria gives")
-    for item in stable:
-        if math.hypot(item.phi - wanted.phi, item.theta - wanted.theta) <= 1e-6:
-            return item
-    raise InputError(
-        f"equilibrium = ({wanted.phi:.6g}, {wanted.theta:.6g}): must be a stable one of the scene at its load"
-    )
+    if isinstance(wanted, Equilibrium):
+        chosen = found[found.index_of(wanted)]
+        if chosen.morse_index == 0:
+            return chosen
+        raise InputError(
+            f"equilibrium = ({chosen.phi:.6g}, {chosen.theta:.6g}) rad: "
+            f"is a {chosen.kind}, must be a stable one"
+        )
+    try:
+        phi, theta = (float(angle) for angle in wanted)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"equilibrium = {shown(wanted)}: must be one of fastmech.find_equilibria, or (phi, theta) in rad"
+        ) from None
+    away = [math.hypot(2 * math.sin((e.phi - phi) / 2), 2 * math.sin((e.theta - theta) / 2)) for e in stable]
+    if min(away) <= NEAR:
+        return stable[away.index(min(away))]
+    places = ", ".join(f"({e.phi:.4f}, {e.theta:.4f})" for e in stable)
+    raise InputError(f"equilibrium = ({phi:g}, {theta:g}) rad: is near no stable one; they are at {places}")
 
 
-def _merging(plane: Plane, start: Floats, direction: float) -> float | None:
-    """Load at which the branch from ``start`` first turns back, None if it leaves the range before.
+def _ending(plane: Plane, start: Floats, direction: float) -> tuple[float | None, bool]:
+    """Value at which the branch from ``start`` ceases to be stable, and whether it goes on unstable.
 
-    A minimum can always be followed a little further. Where no step succeeds, the branch has come as near to
-    its end as a step is short, and what Newton's method cannot polish there is that end.
+    None if it leaves the range before. A minimum can always be followed a little further. Where no step
+    succeeds, the branch has come as near to its end as a step is short, and what Newton's method cannot
+    polish there is that end. Where a symmetric position takes over from two tilted ones, their branch turns
+    back and is stable on both sides: the symmetric one is followed on.
     """
-    equations = rest(plane)
+    equations, folds = rest(plane), fold(plane)
+    along = np.array([0.0, 0.0, direction])
     z, step = start, 0.25 * STEP
     tangent = tangent_at(equations, z)
-    tangent = tangent * math.copysign(1.0, tangent[2] * direction)
-    while 0.0 <= z[2] <= 1.0 and step > 1e-9:
+    tangent = tangent * math.copysign(1.0, tangent @ along)
+    while step > SHORTEST:
         there = newton(equations, z + step * tangent, 0.3 * step, tangent)
         ahead = None if there is None else tangent_at(equations, there)
-        if there is None or ahead is None or abs(ahead @ tangent) < 0.985:
+        if there is None or ahead is None or abs(ahead @ tangent) < 0.985 or not 0.0 <= there[2] <= 1.0:
             step *= 0.5
             continue
         ahead = ahead * math.copysign(1.0, ahead @ tangent)
-        if float(point_at(plane, there[:, None]).determinant[0]) <= 0.0:
-            turn = newton(fold(plane), 0.5 * (z + there), 4.0 * step)
-            if turn is not None:
-                load = float(plane.values(turn[2:])["F0"])
-                return load if plane.low[0] <= load <= plane.high[0] else None
-            step *= 0.5
-            continue
+        unstable = _determinant(plane, there) <= 0.0
+        if unstable or ahead @ along < 0.0:
+            turn = newton(folds, 0.5 * (z + there), 4.0 * step) if unstable else z
+            if turn is None or (not unstable and step > PAST):
+                step *= 0.5
+                continue
+            z = turn
+            beyond = _successor(plane, equations, z, direction) if _crosses(folds, z) else None
+            if beyond is None:
+                break
+            there, ahead = beyond, tangent_at(equations, beyond)
+            ahead = ahead * math.copysign(1.0, ahead @ along)
         z, tangent, step = there, ahead, min(STEP, 1.5 * step)
-    return float(plane.values(z[2:])["F0"]) if 0.0 <= z[2] <= 1.0 else None
+    if min(z[2], 1.0 - z[2]) < 10.0 * SHORTEST:
+        return None, False
+    crosses = _crosses(folds, z)
+    if crosses:
+        # Newton's method stops short of where branches meet; the determinant passes through zero there.
+        after, before = _determinant(plane, z + PAST * tangent), _determinant(plane, z - PAST * tangent)
+        rest_of_it = 2.0 * PAST * _determinant(plane, z) / (before - after) if before != after else math.inf
+        z = z + rest_of_it * tangent if abs(rest_of_it) < 0.01 * PAST else z
+    return float(plane.values(z[2:])[plane.names[0]]), crosses
+
+
+def _successor(plane: Plane, equations: System, z: Floats, direction: float) -> Floats | None:
+    """The stable position a little past z that Newton's method finds from there, if it does.
+
+    So near to where equilibria meet, rounding in the gradient moves them by far more than rounding.
+    """
+    z, far = z.copy(), math.inf
+    z[2] = min(max(z[2] + PAST * direction, 0.0), 1.0)
+    for _ in range(30):
+        value, jacobian = equations(z)
+        if not np.isfinite(value).all():
+            return None
+        step = np.linalg.lstsq(jacobian[:, :2], value)[0]
+        z[:2] -= step
+        far = float(np.linalg.norm(step))
+    return z if far < 1e-8 and _determinant(plane, z) > 0.0 else None
+
+
+def _crosses(folds: System, z: Floats) -> bool:
+    """Whether other equilibria pass through an end, so that there is more than one branch."""
+    sizes = np.linalg.svd(folds(z)[1], compute_uv=False)
+    return bool(sizes[-1] < CROSSING * sizes[0])
+
+
+def _determinant(plane: Plane, z: Floats) -> float:
+    return float(point_at(plane, z[:, None]).determinant[0])

@@ -73,23 +73,22 @@ def barriers(
 
 
 def least_impulses(
-    coefficients: Floats, phi: Floats, theta: Floats, depth: Floats, mass: Floats, on: str
+    coefficients: Floats, phi: Floats, theta: Floats, depth: Floats, masses: tuple[Floats, Floats], on: str
 ) -> Floats:
-    """Impulse on a point [N s] below which no blow on the resting mechanism leaves the well, (n, 6).
+    """Impulse on a point [N s] below which no blow on the resting mechanism leaves its well, (n,).
 
     Energy does not grow under a constant force. So no blow that gives less than the well's depth leaves, and
     none gives more than along the direction in which the point moves most easily. What rounding may make of
-    the depth is taken off. NaN where the depth is, and for M3 at its dead centres.
+    the depth is taken off. NaN for M3 at its dead centres.
 
     Args:
         coefficients: (n, 8) rows as ``solve`` takes them.
-        phi, theta: (n, 6) [rad].
-        depth: (n, 6), over m2 l^2 [1/s^2].
-        mass: (n, 2) of m2 [kg] and m2 l^2 [kg m2].
+        phi, theta: minima (n,) [rad].
+        depth: (n,), over m2 l^2 [1/s^2].
+        masses: m2 [kg] and m2 l^2 [kg m2], (n,).
         on: one of :data:`fastmech.mechanism.impulse.POINTS`.
     """
-    _, _, lift, spring, gravity, force, *_ = np.abs(coefficients.T)
-    rounding = ROUNDING * (lift + spring + gravity + 2.0 * force)
-    easiest = mobility(mass[:, :1], coefficients[:, :1], coefficients[:, 1:2], phi, theta, on).greatest
-    sure = np.maximum(depth - rounding[:, None], 0.0) * mass[:, 1:]
-    return impulse_for(sure, easiest)
+    mass, slider, lift, spring, gravity, force, *_ = coefficients.T
+    rounding = ROUNDING * (np.abs(lift) + spring + gravity + 2.0 * np.abs(force))
+    easiest = mobility(masses[0], mass, slider, phi, theta, on).greatest
+    return impulse_for(np.maximum(depth - rounding, 0.0) * masses[1], easiest)

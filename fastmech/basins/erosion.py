@@ -20,14 +20,14 @@ from fastmech.basins.label import labels_of as labels_by_capture
 from fastmech.basins.label import require_damper
 from fastmech.basins.measures.fractions import basin_stability
 from fastmech.basins.measures.integrity import integrity
-from fastmech.basins.measures.labels import Floats, Integers, check_point
-from fastmech.basins.measures.norm import kinetic_norm, norm_on, state_index
+from fastmech.basins.measures.labels import Floats, Integers, check_axes, check_point
+from fastmech.basins.measures.norm import check_angles, kinetic_norm, norm_on, state_index
 from fastmech.basins.shock import minimal_shock
 from fastmech.disturbance.motion import require_constant_force
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
 from fastmech.equilibria.find import Equilibria, find_equilibria
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown
 from fastmech.scene import Scene
 from fastmech.stability.arguments import require_scene
 
@@ -225,6 +225,7 @@ def erosion(
     require_constant_force(scene)
     checks.progress_function(progress, "values")
     along = check_point("values", values)
+    checks.one_way("values", values, along)
     survey = survey_of(
         axes, most_shock=most_shock, t_end=t_end, labels_of=labels_of, n=n, directions=directions, seed=seed
     )
@@ -249,17 +250,19 @@ def survey_of(
     seed: int,
 ) -> Survey:
     """What to measure, checked; arguments and errors as for :func:`erosion`."""
+    if not isinstance(axes, Mapping) or not axes:
+        raise InputError(f"axes = {shown(axes)}: must map at least one state to its values")
     states = tuple(state_index(name) for name in axes)
-    if not states:
-        raise InputError("axes: must name at least one state")
-    lines = tuple(check_point(f"axes.{name}", line) for name, line in axes.items())
+    lines = check_axes(axes, tuple(np.size(line) for line in axes.values()))
+    for name, line in zip(axes, lines, strict=True):
+        check_angles(f"axes.{name}", name, line)
     rng = np.random.default_rng(checks.whole_number("seed", seed, least=0))
     low, high = np.array([[line.min(), line.max()] for line in lines]).T
     n = checks.whole_number("n", n, least=1)
     t_end = checks.number("t_end", t_end, "s", above=0.0)
     return Survey(
         states,
-        lines,
+        tuple(lines),
         low + (high - low) * rng.random((n, len(lines))),
         labels_of or partial(labels_by_capture, t_end=t_end),
         most_shock,

@@ -55,6 +55,9 @@ TURN = (_FIRST, _SECOND, 2.0 * np.pi - _FIRST - _SECOND + 2.4492935982947064e-16
 #: Every piece takes something of everywhere, so that all take about as long and progress tells the time left.
 BATCH, PIECES, LEAST = 1 << 16, 16, 1 << 11
 
+#: Numbers of 8 bytes that memory holds of every start on the way.
+START_NUMBERS = 20
+
 
 @dataclass(frozen=True)
 class Labels:
@@ -104,7 +107,9 @@ def labels_of(
     """
     require_damper(scene)
     checks.progress_function(progress, "starts")
-    begin, turned = _unwound(checks.states("starts", starts, 4))
+    states = checks.states("starts", starts, 4)
+    checks.memory(len(states), START_NUMBERS, f"starts: labels of {len(states):.3g}", "fewer")
+    begin, turned = _unwound(states)
     thread_count(threads)
     t_end = checks.number("t_end", t_end, "s", above=0.0)
     formula, certificate = find_method(method), certificate_of(scene)

@@ -13,6 +13,7 @@ from fastmech.basins.copies import copy_numbers
 from fastmech.basins.label import Labels, labels_of
 from fastmech.basins.measures.labels import number_turns
 from fastmech.basins.measures.norm import STATE as STATE
+from fastmech.basins.measures.norm import check_angles
 from fastmech.basins.refine import LevelProgress, refine_grid
 from fastmech.basins.status import BasinStatus, counts
 from fastmech.basins.system import system_labels_of
@@ -25,8 +26,8 @@ from fastmech.scene import Scene, nearest
 
 Floats = NDArray[np.float64]
 
-#: Points of the largest map: its arrays take some 150 bytes a point in memory.
-MOST_POINTS = 50_000_000
+#: Points of the largest map, and the numbers of 8 bytes that its arrays take of each in memory.
+MOST_POINTS, POINT_NUMBERS = 50_000_000, 20
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,11 @@ def map_basins(
     shape = tuple(v.size for v in values.values())
     size = math.prod(shape)
     if size > MOST_POINTS:
-        raise InputError(f"axes: ask for {size:.3g} starts, at most {MOST_POINTS:.0e} are allowed")
+        raise InputError(
+            f"axes: ask for {size:.3g} starts, at most {MOST_POINTS:.0e} are allowed; take fewer, "
+            'or in parts for files: fastmech run, kind = "basins"'
+        )
+    checks.memory(size, POINT_NUMBERS, f"axes: {size:.3g} starts", "fewer")
     own = _checked_parameters(scene, parameters or {}, shape)
     collected = _Collected(size)
 
@@ -207,7 +212,7 @@ def _checked_axes(axes: Mapping[str, ArrayLike], names: tuple[str, ...], least: 
     """Axes as rising arrays.
 
     Raises:
-        InputError: too few axes, an unknown one, or values that do not rise.
+        InputError: too few axes, an unknown one, values that do not rise, or angles in degrees.
     """
     if not isinstance(axes, Mapping):
         raise InputError(f"axes = {shown(axes)}: must map coordinates to their values")
@@ -221,8 +226,13 @@ def _checked_axes(axes: Mapping[str, ArrayLike], names: tuple[str, ...], least: 
             array = np.array(values, dtype=np.float64)
         except (TypeError, ValueError, OverflowError):
             raise InputError(f"axes.{name}: must be numbers") from None
-        if array.ndim != 1 or not array.size or not np.isfinite(array).all() or (np.diff(array) <= 0.0).any():
+        if array.ndim != 1 or not array.size or not np.isfinite(array).all():
             raise InputError(f"axes.{name}: must be a row of finite, strictly rising values")
+        checks.one_way(f"axes.{name}", values, array)
+        if array[-1] < array[0]:
+            raise InputError(f"axes.{name}: falls from {array[0]:g} to {array[-1]:g}, must rise")
+        if names == STATE:
+            check_angles(f"axes.{name}", name, array)
         checked[name] = array
     return checked
 
@@ -256,7 +266,7 @@ def _checked_fixed(
     """Values of the coordinates that are no axes.
 
     Raises:
-        InputError: an unknown name, one of an axis, or no finite number.
+        InputError: an unknown name, one of an axis, no finite number, or an angle in degrees.
     """
     if not isinstance(fixed, Mapping):
         raise InputError(f"fixed = {shown(fixed)}: must map coordinates to their values")
@@ -266,8 +276,12 @@ def _checked_fixed(
             raise InputError(
                 f"fixed.{name}: must be one of the coordinates without an axis: {', '.join(others)}"
             )
-    return {
+    held = {
         name: checks.number(f"fixed.{name}", fixed.get(name, 0.0), "rad or rad/s")
         for name in names
         if name not in axes
     }
+    if names == STATE:
+        for name, value in held.items():
+            check_angles(f"fixed.{name}", name, value)
+    return held

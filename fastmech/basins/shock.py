@@ -170,9 +170,10 @@ class Rays:
         best = np.argsort(found[0], kind="stable")[:CANDIDATES]
         units, sizes, labels = units[best], found[0, best], ends[0, best]
         spread, rows = np.full(len(units), 0.5), np.arange(len(units))
+        trials = TRIALS * max(1, units.shape[1] - 1)
         # A turn by the angle s changes the size by s^2 at a smooth minimum.
         while np.isfinite(sizes).any() and (spread > 0.5 * np.sqrt(self.tolerance)).any():
-            random = rng.standard_normal((len(units), TRIALS * (units.shape[1] - 1), units.shape[1]))
+            random = rng.standard_normal((len(units), trials, units.shape[1]))
             turned = units[:, None] + spread[:, None, None] * random
             turned /= np.linalg.norm(turned, axis=2, keepdims=True)
             found, ends = self.first_exits(turned, np.minimum(sizes, most), TURNED_LEVELS, 1)

@@ -212,8 +212,9 @@ def impulse_start(
         direction: of the impulse, from +x [rad].
 
     Raises:
-        InputError: an argument is wrong.
+        InputError: an argument is wrong, or the scene does not rest there.
     """
+    require_rest(scene, rest)
     _require_point(on)
     impulse = checks.number("impulse", impulse, "N s")
     direction = checks.number("direction", direction, "rad")

@@ -31,6 +31,9 @@ from fastmech.errors import InputError, shown
 from fastmech.integrators.methods import find_method
 from fastmech.scene import Scene
 
+#: Numbers of 8 bytes that memory holds of every motion on the way.
+MOTION_NUMBERS = 40
+
 #: Forces between two known ones that are tried at once.
 BETWEEN = 32
 
@@ -135,8 +138,13 @@ def map_snapping(
     end = default_end(rate) if t_end is None else checks.number("t_end", t_end, "s", above=0.0)
     rest = equilibria[index]
     shape = rate.size, force.size
+    motions = rate.size * force.size
+    checks.memory(
+        motions, MOTION_NUMBERS, f"F0, alpha: {motions:.3g} motions",
+        'fewer, or in parts for files: fastmech run, kind = "snapping"',
+    )  # fmt: skip
     certificate = certificate_of(free)
-    motions = Switched.of(
+    switched = Switched.of(
         certificate,
         np.array([rest.phi, rest.theta, 0.0, 0.0]),
         np.tile(force, rate.size),
@@ -146,7 +154,7 @@ def map_snapping(
         method=method,
         threads=threads,
     )
-    found, status = motions.label(progress)
+    found, status = switched.label(progress)
     captured = status == BasinStatus.CAPTURED
     label = np.where(captured, np.append(-1, certificate.tree.wells)[found.code], -1)
     turns = np.where(captured[:, None], found.turns, 0).astype(np.int64)
@@ -247,7 +255,8 @@ def force_free(scene: Scene, start: Equilibrium | None) -> tuple[Scene, Equilibr
 
 def _forces(F0: ArrayLike) -> Floats:
     force = check_point("F0", F0)
-    if not (np.diff(force) > 0.0).all() or not (np.sign(force) == np.sign(force[-1])).all() or not force[0]:
+    checks.one_way("F0", F0, force)
+    if force[-1] < force[0] or not (np.sign(force) == np.sign(force[-1])).all() or not force[0]:
         raise InputError("F0: must rise, be of one sign and nowhere be 0 N")
     return force
 
@@ -259,6 +268,7 @@ def _rates(alpha: ArrayLike) -> Floats:
             "alpha = 0: must be greater than 0 1/s; a constant force has another potential with other wells, "
             "so that its ends cannot be compared"
         )
-    if not (rate > 0.0).all() or not (np.diff(rate) > 0.0).all():
+    checks.one_way("alpha", alpha, rate)
+    if not (rate > 0.0).all() or rate[-1] < rate[0]:
         raise InputError("alpha: must be greater than 0 1/s and rise")
     return rate

@@ -55,15 +55,34 @@ class _SceneCommand(click.Command):
     default=math.inf,
     help="Time at which the force is frozen [s; default: after all decay].",
 )
+@click.option(
+    "--vary",
+    metavar="NAME",
+    default="F0",
+    help="Parameter of which to tell where positions end [default: F0].",
+)
+@click.option(
+    "--position",
+    metavar="PHI THETA",
+    type=(float, float),
+    help="Only for the stable position that is about here [rad; default: for all].",
+)
 @reporting_options
 def command(
-    scene_file: Path | None, at: float, quiet: bool, as_json: bool, **parameters: float | None
+    scene_file: Path | None,
+    at: float,
+    vary: str,
+    position: tuple[float, float] | None,
+    quiet: bool,
+    as_json: bool,
+    **parameters: float | None,
 ) -> None:
     """List every equilibrium of a scene and its stability.
 
-    For every stable one sentences tell the constant loads F0 at which it disappears and how hard it may be
-    struck without leaving its well, and one for all says whether the list is proved to be complete. The scene
-    is that of SCENE.toml (its table [scene]), else the paper's Table 1; the options change it.
+    For every stable one sentences tell the constant loads F0, or the values of another parameter, at which it
+    ends and how hard it may be struck without leaving its well, and one for all says whether the list is
+    proved to be complete. The scene is that of SCENE.toml (its table [scene]), else the paper's Table 1; the
+    options change it.
     """
     from fastmech.scene import Scene
 
@@ -71,7 +90,7 @@ def command(
     scene = scene.replace(**{name: value for name, value in parameters.items() if value is not None})
     with account("equilibria", quiet, as_json) as told:
         with told.bars.preparing():
-            from fastmech.atlas.snap import find_snap
+            from fastmech.atlas.snap import find_snap, stable_at
             from fastmech.basins.shock_limit import proved_limits
             from fastmech.equilibria.find import find_equilibria
             from fastmech.stability.classify import classify
@@ -82,13 +101,16 @@ def command(
             results.append(classify(scene, equilibrium))
             advance(1)
         loaded = scene.replace(F0=found.force, alpha=0.0)
-        stable = [k for k, equilibrium in enumerate(found) if equilibrium.morse_index == 0]
-        advance = told.bars.stage("loads at which they disappear", len(stable))
+        here = find_equilibria(loaded)
+        stable = [k for k, equilibrium in enumerate(here) if equilibrium.morse_index == 0]
+        if position is not None:
+            stable = [here.index_of(stable_at(here, position))]
+        advance = told.bars.stage(f"where they end over {vary}", len(stable))
         snaps, limits = {}, {}
         for k in stable:
-            snaps[k] = find_snap(loaded, found[k])
+            snaps[k] = find_snap(loaded, here[k], parameter=vary)
             with suppress(InputError):  # wells that are not certain have no limits
-                limits[k] = proved_limits(loaded, found[k])
+                limits[k] = proved_limits(loaded, here[k])
             advance(1)
         told.facts |= _facts(found, results, snaps, limits)
     if not as_json:
@@ -105,6 +127,7 @@ def _facts(
         about |= {"energy": equilibrium.energy, "kind": equilibrium.kind, "verdict": result.verdict}
         about["eigenvalues"] = [[value.real, value.imag] for value in map(complex, result.eigenvalues)]
         if k in snaps:
+            about |= {"snap_parameter": snaps[k].parameter}
             about |= {"snap_below": snaps[k].below, "snap_above": snaps[k].above}
         if k in limits:
             about["shock_limit"] = {on: limit for on, limit in limits[k].items() if math.isfinite(limit)}
@@ -131,7 +154,8 @@ def _show(
     for number, result in enumerate(results, start=1):
         console.print(f"{number}: {result.explanation}.")
     for k, snap in snaps.items():
-        console.print(f"{k + 1}: as the load F0 changes, it {snap.answer}.")
+        load = "the load " if snap.parameter == "F0" else ""
+        console.print(f"{k + 1}: as {load}{snap.parameter} changes, it {snap.answer}.")
     for k, limit in limits.items():
         blows = ", ".join(f"{size:.4g} N s on {on}" for on, size in limit.items() if math.isfinite(size))
         console.print(f"{k + 1}: no blow at rest leaves its well with less than {blows}.")

@@ -60,8 +60,8 @@ def linear_range(
     tolerance = checks.number("tolerance", tolerance, "", above=0.0)
     count = checks.whole_number("directions", directions, least=1)
     seed = checks.whole_number("seed", seed, least=0)
-    size = size_at(scene, equilibrium.phi, equilibrium.theta)
     index = equilibria_to_disturb(scene).index_of(equilibrium)
+    size = size_at(scene, equilibrium.phi, equilibrium.theta)
     rng = np.random.default_rng([seed, index, 1])
     rays = size.from_ball(unit_directions(rng, count))[part or slice(None)]
     times = np.linspace(0.0, horizon, OUTPUTS + 1)

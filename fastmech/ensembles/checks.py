@@ -80,8 +80,9 @@ def states(name: str, values: ArrayLike, columns: int) -> NDArray[np.float64]:
     """An array of shape (n, columns); a single state becomes one row. Values need not be finite.
 
     Raises:
-        InputError: not numbers, or another shape.
+        InputError: not numbers, another shape, or more than fit into memory again.
     """
+    memory(np.size(values), 1, f"{name}: the states", "fewer")
     array = reals(name, values, f"numbers of shape (n, {columns})", 2)
     if array.ndim != 2 or array.shape[1] != columns:
         raise InputError(f"{name}: has shape {np.shape(values)}, must be (n, {columns})")
@@ -117,6 +118,31 @@ def free_memory() -> float:
         return 1024.0 * float(text.split("MemAvailable:")[1].split()[0])
     except (OSError, IndexError, ValueError):
         return math.inf
+
+
+def one_way(name: str, given: Any, values: NDArray[np.float64]) -> None:
+    """Refuse values of an axis that neither rise nor fall throughout, or that may be start, stop and number.
+
+    ``given`` is what ``values`` were made from.
+
+    Raises:
+        InputError: they are such.
+    """
+    spaced = values.size == 3 and float(values[2]).is_integer() and values[2] >= 2.0
+    advice = f"numpy.linspace({values[0]:g}, {values[1]:g}, {values[2]:g})" if spaced else ""
+    if spaced and isinstance(given, tuple) and isinstance(given[2], Integral):
+        raise InputError(
+            f"{name} = {shown(given)}: may be start, stop and number; "
+            f"give {advice}, or a list of three values"
+        )
+    steps = np.diff(values) * (1.0 if values[-1] > values[0] else -1.0)
+    if not (steps > 0.0).all():
+        k = int(np.argmin(steps > 0.0)) + 1
+        raise InputError(
+            f"{name}[{k}] = {values[k]:g} after {values[k - 1]:g}: "
+            "must rise or fall throughout, no value twice"
+            + (f"; for {values[2]:g} values give {advice}" if spaced else "")
+        )
 
 
 def rising_times(name: str, values: ArrayLike) -> NDArray[np.float64]:

@@ -3,8 +3,9 @@
 Each rung is sqrt(2) shorter than the one before, so that every run serves several comparisons: with the rung
 above it tells the error, and for a quantile the rung two below is the truth against which that is checked.
 
-A method's order is what smooth right-hand sides have. Where two comparisons show less, errors are reckoned with the order seen; where shorter steps bring nothing (chaos, a singularity, rounding),
-the search ends as soon as the next run would be long, and the estimate says what was reached.
+A method's order is what smooth right-hand sides have. Where two comparisons show less, errors are reckoned
+with the order seen. Where shorter steps bring nothing (chaos, a singularity, rounding), the search ends as
+soon as the next run would be long, and the estimate says what was reached.
 """
 
 from __future__ import annotations

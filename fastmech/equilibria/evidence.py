@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,20 +22,14 @@ NEAR = 1e-4
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a grid of Newton starts and the polynomial of degree 6 say of a list of equilibria."""
+    """What a grid of Newton starts and the polynomial of degree 6 say of a list of equilibria.
+
+    A grid may miss an equilibrium, it must not find another. Neither decides: the outcome is the proof's.
+    """
 
     reached: int  #: listed equilibria that a start of the grid ran into
     unlisted: int  #: equilibria, proved to exist, that the grid search found and the list lacks
     polynomial: UnitRoots
-
-    @property
-    def contradicts(self) -> bool:
-        """Whether the list is shown to lack something.
-
-        A grid may miss an equilibrium, it must not find another. The polynomial's roots are not proved (in
-        double precision double roots are uncertain by 1e-8), so they are reported and decide nothing.
-        """
-        return self.unlisted > 0
 
     @property
     def sentence(self) -> str:
@@ -48,8 +41,12 @@ class Evidence:
         )
 
 
-def gather(coefficients: Coefficients, phi: Floats, theta: Floats) -> Evidence:
-    """Search beside the proof; ``phi``, ``theta`` [rad] are the listed equilibria."""
+def gather(coefficients: Coefficients, phi: Floats, theta: Floats, radius: Floats) -> Evidence:
+    """Search beside the proof; ``phi``, ``theta``, ``radius`` [rad] are the listed equilibria.
+
+    Where U is nearly flat Newton's method stops far from a root. What it found is another equilibrium only if
+    it is proved to exist in a ball that meets none of theirs.
+    """
     c = coefficients
     p = pulls(c.mass, c.lift, c.spring, c.gravity, c.force)
     found = grid_search(p.lift, p.spring, p.gravity, p.force)
@@ -57,10 +54,11 @@ def gather(coefficients: Coefficients, phi: Floats, theta: Floats) -> Evidence:
         2.0 * np.sin(0.5 * (found[:, :1] - phi[None, :])), 2.0 * np.sin(0.5 * (found[:, 1:] - theta[None, :]))
     )
     near = apart < NEAR
-    # Beside a fold Newton's method may stop in a dip that is no root: only proved roots count.
-    proved = [math.isfinite(existence_radius(p, *root)[0]) for root in found[~near.any(axis=1)]]
+    listed = np.where(np.isfinite(radius), radius, 0.0)
+    reach = np.array([existence_radius(p, *root)[0] for root in found])
+    others = np.isfinite(reach) & ~near.any(axis=1) & (apart > reach[:, None] + listed).all(axis=1)
     return Evidence(
         reached=int(near.any(axis=0).sum()),
-        unlisted=sum(proved),
+        unlisted=int(others.sum()),
         polynomial=unit_roots(p.lift, p.spring, p.gravity, p.force, phi),
     )

@@ -14,7 +14,7 @@ from fastmech.equilibria.evidence import Evidence, gather
 from fastmech.equilibria.outcome import Outcome
 from fastmech.equilibria.search import FloatArray
 from fastmech.equilibria.solution import explain, solve_rows
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown
 from fastmech.mechanism.coefficients import Coefficients, force, reduce
 from fastmech.mechanism.reduced import potential_hessian
 from fastmech.scene import Scene
@@ -80,17 +80,21 @@ class Equilibria(Sequence[Equilibrium]):
         """Which of these an equilibrium is.
 
         Raises:
-            InputError: it is none of them, for example one of another scene.
+            InputError: it is none of them, for example one of another scene or for another force.
         """
-        for i, item in enumerate(self.items):
+        if not isinstance(equilibrium, Equilibrium):
+            raise InputError(f"equilibrium = {shown(equilibrium)}: must be one of fastmech.find_equilibria")
+        # Where g = 0 the force alone may differ: the place is an equilibrium of both, its Hessian is not.
+        same = abs(equilibrium.force - self.force) <= 1e-9 * abs(self.force)
+        for i, item in enumerate(self.items if same else ()):
             away = np.hypot(
                 np.sin((equilibrium.phi - item.phi) / 2), np.sin((equilibrium.theta - item.theta) / 2)
             )
             if away <= 1e-9:
                 return i
         raise InputError(
-            f"equilibrium = ({equilibrium.phi:g}, {equilibrium.theta:g}) rad: "
-            "must be one of this scene's equilibria"
+            f"equilibrium = ({equilibrium.phi:g}, {equilibrium.theta:g}) rad, F = {equilibrium.force:g} N: "
+            f"must be one of this scene's equilibria (F = {self.force:g} N)"
         )
 
     @property
@@ -136,12 +140,10 @@ def find_equilibria(scene: Scene, at: float = math.inf) -> Equilibria:
     frozen = frozen_force(scene, at)
     coefficients = reduce(scene)._replace(force=frozen / (scene.m2 * scene.l))
     solution = solve_rows(np.array([coefficients]))
-    evidence = gather(
-        coefficients, solution.phi[0, : solution.count[0]], solution.theta[0, : solution.count[0]]
-    )
-    if solution.outcome[0] == Outcome.COMPLETE and evidence.contradicts:
-        solution.outcome[0] = Outcome.UNPROVED
     outcome, count = Outcome(int(solution.outcome[0])), int(solution.count[0])
+    evidence = gather(
+        coefficients, solution.phi[0, :count], solution.theta[0, :count], solution.radius[0, :count]
+    )
     expected, margin = int(solution.expected[0]), float(solution.margin[0])
     items = tuple(
         Equilibrium(

@@ -72,8 +72,9 @@ def mobility(
 
 def impulse_for(energy: ArrayLike, mobility: ArrayLike) -> Array:
     """Impulse [N s] that gives an energy [J] where u.W u is ``mobility`` [1/kg]; NaN where that is 0."""
+    given, eased = np.asarray(energy), np.asarray(mobility)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(np.asarray(mobility) > 0.0, np.sqrt(2.0 * np.asarray(energy) / mobility), np.nan)
+        return np.where(eased > 0.0, np.sqrt(2.0 * given / eased), np.nan)
 
 
 def rates_after(scene: Scene, q: ArrayLike, on: str, impulse: ArrayLike) -> Array:

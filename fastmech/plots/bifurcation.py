@@ -1,4 +1,4 @@
-"""Equilibria over one parameter: stable solid, unstable dashed, folds marked."""
+"""Equilibria over one parameter: stable solid, unstable dashed, folds and pitchforks marked."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.plots.labels import PI_TICKS, logarithmic
+from fastmech.plots.labels import PI_TICKS, flag_codes, logarithmic
+from fastmech.plots.map_curves import not_proved
 from fastmech.plots.map_view import View
 from fastmech.plots.style import PALETTE, legend_below, new_figure
 
@@ -26,6 +27,14 @@ LOOKS = {
 
 #: Colours of stable sheets, all of the first one where there are more.
 STABLE = (PALETTE["blue"], PALETTE["green"], PALETTE["orange"])
+
+#: Marks and names of what is special on the branches.
+MARKS = {
+    "fold": ("o", "fold"),
+    "pitchfork": ("^", "pitchfork (symmetric)"),
+    "cusp": ("D", "cusp"),
+    "transcritical": ("s", "transcritical"),
+}
 
 #: How many times the least decay time the picture shows; beyond, damping misses a mode.
 SLOWEST = 1e6
@@ -50,8 +59,10 @@ def draw_bifurcation(view: View) -> Figure:
             )  # fmt: skip
             labelled.add(label)
         if folds:
-            places = folds[f"fold_{variable}"]
-            axes.plot(folds["at"], places, "o", color="white", mec="black", ms=6, ls="none", label="fold")
+            for kind, there in _kinds(view, folds).items():
+                marker, label = MARKS[kind]
+                places = folds["at"][there], folds[f"fold_{variable}"][there]
+                axes.plot(*places, marker, color="white", mec="black", ms=6, ls="none", label=label)
             for value in folds["at"]:
                 axes.axvline(value, color="black", lw=0.6, ls=":", zorder=0)
         axes.set(ylabel=f"angle {symbol} [rad]", ylim=(-3.4, 3.4))
@@ -94,12 +105,26 @@ def _decay(axes: Axes, view: View, name: str) -> None:
     _own(axes, view)
 
 
+def _kinds(view: View, folds: dict[str, Floats]) -> dict[str, NDArray[np.bool_]]:
+    """Which folds are of which kind; files of older versions tell none."""
+    if not view.has("fold_kind"):
+        return {"fold": np.ones(folds["at"].size, dtype=bool)}
+    codes = {
+        name: view.dataset["fold_kind"].data == c for name, c in flag_codes(view.dataset["fold_kind"]).items()
+    }
+    return {kind: codes[kind] for kind in MARKS if codes[kind].any()}
+
+
 def _told(view: View, folds: dict[str, Floats], name: str) -> str:
-    """The values of the parameter at the folds, if they are few."""
-    values = folds.get("at", np.zeros(0))
-    if not 0 < values.size <= TOLD:
-        return ""
-    return f"; folds at {', '.join(f'{value:.6g}' for value in values)} {view.dataset[name].units}"
+    """The values of the parameter at the folds, if they are few, and whether there may be others."""
+    told = ""
+    if folds and folds["at"].size <= TOLD:
+        for kind, there in _kinds(view, folds).items():
+            values = ", ".join(f"{value:.6g}" for value in folds["at"][there])
+            told += (
+                f"; {kind}{'s' if np.count_nonzero(there) > 1 else ''} at {values} {view.dataset[name].units}"
+            )
+    return told + not_proved(view)
 
 
 def _own(axes: Axes, view: View) -> None:
@@ -119,6 +144,8 @@ def _sheets(
 ) -> list[tuple[int, Floats, Floats]]:
     """Morse index, parameter and a variable of every sheet; angles lead to its folds and break at +-pi."""
     sheet, values, x = view.data("sheet"), view.data(variable), view.axis(name)
+    if x[0] > x[-1]:
+        sheet, values, x = sheet[::-1], values[::-1], x[::-1]
     curves = []
     for number, index in enumerate(view.variable("sheet_morse_index").data):
         there = sheet == number

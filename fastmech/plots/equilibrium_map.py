@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fastmech.plots.bifurcation import draw_bifurcation
 from fastmech.plots.labels import flag_codes
-from fastmech.plots.map_curves import draw_curves
+from fastmech.plots.map_curves import draw_curves, not_proved
 from fastmech.plots.map_view import View, make_view
 from fastmech.plots.style import FIELD, PALETTE, new_figure, style
 from fastmech.results import Dataset
@@ -217,7 +217,7 @@ def _label(axes: Axes, view: View, title: str) -> None:
 
 def _finish(figure: Figure, view: View, handles: list[Artist]) -> None:
     """The scene above everything, the legend below."""
-    figure.suptitle(view.setting, fontsize=10.0)
+    figure.suptitle(view.setting + not_proved(view), fontsize=10.0)
     if handles:
         columns = 2 if figure.get_figwidth() > 8.0 else 1
         figure.legend(handles=handles, loc="outside lower center", ncols=columns)

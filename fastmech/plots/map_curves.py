@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,16 +10,17 @@ from numpy.typing import NDArray
 from fastmech.plots.labels import flag_codes
 from fastmech.plots.map_view import View
 from fastmech.plots.style import PALETTE
-from fastmech.results import Variable
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-#: How fold curves look, by what merges with a saddle.
+#: How fold curves look, by their kind and what merges with a saddle.
 FOLDS = {
-    "minimum": ("black", "-", 1.8, "fold: a resting position disappears"),
-    "maximum": ("#555555", "--", 1.2, "fold of unstable equilibria"),
+    ("fold", "minimum"): ("black", "-", 1.8, "fold: a resting position disappears"),
+    ("fold", "maximum"): ("#555555", "--", 1.2, "fold of unstable equilibria"),
+    ("pitchfork", "minimum"): ("black", (0, (6, 1, 1, 1)), 1.8, "pitchfork (symmetric) of resting positions"),
+    ("pitchfork", "maximum"): ("#555555", (0, (1, 1)), 1.4, "pitchfork (symmetric) of unstable equilibria"),
 }
 
 #: How vanishing-damping curves look, by what vanishes.
@@ -34,10 +35,16 @@ def draw_curves(axes: Axes, view: View) -> list[Artist]:
     """Draw what the map has of curves; returns one handle a legend entry."""
     if len(view.dataset.attrs["axes"]) != 2 or not view.has("fold_curve"):
         return []
-    handles = _lines(axes, view, "fold", "fold_merges", FOLDS)
-    handles += _lines(axes, view, "unreached", "unreached_vanishes", {
-        name: (color, dash, 1.4, label) for name, (color, dash, label) in UNREACHED.items()
-    })  # fmt: skip
+    handles: list[Artist] = []
+    merges, kinds = _codes(view, "fold_merges"), _codes(view, "fold_kind")
+    # Files of older versions tell no kind; those of others may know kinds that this one does not.
+    shown = [(kind, name) for kind in kinds or ["fold"] for name in merges]
+    for kind, name in [one for one in FOLDS if one in shown] + [one for one in shown if one not in FOLDS]:
+        look = FOLDS.get((kind, name), ("#777777", "-.", 1.2, f"{kind}: {name}"))
+        handles += _line(axes, view, "fold", merges[name] & kinds.get(kind, np.True_), look)
+    for name, chosen in _codes(view, "unreached_vanishes").items():
+        color, dash, label = UNREACHED.get(name, ("#777777", "-.", f"damping misses a mode: {name}"))
+        handles += _line(axes, view, "unreached", chosen, (color, dash, 1.4, label))
     cusp = [view.axis(f"cusp_{name}") for name in view.axes]
     if cusp[0].size:
         handles += axes.plot(*cusp, "D", color="white", mec="black", ms=5.5, ls="none", label="cusp")
@@ -50,40 +57,31 @@ def draw_curves(axes: Axes, view: View) -> list[Artist]:
     return handles
 
 
-def _lines(
-    axes: Axes, view: View, what: str, kind: str, looks: dict[str, tuple[str, str, float, str]]
+def not_proved(view: View) -> str:
+    """What to add where folds may be missing; the file tells why."""
+    proof = str(view.variable("fold_proof").data[0]) if view.has("fold_proof") else "complete"
+    return "" if proof == "complete" else "; not proved that these are all folds"
+
+
+def _codes(view: View, name: str) -> dict[str, NDArray[np.bool_]]:
+    """Which points of curves have which code of a variable."""
+    if not view.has(name):
+        return {}
+    variable = view.variable(name)
+    return {code: variable.data == value for code, value in flag_codes(variable).items()}
+
+
+def _line(
+    axes: Axes, view: View, what: str, chosen: NDArray[np.bool_], look: tuple[str, Any, float, str]
 ) -> list[Artist]:
+    """Some of the curves in one look, each one with a point more that breaks the line."""
     from matplotlib.patheffects import Normal, Stroke
 
-    variable = view.variable(kind)
-    number = view.variable(f"{what}_curve").data
-    x, y = (view.axis(f"{what}_{name}") for name in view.axes)
-    handles: list[Artist] = []
-    others = {name: ("#777777", "-.", 1.2, f"{what}: {name}") for name in flag_codes(variable).others(looks)}
-    for name, (color, dash, width, label) in {**looks, **others}.items():
-        chosen = _broken(variable, name, number)
-        if not chosen[0].size:
-            continue
-        effects = [Stroke(linewidth=width + 1.6, foreground="white", alpha=0.9), Normal()]
-        handles += axes.plot(
-            np.where(chosen[1], np.nan, x[chosen[0]]),
-            np.where(chosen[1], np.nan, y[chosen[0]]),
-            color=color,
-            ls=dash,
-            lw=width,
-            label=label,
-            path_effects=effects,
-        )
-    return handles
-
-
-def _broken(
-    variable: Variable, name: str, number: NDArray[np.int32]
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Points of one kind's curves, each curve with one more that breaks the line, and where these are."""
-    of_kind = np.flatnonzero(variable.data == flag_codes(variable)[name])
-    ends = np.flatnonzero(np.diff(number[of_kind], append=-1))
-    return (
-        np.insert(of_kind, ends + 1, of_kind[ends]),
-        np.insert(np.zeros(of_kind.size, dtype=bool), ends + 1, True),
-    )
+    points = np.flatnonzero(chosen)
+    if not points.size:
+        return []
+    color, dash, width, label = look
+    ends = np.flatnonzero(np.diff(view.variable(f"{what}_curve").data[points], append=-1)) + 1
+    lines = [np.insert(view.axis(f"{what}_{name}")[points], ends, np.nan) for name in view.axes]
+    effects = [Stroke(linewidth=width + 1.6, foreground="white", alpha=0.9), Normal()]
+    return list(axes.plot(*lines, color=color, ls=dash, lw=width, label=label, path_effects=effects))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from fastmech.basins.ladder import SUBSTEPS
+from fastmech.basins.measures.norm import STATE, check_angles
 from fastmech.basins.runs import rounds_until
 from fastmech.basins.steps import fastest_followed, shortest_step
 from fastmech.ensembles import checks
@@ -21,9 +22,6 @@ from fastmech.scene import Number, Scene
 
 #: Values of the longest axis.
 MOST_VALUES = 100_000
-
-#: Angles lie within so many turns of zero: what is beyond was meant in degrees.
-MOST_TURNS = 4
 
 Value = Annotated[Number, Field(strict=True, allow_inf_nan=False)]
 
@@ -162,11 +160,7 @@ def check_starts(scene: Scene, starts: Mapping[str, NDArray[np.float64]]) -> Non
     """
     fastest = fastest_followed(reduce(scene))
     for where, values in starts.items():
-        largest = float(np.abs(values).max())
-        if where.endswith("_dot"):
-            if largest > fastest:
-                raise InputError(
-                    f"{where} = {largest:g} rad/s: steps follow {fastest:.3g} rad/s here at most"
-                )
-        elif largest > 2.0 * np.pi * MOST_TURNS:
-            raise InputError(f"{where} = {largest:g}: is beyond {MOST_TURNS} turns; angles are in radians")
+        largest, name = float(np.abs(values).max()), where.rpartition(".")[2]
+        check_angles(where, name, values)
+        if name in STATE[2:] and largest > fastest:
+            raise InputError(f"{where} = {largest:g} rad/s: steps follow {fastest:.3g} rad/s here at most")

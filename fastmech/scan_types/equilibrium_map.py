@@ -11,8 +11,8 @@ round a cusp, ``sheet_break`` where a sheet is torn. ``curves``, of a map over t
 curves, cusps and vanishing-damping curves, point after point, ``fold_curve`` and ``unreached_curve``
 numbering them; of a map over one its folds.
 
-A fold curve is found where it separates points of the grid: an island of six equilibria (or of four) that
-lies between the points, parting no two neighbours, is not seen. A finer grid sees it.
+Folds do not depend on the grid: ``fold_proof`` tells that none is missing, or where that is not proved;
+``fold_kind`` names folds and the pitchforks of symmetric scenes.
 """
 
 from __future__ import annotations

@@ -18,9 +18,11 @@ from fastmech.stability.modes import SIN_PHI, SIN_PSI, UNLOADED
 
 Floats = NDArray[np.float64]
 
-#: Values of an axis that seed the vanishing-damping curves; folds are seeded by every edge of the map.
+#: Values of an axis that seed the vanishing-damping curves.
 SEED_VALUES = 151
 
+#: What is told of folds of which none can be missing.
+COMPLETE = "complete"
 
 #: Dimension of what is told of all curves together.
 TALLY = "total_unexplained_and_unfinished"
@@ -31,6 +33,15 @@ class Merging(IntEnum):
 
     MINIMUM = 0
     MAXIMUM = 1
+
+
+class Kind(IntEnum):
+    """What happens on a fold."""
+
+    FOLD = 0
+    PITCHFORK = 1
+    CUSP = 2
+    TRANSCRITICAL = 3
 
 
 class Vanishing(IntEnum):
@@ -49,10 +60,9 @@ _VANISHING = {
 
 
 def curve_variables(scene: Scene, axes: dict[str, Floats], threads: int | None) -> dict[str, Variable]:
-    """Folds over one parameter, curves over two; nothing over three or where values do not rise."""
-    if "alpha" in axes or not all(
-        values.size > 1 and (np.diff(values) > 0.0).all() for values in axes.values()
-    ):
+    """Folds over one parameter, curves over two; nothing over three or where values turn back."""
+    steps = [np.diff(values) for values in axes.values()]
+    if "alpha" in axes or not all(d.size and ((d > 0.0).all() or (d < 0.0).all()) for d in steps):
         return {}
     if len(axes) == 1:
         return _fold_points(scene, axes)
@@ -74,6 +84,8 @@ def _fold_points(scene: Scene, axes: dict[str, Floats]) -> dict[str, Variable]:
         "fold_merges": _codes(
             each, [Merging[f.merges.upper()] for f in found], "merges with a saddle", Merging
         ),
+        "fold_kind": _codes(each, [Kind[f.kind.upper()] for f in found], "kind of the fold", Kind),
+        "fold_proof": _proof(found.reason),
     }
 
 
@@ -94,6 +106,10 @@ def _fold_curves(scene: Scene, x: tuple[str, Floats], y: tuple[str, Floats]) -> 
             "merges with a saddle",
             Merging,
         ),
+        "fold_kind": _codes(
+            each, [k for c in curves for k in [Kind[c.kind.upper()]] * c.x.size], "kind of the curve", Kind
+        ),
+        "fold_proof": _proof(found.reason),
         f"cusp_{x[0]}": _numbers(cusp, [c.x for c in found.cusps], units[0], f"{x[0]} at the cusp"),
         f"cusp_{y[0]}": _numbers(cusp, [c.y for c in found.cusps], units[1], f"{y[0]} at the cusp"),
         "cusp_phi": _numbers(cusp, [c.phi for c in found.cusps], "rad", "phi where three equilibria merge"),
@@ -147,6 +163,11 @@ def _unreached_curves(
             "edges of the seeding grid that such a curve crosses, those without a curve, curves cut short",
         ),
     }
+
+
+def _proof(reason: str) -> Variable:
+    words = np.array([reason or COMPLETE], dtype=object)
+    return Variable(("statement",), words, "1", "whether it is proved that no other fold is in the map")
 
 
 def _numbers(dims: tuple[str, ...], values: Sequence[float], unit: str, about: str) -> Variable:

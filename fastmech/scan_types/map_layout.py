@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from fastmech.atlas.coincidence import Coincidence
 from fastmech.atlas.map import Slab
-from fastmech.atlas.verdicts import Verdict
 from fastmech.equilibria.outcome import Outcome
 from fastmech.mechanism.impulse import POINTS
 from fastmech.results import NO_CODE, Variable, flags, numbers, parts
+from fastmech.stability.criteria import Verdict
 
 CRITERIA = {
     "verdict_sylvester": "verdict: Lagrange-Dirichlet",

@@ -1,80 +1,118 @@
-"""The loads at which each resting position of the scene disappears."""
+"""The loads, or the values of another parameter, at which resting positions of the scene end."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
-from fastmech.atlas.snap import find_snap
+from fastmech.atlas.snap import MOVING, find_snap, stable_at
 from fastmech.equilibria.find import Equilibrium, find_equilibria
 from fastmech.errors import InputError
 from fastmech.results import Dataset, Variable
 from fastmech.scan_types.each import Each
 from fastmech.scan_types.request import TiledScan
 from fastmech.scan_types.tiling import Tiling
-from fastmech.scene import Number, Scene
+from fastmech.scene import Number, Scene, nearest
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+def _moving(name: str) -> str:
+    if name not in MOVING:
+        raise ValueError(f"must be one that moves equilibria; {nearest(name, list(MOVING))}")
+    return name
+
+
 class SnapScan(TiledScan):
-    """Constant loads F0, below and above the present one, at which a stable position merges with a saddle."""
+    """Values of a parameter, below and above the present one, at which a stable position ends."""
 
     kind: ClassVar[str] = "snap"
 
-    searched: list[Number] | None = Field(None, min_length=2, max_length=2, description="loads to search [N]")
+    parameter: Annotated[str, AfterValidator(_moving)] = Field(
+        "F0", description=f"what changes: one of {', '.join(MOVING)}"
+    )
+    position: list[Number] | None = Field(
+        None,
+        min_length=2,
+        max_length=2,
+        description="about where the stable position is [rad], all by default",
+    )
+    searched: list[Number] | None = Field(
+        None, min_length=2, max_length=2, description="values to search [the parameter's unit]"
+    )
 
     def check(self, scene: Scene) -> None:
-        """The range must hold the present load."""
-        present = scene.F0 if scene.alpha == 0.0 else 0.0
-        if self.searched is not None and not self.searched[0] <= present <= self.searched[1]:
-            raise InputError(
-                f"searched = {self.searched}: must be a range of forces that holds {present:g} N"
-            )
+        """The range must hold the present value, and the scene accept its ends."""
+        if self.searched is None:
+            return
+        for end in self.searched:
+            scene.replace(**{self.parameter: end})
+        present = getattr(scene.replace(F0=scene.F0 if scene.alpha == 0.0 else 0.0), self.parameter)
+        low, high = self.searched
+        if not (low < high and low <= present <= high):
+            told = f"must be a range of {self.parameter} that holds {present:g}"
+            raise InputError(f"searched = {self.searched}: {told}")
 
     def tiling(self, scene: Scene) -> Tiling:
         """The stable positions one by one."""
-        stable = {k: e for k, e in enumerate(find_equilibria(scene)) if e.morse_index == 0}
-        each = list(stable.values())
+        found = find_equilibria(scene)
+        stable = [e for e in found if e.morse_index == 0]
+        if self.position is not None:
+            stable = [stable_at(found, self.position)]
+        which = [found.index_of(e) for e in stable]
         return Each(
             "stable positions",
-            len(each),
-            lambda k: self._one(scene, each[k]),
-            lambda tiles: _joined(list(stable), tiles),
+            len(stable),
+            lambda k: self._one(scene, stable[k]),
+            lambda tiles: self._joined(which, tiles),
         )
 
-    def _one(self, scene: Scene, equilibrium: Equilibrium) -> Dataset:
-        """Follow one stable position as the load changes; NaN stands for no load."""
+    def _one(self, scene: Scene, position: Equilibrium) -> Dataset:
+        """Follow one stable position as the parameter changes; NaN stands for no value."""
         limits = (self.searched[0], self.searched[1]) if self.searched is not None else None
-        found = find_snap(scene, equilibrium, limits)
-        ends = [np.nan if load is None else load for load in (found.below, found.above)]
+        found = find_snap(scene, position, limits, parameter=self.parameter)
+        ends = [np.nan if value is None else value for value in (found.below, found.above)]
         row = np.array([found.phi, found.theta, *ends, *found.searched], dtype=np.float64)
-        return Dataset({"row": Variable(("entry",), row)}, {"sentence": found.sentence})
+        return Dataset(
+            {"row": Variable(("entry",), row), "unstable": Variable(("end",), np.array(found.unstable))},
+            {"sentence": found.sentence, "unit": found.unit},
+        )
+
+    def _joined(self, which: list[int], tiles: list[Dataset]) -> Dataset:
+        rows = np.array([tile["row"].data for tile in tiles]).reshape(-1, 6)
+        unstable = np.array([tile["unstable"].data for tile in tiles], dtype=np.bool_).reshape(-1, 2)
+        each = ("equilibrium",)
+        sentences = np.array([tile.attrs["sentence"] for tile in tiles], dtype=object)
+        unit = str(tiles[0].attrs["unit"]) if tiles else "1"
+        name = self.parameter
+        gone = f"it ends when {name} {{}} to; NaN: at no value searched"
+        return Dataset(
+            {
+                "equilibrium": Variable(each, np.array(which, np.int32), "1", "number of the equilibrium"),
+                "end": Variable(("end",), np.array(["lowest", "highest"], object), "1", "end of the search"),
+                "phi": Variable(each, rows[:, 0], "rad", "angle phi"),
+                "theta": Variable(each, rows[:, 1], "rad", "angle theta"),
+                "snap_below": Variable(each, rows[:, 2], unit, gone.format("falls")),
+                "snap_above": Variable(each, rows[:, 3], unit, gone.format("rises")),
+                "turns_unstable": Variable(
+                    (*each, "end"),
+                    unstable,
+                    "1",
+                    "it goes on there as an unstable one and does not disappear",
+                ),
+                "searched": Variable(
+                    (*each, "end"), rows[:, 4:], unit, f"lowest and highest {name} searched"
+                ),
+                "sentence": Variable(each, sentences, "1", "the answer in words"),
+            },
+            {"parameter": name},
+        )
 
     @staticmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
-        """Nothing to draw: the bifurcation diagram of an equilibrium map over F0 shows it."""
+        """Nothing to draw: the bifurcation diagram of an equilibrium map over the parameter shows it."""
         return {}
-
-
-def _joined(which: list[int], tiles: list[Dataset]) -> Dataset:
-    rows = np.array([tile["row"].data for tile in tiles]).reshape(-1, 6)
-    each = ("equilibrium",)
-    sentences = np.array([tile.attrs["sentence"] for tile in tiles], dtype=object)
-    gone = "it disappears when the load {} to; NaN: at no load searched"
-    return Dataset(
-        {
-            "equilibrium": Variable(each, np.array(which, np.int32), "1", "number of the equilibrium"),
-            "end": Variable(("end",), np.array(["lowest", "highest"], object), "1", "end of the search"),
-            "phi": Variable(each, rows[:, 0], "rad", "angle phi"),
-            "theta": Variable(each, rows[:, 1], "rad", "angle theta"),
-            "snap_below": Variable(each, rows[:, 2], "N", gone.format("falls")),
-            "snap_above": Variable(each, rows[:, 3], "N", gone.format("rises")),
-            "searched": Variable((*each, "end"), rows[:, 4:], "N", "lowest and highest load searched"),
-            "sentence": Variable(each, sentences, "1", "the answer in words"),
-        }
-    )

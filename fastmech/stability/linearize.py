@@ -14,6 +14,7 @@ from fastmech.jit import inlined
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.mechanism.reduced import metric_11, metric_determinant, potential_hessian, slider_ratio
 from fastmech.scene import Scene
+from fastmech.stability.arguments import require_rest
 
 FloatArray = NDArray[np.float64]
 
@@ -133,7 +134,12 @@ def fill_state_matrix(s: SmallMotion, out: FloatArray) -> None:
 
 
 def linearized(scene: Scene, equilibrium: Rest) -> tuple[Coefficients, SmallMotion]:
-    """Reduced coefficients with the equilibrium's frozen force, and its small motion."""
+    """Reduced coefficients with the equilibrium's frozen force, and its small motion.
+
+    Raises:
+        InputError: an argument is wrong, or the scene does not rest there.
+    """
+    require_rest(scene, equilibrium)
     c = reduce(scene)._replace(force=equilibrium.force / (scene.m2 * scene.l))
     motion = small_motion(
         equilibrium.phi, equilibrium.theta, c.mass, c.slider, c.lift, c.spring, c.gravity, c.force, c.damping
@@ -142,7 +148,11 @@ def linearized(scene: Scene, equilibrium: Rest) -> tuple[Coefficients, SmallMoti
 
 
 def jacobian(scene: Scene, equilibrium: Rest) -> FloatArray:
-    """State matrix (4, 4) of the linearized motion of (xi_phi, xi_theta, eta_phi, eta_theta), paper (21)."""
+    """State matrix (4, 4) of the linearized motion of (xi_phi, xi_theta, eta_phi, eta_theta), paper (21).
+
+    Raises:
+        InputError: as ``linearized``.
+    """
     matrix = np.empty((4, 4))
     fill_state_matrix(linearized(scene, equilibrium)[1], matrix)
     return matrix

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fastmech.stability.linearize import FloatArray, SmallMotion, polynomial
+from fastmech.jit import inlined
+from fastmech.stability.linearize import SmallMotion
 
 #: Names of the three measures that must be away from zero for the damper to reach both modes.
 SIN_PHI = "sin phi"
@@ -19,8 +20,9 @@ MEANING = {
 }
 
 
-def squared_frequencies(s: SmallMotion) -> FloatArray:
-    """Squares of the undamped natural frequencies (2,) [1/s^2], rising; negative ones grow instead.
+@inlined
+def squares(s: SmallMotion) -> tuple[float, float]:
+    """Squares of the undamped natural frequencies [1/s^2], rising; negative ones grow instead.
 
     They are the roots of det(K - w^2 M), found from the Hessian in the Cholesky coordinates of M.
     """
@@ -28,8 +30,12 @@ def squared_frequencies(s: SmallMotion) -> FloatArray:
     r = np.sqrt(s.determinant)
     h12 = (s.k12 - s.s12 * s.k22) / r
     h11 = (s.k11 - 2.0 * s.s12 * s.k12 + s.s12 * s.s12 * s.k22) / s.determinant
-    squares: FloatArray = np.linalg.eigvalsh(np.array([[h11, h12], [h12, s.k22]]))
-    return squares
+    mean, half = 0.5 * (h11 + s.k22), 0.5 * (h11 - s.k22)
+    spread = np.hypot(half, h12)
+    larger = mean + np.copysign(spread, mean)
+    product = (s.k11 * s.k22 - s.k12 * s.k12) / s.determinant
+    smaller = product / larger if larger != 0.0 else 0.0
+    return min(larger, smaller), max(larger, smaller)
 
 
 def reach(s: SmallMotion, spring: float) -> dict[str, float]:
@@ -47,7 +53,10 @@ def reach(s: SmallMotion, spring: float) -> dict[str, float]:
     }
 
 
-def slowest_decay(s: SmallMotion, spring: float, squares: FloatArray) -> float:
+@inlined
+def slowest_decay(
+    s: SmallMotion, spring: float, low: float, high: float, p: tuple[float, float, float, float]
+) -> float:
     """Decay rate [1/s] of the mode that the damper reaches least, for a minimum of U; zero if it is missed.
 
     For where eigenvalues have no digits left: weak, missing or enormous damping. The characteristic
@@ -59,22 +68,19 @@ def slowest_decay(s: SmallMotion, spring: float, squares: FloatArray) -> float:
     For large p3 the same with the product of both gaps and K22 for w^2, and a real root at -p0/(p3 K22). The
     product is (K12 - sin(phi+theta) K22)^2 / det M, which gives the smaller gap without cancellation.
     """
-    low, high = squares
-    p3, _, p1, p0 = polynomial(s)
+    p3, _, p1, p0 = p
     split = high - low
     if not split > 0.0 or p3 == 0.0:
         return 0.0
     product = (s.s12 * (spring - s.k22)) ** 2 / s.determinant
     if p3 * p3 > high:
-        swinging = p3 * product / (2.0 * (split * split + p3 * p3 * s.k22))
-        return float(min(swinging, p0 / p1))
+        return min(p3 * product / (2.0 * (split * split + p3 * p3 * s.k22)), p0 / p1)
     below, above = s.k22 - low, high - s.k22
     if below < above:
         below = product / above
     else:
         above = product / below
-    rates = [
-        p3 * gap * split / (2.0 * (split * split + p3 * p3 * square))
-        for gap, square in ((below, low), (above, high))
-    ]
-    return float(min(rates))
+    return min(
+        p3 * below * split / (2.0 * (split * split + p3 * p3 * low)),
+        p3 * above * split / (2.0 * (split * split + p3 * p3 * high)),
+    )

@@ -22,7 +22,6 @@ from fastmech.kernels.jacobians import lagrange_jacobian
 from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
-from fastmech.stability.arguments import require_rest
 from fastmech.stability.linearize import Rest, jacobian
 from fastmech.step_limits.crossing import first_crossing
 
@@ -38,10 +37,9 @@ def measured_stable_step(scene: Scene, equilibrium: Rest, method: str) -> float:
     Raises:
         InputError: an argument is wrong.
     """
-    require_rest(scene, equilibrium)
     formula = with_jacobian(find_method(method), lagrange_jacobian, True)
-    frozen = scene.replace(F0=equilibrium.force, alpha=0.0)
     fastest = float(np.abs(np.linalg.eigvals(jacobian(scene, equilibrium))).max())
+    frozen = scene.replace(F0=equilibrium.force, alpha=0.0)
     at = np.array([equilibrium.phi, equilibrium.theta, 0.0, 0.0])
     params = np.array(reduce(frozen), dtype=np.float64)
     rhs = right_hand_side(reduce(frozen))

@@ -9,7 +9,6 @@ from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Method
 from fastmech.integrators.methods import find_method
 from fastmech.scene import Scene
-from fastmech.stability.arguments import require_rest
 from fastmech.stability.linearize import Rest, jacobian
 from fastmech.step_limits.amplification import amplifies
 from fastmech.step_limits.crossing import DIVISIONS, first_crossing
@@ -84,8 +83,8 @@ def largest_stable_step(scene: Scene, equilibrium: Rest, method: str) -> float:
     Raises:
         InputError: an argument is wrong.
     """
-    require_rest(scene, equilibrium)
-    return stable_step(find_method(method), np.linalg.eigvals(jacobian(scene, equilibrium)))
+    values = np.linalg.eigvals(jacobian(scene, equilibrium))
+    return stable_step(find_method(method), values)
 
 
 def limiting_eigenvalues(scene: Scene, equilibrium: Rest) -> NDArray[np.complex128]:

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
 from fastmech.scene import Scene
-from fastmech.stability.arguments import require_rest
 from fastmech.stability.linearize import Rest, jacobian, linearized
 
 Floats = NDArray[np.float64]
@@ -44,7 +43,6 @@ def transient_growth(scene: Scene, equilibrium: Rest, until: float = 10.0) -> Tr
     Raises:
         InputError: an argument is wrong.
     """
-    require_rest(scene, equilibrium)
     until = checks.number("until", until, "s", above=0.0)
     _, s = linearized(scene, equilibrium)
     M = np.array([[s.m11, s.s12], [s.s12, 1.0]])

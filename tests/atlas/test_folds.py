@@ -6,8 +6,10 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+import mpmath
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from fastmech.atlas.coincidence import Coincidence
 from fastmech.atlas.fold_points import find_folds
@@ -131,6 +133,188 @@ def crossed(found: FoldSet, start: Any, end: Any, along: int) -> bool:
     return False
 
 
+ISLANDS = Scene(alpha=0.0, c1=294.9)
+
+
+def pulls_at(scene: Scene, phi: Any, theta: Any, **changes: Any) -> tuple[Any, ...]:
+    """Gradient and Hessian's determinant of U, and A1^2, A2^2, A3^2, f (a - b), at 50 digits."""
+    p = {n: mpmath.mpf(v) for n, v in scene.model_dump().items()} | changes
+    a = (p["m1"] + p["m2"]) * p["g"] * p["l"] - p["c2"] * p["l"] ** 2
+    b, C, f = p["m2"] * p["g"] * p["l"], p["c1"] * p["l"] ** 2, p["F0"] * p["l"]
+    one = a * mpmath.cos(phi) + f * mpmath.sin(phi) - C * mpmath.cos(phi + theta)
+    two = b * mpmath.sin(theta) + f * mpmath.cos(theta) - C * mpmath.cos(phi + theta)
+    s = C * mpmath.sin(phi + theta)
+    h11 = f * mpmath.cos(phi) - a * mpmath.sin(phi) + s
+    h22 = b * mpmath.cos(theta) - f * mpmath.sin(theta) + s
+    return one, two, h11 * h22 - s * s, a * a + f * f, b * b + f * f, C * C, f * (a - b)
+
+
+@pytest.mark.parametrize("number", [2, 3, 12, 101])
+@pytest.mark.parametrize("falling", [1, -1])
+def test_islands_are_found_whatever_the_grid(number: int, falling: int) -> None:
+    """Cusps lie where two amplitudes are equal, or where f (a - b) = 0: at 50 digits."""
+    F0, c2 = np.linspace(-400.0, 400.0, number)[::falling], np.linspace(0.0, 500.0, number)[::falling]
+    found = trace_folds(ISLANDS, ("F0", F0), ("c2", c2))
+    assert (len(found.curves), len(found.cusps)) == (3, 10)
+    assert (found.complete, found.reason, found.unexplained) == (True, "", 0)
+    assert {curve.kind for curve in found.curves} == {"fold"}
+    with mpmath.workdps(50):
+        for cusp in found.cusps:
+            at = [mpmath.mpf(v) for v in (cusp.phi, cusp.theta, cusp.x, cusp.y)]
+            here = pulls_at(ISLANDS, *at[:2], F0=at[2], c2=at[3])
+            kind = int(np.argmin([abs(x) for x in vanishing(here)]))
+            # One of these vanishes besides the gradient; which, fixes the cusp with the determinant's zero.
+            exact = mpmath.findroot(
+                lambda phi, theta, F, c2, kind=kind: cusp_equations(phi, theta, F, c2, kind), at, tol=1e-30
+            )
+            assert max(abs(x - y) for x, y in zip(exact, at, strict=True)) < 1e-9
+
+
+def vanishing(p: tuple[Any, ...]) -> list[Any]:
+    *_, A1, A2, A3, turn = p
+    return [A2 - A3, A3 - A1, A1 - A2, turn]
+
+
+def cusp_equations(phi: Any, theta: Any, F: Any, c2: Any, kind: int) -> list[Any]:
+    """Gradient and determinant, and that the null direction's third derivative vanishes."""
+    p = pulls_at(ISLANDS, phi, theta, F0=F, c2=c2)
+    return [*p[:3], vanishing(p)[kind]]
+
+
+def test_folds_far_from_the_values_are_found() -> None:
+    scene = Scene(alpha=0.0, c1=779.0951, c2=87.5796)
+    found = find_folds(scene, "F0", [0.05, 600.0])
+    assert found.complete
+    assert [fold.kind for fold in found] == ["fold", "fold"]
+    with mpmath.workdps(50):
+        for fold in found:
+            exact = mpmath.findroot(
+                lambda phi, theta, F: pulls_at(scene, phi, theta, F0=F)[:3],
+                (fold.phi, fold.theta, fold.value),
+            )
+            assert fold.value == pytest.approx(float(exact[2]), rel=1e-11)
+
+
+def test_pitchforks_are_named() -> None:
+    """Without a force M1 and M2 hang at (-pi/2, 0) until C = a b / (a + b), where the position splits."""
+    scene = Scene(alpha=0.0, F0=0.0, c2=92.85)
+    a, b = 22.0 * 9.80665 * 1.25 - 92.85 * 1.25**2, 12.0 * 9.80665 * 1.25
+    (found,) = find_folds(scene, "c1", np.linspace(0.0, 150.0, 31))
+    assert found.kind == "pitchfork"
+    assert found.value == pytest.approx(a * b / (a + b) / 1.25**2, rel=1e-14)
+    assert (found.phi, found.theta) == pytest.approx((-np.pi / 2, 0.0), abs=1e-12)
+    plane = trace_folds(PAPER.replace(F0=0.0), ("c1", [1.0, 400.0]), ("c2", [1.0, 800.0]))
+    assert {curve.kind for curve in plane.curves} == {"pitchfork"}
+    assert plane.complete
+    # Where two amplitudes agree everywhere there are both.
+    plane = trace_folds(PAPER.replace(c2=34 * WEIGHT), ("F0", [-400.0, 400.0]), ("c1", [0.0, 400.0]))
+    assert {curve.kind for curve in plane.curves} == {"fold", "pitchfork"}
+    assert plane.complete
+
+
+def test_a_line_through_a_cusp_says_that_it_is_one() -> None:
+    found = find_folds(PAPER.replace(c1=float(CUSPS["unforced_stiff"]["values"][1])), "F0", [-50.0, 50.0])
+    assert [(fold.kind, round(fold.value, 6)) for fold in found] == [("cusp", 0.0)]
+    assert not found.complete
+    assert "folds meet or touch there" in found.reason
+
+
+@pytest.mark.parametrize(
+    ("scene", "x", "y"),
+    [
+        (PAPER.replace(c1=0.0), ("F0", [-400.0, 400.0]), ("c2", [0.0, 400.0])),
+        (PAPER.replace(g=0.0), ("F0", [-400.0, 400.0]), ("c1", [0.0, 400.0])),
+        (PAPER.replace(g=0.0, F0=0.0), ("c1", [0.0, 400.0]), ("c2", [0.0, 400.0])),
+    ],
+    ids=["no spring c1", "no gravity", "no gravity, no force"],
+)
+def test_planes_with_degenerate_points_say_so(scene: Scene, x: Any, y: Any) -> None:
+    found = trace_folds(scene, x, y)
+    assert found.curves == ()
+    assert not found.complete
+    assert "equilibria are not isolated near" in found.reason
+
+
+@pytest.mark.parametrize("names", [("F0", "c1"), ("F0", "c2"), ("c1", "c2"), ("F0", "m2"), ("l", "c1")])
+def test_no_zero_on_the_torus_is_missed(names: tuple[str, str]) -> None:
+    """Brute force: at a place (phi, theta) the gradient is solved for the two parameters, linearly.
+
+    Wherever the determinant then changes its sign between neighbours of 500 x 500 places, with parameters in
+    the rectangle, a curve passes.
+    """
+    rng = np.random.default_rng(len("".join(names)))
+    ends = {"F0": (-300.0, 200.0), "c1": (1.0, 900.0), "c2": (2.0, 500.0), "m2": (0.5, 30.0), "l": (0.3, 3.0)}
+    for _ in range(2):
+        scene = Scene(
+            alpha=0.0,
+            **{n: 10 ** rng.uniform(-0.3, 1.3) for n in ("m1", "m2")},
+            **{n: 10 ** rng.uniform(1.0, 2.9) for n in ("c1", "c2")},
+            l=rng.uniform(0.4, 2.5),
+            F0=rng.choice([-1.0, 1.0]) * 10 ** rng.uniform(0.5, 2.5),
+        )
+        ranges = [ends[name] for name in names]
+        found = trace_folds(scene, *zip(names, ranges, strict=True))
+        assert found.complete, found.reason
+        zeros = zeros_on_the_torus(scene, names, ranges, 500)
+        assert len(zeros)
+        known = np.concatenate(
+            [
+                np.column_stack([f(g) for g in (c.phi, c.theta) for f in (np.cos, np.sin)] + [
+                    (v - low) / (high - low) for v, (low, high) in zip((c.x, c.y), ranges, strict=True)
+                ])
+                for c in found.curves
+            ]
+        )  # fmt: skip
+        assert cKDTree(known).query(zeros)[0].max() < 0.03
+
+
+def zeros_on_the_torus(
+    scene: Scene, names: tuple[str, str], ranges: list[tuple[float, float]], n: int
+) -> np.typing.NDArray[np.float64]:
+    """(cos phi, sin phi, cos theta, sin theta, u, v) of sign changes of the determinant."""
+    angle = (np.arange(n) + 0.5) / n * 2.0 * np.pi
+    phi, theta = np.meshgrid(angle, angle, indexing="ij")
+
+    def gradient(first: Any, second: Any) -> tuple[Any, Any, Any, Any, Any, Any]:
+        p = scene.model_dump() | {names[0]: first, names[1]: second}
+        # Over l the loads are linear in l and c1 l together; c1 l stands for c1 where both vary.
+        spring = p["c1"] if names == ("l", "c1") else p["c1"] * p["l"]
+        a, b, f = (p["m1"] + p["m2"]) * p["g"] - p["c2"] * p["l"], p["m2"] * p["g"], p["F0"]
+        pull = spring * np.cos(phi + theta)
+        return (
+            a * np.cos(phi) + f * np.sin(phi) - pull,
+            b * np.sin(theta) + f * np.cos(theta) - pull,
+            a, b, spring, f,
+        )  # fmt: skip
+
+    zero, by_first, by_second = (np.array(gradient(*at)[:2]) for at in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
+    by_first, by_second = by_first - zero, by_second - zero
+    with np.errstate(divide="ignore", invalid="ignore"):
+        solvable = by_first[0] * by_second[1] - by_first[1] * by_second[0]
+        first = -(zero[0] * by_second[1] - zero[1] * by_second[0]) / solvable
+        second = -(by_first[0] * zero[1] - by_first[1] * zero[0]) / solvable
+        _, _, a, b, spring, f = gradient(first, second)
+        s = spring * np.sin(phi + theta)
+        h11 = f * np.cos(phi) - a * np.sin(phi) + s
+        determinant = h11 * (b * np.cos(theta) - f * np.sin(theta) + s) - s * s
+        if names == ("l", "c1"):
+            second = second / first
+        parts = [(v - low) / (high - low) for v, (low, high) in zip((first, second), ranges, strict=True)]
+        inside = (parts[0] > 0.0) & (parts[0] < 1.0) & (parts[1] > 0.0) & (parts[1] < 1.0)
+        places = []
+        for along in (0, 1):
+            after = [np.roll(v, -1, along) for v in (determinant, solvable, inside, *parts)]
+            near = (np.abs(after[3] - parts[0]) < 0.02) & (np.abs(after[4] - parts[1]) < 0.02)
+            change = inside & after[2] & near & (determinant * after[0] < 0.0) & (solvable * after[1] > 0.0)
+            places.append(
+                np.column_stack(
+                    [f(g[change]) for g in (phi, theta) for f in (np.cos, np.sin)]
+                    + [v[change] for v in parts]
+                )
+            )
+    return np.concatenate(places)
+
+
 def test_closed_curve_is_closed() -> None:
     found = trace_folds(PAPER, ("F0", np.linspace(-100.0, 100.0, 81)), ("c1", np.linspace(20.0, 250.0, 81)))
     (curve,) = found.curves
@@ -145,7 +329,7 @@ def test_closed_curve_is_closed() -> None:
     [
         (("F0", [0.0, 1.0]), ("F0", [0.0, 1.0]), r"^axes: F0 is given twice"),
         (("alpha", [0.0, 1.0]), ("F0", [0.0, 1.0]), r"^axes\.alpha: equilibria do not depend"),
-        (("F0", [1.0, 0.0]), ("c1", [0.0, 1.0]), r"^axes\.F0: must be two or more values that rise"),
+        (("F0", [1.0, 0.0, 2.0]), ("c1", [0.0, 1.0]), r"^axes\.F0: must be two or more values that rise"),
         (("F0", [0.0, 1.0]), ("c9", [0.0, 1.0]), r"^axes\.c9: unknown parameter"),
     ],
 )

@@ -46,6 +46,22 @@ def test_shapes_and_types(atlas: EquilibriumMap) -> None:
     assert list(atlas.axes) == list(AXES)
 
 
+def test_fallen_axes_are_turned_round(atlas: EquilibriumMap) -> None:
+    turned = map_equilibria(PAPER, {name: values[::-1] for name, values in AXES.items()}, threads=1)
+    np.testing.assert_array_equal(turned.count[::-1, ::-1, ::-1], atlas.count)
+    np.testing.assert_allclose(turned.phi[::-1, ::-1, ::-1], atlas.phi, atol=1e-7)
+
+
+def test_no_scene_is_refused_in_a_line() -> None:
+    for wrong in (
+        lambda: map_equilibria(None, {"c1": [1.0]}),  # type: ignore[arg-type]
+        lambda: find_folds(None, "c1", [1.0, 2.0]),  # type: ignore[arg-type]
+        lambda: find_snap(None),  # type: ignore[arg-type]
+    ):
+        with pytest.raises(InputError, match=r"^scene = None: must be a Scene$"):
+            wrong()
+
+
 def test_every_point_is_what_find_equilibria_finds(atlas: EquilibriumMap) -> None:
     for i, j, k in np.ndindex(5, 6, 3):
         scene = PAPER.replace(F0=AXES["F0"][i], c1=AXES["c1"][j], c2=AXES["c2"][k])
@@ -81,30 +97,48 @@ def test_eigenvalues_are_those_of_classify(atlas: EquilibriumMap) -> None:
 CODES = {"asymptotically stable": 0, "stable": 1, "unstable": 2, "critical": 3}
 
 
-@pytest.mark.parametrize("beta", [0.0, 1e-3, 121.0, 1e6])
-def test_verdicts_rates_and_frequencies_are_those_of_classify(beta: float) -> None:
+def near_anything(rng: np.random.Generator) -> Scene:
+    """A random scene; many beside the degenerate set, a fold or a symmetry, or with extreme damping."""
+    m1, m2, l = 10 ** rng.uniform(-1, 2), 10 ** rng.uniform(-1, 2), rng.uniform(0.2, 4.0)
+    c1, c2, F0, beta = 10 ** rng.uniform(0, 4), 10 ** rng.uniform(0, 4), rng.uniform(-1e3, 1e3), 121.0
+    kind, tiny = rng.integers(8), 10.0 ** rng.uniform(-16, -6, 3)
+    if kind == 0:
+        c1, F0, c2 = 200.0 * tiny[0], 100.0 * tiny[1], (m1 + m2) * 9.80665 / l * (1.0 + tiny[2])
+    elif kind == 1:
+        F0 = 100.0 * tiny[1]
+    elif kind == 2:
+        beta = 10 ** rng.uniform(-9, 12)
+    elif kind == 3:
+        beta = 0.0
+    scene = Scene(m1=m1, m2=m2, l=l, c1=c1, c2=c2, F0=F0, beta=beta, alpha=0.0)
+    if kind == 4:
+        snap = find_folds(scene, "F0", np.linspace(-2.1 * c1 * l, 2.1 * c1 * l, 40))
+        scene = scene.replace(F0=snap[0].value * (1.0 + tiny[0])) if snap else scene
+    return scene
+
+
+def test_2000_scenes_are_to_a_map_what_they_are_one_by_one() -> None:
+    """Counts, outcomes, kinds and all four verdicts are the same, and the decay rates and frequencies."""
     rng = np.random.default_rng(5)
-    for _ in range(12):
-        scene = Scene(
-            m1=10 ** rng.uniform(-1, 2), m2=10 ** rng.uniform(-1, 2), l=rng.uniform(0.2, 4.0), alpha=0.0,
-            c1=10 ** rng.uniform(0, 4), c2=10 ** rng.uniform(0, 4), F0=rng.uniform(-1e3, 1e3), beta=beta,
-        )  # fmt: skip
-        found = find_equilibria(scene)
-        one = map_equilibria(scene, {"F0": [scene.F0]})
+    critical = 0
+    for _ in range(2000):
+        scene = near_anything(rng)
+        found, one = find_equilibria(scene), map_equilibria(scene, {"F0": [scene.F0]}, threads=1)
+        assert (one.count[0], one.outcome[0]) == (len(found), found.certificate.outcome)
+        np.testing.assert_array_equal(one.morse_index[0, : len(found)], found.morse_index)
         for slot, e in enumerate(found):
             c = classify(scene, e)
-            by_three = [c.sylvester.verdict, c.hurwitz.verdict, c.spectrum.verdict, c.verdict]
-            mine = list(one.verdict[0, slot])
-            # The eigenvalues' own bounds differ; each may call critical what the other still resolves.
-            assert mine[0] == CODES[by_three[0]]
-            assert mine[1] == CODES[by_three[1]]
-            assert mine[2] == CODES[by_three[2]] or 3 in (mine[2], CODES[by_three[2]])
-            assert mine[3] == CODES[by_three[3]]
+            by_all = [c.sylvester.verdict, c.hurwitz.verdict, c.spectrum.verdict, c.verdict]
+            assert list(one.verdict[0, slot]) == [CODES[verdict] for verdict in by_all]
+            critical += 3 in one.verdict[0, slot]
+            np.testing.assert_allclose(
+                one.eigenvalues[0, slot], c.eigenvalues, atol=c.eigenvalue_errors.max()
+            )
             np.testing.assert_allclose(one.frequency[0, slot], c.natural_frequencies[0], rtol=1e-8)
-            if e.morse_index == 0:
-                assert one.decay_time[0, slot] == pytest.approx(c.decay_time, rel=1e-4)
-            else:
-                assert np.isnan(one.decay_time[0, slot])
+            np.testing.assert_allclose(
+                1.0 / one.decay_time[0, slot], c.decay_rate, rtol=1e-8, atol=c.eigenvalue_errors.max()
+            )
+    assert critical > 100
 
 
 def test_verdicts_near_a_missed_mode() -> None:
@@ -168,6 +202,28 @@ def test_degenerate_point_is_marked() -> None:
         (None, r"^axes = None: must map parameter names"),
         ({"c1": [1.0, -2.0]}, r"^axes\.c1: scene\.c1 = -2\.0: "),
         ({"F0": [np.nan]}, r"^axes\.F0: scene\.F0 = nan: "),
+        (
+            {"F0": (0, 100, 5)},
+            r"^axes\.F0 = \(0, 100, 5\): may be start, stop and number; give numpy\.linspace\(0, 100, 5\)",
+        ),
+        (
+            {"F0": (0, 100, 500)},
+            r"^axes\.F0 = \(0, 100, 500\): may be start, stop and number; .*, or a list of three values$",
+        ),
+        (
+            {"F0": [0, 100, 5]},
+            r"^axes\.F0\[2\] = 5 after 100: must rise or fall throughout, no value twice; for 5 values",
+        ),
+        (
+            {"c1": [1.0, 2.0, 2.0, 3.0]},
+            r"^axes\.c1\[2\] = 2 after 2: must rise or fall throughout, no value twice$",
+        ),
+        ({"c1": [3.0, 2.0, 2.5, 1.0]}, r"^axes\.c1\[2\] = 2\.5 after 2: must rise or fall throughout"),
+        ({"c1": [1.0, 1.0]}, r"^axes\.c1\[1\] = 1 after 1: must rise or fall"),
+        (
+            dict.fromkeys(("c1", "c2"), np.arange(30_000.0)),
+            r'^axes: 9e\+08 points would take .* GiB on the way, .* run, kind = "equilibrium_map"$',
+        ),
     ],
 )
 def test_wrong_axes_are_refused(axes: dict[str, list[float]], message: str) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fastmech.atlas.fold_points import find_folds
-from fastmech.atlas.snap import find_snap
+from fastmech.atlas.snap import find_snap, fold_free
 from fastmech.equilibria.find import find_equilibria
 from fastmech.errors import InputError
 from fastmech.scene import Scene
@@ -40,7 +40,7 @@ def test_each_well_of_a_bistable_mechanism_snaps_at_one_end() -> None:
 
 def test_a_decaying_force_starts_from_none() -> None:
     snap = find_snap(BISTABLE.replace(alpha=0.7))
-    assert snap.force == 0.0
+    assert snap.value == 0.0
     (load,) = (load for load in (snap.below, snap.above) if load is not None)
     assert abs(load) == pytest.approx(671.1627073982018, rel=1e-12)
 
@@ -78,14 +78,77 @@ def test_beyond_twice_c1_l_there_is_no_fold() -> None:
         assert find_folds(scene, "F0", np.linspace(bound, 10.0 * bound, 200)) == ()
 
 
+def test_how_soft_c1_may_get() -> None:
+    """A symmetric mechanism falls over at a pitchfork, where the Hessian at (-pi/2, 0) is singular.
+
+    It is [[a - C, -C], [-C, b - C]] with a = (m1 + m2) g l - c2 l^2, b = m2 g l and C = c1 l^2, paper (19).
+    """
+    scene = Scene(F0=0.0, c1=20.0, c2=92.85, alpha=0.0)
+    a, b = 22 * 9.80665 * 1.25 - 92.85 * 1.25**2, 12 * 9.80665 * 1.25
+    pitchfork = a * b / (a + b) / 1.25**2
+    assert pitchfork == pytest.approx(43.1747, abs=1e-4)
+    for place in (None, (-1.57, 0.0), (3 * np.pi / 2, 0.01)):
+        snap = find_snap(scene, place, parameter="c1")
+        assert (snap.below, snap.unstable) == (None, (False, True))
+        assert snap.above == pytest.approx(pitchfork, rel=1e-9)
+        assert "c1 = 20 N/m turns unstable at 43.1747 N/m" in snap.sentence
+    tilted = scene.replace(c1=60.0)
+    for e in find_equilibria(tilted):
+        if e.kind == "minimum":  # the tilted ones straighten up there and stay
+            assert find_snap(tilted, e, (20.0, 80.0), parameter="c1").below is None
+
+
+@pytest.mark.parametrize("parameter", ["c1", "c2", "m1", "m2", "l", "g"])
+def test_other_parameters_against_a_walk(parameter: str) -> None:
+    """Of all equilibria at neighbouring values the nearest minimum goes on up to there and no further."""
+    ended = 0
+    for start in (e for e in find_equilibria(BISTABLE) if e.kind == "minimum"):
+        snap = find_snap(BISTABLE, start, parameter=parameter)
+        for value, end in zip((snap.below, snap.above), snap.searched, strict=True):
+            goal = value if value is not None else min(max(end, 0.5 * snap.value), 2.0 * snap.value)
+            beyond = [] if value is None else [value + 1e-4 * (value - snap.value)]
+            at = np.array([start.phi, start.theta])
+            for here in [*(goal - (goal - snap.value) * np.linspace(1.0, 1e-3, 300) ** 2), *beyond]:
+                found = find_equilibria(BISTABLE.replace(**{parameter: float(here)}))
+                places = np.array([[e.phi, e.theta] for e in found if e.kind == "minimum"])
+                away = np.linalg.norm(2.0 * np.sin((places - at) / 2.0), axis=1)
+                assert (away.min() > 0.3) == (here in beyond)
+                at = places[away.argmin()]
+            ended += len(beyond)
+    assert ended >= 1
+
+
+@pytest.mark.parametrize("parameter", ["c1", "c2", "m1", "m2", "l", "g"])
+def test_beyond_the_bound_there_is_no_fold(parameter: str) -> None:
+    rng = np.random.default_rng(10)
+    for _ in range(20):
+        scene = Scene(
+            m1=10 ** rng.uniform(-1, 2), m2=10 ** rng.uniform(-1, 2), l=rng.uniform(0.2, 4.0), alpha=0.0,
+            c1=10 ** rng.uniform(0, 3), c2=10 ** rng.uniform(0, 4), F0=rng.uniform(-500, 500),
+        )  # fmt: skip
+        bound = max(fold_free(scene, parameter)[1], 1e-3)
+        assert find_folds(scene, parameter, np.geomspace(bound * (1 + 1e-9), 100.0 * bound, 200)) == ()
+
+
 def test_wrong_requests_are_refused() -> None:
     saddle = next(e for e in find_equilibria(BISTABLE) if e.kind == "saddle")
-    with pytest.raises(InputError, match=r"^equilibrium = .*: must be a stable one"):
+    with pytest.raises(InputError, match=r"^equilibrium = .* rad: is a saddle, must be a stable one$"):
         find_snap(BISTABLE, saddle)
-    with pytest.raises(InputError, match=r"^equilibrium = 3: must be one that find_equilibria gives$"):
+    with pytest.raises(InputError, match=r"^equilibrium = 3: must be one of .*, or \(phi, theta\) in rad$"):
         find_snap(BISTABLE, 3)  # type: ignore[arg-type]
+    with pytest.raises(
+        InputError, match=r"^equilibrium = \(0, 0\) rad: is near no stable one; they are at \(0\.70"
+    ):
+        find_snap(BISTABLE, (0.0, 0.0))
+    for parameter in ("beta", "m3", "alpha", 3):
+        with pytest.raises(
+            InputError, match=rf"^parameter = {parameter!r}: must be one that moves equilibria"
+        ):
+            find_snap(BISTABLE, parameter=parameter)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"^scene\.c1 = -1"):
+        find_snap(BISTABLE, searched=(-1.0, 500.0), parameter="c1")
     for searched in ((100.0, 200.0), (1.0,), "ab", 5, (None, None), ("-500", "500"), (np.nan, 500.0)):
-        message = f"searched = {searched!r}: must be a range of forces [N] that holds 85.3 N"
+        message = f"searched = {searched!r}: must be a range of F0 that holds 85.3 N"
         with pytest.raises(InputError, match=f"^{re.escape(message)}$"):
             find_snap(BISTABLE, searched=searched)  # type: ignore[arg-type]
 

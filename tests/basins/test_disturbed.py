@@ -250,7 +250,7 @@ def test_a_decaying_force_and_a_foreign_equilibrium_are_refused() -> None:
         disturb(SCENE.replace(alpha=0.7), stable, 1)
     with pytest.raises(
         InputError,
-        match=r"^equilibrium = \(1\.45058, -0\.232575\) rad: must be one of this scene's equilibria",
+        match=r"^equilibrium = \(1\.45058, -0\.232575\) rad, F = 100 N: must be one of this scene's",
     ):
         disturb(Scene(F0=-100.0, alpha=0.0), stable, 1)
     with pytest.raises(InputError, match=r"^scene\.beta = 0: must be greater than 0 N s/m"):

@@ -138,7 +138,10 @@ def test_a_well_erodes_towards_its_fold() -> None:
     [
         ({"scene": fm.Scene()}, "scene.alpha = 0.7: must be 0"),
         ({"axes": {"ph": [0.0, 1.0]}}, "axes.ph: unknown name; did you mean 'phi'?"),
-        ({"axes": {}}, "axes: must name at least one state"),
+        ({"axes": {}}, "axes = {}: must map at least one state"),
+        ({"axes": {"phi": [0.0, 1.0, 1.0]}}, "axes.phi: must rise in equal steps"),
+        ({"axes": {"phi": [-180.0, 180.0]}}, "axes.phi: reaches 180, beyond 4 turns; angles are in rad"),
+        ({"values": [1.0, 3.0, 2.0]}, "values[2] = 2 after 3: must rise or fall throughout"),
         ({"n": 0}, "n = 0: must be an integer not less than 1"),
         ({"scene": BISTABLE.replace(beta=0.0)}, "scene.beta = 0: must be greater than 0"),
         ({"parameter": "F1"}, "axes.F1: unknown parameter"),

@@ -226,7 +226,28 @@ def test_fixed_coordinates_are_starts() -> None:
     [
         ({"axes": {"phi": [0.0, 1.0]}}, r"axes = \['phi'\]: must be 2 to 4"),
         ({"axes": {"phi": [0.0, 1.0], "thta": [0.0]}}, r"axes.thta: unknown name; did you mean 'theta'"),
-        ({"axes": {"phi": [1.0, 0.0], "theta": [0.0]}}, r"axes.phi: .*strictly rising"),
+        ({"axes": {"phi": [1.0, 0.0], "theta": [0.0]}}, r"^axes\.phi: falls from 1 to 0, must rise$"),
+        (
+            {"axes": {"phi": [0.0, 1.0, 1.0], "theta": [0.0]}},
+            r"^axes\.phi\[2\] = 1 after 1: must rise or fall",
+        ),
+        (
+            {"axes": {"phi": (0, 3, 5), "theta": [0.0]}},
+            r"^axes\.phi = \(0, 3, 5\): may be start, stop and number",
+        ),
+        (
+            {"axes": {"phi": [-180.0, 180.0], "theta": [0.0]}},
+            r"^axes\.phi: reaches 180, beyond 4 turns; angles are in rad",
+        ),
+        (
+            {"axes": {"phi": [0.0], "phi_dot": [0.0]}, "fixed": {"theta": -90.0}},
+            r"^fixed\.theta: reaches 90, beyond 4",
+        ),
+        ({"axes": None}, r"^axes = None: must map coordinates to their values$"),
+        (
+            {"axes": dict.fromkeys(("phi", "theta"), np.linspace(-3, 3, 30_000))},
+            r'^axes: ask for 9e\+08 starts, at most 5e\+07 are allowed; .* fastmech run, kind = "basins"$',
+        ),
         ({"fixed": {"phi": 1.0}}, r"fixed.phi: must be one of the coordinates without an axis"),
         ({"progress": 3}, "progress = 3: must be a function of the number of finished starts"),
         ({"refine": 3}, r"refine = 3: must be a power of two"),
@@ -245,3 +266,15 @@ def test_wrong_requests(change: dict[str, Any], message: str) -> None:
     good = {"scene": CONSTANT, "axes": {"phi": [0.0, 1.0], "theta": [0.0, 1.0]}}
     with pytest.raises(fm.InputError, match=message):
         fm.map_basins(**(good | change))
+
+
+def test_two_milliard_starts_are_refused_before_they_are_copied() -> None:
+    starts = np.broadcast_to(np.zeros(4), (2_000_000_000, 4))
+    for refused in (
+        lambda: fm.labels_of(CONSTANT, starts),
+        lambda: fm.integrate(CONSTANT, starts, 1.0, dt=0.1),
+    ):
+        with pytest.raises(fm.InputError, match=r"^\w+: the states would take 59\.6 GiB on the way, [^\n]*$"):
+            refused()
+    with pytest.raises(fm.InputError, match=r"^n = 2000000000: must be an integer not greater than"):
+        fm.disturb(CONSTANT, fm.find_equilibria(CONSTANT)[0], 2_000_000_000)

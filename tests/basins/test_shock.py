@@ -45,6 +45,8 @@ def test_a_shock_of_some_states_alone() -> None:
     shock = minimal_shock(ellipsoid, PLACE, np.eye(3), most=5.0, coordinates=(2, 0))
     assert shock.size == pytest.approx(1.0, rel=1e-3)
     assert shock.shock[1] == 0.0
+    alone = minimal_shock(ellipsoid, PLACE, np.eye(3), most=5.0, coordinates=(1,))
+    assert alone.size == pytest.approx(0.5, rel=1e-3)
 
 
 @pytest.mark.nojit

@@ -179,6 +179,12 @@ def test_the_least_blow_on_m2_is_that_of_scipy(side: float, bracket: tuple[float
             "alpha = 0: must be greater than 0 1/s; a constant force has another",
         ),
         ({"alpha": [2.0, 1.0]}, "alpha: must be greater than 0 1/s and rise"),
+        ({"F0": (10, 100, 5)}, "F0 = (10, 100, 5): may be start, stop and number; give numpy.linspace"),
+        ({"F0": [1.0, 2.0, 2.0]}, "F0[2] = 2 after 2: must rise or fall throughout, no value twice"),
+        (
+            {"F0": np.arange(1.0, 30_001.0), "alpha": np.arange(1.0, 30_001.0)},
+            "F0, alpha: 9e+08 motions would",
+        ),
         ({"F0": [-1.0, 1.0]}, "F0: must rise, be of one sign and nowhere be 0 N"),
         ({"scene": fm.Scene(beta=0.0)}, "scene.beta = 0: must be greater than 0"),
         ({"progress": 3}, "progress = 3: must be a function of the number of finished motions"),

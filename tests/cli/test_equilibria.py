@@ -69,6 +69,16 @@ def test_the_load_at_which_each_position_disappears(invoke):
         assert text.count("disappears at no load whatever (searched from -411.312 to 411.312 N; no") == 1
 
 
+def test_how_another_parameter_may_change(invoke):
+    symmetric = ["--alpha", "0", "--F0", "0", "--c1", "20", "--c2", "92.85"]
+    result = invoke("equilibria", *symmetric, "--vary", "c1", "--position", "-1.57", "0")
+    text = " ".join(result.stdout.split())
+    assert "1: as c1 changes, it turns unstable at 43.1747 N/m (searched from 0 to 526.698 N/m; no" in text
+    refused = invoke("equilibria", *symmetric, "--vary", "beta")
+    assert (refused.exit_code, refused.stderr.count("\n")) == (2, 1)
+    assert "parameter = 'beta': must be one that moves equilibria" in refused.stderr
+
+
 def test_no_isolated_equilibria(invoke):
     result = invoke("equilibria", "--c1", "0", "--F0", "0", "--g", "0")
     assert result.exit_code == 0

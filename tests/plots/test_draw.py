@@ -269,6 +269,26 @@ def test_pictures_tell_their_scene():
     assert {"stable, number 1", "stable, number 2"} <= {curve.get_label() for curve in line.lines}
 
 
+def test_pitchforks_are_named_and_missing_proofs_told():
+    """C = a b / (a + b): see ``tests/atlas/test_folds.py``."""
+    unforced = Scene(alpha=0.0, F0=0.0, c2=92.85)
+    falling = {"c1": axis(120.0, 1.0, 60)}
+    axes = draw("equilibrium_map", unforced, axes=falling)["branches"].axes[0]
+    assert axes.get_title().startswith("Equilibria over c1; pitchfork at 43.1747 N/m\n")
+    marks = [line for line in axes.lines if line.get_label() == "pitchfork (symmetric)"]
+    assert [float(x) for x in marks[0].get_xdata()] == pytest.approx([43.17473449000661])
+    grid = {"c1": axis(1.0, 400.0, 8), "c2": axis(1.0, 800.0, 9)}
+    dataset = run("equilibrium_map", unforced, axes=grid)
+    figure = scan_kinds()["equilibrium_map"].draw(dataset, unforced.model_dump())["count"]
+    (legend,) = figure.legends
+    assert {text.get_text() for text in legend.get_texts()} >= {
+        "pitchfork (symmetric) of resting positions", "pitchfork (symmetric) of unstable equilibria"
+    }  # fmt: skip
+    dataset["fold_proof"].data[0] = "not proved near c1 = 1 N/m"
+    figure = scan_kinds()["equilibrium_map"].draw(dataset, unforced.model_dump())["count"]
+    assert "not proved that these are all folds" in figure.get_suptitle()
+
+
 def test_stable_branches_are_solid_and_unstable_dashed():
     dataset = run("equilibrium_map", CONSTANT, axes={"F0": axis(-3.0, 3.0, 41)})
     axes = scan_kinds()["equilibrium_map"].draw(dataset, CONSTANT.model_dump())["branches"].axes[0]

@@ -100,7 +100,7 @@ ALONG = "along.F0 = {start = 0.0, stop = 1.0, num = 3}\n"
 FORCES, RATES = "F0 = {start = 1.0, stop = 2.0, num = 3}\n", "alpha = {start = 1.0, stop = 2.0, num = 3}\n"
 
 IMPOSSIBLE = {
-    "degrees": ("basins", PHI.replace("1.0", "180.0") + THETA, "axes.phi = 180: is beyond 4 turns"),
+    "degrees": ("basins", PHI.replace("1.0", "180.0") + THETA, "axes.phi: reaches 180, beyond 4 turns"),
     "rates": (
         "basins",
         PHI + "axes.phi_dot = {start=0.0, stop=1e12, num=3}",
@@ -134,7 +134,11 @@ IMPOSSIBLE = {
     "a horizon": ("disturbed", "linear_horizon = 1e300", "linear_horizon = 1e+300 s: takes "),
     "years of work": ("disturbed", "trajectories = 100000000\nt_end = 5e5", "right-hand sides"),
     "a long seed": ("disturbed", f"seed = {2**128}", f"seed = {2**128}: input should be less than {2**128}"),
-    "no such range": ("snap", "searched = [1.0, 2.0]", "searched = [1.0, 2.0]: must be a range of forces"),
+    "no such range": (
+        "snap",
+        "searched = [1.0, 2.0]",
+        "searched = [1.0, 2.0]: must be a range of F0 that holds 100",
+    ),
     "a wide range": ("snap", "searched = [-1e300, 1e300]", "searched.0 = -1e+300: must not exceed"),
     "slow decay": (
         "snapping",

@@ -53,6 +53,8 @@ def test_curves_come_with_the_map() -> None:
     dataset = mapped().groups["curves"]
     assert dataset["fold_crossings"].data[0] > 10
     assert dataset["fold_crossings"].data[1] == 0
+    assert list(dataset["fold_proof"].data) == ["complete"]
+    assert set(dataset["fold_kind"].data) == {0}
     assert dataset["cusp_F0"].data.size >= 4
     assert set(np.unique(dataset["unreached_vanishes"].data)) >= {0, 2}
     line = EquilibriumMap(axes={"F0": {"start": -800.0, "stop": 800.0, "num": 99}}).run(SCENE, RunContext())
@@ -181,6 +183,16 @@ def test_snap_scan() -> None:
     assert np.nanmin(dataset["snap_below"].data) == pytest.approx(-671.1627073982018, abs=1e-9)
     with pytest.raises(InputError, match="searched"):
         SnapScan(searched=[0.0, 1.0]).run(SCENE, RunContext())
+
+
+def test_snap_scan_of_a_spring_and_a_place() -> None:
+    scene = Scene(F0=0.0, c1=20.0, c2=92.85, alpha=0.0)
+    dataset = SnapScan(parameter="c1", position=[-1.57, 0.0]).run(scene, RunContext())
+    assert (dataset.sizes["equilibrium"], dataset["snap_above"].units) == (1, "N/m")
+    assert dataset["snap_above"].data == pytest.approx(43.17473449, abs=1e-7)
+    assert dataset["turns_unstable"].data.tolist() == [[False, True]]
+    with pytest.raises(InputError, match="moves equilibria"):
+        SnapScan(parameter="beta").run(scene, RunContext())
 
 
 def test_a_map_too_large_for_any_machine_is_refused_at_once() -> None:

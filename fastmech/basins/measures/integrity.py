@@ -88,7 +88,7 @@ def integrity(
         attractor = np.array([attractor.phi, attractor.theta, 0.0, 0.0])[chosen]
     if norm is None:
         raise InputError("norm: missing; by default it is that of an equilibrium and a scene")
-    lines = check_axes(list(axes.values()) if isinstance(axes, Mapping) else axes, array.shape)
+    lines = check_axes(axes, array.shape)
     label = checks.whole_number("label", label, least=0)
     place = check_point("attractor", attractor, array.ndim)
     first, last = np.array([line[0] for line in lines]), np.array([line[-1] for line in lines])

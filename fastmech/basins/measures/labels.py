@@ -6,7 +6,7 @@ counted in every total and never taken for a basin.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, TypeAlias
 
 import numpy as np
@@ -96,7 +96,7 @@ def check_point(name: str, values: ArrayLike, dim: int | None = None) -> Floats:
     return point
 
 
-def check_axes(axes: Sequence[ArrayLike], shape: tuple[int, ...]) -> list[Floats]:
+def check_axes(axes: Mapping[str, ArrayLike] | Sequence[ArrayLike], shape: tuple[int, ...]) -> list[Floats]:
     """Coordinates along every axis of a grid, finite, rising in equal steps.
 
     Raises:
@@ -104,12 +104,16 @@ def check_axes(axes: Sequence[ArrayLike], shape: tuple[int, ...]) -> list[Floats
     """
     if len(axes) != len(shape):
         raise InputError(f"axes: has {len(axes)} axes, the labels have {len(shape)}")
+    if isinstance(axes, Mapping):
+        named = [(f"axes.{name}", axis) for name, axis in axes.items()]
+    else:
+        named = [(f"axes[{k}]", axis) for k, axis in enumerate(axes)]
     checked = []
-    for k, (axis, length) in enumerate(zip(axes, shape, strict=True)):
-        values = check_point(f"axes[{k}]", axis, length)
-        step = (values[-1] - values[0]) / (length - 1)
+    for (name, axis), length in zip(named, shape, strict=True):
+        values = check_point(name, axis, length)
+        step = (values[-1] - values[0]) / max(length - 1, 1)
         if not step > 0.0 or np.abs(np.diff(values) - step).max() > 1e-6 * step:
-            raise InputError(f"axes[{k}]: must rise in equal steps")
+            raise InputError(f"{name}: must rise in equal steps")
         checked.append(values)
     return checked
 

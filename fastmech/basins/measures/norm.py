@@ -18,9 +18,27 @@ from fastmech.ensembles import checks
 from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError, shown
 from fastmech.scene import Scene, nearest
+from fastmech.stability.arguments import require_rest
 
 #: States of the mechanism by the names of a map's axes.
 STATE = ("phi", "theta", "phi_dot", "theta_dot")
+
+
+#: Angles lie within so many turns of zero: what is beyond was meant in degrees.
+MOST_TURNS = 4
+
+
+def check_angles(field: str, name: str, values: ArrayLike) -> None:
+    """Refuse angles that must be degrees; ``name`` is that of a state, of which rates are no angles.
+
+    Raises:
+        InputError: one is beyond ``MOST_TURNS`` turns.
+    """
+    largest = float(np.abs(values).max())
+    if name in STATE[:2] and largest > 2.0 * np.pi * MOST_TURNS:
+        raise InputError(
+            f"{field}: reaches {largest:g}, beyond {MOST_TURNS} turns; angles are in radians (numpy.deg2rad)"
+        )
 
 
 def state_index(name: str) -> int:
@@ -40,7 +58,11 @@ def kinetic_norm(scene: Scene, equilibrium: Equilibrium) -> Floats:
     ``size^2 = (xi' a xi + eta' a eta / omega^2) / (m2 l^2)`` for departures xi [rad] and eta [rad/s], with
     the metric ``a`` at the equilibrium, paper (11), and the highest natural frequency omega [rad/s]. The
     kinetic energy of a kick is ``size^2 omega^2 m2 l^2 / 2``. The force is the equilibrium's frozen one.
+
+    Raises:
+        InputError: an argument is wrong, or the scene does not rest there.
     """
+    require_rest(scene, equilibrium)
     frozen = scene.replace(F0=equilibrium.force, alpha=0.0)
     return size_at(frozen, equilibrium.phi, equilibrium.theta).to_ball
 

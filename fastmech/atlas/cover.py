@@ -1,0 +1,293 @@
+"""All solutions of a system within a rectangle of parameters, by branch and prune, with a proof.
+
+The unknowns are two angles and one or two parts of parameters' ranges; the solutions are points or curves. A
+box of unknowns is dropped where one of the equations, or one of them multiplied by the inverse of the
+Jacobian at the box's centre, keeps its sign, and shrunk to where it does not. What is left is split. Where
+Newton's method finds a solution in a small box the curve through it is followed.
+
+**Neighbourhoods.** Let z be a solution, t the unit null vector of the Jacobian there (for curves) and M the
+inverse of the Jacobian with the row t. In a box round z the Jacobian of (F, t.w) stays so near to the one at
+z that M times their difference is at most q < 1, in the norm whose unit ball is the box. So (F, t.w) is one
+to one there, and by contraction every value of t.(w - z) up to (1 - q) times the box's size along t is taken
+by a solution. Hence all solutions of this neighbourhood lie on the one arc through z, and a box within it
+needs no further look. The set of solutions is **complete** when no box is left. Bounds hold in double
+precision, with an allowance for rounding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from fastmech.atlas.continuation import Curve
+from fastmech.atlas.enclosure import ROUNDING, System
+from fastmech.jit import CUBE, MATRIX, inlined, kernel
+
+Floats = NDArray[np.float64]
+
+#: Boxes of the start along an angle and along a parameter.
+ANGLES, PARTS = 16, 4
+
+#: Boxes that are looked at in all, and size of a box that is not split any more.
+MOST_BOXES, SMALLEST = 1_200_000, 1e-8
+
+#: Largest q of a neighbourhood, and of a box in which Newton's method is tried.
+CONTRACTION, RIPE = 0.75, 0.5
+
+#: Neighbourhoods: longest and shortest half length tried [rad and parts], their ratios; width over length.
+WIDEST, NARROWEST, SHORTER, THIN = 0.05, 1e-5, 0.5, 0.1
+
+#: Largest distance of a curve's points over the reach of their neighbourhoods, and halvings to get there.
+SPACING, MOST_HALVINGS = 1.0, 12
+
+#: Periods of the unknowns, 0: none.
+TURNS = np.array([2.0 * np.pi, 2.0 * np.pi, 0.0, 0.0])
+
+
+def apart(a: Floats, b: Floats) -> Floats:
+    """Difference of points (phi, theta, u, v), angles the short way."""
+    gap = a - b
+    gap[..., :2] = np.mod(gap[..., :2] + np.pi, 2.0 * np.pi) - np.pi
+    return gap
+
+
+@inlined
+def minor(A: Floats, i: int, k: int) -> float:
+    """The cofactor of an entry of a matrix (4, 4)."""
+    r, q, s = (i + 1) % 4, (i + 2) % 4, (i + 3) % 4
+    x, y, z = (k + 1) % 4, (k + 2) % 4, (k + 3) % 4
+    size = (
+        A[r, x] * (A[q, y] * A[s, z] - A[q, z] * A[s, y])
+        - A[r, y] * (A[q, x] * A[s, z] - A[q, z] * A[s, x])
+        + A[r, z] * (A[q, x] * A[s, y] - A[q, y] * A[s, x])
+    )
+    return size if (i + k) % 2 == 0 else -size
+
+
+@kernel(types.void(CUBE, CUBE, MATRIX))
+def invert(slope: Floats, inverse: Floats, tangent: Floats) -> None:
+    """Write M (boxes, n, 3) and t (boxes, n) of Jacobians (boxes, 3, n); NaN where they are singular."""
+    n = slope.shape[2]
+    A = np.zeros((4, 4))
+    A[3, 3] = 1.0
+    for p in range(slope.shape[0]):
+        for i in range(3):
+            for k in range(n):
+                A[i, k] = slope[p, i, k]
+        if n == 4:
+            for k in range(4):
+                tangent[p, k] = minor(A, 3, k)
+            size = np.sqrt(tangent[p, 0] ** 2 + tangent[p, 1] ** 2 + tangent[p, 2] ** 2 + tangent[p, 3] ** 2)
+            for k in range(4):
+                tangent[p, k] /= size
+                A[3, k] = tangent[p, k]
+        determinant = 0.0
+        for k in range(4):
+            determinant += A[3, k] * minor(A, 3, k)
+        for k in range(n):
+            for i in range(3):
+                inverse[p, k, i] = minor(A, i, k) / determinant
+
+
+def inverses(slope: Floats) -> tuple[Floats, Floats]:
+    """M (boxes, n, 3) and t (boxes, n), zero for points, of Jacobians (boxes, 3, n)."""
+    boxes, _, n = slope.shape
+    inverse, t = np.empty((boxes, n, 3)), np.zeros((boxes, n))
+    invert(slope, inverse, t)
+    lost = ~np.isfinite(inverse).all(axis=(1, 2))
+    inverse[lost], t[lost] = np.nan, 0.0
+    return inverse, t
+
+
+@dataclass
+class Neighbourhoods:
+    """Boxes round solutions that hold nothing but the arcs through these."""
+
+    system: System
+    points: Floats  #: of a curve in order, or one alone; polished points between them are added
+    tangents: Floats = field(init=False)
+    radius: Floats = field(init=False)  #: (points, n)
+    reach: Floats = field(init=False)  #: (points,) along the tangent
+    _tree: cKDTree = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Neighbourhoods of all points, and of more between them until each holds its neighbours."""
+        here = self._at(self.points)
+        for _ in range(MOST_HALVINGS):
+            z, _, _, reach = here
+            gap = apart(z[1:], z[:-1])
+            far = np.linalg.norm(gap, axis=1) > SPACING * np.maximum(reach[1:], reach[:-1])
+            if not far.any():
+                break
+            between = self._at(polished(self.system, z[:-1][far] + 0.5 * gap[far]))
+            place = np.flatnonzero(far) + 1
+            here = tuple(  # type: ignore[assignment]
+                np.insert(old, place, new, axis=0) for old, new in zip(here, between, strict=True)
+            )
+        self.points, self.tangents, self.radius, self.reach = here
+        self._tree = cKDTree(wrapped(self.points), boxsize=TURNS[: self.points.shape[1]])
+
+    def _at(self, points: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """Points, tangents, radius and reach."""
+        inverse, t = inverses(self.system.over(points, np.zeros_like(points)).slope)
+        size = np.abs(inverse)
+        shape = np.abs(t) + (THIN if t.any() else 1.0)
+        radius, change = np.zeros_like(shape), np.ones((len(points), 1))
+        long, todo = WIDEST, np.arange(len(points))
+        while todo.size and long > NARROWEST:
+            size_, there = size[todo], points[todo]
+            # As wide as twice what the curve may bend away within its length.
+            tried = long * shape[todo]
+            for _ in range(2):
+                tried = long * shape[todo] + 2.0 * self._bent(size_, there, tried)
+            now = (self._bent(size_, there, tried) / tried).max(axis=1, keepdims=True)
+            good = now[:, 0] < CONTRACTION
+            radius[todo[good]], change[todo[good]] = tried[good], now[good]
+            long, todo = SHORTER * long, todo[~good]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            reach = (1.0 - change)[:, 0] * (radius / np.abs(t)).min(axis=1)
+        return points, t, radius, reach
+
+    def _bent(self, size: Floats, points: Floats, radius: Floats) -> Floats:
+        """How far the change of the Jacobian within a box may lead away."""
+        return ((size @ self.system.over(points, radius).bend) @ radius[:, :, None])[:, :, 0]
+
+    def hold(self, centre: Floats, half: Floats) -> NDArray[np.bool_]:
+        """Whether boxes (boxes, n) lie within one neighbourhood."""
+        held = np.zeros(len(centre), dtype=bool)
+        small = np.flatnonzero((half <= self.radius.max(axis=0)).all(axis=1))
+        if not small.size:
+            return held
+        centre, half = centre[small], half[small]
+        nearest = self._tree.query(wrapped(centre), k=min(2, len(self.points)))[1]
+        for near in nearest.reshape(small.size, -1).T:
+            gap, t = apart(centre, self.points[near]), self.tangents[near]
+            within = (np.abs(gap) + half <= self.radius[near]).all(axis=1)
+            along = np.abs((gap * t).sum(axis=1)) + (np.abs(t) * half).sum(axis=1)
+            held[small] |= within & (along <= self.reach[near])
+        return held
+
+
+def polished(system: System, points: Floats) -> Floats:
+    """Solutions near points (points, n) by Newton's method, the nearest ones of curves."""
+    for _ in range(4):
+        found = system.over(points, np.zeros_like(points))
+        inverse = inverses(found.slope)[0]
+        points = points - np.nan_to_num(inverse @ found.value[:, :, None])[:, :, 0]
+    return points
+
+
+def wrapped(points: Floats) -> Floats:
+    """Angles from 0 to 2 pi."""
+    z = points.copy()
+    z[:, :2] = np.mod(z[:, :2], 2.0 * np.pi)
+    z[:, :2][z[:, :2] >= 2.0 * np.pi] = 0.0  # what is below zero by rounding
+    return z
+
+
+@dataclass
+class Found:
+    """What a search has found."""
+
+    curves: list[Curve]
+    open: Floats  #: (places, n) of boxes that are left; none: complete
+    cut_short: bool  #: at ``MOST_BOXES``
+
+
+def solutions(system: System, follow: Callable[[Floats], Curve | None]) -> Found:
+    """All solutions of a system with the unknowns phi, theta [rad] and one or two parts from 0 to 1.
+
+    Args:
+        system: as many equations as unknowns, or one less.
+        follow: gives the curve through a solution, within the rectangle; None: there is none.
+    """
+    centre, half = start(system.unknowns)
+    curves: list[Curve] = []
+    known: list[Neighbourhoods] = []
+    tiny, looked_at = [centre[:0]], 0
+    while len(centre) and looked_at < MOST_BOXES:
+        looked_at += len(centre)
+        centre, half, slope, ripe = pruned(system, centre, half)
+        left = ~held_by(known, centre, half)
+        centre, half, slope, ripe = centre[left], half[left], slope[left], ripe[left]
+        z = polished(system, centre[ripe])
+        near = (np.abs(z - centre[ripe]) <= 2.0 * half[ripe].max(axis=1, keepdims=True)).all(axis=1)
+        z = z[near & ((z[:, 2:] >= 0.0) & (z[:, 2:] <= 1.0)).all(axis=1)]
+        z = z[~held_by(known, z, np.zeros_like(z))]
+        before = len(known)
+        while len(z):
+            curve = follow(z[0])
+            if curve is not None:
+                curves.append(curve)
+                known.append(Neighbourhoods(system, curve.points))
+            z = z[1:]
+            z = z[~held_by(known[-1:], z, np.zeros_like(z))]
+        left = ~held_by(known[before:], centre, half)
+        small = half.max(axis=1) < SMALLEST
+        tiny.append(centre[left & small])
+        left &= ~small
+        centre, half = split(centre[left], half[left], slope[left])
+    return Found(curves, np.concatenate([*tiny, centre]), looked_at >= MOST_BOXES and len(centre) > 0)
+
+
+def held_by(known: list[Neighbourhoods], centre: Floats, half: Floats) -> NDArray[np.bool_]:
+    """Which boxes (boxes, n) lie within a neighbourhood of one of the curves."""
+    held = np.zeros(len(centre), dtype=bool)
+    for one in known:
+        held[~held] = one.hold(centre[~held], half[~held])
+    return held
+
+
+def start(n: int) -> tuple[Floats, Floats]:
+    """Boxes that cover the torus and the rectangle."""
+    pieces = np.array([ANGLES] * 2 + [PARTS] * (n - 2))
+    length = np.array([2.0 * np.pi] * 2 + [1.0] * (n - 2))
+    centre = (np.indices(pieces).reshape(n, -1).T + 0.5) / pieces * length
+    centre[:, :2] -= np.pi
+    return centre, np.tile(0.5 * length / pieces, (len(centre), 1))
+
+
+def pruned(system: System, centre: Floats, half: Floats) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
+    """What is left of boxes: centres, halves, slopes, and whether at most one arc can pass through."""
+    value, slope, bend = system.over(centre, half)
+    kept = ~np.isnan(value[:, 0])
+    centre, half, value, slope, bend = (x[kept] for x in (centre, half, value, slope, bend))
+    rest = 0.5 * (bend @ half[:, :, None])[:, :, 0] + ROUNDING
+    inverse, t = inverses(slope)
+    lost = np.isnan(inverse[:, 0, 0])
+    inverse[lost] = 0.0
+    step = -(inverse @ value[:, :, None])[:, :, 0]
+    room = (np.abs(inverse) @ rest[:, :, None])[:, :, 0]
+    # Every solution in the box is centre + step + s t, up to room, with some s.
+    reach = (np.abs(t) * half).sum(axis=1)[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = np.sort(np.stack([(-half - room - step) / t, (half + room - step) / t]), axis=0)
+    moves = np.abs(t) > 1e-12
+    first = np.where(moves, ends[0], -reach).max(axis=1)
+    last = np.where(moves, ends[1], reach).min(axis=1)
+    along = np.sort(np.stack([first[:, None] * t, last[:, None] * t]), axis=0)
+    low = np.maximum(-half, step + along[0] - room)
+    high = np.minimum(half, step + along[1] + room)
+    low[lost], high[lost] = -half[lost], half[lost]
+    kept = lost | ((first <= last) & (low <= high).all(axis=1))
+    change = ((np.abs(inverse) @ bend) @ half[:, :, None])[:, :, 0]
+    ripe = ~lost & (change <= RIPE * half).all(axis=1)
+    low, high = low[kept], high[kept]
+    return centre[kept] + 0.5 * (low + high), 0.5 * (high - low), slope[kept], ripe[kept]
+
+
+def split(centre: Floats, half: Floats, slope: Floats) -> tuple[Floats, Floats]:
+    """Every box in four, along the unknowns that change the equations most."""
+    for _ in range(2):
+        weight = (np.abs(slope).max(axis=1) + 1e-3) * half
+        widest = np.arange(half.shape[1]) == np.argmax(weight, axis=1)[:, None]
+        half = np.where(widest, 0.5 * half, half)
+        shift = np.where(widest, half, 0.0)
+        centre, half = np.concatenate([centre - shift, centre + shift]), np.concatenate([half, half])
+        slope = np.concatenate([slope, slope])
+    return centre, half
