@@ -92,9 +92,9 @@ def test_the_request_in_the_repository_is_valid() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("F0 = {start=-1.0, stop=1.0, num=3}", r"F0.start = -1: must have the sign of stop"),
-        ("F0 = {start=2.0, stop=1.0, num=3}", r"F0.stop = 1: must be greater than start = 2"),
-        ("alpha = {start=0.0, stop=1.0, num=3}", r"alpha.start"),
+        ("F0 = {start=-1.0, stop=1.0, num=3}", r"F0: goes from -1 to 1 N: must be of one sign"),
+        ("F0 = {start=2.0, stop=1.0, num=3}", r"F0: falls from 2 to 1, must rise"),
+        ("alpha = {start=0.0, stop=1.0, num=3}", r"alpha = .*must have one sign and not be 0"),
         ("scene = {beta = 0.0}", r"beta = 0"),
     ],
 )
