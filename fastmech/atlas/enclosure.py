@@ -108,10 +108,10 @@ class Term:
     slot: int
 
     def _then(self, kind: int, x: Any, y: Any) -> Term:
-        slots = [
+        first, second = (
             other.slot if isinstance(other, Term) else self._then_constant(float(other)) for other in (x, y)
-        ]
-        self.tape.append((kind, *slots, 0.0))
+        )
+        self.tape.append((kind, first, second, 0.0))
         return Term(self.tape, len(self.tape) - 1)
 
     def _then_constant(self, value: float) -> int:

@@ -246,12 +246,12 @@ def with_cusps(plane: Plane, line: Curve, found: list[Floats]) -> Floats:
     sides = np.array([*p.bent, p.pulls[2]]) >= 0.0
     turned = sides[:, 1:] != sides[:, :-1]
     tried: list[tuple[int, Floats, int | None]] = []
-    for k in np.flatnonzero(turned.any(axis=0)):
+    for k in np.flatnonzero(turned.any(axis=0)).tolist():
         middle = 0.5 * (line.points[k] + line.points[k + 1])
         if turned[3, k]:
-            tried.append((int(k), middle, None))
+            tried.append((k, middle, None))
         if turned[:3, k].sum() == 2:
-            tried.append((int(k), middle, int(np.argmin(turned[:3, k]))))
+            tried.append((k, middle, int(np.argmin(turned[:3, k]))))
     if not line.closed:
         nearly = np.abs(p.third / p.size) < NEARLY
         ends = [k for k in (0, len(line.points) - 1) if nearly[k]]

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.atlas.continuation import System, newton, tangent_at
+from fastmech.atlas.continuation import newton, tangent_at
+from fastmech.atlas.enclosure import System
 from fastmech.atlas.systems import Plane, fold, point_at, rest
 from fastmech.equilibria.find import Equilibria, Equilibrium, find_equilibria
 from fastmech.errors import InputError, shown

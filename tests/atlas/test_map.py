@@ -134,7 +134,10 @@ def test_2000_scenes_are_to_a_map_what_they_are_one_by_one() -> None:
             np.testing.assert_allclose(
                 one.eigenvalues[0, slot], c.eigenvalues, atol=c.eigenvalue_errors.max()
             )
-            np.testing.assert_allclose(one.frequency[0, slot], c.natural_frequencies[0], rtol=1e-8)
+            # Beside the degenerate set rounding hides whether U rises or falls: NaN stands for a fall.
+            lowest = np.nan_to_num([one.frequency[0, slot], c.natural_frequencies[0]]) ** 2
+            scale = np.nan_to_num(c.natural_frequencies[1]) ** 2
+            np.testing.assert_allclose(*lowest, rtol=1e-8, atol=1e-13 * scale)
             np.testing.assert_allclose(
                 1.0 / one.decay_time[0, slot], c.decay_rate, rtol=1e-8, atol=c.eigenvalue_errors.max()
             )

@@ -24,7 +24,8 @@ AXES = {
 
 def test_layout(tmp_path: Path) -> None:
     section = stored(Basins(axes=AXES, fixed={"theta_dot": 1.0}, settle_radius=0.01), CONSTANT, tmp_path)
-    one = dict.fromkeys(("label", "well", "turns_phi", "turns_theta", "status", "computed"), "1")
+    one = dict.fromkeys(("basin", "equilibrium", "label", "well", "turns_phi", "turns_theta"), "1")
+    one |= dict.fromkeys(("status", "computed"), "1")
     one |= {f"basin_{name}": "1" for name in ("well", "turns_phi", "turns_theta", "share", "share_at_most")}
     one |= {"equilibrium_phi": "rad", "equilibrium_theta": "rad", "equilibrium_energy": "J", "barrier": "J"}
     one |= {"equilibrium_morse_index": "1", "force": "N", "phi": "rad", "theta": "rad"}
