@@ -36,6 +36,10 @@ ANGLES, PARTS = 16, 4
 #: Boxes that are looked at in all, and size of a box that is not split any more.
 MOST_BOXES, SMALLEST = 1_200_000, 1e-8
 
+#: Solutions that lead along a curve that is known, or along none, before the search is given up: at a curve's
+#: singular points its neighbourhoods vanish, and where there are many the search would not end.
+MOST_VAIN = 50
+
 #: Largest q of a neighbourhood, and of a box in which Newton's method is tried.
 CONTRACTION, RIPE = 0.75, 0.5
 
@@ -196,7 +200,7 @@ class Found:
 
     curves: list[Curve]
     open: Floats  #: (places, n) of boxes that are left; none: complete
-    cut_short: bool  #: at ``MOST_BOXES``
+    cut_short: bool  #: at ``MOST_BOXES`` or ``MOST_VAIN``
 
 
 def solutions(system: System, follow: Callable[[Floats], Curve | None]) -> Found:
@@ -209,8 +213,8 @@ def solutions(system: System, follow: Callable[[Floats], Curve | None]) -> Found
     centre, half = start(system.unknowns)
     curves: list[Curve] = []
     known: list[Neighbourhoods] = []
-    tiny, looked_at = [centre[:0]], 0
-    while len(centre) and looked_at < MOST_BOXES:
+    tiny, looked_at, vain = [centre[:0]], 0, 0
+    while 0 < len(centre) <= MOST_BOXES - looked_at and vain < MOST_VAIN:
         looked_at += len(centre)
         centre, half, slope, ripe = pruned(system, centre, half)
         left = ~held_by(known, centre, half)
@@ -220,19 +224,21 @@ def solutions(system: System, follow: Callable[[Floats], Curve | None]) -> Found
         z = z[near & ((z[:, 2:] >= 0.0) & (z[:, 2:] <= 1.0)).all(axis=1)]
         z = z[~held_by(known, z, np.zeros_like(z))]
         before = len(known)
-        while len(z):
+        while len(z) and vain < MOST_VAIN:
             curve = follow(z[0])
-            if curve is not None:
+            if curve is not None and held_by(known, curve.points, np.zeros_like(curve.points)).mean() < 0.5:
                 curves.append(curve)
                 known.append(Neighbourhoods(system, curve.points))
-            z = z[1:]
-            z = z[~held_by(known[-1:], z, np.zeros_like(z))]
+                z = z[~held_by(known[-1:], z, np.zeros_like(z))]
+            else:
+                vain += 1
+                z = z[1:]
         left = ~held_by(known[before:], centre, half)
         small = half.max(axis=1) < SMALLEST
         tiny.append(centre[left & small])
         left &= ~small
         centre, half = split(centre[left], half[left], slope[left])
-    return Found(curves, np.concatenate([*tiny, centre]), looked_at >= MOST_BOXES and len(centre) > 0)
+    return Found(curves, np.concatenate([*tiny, centre]), len(centre) > 0)
 
 
 def held_by(known: list[Neighbourhoods], centre: Floats, half: Floats) -> NDArray[np.bool_]:
@@ -245,11 +251,11 @@ def held_by(known: list[Neighbourhoods], centre: Floats, half: Floats) -> NDArra
 
 def start(n: int) -> tuple[Floats, Floats]:
     """Boxes that cover the torus and the rectangle."""
-    pieces = np.array([ANGLES] * 2 + [PARTS] * (n - 2))
+    pieces = (ANGLES,) * 2 + (PARTS,) * (n - 2)
     length = np.array([2.0 * np.pi] * 2 + [1.0] * (n - 2))
     centre = (np.indices(tuple(pieces)).reshape(n, -1).T + 0.5) / pieces * length
     centre[:, :2] -= np.pi
-    return centre, np.tile(0.5 * length / pieces, (len(centre), 1))
+    return centre, np.tile(0.5 * length / np.array(pieces), (len(centre), 1))
 
 
 def pruned(system: System, centre: Floats, half: Floats) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:

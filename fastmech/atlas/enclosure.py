@@ -108,13 +108,11 @@ class Term:
     slot: int
 
     def _then(self, kind: int, x: Any, y: Any) -> Term:
-        first, second = (
-            other.slot if isinstance(other, Term) else self._then_constant(float(other)) for other in (x, y)
-        )
-        self.tape.append((kind, first, second, 0.0))
+        one, two = (z.slot if isinstance(z, Term) else self._constant(float(z)) for z in (x, y))
+        self.tape.append((kind, one, two, 0.0))
         return Term(self.tape, len(self.tape) - 1)
 
-    def _then_constant(self, value: float) -> int:
+    def _constant(self, value: float) -> int:
         self.tape.append((CONSTANT, 0, 0, value))
         return len(self.tape) - 1
 

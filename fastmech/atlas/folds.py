@@ -15,7 +15,7 @@ from fastmech.atlas.cover import TURNS, Found, apart, solutions, wrapped
 from fastmech.atlas.enclosure import System
 from fastmech.atlas.margin import margins
 from fastmech.atlas.systems import Plane, Point, cusp, families, point_at, suited
-from fastmech.errors import InputError, shown
+from fastmech.errors import InputError
 from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -144,9 +144,6 @@ def checked_plane(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLik
     Raises:
         InputError: see ``trace_folds``.
     """
-    for name, given in (("x", x), ("y", y)):
-        if not isinstance(given, tuple | list) or len(given) != 2 or not isinstance(given[0], str):
-            raise InputError(f"{name} = {shown(given)}: must be a parameter's name and its values")
     if x[0] == y[0]:
         raise InputError(f"axes: {x[0]} is given twice; two different parameters are needed")
     return {name: check_axis(scene, name, values) for name, values in (x, y)}
@@ -249,7 +246,7 @@ def with_cusps(plane: Plane, line: Curve, found: list[Floats]) -> Floats:
     sides = np.array([*p.bent, p.pulls[2]]) >= 0.0
     turned = sides[:, 1:] != sides[:, :-1]
     tried: list[tuple[int, Floats, int | None]] = []
-    for k in np.flatnonzero(turned.any(axis=0)).tolist():
+    for k in map(int, np.flatnonzero(turned.any(axis=0))):
         middle = 0.5 * (line.points[k] + line.points[k + 1])
         if turned[3, k]:
             tried.append((k, middle, None))
