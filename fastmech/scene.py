@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import sys
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown, shown_name
 
 #: Bounds within which ratios and products of parameters stay in double precision.
 SMALLEST, LARGEST = 1e-30, 1e30
@@ -84,6 +85,16 @@ class Scene(BaseModel):
         """A scene with some parameters changed, validated again."""
         return type(self)(**(self.model_dump() | changes))
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Refuse it, with the call that gives another scene."""
+        if name not in type(self).model_fields:
+            raise InputError(
+                f"scene.{shown_name(name)}: unknown name; {nearest(name, list(type(self).model_fields))}"
+            )
+        raise InputError(
+            f"scene.{name}: a scene does not change; write scene = scene.replace({name}={shown(value)})"
+        )
+
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:
         """The scene of a TOML file: its table ``[scene]``.
@@ -136,7 +147,10 @@ def parse_toml(text: str, path: str | Path) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise InputError(f"{path}: is not valid TOML: {error}") from None
+        raise InputError(f"{path}: is not valid TOML: {shown_name(error)}") from None
+    except ValueError:
+        most = f"{sys.get_int_max_str_digits():,}"
+        raise InputError(f"{path}: is not valid TOML: an integer has more than {most} digits") from None
 
 
 def nearest(name: str, valid: Mapping[str, Any] | list[str]) -> str:
@@ -148,10 +162,10 @@ def nearest(name: str, valid: Mapping[str, Any] | list[str]) -> str:
 def explain(error: ValidationError, where: str, model: type[BaseModel]) -> str:
     """One line for the first thing wrong: field, value, what is allowed."""
     first = error.errors(include_url=False)[0]
-    path = ".".join([where, *(str(part) for part in first["loc"])])
+    path = ".".join([where, *(shown_name(part) for part in first["loc"])])
     if first["type"] == "extra_forbidden":
         return f"{path}: unknown name; {nearest(str(first['loc'][-1]), list(model.model_fields))}"
     if first["type"] == "missing":
         return f"{path}: missing"
     message = first["msg"].removeprefix("Value error, ")
-    return f"{path} = {first['input']!r}: {message[0].lower() + message[1:]}"
+    return f"{path} = {shown(first['input'])}: {message[0].lower() + message[1:]}"

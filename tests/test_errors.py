@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from fastmech.errors import shown
+from fastmech.errors import InputError, called_here, shown, shown_name
 
 pytestmark = pytest.mark.nojit
 
@@ -21,3 +21,30 @@ def test_values_are_shown_on_one_short_line(value: object) -> None:
 def test_short_values_are_shown_whole() -> None:
     assert shown("rk4") == "'rk4'"
     assert shown(-3.0) == "-3.0"
+
+
+def test_names_have_no_quotes() -> None:
+    assert shown_name("F0") == "F0"
+    assert shown_name("a\nb\x1b") == r"a b\x1b"
+    assert shown_name("x" * 3_000_000) == "x" * 77 + "..."
+
+
+def test_a_message_is_one_line_whatever_is_in_it() -> None:
+    path = "/".join(["folder" * 10] * 20)  # longer than a name, no name of it too long
+    assert str(InputError(f"{path}: cannot be read")) == f"{path}: cannot be read"
+    assert str(InputError("a\n\x1b[31mb")) == r"a \x1b[31mb"
+    assert str(InputError("z" * 300 + ".h5: cannot be read")) == "z" * 77 + "...: cannot be read"
+
+
+def test_other_libraries_names_are_told() -> None:
+    @called_here(rtol="tol")
+    def solve(x: float, *, tol: float = 1e-3) -> float:
+        """Solve."""
+        return x * tol
+
+    assert solve(2.0, tol=0.5) == 1.0
+    assert (solve.__name__, solve.__doc__) == ("solve", "Solve.")
+    with pytest.raises(InputError, match=r"^rtol: is called tol here$"):
+        solve(2.0, rtol=0.5)  # type: ignore[call-arg]
+    with pytest.raises(TypeError, match="atol"):
+        solve(2.0, atol=0.5)  # type: ignore[call-arg]

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic import ValidationError
 
 from fastmech.errors import InputError
 from fastmech.scene import Scene, nearest, read_toml
@@ -124,9 +123,22 @@ def test_the_first_of_several_mistakes_is_named() -> None:
 
 def test_frozen() -> None:
     scene = Scene()
-    with pytest.raises(ValidationError, match="frozen"):
+    with pytest.raises(InputError, match=r"^scene\.m1: .*write scene = scene\.replace\(m1=2\.0\)$"):
         scene.m1 = 2.0  # type: ignore[misc]
+    with pytest.raises(InputError, match=r"^scene\.M1: unknown name; did you mean 'm1'\?$"):
+        scene.M1 = 2.0  # type: ignore[attr-defined]
     assert scene.m1 == 10.0
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"m1": "x" * 3_000_000}, {"m1": [0.0] * 1_000_000}, {"m1": 10**5000}, {"x" * 3_000_000: 1.0}],
+    ids=["text", "list", "integer", "name"],
+)
+def test_huge_values_are_shown_short(wrong: dict[str, Any]) -> None:
+    with pytest.raises(InputError) as error:
+        Scene(**wrong)
+    assert len(str(error.value)) < 250
 
 
 def test_replace_validates_and_leaves_the_original() -> None:
@@ -175,6 +187,8 @@ def test_from_toml(tmp_path: Path) -> None:
         ("[scene]\nmass = 1\n", "scene.mass: unknown name; "),
         ("[scene\n", "{path}: is not valid TOML: "),
         ("[scene]\nm1 = 1\nm1 = 2\n", "{path}: is not valid TOML: "),
+        (f"[scene]\nm1 = {'9' * 5000}\n", "{path}: is not valid TOML: an integer has more than 4,300 digits"),
+        (f"[scene]\nm1 = 0x{'f' * 5000}\n", "scene.m1 = an integer of 20,000 bits: "),
     ],
 )
 def test_wrong_files_are_refused_in_one_line(tmp_path: Path, text: str, message: str) -> None:

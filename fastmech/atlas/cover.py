@@ -252,7 +252,7 @@ def start(n: int) -> tuple[Floats, Floats]:
     """Boxes that cover the torus and the rectangle."""
     pieces = (ANGLES,) * 2 + (PARTS,) * (n - 2)
     length = np.array([2.0 * np.pi] * 2 + [1.0] * (n - 2))
-    centre = (np.indices(pieces).reshape(n, -1).T + 0.5) / pieces * length
+    centre = (np.indices(tuple(pieces)).reshape(n, -1).T + 0.5) / pieces * length
     centre[:, :2] -= np.pi
     return centre, np.tile(0.5 * length / np.array(pieces), (len(centre), 1))
 

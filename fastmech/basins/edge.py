@@ -25,6 +25,7 @@ from fastmech.equilibria.find import Equilibrium, find_equilibria
 from fastmech.errors import InputError
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
+from fastmech.stability.arguments import require_scene
 
 #: Points between two starts whose labels are asked for at once.
 SECTIONS = 15
@@ -152,6 +153,7 @@ def saddle_at(scene: Scene, state: ArrayLike) -> tuple[Equilibrium, float]:
     Raises:
         InputError: the force decays, or the state is not four finite numbers.
     """
+    require_scene(scene)
     require_constant_force(scene)
     y = check_point("state", state, 4)
     best: tuple[Equilibrium, float] | None = None

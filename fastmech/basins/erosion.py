@@ -29,6 +29,7 @@ from fastmech.ensembles.run import Progress
 from fastmech.equilibria.find import Equilibria, find_equilibria
 from fastmech.errors import InputError, shown
 from fastmech.scene import Scene
+from fastmech.stability.arguments import require_scene
 
 #: Relative tolerance of shocks: what a profile shows.
 TOLERANCE = 1e-3
@@ -220,6 +221,7 @@ def erosion(
     Raises:
         InputError: an argument is wrong, the force decays, there is no damper, or wells are not certain.
     """
+    require_scene(scene)
     require_constant_force(scene)
     checks.progress_function(progress, "values")
     along = check_point("values", values)

@@ -38,6 +38,7 @@ from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import unit
 from fastmech.scene import Scene
+from fastmech.stability.arguments import require_scene
 from fastmech.step_limits.beyond import is_beyond
 from fastmech.step_limits.warning import warn_of_step
 
@@ -204,8 +205,9 @@ def require_damper(scene: Scene) -> None:
     """Refuse a scene in which nothing comes to rest.
 
     Raises:
-        InputError: ``beta`` is zero.
+        InputError: ``beta`` is zero, or it is no scene.
     """
+    require_scene(scene)
     if scene.beta == 0.0:
         raise InputError(
             "scene.beta = 0: must be greater than 0 N s/m: without damper nothing comes to rest and there "

@@ -99,10 +99,12 @@ def map_basins(
     Raises:
         InputError: an argument is wrong, the scene has no damper, or its wells are not certain.
     """
+    if not isinstance(scene, Scene | System):
+        raise InputError(f"scene = {shown(scene)}: must be a Scene or a System")
     names = STATE if isinstance(scene, Scene) else tuple(scene.state)
     values = _checked_axes(axes, names, least=2 if isinstance(scene, Scene) else 1)
     checks.progress_function(progress, "starts")
-    held = _checked_fixed(fixed or {}, values, names)
+    held = _checked_fixed({} if fixed is None else fixed, values, names)
     shape = tuple(v.size for v in values.values())
     size = math.prod(shape)
     if size > MOST_POINTS:
@@ -215,14 +217,14 @@ def _checked_axes(axes: Mapping[str, ArrayLike], names: tuple[str, ...], least: 
     if not isinstance(axes, Mapping):
         raise InputError(f"axes = {shown(axes)}: must map coordinates to their values")
     if not least <= len(axes) <= len(names):
-        raise InputError(f"axes = {list(axes)}: must be {least} to {len(names)} of {', '.join(names)}")
+        raise InputError(f"axes = {shown(list(axes))}: must be {least} to {len(names)} of {', '.join(names)}")
     checked = {}
     for name, values in axes.items():
         if name not in names:
             raise InputError(f"axes.{name}: unknown name; {nearest(name, list(names))}")
         try:
             array = np.array(values, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise InputError(f"axes.{name}: must be numbers") from None
         if array.ndim != 1 or not array.size or not np.isfinite(array).all():
             raise InputError(f"axes.{name}: must be a row of finite, strictly rising values")
@@ -266,6 +268,8 @@ def _checked_fixed(
     Raises:
         InputError: an unknown name, one of an axis, no finite number, or an angle in degrees.
     """
+    if not isinstance(fixed, Mapping):
+        raise InputError(f"fixed = {shown(fixed)}: must map coordinates to their values")
     for name in fixed:
         if name not in names or name in axes:
             others = [other for other in names if other not in axes]

@@ -27,6 +27,9 @@ LEVELS, TURNED_LEVELS = 24, 8
 #: Radii, of all those, at which rays are looked at together, more of them where there are fewer starts.
 TOGETHER, STARTS = 4, 64
 
+#: Directions of the largest search: some hundred bytes of memory each.
+MOST_DIRECTIONS = 10_000_000
+
 #: Points between two radii at which a way out is narrowed down.
 SECTIONS = 7
 
@@ -83,7 +86,7 @@ def minimal_shock(
     """
     rays, most = _rays_in_a_norm(label_of, attractor, norm, coordinates, most, tolerance)
     rng = np.random.default_rng(checks.whole_number("seed", seed, least=0))
-    number = checks.whole_number("directions", directions, least=1)
+    number = checks.whole_number("directions", directions, least=1, most=MOST_DIRECTIONS)
     units = _random_units(rng, number, len(rays.to_state))
     if guess is not None:
         units = np.concatenate([_directions_of(guess, rays), units])
@@ -108,7 +111,8 @@ def brute_force_shock(
     """
     rays, most = _rays_in_a_norm(label_of, attractor, norm, coordinates, most, tolerance)
     rng = np.random.default_rng(checks.whole_number("seed", seed, least=0))
-    units = _random_units(rng, checks.whole_number("directions", directions, least=1), len(rays.to_state))
+    number = checks.whole_number("directions", directions, least=1, most=MOST_DIRECTIONS)
+    units = _random_units(rng, number, len(rays.to_state))
     sizes, labels = rays.first_exits(units[None], np.array([most]), LEVELS, 1)
     return rays.result(units, sizes[0], labels[0])
 

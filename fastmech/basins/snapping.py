@@ -27,7 +27,7 @@ from fastmech.capture.certificate import certificate_of
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
 from fastmech.equilibria.find import Equilibria, Equilibrium, find_equilibria
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown
 from fastmech.integrators.methods import find_method
 from fastmech.scene import Scene
 
@@ -135,7 +135,7 @@ def map_snapping(
     find_method(method)
     if dt is not None:
         dt = checks.number("dt", dt, "s", above=0.0)
-    end = 200.0 + np.log(1e6) / rate if t_end is None else checks.number("t_end", t_end, "s", above=0.0)
+    end = default_end(rate) if t_end is None else checks.number("t_end", t_end, "s", above=0.0)
     rest = equilibria[index]
     shape = rate.size, force.size
     motions = rate.size * force.size
@@ -168,6 +168,11 @@ def map_snapping(
         np.where(captured, found.time, np.nan).reshape(shape),
         status.reshape(shape),
     )
+
+
+def default_end(alpha: ArrayLike) -> Floats:
+    """End of a run [s] by default: when the force has fallen to a millionth, and 200 s."""
+    return 200.0 + np.log(1e6) / np.asarray(alpha, dtype=np.float64)
 
 
 def critical_forces(
@@ -240,6 +245,8 @@ def force_free(scene: Scene, start: Equilibrium | None) -> tuple[Scene, Equilibr
     minima = [i for i, e in enumerate(equilibria) if e.kind == "minimum"]
     if not minima:
         raise InputError(f"scene: has no well without force: {equilibria.certificate.sentence}")
+    if not isinstance(start, Equilibrium | None):
+        raise InputError(f"start = {shown(start)}: must be a minimum that find_equilibria gives")
     index = minima[0] if start is None else equilibria.index_of(start)
     if index not in minima:
         raise InputError(f"start: is a {equilibria[index].kind}, must be a minimum of the force-free scene")

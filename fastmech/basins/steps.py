@@ -80,6 +80,16 @@ def step_of_fading(c: Coefficients) -> float:
     return min(FALL / c.decay, PHASE / highest_frequency(c))
 
 
+def fastest_followed(c: Coefficients) -> float:
+    """Largest turning [rad/s] for which the shortest of the steps by default is short enough."""
+    return TURNING / shortest_step(c)
+
+
+def shortest_step(c: Coefficients) -> float:
+    """Shortest of the coarse steps by default [s]."""
+    return 0.5**MOST_OCTAVES * PHASE / highest_frequency(c)
+
+
 def coarse_steps(c: Coefficients, starts: Floats) -> Floats:
     """Coarse step [s] of each start, shape (n,): the scene's own, halved until it is small enough.
 

@@ -30,6 +30,7 @@ from fastmech.ensembles.stopping import STOP_CODE
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import unit
 from fastmech.scene import Scene
+from fastmech.stability.arguments import require_scene
 
 Floats = NDArray[np.float64]
 
@@ -142,4 +143,5 @@ def trapped(scene: Scene, states: ArrayLike) -> Captured:
     Raises:
         InputError: not states, or the scene's wells are not certain.
     """
+    require_scene(scene)
     return certificate_of(scene).captured(checks.states("states", states, 4))

@@ -14,8 +14,9 @@ from typing import Any
 import click
 
 from fastmech import __version__
-from fastmech.cli.failure import SUMMARY, Failure, one_line
+from fastmech.cli.failure import SUMMARY, Failure, told_in_one_line
 from fastmech.cli.vectors import ask_for_wide_vectors
+from fastmech.errors import shown
 from fastmech.interrupts import listen
 
 COMMANDS = (
@@ -49,20 +50,20 @@ class _Commands(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         name = args[0]
         if name not in COMMANDS and not name.startswith("-"):
-            raise Failure(f"{name!r}: unknown command; {_hint(name)}")
+            raise Failure(f"{shown(name)}: unknown command; {_hint(name)}")
         return super().resolve_command(ctx, args)
 
     def make_context(
         self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: object
     ) -> click.Context:
         summary = {"command": next(iter(args), None)} if "--json" in args else None
-        with one_line(summary):
+        with told_in_one_line(summary):
             context = super().make_context(info_name, args, parent, **extra)
         context.meta[SUMMARY] = summary
         return context
 
     def invoke(self, ctx: click.Context) -> object:
-        with one_line(ctx.meta[SUMMARY]):
+        with told_in_one_line(ctx.meta[SUMMARY]):
             return super().invoke(ctx)
 
     def main(self, args: Sequence[str] | None = None, *others: Any, **extra: Any) -> Any:

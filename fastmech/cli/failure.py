@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,12 +11,15 @@ from typing import IO, Any
 
 import click
 
-from fastmech.errors import InputError
+from fastmech.errors import InputError, one_line, shown_name
 from fastmech.interrupts import signal_of
 from fastmech.tiles.ends import CrashedTilesError
 
 #: Added to the number of a signal that ends a command, as shells do: 130 for Ctrl-C, 143 for SIGTERM.
 BY_SIGNAL = 128
+
+#: What is too long in a message of click's: a value in quotes, or a word.
+_LONG_WORD = re.compile(r"(?<!\w)(?P<quote>['\"])(?P<value>.{81,}?)(?P=quote)|\S{81,}")
 
 #: Where in a context's ``meta`` a command leaves what it has done when it fails.
 SUMMARY = "fastmech.summary"
@@ -29,7 +33,7 @@ class Failure(click.ClickException):
     """
 
     def __init__(self, message: str, exit_code: int = 2) -> None:
-        super().__init__(" ".join(message.splitlines()))
+        super().__init__(one_line(message))
         self.exit_code = exit_code  # type: ignore[misc] # click has one for each class of failures
         self.summary: dict[str, Any] | None = None
 
@@ -41,8 +45,14 @@ class Failure(click.ClickException):
             click.echo(json.dumps(told))
 
 
+def _cut(word: re.Match[str]) -> str:
+    """What click quotes of the command line, as short as other values."""
+    quote = word["quote"]
+    return shown_name(word[0]) if quote is None else f"{quote}{shown_name(word['value'])}{quote}"
+
+
 @contextmanager
-def one_line(summary: dict[str, Any] | None) -> Iterator[None]:
+def told_in_one_line(summary: dict[str, Any] | None) -> Iterator[None]:
     """Turn what a user causes (a wrong command line, wrong input, an interruption) into a `Failure`.
 
     Warnings are lines of the same form.
@@ -70,7 +80,7 @@ def _failure(error: BaseException) -> Failure | None:
             return error
         case click.UsageError():
             see = f" See: {error.ctx.command_path} --help" if error.ctx else ""
-            return Failure(f"{error.format_message()}{see}")
+            return Failure(f"{_LONG_WORD.sub(_cut, error.format_message())}{see}")
         case InputError():
             return Failure(str(error))
         case MemoryError():

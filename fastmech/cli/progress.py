@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import timedelta
+from importlib import import_module
 from typing import Self
 
 from rich.console import Console
@@ -50,14 +51,14 @@ class _Time(ProgressColumn):
 #: Seconds between lines in a log file.
 LOG_PERIOD = 30.0
 
-#: Seconds between looks at whether loading and compiling is over.
+#: Seconds between looks at what is being loaded or compiled.
 LOOK = 1.0
 
-#: Seconds of loading and compiling that pass without a word.
+#: Seconds of loading and compiling, in all, that pass without a word.
 SILENT = 3.0
 
-#: What loading is called: machine code that another run has left is read, the rest is made.
-PREPARING = "loading kernels, compiling what is new"
+#: What it is called before any kernel is asked for.
+LOADING = "loading"
 
 
 class Stage:
@@ -116,17 +117,45 @@ class LogLine:
         print(line, file=sys.stderr, flush=True)
 
 
+class Preparation:
+    """What is being loaded or compiled, and how long that has taken; any thread may tell.
+
+    A kernel that another one calls is made within it.
+    """
+
+    def __init__(self) -> None:
+        self._lock, self._in_hand, self._done, self._since = threading.Lock(), list[str](), 0.0, 0.0
+
+    def tell(self, name: str | None) -> None:
+        """Something is begun, or (None) what was begun last is there."""
+        with self._lock:
+            now = time.perf_counter()
+            if self._in_hand:
+                self._done += now - self._since
+            self._since = now
+            if name is None:
+                self._in_hand.pop()
+            else:
+                self._in_hand.append(name)
+
+    def look(self) -> tuple[str | None, float]:
+        """What is in hand, if anything, and the seconds so far."""
+        with self._lock:
+            if not self._in_hand:
+                return None, self._done
+            return self._in_hand[-1], self._done + time.perf_counter() - self._since
+
+
 class ProgressBars:
     """Bars with percentage, rate and time left; where they cannot be drawn, a line every so often.
 
     Whenever progress is told, a command may also stop: see `fastmech.interrupts.check`.
-
-    Attributes:
-        prepared: seconds that loading and compiling have taken.
     """
 
     def __init__(self, quiet: bool = False) -> None:
-        self._quiet, self._moved, self.prepared = quiet, 0.0, 0.0
+        self._quiet, self._moved = quiet, 0.0
+        self._preparation, self._over = Preparation(), threading.Event()
+        self._teller = threading.Thread(target=self._tell_preparing, daemon=True)
         console = Console(stderr=True)
         draws = sys.stderr.isatty() and not console.is_dumb_terminal
         self._logs = not quiet and not draws
@@ -149,7 +178,18 @@ class ProgressBars:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._over.set()
+        if self._teller.is_alive():
+            self._teller.join()
+        jit = sys.modules.get("fastmech.jit")
+        if jit is not None and self._preparation.tell in jit.listeners:
+            jit.listeners.remove(self._preparation.tell)
         self._progress.stop()
+
+    @property
+    def prepared(self) -> float:
+        """Seconds that loading and compiling have taken."""
+        return self._preparation.look()[1]
 
     def stage(self, name: str, total: int) -> Callable[[int], None]:
         """Announce a piece of work; the result is told how many items have been finished since."""
@@ -202,30 +242,35 @@ class ProgressBars:
 
     @contextmanager
     def preparing(self) -> Iterator[None]:
-        """Show that kernels are loaded and compiled, if that takes longer than `SILENT` seconds."""
-        begun, over = time.perf_counter(), threading.Event()
-        teller = threading.Thread(target=self._tell_preparing, args=(begun, over), daemon=True)
-        teller.start()
+        """Load what the block imports; then show and count every kernel that is loaded or compiled."""
+        self._preparation.tell(LOADING)
+        self._teller.start()
         try:
             yield
+            import_module("fastmech.jit").listeners.append(self._preparation.tell)
         finally:
-            over.set()
-            teller.join()
-            self.prepared += time.perf_counter() - begun
+            self._preparation.tell(None)
         check()
 
-    def _tell_preparing(self, begun: float, over: threading.Event) -> None:
+    def _tell_preparing(self) -> None:
         task, due, stopping = None, SILENT, False
-        while not over.wait(LOOK):
-            seconds = time.perf_counter() - begun
+        while not self._over.wait(LOOK):
+            name, seconds = self._preparation.look()
+            if name is None or seconds < SILENT:
+                if task is not None:
+                    self._progress.remove_task(task)
+                    task = None
+                continue
+            what = name if name == LOADING else f"compiling {name}"
             if not self._quiet and is_noted() and not stopping:
                 stopping = True
                 self._line("stops when the kernel in hand is compiled, at once when interrupted again")
-            if seconds >= due and task is None:
-                task = self._progress.add_task(PREPARING, total=None)
+            if task is None:
+                task = self._progress.add_task(what, total=None)
+            self._progress.update(task, description=what)
             if seconds >= due and self._logs:
                 due = seconds + LOG_PERIOD
-                self._line(f"{PREPARING}: {seconds:.0f} s")
+                self._line(f"{what}, {seconds:.0f} s so far")
         if task is not None:
             self._progress.remove_task(task)
 

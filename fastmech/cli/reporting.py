@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from fastmech.cli.failure import SUMMARY
-from fastmech.interrupts import check
+from fastmech.interrupts import Interrupt, check, signal_of
 
 if TYPE_CHECKING:
     from fastmech.cli.progress import ProgressBars
@@ -38,11 +38,12 @@ class Account:
 
     Attributes:
         bars: where progress is told.
+        done: the file that is complete, whatever comes; empty: none yet.
         facts: what the JSON says besides the command, its time, its stages and files.
     """
 
     def __init__(self, bars: ProgressBars, as_json: bool) -> None:
-        self.bars, self.facts = bars, dict[str, Any]()
+        self.bars, self.facts, self.done = bars, dict[str, Any](), ""
         self._begun = time.perf_counter()
         self._as_json, self._files = as_json, list[str]()
 
@@ -89,10 +90,12 @@ def account(name: str, quiet: bool, as_json: bool) -> Iterator[Account]:
             check()
         except click.exceptions.Exit as end:
             code = end
-        except BaseException:
+        except BaseException as error:
             context = click.get_current_context(silent=True)
             if context is not None and as_json:
                 context.meta[SUMMARY] |= told.summary(name)
+            if isinstance(error, KeyboardInterrupt) and told.done:
+                raise Interrupt(f"interrupted; {told.done} is complete", signal_of(error)) from None
             raise
     if as_json:
         ended = 0 if code is None else code.exit_code

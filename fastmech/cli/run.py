@@ -66,15 +66,13 @@ def command(
     if workers is not None and scheduler is not None:
         raise click.UsageError("--workers and --scheduler exclude each other")
     with account("run", quiet, as_json) as told:
-        from fastmech.scan_types.request import RunContext, check_outline
-
         text = before = None
         if source is not None:
             request_file, text, before = _asked_in(source)
         assert request_file is not None
-        check_outline(request_file, text)  # before kernels are compiled, which may take a minute
         with told.bars.preparing():
             from fastmech.runner import run_request
+            from fastmech.scan_types.request import RunContext
             from fastmech.tiles.run import default_output
         context = RunContext(threads, told.bars.stage)
         target = out or default_output(request_file)
@@ -84,6 +82,7 @@ def command(
         with _hiring(workers, scheduler) as hire:
             settings: dict[str, Any] = {"fresh": fresh, "context": context, "hire": hire}
             report = run_request(request_file, target, **settings, tell=told.bars.tell, text=text)
+        told.done = str(target)
         told.facts |= report.summary()
         _show(told, report)
         if before is not None:
@@ -131,8 +130,11 @@ def _run_tile(
     keep: Path | None,
     context: RunContext,
 ) -> None:
+    from fastmech.store.write import check_writable
     from fastmech.tiles.alone import compute_alone
 
+    if keep is not None:
+        check_writable(keep)
     alone = compute_alone(request_file, tile, context, target, text)
     told.facts |= {"tile": tile, "content": alone.content, "same": alone.same}
     told.say(f"{alone.seconds:9.2f} s  {tile}: {alone.items:,} {alone.what}")

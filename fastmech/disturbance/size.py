@@ -70,7 +70,7 @@ def confining_energy(scene: Scene, e: Equilibrium, radius: float) -> float:
     highest frequency), to second order.
     """
     lowest = float(scipy.linalg.eigvalsh(e.hessian, metric(scene, (e.phi, e.theta)))[0])
-    return 0.5 * lowest * unit(scene) * radius**2
+    return 0.5 * lowest * unit(scene) * radius * radius
 
 
 def uniform_ball(rng: np.random.Generator, n: int) -> Floats:

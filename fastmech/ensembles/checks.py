@@ -32,7 +32,7 @@ def number(name: str, value: Any, unit: str, *, above: float = -math.inf, least:
     except OverflowError:  # of an integer
         found = math.inf
     if not math.isfinite(found) or not found > above or not found >= least:
-        raise InputError(f"{name} = {value!r}: {allowed}")
+        raise InputError(f"{name} = {shown(value)}: {allowed}")
     return found
 
 
@@ -43,9 +43,9 @@ def whole_number(name: str, value: Any, *, least: int, most: int | None = None) 
         InputError: it is something else.
     """
     if not isinstance(value, Integral) or isinstance(value, bool) or value < least:
-        raise InputError(f"{name} = {value!r}: must be an integer not less than {least}")
+        raise InputError(f"{name} = {shown(value)}: must be an integer not less than {least}")
     if most is not None and int(value) > most:
-        raise InputError(f"{name} = {value!r}: must be an integer not greater than {most}")
+        raise InputError(f"{name} = {shown(value)}: must be an integer not greater than {most}")
     return int(value)
 
 
@@ -56,7 +56,7 @@ def progress_function(progress: Any, what: str) -> None:
         InputError: it cannot be called.
     """
     if progress is not None and not callable(progress):
-        raise InputError(f"progress = {progress!r}: must be a function of the number of finished {what}")
+        raise InputError(f"progress = {shown(progress)}: must be a function of the number of finished {what}")
 
 
 def reals(name: str, values: ArrayLike, what: str, least_dimensions: int = 0) -> NDArray[np.float64]:

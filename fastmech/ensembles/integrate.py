@@ -24,7 +24,7 @@ from fastmech.ensembles.system import System, stop_codes
 from fastmech.ensembles.threads import in_parts
 from fastmech.ensembles.tolerance import solve_to_tolerance
 from fastmech.ensembles.turning import counted_turns, watched
-from fastmech.errors import InputError
+from fastmech.errors import InputError, called_here, shown
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Method
 from fastmech.integrators.methods import find_method
@@ -82,6 +82,7 @@ class Trajectories:
         return f"Trajectories({what}; {self.failures or 'none failed'})"
 
 
+@called_here(rtol="tol", atol="tol", t_span="t_end", max_step="dt", h="dt", step="dt", args="parameters")
 def integrate(
     scene: Scene | System,
     y0: ArrayLike,
@@ -149,7 +150,7 @@ def integrate(
     """
     outputs = _output_times(t_end, t_eval)
     checks.progress_function(progress, "trajectories")
-    starts, problem, own = _problem(scene, y0, parameters or {}, formulation)
+    starts, problem, own = _problem(scene, y0, {} if parameters is None else parameters, formulation)
     fitted_at = _fit_times(fit, scene, outputs[-1])
     kept = starts.shape[1] * (outputs.size + max(len(fitted_at) - 1, 0) + problem.canonical)
     beside = BESIDE + OWN * sum(column.ndim for column in problem.params.columns)
@@ -173,7 +174,7 @@ def integrate(
             reason=found.reason,
         )
     if quantile is not None:
-        raise InputError(f"quantile = {quantile!r}: tells whose error tol is; give tol with it")
+        raise InputError(f"quantile = {shown(quantile)}: tells whose error tol is; give tol with it")
     formula = find_method("rk4" if method is None else method)
     step = checks.number("dt", DEFAULT_DT if dt is None else dt, "s", above=0.0)
     settings = Settings(formula, step, fitted_at, _precision(dtype, problem, formula))
@@ -238,7 +239,7 @@ def _fit_times(fit: bool | ArrayLike, scene: Scene | System, until: float) -> tu
 def _precision(dtype: str, problem: Problem, method: Method) -> Precision:
     known: dict[str, Precision] = {"float64": np.float64, "float32": np.float32}
     if not isinstance(dtype, str) or dtype not in known:
-        raise InputError(f"dtype = {dtype!r}: must be one of {', '.join(known)}")
+        raise InputError(f"dtype = {shown(dtype)}: must be one of {', '.join(known)}")
     if dtype == "float32" and problem.observation.stops:
         raise InputError("dtype = 'float32': not with a stopping condition")
     if dtype == "float32" and isinstance(method, ImplicitRungeKutta):
@@ -264,17 +265,17 @@ def _problem(
 ) -> tuple[NDArray[np.float64], Problem, dict[str, NDArray[np.float64]]]:
     """Checked starts, what to integrate from them, and a scene's parameters that differ between them."""
     if isinstance(scene, System) and formulation is not None:
-        raise InputError(f"formulation = {formulation!r}: only for a scene")
+        raise InputError(f"formulation = {shown(formulation)}: only for a scene")
     formulation = "lagrange" if formulation is None else formulation
     if not isinstance(formulation, str) or formulation not in FORMULATIONS:
         raise InputError(
-            f"formulation = {formulation!r}: unknown; {nearest(str(formulation), list(FORMULATIONS))}"
+            f"formulation = {shown(formulation)}: unknown; {nearest(str(formulation), list(FORMULATIONS))}"
         )
     if isinstance(scene, System):
         starts = checks.states("y0", y0, len(scene.state))
         return starts, system_problem(scene, len(starts), parameters), {}
     if not isinstance(scene, Scene):
-        raise InputError(f"scene = {scene!r}: must be a Scene or a System")
+        raise InputError(f"scene = {shown(scene)}: must be a Scene or a System")
     starts = checks.states("y0", y0, 4)
     own = own_values(parameters, scene.model_dump(), len(starts))
     return starts, scene_problem(scene, len(starts), own, formulation), own

@@ -67,9 +67,8 @@ class Course(NamedTuple):
     ended: NDArray[np.int64]  #: what became of each (n,)
 
 
-COURSE: Any = types.NamedTuple(
-    [MATRIX, MATRIX, VECTOR, VECTOR, VECTOR, VECTOR, CUBE, MATRIX, MATRIX, INTEGERS], Course
-)
+_tuple: Any = types.NamedTuple
+COURSE = _tuple([MATRIX, MATRIX, VECTOR, VECTOR, VECTOR, VECTOR, CUBE, MATRIX, MATRIX, INTEGERS], Course)
 
 
 class Work(NamedTuple):
@@ -77,7 +76,8 @@ class Work(NamedTuple):
 
     y: Floats  #: state (dim,)
     trial: Floats  #: state after the step tried (dim,)
-    near: Floats  #: the same from earlier stages; or a state a little later (dim,)
+    near: Floats  #: a state beside one of them (dim,)
+    seen: Floats  #: states of the stages (7, dim)
     stages: Floats  #: rates (7, dim)
     Y: Floats  #: as a block (dim, 1)
     rates: Floats  #: of the block
@@ -103,9 +103,7 @@ def _step(rhs: Any, t: float, h: float, w: Any, local: float) -> float:
             total = 0.0
             for k in range(stage):
                 total += _A[stage, k] * w.stages[k, d]
-            w.trial[d] = w.y[d] + h * total
-            if stage == 5:
-                w.near[d] = w.trial[d]
+            w.trial[d] = w.seen[stage, d] = w.y[d] + h * total
         _rates(rhs, t + _C[stage] * h, w.trial, w, stage)
     worst = 0.0
     for d in range(w.y.size):
@@ -130,13 +128,15 @@ def _turned(a: Floats, b: Floats) -> int:
 
 
 @inlined
-def _left(switches: Any, t: float, w: Any, before: Floats, after: Floats) -> int:
-    """The same for the end ``t`` of a step; also where only its last stage sees other decisions."""
-    switches(t, w.near, w.own, after)
-    turned = _turned(before, after)
-    if not turned:
-        switches(t, w.trial, w.own, after)
-        turned = _turned(before, after)
+def _left(switches: Any, t: float, h: float, w: Any, before: Floats, after: Floats) -> int:
+    """The same for a step and all its stages: else it would be of neither side."""
+    turned = 0
+    for stage in range(1, 7):
+        if not turned:
+            for d in range(w.y.size):
+                w.near[d] = w.seen[stage, d]
+            switches(t + _C[stage] * h, w.near, w.own, after)
+            turned = _turned(before, after)
     return turned
 
 
@@ -166,11 +166,6 @@ def _meet(a: Floats, a_slopes: Floats, b: Floats, b_slopes: Floats, h: float) ->
                 at = (sign * (first - last) + up * h) / (up - down)
                 if 0.0 < at < h and sign * first + down * at <= 0.0:
                     return at
-            elif down < 0.0 and sign * (first - last) < -0.5 * h * max(down, up):
-                # Towards zero at both ends, and yet not nearer: stages have seen the other side.
-                at = -sign * first / down
-                if 0.0 < at < h:
-                    return at
     return 0.0
 
 
@@ -198,7 +193,7 @@ def _switch(
         middle += 0.4 * resolution if share < 0.5 else -0.4 * resolution
         middle = min(max(middle, low + 0.4 * resolution), high - 0.4 * resolution)
         _step(rhs, t, middle, w, local)
-        turned = _left(switches, t + middle, w, before, after)
+        turned = _left(switches, t, middle, w, before, after)
         if turned:
             high, first = middle, turned
             below, above = at[first], after[first]
@@ -216,7 +211,7 @@ def _follow(rhs: Any, switches: Any, observe: Any, course: Any, i: int) -> None:
     dim, longest, local = course.starts.shape[1], course.limits[0], course.limits[2]
     count, size = course.params.shape[1], 1 + 2 * MOST_NOTES
     w = Work(
-        np.empty(dim), np.empty(dim), np.empty(dim), np.empty((7, dim)),
+        np.empty(dim), np.empty(dim), np.empty(dim), np.empty((7, dim)), np.empty((7, dim)),
         np.empty((dim, 1)), np.empty((dim, 1)), np.empty((count, 1)), np.empty(count),
     )  # fmt: skip
     before, after, at = np.zeros(size), np.zeros(size), np.zeros(size)
@@ -250,7 +245,7 @@ def _follow(rhs: Any, switches: Any, observe: Any, course: Any, i: int) -> None:
         tried = cross if cross > 0.0 else (h if t + h < end else end - t)
         cross, resolution = 0.0, max(RESOLUTION * longest, 1e-15 * abs(end))
         error = _step(rhs, t, tried, w, local)
-        switched = error < np.inf and _left(switches, t + tried, w, before, after) > 0
+        switched = error < np.inf and _left(switches, t, tried, w, before, after) > 0
         if switched and tried > resolution:
             near = resolution if error <= 1.0 else max(resolution, COARSE * tried)
             low, high = _switch(rhs, switches, t, tried, w, (before, after, at), (local, near))

@@ -20,7 +20,7 @@ from fastmech.ensembles.parameters import Parameters
 from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.ensembles.stiffness import damping_rate
 from fastmech.ensembles.system import System
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown
 from fastmech.kernels.jacobians import canonical_jacobian, lagrange_jacobian
 from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import Coefficients, reduce
@@ -128,7 +128,7 @@ def own_values(parameters: Mapping[str, ArrayLike], known: Mapping[str, float], 
         InputError: an unknown name, not n values, or values that are not finite.
     """
     if not isinstance(parameters, Mapping):
-        raise InputError(f"parameters = {parameters!r}: must map names to values, one a start")
+        raise InputError(f"parameters = {shown(parameters)}: must map names to values, one a start")
     own = {}
     for name, values in parameters.items():
         if name not in known:

@@ -114,7 +114,7 @@ class UnclearError(Exception):
     """A function of which it cannot be told where it decides."""
 
 
-def watching(function: types.FunctionType, depend: set[str]) -> tuple[types.FunctionType, int]:
+def watching(function: Any, depend: set[str]) -> tuple[types.FunctionType, int]:
     """A copy that takes the array of its notes as first argument, and how many places of it note.
 
     ``depend`` names the arguments that change on the way; what depends on others alone is no decision.
@@ -138,7 +138,7 @@ def watching(function: types.FunctionType, depend: set[str]) -> tuple[types.Func
     return made, watch.places
 
 
-def decides_nothing(function: types.FunctionType) -> bool:
+def decides_nothing(function: Any) -> bool:
     """Whether a function whose source is not at hand has no decision in its instructions, and calls none."""
     code = function.__code__
     if any(
@@ -169,7 +169,7 @@ def _kind(value: Any) -> str:
     return name if name in {*_SIGN, *_EXTREME, *_INTEGER, *_RATIO, "clip"} else ""
 
 
-def _definition(function: types.FunctionType) -> ast.FunctionDef:
+def _definition(function: Any) -> ast.FunctionDef:
     """The part of the source that defines a function; of a lambda the function that it is."""
     code = function.__code__
     try:

@@ -20,7 +20,7 @@ from fastmech.ensembles.refusals import explain, reason
 from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
 from fastmech.ensembles.switches import UnclearError, decides_nothing, watching
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown
 from fastmech.generated import new_module, run_module
 from fastmech.jit import inlined
 from fastmech.kernels.attempt import attempted
@@ -119,7 +119,7 @@ class System:
     def __post_init__(self) -> None:
         state = _names("state", self.state, least=1)
         if not isinstance(self.parameters, Mapping):
-            raise InputError(f"parameters = {self.parameters!r}: must be a mapping of names to numbers")
+            raise InputError(f"parameters = {shown(self.parameters)}: must be a mapping of names to numbers")
         names = _names("parameters", self.parameters, least=0)
         values = [checks.number(f"parameters.{k}", v, "") for k, v in self.parameters.items()]
         object.__setattr__(self, "state", state)
@@ -254,14 +254,14 @@ def _names(field: str, given: Any, least: int) -> list[str]:
         or len(set(names)) < len(names)
     ):
         told = given if names is None else names
-        raise InputError(f"{field} = {told!r}: must be different Python names, at least {least}")
+        raise InputError(f"{field} = {shown(told)}: must be different Python names, at least {least}")
     return names
 
 
 def _check_function(field: str, function: Any, state: list[str], parameters: list[str]) -> None:
     """Arguments are matched by name: a value never lands in the wrong place silently."""
     if not isinstance(function, types.FunctionType):
-        raise InputError(f"{field} = {function!r}: must be a plain Python function")
+        raise InputError(f"{field} = {shown(function)}: must be a plain Python function")
     given = inspect.signature(function).parameters
     taken, wanted = list(given), ", ".join(["t", *state, *parameters])
     fits = taken[1 : 1 + len(state)] == state and sorted(taken[1 + len(state) :]) == sorted(parameters)

@@ -93,7 +93,7 @@ def fuzz_results(count: int, seed: int, tell: Callable[[int], None] = lambda n: 
     def read(path: Path) -> None:
         refusal = None
         with open_results(path) as results:
-            for name in results:
+            for name in results.groups:
                 for variable in results[name]:
                     try:
                         found = values_of(results[name][variable])

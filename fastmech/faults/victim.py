@@ -63,7 +63,7 @@ THREADS = 2
 IN_HAND = THREADS + 1
 
 #: Attributes that say when and where a result was made, not what it is.
-CIRCUMSTANCES = ("created", "wall_time_s")
+CIRCUMSTANCES = ("created", "history", "wall_time_s")
 
 
 scan_kinds()  # loads all kernels: a process forked from here starts at once
@@ -128,7 +128,7 @@ def content_of(path: Path) -> dict[str, bytes]:
     content: dict[str, bytes] = {}
     with open_results(path) as results:
         content |= _attributes("", results.attrs)
-        for name in results:
+        for name in results.groups:
             content |= _attributes(name, results[name].attrs)
             for variable_name in results[name]:
                 content[f"{name}/{variable_name}"] = values_of(results[name][variable_name])

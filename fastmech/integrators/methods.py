@@ -24,7 +24,7 @@ accuracy would set the step.
 
 from __future__ import annotations
 
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Adams, Method, RungeKutta
 from fastmech.integrators.tableaus import TABLEAUS
@@ -52,13 +52,20 @@ _ALL: tuple[Method, ...] = (
 #: Every method by its name.
 METHODS: dict[str, Method] = {method.name: method for method in _ALL}
 
+#: What other libraries call them, in lower case.
+_ELSEWHERE = {"rk45": "dopri5", "ode45": "dopri5", "dp5": "dopri5", "radau": "radau5", "vern6": "verner6"}
+
 
 def find_method(name: str) -> Method:
     """The method of this name.
 
     Raises:
-        InputError: no such method; the message lists the known ones.
+        InputError: no such method; the message lists the known ones, after the one that is meant by a name in
+            capitals or another library's.
     """
-    if not isinstance(name, str) or name not in METHODS:
-        raise InputError(f"method = {name!r}: unknown; known: {', '.join(METHODS)}")
-    return METHODS[name]
+    if isinstance(name, str) and name in METHODS:
+        return METHODS[name]
+    low = name.lower() if isinstance(name, str) else ""
+    meant = _ELSEWHERE.get(low, low if low in METHODS else None)
+    hint = "" if meant is None else f"did you mean {meant!r}? "
+    raise InputError(f"method = {shown(name)}: unknown; {hint}known: {', '.join(METHODS)}")

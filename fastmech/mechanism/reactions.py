@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.errors import InputError, shown
 from fastmech.mechanism.coefficients import force
 from fastmech.mechanism.geometry import accelerations, positions, velocities
 from fastmech.mechanism.lagrange import angular_accelerations
@@ -29,7 +30,22 @@ class Reactions(NamedTuple):
 
 
 def reactions(scene: Scene, y: ArrayLike, t: ArrayLike) -> Reactions:
-    """Rod forces and the slider's normal reaction at states ``y`` (..., 4) and times ``t`` [s]."""
+    """Rod forces and the slider's normal reaction at states ``y`` (..., 4) and times ``t`` [s].
+
+    Raises:
+        InputError: no scene, no such states, or times that do not belong to them.
+    """
+    if not isinstance(scene, Scene):
+        raise InputError(f"scene = {shown(scene)}: must be a Scene")
+    try:
+        y, t = np.asarray(y, dtype=np.float64), np.asarray(t, dtype=np.float64)
+        fits = y.shape[-1:] == (4,) and np.broadcast_shapes(y.shape[:-1], t.shape) is not None
+    except (TypeError, ValueError, OverflowError):
+        fits = False
+    if not fits:
+        raise InputError(
+            f"y, t: have shapes {np.shape(y)} and {np.shape(t)}, must be numbers (..., 4) and (...)"
+        )
     r, v = positions(scene, y), velocities(scene, y)
     a = accelerations(scene, y, angular_accelerations(scene, y, t))
     l, g = scene.l, scene.g

@@ -60,7 +60,7 @@ def draw_bifurcation(view: View) -> Figure:
             labelled.add(label)
         if folds:
             for kind, there in _kinds(view, folds).items():
-                marker, label = MARKS[kind]
+                marker, label = MARKS.get(kind, ("P", kind))
                 places = folds["at"][there], folds[f"fold_{variable}"][there]
                 axes.plot(*places, marker, color="white", mec="black", ms=6, ls="none", label=label)
             for value in folds["at"]:
@@ -109,10 +109,9 @@ def _kinds(view: View, folds: dict[str, Floats]) -> dict[str, NDArray[np.bool_]]
     """Which folds are of which kind; files of older versions tell none."""
     if not view.has("fold_kind"):
         return {"fold": np.ones(folds["at"].size, dtype=bool)}
-    codes = {
-        name: view.dataset["fold_kind"].data == c for name, c in flag_codes(view.dataset["fold_kind"]).items()
-    }
-    return {kind: codes[kind] for kind in MARKS if codes[kind].any()}
+    codes, kind = flag_codes(view.variable("fold_kind")), view.variable("fold_kind").data
+    found = {name: kind == codes[name] for name in (*MARKS, *codes.others(MARKS))}
+    return {name: there for name, there in found.items() if there.any()}
 
 
 def _told(view: View, folds: dict[str, Floats], name: str) -> str:

@@ -7,7 +7,6 @@ and is -1 where there is no label; ``status`` says why.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
@@ -16,26 +15,26 @@ from pydantic import AfterValidator, Field
 
 from fastmech.basins.label import require_damper
 from fastmech.basins.map import STATE
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown
 from fastmech.results import Dataset
+from fastmech.scan_types.axis import Axis, arrays, check_duration, check_rising, check_size, check_starts
 from fastmech.scan_types.basin_tiling import BasinTiling
-from fastmech.scan_types.equilibrium_map import Axis
 from fastmech.scan_types.request import MethodName, TiledScan
 from fastmech.scan_types.tiling import Tiling
-from fastmech.scene import Scene, nearest
+from fastmech.scene import Number, Scene, nearest
 from fastmech.step_limits.warning import step_warning
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Starts of the largest map that is held in memory with its labels.
-MOST_POINTS = 20_000_000
+#: Starts of the largest map that is held in memory with its labels, and the numbers of 8 bytes of each.
+MOST_POINTS, POINT_NUMBERS = 20_000_000, 20
 
 
 def _known_coordinates(entries: dict[str, Axis] | dict[str, float]) -> dict[str, Axis] | dict[str, float]:
     for name in entries:
         if name not in STATE:
-            raise ValueError(f"unknown coordinate {name!r}; {nearest(name, list(STATE))}")
+            raise ValueError(f"unknown coordinate {shown(name)}; {nearest(name, list(STATE))}")
     return entries
 
 
@@ -58,7 +57,7 @@ class Basins(TiledScan):
     refine: Annotated[int | None, Field(ge=2, le=1024), AfterValidator(_power_of_two)] = Field(
         None, description="compute so coarse a grid first, then only near boundaries (a heuristic)"
     )
-    settle_radius: Annotated[float | None, Field(gt=0)] = Field(
+    settle_radius: Annotated[Number, Field(gt=0)] | None = Field(
         None, description="also the time from which on a motion stays so near to its well [rad]"
     )
     dt: Annotated[float | None, Field(gt=0)] = Field(None, description="coarsest step [s]")
@@ -67,16 +66,14 @@ class Basins(TiledScan):
     def check(self, scene: Scene) -> None:
         """Without a damper there are no basins; and a map has its limits."""
         require_damper(scene)
-        total = math.prod(axis.num for axis in self.axes.values())
-        if total > MOST_POINTS:
-            raise InputError(f"axes: ask for {total:.3g} starts, at most {MOST_POINTS:.0e} are allowed")
+        check_size("axes", self.axes, "starts", MOST_POINTS, POINT_NUMBERS)
         for name, axis in self.axes.items():
             if name in self.fixed:
                 raise InputError(f"fixed.{name}: is an axis of the map; give one or the other")
-            if axis.num > 1 and axis.stop <= axis.start:
-                raise InputError(
-                    f"axes.{name}.stop = {axis.stop:g}: must be greater than start = {axis.start:g}"
-                )
+            check_rising(f"axes.{name}", axis)
+        starts = {f"axes.{name}": axis.array for name, axis in self.axes.items()}
+        check_starts(scene, starts | {f"fixed.{name}": np.array(value) for name, value in self.fixed.items()})
+        check_duration(scene, self.t_end, self.dt)
 
     def step_warning(self, scene: Scene) -> str | None:
         """By the scene's limit and the decaying force; without ``dt`` each start's step is chosen."""
@@ -84,8 +81,7 @@ class Basins(TiledScan):
 
     def tiling(self, scene: Scene) -> Tiling:
         """Planes of the first axis; a refined map is one tile, because it follows boundaries anywhere."""
-        axes = {name: np.linspace(axis.start, axis.stop, axis.num) for name, axis in self.axes.items()}
-        return BasinTiling(self, scene, axes)
+        return BasinTiling(self, scene, arrays(self.axes))
 
     @staticmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:

@@ -7,18 +7,28 @@ from collections.abc import Mapping
 from itertools import product
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-import numpy as np
 from pydantic import AfterValidator, Field
 
 from fastmech.basins.label import require_damper
-from fastmech.disturbance.motion import equilibria_to_disturb, require_constant_force
-from fastmech.errors import InputError
+from fastmech.basins.steps import shortest_step
+from fastmech.disturbance.motion import require_constant_force
+from fastmech.errors import InputError, shown
+from fastmech.integrators.methods import find_method
+from fastmech.mechanism.coefficients import reduce
 from fastmech.results import Dataset
+from fastmech.scan_types.axis import (
+    Axis,
+    arrays,
+    check_duration,
+    check_parameters,
+    check_size,
+    check_steps,
+)
 from fastmech.scan_types.disturbed_layout import TRAJECTORY_VARIABLES
 from fastmech.scan_types.disturbed_map import MOST_POINTS, MOST_TRAJECTORIES, DisturbedMap
 from fastmech.scan_types.disturbed_tiling import DisturbedTiling
-from fastmech.scan_types.equilibrium_map import Axis, known_parameters
-from fastmech.scan_types.request import MethodName, TiledScan
+from fastmech.scan_types.equilibrium_map import known_parameters
+from fastmech.scan_types.request import MethodName, Seed, TiledScan
 from fastmech.scan_types.tiling import Tiling
 from fastmech.scene import Scene, nearest
 from fastmech.step_limits.warning import step_warning
@@ -28,6 +38,12 @@ if TYPE_CHECKING:
 
     from fastmech.store.read import Section
 
+#: Right-hand sides of the largest ensemble: a year of a hundred cores.
+MOST_WORK = 1e17
+
+#: Numbers of 8 bytes that memory holds of every point of a map.
+POINT_NUMBERS = 250
+
 #: Trajectories of each equilibrium that are drawn at most: they are random, so some stand for all.
 DRAWN = 1 << 20
 
@@ -35,7 +51,7 @@ DRAWN = 1 << 20
 def _known_variables(names: list[str]) -> list[str]:
     for name in names:
         if name not in TRAJECTORY_VARIABLES:
-            raise ValueError(f"unknown variable {name!r}; {nearest(name, list(TRAJECTORY_VARIABLES))}")
+            raise ValueError(f"unknown variable {shown(name)}; {nearest(name, list(TRAJECTORY_VARIABLES))}")
     return names
 
 
@@ -55,7 +71,7 @@ class Disturbed(TiledScan):
     trajectories: Annotated[int, Field(ge=1, le=100_000_000)] = 4096
     radius: Annotated[float, Field(gt=0, description="largest size of a disturbance [rad]")] = 0.5
     return_radius: Annotated[float, Field(gt=0, description="radius of the ball of return [rad]")] = 0.01
-    seed: Annotated[int, Field(ge=0)] = 0
+    seed: Seed = 0
     t_end: Annotated[float, Field(gt=0)] = 120.0
     dt: Annotated[float | None, Field(gt=0)] = Field(
         None, description="longest step [s]; by default each start's own, from the scene and its energy"
@@ -70,19 +86,26 @@ class Disturbed(TiledScan):
     )
 
     def check(self, scene: Scene) -> None:
-        """There must be something to disturb, a constant force and a damper, all over a map."""
+        """A constant force and a damper all over a map, and no more work than is possible."""
+        check_parameters(scene, self.axes, "axes")
         for corner in self._corners(scene):
             require_constant_force(corner)
             require_damper(corner)
+            check_duration(corner, self.t_end, self.dt)
+            check_steps("linear_horizon", self.linear_horizon, shortest_step(reduce(corner)))
         if not self.axes:
-            equilibria_to_disturb(scene)
+            steps = math.ceil(self.t_end / (self.dt or shortest_step(reduce(scene))))
+            work = self.trajectories * find_method(self.method).evaluations(steps)
+            if work > MOST_WORK:
+                raise InputError(
+                    f"trajectories, t_end, dt: ask for {work:.3g} right-hand sides about every equilibrium, "
+                    f"at most {MOST_WORK:.0e} are possible"
+                )
             return
         for name in _NOT_OF_A_MAP:
             if name in self.model_fields_set:
                 raise InputError(f"{name}: is nothing of a map; leave it out, or the axes")
-        total = math.prod(axis.num for axis in self.axes.values())
-        if total > MOST_POINTS:
-            raise InputError(f"axes: ask for {total:.3g} points, at most {MOST_POINTS:.0e} are allowed")
+        check_size("axes", self.axes, "points", MOST_POINTS, POINT_NUMBERS)
         if self.trajectories > MOST_TRAJECTORIES:
             raise InputError(
                 f"trajectories = {self.trajectories}: must be at most {MOST_TRAJECTORIES} on a map"
@@ -97,14 +120,13 @@ class Disturbed(TiledScan):
 
     def _corners(self, scene: Scene) -> list[Scene]:
         """The scene with the first and last values of all axes; itself where there are none."""
-        ends = [(axis.start, axis.stop) for axis in self.axes.values()]
+        ends = [axis.array[[0, -1]].tolist() for axis in self.axes.values()]
         return [scene.replace(**dict(zip(self.axes, values, strict=True))) for values in product(*ends)]
 
     def tiling(self, scene: Scene) -> Tiling:
         """Blocks of directions and of trajectories; of a map the equilibria one by one."""
         if self.axes:
-            axes = {name: np.linspace(axis.start, axis.stop, axis.num) for name, axis in self.axes.items()}
-            return DisturbedMap(self, scene, axes)
+            return DisturbedMap(self, scene, arrays(self.axes))
         return DisturbedTiling(self, scene)
 
     @property
@@ -117,7 +139,8 @@ class Disturbed(TiledScan):
     def settings(self) -> dict[str, Any]:
         """What a section says of its request."""
         left_out = {"scene", "axes", *(_NOT_OF_A_MAP if self.axes else ["variables"])}
-        return self.model_dump(exclude=left_out, exclude_none=True)
+        settings = self.model_dump(exclude=left_out, exclude_none=True)
+        return settings | {"seed": self.seed if self.seed < 2**64 else str(self.seed)}  # no integer of HDF5's
 
     @staticmethod
     def read(section: Section, scene: Mapping[str, float]) -> Dataset:

@@ -9,11 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from fastmech.disturbance.motion import default_step, disturbed_motion, equilibria_to_disturb
+from fastmech.basins.steps import highest_frequency
+from fastmech.disturbance.motion import (
+    PHASE,
+    default_step,
+    disturbed_motion,
+    equilibria_to_disturb,
+    require_constant_force,
+)
+from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import FAILURES
 from fastmech.ensembles.spans import output_steps
 from fastmech.equilibria.find import Equilibria, Equilibrium
+from fastmech.equilibria.search import MOST
+from fastmech.mechanism.coefficients import reduce
 from fastmech.results import STATE_UNITS, Dataset, Variable, numbers, parts
+from fastmech.scan_types.axis import check_steps
 from fastmech.scan_types.each import Each
 from fastmech.scan_types.request import HALVING, MethodName, TiledScan, failures
 from fastmech.scan_types.tiling import Tiling
@@ -43,8 +54,12 @@ class DisturbedMotionScan(TiledScan):
     method: MethodName = "dop853"
 
     def check(self, scene: Scene) -> None:
-        """There must be something to disturb, and a constant force."""
-        equilibria_to_disturb(scene)
+        """The force must be constant, so many steps possible, and the outputs fit into memory."""
+        require_constant_force(scene)
+        check_steps("t_end", self.t_end, self.dt or PHASE / highest_frequency(reduce(scene)))
+        checks.memory(
+            self.outputs * 2 * 4 * MOST, 3, "outputs: the motions about equilibria", "fewer outputs"
+        )
 
     def step_warning(self, scene: Scene) -> str | None:
         """By the scene's limit; without ``dt`` each equilibrium's step is chosen."""

@@ -17,17 +17,16 @@ Folds do not depend on the grid: ``fold_proof`` tells that none is missing, or w
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
-import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, Field
 
 from fastmech.atlas.axes import refuse_decaying_load
 from fastmech.atlas.map import Slab
-from fastmech.errors import InputError
+from fastmech.errors import shown
 from fastmech.results import Dataset, Variable
+from fastmech.scan_types.axis import Axis, arrays, check_parameters, check_size
 from fastmech.scan_types.map_layout import TOGETHER, point_variables
 from fastmech.scan_types.map_tiling import MapTiling
 from fastmech.scan_types.request import TiledScan
@@ -42,22 +41,15 @@ if TYPE_CHECKING:
 #: Points of the largest map: its sheets take 24 bytes a point in memory, its file about 100.
 MOST_POINTS = 50_000_000
 
-
-class Axis(BaseModel):
-    """Evenly spaced values of a parameter, ends included."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-
-    start: float
-    stop: float
-    num: Annotated[int, Field(ge=1, le=100_000)]
+#: Numbers of 8 bytes that memory holds of every point of a map, and of every point that is being solved.
+SHEET_NUMBERS, POINT_NUMBERS = 3, 250
 
 
 def known_parameters(axes: dict[str, Axis]) -> dict[str, Axis]:
     """Refuse axes that are no parameters of a scene."""
     for name in axes:
         if name not in Scene.model_fields:
-            raise ValueError(f"unknown parameter {name!r}; {nearest(name, list(Scene.model_fields))}")
+            raise ValueError(f"unknown parameter {shown(name)}; {nearest(name, list(Scene.model_fields))}")
     return axes
 
 
@@ -65,7 +57,7 @@ def _known_variables(names: list[str]) -> list[str]:
     known = [*point_variables(("x",), Slab.empty(1)), *TOGETHER]
     for name in names:
         if name not in known:
-            raise ValueError(f"unknown variable {name!r}; {nearest(name, known)}")
+            raise ValueError(f"unknown variable {shown(name)}; {nearest(name, known)}")
     return names
 
 
@@ -82,17 +74,16 @@ class EquilibriumMap(TiledScan):
     def check(self, scene: Scene) -> None:
         """Every value of every axis must be one the scene accepts, and every axis must matter."""
         refuse_decaying_load(scene, self.axes)
-        total = math.prod(axis.num for axis in self.axes.values())
-        if total > MOST_POINTS:
-            raise InputError(f"axes: ask for {total:.3g} points, at most {MOST_POINTS:.0e} are allowed")
-        for name, axis in self.axes.items():
-            for value in (axis.start, axis.stop):
-                scene.replace(**{name: value})
+        check_parameters(scene, self.axes, "axes")
+        check_size("axes", self.axes, "points", MOST_POINTS, SHEET_NUMBERS)
+        first, *others = self.axes
+        plane = {name: self.axes[name] for name in others} or {first: self.axes[first]}
+        if others:
+            check_size("axes", plane, f"points in a plane of {first}", MOST_POINTS, POINT_NUMBERS)
 
     def tiling(self, scene: Scene) -> Tiling:
         """Planes of the first axis, and the curves as a tile of their own."""
-        axes = {name: np.linspace(axis.start, axis.stop, axis.num) for name, axis in self.axes.items()}
-        return MapTiling(self, scene, axes)
+        return MapTiling(self, scene, arrays(self.axes))
 
     @property
     def wells(self) -> bool:

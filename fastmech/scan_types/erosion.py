@@ -7,7 +7,6 @@ the well; starts are uniform in the window that ``axes`` span, the other states 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -17,11 +16,20 @@ from pydantic import AfterValidator, Field
 from fastmech.basins.erosion import FLAGS, MEASURES, Ends, survey_of, wells_along
 from fastmech.basins.label import labels_of, require_damper
 from fastmech.basins.measures.norm import STATE
+from fastmech.basins.steps import MOST_OCTAVES, TURNING
 from fastmech.disturbance.motion import require_constant_force
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown
 from fastmech.results import Dataset, Variable
-from fastmech.scan_types.equilibrium_map import Axis
-from fastmech.scan_types.request import TiledScan
+from fastmech.scan_types.axis import (
+    Axis,
+    arrays,
+    check_duration,
+    check_parameters,
+    check_rising,
+    check_size,
+    check_starts,
+)
+from fastmech.scan_types.request import Seed, TiledScan
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
 from fastmech.scene import Scene, nearest
 
@@ -30,6 +38,10 @@ if TYPE_CHECKING:
 
 #: Points of the largest map of a value.
 MOST_POINTS = 1_000_000
+
+#: Largest shock [rad]: a kick of the rates of this size, times the frequency at the well, is as fast as the
+#: shortest steps by default can follow.
+MOST_SHOCK = TURNING * 2.0**MOST_OCTAVES
 
 _ABOUT = {
     "phi": ("rad", "angle phi of the well"),
@@ -57,9 +69,11 @@ _ABOUT = {
 def _known_states(axes: dict[str, Axis]) -> dict[str, Axis]:
     for name, axis in axes.items():
         if name not in STATE:
-            raise ValueError(f"unknown coordinate {name!r}; {nearest(name, list(STATE))}")
-        if axis.num < 2 or axis.stop <= axis.start:
-            raise ValueError(f"axis {name!r} must rise and have at least 2 points")
+            raise ValueError(f"unknown coordinate {shown(name)}; {nearest(name, list(STATE))}")
+        if axis.values is not None or axis.spacing == "log" or axis.size < 2 or not axis.rises:
+            raise ValueError(
+                f"axis {shown(name)} must rise evenly (start, stop, num) and have at least 2 points"
+            )
     return axes
 
 
@@ -74,11 +88,13 @@ class Erosion(TiledScan):
     axes: Annotated[dict[str, Axis], Field(min_length=1, max_length=4), AfterValidator(_known_states)] = (
         Field(description="the window and the map in it")
     )
-    most_shock: Annotated[float, Field(gt=0)] = Field(2.0, description="largest shock to look for [rad]")
+    most_shock: Annotated[float, Field(gt=0, le=MOST_SHOCK)] = Field(
+        2.0, description="largest shock to look for [rad]"
+    )
     t_end: Annotated[float, Field(gt=0)] = 60.0
     starts: Annotated[int, Field(ge=1, le=1_000_000)] = 2048
     directions: Annotated[int, Field(ge=1, le=100_000)] = 64
-    seed: Annotated[int, Field(ge=0)] = 0
+    seed: Seed = 0
 
     @property
     def parameter(self) -> str:
@@ -88,8 +104,7 @@ class Erosion(TiledScan):
     @property
     def values(self) -> np.ndarray:
         """Its values."""
-        axis = self.along[self.parameter]
-        return np.linspace(axis.start, axis.stop, axis.num)
+        return self.along[self.parameter].array
 
     def check(self, scene: Scene) -> None:
         """The scene needs a constant force and a damper, the parameter must rise to values it accepts."""
@@ -99,15 +114,14 @@ class Erosion(TiledScan):
         if name not in Scene.model_fields or name == "alpha":
             allowed = [field for field in Scene.model_fields if field != "alpha"]
             raise InputError(f"along.{name}: unknown parameter; {nearest(name, allowed)}")
-        if axis.num > 1 and axis.stop <= axis.start:
-            raise InputError(
-                f"along.{name}.stop = {axis.stop:g}: must be greater than start = {axis.start:g}"
-            )
-        for value in (axis.start, axis.stop):
-            require_damper(scene.replace(**{name: value}))
-        total = math.prod(axis.num for axis in self.axes.values())
-        if total > MOST_POINTS:
-            raise InputError(f"axes: ask for {total:.3g} starts, at most {MOST_POINTS:.0e} are allowed")
+        check_rising(f"along.{name}", axis)
+        check_parameters(scene, self.along, "along")
+        ends = [scene.replace(**{name: float(value)}) for value in self.values[[0, -1]]]
+        check_size("axes", self.axes, "starts", MOST_POINTS, 1)
+        for end in ends:
+            require_damper(end)
+            check_starts(end, {f"axes.{state}": line for state, line in arrays(self.axes).items()})
+            check_duration(end, self.t_end, None)
 
     def tiling(self, scene: Scene) -> Tiling:
         """Every well at every value is a tile."""
@@ -130,9 +144,7 @@ class ErosionTiling(Tiling):
         self.request, self.scene, self.values = request, scene, request.values
         self.sheets, self.places = wells_along(scene, request.parameter, self.values)
         self.count = self.values.size * self.sheets.size
-        self.window = {
-            name: np.linspace(axis.start, axis.stop, axis.num) for name, axis in request.axes.items()
-        }
+        self.window = arrays(request.axes)
 
     def items(self, index: int) -> int:
         """One well."""

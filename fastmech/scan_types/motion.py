@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from fastmech.ensembles import checks
 from fastmech.ensembles.balance import energy_balance
 from fastmech.ensembles.integrate import FAILURES, integrate
 from fastmech.ensembles.spans import output_steps
@@ -17,6 +18,7 @@ from fastmech.mechanism.geometry import constraints, positions
 from fastmech.mechanism.hamilton import momenta
 from fastmech.mechanism.reactions import reactions
 from fastmech.results import STATE_UNITS, Dataset, Variable, parts
+from fastmech.scan_types.axis import check_steps
 from fastmech.scan_types.each import Each
 from fastmech.scan_types.request import HALVING, MethodName, TiledScan, failures
 from fastmech.scan_types.tiling import Tiling
@@ -25,6 +27,9 @@ from fastmech.step_limits.warning import step_warning
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+#: Numbers of a section for every output.
+OUTPUT_NUMBERS = 30
 
 _STATE = {"phi": "angle phi", "theta": "angle theta", "phi_dot": "rate of phi", "theta_dot": "rate of theta"}
 _REACTIONS = {
@@ -55,6 +60,11 @@ class Motion(TiledScan):
     outputs: Annotated[int, Field(ge=2, le=10_000_000)] = 2001
     dt: Annotated[float, Field(gt=0)] = 0.01
     method: MethodName = "dop853"
+
+    def check(self, scene: Scene) -> None:
+        """So many steps must be possible, and what is kept of every output fit into memory."""
+        check_steps("t_end", self.t_end, self.dt)
+        checks.memory(self.outputs * OUTPUT_NUMBERS, 3, "outputs: the motion", "fewer outputs")
 
     def step_warning(self, scene: Scene) -> str | None:
         """By the scene's limit, the decaying force and the rates of the start."""

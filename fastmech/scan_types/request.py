@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from fastmech.ensembles.status import failure_counts, failure_line
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown, shown_name
 from fastmech.integrators.methods import find_method
 from fastmech.results import Dataset, Variable, check_name
 from fastmech.scan_types.tiling import RunContext as RunContext
@@ -29,12 +29,21 @@ if TYPE_CHECKING:
 
 
 def _known_method(name: str) -> str:
-    find_method(name)
-    return name
+    try:
+        return find_method(name).name
+    except InputError as error:
+        raise ValueError(str(error).removeprefix(f"method = {shown(name)}: ")) from None
 
 
 #: A field that names an integration method.
 MethodName = Annotated[str, AfterValidator(_known_method)]
+
+
+#: Seed of random numbers, as long as those that NumPy recommends.
+Seed = Annotated[int, Field(ge=0, lt=2**128)]
+
+#: Characters of the longest name of a scan, which is part of file names.
+LONGEST_NAME = 100
 
 
 class Scan(BaseModel, ABC):
@@ -165,24 +174,6 @@ class Request:
         return [f"scan.{name}: {line}" for name, line in told.items() if line is not None]
 
 
-@dataclass(frozen=True)
-class Outline:
-    """What a request file says without the kinds of its scans: title, scene, the scans' tables by name."""
-
-    title: str
-    scene: Scene
-    scans: Mapping[str, Any]
-
-
-def check_outline(path: str | Path, text: str | None = None) -> None:
-    """Refuse what is wrong with a request file however its scans are read: that loads or compiles kernels.
-
-    Raises:
-        InputError: the file cannot be read, or its title, its scene or a scan's name is wrong.
-    """
-    _outline(read_text(path) if text is None else text, path)
-
-
 def read_request(path: str | Path, kinds: Mapping[str, type[Scan]], text: str | None = None) -> Request:
     """Read and validate a request file, or the text that is given as its own.
 
@@ -198,17 +189,21 @@ def request_of_text(text: str, path: str | Path, kinds: Mapping[str, type[Scan]]
     Raises:
         InputError: it is no TOML, or anything in it is unknown, of a wrong type or out of range.
     """
-    outline = _outline(text, path)
-    if not outline.scans:
+    table = parse_toml(text, path)
+    allowed = ["title", "scene", "scan"]
+    for name in table:
+        if name not in allowed:
+            raise InputError(f"{shown_name(name)}: unknown name; {nearest(name, allowed)}")
+    title = table.get("title", Path(path).stem)
+    if not isinstance(title, str) or "\0" in title:
+        raise InputError(f"title = {shown(title)}: must be a text without null characters")
+    scene = Scene(**_table(table.get("scene", {}), "scene"))
+    scans = _table(table.get("scan", {}), "scan")
+    if not scans:
         raise InputError(
             f"{path}: asks for no scan; write a table [scan.NAME] with kind = one of {list(kinds)}"
         )
-    request = Request(
-        title=outline.title,
-        scene=outline.scene,
-        scans={name: _scan(name, entry, kinds) for name, entry in outline.scans.items()},
-        text=text,
-    )
+    request = Request(title, scene, {name: _scan(name, scans[name], kinds) for name in scans}, text)
     for name, scan in request.scans.items():
         try:
             scan.check(request.scene_of(name))
@@ -217,39 +212,26 @@ def request_of_text(text: str, path: str | Path, kinds: Mapping[str, type[Scan]]
     return request
 
 
-def _outline(text: str, path: str | Path) -> Outline:
-    table = parse_toml(text, path)
-    allowed = ["title", "scene", "scan"]
-    for name in table:
-        if name not in allowed:
-            raise InputError(f"{name}: unknown name; {nearest(name, allowed)}")
-    title = table.get("title", Path(path).stem)
-    if not isinstance(title, str):
-        raise InputError(f"title = {title!r}: must be a text")
-    scene = Scene(**_table(table.get("scene", {}), "scene"))
-    scans = _table(table.get("scan", {}), "scan")
-    for name, entry in scans.items():
-        where = f"scan.{name}"
-        check_name(name, where)
-        if name in Scene.model_fields:
-            raise InputError(f"{where}: is the name of a parameter of the scene; choose another")
-        _table(entry, where)
-    return Outline(title, scene, scans)
-
-
 def _table(value: Any, where: str) -> dict[str, Any]:
     if not isinstance(value, dict):
-        raise InputError(f"{where} = {value!r}: must be a table")
+        raise InputError(f"{where} = {shown(value)}: must be a table")
     return value
 
 
-def _scan(name: str, value: Mapping[str, Any], kinds: Mapping[str, type[Scan]]) -> Scan:
-    where, entry = f"scan.{name}", dict(value)
+def _scan(name: str, value: Any, kinds: Mapping[str, type[Scan]]) -> Scan:
+    where = f"scan.{shown_name(name)}"
+    check_name(name, where)
+    if len(name) > LONGEST_NAME:
+        raise InputError(f"{where}: has {len(name):,} characters, at most {LONGEST_NAME} are allowed")
+    if name in Scene.model_fields:
+        raise InputError(f"{where}: is the name of a parameter of the scene; choose another")
+    entry = dict(_table(value, where))
     kind = entry.pop("kind", None)
     if kind is None:
         raise InputError(f"{where}.kind: missing; allowed: {', '.join(kinds)}")
     if not isinstance(kind, str) or kind not in kinds:
-        raise InputError(f"{where}.kind = {kind!r}: unknown; {nearest(str(kind), list(kinds))}")
+        hint = nearest(kind if isinstance(kind, str) else "", list(kinds))
+        raise InputError(f"{where}.kind = {shown(kind)}: unknown; {hint}")
     try:
         return kinds[kind](**entry)
     except ValidationError as error:

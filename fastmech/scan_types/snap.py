@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from fastmech.atlas.snap import MOVING, find_snap, stable_at
 from fastmech.equilibria.find import Equilibrium, find_equilibria
+from fastmech.errors import InputError
 from fastmech.results import Dataset, Variable
 from fastmech.scan_types.each import Each
 from fastmech.scan_types.request import TiledScan
 from fastmech.scan_types.tiling import Tiling
-from fastmech.scene import Scene
+from fastmech.scene import Number, Scene, nearest
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+def _moving(name: str) -> str:
+    if name not in MOVING:
+        raise ValueError(f"must be one that moves equilibria; {nearest(name, list(MOVING))}")
+    return name
 
 
 class SnapScan(TiledScan):
@@ -25,16 +32,30 @@ class SnapScan(TiledScan):
 
     kind: ClassVar[str] = "snap"
 
-    parameter: str = Field("F0", description=f"what changes: one of {', '.join(MOVING)}")
-    position: list[float] | None = Field(
+    parameter: Annotated[str, AfterValidator(_moving)] = Field(
+        "F0", description=f"what changes: one of {', '.join(MOVING)}"
+    )
+    position: list[Number] | None = Field(
         None,
         min_length=2,
         max_length=2,
         description="about where the stable position is [rad], all by default",
     )
-    searched: list[float] | None = Field(
+    searched: list[Number] | None = Field(
         None, min_length=2, max_length=2, description="values to search [the parameter's unit]"
     )
+
+    def check(self, scene: Scene) -> None:
+        """The range must hold the present value, and the scene accept its ends."""
+        if self.searched is None:
+            return
+        for end in self.searched:
+            scene.replace(**{self.parameter: end})
+        present = getattr(scene.replace(F0=scene.F0 if scene.alpha == 0.0 else 0.0), self.parameter)
+        low, high = self.searched
+        if not (low < high and low <= present <= high):
+            told = f"must be a range of {self.parameter} that holds {present:g}"
+            raise InputError(f"searched = {self.searched}: {told}")
 
     def tiling(self, scene: Scene) -> Tiling:
         """The stable positions one by one."""

@@ -8,18 +8,18 @@ scene's equilibria along ``equilibrium``; and the critical impulse, the limit of
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from fastmech.basins.label import require_damper
 from fastmech.basins.shock_limit import shock_limit
-from fastmech.basins.snapping import SnappingMap, critical_forces, force_free, map_snapping
+from fastmech.basins.snapping import SnappingMap, critical_forces, default_end, force_free, map_snapping
 from fastmech.basins.status import FAILURES, BasinStatus
 from fastmech.errors import InputError
 from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers
-from fastmech.scan_types.equilibrium_map import Axis
+from fastmech.scan_types.axis import Axis, check_duration, check_parameters, check_rising, check_size
 from fastmech.scan_types.request import MethodName, TiledScan, failures
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
 from fastmech.scene import Scene
@@ -27,21 +27,20 @@ from fastmech.scene import Scene
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Motions of the largest map.
-MOST_POINTS = 5_000_000
+#: Motions of the largest map, and numbers of 8 bytes of each in memory.
+MOST_POINTS, POINT_NUMBERS = 5_000_000, 20
+
+#: Least tolerance of a critical force over the force: doubles between two such forces.
+ROUNDING = 2.0**-44
 
 #: Motions of a tile, about.
 TILE_POINTS = 1 << 12
 
 
-class Rates(BaseModel):
-    """Values evenly spaced in their logarithm, ends included."""
+class Rates(Axis):
+    """Values evenly spaced in their logarithm, unless it is said otherwise."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-
-    start: Annotated[float, Field(gt=0)]
-    stop: Annotated[float, Field(gt=0)]
-    num: Annotated[int, Field(ge=1, le=100_000)]
+    spacing: Literal["linear", "log"] = "log"
 
 
 class Snapping(TiledScan):
@@ -60,24 +59,35 @@ class Snapping(TiledScan):
     @property
     def forces(self) -> np.ndarray:
         """Values of F0 [N]."""
-        return np.linspace(self.F0.start, self.F0.stop, self.F0.num)
+        return self.F0.array
 
     @property
     def rates(self) -> np.ndarray:
         """Values of alpha [1/s]."""
-        return np.geomspace(self.alpha.start, self.alpha.stop, self.alpha.num)
+        return self.alpha.array
 
     def check(self, scene: Scene) -> None:
         """Forces of one sign, rising axes, a damper."""
         require_damper(scene)
         for name, axis in (("F0", self.F0), ("alpha", self.alpha)):
-            if axis.num > 1 and axis.stop <= axis.start:
-                raise InputError(f"{name}.stop = {axis.stop:g}: must be greater than start = {axis.start:g}")
-        if self.F0.start * self.F0.stop <= 0.0:
-            raise InputError(f"F0.start = {self.F0.start:g}: must have the sign of stop and not be 0 N")
-        total = self.F0.num * self.alpha.num
-        if total > MOST_POINTS:
-            raise InputError(f"F0, alpha: ask for {total:.3g} motions, at most {MOST_POINTS:.0e} are allowed")
+            check_rising(name, axis)
+        first, last = (float(force) for force in self.forces[[0, -1]])
+        if first * last <= 0.0:
+            raise InputError(f"F0: goes from {first:g} to {last:g} N: must be of one sign and not be 0 N")
+        slowest = float(self.rates[0])
+        if slowest <= 0.0:
+            raise InputError(f"alpha: begins at {slowest:g} 1/s: must be greater than 0 1/s")
+        least = ROUNDING * float(np.abs(self.forces).max())
+        if self.tolerance < least:
+            raise InputError(
+                f"tolerance = {self.tolerance:g}: must not be less than {least:.2g} N, for rounding"
+            )
+        axes = {"F0": self.F0, "alpha": self.alpha}
+        check_parameters(scene, axes, "axes")
+        check_size("F0, alpha", axes, "motions", MOST_POINTS, POINT_NUMBERS)
+        end = float(default_end(slowest)) if self.t_end is None else self.t_end
+        for force in (first, last):
+            check_duration(scene.replace(F0=force, alpha=slowest), end, None)
 
     def tiling(self, scene: Scene) -> Tiling:
         """Some decay rates a tile."""

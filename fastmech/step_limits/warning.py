@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.errors import InputError, StepWarning
+from fastmech.errors import InputError, StepWarning, shown
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import potential_energy, potential_gradient, potential_hessian
@@ -151,8 +151,8 @@ def step_warning(scene: Scene, dt: float, method: str, starts: ArrayLike | None 
     """
     require_scene(scene)
     fastest = 0.0 if starts is None else _fastest(starts)
-    if not isinstance(dt, Real) or isinstance(dt, bool) or not 0.0 < dt < np.inf:
-        raise InputError(f"dt = {dt!r}: must be a finite number of s greater than 0")
+    if not isinstance(dt, Real) or isinstance(dt, bool) or not 0.0 < dt <= float(np.finfo(np.float64).max):
+        raise InputError(f"dt = {shown(dt)}: must be a finite number of s greater than 0")
     return _told(_first_limit(scene, dt, method, fastest), dt, method)
 
 
@@ -196,7 +196,7 @@ def _fastest(starts: ArrayLike) -> float:
     """The greatest finite rate [rad/s] of states (n, 4) or (4,)."""
     try:
         states = np.asarray(starts, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError("starts: must be numbers of shape (n, 4)") from None
     if states.ndim not in (1, 2) or states.shape[-1] != 4:
         raise InputError(f"starts: has shape {states.shape}, must be (n, 4)")

@@ -6,7 +6,7 @@ import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown, shown_name
 from fastmech.results import Dataset
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import Request, RunContext, read_request
@@ -82,11 +82,15 @@ def compute_alone(
     request = read_request(path, scan_kinds(), text)
     sections = {s.name: s for s in sections_of(request, identity_of(asked_for(request)))}
     name, _, number = tile.partition(":")
+    where = f"--tile {shown_name(tile)}"
     if name not in sections:
-        raise InputError(f"--tile {tile}: the request has no section {name!r}; it has {', '.join(sections)}")
+        there = ", ".join(sections)
+        raise InputError(f"{where}: the request has no section {shown(name)}; it has {there}")
     section = sections[name]
-    if not (number.isascii() and number.isdigit()) or int(number) >= section.tiling.count:
-        raise InputError(f"--tile {tile}: {name} has the tiles 0 to {section.tiling.count - 1}")
+    count = section.tiling.count
+    is_number = number.isascii() and number.isdigit() and len(number) <= len(str(count))
+    if not is_number or int(number) >= count:
+        raise InputError(f"{where}: {name} has the tiles 0 to {count - 1}")
     index = int(number)
     made = section.compute(index, context)
     image = b"".join(chunk.data for chunk in made.image)

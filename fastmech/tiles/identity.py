@@ -10,6 +10,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from fastmech.errors import shown_name
 from fastmech.kernel_cache import COMPILED, PACKAGE, source_hash
 from fastmech.scan_types.request import Request
 from fastmech.store.read import open_results
@@ -62,7 +63,7 @@ def differences(there: str, here: str) -> str:
     for name in sorted(old.keys() | new.keys()):
         was, now = old.get(name, "nothing"), new.get(name, "nothing")
         if was != now:
-            told.append(f"{name.removeprefix('code.')} = {was} there, {now} here")
+            told.append(f"{name.removeprefix('code.')} = {shown_name(was)} there, {shown_name(now)} here")
     more = f" and {len(told) - _MOST_TOLD} more" if len(told) > _MOST_TOLD else ""
     return "; ".join(told[:_MOST_TOLD]) + more
 

@@ -60,6 +60,13 @@ class Manifest:
     items: dict[str, int]
 
 
+def _clear(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
+
+
 class DamagedManifestError(InputError):
     """A manifest is not what was written."""
 
@@ -185,7 +192,8 @@ class Parts:
         """The files of finished tiles; none while it is not known where they are."""
         if section.name not in self._places:
             return []
-        there = {path.name: path for path in (self.folder / self._places[section.name]).glob("*.tile")}
+        folder = self.folder / self._places[section.name]
+        there = {path.name for path in folder.glob("*.tile") if path.is_file()}
         mine = (self.path(section, index) for index in range(section.tiling.count))
         return [path for path in mine if path.name in there]
 
@@ -215,16 +223,14 @@ class Parts:
         return tile_dataset(data)
 
     def drop(self, section: TiledSection, index: int) -> None:
-        """Forget a tile."""
-        self.path(section, index).unlink(missing_ok=True)
+        """Forget a tile, or whatever stands in its place."""
+        _clear(self.path(section, index))
 
     def remove(self) -> None:
         """Remove everything but the lock, the manifest last."""
         for entry in sorted(self.folder.iterdir(), key=lambda entry: entry.name == "manifest.json"):
-            if entry.is_dir():
-                shutil.rmtree(entry, ignore_errors=True)
-            elif entry.name != "lock":
-                entry.unlink(missing_ok=True)
+            if entry.name != "lock":
+                _clear(entry)
 
     @property
     def _lock(self) -> Path:

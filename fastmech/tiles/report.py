@@ -20,7 +20,7 @@ class RunReport:
     """
 
     path: Path
-    tiles: int
+    tiles: int = 0
     computed: int = 0
     damaged: list[Path] = field(default_factory=list)
     was_complete: bool = False

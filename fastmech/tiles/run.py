@@ -8,6 +8,7 @@ import shlex
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cached_property
 from pathlib import Path
 
 from fastmech.ensembles.run import Progress
@@ -39,6 +40,29 @@ def default_output(path: str | Path) -> Path:
     return Path("results") / f"{Path(path).stem}.h5"
 
 
+def _check_place(path: Path) -> None:
+    """Refuse a name that no file can have, before anything is computed for it.
+
+    Raises:
+        InputError: links lead round in a circle, the name is too long, or the system refuses it.
+    """
+    try:
+        path.stat()
+    except FileNotFoundError:
+        pass
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def _inode(path: Path) -> tuple[int, int] | None:
+    """Which file has this name; None: none."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_ino, found.st_mtime_ns
+
+
 class ScanRun:
     """One run of a request.
 
@@ -68,12 +92,19 @@ class ScanRun:
         self.identity = identity_of(self.asked)
         self.sections = sections_of(request, self.identity)
         self.parts = Parts(Path(os.path.realpath(target)))
-        self.tasks = [Task(s, index) for s in self.sections for index in range(s.tiling.count)]
+        for path in (target, self.parts.folder):
+            _check_place(path)
         self.seconds: dict[Task, float] = {}
         self.crashes: list[Crash] = []
         self.replace = False
         self.started = time.perf_counter()
-        self.report = RunReport(target, len(self.tasks))
+        self.before = _inode(self.parts.target)
+        self.report = RunReport(target)
+
+    @cached_property
+    def tasks(self) -> list[Task]:
+        """All tiles; what they are may take kernels to find out."""
+        return [Task(s, index) for s in self.sections for index in range(s.tiling.count)]
 
     def run(self, fresh: bool) -> RunReport:
         """Compute what is missing and assemble the result file.
@@ -88,11 +119,13 @@ class ScanRun:
             Stopped: the user stopped it.
         """
         if self._is_complete(fresh):
-            self.report.was_complete = True
+            self.report.was_complete, self.report.tiles = True, len(self.tasks)
             return self.report
         with self.parts.held():
             try:
-                if not self._begin(fresh):
+                begun = self._begin(fresh)
+                self.report.tiles = len(self.tasks)
+                if not begun:
                     self.report.was_complete = True
                     return self.report
                 self._check_tiles()
@@ -104,6 +137,8 @@ class ScanRun:
                     raise InputError(f"{self.parts.folder}: tiles are damaged time and again; check the disk")
                 self.parts.remove()
             except KeyboardInterrupt as interrupt:
+                if _inode(self.parts.target) not in (None, self.before):  # a file of that name is complete
+                    raise Stopped(f"interrupted; {self.target} is complete", signal_of(interrupt)) from None
                 message = self._kept("interrupted")
                 if still_computing(PATIENCE):
                     message += "; this process ends with the tiles in hand, which are not kept"
@@ -111,8 +146,9 @@ class ScanRun:
             except InputError as error:
                 raise InputError(self._kept(str(error))) from None
             except OSError as error:
+                place = error.filename or self.target
                 raise InputError(
-                    self._kept(f"{self.target}: cannot be written: {error.strerror or error}")
+                    self._kept(f"{place}: cannot be written: {error.strerror or error}")
                 ) from None
         self.report.seconds = time.perf_counter() - self.started
         return self.report

@@ -59,7 +59,10 @@ class TiledSection:
 
 @lru_cache(maxsize=64)
 def _tiling(section: TiledSection) -> Tiling:
-    return section.scan.tiling(section.scene)
+    try:
+        return section.scan.tiling(section.scene)
+    except InputError as error:
+        raise InputError(f"scan.{section.name}: {error}") from None
 
 
 def sections_of(request: Request, identity: str) -> list[TiledSection]:

@@ -15,6 +15,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from fastmech.ensembles import checks
+from fastmech.errors import InputError
 from fastmech.scene import Scene
 from fastmech.stability.linearize import Rest, jacobian, linearized
 
@@ -54,10 +55,14 @@ def transient_growth(scene: Scene, equilibrium: Rest, until: float = 10.0) -> Tr
     A = root @ jacobian(scene, equilibrium) @ np.linalg.inv(root)
     reactivity = float(np.linalg.eigvalsh((A + A.T) / 2.0)[-1])
     times = np.linspace(0.0, until, TIMES + 1)
-    step, flow = scipy.linalg.expm(A * times[1]), np.eye(4)
-    sizes = [1.0]
+    sizes, flow = [1.0], np.eye(4)
+    with np.errstate(over="ignore", invalid="ignore"):
+        step = scipy.linalg.expm(A * times[1])
     for _ in times[1:]:
-        flow = step @ flow
+        with np.errstate(over="ignore", invalid="ignore"):
+            flow = step @ flow
+        if not np.isfinite(flow).all():
+            raise InputError(f"until = {until:g} s: by then disturbances are beyond doubles")
         sizes.append(float(np.linalg.norm(flow, 2)))
     best = int(np.argmax(sizes))
     return TransientGrowth(reactivity, sizes[best], float(times[best]), until)

@@ -15,7 +15,7 @@ from fastmech.ensembles.plausible import judge
 from fastmech.ensembles.problem import extreme_scenes, own_values, scene_problem, system_problem
 from fastmech.ensembles.status import Status, failure_counts, failure_line
 from fastmech.ensembles.system import System
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.scene import Scene
 from fastmech.step_limits.beyond import StepJudge, StepsTaken
@@ -84,17 +84,18 @@ def largest_lyapunov(
     """
     t_end = checks.number("t_end", t_end, "s", above=0.0)
     dt = checks.number("dt", dt, "s", above=0.0)
+    parameters = {} if parameters is None else parameters
     if isinstance(scene, System):
         starts = checks.states("y0", y0, len(scene.state))
-        problem = system_problem(scene, len(starts), parameters or {})
+        problem = system_problem(scene, len(starts), parameters)
     elif isinstance(scene, Scene):
         starts = checks.states("y0", y0, 4)
-        own = own_values(parameters or {}, scene.model_dump(), len(starts))
+        own = own_values(parameters, scene.model_dump(), len(starts))
         problem = scene_problem(scene, len(starts), own, "lagrange")
         judge_of_steps = StepJudge(scene, own, starts, METHOD)
         judge_of_steps.warn(extreme_scenes(scene, own, problem), dt, t_end / dt)
     else:
-        raise InputError(f"scene = {scene!r}: must be a Scene or a System")
+        raise InputError(f"scene = {shown(scene)}: must be a Scene or a System")
     Y = np.array(starts.T, order="C")
     params = problem.params.block(len(starts))
     # A fixed direction with no special zeros: it turns to the fastest growing one within a few periods.

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
+from fastmech.atlas.damping import trace_unreached
 from fastmech.atlas.fold_points import find_folds
 from fastmech.atlas.folds import trace_folds
 from fastmech.atlas.map import EquilibriumMap, map_equilibria
@@ -60,6 +63,21 @@ def test_no_scene_is_refused_in_a_line() -> None:
     ):
         with pytest.raises(InputError, match=r"^scene = None: must be a Scene$"):
             wrong()
+
+
+@pytest.mark.parametrize("trace", [trace_folds, trace_unreached])
+def test_planes_that_are_none_are_refused_in_a_line(trace: Callable[..., object]) -> None:
+    good = ("c1", [1.0, 2.0])
+    for x, y, name in (
+        (good, None, "y"),
+        ({"c1": [1.0, 2.0]}, None, "x"),
+        (("c1",), good, "x"),
+        ("c1", good, "x"),
+    ):
+        with pytest.raises(InputError, match=rf"^{name} = .*: must be a parameter's name and its values$"):
+            trace(PAPER, x, y)
+    with pytest.raises(InputError, match=r"^scene = None: must be a Scene$"):
+        trace(None, good, ("c2", [1.0, 2.0]))
 
 
 def test_every_point_is_what_find_equilibria_finds(atlas: EquilibriumMap) -> None:
@@ -134,7 +152,10 @@ def test_2000_scenes_are_to_a_map_what_they_are_one_by_one() -> None:
             np.testing.assert_allclose(
                 one.eigenvalues[0, slot], c.eigenvalues, atol=c.eigenvalue_errors.max()
             )
-            np.testing.assert_allclose(one.frequency[0, slot], c.natural_frequencies[0], rtol=1e-8)
+            # Beside the degenerate set rounding hides whether U rises or falls: NaN stands for a fall.
+            lowest = np.nan_to_num([one.frequency[0, slot], c.natural_frequencies[0]]) ** 2
+            highest = np.nan_to_num(c.natural_frequencies[1]) ** 2
+            np.testing.assert_allclose(*lowest, rtol=1e-8, atol=1e-13 * highest)
             np.testing.assert_allclose(
                 1.0 / one.decay_time[0, slot], c.decay_rate, rtol=1e-8, atol=c.eigenvalue_errors.max()
             )

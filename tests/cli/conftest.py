@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -31,6 +32,8 @@ Invoke = Callable[..., Result]
 @pytest.fixture(autouse=True)
 def _in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+    for pause in ("SILENT", "LOG_PERIOD"):  # whether kernels are there already is no matter of these tests
+        monkeypatch.setattr(f"fastmech.cli.progress.{pause}", math.inf)
     _tiling.cache_clear()
 
 

@@ -84,17 +84,12 @@ def test_help_loads_no_numerical_library():
 @pytest.mark.parametrize(
     ("arguments", "fragments"),
     [
-        (["run", "none.toml"], ["none.toml: cannot be read"]),
-        (["run", "none.toml", "--tile", "a:0"], ["none.toml: cannot be read"]),
-        (["run", "broken.toml"], ["broken.toml: is not valid TOML"]),
-        (["run", "wrong.toml"], ["scene.m1 = -1", "greater than 0"]),
         (["run", "right.toml", "--out", "folder"], ["--out", "folder"]),
         (["plot", "none.h5"], ["none.h5: cannot be read"]),
         (["plot", "right.toml"], ["right.toml"]),
         (["plot", "none.h5", "--out", "right.toml"], ["--out", "right.toml"]),
         (["info", "none.h5"], ["none.h5: cannot be read"]),
         (["export", "none.h5", "--to", "csv"], ["none.h5: cannot be read"]),
-        (["status", "none.h5"], ["none.h5"]),
         (["equilibria", "none.toml"], ["none.toml: cannot be read"]),
         (["equilibria", "--at", "-1"], ["--at", "-1"]),
         (["equilibria", "--m1", "-1"], ["scene.m1 = -1", "greater than 0"]),
@@ -103,8 +98,40 @@ def test_help_loads_no_numerical_library():
         (["bench", "--out", "right.toml"], ["--out", "right.toml"]),
     ],
 )
-def test_wrong_input_is_told_before_kernels_are_compiled(arguments, fragments):
-    """A process of its own, in which Numba is not loaded, with a cache that stays empty."""
+def test_wrong_input_is_told_before_numba_is_loaded(arguments, fragments):
+    refused_without_kernels(arguments, fragments, "    assert 'numba' not in sys.modules\n")
+
+
+AXES = "axes.F0 = { start = 0.0, stop = 1.0, num = 2 }\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "fragment"),
+    [
+        ("[scan.a", "is not valid TOML"),
+        ("[scene]\nm1 = -1.0\n" + SCAN, "scene.m1 = -1.0"),
+        ('[scan.a]\nkind = "moton"', "scan.a.kind = 'moton': unknown; did you mean 'motion'?"),
+        ('[scan.a]\nkind = "equilibrium_map"\naxes.F0 = { start = 0.0, num = 2 }', "stop is missing"),
+        (
+            '[scan.a]\nkind = "erosion"\naxes.phi = { start = 0.0, stop = 1.0, num = 3 }',
+            "scan.a.along: missing",
+        ),
+        (SCAN + "[scan.b]\nkind = 'disturbed'\nseed = -1", "scan.b.seed = -1"),
+        (SCAN + f"seed = {'9' * 5000}", "an integer has more than 4,300 digits"),
+    ],
+)
+def test_a_wrong_request_is_refused_before_any_kernel_is_made(text, fragment):
+    Path("a.toml").write_text(text, encoding="utf-8")
+    refused_without_kernels(["run", "a.toml"], [fragment])
+
+
+@pytest.mark.parametrize("arguments", [["run", "none.toml", "--tile", "a:0"], ["status", "none.h5"]])
+def test_a_missing_file_is_told_before_any_kernel_is_made(arguments):
+    refused_without_kernels(arguments, ["none."])
+
+
+def refused_without_kernels(arguments, fragments, after=""):
+    """A process of its own, with a cache of kernels that stays empty."""
     Path("folder").mkdir()
     Path("broken.toml").write_text("[scan.a", encoding="utf-8")
     Path("wrong.toml").write_text("[scene]\nm1 = -1.0\n" + SCAN, encoding="utf-8")
@@ -117,7 +144,7 @@ def test_wrong_input_is_told_before_kernels_are_compiled(arguments, fragments):
         "try:\n"
         "    main(sys.argv[1:])\n"
         "finally:\n"
-        "    assert 'numba' not in sys.modules\n"
+        f"{after or '    pass'}\n"
     )
     done = subprocess.run(
         [sys.executable, "-c", program, *arguments],

@@ -7,7 +7,8 @@ import time
 
 import pytest
 
-from fastmech.cli.progress import PREPARING, ProgressBars
+from fastmech.cli.progress import LOADING, Preparation, ProgressBars
+from fastmech.jit import listeners
 
 
 def use(bars: ProgressBars) -> None:
@@ -65,15 +66,44 @@ def test_long_preparing_is_told(
     monkeypatch.setenv("TERM", kind)
     monkeypatch.setattr("fastmech.cli.progress.LOOK", 0.001)
     monkeypatch.setattr("fastmech.cli.progress.SILENT", 0.0)
+    monkeypatch.setattr("fastmech.cli.progress.LOG_PERIOD", 0.0)
     shown = ""
-    with ProgressBars() as bars, bars.preparing():
-        until = time.monotonic() + 60.0
-        while PREPARING not in shown and time.monotonic() < until:
-            time.sleep(0.01)
-            shown += capsys.readouterr().err
-    assert PREPARING in shown
-    assert bars.prepared > 0.0
+    with ProgressBars() as bars:
+
+        def wait_for(word: str) -> None:
+            nonlocal shown
+            until = time.monotonic() + 60.0
+            while word not in shown and time.monotonic() < until:
+                time.sleep(0.01)
+                shown += capsys.readouterr().err
+            assert word in shown
+
+        with bars.preparing():
+            wait_for(LOADING)
+        (tell,) = listeners
+        tell("integrate_blocks")
+        wait_for("compiling integrate_blocks")
+        tell("a_part_of_it")
+        wait_for("compiling a_part_of_it")
+        tell(None)
+        tell(None)
+    assert listeners == []
     assert bars.stages() == []
+
+
+def test_seconds_of_kernels_count_once(monkeypatch: pytest.MonkeyPatch):
+    """Of kernels within kernels the outer one's seconds; what lies between two is no preparing."""
+    now = [0.0]
+    monkeypatch.setattr("fastmech.cli.progress.time.perf_counter", lambda: now[0])
+    preparation = Preparation()
+    for seconds, name in ((1.0, "outer"), (2.0, "inner"), (4.0, None), (8.0, None), (16.0, "last")):
+        now[0] += seconds
+        preparation.tell(name)
+    now[0] += 32.0
+    assert preparation.look() == ("last", 2.0 + 4.0 + 8.0 + 32.0)
+    preparation.tell(None)
+    now[0] += 64.0
+    assert preparation.look() == (None, 46.0)
 
 
 def test_short_preparing_is_not(capsys: pytest.CaptureFixture[str]):

@@ -11,6 +11,8 @@ import pytest
 
 from fastmech.cli import COMMANDS, main
 from fastmech.cli.reporting import account
+from fastmech.jit import listeners
+from fastmech.scan_types.motion import Motion
 
 #: Commands that end at once whatever they are given.
 SHORT = {"status", "info"}
@@ -121,8 +123,19 @@ def test_an_interrupt_is_json_with_what_was_done(invoke, tiny, monkeypatch):
 
 
 def test_seconds_count_loading_and_compiling(invoke, tiny, monkeypatch):
-    clock = iter(float(second) for second in range(0, 100_000, 10))
-    monkeypatch.setattr("fastmech.cli.reporting.time.perf_counter", lambda: next(clock))
+    """A kernel that is made while the first tile is computed."""
+    compute = Motion._lagrangian
+
+    def make_a_kernel(self, scene):
+        for name in ("integrate_blocks", None):
+            for tell in listeners:
+                tell(name)
+            now[0] += 20.0
+        return compute(self, scene)
+
+    now = [0.0]
+    monkeypatch.setattr("fastmech.cli.reporting.time.perf_counter", lambda: now[0])
+    monkeypatch.setattr(Motion, "_lagrangian", make_a_kernel)
     told = json.loads(invoke("run", tiny, "--out", "x.h5", "--json").stdout)
-    assert 10.0 <= told["seconds_preparing"] < told["seconds"]
+    assert (told["seconds_preparing"], told["seconds"]) == (20.0, 40.0)
     assert told["exit_code"] == 0

@@ -186,6 +186,34 @@ def test_interruption_is_one_line_and_writes_nothing(invoke, tiny, monkeypatch):
     assert files() == {"tiny.toml"}
 
 
+def test_an_interrupt_after_the_last_moment_says_that_the_file_is_complete(invoke, tiny, monkeypatch):
+    with monkeypatch.context() as patched:
+        patched.setattr("fastmech.cli.run._show", interrupt)
+        result = invoke("run", tiny, "--out", "x.h5")
+    assert result.exit_code == 130
+    assert result.stderr == "fastmech: interrupted; x.h5 is complete\n"
+    assert json.loads(invoke("run", tiny, "--out", "x.h5", "--json").stdout)["was_complete"] is True
+
+
+@pytest.mark.parametrize(
+    ("arguments", "fragment"),
+    [
+        (["--out", "z" * 300], "z...: cannot be written: File name too long"),
+        (["--tile", "rest:0", "--keep", "z" * 300], "cannot be written: File name too long"),
+        (["--threads", "9" * 5000], "'--threads': '99999"),
+        (["--tile", "z" * 5000], "--tile zzz"),
+        (["--tile", "rest:" + "9" * 5000], "--tile rest:999"),
+        (["z" * 5000], "Got unexpected extra argument (zzz"),
+        (["--" + "z" * 5000], "No such option"),
+    ],
+    ids=["out", "keep", "integer", "section", "index", "argument", "option"],
+)
+def test_what_is_huge_is_told_in_a_short_line(invoke, tiny, arguments, fragment):
+    result = invoke("run", tiny, *arguments)
+    assert_refused(result, fragment)
+    assert len(result.stderr) < 300
+
+
 def test_the_same_run_again_has_nothing_to_do(invoke, tiny, monkeypatch):
     assert invoke("run", tiny, "--out", "x.h5").exit_code == 0
     before = Path("x.h5").read_bytes()

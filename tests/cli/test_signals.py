@@ -54,14 +54,12 @@ def test_while_kernels_are_compiled(tiny, number, arguments):
     done = stopped(number, "fastmech.jit:cache_directory", *arguments, "--json")
     assert done.returncode == 128 + number
     *waits, last = done.stderr.splitlines()
-    assert last == "fastmech: interrupted"
-    assert all("stops when the kernel in hand is compiled" in line for line in waits)  # of a slow machine
+    assert last.partition(";")[0] == "fastmech: interrupted"
+    for line in waits:  # of a slow machine
+        assert "stops when the kernel in hand is compiled" in line or line.endswith(" s so far")
     told = json.loads(done.stdout)
-    assert (told["command"], told["error"], told["exit_code"]) == (
-        arguments[0],
-        "interrupted",
-        128 + number,
-    )
+    assert (told["command"], told["exit_code"]) == (arguments[0], 128 + number)
+    assert f"fastmech: {told['error']}" == last
     assert Path("calls").read_text() == "1\n"
     assert not Path("x.h5.parts").exists()
 

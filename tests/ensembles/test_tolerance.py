@@ -248,7 +248,7 @@ def turned(y: Floats, t: float, force: float) -> Floats:
     return np.stack([force + x * math.cos(t) + v * math.sin(t), v * math.cos(t) - x * math.sin(t)], axis=1)
 
 
-@pytest.mark.parametrize(("tol", "times"), [(1e-3, 100), (1e-5, 20)])
+@pytest.mark.parametrize(("tol", "times"), [(1e-3, 20), (1e-5, 20)])
 @pytest.mark.parametrize(
     ("rhs", "states", "ends"),
     [
@@ -262,15 +262,12 @@ def test_a_jump_common_to_all_is_no_matter_of_luck(
     """Where in a step all trajectories jump is the same, so nobody's error makes up for another's."""
     system, starts = fm.System(rhs, states, {"when": 0.5}), np.linspace(0.6, 1.4, 10 * len(states))
     starts = starts.reshape(10, -1)
-    shares, false = [], 0
     for when in np.random.default_rng(3).uniform(0.1, 0.9, times):
         run = fm.integrate(system, starts, 1.0, tol=tol, parameters={"when": np.full(10, when)})
         assert run.error_estimate is not None
         true = np.abs(run.y[-1] - ends(starts, when)).max()
-        shares.append(true / run.error_estimate)
-        false += run.error_estimate <= tol < true
-    assert np.mean(np.array(shares) > 3.0) <= 0.05
-    assert false <= 0.05 * times
+        assert true <= run.error_estimate + ROUNDING
+        assert run.error_estimate <= tol
 
 
 def test_progress_counts_every_trajectory_once() -> None:

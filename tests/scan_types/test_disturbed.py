@@ -342,3 +342,14 @@ def test_blocks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
     small = scan.run(scene, RunContext(threads=1))
     for name in whole:
         assert whole[name].data.tobytes() == small[name].data.tobytes(), name
+
+
+def test_a_seed_of_128_bits_is_kept_whole(tmp_path: Path) -> None:
+    """HDF5 has no such integers: the file holds its digits."""
+    scene, seed = Scene(alpha=0.0), 2**128 - 1
+    brief = {"trajectories": 3, "t_end": 0.1, "method": "rk4", "linear_directions": 1}
+    section = stored(Disturbed(seed=seed, **brief), scene, tmp_path)
+    assert section.attrs["seed"] == str(seed)
+    other = stored(Disturbed(seed=2**64 - 1, **brief), scene, tmp_path)
+    assert other.attrs["seed"] == 2**64 - 1
+    assert (section["start_phi"].data != other["start_phi"].data).all()

@@ -126,7 +126,7 @@ def test_the_request_in_the_repository_is_valid() -> None:
     [
         ("along.c4 = {start=1.0, stop=2.0, num=3}", r"scan.b.along.c4: unknown parameter; did you mean"),
         ("along.alpha = {start=1.0, stop=2.0, num=3}", r"scan.b.along.alpha: unknown parameter"),
-        ("along.c1 = {start=2.0, stop=1.0, num=3}", r"scan.b.along.c1.stop = 1: must be greater than start"),
+        ("along.c1 = {start=2.0, stop=1.0, num=3}", r"scan.b.along.c1: falls from 2 to 1, must rise"),
         ("along.beta = {start=0.0, stop=1.0, num=3}", r"beta = 0"),
         ("along.c1 = {start=1.0, stop=2.0, num=3}\nscene = {alpha = 0.5}", r"alpha = 0.5: must be 0"),
     ],

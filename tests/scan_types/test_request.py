@@ -8,6 +8,7 @@ import pytest
 
 from fastmech.errors import InputError
 from fastmech.scan_types import scan_kinds
+from fastmech.scan_types.equilibrium_map import EquilibriumMap
 from fastmech.scan_types.request import Request, Scan, read_request
 from fastmech.scene import Scene
 
@@ -52,7 +53,9 @@ def test_everything_is_read(tmp_path: Path):
     assert list(request.scans) == ["first", "second"]
     first = request.scans["first"].model_dump()
     assert (first["phi"], first["t_end"], first["outputs"]) == (1.0, 2.5, 11)
-    assert request.scans["second"].model_dump()["axes"]["F0"] == {"start": -10.0, "stop": 10.0, "num": 3}
+    second = request.scans["second"]
+    assert isinstance(second, EquilibriumMap)
+    assert second.axes["F0"].array.tolist() == [-10.0, 0.0, 10.0]
 
 
 def test_a_scan_has_the_scene_with_its_changes(tmp_path: Path):
@@ -106,7 +109,10 @@ MISTAKES = {
     "no axes": (MAP, "scan.a.axes: missing"),
     "empty axes": (MAP + "axes = {}", "scan.a.axes = {}: "),
     "axis": (MAP + "axes.F1 = { start = 0.0, stop = 1.0, num = 2 }", "unknown parameter 'F1'"),
-    "axis without end": (MAP + "axes.F0 = { start = 0.0, num = 2 }", "scan.a.axes.F0.stop: missing"),
+    "axis without end": (
+        MAP + "axes.F0 = { start = 0.0, num = 2 }",
+        "scan.a.axes.F0 = {'start': 0.0, 'num': 2}: stop is missing",
+    ),
     "axis of no point": (MAP + "axes.F0 = { start = 0.0, stop = 1.0, num = 0 }", "scan.a.axes.F0.num = 0: "),
     "not TOML": ("[scan", "is not valid TOML"),
 }

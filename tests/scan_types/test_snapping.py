@@ -35,7 +35,7 @@ def test_a_file_holds_what_the_functions_give(section: Dataset) -> None:
     units |= {"critical_impulse": "N s", "window_alpha": "1/s", "window_first": "N", "window_last": "N"}
     units |= dict.fromkeys(("window_well", "window_turns_phi", "window_turns_theta", "window_left"), "1")
     units |= {"equilibrium_phi": "rad", "equilibrium_theta": "rad", "equilibrium_energy": "J"}
-    check_labels(section, units | {"equilibrium_morse_index": "1"})
+    check_labels(section, units | {"equilibrium": "1", "equilibrium_morse_index": "1"})
     np.testing.assert_allclose(section["alpha"].data, [0.8, 2.0, 5.0])
     own = fm.map_snapping(SCENE, section["F0"].data, section["alpha"].data)
     np.testing.assert_array_equal(section["well"].data, own.label)
@@ -92,9 +92,9 @@ def test_the_request_in_the_repository_is_valid() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("F0 = {start=-1.0, stop=1.0, num=3}", r"F0.start = -1: must have the sign of stop"),
-        ("F0 = {start=2.0, stop=1.0, num=3}", r"F0.stop = 1: must be greater than start = 2"),
-        ("alpha = {start=0.0, stop=1.0, num=3}", r"alpha.start"),
+        ("F0 = {start=-1.0, stop=1.0, num=3}", r"F0: goes from -1 to 1 N: must be of one sign"),
+        ("F0 = {start=2.0, stop=1.0, num=3}", r"F0: falls from 2 to 1, must rise"),
+        ("alpha = {start=0.0, stop=1.0, num=3}", r"alpha = .*must have one sign and not be 0"),
         ("scene = {beta = 0.0}", r"beta = 0"),
     ],
 )

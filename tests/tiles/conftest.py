@@ -56,7 +56,7 @@ def content(path: Path) -> dict[tuple[str, str], tuple[object, ...]]:
     """Every value of a result file with what is said about it."""
     found: dict[tuple[str, str], tuple[object, ...]] = {}
     with open_results(path) as results:
-        for section in results:
+        for section in results.groups:
             for name in results[section]:
                 v = results[section][name]
                 raw = v.data.tolist() if v.data.dtype == object else v.data.tobytes()

@@ -141,6 +141,77 @@ def test_a_tile_that_is_damaged_while_the_run_assembles(run: Run, tmp_path: Path
     assert content(report.path) == whole
 
 
+def test_a_folder_in_place_of_a_tile_is_computed_again(run: Run, tmp_path: Path) -> None:
+    whole = content(run("whole.h5").path)
+    with stopped_after(5, KeyboardInterrupt()), pytest.raises(Stopped):
+        run()
+    place = tiles(tmp_path)[2]
+    place.unlink()
+    place.mkdir()
+    (place / "something").write_text("else", encoding="utf-8")
+    assert sum(s.done for s in ScanLook(tmp_path / "scan.h5").progress().sections) == 4
+    report = run()
+    assert (report.damaged, report.computed) == ([place], TILES - 4)
+    assert content(report.path) == whole
+    assert not (tmp_path / "scan.h5.parts").exists()
+
+
+def never(*arguments: object) -> None:
+    raise AssertionError("nothing is computed before the place of the result is known to be one")
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("loop.h5", "loop.h5: cannot be written: Too many levels of symbolic links"),
+        ("z" * 300, "cannot be written: File name too long"),
+        ("z" * 252, "z...: cannot be written: File name too long"),
+    ],
+    ids=["loop", "long", "long for its tiles"],
+)
+def test_a_name_that_no_file_can_have(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, message: str
+) -> None:
+    monkeypatch.setattr(MapTiling, "__init__", never)
+    (tmp_path / "loop.h5").symlink_to(tmp_path / "back.h5")
+    (tmp_path / "back.h5").symlink_to(tmp_path / "loop.h5")
+    with pytest.raises(InputError) as error:
+        run(name)
+    assert message in str(error.value)
+
+
+@pytest.mark.parametrize("fresh", [False, True])
+def test_an_interrupt_when_the_file_is_complete_says_so(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fresh: bool
+) -> None:
+    if fresh:
+        run()
+
+    def interrupt(*arguments: object, **options: object) -> None:
+        raise KeyboardInterrupt
+
+    remove, calls = Parts.remove, []
+
+    def in_the_end(self: Parts) -> None:
+        calls.append(self)
+        if len(calls) == 1 + fresh:  # the first one clears the way for a fresh run
+            raise KeyboardInterrupt
+        remove(self)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Parts, "remove", in_the_end)
+        with pytest.raises(Stopped, match=r"^interrupted; .*scan\.h5 is complete$"):
+            run(fresh=fresh)
+    whole = content(tmp_path / "scan.h5")
+    assert run().was_complete
+    assert not (tmp_path / "scan.h5.parts").exists()
+    with monkeypatch.context() as patched:
+        patched.setattr("fastmech.tiles.run.write_assembled", interrupt)
+        with pytest.raises(Stopped, match=rf"^interrupted; {TILES} of {TILES} tiles are kept"):
+            run(fresh=True)
+    assert content(tmp_path / "scan.h5") == whole
+
+
 def test_a_changed_request_in_progress_is_refused(run: Run, request_file: Path) -> None:
     with stopped_after(3, KeyboardInterrupt()), pytest.raises(Stopped):
         run()
@@ -254,7 +325,7 @@ def test_a_vanished_folder_is_told(run: Run, tmp_path: Path) -> None:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Parts, "store", vanish)
-        with pytest.raises(InputError, match=r"scan\.h5: cannot be written: No such file or directory"):
+        with pytest.raises(InputError, match=r"scan\.h5\.parts/.*: cannot be written: No such file"):
             run()
     assert run().computed == TILES
 

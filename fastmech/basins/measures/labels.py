@@ -86,7 +86,7 @@ def check_point(name: str, values: ArrayLike, dim: int | None = None) -> Floats:
     """
     try:
         point = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{name}: must be numbers") from None
     if point.ndim != 1 or not point.size or (dim is not None and point.size != dim):
         wanted = "(dim,)" if dim is None else f"({dim},)"

@@ -16,7 +16,7 @@ from fastmech.basins.measures.labels import Floats
 from fastmech.disturbance.size import size_at
 from fastmech.ensembles import checks
 from fastmech.equilibria.find import Equilibrium
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown
 from fastmech.scene import Scene, nearest
 from fastmech.stability.arguments import require_rest
 
@@ -84,6 +84,8 @@ def norm_on(norm: ArrayLike, dim: int, coordinates: Sequence[int] | None = None)
     if matrix.shape != (dim, dim) or not np.isfinite(matrix).all():
         raise InputError(f"norm: has shape {matrix.shape}, must be a finite matrix ({dim}, {dim})")
     if coordinates is not None:
+        if not isinstance(coordinates, Sequence | np.ndarray):
+            raise InputError(f"coordinates = {shown(coordinates)}: must be indices of states")
         chosen = [checks.whole_number("coordinates", k, least=0, most=dim - 1) for k in coordinates]
         if not chosen or len(set(chosen)) != len(chosen):
             raise InputError(f"coordinates = {list(coordinates)}: must be different indices, at least one")

@@ -1,0 +1,94 @@
+"""Arguments of a wrong kind get one short line, whatever they are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fastmech as fm
+
+SCENE = fm.Scene(F0=85.3, c1=294.9, c2=92.85, alpha=0.0)
+STARTS = np.zeros((2, 4))
+AXES = {"phi": [0.0, 0.1], "theta": [0.0, 0.1]}
+
+WRONG = [
+    None,
+    "x",
+    np.nan,
+    -1,
+    {1, 2},
+    [],
+    1e300,
+    np.zeros((2, 3, 5)),
+    object(),
+    True,
+    [["a"]],
+    "x" * 3_000_000,
+]
+
+#: Public functions, what they are given otherwise, and arguments for which none of the values above will do.
+CALLS: list[tuple[Callable[..., Any], dict[str, Any], tuple[str, ...]]] = [
+    (fm.integrate, {"scene": SCENE, "y0": STARTS, "t_end": 1.0}, ("scene",)),
+    (fm.labels_of, {"scene": SCENE, "starts": STARTS}, ("scene",)),
+    (fm.map_basins, {"scene": SCENE, "axes": AXES}, ("scene", "axes")),
+    (fm.map_snapping, {"scene": SCENE, "F0": [1.0], "alpha": [1.0]}, ("scene",)),
+    (fm.copy_labels, {"scene": SCENE}, ("scene",)),
+    (fm.trapped, {"scene": SCENE, "states": STARTS}, ("scene",)),
+    (fm.reactions, {"scene": SCENE, "y": STARTS, "t": 0.0}, ("scene", "y")),
+    (fm.saddle_at, {"scene": SCENE, "state": STARTS[0]}, ("scene", "state")),
+    (
+        fm.erosion,
+        {"scene": SCENE, "parameter": "F0", "values": [1.0], "axes": AXES, "most_shock": 1.0},
+        ("scene",),
+    ),
+    (fm.largest_lyapunov, {"scene": SCENE, "y0": STARTS, "t_end": 1.0}, ("scene",)),
+    (fm.step_warning, {"scene": SCENE, "dt": 0.1, "method": "rk4"}, ("scene", "method")),
+]
+
+
+@pytest.mark.nojit
+@pytest.mark.parametrize(("function", "given", "names"), CALLS, ids=[call[0].__name__ for call in CALLS])
+def test_arguments_of_a_wrong_kind(
+    function: Callable[..., Any], given: dict[str, Any], names: tuple[str, ...]
+) -> None:
+    for name in names:
+        for value in WRONG:
+            with pytest.raises(fm.InputError) as error:
+                function(**{**given, name: value})
+            assert len(str(error.value)) < 500
+            assert str(error.value).isprintable()
+
+
+@pytest.mark.nojit
+def test_integers_beyond_doubles() -> None:
+    huge = 10**5000
+    for call in (
+        lambda: fm.step_warning(SCENE, huge, "rk4"),
+        lambda: fm.step_warning(SCENE, 0.1, "rk4", [huge, 0, 0, 0]),
+        lambda: fm.integrate(SCENE, STARTS, huge),
+        lambda: fm.saddle_at(SCENE, [huge, 0, 0, 0]),
+        lambda: fm.map_basins(SCENE, {**AXES, "phi": [0, huge]}),
+        lambda: fm.reactions(SCENE, [huge, 0, 0, 0], 0.0),
+    ):
+        with pytest.raises(fm.InputError):
+            call()
+
+
+@pytest.mark.nojit
+def test_names_of_other_libraries() -> None:
+    with pytest.raises(fm.InputError, match=r"^rtol: is called tol here$"):
+        fm.integrate(SCENE, STARTS, 1.0, rtol=1e-6)  # type: ignore[call-arg]
+    for method, here in (("RK45", "dopri5"), ("RK4", "rk4"), ("DOP853", "dop853"), ("Radau", "radau5")):
+        with pytest.raises(
+            fm.InputError, match=rf"^method = '{method}': unknown; did you mean '{here}'\? known: "
+        ):
+            fm.integrate(SCENE, STARTS, 1.0, method=method)
+
+
+def test_growth_beyond_doubles() -> None:
+    saddle = next(e for e in fm.find_equilibria(SCENE) if e.morse_index == 1)
+    with pytest.raises(fm.InputError, match=r"^until = 1e\+06 s: by then disturbances are beyond doubles$"):
+        fm.transient_growth(SCENE, saddle, 1e6)
