@@ -49,6 +49,9 @@ WIDEST, NARROWEST, SHORTER, THIN = 0.05, 1e-8, 0.5, 0.1
 #: Largest distance of a curve's points over the reach of their neighbourhoods, and halvings to get there.
 SPACING, MOST_HALVINGS = 1.0, 12
 
+#: Neighbourhoods of a curve after which no more are added.
+MOST_NEIGHBOURHOODS = 20_000
+
 #: Periods of the unknowns, 0: none.
 TURNS = np.array([2.0 * np.pi, 2.0 * np.pi, 0.0, 0.0])
 
@@ -126,7 +129,7 @@ class Neighbourhoods:
             z, _, _, reach = here
             gap = apart(z[1:], z[:-1])
             far = np.linalg.norm(gap, axis=1) > SPACING * np.maximum(reach[1:], reach[:-1])
-            if not far.any():
+            if not far.any() or len(z) > MOST_NEIGHBOURHOODS:
                 break
             between = self._at(polished(self.system, z[:-1][far] + 0.5 * gap[far]))
             place = np.flatnonzero(far) + 1
@@ -168,8 +171,12 @@ class Neighbourhoods:
         if not small.size:
             return held
         centre, half = centre[small], half[small]
-        nearest = self._tree.query(wrapped(centre), k=min(2, len(self.points)))[1]
-        for near in nearest.reshape(small.size, -1).T:
+        beyond = float(np.linalg.norm(self.radius, axis=1).max())
+        nearest = self._tree.query(wrapped(centre), k=2, distance_upper_bound=beyond)[1]
+        nearest = np.minimum(
+            nearest, len(self.points) - 1
+        )  # where there is none so near: one that is further
+        for near in nearest.T:
             gap, t = apart(centre, self.points[near]), self.tangents[near]
             within = (np.abs(gap) + half <= self.radius[near]).all(axis=1)
             along = np.abs((gap * t).sum(axis=1)) + (np.abs(t) * half).sum(axis=1)

@@ -284,7 +284,7 @@ def test_pitchforks_are_named_and_missing_proofs_told():
     assert {text.get_text() for text in legend.get_texts()} >= {
         "pitchfork (symmetric) of resting positions", "pitchfork (symmetric) of unstable equilibria"
     }  # fmt: skip
-    dataset["fold_proof"].data[0] = "not proved near c1 = 1 N/m"
+    dataset.groups["curves"]["fold_proof"].data[0] = "not proved near c1 = 1 N/m"
     figure = scan_kinds()["equilibrium_map"].draw(dataset, unforced.model_dump())["count"]
     assert "not proved that these are all folds" in figure.get_suptitle()
 
