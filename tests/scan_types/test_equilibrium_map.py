@@ -191,7 +191,7 @@ def test_snap_scan_of_a_spring_and_a_place() -> None:
     assert (dataset.sizes["equilibrium"], dataset["snap_above"].units) == (1, "N/m")
     assert dataset["snap_above"].data == pytest.approx(43.17473449, abs=1e-7)
     assert dataset["turns_unstable"].data.tolist() == [[False, True]]
-    with pytest.raises(InputError, match="moves equilibria"):
+    with pytest.raises(ValueError, match="must be one that moves equilibria"):
         SnapScan(parameter="beta").run(scene, RunContext())
 
 
