@@ -15,7 +15,7 @@ from fastmech.atlas.cover import TURNS, Found, apart, solutions, wrapped
 from fastmech.atlas.enclosure import System
 from fastmech.atlas.margin import margins
 from fastmech.atlas.systems import Plane, Point, cusp, families, point_at, suited
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown
 from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -144,6 +144,9 @@ def checked_plane(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLik
     Raises:
         InputError: see ``trace_folds``.
     """
+    for name, given in (("x", x), ("y", y)):
+        if not isinstance(given, tuple | list) or len(given) != 2 or not isinstance(given[0], str):
+            raise InputError(f"{name} = {shown(given)}: must be a parameter's name and its values")
     if x[0] == y[0]:
         raise InputError(f"axes: {x[0]} is given twice; two different parameters are needed")
     return {name: check_axis(scene, name, values) for name, values in (x, y)}

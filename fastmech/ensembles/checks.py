@@ -82,7 +82,7 @@ def states(name: str, values: ArrayLike, columns: int) -> NDArray[np.float64]:
     Raises:
         InputError: not numbers, another shape, or more than fit into memory again.
     """
-    memory(np.size(values), 1, f"{name}: the states", "fewer")
+    memory(getattr(values, "size", 0), 1, f"{name}: the states", "fewer")
     array = reals(name, values, f"numbers of shape (n, {columns})", 2)
     if array.ndim != 2 or array.shape[1] != columns:
         raise InputError(f"{name}: has shape {np.shape(values)}, must be (n, {columns})")

@@ -72,9 +72,9 @@ def test_no_run_takes_more_than_it_was_checked_for(
     asked: list[float] = []
     original = checks.memory
 
-    def noted(numbers: int, copies: int) -> None:
+    def noted(numbers: int, copies: int, *words: str) -> None:
         asked.append(8.0 * numbers * copies)
-        original(numbers, copies)
+        original(numbers, copies, *words)
 
     monkeypatch.setattr(integrate.checks, "memory", noted)
     starts = random_starts(n)
