@@ -97,11 +97,12 @@ _COMPARED = {
 #: Functions by what they decide: the sign of an argument, between arguments, the integer below; and those
 #: that decide nothing, or nothing that their arguments' decisions do not tell.
 _SIGN = {"abs": 0, "absolute": 0, "fabs": 0, "sign": 0, "heaviside": 0, "copysign": 1, "signbit": 0}
+_SIGN |= {"atan2": 0, "arctan2": 0}  # which jump from pi to -pi
 _EXTREME = {"min", "max", "minimum", "maximum", "fmin", "fmax"}
 _INTEGER = {"floor", "ceil", "trunc", "rint", "round", "int", "fix"}
 _RATIO = {"fmod", "mod", "remainder"}
 _SMOOTH = {
-    *("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "arcsin", "arccos", "arctan", "arctan2"),
+    *("sin", "cos", "tan", "asin", "acos", "atan", "arcsin", "arccos", "arctan"),
     *("sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "arcsinh", "arccosh", "arctanh", "sinc"),
     *("exp", "exp2", "expm1", "log", "log2", "log10", "log1p", "sqrt", "cbrt", "pow", "power", "square"),
     *("hypot", "erf", "erfc", "gamma", "lgamma", "radians", "degrees", "deg2rad", "rad2deg", "float"),

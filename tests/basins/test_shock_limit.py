@@ -182,7 +182,7 @@ def test_without_damper_the_bound_is_all() -> None:
         ({"equilibrium": fm.find_equilibria(FREE)[1]}, "equilibrium: is a saddle, must be a minimum"),
         (
             {"equilibrium": fm.find_equilibria(BISTABLE)[0]},
-            "equilibrium = (0.708161, 0.498745) rad: must be one of",
+            "equilibrium = (0.708161, 0.498745) rad, F = 85.3 N: this scene",
         ),
         ({"on": "M4"}, "on = 'M4': must be one of M1, M2, M3"),
         ({"direction": np.inf}, "direction = inf: must be a finite number of rad"),

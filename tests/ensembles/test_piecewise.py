@@ -255,6 +255,34 @@ def test_stops_are_located_between_branches_too() -> None:
     assert run.stop_time[0] == pytest.approx(t0 + brentq(depth, 0.0, 0.08), abs=1e-7)
 
 
+def sawtooth(t: float, x: float, v: float) -> tuple[float, float]:
+    return v, 1.0 - 0.1 * v - 0.5 * np.arctan2(fm.sin(x), fm.cos(x))
+
+
+def test_an_angle_that_wraps_jumps() -> None:
+    """The angle of (cos x, sin x) goes from pi to -pi at odd multiples of pi: SciPy stops there."""
+    starts = np.random.default_rng(0).uniform([-1.0, 4.0], [1.0, 8.0], (24, 2))
+    run = fm.integrate(fm.System(sawtooth, ["x", "v"], {}), starts, 8.0, tol=1e-6)
+    assert np.isfinite(run.error).mean() >= 0.5
+
+    def wraps(t: float, y: Floats, turn: float) -> float:
+        return float(abs(y[0] - turn) - math.pi)
+
+    wraps.terminal, wraps.direction = True, 1.0  # type: ignore[attr-defined]
+    for k in np.flatnonzero(np.isfinite(run.error)):
+        t, y = 0.0, starts[k]
+        while t < 8.0:
+            # The middle of the turn in which the motion goes on.
+            turn = 2.0 * math.pi * np.round((y[0] + 1e-9 * np.sign(y[1])) / (2.0 * math.pi))
+            done = solve_ivp(
+                lambda t, y, c: (y[1], 1.0 - 0.1 * y[1] - 0.5 * (y[0] - c)),
+                (t, 8.0), y, args=(turn,), events=wraps, rtol=1e-11, atol=1e-12,
+            )  # fmt: skip
+            t, y = float(done.t[-1]), done.y[:, -1]
+            y[0] += 1e-12 * np.sign(y[1]) * (t < 8.0)
+        assert np.abs(run.y[-1, k] - y).max() <= 1e-5
+
+
 @pytest.mark.parametrize("quantile", [0.5, 0.9])
 def test_below_the_largest_error_single_errors_are_said_to_be_unknown(quantile: float) -> None:
     starts = np.random.default_rng(0).uniform(-1.0, 1.0, (20, 2))

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from fastmech.basins.measures.jackknife import PARTS, half_width, part_of
-from fastmech.basins.measures.labels import Floats, Integers, LabelsLike, check_map
+from fastmech.basins.measures.labels import Floats, Integers, LabelsLike, check_map, too_thin
 from fastmech.basins.measures.slopes import is_smooth, line
 from fastmech.errors import InputError
 
@@ -26,6 +26,7 @@ class BoundaryDimension:
     local_errors: Floats  #: half widths of their 95 % intervals by parts of the map (sizes - 1,)
 
     codimension: float  #: the map's dimension less that of the boundary: the uncertainty exponent
+    thin: str  #: why the map is too coarse for its basins, one line; empty: it is not
 
     @property
     def mixed_powers(self) -> Floats:
@@ -36,9 +37,11 @@ class BoundaryDimension:
     def smooth(self) -> bool | None:
         """Whether the dimension of a smooth boundary, one less than the map's, lies within the error bar.
 
-        None: the error bar is too wide to tell, there is no boundary, or one is in most of the finest boxes.
+        None: the error bar is too wide to tell, there is no boundary, one is in most of the finest boxes, or
+        no more than ``thin`` speaks against it.
         """
-        return None if self.mixed[0] > 0.5 else is_smooth(self.codimension, self.error)
+        smooth = None if self.mixed[0] > 0.5 else is_smooth(self.codimension, self.error)
+        return None if self.thin and not smooth else smooth
 
 
 def boundary_dimension(labels: LabelsLike, edges: ArrayLike | None = None) -> BoundaryDimension:
@@ -89,6 +92,7 @@ def boundary_dimension(labels: LabelsLike, edges: ArrayLike | None = None) -> Bo
         local_dimensions=array.ndim - local,
         local_errors=np.array([half_width(part) for part in np.diff(without, axis=0) / np.diff(x)[:, None]]),
         codimension=float(slope),
+        thin=too_thin(array),
     )
 
 

@@ -154,6 +154,8 @@ def fractal_boundary_test(
     entropy, error, number = (np.array(column) for column in zip(*found, strict=True))
     boxes = boundary_dimension(array)
     fractal, reason = _judge(boxes, entropy)
+    if fractal and boxes.thin:
+        fractal, reason = None, boxes.thin
     smooth_value = np.array([smooth_boundary_entropy(array.ndim, float(radius)) for radius in sizes])
     return FractalTest(fractal, reason, sizes, entropy, error, smooth_value, number, boxes)
 

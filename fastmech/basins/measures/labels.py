@@ -11,10 +11,14 @@ from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import minimum_filter
 
 from fastmech.errors import InputError
 
 Floats = NDArray[np.float64]
+
+#: Points by which a basin is wide where it is resolved: two on either side of one.
+WHOLE = 5
 Integers = NDArray[np.int64]
 
 
@@ -62,6 +66,31 @@ def known_labels(labels: Integers) -> Integers:
     """The labels that occur, rising, without the negative ones."""
     found = np.unique(labels)
     return found[found >= 0]
+
+
+def too_thin(labels: Integers) -> str:
+    """Why a map cannot tell what its boundaries are like: most are of basins nowhere ``WHOLE`` points wide.
+
+    Args:
+        labels: on a grid.
+
+    Returns:
+        One line, empty where most boundaries are those of wider basins.
+    """
+    thin = [
+        label
+        for label in known_labels(labels)
+        if not minimum_filter(labels == label, size=WHOLE, mode="nearest").any()
+    ]
+    narrow, boundaries, of_thin = np.isin(labels, thin), 0, 0
+    for axis in range(labels.ndim):
+        differ = np.diff(labels, axis=axis) != 0
+        beside = np.diff(narrow.astype(np.int8), axis=axis) != 0
+        boundaries += np.count_nonzero(differ)
+        of_thin += np.count_nonzero(differ & beside)
+    if 2 * of_thin <= boundaries:
+        return ""
+    return f"most boundaries are those of basins nowhere {WHOLE} points wide: a finer map can tell"
 
 
 def ask(label_of: LabelOf, starts: Floats) -> Integers:

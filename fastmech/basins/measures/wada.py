@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_cdt
 
-from fastmech.basins.measures.labels import Floats, Integers, LabelsLike, check_map, known_labels
+from fastmech.basins.measures.labels import Floats, Integers, LabelsLike, check_map, known_labels, too_thin
 from fastmech.ensembles import checks
 
 #: Strides with which a map is looked at, from coarse to fine.
@@ -80,6 +80,8 @@ def wada_merge_test(labels: LabelsLike, fattening: int = 5) -> WadaTest:
     _, distance, far, points = looks[-1]
     full = max(float(np.mean(np.diff(array, axis=axis) != 0)) for axis in range(array.ndim))
     wada, reason = _judge(len(which), apart, float(distance.max(initial=0.0)), full, fattening)
+    if wada and (thin := too_thin(array)):
+        wada, reason = None, thin
     return WadaTest(
         wada=wada,
         reason=reason,

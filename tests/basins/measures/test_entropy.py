@@ -11,6 +11,7 @@ from fastmech.basins.measures.entropy import (
     fractal_boundary_test,
     smooth_boundary_entropy,
 )
+from fastmech.basins.measures.wada import wada_merge_test
 from fastmech.errors import InputError
 
 pytestmark = pytest.mark.nojit
@@ -126,6 +127,18 @@ def test_stripes_as_narrow_as_the_map_s_steps_are_never_fractal(
         result = fractal_boundary_test(picture, balls=2000)
         assert not result.fractal
         assert result.fractal is False or "finer map" in result.reason or "too few" in result.reason
+
+
+@pytest.mark.parametrize("width", [1.0, 2.0, 3.0])
+def test_a_band_too_thin_for_the_map_tells_nothing_about_its_boundaries(width: float) -> None:
+    """Two straight lines so near to each other, in twelve directions: neither fractal, nor one boundary."""
+    for angle in np.deg2rad(np.arange(0.0, 180.0, 15.0)):
+        across = along(201, float(angle))
+        band = np.where(across < -width / 2, 0, np.where(across < width / 2, 1, 2))
+        result = fractal_boundary_test(band, balls=2000)
+        assert result.fractal is None
+        assert result.boxes.smooth is None
+        assert not wada_merge_test(band).wada
 
 
 FRACTAL = {
