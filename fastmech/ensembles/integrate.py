@@ -24,6 +24,7 @@ from fastmech.ensembles.system import System, stop_codes
 from fastmech.ensembles.threads import in_parts
 from fastmech.ensembles.tolerance import solve_to_tolerance
 from fastmech.ensembles.turning import counted_turns, watched
+from fastmech.ensembles.work_precision import Case
 from fastmech.errors import InputError, called_here, shown
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Method
@@ -166,7 +167,8 @@ def integrate(
             raise InputError(f"quantile = {quantile:g}: must not be greater than 1")
         if method is not None:
             find_method(method)
-        found = solve_to_tolerance(problem, starts, outputs, tol, quantile, method, threads, progress)
+        case = Case(problem, starts, outputs, threads)
+        found = solve_to_tolerance(case, tol, quantile, method, progress)
         return replace(
             _trajectories(problem, outputs, found.solution, found.settings),
             error=found.error,

@@ -162,7 +162,7 @@ class System:
         if not places:
             return None
         states = [f"y[{d}]" for d in range(len(self.state))]
-        own = [f"p[{list(self.parameters).index(name)}]" for name in self._parameter_order]
+        own = [f"p[{list(self.parameters).index(name)}]" for name in self.parameter_order]
         name, arguments = getattr(self.rhs, "__name__", "rhs"), ", ".join(["t", *states, *own])
         source = _SWITCHES.format(name=name, arguments=arguments)
         if self.stop is not None:
@@ -175,7 +175,7 @@ class System:
         return run_module(module, source).switches
 
     @property
-    def _parameter_order(self) -> list[str]:
+    def parameter_order(self) -> list[str]:
         """Parameters in the order in which the right-hand side takes them."""
         return list(inspect.signature(self.rhs).parameters)[1 + len(self.state) :]
 
@@ -215,7 +215,7 @@ class System:
         """The kernels' text; ``trigonometry``: whether the right-hand side has any that may raise."""
         dim = len(self.state)
         states = [f"Y[{d}, i]" for d in range(dim)]
-        given = [f"p[{list(self.parameters).index(name)}, i]" for name in self._parameter_order]
+        given = [f"p[{list(self.parameters).index(name)}, i]" for name in self.parameter_order]
         stores = [f"        dY[{d}, i] = rate{d}" for d in range(dim)]
         text = (_HEAD + (_TEMPLATE_WITHIN if trigonometry else _TEMPLATE)).format(
             name=getattr(self.rhs, "__name__", "rhs"),
