@@ -132,17 +132,13 @@ class Trial:
     truth: Solution | None = None
     doubt: Floats = field(default_factory=lambda: np.zeros(0))  #: errors of the reference
     refers: tuple[Method, float] | None = None  #: its method and step [s]
+    fitted: float = 1.0  #: steps of a trajectory, on average, in those of slow motion
     _runs: dict[tuple[str, float], Solution] = field(default_factory=dict)
 
     @property
     def until(self) -> float:
         """End of the run [s]."""
         return float(self.case.outputs[-1])
-
-    @property
-    def converged(self) -> bool:
-        """Whether any trajectory has a reference."""
-        return bool((self.doubt <= REFERRED * self.tol).any())
 
     @property
     def longest(self) -> float:
@@ -162,9 +158,10 @@ class Trial:
         """The sample's run."""
         if (method.name, dt) not in self._runs:
             problem, starts, outputs, threads = self.case
-            self._runs[method.name, dt] = solve_at(
-                problem, starts, outputs, self.settings(method, dt), threads
-            )
+            run = solve_at(problem, starts, outputs, self.settings(method, dt), threads)
+            self._runs[method.name, dt] = run
+            if self.fit and self.until and len(starts):
+                self.fitted = max(float(run.steps.mean()) * dt / self.until, 1.0)
         return self._runs[method.name, dt]
 
     def work(self, method: Method, dt: float) -> float:
@@ -180,7 +177,7 @@ class Trial:
             lengths = intervals / steps
             starts_anew += np.count_nonzero(~np.isclose(lengths[1:], lengths[:-1], rtol=1e-9))
         own = step_operations(method, operations, dim)
-        return taken * own + starts_anew * start_operations(method, operations, dim)
+        return taken * self.fitted * own + starts_anew * start_operations(method, operations, dim)
 
     def typical(self, errors: Floats) -> float:
         """The quantile that counts; of those that have a reference where it is not known of all."""
@@ -197,12 +194,14 @@ class Trial:
     def refer(self, method: Method, dt: float) -> bool:
         """Find a reference with steps from dt [s] on; whether it is good enough for the sample's quantile.
 
-        Where nothing converges no run of more than :data:`CHEAP` operations begins. What is kept is the run
-        in which most trajectories have converged.
+        Where nothing converges, or another method's reference is there, no run of more than :data:`CHEAP`
+        operations begins. What is kept is the run in which most trajectories have converged.
         """
         goal, p, n = REFERRED * self.tol, method.order, max(len(self.case.starts), 1)
         kept = int(np.count_nonzero(self.doubt <= goal)) if self.refers else -1
         dt, before, vain, ratio = min(dt, self.longest), math.inf, 0, RATIO
+        if self.refers is not None and n * self.work(method, dt) > CHEAP:
+            return False
         last = self.run(method, dt)
         while not vain or n * self.work(method, dt / ratio) <= CHEAP:
             dt /= ratio
@@ -241,7 +240,8 @@ class Trial:
             else:
                 vain = vain + 1 if good is None and bad < math.inf and found > 0.5 * before else 0
                 before, bad = found, min(bad, dt)
-                if vain == VAIN - 1 or (good is not None and bad <= 1.2 * good[0]):
+                dear = len(self.case.starts) * self.work(method, dt) > CHEAP
+                if vain > (not dear) or (good is not None and bad <= 1.2 * good[0]):
                     break
                 dt *= 1.0 / RATIO if vain else min(wanted, 0.9)
                 dt = dt if good is None else max(dt, math.sqrt(good[0] * bad))
@@ -308,7 +308,7 @@ def choose(case: Case, tol: float, level: float, method: str | None, truth: Solu
         whole.truth, whole.doubt = whole.run(best.method, finer * best.dt), np.zeros(len(case.starts))
     if truth is not None:
         whole.truth, whole.doubt = truth, np.zeros(len(case.starts))
-    if not (small and best.good and best.error >= NEAR * tol) and not best.limited:
+    if best.error < math.inf and not best.limited and not (small and NEAR * tol <= best.error <= tol):
         best = whole.tune(best.method, probe.predicted(best).dt, NEAR)
     reason = "as asked for" if method is not None else _reason(best, points, tol)
     return Chosen(whole.settings(best.method, best.dt), reason, whole)
@@ -324,9 +324,12 @@ def _points(probe: Trial, asked: Method | None) -> list[Point]:
         implicit = asked
     stiff = STIFF * limit < dt or implicit is asked
     base = implicit if stiff else explicit
-    if not probe.refer(base, dt if stiff else min(dt, limit)) and not stiff and not probe.converged:
+    if not probe.refer(base, dt if stiff else min(dt, limit)) and not stiff and np.isinf(probe.doubt).all():
         probe.refer(implicit, dt)
     assert probe.refers is not None
+    if not (probe.doubt <= probe.tol).any():  # nothing converges
+        base, dt = probe.refers if asked is None else (asked, probe.refers[1])
+        return [Point(base, dt, math.inf, probe.work(base, dt), False)]
     base, step = probe.refers[0], probe.nearest()
     if asked is not None:
         equal = 1.0 if base is asked else probe.work(asked, step) / probe.work(base, step)

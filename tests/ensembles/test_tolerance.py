@@ -15,7 +15,7 @@ from ensembles.references import Floats, errors, motions, motions_of, rest_start
 from ensembles.starts import random_starts
 
 import fastmech as fm
-from fastmech.ensembles.richardson import ROUNDING
+from fastmech.ensembles.work_precision import ROUNDING
 from fastmech.errors import InputError
 from fastmech.scene import Scene
 
