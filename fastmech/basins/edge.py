@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike
 from fastmech.basins.copies import copy_labels, label_name
 from fastmech.basins.measures.labels import Floats, LabelOf, ask, check_point
 from fastmech.basins.measures.norm import kinetic_norm, norm_on
-from fastmech.basins.steps import coarse_steps
-from fastmech.disturbance.motion import require_constant_force
+from fastmech.basins.steps import coarse_steps, method_for
+from fastmech.disturbance.motion import damped_times, require_constant_force
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.system import System
@@ -67,7 +67,7 @@ def track_edge(
     tolerance: float = 1e-3,
     interval: float = 0.25,
     dt: float | None = None,
-    method: str = "dop853",
+    method: str | None = None,
 ) -> EdgeTrack:
     """Follow the boundary between two starts until it comes to rest.
 
@@ -87,7 +87,7 @@ def track_edge(
         tolerance: the edge state rests if a whole stretch moves by no more than this, ``far`` or more.
         interval: time between looks at their distance [s].
         dt: longest step [s]. By default, of a scene, it follows from frequencies and the starts' energies.
-        method: name of the method.
+        method: name of the method; ``dop853`` by default, of a scene see ``fm.labels_of``.
 
     Raises:
         InputError: an argument is wrong, the force decays, or the starts' labels are not two known ones.
@@ -121,7 +121,10 @@ def track_edge(
 
     times, states, gaps = [], [], []
     t, moved, lost = 0.0, np.inf, False
-    looks = interval * np.arange(1, OUTPUTS + 1)
+    looks, at_first = interval * np.arange(1, OUTPUTS + 1), np.zeros(0)
+    if isinstance(scene, Scene):
+        method = method_for(scene, method)
+        at_first = damped_times(scene, method, min(dt, interval))
     while True:
         a, b = _bisect(label_of, first, a, b, float(distance(a, b)), near)
         times.append(t)
@@ -129,7 +132,9 @@ def track_edge(
         gaps.append(float(distance(a, b)))
         if t >= t_end or moved <= tolerance:
             break
-        way = integrate(scene, np.stack([a, b]), dt=dt, method=method, t_eval=looks).y
+        times_on_way = np.append(at_first, looks)
+        way = integrate(scene, np.stack([a, b]), dt=dt, method=method or "dop853", t_eval=times_on_way).y
+        way = way[at_first.size :]
         parted = np.flatnonzero(distance(way[:, 0], way[:, 1]) > far)
         last = int(parted[0]) if parted.size else OUTPUTS - 1
         moved = float(distance(way[: last + 1, 0], a).max())

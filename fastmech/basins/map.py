@@ -69,7 +69,7 @@ def map_basins(
     refine: int | None = None,
     parameters: Mapping[str, ArrayLike] | None = None,
     dt: float | None = None,
-    method: str = "dop853",
+    method: str | None = None,
     settle_radius: float | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
@@ -90,7 +90,7 @@ def map_basins(
         parameters: of a system, values of parameters by name that differ between starts, each of a shape that
             broadcasts to the map's: ``values[:, None]`` changes along the first of two axes.
         dt: coarsest step [s], see :func:`fastmech.basins.label.labels_of`; a system needs one.
-        method: name of the integration method.
+        method: name of the integration method; ``dop853`` by default, of a scene see there.
         settle_radius: see there; a scene's only.
         threads: threads to use, all processors by default. The result does not depend on it.
         progress: is told how many starts are done since its last call; of a refined map its share of the work
@@ -135,7 +135,7 @@ def map_basins(
                 starts,
                 t_end,
                 dt=dt,
-                method=method,
+                method=method or "dop853",
                 parameters={name: value.ravel()[points] for name, value in own.items()},
                 threads=threads,
                 progress=tell,

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fastmech.basins.map import STATE, BasinMap, map_basins
 from fastmech.basins.status import FAILURES, BasinStatus
+from fastmech.basins.steps import method_for
 from fastmech.capture.certificate import certificate_of
 from fastmech.results import Dataset, Variable
 from fastmech.scan_types.basin_layout import basin_variables
@@ -37,7 +38,7 @@ class _Request(Protocol):
     @property
     def dt(self) -> float | None: ...
     @property
-    def method(self) -> str: ...
+    def method(self) -> str | None: ...
 
 
 class BasinTiling(Tiling):
@@ -103,7 +104,7 @@ class BasinTiling(Tiling):
         attrs: dict[str, Any] = {
             "axes": tuple(self.axes),
             "t_end": found.t_end,
-            "method": self.request.method,
+            "method": method_for(self.scene, self.request.method),
         }
         attrs |= {"steps": found.steps, "refine": self.request.refine or 0}
         attrs |= {f"fixed_{name}": value for name, value in found.fixed.items()}

@@ -15,11 +15,12 @@ from pydantic import AfterValidator, Field
 
 from fastmech.basins.label import require_damper
 from fastmech.basins.map import STATE
+from fastmech.basins.steps import method_for
 from fastmech.errors import InputError, shown
 from fastmech.results import Dataset
 from fastmech.scan_types.axis import Axis, arrays, check_duration, check_rising, check_size, check_starts
 from fastmech.scan_types.basin_tiling import BasinTiling
-from fastmech.scan_types.request import MethodName, TiledScan
+from fastmech.scan_types.request import TiledScan, UsualMethod
 from fastmech.scan_types.tiling import Tiling
 from fastmech.scene import Number, Scene, nearest
 from fastmech.step_limits.warning import step_warning
@@ -61,7 +62,7 @@ class Basins(TiledScan):
         None, description="also the time from which on a motion stays so near to its well [rad]"
     )
     dt: Annotated[float | None, Field(gt=0)] = Field(None, description="coarsest step [s]")
-    method: MethodName = "dop853"
+    method: UsualMethod = None
 
     def check(self, scene: Scene) -> None:
         """Without a damper there are no basins; and a map has its limits."""
@@ -77,7 +78,7 @@ class Basins(TiledScan):
 
     def step_warning(self, scene: Scene) -> str | None:
         """By the scene's limit and the decaying force; without ``dt`` each start's step is chosen."""
-        return None if self.dt is None else step_warning(scene, self.dt, self.method)
+        return None if self.dt is None else step_warning(scene, self.dt, method_for(scene, self.method))
 
     def tiling(self, scene: Scene) -> Tiling:
         """Planes of the first axis; a refined map is one tile, because it follows boundaries anywhere."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from pydantic import AfterValidator, Field
 
 from fastmech.basins.label import require_damper
-from fastmech.basins.steps import shortest_step
+from fastmech.basins.steps import method_for, shortest_step
 from fastmech.disturbance.motion import require_constant_force
 from fastmech.errors import InputError, shown
 from fastmech.integrators.methods import find_method
@@ -28,7 +28,7 @@ from fastmech.scan_types.disturbed_layout import TRAJECTORY_VARIABLES
 from fastmech.scan_types.disturbed_map import MOST_POINTS, MOST_TRAJECTORIES, DisturbedMap
 from fastmech.scan_types.disturbed_tiling import DisturbedTiling
 from fastmech.scan_types.equilibrium_map import known_parameters
-from fastmech.scan_types.request import MethodName, Seed, TiledScan
+from fastmech.scan_types.request import Seed, TiledScan, UsualMethod
 from fastmech.scan_types.tiling import Tiling
 from fastmech.scene import Scene, nearest
 from fastmech.step_limits.warning import step_warning
@@ -76,7 +76,7 @@ class Disturbed(TiledScan):
     dt: Annotated[float | None, Field(gt=0)] = Field(
         None, description="longest step [s]; by default each start's own, from the scene and its energy"
     )
-    method: MethodName = "dop853"
+    method: UsualMethod = None
     linear_horizon: Annotated[float, Field(gt=0, description="horizon of the comparison [s]")] = 1.0
     linear_tolerance: Annotated[float, Field(gt=0, description="deviation allowed, relative")] = 0.05
     linear_directions: Annotated[int, Field(ge=1, le=1_000_000)] = 256
@@ -95,7 +95,7 @@ class Disturbed(TiledScan):
             check_steps("linear_horizon", self.linear_horizon, shortest_step(reduce(corner)))
         if not self.axes:
             steps = math.ceil(self.t_end / (self.dt or shortest_step(reduce(scene))))
-            work = self.trajectories * find_method(self.method).evaluations(steps)
+            work = self.trajectories * find_method(method_for(scene, self.method)).evaluations(steps)
             if work > MOST_WORK:
                 raise InputError(
                     f"trajectories, t_end, dt: ask for {work:.3g} right-hand sides about every equilibrium, "
@@ -115,7 +115,9 @@ class Disturbed(TiledScan):
         """By the scene's limit; without ``dt`` each start's step is chosen."""
         if self.dt is None:
             return None
-        told = [step_warning(corner, self.dt, self.method) for corner in self._corners(scene)]
+        told = [
+            step_warning(corner, self.dt, method_for(corner, self.method)) for corner in self._corners(scene)
+        ]
         return next((line for line in told if line is not None), None)
 
     def _corners(self, scene: Scene) -> list[Scene]:

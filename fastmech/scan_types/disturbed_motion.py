@@ -12,6 +12,7 @@ from pydantic import Field
 from fastmech.basins.steps import highest_frequency
 from fastmech.disturbance.motion import (
     PHASE,
+    default_method,
     default_step,
     disturbed_motion,
     equilibria_to_disturb,
@@ -26,7 +27,7 @@ from fastmech.mechanism.coefficients import reduce
 from fastmech.results import STATE_UNITS, Dataset, Variable, numbers, parts
 from fastmech.scan_types.axis import check_steps
 from fastmech.scan_types.each import Each
-from fastmech.scan_types.request import HALVING, MethodName, TiledScan, failures
+from fastmech.scan_types.request import HALVING, TiledScan, UsualMethod, failures
 from fastmech.scan_types.tiling import Tiling
 from fastmech.scene import Scene
 from fastmech.step_limits.warning import step_warning
@@ -51,7 +52,7 @@ class DisturbedMotionScan(TiledScan):
     dt: Annotated[float | None, Field(gt=0)] = Field(
         None, description="longest step [s]; by default 0.05 rad of each equilibrium's highest frequency"
     )
-    method: MethodName = "dop853"
+    method: UsualMethod = None
 
     def check(self, scene: Scene) -> None:
         """The force must be constant, so many steps possible, and the outputs fit into memory."""
@@ -63,30 +64,35 @@ class DisturbedMotionScan(TiledScan):
 
     def step_warning(self, scene: Scene) -> str | None:
         """By the scene's limit; without ``dt`` each equilibrium's step is chosen."""
-        return None if self.dt is None else step_warning(scene, self.dt, self.method)
+        return (
+            None
+            if self.dt is None
+            else step_warning(scene, self.dt, self.method or default_method(scene, self.dt))
+        )
 
     def tiling(self, scene: Scene) -> Tiling:
         """The equilibria one by one."""
         equilibria = equilibria_to_disturb(scene)
+        method = self.method or default_method(scene, self.dt or PHASE / highest_frequency(reduce(scene)))
         return Each(
             "disturbed motions",
             len(equilibria),
-            lambda index: self._one(scene, equilibria[index]),
-            lambda tiles: self._joined(equilibria, tiles),
+            lambda index: self._one(scene, equilibria[index], method),
+            lambda tiles: self._joined(equilibria, tiles, method),
         )
 
     @property
     def _times(self) -> Floats:
         return np.linspace(0.0, self.t_end, self.outputs)
 
-    def _one(self, scene: Scene, equilibrium: Equilibrium) -> Dataset:
+    def _one(self, scene: Scene, equilibrium: Equilibrium, method: str) -> Dataset:
         """Integrate one disturbance; the linearized motion is a matrix exponential."""
         t = self._times
         disturbance = [self.xi_phi, self.xi_theta, self.eta_phi, self.eta_theta]
         # The step taken: what divides the intervals between outputs.
         step = t[1] / output_steps(t[:2], self.dt or default_step(scene, equilibrium))[0]
         motion, halved = (
-            disturbed_motion(scene, equilibrium, disturbance, t, dt=dt, method=self.method)
+            disturbed_motion(scene, equilibrium, disturbance, t, dt=dt, method=method)
             for dt in (step, 0.5 * step)
         )
         difference = np.max(np.abs(halved.nonlinear - motion.nonlinear))
@@ -100,7 +106,7 @@ class DisturbedMotionScan(TiledScan):
             }
         )
 
-    def _joined(self, equilibria: Equilibria, tiles: list[Dataset]) -> Dataset:
+    def _joined(self, equilibria: Equilibria, tiles: list[Dataset], method: str) -> Dataset:
         dims = ("equilibrium", "time")
         variables = {
             **numbers("equilibrium", len(equilibria), "number of the equilibrium"),
@@ -113,6 +119,7 @@ class DisturbedMotionScan(TiledScan):
             variables |= parts(kind, dims, motion, STATE_UNITS, f"disturbance of {{}}, {kind} motion")
         steps = [float(tile["step"].data) for tile in tiles]
         attrs = self.model_dump(exclude={"scene"}, exclude_none=True) | {
+            "method": method,
             "shortest_step": min(steps),
             "longest_step": max(steps),
             "error_estimate": float(np.max([tile["difference"].data for tile in tiles])),

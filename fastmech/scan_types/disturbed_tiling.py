@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.basins.disturbed import FAILURES, STREAM, DisturbedEnsemble, disturb, measuring_steps
+from fastmech.basins.steps import method_for
 from fastmech.disturbance.linear_range import linear_range
-from fastmech.disturbance.motion import equilibria_to_disturb
+from fastmech.disturbance.motion import damped_times, equilibria_to_disturb
 from fastmech.disturbance.size import size_at
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.spans import output_steps
@@ -60,7 +61,7 @@ class _Request(Protocol):
     @property
     def dt(self) -> float | None: ...
     @property
-    def method(self) -> str: ...
+    def method(self) -> str | None: ...
     @property
     def linear_horizon(self) -> float: ...
     @property
@@ -88,12 +89,13 @@ class DisturbedTiling(Tiling):
     def __init__(self, request: _Request, scene: Scene) -> None:
         self.request, self.scene = request, scene
         self.equilibria = equilibria_to_disturb(scene)
+        self.method = method_for(scene, request.method)
         self.rays = _blocks(request.linear_directions, DIRECTIONS)
         rest = np.column_stack(
             [self.equilibria.phi, self.equilibria.theta, *np.zeros((2, len(self.equilibria)))]
         )
-        step = request.dt or float(measuring_steps(scene, rest, request.method).min())
-        self.parts = _blocks(request.trajectories, _tile_length(request, step))
+        step = request.dt or float(measuring_steps(scene, rest, self.method).min())
+        self.parts = _blocks(request.trajectories, self._tile_length(step))
         self.count = len(self.equilibria) * (len(self.rays) + len(self.parts))
 
     def items(self, index: int) -> int:
@@ -127,14 +129,12 @@ class DisturbedTiling(Tiling):
             seed=request.seed,
             t_end=request.t_end,
             dt=request.dt,
-            method=request.method,
+            method=self.method,
             part=part,
             threads=context.threads,
             progress=lambda finished: context.check(),
         )
-        errors = (
-            _sampled_errors(self.scene, ensemble, request.method) if part.start == 0 else np.zeros((0, 2))
-        )
+        errors = _sampled_errors(self.scene, ensemble, self.method) if part.start == 0 else np.zeros((0, 2))
         arrays = {name: getattr(ensemble, _FIELDS.get(name, name)) for name in request.kept}
         tally = Tally.of(ensemble.outcome, ensemble.time_to_return)
         return self._tile(arrays, errors, tally, [ensemble.dt.min(), ensemble.dt.max()])
@@ -155,6 +155,7 @@ class DisturbedTiling(Tiling):
         plane |= linear_variables(np.broadcast_to(0.0, (1, rays, 4)), np.broadcast_to(0.0, (1, rays)))
         attrs = {
             **request.settings,
+            "method": self.method,
             "distribution": "uniform in the ball of the given radius, kinetic-energy norm at the equilibrium",
         }
         return Stream(Dataset(fixed, attrs), plane, "equilibrium", lambda: self._pieces(tile, count))
@@ -170,6 +171,12 @@ class DisturbedTiling(Tiling):
         sample = min(SAMPLE, self.request.trajectories) if part.start == 0 else 0
         nothing = empty_trajectories(self.request.kept, self.items(index))
         return self._tile(nothing, np.full((sample, 2), np.nan), Tally())
+
+    def _tile_length(self, dt: float) -> int:
+        """Trajectories of a tile, by their cost: a power of two, which divides a stream of random numbers."""
+        steps = int(output_steps(np.array([0.0, self.request.t_end]), dt).sum())
+        affordable = EVALUATIONS // find_method(self.method).evaluations(steps)
+        return int(min(STREAM, max(SAMPLE, 1 << max(0, affordable.bit_length() - 1))))
 
     def _part(self, index: int) -> slice | None:
         """The trajectories of a tile; None for a tile of directions."""
@@ -237,19 +244,14 @@ def _blocks(total: int, length: int) -> list[slice]:
     return [slice(k, min(k + length, total)) for k in range(0, total, length)]
 
 
-def _tile_length(request: _Request, dt: float) -> int:
-    """Trajectories of a tile, by what they cost: a power of two, which divides a stream of random numbers."""
-    steps = int(output_steps(np.array([0.0, request.t_end]), dt).sum())
-    affordable = EVALUATIONS // find_method(request.method).evaluations(steps)
-    return int(min(STREAM, max(SAMPLE, 1 << max(0, affordable.bit_length() - 1))))
-
-
 def _sampled_errors(scene: Scene, e: DisturbedEnsemble, method: str) -> Floats:
     """Largest differences of the first final angles and rates from those of half the step, (sample, 2)."""
     final, dt = e.final[:SAMPLE], e.dt[:SAMPLE]
     finer = np.empty_like(final)
     for step in np.unique(dt):
         some = np.flatnonzero(dt == step)
-        finer[some] = integrate(scene, e.starts[some], e.t_end, 0.5 * float(step), method).y[-1]
+        half = 0.5 * float(step)
+        times = np.append(damped_times(scene, method, min(half, e.t_end)), e.t_end)
+        finer[some] = integrate(scene, e.starts[some], dt=half, method=method, t_eval=times).y[-1]
     difference = np.abs(finer - final).reshape(-1, 2, 2).max(axis=2)
     return np.where(np.isnan(e.failed[:SAMPLE])[:, None], difference, np.nan)

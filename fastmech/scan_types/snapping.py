@@ -17,10 +17,11 @@ from fastmech.basins.label import require_damper
 from fastmech.basins.shock_limit import shock_limit
 from fastmech.basins.snapping import SnappingMap, critical_forces, default_end, force_free, map_snapping
 from fastmech.basins.status import FAILURES, BasinStatus
+from fastmech.basins.steps import method_for
 from fastmech.errors import InputError
 from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers
 from fastmech.scan_types.axis import Axis, check_duration, check_parameters, check_rising, check_size
-from fastmech.scan_types.request import MethodName, TiledScan, failures
+from fastmech.scan_types.request import TiledScan, UsualMethod, failures
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
 from fastmech.scene import Scene
 
@@ -54,7 +55,7 @@ class Snapping(TiledScan):
     t_end: Annotated[float, Field(gt=0)] | None = Field(
         None, description="end of the runs [s]; by default 200 s after a millionth of the force is left"
     )
-    method: MethodName = "dop853"
+    method: UsualMethod = None
 
     @property
     def forces(self) -> np.ndarray:
@@ -171,7 +172,11 @@ class SnappingTiling(Tiling):
         variables["critical_impulse"] = Variable(
             (), np.array(limit), "N s", "limit of the critical F0/alpha for fast decay, NaN: none was found"
         )
-        attrs = {"start": start, "tolerance": self.request.tolerance, "method": self.request.method}
+        attrs = {
+            "start": start,
+            "tolerance": self.request.tolerance,
+            "method": method_for(free, self.request.method),
+        }
         return Dataset(variables, attrs | found.counts | failures(found.status, FAILURES))
 
     def missing(self, index: int) -> Dataset:
