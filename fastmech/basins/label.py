@@ -120,6 +120,31 @@ def labels_of(
     Raises:
         InputError: an argument is wrong, the scene has no damper, or its wells are not certain.
     """
+    return label_starts(
+        scene,
+        starts,
+        t_end,
+        dt=dt,
+        method=method,
+        settle_radius=settle_radius,
+        threads=threads,
+        progress=progress,
+    )
+
+
+def label_starts(
+    scene: Scene,
+    starts: ArrayLike,
+    t_end: float,
+    *,
+    dt: float | None = None,
+    method: str | None = None,
+    settle_radius: float | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+    ladder: tuple[int, ...] = SUBSTEPS,
+) -> Labels:
+    """As :func:`labels_of`, with these numbers of substeps, one computation after the other."""
     require_damper(scene)
     checks.progress_function(progress, "starts")
     states = checks.states("starts", starts, 4)
@@ -145,11 +170,11 @@ def labels_of(
     for some in pieces_of(len(begin)):
         for step in np.unique(coarse[some[finite[some]]]):
             members = some[finite[some] & (coarse[some] == step)]
-            ladder = Ladder(certificate, t_end, float(step), formula, threads, prelude)
-            ladder.label(begin, members, found, status)
+            followed = Ladder(certificate, t_end, float(step), formula, threads, prelude, ladder)
+            followed.label(begin, members, found, status)
             if settle is not None and settle_radius is not None:
-                settle[members] = ladder.settle_times(begin, members, found, status, settle_radius)
-            found.steps += ladder.steps
+                settle[members] = followed.settle_times(begin, members, found, status, settle_radius)
+            found.steps += followed.steps
         if progress is not None:
             progress(some.size)
     captured = status == BasinStatus.CAPTURED
@@ -250,6 +275,7 @@ class Ladder:
     method: Method
     threads: int | None
     prelude: Prelude | None = None  #: what comes before
+    ladder: tuple[int, ...] = SUBSTEPS
     steps: int = 0
 
     def __post_init__(self) -> None:
@@ -297,14 +323,15 @@ class Ladder:
             lambda some: self.lingers(begin[some]),
             found,
             status,
+            self.ladder,
         )
 
     def lingers(self, starts: Floats) -> NDArray[np.bool_]:
         """Which motions come to an unstable equilibrium, with the finest step."""
-        finest = self.coarse * SUBSTEPS[0] / SUBSTEPS[-1]
-        if self.grows(SUBSTEPS[-1]):
+        finest = self.coarse * SUBSTEPS[0] / self.ladder[-1]
+        if self.ladder != SUBSTEPS or self.grows(self.ladder[-1]):  # few substeps leave it undecided
             return np.zeros(len(starts), dtype=np.bool_)
-        begin, _ = self.begin(starts, SUBSTEPS[-1])
+        begin, _ = self.begin(starts, self.ladder[-1])
         return lingering(self.certificate, begin, self.t_end, finest, self.method.name, self.threads)
 
     def settle_times(

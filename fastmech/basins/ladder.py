@@ -52,13 +52,14 @@ def climb(
     lingers: Lingers,
     found: Paths,
     status: NDArray[np.int8],
+    ladder: tuple[int, ...] = SUBSTEPS,
 ) -> None:
     """Find labels and statuses of some starts, and write them where ``members`` says."""
-    coarse = compute(members, SUBSTEPS[0])
-    for substeps in SUBSTEPS[1:]:
+    coarse = compute(members, ladder[0])
+    for substeps in ladder[1:]:
         fine = compute(members, substeps)
         settled = agree(members, coarse, fine)
-        done = np.flatnonzero(settled | (substeps == SUBSTEPS[-1]))
+        done = np.flatnonzero(settled | (substeps == ladder[-1]))
         ends, last = members[done], fine.take(done)
         found.put(ends, last)
         captured = settled[done] & (last.code > 0)
