@@ -7,13 +7,14 @@ it swings is measured in a run of its own to the end.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.basins.label import labels_of, require_damper
+from fastmech.basins.label import label_starts, require_damper
 from fastmech.basins.ladder import SUBSTEPS
 from fastmech.basins.measures.fractions import Shares, basin_stability
 from fastmech.basins.status import BasinStatus
@@ -101,9 +102,12 @@ _BY_RUN = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class DisturbedEnsemble:
-    """Random disturbances of one equilibrium and what became of them; arrays over n trajectories."""
+    """Random disturbances of one equilibrium and what became of them; arrays over n trajectories.
+
+    Printed, it says how many return, how soon, and how far they swing.
+    """
 
     equilibria: Equilibria  #: all equilibria of the scene
     index: int  #: which of them was disturbed
@@ -133,6 +137,24 @@ class DisturbedEnsemble:
         """
         known = (self.outcome == Outcome.RETURNED) | (self.outcome == Outcome.ELSEWHERE)
         return basin_stability(np.where(known, self.outcome, -1), int(Outcome.RETURNED))
+
+    def __repr__(self) -> str:
+        e, shares = self.equilibria[self.index], self.returned
+        ended = failure_counts(self.outcome, Outcome)
+        lines = [
+            f"{self.outcome.size:,} disturbances of the {e.kind} at phi = {e.phi:.4g}, "
+            f"theta = {e.theta:.4g} rad, followed for {self.t_end:g} s",
+            "  ended: " + ", ".join(f"{count:,} {name}" for name, count in ended.items()),
+            f"  returned: {shares.fraction:.2%}, at most {shares.at_most:.2%} "
+            f"(95 % interval {shares.lower:.2%} to {shares.upper:.2%})",
+        ]
+        times = self.time_to_return[np.isfinite(self.time_to_return)]
+        if times.size:
+            lines.append(f"  back after {np.median(times):.3g} s (median), {times.max():.3g} s at most")
+        if np.isfinite(self.excursion).any():
+            phi, theta = np.nanmax(self.excursion, axis=0)
+            lines.append(f"  largest excursion: {phi:.3g} rad of phi, {theta:.3g} rad of theta")
+        return "\n".join([*lines, *([f"  {self.failures}"] if self.failures else [])])
 
     @property
     def share_returned(self) -> float:
@@ -204,13 +226,13 @@ def disturb(
     index = equilibria.index_of(equilibrium)
     c, center = reduce(scene), np.array([equilibrium.phi, equilibrium.theta, 0.0, 0.0])
     size = size_at(scene, equilibrium.phi, equilibrium.theta)
-    _refuse_meeting_balls(equilibria, index, size, return_radius)
+    refuse_meeting_balls(scene, equilibria, return_radius, [index])
     chosen = range(*(part or slice(None)).indices(n))
     starts = center + size.from_ball(radius * _starts_in_ball(seed, index, n, chosen))
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StepWarning)  # it has been told
-        ends = labels_of(scene, starts, t_end, dt=dt, method=method, threads=threads)
+        ends = label_starts(scene, starts, t_end, dt=dt, method=method, threads=threads)
     longest = measuring_steps(scene, starts, method) if dt is None else np.full(len(starts), dt)
     at_first = damped_times(scene, method, min(dt or PHASE / highest_frequency(c), t_end))
     times = np.array([0.0, *at_first, t_end])
@@ -289,17 +311,24 @@ def measuring_steps(scene: Scene, starts: Floats, method: str) -> Floats:
     return np.asarray(np.clip(0.9 * step_limit(scene, method), finest, share * coarse))
 
 
-def _refuse_meeting_balls(equilibria: Equilibria, index: int, size: Size, radius: float) -> None:
-    """Refuse a ball of return that reaches half way to another equilibrium."""
+def refuse_meeting_balls(
+    scene: Scene, equilibria: Equilibria, radius: float, which: Sequence[int] | range
+) -> None:
+    """Refuse a ball of return about one of some equilibria that reaches half way to another.
+
+    Raises:
+        InputError: it does.
+    """
     angles = np.column_stack([equilibria.phi, equilibria.theta])
-    away = np.delete(angles, index, axis=0) - angles[index]
-    away -= 2.0 * np.pi * np.round(away / (2.0 * np.pi))
-    nearest = float(size(np.concatenate([away, np.zeros_like(away)], axis=1)).min(initial=np.inf))
-    if radius > 0.5 * nearest:
-        raise InputError(
-            f"return_radius = {radius:g} rad: must not exceed {0.5 * nearest:.3g} rad, "
-            "half the distance of two equilibria"
-        )
+    for index in which:
+        away = np.delete(angles, index, axis=0) - angles[index]
+        away -= 2.0 * np.pi * np.round(away / (2.0 * np.pi))
+        sizes = size_at(scene, *angles[index])(np.concatenate([away, np.zeros_like(away)], axis=1))
+        if radius > 0.5 * (nearest := float(sizes.min(initial=np.inf))):
+            raise InputError(
+                f"return_radius = {radius:g} rad: must not exceed {0.5 * nearest:.3g} rad, "
+                "half the distance of two equilibria"
+            )
 
 
 def _starts_in_ball(seed: int, index: int, n: int, chosen: range) -> Floats:

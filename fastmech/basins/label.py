@@ -16,12 +16,14 @@ import math
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.atlas.wells import ROUNDING
 from fastmech.basins.ladder import SUBSTEPS, climb, lingering, tell_the_same
+from fastmech.basins.measures.norm import FEW_TURNS, beyond_turns
 from fastmech.basins.runs import Paths, follow, rounds_until
 from fastmech.basins.status import BasinStatus, counts
 from fastmech.basins.steps import (
@@ -68,13 +70,19 @@ BATCH, PIECES, LEAST = 1 << 16, 16, 1 << 11
 #: Least growth from step to step while a strong damper stops part of a motion.
 FINEST_GROWTH = 0.2
 
+#: Angles larger than this are none in degrees either.
+MOST_DEGREES = 720.0
+
+#: Wells that have a line of their own where ends are printed.
+MOST_LINES = 3
+
 #: Numbers of 8 bytes that memory holds of every start on the way.
 START_NUMBERS = 20
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Labels:
-    """Where n starts end."""
+    """Where n starts end; printed, how many end where, and when."""
 
     tree: BarrierTree | None  #: wells, barriers and equilibria; of a system of your own: None
     well: NDArray[np.int8]  #: index of the well among the equilibria, -1: no label; shape (n,)
@@ -88,6 +96,29 @@ class Labels:
     def counts(self) -> dict[str, int]:
         """How many starts have each status."""
         return counts(self.status)
+
+    def __repr__(self) -> str:
+        return told_ends(f"{self.status.size:,} starts", self)
+
+
+def told_ends(what: str, found: Any) -> str:
+    """At most six lines on ``what`` has the wells, statuses and times of :class:`Labels`, and its tree."""
+    n, well = found.status.size, found.well.ravel()
+    known, number = np.unique(well[well >= 0], return_counts=True)
+    order = np.argsort(-number, kind="stable")
+    statuses = ", ".join(f"{count:,} {name}" for name, count in found.counts.items() if count)
+    lines = [f"{what}: {statuses}"]
+    for k in order[:MOST_LINES]:
+        e = None if found.tree is None else found.tree.equilibria[int(known[k])]
+        place = "" if e is None else f" at phi = {e.phi:.4g}, theta = {e.theta:.4g} rad"
+        name = f"code {known[k]}" if e is None else f"well {known[k]}"
+        lines.append(f"  {name}{place}: {number[k]:,} ({number[k] / n:.1%})")
+    if order.size > MOST_LINES:
+        lines.append(f"  {order.size - MOST_LINES} more: {number[order[MOST_LINES:]].sum():,}")
+    times = found.time[np.isfinite(found.time)]
+    if times.size:
+        lines.append(f"  after {np.median(times):.3g} s (median), {times.max():.3g} s at most")
+    return "\n".join(lines)
 
 
 def labels_of(
@@ -105,7 +136,8 @@ def labels_of(
 
     Args:
         scene: the mechanism, with a damper. A decaying force leads to the wells of springs and weights.
-        starts: phi, theta [rad], phi', theta' [rad/s], shape (n, 4) or (4,); angles count their turns.
+        starts: phi, theta [rad], phi', theta' [rad/s], shape (n, 4) or (4,); angles count their turns, and
+            more than four give a warning, if they may be degrees.
         t_end: end of the run [s]; what is not captured by then is undecided.
         dt: coarsest step [s]: each path is computed with it and with two thirds of it, and with less where
             these differ. By default it follows from the scene's frequencies and the start's energy.
@@ -120,6 +152,11 @@ def labels_of(
     Raises:
         InputError: an argument is wrong, the scene has no damper, or its wells are not certain.
     """
+    states = checks.states("starts", starts, 4)
+    angles = np.abs(states[:, :2])
+    largest = float(np.max(angles, initial=0.0, where=np.isfinite(angles)))
+    if 2.0 * np.pi * FEW_TURNS < largest <= MOST_DEGREES:
+        warnings.warn(f"starts: {beyond_turns(largest)}", stacklevel=2)
     return label_starts(
         scene,
         starts,
@@ -135,7 +172,7 @@ def labels_of(
 def label_starts(
     scene: Scene,
     starts: ArrayLike,
-    t_end: float,
+    t_end: float = 60.0,
     *,
     dt: float | None = None,
     method: str | None = None,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.basins.copies import copy_numbers
-from fastmech.basins.label import Labels, labels_of
+from fastmech.basins.label import Labels, label_starts, told_ends
 from fastmech.basins.measures.labels import number_turns
 from fastmech.basins.measures.norm import STATE as STATE
 from fastmech.basins.measures.norm import check_angles
@@ -30,9 +30,12 @@ Floats = NDArray[np.float64]
 MOST_POINTS, POINT_NUMBERS = 50_000_000, 20
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class BasinMap:
-    """Labels over a grid of starts; arrays have one axis for each of ``axes``, in their order."""
+    """Labels over a grid of starts; arrays have one axis for each of ``axes``, in their order.
+
+    Printed, it says how many starts end where, and when.
+    """
 
     axes: dict[str, Floats]  #: values along each axis [rad, rad/s]
     fixed: dict[str, float]  #: the other coordinates of the starts
@@ -58,6 +61,10 @@ class BasinMap:
         The table is sorted by well, then turns of phi, then of theta.
         """
         return number_turns(self.well, self.turns)
+
+    def __repr__(self) -> str:
+        grid = " x ".join(f"{name} ({values.size:,})" for name, values in self.axes.items())
+        return told_ends(f"map over {grid}", self)
 
 
 def map_basins(
@@ -119,7 +126,7 @@ def map_basins(
     def compute(points: NDArray[np.intp], tell: Progress | None) -> NDArray[np.int64]:
         starts = grid_starts(values, held, names, points)
         if isinstance(scene, Scene):
-            part = labels_of(
+            part = label_starts(
                 scene,
                 starts,
                 t_end,

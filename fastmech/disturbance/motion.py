@@ -12,7 +12,8 @@ from fastmech.disturbance.size import size_at
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.stiffness import damping_rate
-from fastmech.equilibria.find import Equilibria, Equilibrium, find_equilibria
+from fastmech.equilibria.balance import pulls, vanishing
+from fastmech.equilibria.find import Equilibria, Equilibrium, degenerate_sentence, find_equilibria
 from fastmech.errors import InputError
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.methods import find_method
@@ -122,11 +123,23 @@ def equilibria_to_disturb(scene: Scene) -> Equilibria:
     Raises:
         InputError: the force decays, or no equilibrium is isolated.
     """
-    require_constant_force(scene)
+    require_isolated(scene)
     equilibria = find_equilibria(scene)
     if not equilibria:
         raise InputError(f"scene: has no equilibrium to disturb: {equilibria.certificate.sentence}")
     return equilibria
+
+
+def require_isolated(scene: Scene) -> None:
+    """Refuse, before equilibria are looked for, a scene whose force changes or that rests all along a line.
+
+    Raises:
+        InputError: it does.
+    """
+    require_constant_force(scene)
+    c = reduce(scene)
+    if vanishing(pulls(c.mass, c.lift, c.spring, c.gravity, c.force)) >= 2:
+        raise InputError(f"scene: has no equilibrium to disturb: {degenerate_sentence(scene, scene.F0)}")
 
 
 def propagators(matrix: Floats, times: Floats) -> Floats:

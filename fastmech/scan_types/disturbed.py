@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field
 
 from fastmech.basins.label import require_damper
 from fastmech.basins.steps import method_for, shortest_step
-from fastmech.disturbance.motion import require_constant_force
+from fastmech.disturbance.motion import require_constant_force, require_isolated
 from fastmech.errors import InputError, shown
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
@@ -89,8 +89,8 @@ class Disturbed(TiledScan):
         """A constant force and a damper all over a map, and no more work than is possible."""
         check_parameters(scene, self.axes, "axes")
         for corner in self._corners(scene):
-            require_constant_force(corner)
             require_damper(corner)
+            (require_constant_force if self.axes else require_isolated)(corner)
             check_duration(corner, self.t_end, self.dt)
             check_steps("linear_horizon", self.linear_horizon, shortest_step(reduce(corner)))
         if not self.axes:

@@ -16,7 +16,7 @@ from fastmech.disturbance.motion import (
     default_step,
     disturbed_motion,
     equilibria_to_disturb,
-    require_constant_force,
+    require_isolated,
 )
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import FAILURES
@@ -56,7 +56,7 @@ class DisturbedMotionScan(TiledScan):
 
     def check(self, scene: Scene) -> None:
         """The force must be constant, so many steps possible, and the outputs fit into memory."""
-        require_constant_force(scene)
+        require_isolated(scene)
         check_steps("t_end", self.t_end, self.dt or PHASE / highest_frequency(reduce(scene)))
         checks.memory(
             self.outputs * 2 * 4 * MOST, 3, "outputs: the motions about equilibria", "fewer outputs"

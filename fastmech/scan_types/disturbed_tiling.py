@@ -9,7 +9,14 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.basins.disturbed import FAILURES, STREAM, DisturbedEnsemble, disturb, measuring_steps
+from fastmech.basins.disturbed import (
+    FAILURES,
+    STREAM,
+    DisturbedEnsemble,
+    disturb,
+    measuring_steps,
+    refuse_meeting_balls,
+)
 from fastmech.basins.steps import method_for
 from fastmech.disturbance.linear_range import linear_range
 from fastmech.disturbance.motion import damped_times, equilibria_to_disturb
@@ -89,6 +96,7 @@ class DisturbedTiling(Tiling):
     def __init__(self, request: _Request, scene: Scene) -> None:
         self.request, self.scene = request, scene
         self.equilibria = equilibria_to_disturb(scene)
+        refuse_meeting_balls(scene, self.equilibria, request.return_radius, range(len(self.equilibria)))
         self.method = method_for(scene, request.method)
         self.rays = _blocks(request.linear_directions, DIRECTIONS)
         rest = np.column_stack(

@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import AfterValidator, Field
 
 from fastmech.basins.erosion import FLAGS, MEASURES, Ends, survey_of, wells_along
-from fastmech.basins.label import labels_of, require_damper
+from fastmech.basins.label import label_starts, require_damper
 from fastmech.basins.measures.norm import STATE
 from fastmech.basins.steps import MOST_OCTAVES, TURNING
 from fastmech.disturbance.motion import require_constant_force
@@ -156,7 +156,7 @@ class ErosionTiling(Tiling):
 
         def ends(scene: Scene, starts: np.ndarray) -> Ends:
             context.check()
-            return labels_of(scene, starts, t_end=self.request.t_end, threads=context.threads)
+            return label_starts(scene, starts, t_end=self.request.t_end, threads=context.threads)
 
         survey = survey_of(
             self.window,

@@ -300,3 +300,15 @@ def test_failed_trajectories_make_no_noise() -> None:
     (stable,) = [e for e in find_equilibria(scene) if e.kind == "minimum"]
     run = disturb(scene, stable, 100, radius=1.0, t_end=3.0, dt=0.5, method="rk4")
     assert {Outcome.NOT_FINITE, Outcome.STEP_TOO_LARGE} & set(run.outcome.tolist())
+
+
+def test_printed_it_says_what_became_of_them() -> None:
+    (stable,) = equilibria("table_1", 0)
+    run = disturb(SCENE, stable, 300, radius=0.05)
+    lines = str(run).splitlines()
+    assert len(lines) <= 6
+    assert lines[0].startswith("300 disturbances of the minimum at phi = 1.451, theta = -0.2326 rad")
+    assert lines[1] == "  ended: 300 returned"
+    assert lines[2].startswith("  returned: 100.00%, at most 100.00% (95 % interval 98.7")  # 1/(1 + z^2/n)
+    assert f"{np.median(run.time_to_return):.3g} s (median)" in lines[3]
+    assert f"{run.excursion[:, 0].max():.3g} rad of phi" in lines[4]

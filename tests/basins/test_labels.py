@@ -245,3 +245,23 @@ def test_heavy_damping_and_a_force_that_is_gone_at_once() -> None:
     found, same = fm.labels_of(scene, still, 10.0), fm.labels_of(free, blow, 10.0)
     assert found.counts["captured"] == same.counts["captured"] == 1
     assert found.well[0] == same.well[0]
+
+
+def test_angles_that_may_be_degrees_give_a_warning() -> None:
+    with pytest.warns(UserWarning, match=r"starts: reaches 180, beyond 4 turns; .*numpy.deg2rad"):
+        fm.labels_of(BISTABLE, [[90.0, 180.0, 0.0, 0.0]], 1.0)
+
+
+def test_printed_it_says_where_they_end() -> None:
+    found = fm.labels_of(BISTABLE, random_starts(200))
+    for lines in (
+        str(found).splitlines(),
+        str(fm.map_basins(BISTABLE, {"phi": [0, 1], "theta": [0, 1]})).split("\n"),
+    ):
+        assert 2 <= len(lines) <= 6
+        assert "captured" in lines[0]
+    largest = np.bincount(found.well[found.well >= 0]).argmax()
+    share = np.mean(found.well == largest)
+    assert f"  well {largest} at phi = " in str(found)
+    assert f"({share:.1%})" in str(found)
+    assert f"{np.nanmax(found.time):.3g} s at most" in str(found)

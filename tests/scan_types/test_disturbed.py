@@ -362,3 +362,12 @@ def test_heavy_damping_fails_nothing(tmp_path: Path) -> None:
     assert section.attrs["failed"] == 0
     assert section.attrs["method"] == "radau5"
     assert section.attrs["error_estimate_median"] < 1e-4
+
+
+def test_what_cannot_be_disturbed_is_refused_before_anything_is_computed() -> None:
+    """All along a line in closed form; a ball of return by the equilibria alone."""
+    line = Scene(alpha=0.0, F0=0.0, c1=0.0, c2=22.0 * 9.80665 / 1.25)
+    with pytest.raises(fm.InputError, match="equilibria are not isolated: c1 = 0, F = 0"):
+        Disturbed().check(line)
+    with pytest.raises(fm.InputError, match="return_radius = 3 rad: must not exceed"):
+        Disturbed(return_radius=3.0).tiling(Scene(alpha=0.0))
