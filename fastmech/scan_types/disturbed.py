@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import AfterValidator, Field
 
+from fastmech.basins.disturbed import DisturbedEnsemble, disturb
 from fastmech.basins.label import require_damper
 from fastmech.basins.steps import method_for, shortest_step
 from fastmech.disturbance.motion import require_constant_force, require_isolated
+from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError, shown
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
@@ -29,7 +31,7 @@ from fastmech.scan_types.disturbed_map import MOST_POINTS, MOST_TRAJECTORIES, Di
 from fastmech.scan_types.disturbed_tiling import DisturbedTiling
 from fastmech.scan_types.equilibrium_map import known_parameters
 from fastmech.scan_types.request import Seed, TiledScan, UsualMethod
-from fastmech.scan_types.tiling import Tiling
+from fastmech.scan_types.tiling import RunContext, Tiling
 from fastmech.scene import Scene, nearest
 from fastmech.step_limits.warning import step_warning
 
@@ -131,6 +133,25 @@ class Disturbed(TiledScan):
             return DisturbedMap(self, scene, arrays(self.axes))
         return DisturbedTiling(self, scene)
 
+    def ensemble(
+        self, scene: Scene, equilibrium: Equilibrium, context: RunContext, part: slice | None = None
+    ) -> DisturbedEnsemble:
+        """Disturb one equilibrium, or a part of its trajectories."""
+        return disturb(
+            scene,
+            equilibrium,
+            self.trajectories,
+            radius=self.radius,
+            return_radius=self.return_radius,
+            seed=self.seed,
+            t_end=self.t_end,
+            dt=self.dt,
+            method=self.method,
+            part=part,
+            threads=context.threads,
+            progress=lambda finished: context.check(),
+        )
+
     @property
     def kept(self) -> list[str]:
         """Names of what is kept of every trajectory."""
@@ -151,7 +172,10 @@ class Disturbed(TiledScan):
             return section.load()
         step = -(-section.sizes.get("trajectory", 1) // DRAWN)
         drawn = [name for name in section if not name.startswith(("start", "final", "linear_direction"))]
-        return section.load(drawn, {"trajectory": slice(None, None, step)})
+        found = section.load(drawn, {"trajectory": slice(None, None, step)})
+        return Dataset(
+            found.variables, found.attrs, {name: group.load() for name, group in section.groups.items()}
+        )
 
     @staticmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
@@ -159,7 +183,7 @@ class Disturbed(TiledScan):
         if "axes" in dataset.attrs:
             from fastmech.plots.disturbed_map import draw_disturbed_map
 
-            return draw_disturbed_map(dataset, scene)
+            return draw_disturbed_map(dataset.merged, scene)
         from fastmech.plots.disturbed import draw_disturbed
 
-        return draw_disturbed(dataset)
+        return draw_disturbed(dataset.merged)

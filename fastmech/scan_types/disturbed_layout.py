@@ -1,4 +1,8 @@
-"""The variables of disturbed ensembles: names, dimensions, units and meanings, in one place."""
+"""The variables of disturbed ensembles: names, dimensions, units and meanings, in one place.
+
+A table of the section has a row for each trajectory of each equilibrium; what has other dimensions is in the
+groups ``linear``, ``quantiles`` and ``halving``.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +16,7 @@ from fastmech.basins.disturbed import Outcome
 from fastmech.results import ANGLE_UNITS, NO_CODE, STATE_UNITS, Variable, flags, numbers, parts
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
+QUANTILE = Variable(("quantile",), np.array(QUANTILES), "1", "quantile")
 
 ABOUT_SHARES = {
     "share_returned": "share that is proved to return",
@@ -78,32 +83,32 @@ def equilibrium_variables(
         "phi": Variable(_EACH, phi, "rad", "angle phi of the disturbed equilibrium"),
         "theta": Variable(_EACH, theta, "rad", "angle theta of the disturbed equilibrium"),
         "omega": Variable(_EACH, omega, "rad/s", "frequency in the norm"),
-        "quantile": Variable(("quantile",), np.array(QUANTILES), "1", "quantile"),
     }
 
 
-def tally_variables(
-    shares: Mapping[str, NDArray[np.float64]],
-    errors: NDArray[np.float64],
-    quantiles: NDArray[np.float64],
-) -> dict[str, Variable]:
-    """What the trajectories of each equilibrium come to; ``shares`` are those of a tally."""
+def share_variables(shares: Mapping[str, NDArray[np.float64]]) -> dict[str, Variable]:
+    """The shares of a tally of each equilibrium."""
+    return {name: Variable(_EACH, shares[name], "1", about) for name, about in ABOUT_SHARES.items()}
+
+
+def quantile_variables(quantiles: NDArray[np.float64]) -> dict[str, Variable]:
+    """Quantiles of the times to return to each equilibrium."""
+    dims = ("equilibrium", "quantile")
     return {
-        **{name: Variable(_EACH, shares[name], "1", about) for name, about in ABOUT_SHARES.items()},
-        **parts(
-            "halving_difference",
-            ("equilibrium", "sample"),
-            errors,
-            {"angle": "rad", "rate": "rad/s"},
-            "largest difference of a final {} from that with half the step, first trajectories; NaN: failed",
-        ),
-        "time_to_return_quantile": Variable(
-            ("equilibrium", "quantile"),
-            quantiles,
-            "s",
-            ABOUT_QUANTILES,
-        ),
+        "quantile": QUANTILE,
+        "time_to_return_quantile": Variable(dims, quantiles, "s", ABOUT_QUANTILES),
     }
+
+
+def halving_variables(errors: NDArray[np.float64]) -> dict[str, Variable]:
+    """How far final states of some trajectories are from those of half the step."""
+    return parts(
+        "halving_difference",
+        ("equilibrium", "sample"),
+        errors,
+        {"angle": "rad", "rate": "rad/s"},
+        "largest difference of a final {} from that with half the step, first trajectories; NaN: failed",
+    )
 
 
 def linear_variables(directions: NDArray[np.float64], limit: NDArray[np.float64]) -> dict[str, Variable]:

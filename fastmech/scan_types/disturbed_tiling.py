@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,6 @@ from fastmech.basins.disturbed import (
     FAILURES,
     STREAM,
     DisturbedEnsemble,
-    disturb,
     measuring_steps,
     refuse_meeting_balls,
 )
@@ -29,8 +28,10 @@ from fastmech.scan_types.disturbed_layout import (
     QUANTILES,
     empty_trajectories,
     equilibrium_variables,
+    halving_variables,
     linear_variables,
-    tally_variables,
+    quantile_variables,
+    share_variables,
     trajectory_variables,
 )
 from fastmech.scan_types.request import HALVING, counted_failures
@@ -38,6 +39,9 @@ from fastmech.scan_types.tally import SHARES, Tally
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
 from fastmech.scene import Scene
 from fastmech.store.stream import Piece, Stream
+
+if TYPE_CHECKING:
+    from fastmech.scan_types.disturbed import Disturbed
 
 Floats = NDArray[np.float64]
 
@@ -54,33 +58,6 @@ DIRECTIONS = 256
 PIECE_BYTES = 1 << 25
 
 
-class _Request(Protocol):
-    @property
-    def trajectories(self) -> int: ...
-    @property
-    def radius(self) -> float: ...
-    @property
-    def return_radius(self) -> float: ...
-    @property
-    def seed(self) -> int: ...
-    @property
-    def t_end(self) -> float: ...
-    @property
-    def dt(self) -> float | None: ...
-    @property
-    def method(self) -> str | None: ...
-    @property
-    def linear_horizon(self) -> float: ...
-    @property
-    def linear_tolerance(self) -> float: ...
-    @property
-    def linear_directions(self) -> int: ...
-    @property
-    def kept(self) -> list[str]: ...
-    @property
-    def settings(self) -> dict[str, Any]: ...
-
-
 class DisturbedTiling(Tiling):
     """First blocks of directions for the linearized motion, then blocks of trajectories.
 
@@ -93,7 +70,7 @@ class DisturbedTiling(Tiling):
 
     what = "disturbed trajectories"
 
-    def __init__(self, request: _Request, scene: Scene) -> None:
+    def __init__(self, request: Disturbed, scene: Scene) -> None:
         self.request, self.scene = request, scene
         self.equilibria = equilibria_to_disturb(scene)
         refuse_meeting_balls(scene, self.equilibria, request.return_radius, range(len(self.equilibria)))
@@ -128,20 +105,7 @@ class DisturbedTiling(Tiling):
             )
             rays = {"directions": Variable(("ray", "component"), found.directions)}
             return Dataset(rays | {"limit": Variable(("ray",), found.limit)})
-        ensemble = disturb(
-            self.scene,
-            equilibrium,
-            request.trajectories,
-            radius=request.radius,
-            return_radius=request.return_radius,
-            seed=request.seed,
-            t_end=request.t_end,
-            dt=request.dt,
-            method=self.method,
-            part=part,
-            threads=context.threads,
-            progress=lambda finished: context.check(),
-        )
+        ensemble = request.ensemble(self.scene, equilibrium, context, part)
         errors = _sampled_errors(self.scene, ensemble, self.method) if part.start == 0 else np.zeros((0, 2))
         arrays = {name: getattr(ensemble, _FIELDS.get(name, name)) for name in request.kept}
         tally = Tally.of(ensemble.outcome, ensemble.time_to_return)
@@ -156,11 +120,7 @@ class DisturbedTiling(Tiling):
         count, request = len(each), self.request
         nothing = empty_trajectories(request.kept, 1)
         arrays = {n: np.broadcast_to(a, (1, request.trajectories, *a.shape[1:])) for n, a in nothing.items()}
-        sample, rays = min(SAMPLE, request.trajectories), request.linear_directions
-        plane = trajectory_variables(arrays)
-        shares = dict.fromkeys(SHARES, np.zeros(1))
-        plane |= tally_variables(shares, np.zeros((1, sample, 2)), np.zeros((1, len(QUANTILES))))
-        plane |= linear_variables(np.broadcast_to(0.0, (1, rays, 4)), np.broadcast_to(0.0, (1, rays)))
+        plane = trajectory_variables(arrays) | share_variables(dict.fromkeys(SHARES, np.zeros(1)))
         attrs = {
             **request.settings,
             "method": self.method,
@@ -205,10 +165,11 @@ class DisturbedTiling(Tiling):
         return Dataset(columns | tally.variables(), tally.attrs())
 
     def _pieces(self, tile: Tiles, count: int) -> Iterator[Piece]:
-        for number, block in enumerate(self.rays):
-            found = [tile(number * count + e) for e in range(count)]
-            directions, limit = (np.stack([f[name].data for f in found]) for name in ("directions", "limit"))
-            yield (slice(0, count), block), _data(linear_variables(directions, limit))
+        limits = [[tile(number * count + e) for number in range(len(self.rays))] for e in range(count)]
+        directions, limit = (
+            np.stack([np.concatenate([f[name].data for f in found]) for found in limits])
+            for name in ("directions", "limit")
+        )
         first = count * len(self.rays)
         tallies, errors, steps = [Tally() for _ in range(count)], [], []
         held: list[dict[str, NDArray[Any]]] = []
@@ -228,7 +189,12 @@ class DisturbedTiling(Tiling):
         each = [t.shares() for t in tallies]
         shares = {name: np.array([share[name] for share in each]) for name in SHARES}
         quantiles = np.array([t.quantiles(QUANTILES) for t in tallies])
-        yield slice(0, count), _data(tally_variables(shares, np.stack(errors), quantiles))
+        each_one = numbers("equilibrium", count, "number of the equilibrium")
+        groups = {
+            "linear": Dataset(each_one | linear_variables(directions, limit)),
+            "quantiles": Dataset(each_one | quantile_variables(quantiles)),
+            "halving": Dataset(each_one | halving_variables(np.stack(errors))),
+        }
         attrs: dict[str, Any] = {
             "error_estimate": float(np.max(errors)),
             "error_estimate_median": float(np.median(errors)),
@@ -237,7 +203,8 @@ class DisturbedTiling(Tiling):
         attrs |= {"shortest_step": min(steps), "longest_step": max(steps)} if steps else {}
         ended = sum((t.ended for t in tallies), Counter[str]())
         failed = {k.name.lower(): ended[k.name.lower()] for k in FAILURES if ended[k.name.lower()]}
-        yield Dataset({}, attrs | counted_failures(failed, ended.total()))
+        yield slice(0, count), _data(share_variables(shares))
+        yield Dataset({}, attrs | counted_failures(failed, ended.total()), groups)
 
 
 #: Names of variables in `fastmech.basins.disturbed.DisturbedEnsemble`, where they are others.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,19 +22,14 @@ from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
 from fastmech.scene import Scene
 from fastmech.store.stream import Piece, Stream
 
+if TYPE_CHECKING:
+    from fastmech.scan_types.equilibrium_map import EquilibriumMap
+
 #: Points of a tile, about: a second of one thread where all is asked for.
 TILE_POINTS = 1 << 15
 
 #: What the sheets are found from.
 _FOR_SHEETS = ("phi", "theta", "morse_index", "count")
-
-
-class _Request(Protocol):
-    @property
-    def variables(self) -> list[str] | None: ...
-    @property
-    def wells(self) -> bool: ...
-    def kept(self, variables: dict[str, Variable]) -> dict[str, Variable]: ...
 
 
 class MapTiling(Tiling):
@@ -48,7 +43,7 @@ class MapTiling(Tiling):
 
     what = "points of the map"
 
-    def __init__(self, request: _Request, scene: Scene, axes: dict[str, NDArray[np.float64]]) -> None:
+    def __init__(self, request: EquilibriumMap, scene: Scene, axes: dict[str, NDArray[np.float64]]) -> None:
         self.request, self.scene, self.axes = request, scene, axes
         self.first, *others = axes
         self.plane = math.prod(len(axes[other]) for other in others)

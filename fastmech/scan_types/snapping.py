@@ -1,8 +1,8 @@
 """Dynamic snapping: which suddenly applied, fading force throws the mechanism out of its force-free well.
 
-Layout: ends over ``alpha`` and ``F0``; the smallest force that leaves for each alpha; along ``window`` the
-runs of neighbouring forces that end alike, with the alpha they belong to; what is known about the force-free
-scene's equilibria along ``equilibrium``; and the critical impulse, the limit of F0/alpha as alpha grows.
+Layout: ends over ``alpha`` and ``F0``; the smallest force that leaves for each alpha; and the critical
+impulse, the limit of F0/alpha as alpha grows. In groups of their own ``windows``, the runs of neighbouring
+forces that end alike, with the alpha they belong to, and ``equilibria``, those of the force-free scene.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ class Snapping(TiledScan):
         """The map with the critical curve."""
         from fastmech.plots.snapping import draw_snapping
 
-        return draw_snapping(dataset, scene)
+        return draw_snapping(dataset.merged, scene)
 
 
 class SnappingTiling(Tiling):
@@ -162,7 +162,7 @@ class SnappingTiling(Tiling):
         )
         side = 0.0 if self.forces[0] > 0.0 else np.pi
         limit = np.cos(side) * shock_limit(free, equilibria[start], "M2", side).found.impulse
-        variables = _ends(found) | _windows(found) | _equilibria(found)
+        variables = _ends(found)
         variables["critical_F0"] = Variable(
             ("alpha",),
             joined["critical"],
@@ -177,7 +177,8 @@ class SnappingTiling(Tiling):
             "tolerance": self.request.tolerance,
             "method": method_for(free, self.request.method),
         }
-        return Dataset(variables, attrs | found.counts | failures(found.status, FAILURES))
+        groups = {"windows": Dataset(_windows(found)), "equilibria": Dataset(_equilibria(found))}
+        return Dataset(variables, attrs | found.counts | failures(found.status, FAILURES), groups)
 
     def missing(self, index: int) -> Dataset:
         """Rates that have not been computed."""
