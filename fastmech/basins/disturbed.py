@@ -18,7 +18,7 @@ from fastmech.basins.label import label_starts, require_damper
 from fastmech.basins.ladder import SUBSTEPS
 from fastmech.basins.measures.fractions import Shares, basin_stability
 from fastmech.basins.status import BasinStatus
-from fastmech.basins.steps import PHASE, coarse_steps, highest_frequency, method_for
+from fastmech.basins.steps import MOST_OCTAVES, PHASE, TURNING, coarse_steps, highest_frequency, method_for
 from fastmech.disturbance.motion import damped_times, equilibria_to_disturb
 from fastmech.disturbance.observe import EXCURSION_PHI, EXCURSION_THETA, LAST_OUTSIDE, observe_departure
 from fastmech.disturbance.size import Size, confining_energy, excess_energy, size_at, uniform_ball
@@ -45,6 +45,9 @@ STREAM = 65_536
 
 #: Trajectories of the largest ensemble: its results take about 150 bytes each in memory.
 MOST_TRAJECTORIES = 100_000_000
+
+#: Largest disturbance [rad]: times the frequency it is as fast as the shortest steps by default can follow.
+MOST_RADIUS = TURNING * 2.0**MOST_OCTAVES
 
 #: Share of a start's coarse step, at which labels begin, that measuring takes by default; an implicit method,
 #: whose error constant is larger, takes half of it.
@@ -216,7 +219,10 @@ def disturb(
     require_damper(scene)
     n = checks.whole_number("n", n, least=1, most=MOST_TRAJECTORIES)
     seed = checks.whole_number("seed", seed, least=0)
-    radius = checks.number("radius", radius, "rad", above=0.0)
+    if (radius := checks.number("radius", radius, "rad", above=0.0)) > MOST_RADIUS:
+        raise InputError(
+            f"radius = {radius:g} rad: must not exceed {MOST_RADIUS:g} rad; no step follows that"
+        )
     return_radius = checks.number("return_radius", return_radius, "rad", above=0.0)
     t_end = checks.number("t_end", t_end, "s", above=0.0)
     method = method_for(scene, method)

@@ -24,8 +24,7 @@ from fastmech.ensembles.system import System
 from fastmech.equilibria.find import Equilibrium, find_equilibria
 from fastmech.errors import InputError
 from fastmech.mechanism.coefficients import reduce
-from fastmech.scene import Scene
-from fastmech.stability.arguments import require_scene
+from fastmech.scene import Scene, require_scene
 
 #: Points between two starts whose labels are asked for at once.
 SECTIONS = 15
@@ -176,17 +175,21 @@ def saddle_at(scene: Scene, state: ArrayLike) -> tuple[Equilibrium, float]:
 
 def _sides(label_of: LabelOf, a: Floats, b: Floats) -> tuple[int, Floats, Floats] | None:
     """Two points on the line through a and b with different known labels, the nearest, and the first's."""
-    apart = np.concatenate([[0.0], 2.0 ** np.arange(DOUBLINGS)])
-    line = np.concatenate([-apart[:0:-1], apart])
-    points = a + line[:, None] * (b - a)
-    labels = ask(label_of, points)
-    known = np.flatnonzero(labels >= 0)
-    changes = np.flatnonzero(np.diff(labels[known]) != 0)
-    if not changes.size:
-        return None
-    pairs = np.stack([known[changes], known[changes + 1]], axis=1)
-    nearest = pairs[np.abs(line[pairs]).max(axis=1).argmin()]
-    return int(labels[nearest[0]]), points[nearest[0]], points[nearest[1]]
+    line, points, labels = np.zeros(0), np.zeros((0, a.size)), np.zeros(0, dtype=np.int64)
+    further = np.array([0.0, 1.0])
+    for doubling in range(DOUBLINGS):
+        more = a + further[:, None] * (b - a)
+        line, points = np.append(line, further), np.concatenate([points, more])
+        labels = np.append(labels, ask(label_of, more))
+        known = np.flatnonzero(labels >= 0)
+        known = known[np.argsort(line[known])]
+        changes = np.flatnonzero(np.diff(labels[known]) != 0)
+        if changes.size:
+            pairs = np.stack([known[changes], known[changes + 1]], axis=1)
+            nearest = pairs[np.abs(line[pairs]).max(axis=1).argmin()]
+            return int(labels[nearest[0]]), points[nearest[0]], points[nearest[1]]
+        further = np.array([-(2.0**doubling), 2.0 ** (doubling + 1)])
+    return None
 
 
 def _bisect(

@@ -27,8 +27,7 @@ from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
 from fastmech.equilibria.find import Equilibria, find_equilibria
 from fastmech.errors import InputError, shown
-from fastmech.scene import Scene
-from fastmech.stability.arguments import require_scene
+from fastmech.scene import Scene, require_scene
 
 #: Relative tolerance of shocks: what a profile shows.
 TOLERANCE = 1e-3

@@ -49,8 +49,7 @@ from fastmech.integrators.method import Method
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import unit
-from fastmech.scene import Scene
-from fastmech.stability.arguments import require_scene
+from fastmech.scene import Scene, require_scene
 from fastmech.step_limits.beyond import is_beyond
 from fastmech.step_limits.warning import warn_of_step
 

@@ -200,6 +200,8 @@ def critical_forces(
     Raises:
         InputError: an argument is wrong.
     """
+    if not isinstance(snapping, SnappingMap):
+        raise InputError(f"snapping = {shown(snapping)}: must be what fastmech.map_snapping gives")
     tolerance = checks.number("tolerance", tolerance, "N", above=0.0)
     start = snapping.equilibria[snapping.start]
     sign = float(np.sign(snapping.F0[0]))

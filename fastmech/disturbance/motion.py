@@ -18,7 +18,7 @@ from fastmech.errors import InputError
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
-from fastmech.scene import Scene
+from fastmech.scene import Scene, require_scene
 from fastmech.stability.linearize import jacobian
 
 Floats = NDArray[np.float64]
@@ -110,6 +110,7 @@ def require_constant_force(scene: Scene) -> None:
     Raises:
         InputError: the force decays.
     """
+    require_scene(scene)
     if scene.F0 != 0 and scene.alpha != 0:
         raise InputError(
             f"scene.alpha = {scene.alpha:g}: must be 0 1/s for motion about an equilibrium (or F0 = 0 N); "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -100,7 +101,7 @@ def _panels(view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[
                 logarithmic(bar.ax.yaxis)
     if handles := _marks(view, sheets, fields):
         figure.legend(handles=handles, loc="outside lower center", ncols=2)
-    figure.suptitle(_setting(view), fontsize=10.0)
+    _title(figure, _setting(view))
     return figure
 
 
@@ -142,8 +143,13 @@ def _lines(view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[s
         panels[0].plot([], [], UNTOLD, color="black", label=ABOUT_UNTOLD)
     legend_below(figure, panels[0], 2)
     band = "; band: 95 % Wilson interval, undecided ones as none or all" if name == "share_returned" else ""
-    figure.suptitle(_setting(view) + band, fontsize=10.0)
+    _title(figure, _setting(view) + band)
     return figure
+
+
+def _title(figure: Figure, text: str) -> None:
+    """Over all panels, in as many lines as it takes."""
+    figure.suptitle(fill(text, int(12 * figure.get_figwidth())), fontsize=10.0)
 
 
 def _look(name: str, field: Floats) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import AfterValidator, Field
 
-from fastmech.basins.disturbed import DisturbedEnsemble, disturb
+from fastmech.basins.disturbed import MOST_RADIUS, DisturbedEnsemble, disturb
 from fastmech.basins.label import require_damper
 from fastmech.basins.steps import method_for, shortest_step
 from fastmech.disturbance.motion import require_constant_force, require_isolated
@@ -66,12 +66,14 @@ class Disturbed(TiledScan):
 
     kind: ClassVar[str] = "disturbed"
 
-    axes: Annotated[dict[str, Axis], Field(max_length=3), AfterValidator(known_parameters)] = Field(
+    axes: Annotated[dict[str, Axis], AfterValidator(known_parameters)] = Field(
         default={}, description="parameters over which all equilibria are disturbed; none: the scene's alone"
     )
 
     trajectories: Annotated[int, Field(ge=1, le=100_000_000)] = 4096
-    radius: Annotated[float, Field(gt=0, description="largest size of a disturbance [rad]")] = 0.5
+    radius: Annotated[
+        float, Field(gt=0, le=MOST_RADIUS, description="largest size of a disturbance [rad]")
+    ] = 0.5
     return_radius: Annotated[float, Field(gt=0, description="radius of the ball of return [rad]")] = 0.01
     seed: Seed = 0
     t_end: Annotated[float, Field(gt=0)] = 120.0

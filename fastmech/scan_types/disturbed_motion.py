@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from fastmech.basins.disturbed import MOST_RADIUS
 from fastmech.basins.steps import highest_frequency
 from fastmech.disturbance.motion import (
     PHASE,
@@ -38,15 +39,18 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
+Size = Annotated[float, Field(ge=-MOST_RADIUS, le=MOST_RADIUS)]
+
+
 class DisturbedMotionScan(TiledScan):
     """The same disturbance of every equilibrium; the default is the paper's: xi1 = 0.1, eta1 = 0.1."""
 
     kind: ClassVar[str] = "disturbed_motion"
 
-    xi_phi: float = Field(default=0.1, description="disturbance of phi [rad]")
-    xi_theta: float = Field(default=0.0, description="disturbance of theta [rad]")
-    eta_phi: float = Field(default=0.1, description="disturbance of phi' [rad/s]")
-    eta_theta: float = Field(default=0.0, description="disturbance of theta' [rad/s]")
+    xi_phi: Size = Field(default=0.1, description="disturbance of phi [rad]")
+    xi_theta: Size = Field(default=0.0, description="disturbance of theta [rad]")
+    eta_phi: Size = Field(default=0.1, description="disturbance of phi' [rad/s]")
+    eta_theta: Size = Field(default=0.0, description="disturbance of theta' [rad/s]")
     t_end: Annotated[float, Field(gt=0)] = 20.0
     outputs: Annotated[int, Field(ge=2, le=10_000_000)] = 1001
     dt: Annotated[float | None, Field(gt=0)] = Field(

@@ -46,7 +46,9 @@ SHEET_NUMBERS, POINT_NUMBERS = 3, 250
 
 
 def known_parameters(axes: dict[str, Axis]) -> dict[str, Axis]:
-    """Refuse axes that are no parameters of a scene."""
+    """Refuse axes that are no parameters of a scene, or too many."""
+    if len(axes) > 3:
+        raise ValueError("must be three axes at most")
     for name in axes:
         if name not in Scene.model_fields:
             raise ValueError(f"unknown parameter {shown(name)}; {nearest(name, list(Scene.model_fields))}")
@@ -66,7 +68,7 @@ class EquilibriumMap(TiledScan):
 
     kind: ClassVar[str] = "equilibrium_map"
 
-    axes: Annotated[dict[str, Axis], Field(min_length=1, max_length=3), AfterValidator(known_parameters)]
+    axes: Annotated[dict[str, Axis], Field(min_length=1), AfterValidator(known_parameters)]
     variables: Annotated[list[str], AfterValidator(_known_variables)] | None = Field(
         None, description="what to keep of every point (all by default); large maps are smaller with less"
     )
