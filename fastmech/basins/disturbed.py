@@ -274,8 +274,8 @@ def disturb(
     for kind, told in _BY_LABEL.items():
         outcome[ends.status == kind] = told
     outcome[(ends.well == index) & ~ends.turns.any(axis=1)] = Outcome.RETURNED
-    for reached, told in _BY_RUN.items():
-        outcome[status == reached] = told
+    for seen, told in _BY_RUN.items():
+        outcome[status == seen] = told
     failing = np.isin(outcome, FAILURES)
     last_outside = records[LAST_OUTSIDE]
     left = (size(starts - center) > return_radius) | (last_outside > 0.0)

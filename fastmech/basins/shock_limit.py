@@ -149,7 +149,7 @@ def shock_limit(
     amplitudes = certificate.amplitudes * unit(scene)
     # Where rounding leaves nothing of the depth, the search begins where rounding ends.
     low, high = max(depth, ROUNDING * amplitudes), ENERGY * amplitudes
-    everywhere = angle is None and moves.least > 0.0
+    everywhere = angle is None and bool(moves.least > 0.0)
     search = _Search(scene, place, rates_after(scene, place[:2], on, np.eye(2)), t_end, threads, everywhere)
     if search.own < 0:
         return replace(alone, undecided_from=proved.impulse, trajectories=1)
@@ -254,18 +254,18 @@ class _Search:
         while between and apart > TOLERANCE:
             sides = between * np.arange(-SIDES, SIDES + 1) / SIDES
             shares = 1.0 - apart * np.arange(1, SIZES + 1) / SIZES
-            before = self.size, self.angle
+            size, angle = self.size, self.angle
             grid = np.meshgrid(self.angle + sides, self.size * shares)
             self.ends(grid[0].ravel(), grid[1].ravel(), SUBSTEPS[:2])
-            if self.size > (1.0 - 0.9 * apart) * before[0]:  # else it goes on down
+            if self.size > (1.0 - 0.9 * apart) * size:  # else it goes on down
                 apart /= 3.0
-            if abs(self.angle - before[1]) < 0.9 * between:
+            if abs(math.remainder(self.angle - angle, 2.0 * math.pi)) < 0.9 * between:
                 between /= 2.0
         apart = max(apart, 10.0 * TOLERANCE)
         while apart > (TOLERANCE if self.everywhere else ALONE_TOLERANCE):
-            sizes, before = self.size * (1.0 - apart * np.arange(1, LINE + 1) / LINE), self.size
+            sizes, size = self.size * (1.0 - apart * np.arange(1, LINE + 1) / LINE), self.size
             self.ends(np.full(LINE, self.angle), sizes, SUBSTEPS)
-            if self.size > (1.0 - 0.9 * apart) * before:
+            if self.size > (1.0 - 0.9 * apart) * size:
                 apart *= 2.0 / LINE
 
 

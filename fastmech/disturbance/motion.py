@@ -101,7 +101,7 @@ def damped_times(scene: Scene, method: str, until: float, ratio: float = 2.0) ->
         return np.zeros(0)
     first = (ratio - 1.0) * LAYER / rate
     number = int(np.ceil(np.log1p((ratio - 1.0) * until / first) / np.log(ratio)))
-    return first * (ratio ** np.arange(1, number) - 1.0) / (ratio - 1.0)
+    return np.asarray(first * (ratio ** np.arange(1, number) - 1.0) / (ratio - 1.0), dtype=np.float64)
 
 
 def require_constant_force(scene: Scene) -> None:

@@ -142,14 +142,15 @@ def _lines(view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[s
     if any(_untold(view, int(sheet)).any() for sheet in sheets):
         panels[0].plot([], [], UNTOLD, color="black", label=ABOUT_UNTOLD)
     legend_below(figure, panels[0], 2)
-    band = "; band: 95 % Wilson interval, undecided ones as none or all" if name == "share_returned" else ""
+    band = "\nband: 95 % Wilson interval, undecided ones as none or all" if name == "share_returned" else ""
     _title(figure, _setting(view) + band)
     return figure
 
 
 def _title(figure: Figure, text: str) -> None:
     """Over all panels, in as many lines as it takes."""
-    figure.suptitle(fill(text, int(12 * figure.get_figwidth())), fontsize=10.0)
+    width = int(12 * figure.get_figwidth())
+    figure.suptitle("\n".join(fill(line, width) for line in text.splitlines()), fontsize=10.0)
 
 
 def _look(name: str, field: Floats) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import Any
 from fastmech.errors import InputError, shown
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import potential_gradient, unit
-from fastmech.scene import require_scene
+from fastmech.scene import require_scene as require_scene
 
 #: What an equilibrium has: its place, its proof and its force.
 ENTRIES = ("phi", "theta", "morse_index", "radius", "force")
