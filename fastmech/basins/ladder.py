@@ -153,12 +153,7 @@ def _away(states: Floats, place: Floats) -> Floats:
 
 
 def lingering(
-    certificate: Certificate,
-    starts: Floats,
-    t_end: float,
-    dt: float,
-    method: str,
-    threads: int | None,
+    certificate: Certificate, starts: Floats, t_end: float, dt: float, method: str, threads: int | None
 ) -> NDArray[np.bool_]:
     """Which motions from ``starts`` (n, 4) come to an unstable equilibrium by ``t_end`` [s]."""
     times = np.linspace(0.0, t_end, math.ceil(t_end / LOOK) + 1)
@@ -169,12 +164,7 @@ def lingering(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", StepWarning)
             run = integrate(
-                certificate.scene,
-                starts[some],
-                dt=dt,
-                method=method,
-                t_eval=times,
-                threads=threads,
+                certificate.scene, starts[some], dt=dt, method=method, t_eval=times, threads=threads
             )
         near = near_saddle(certificate, run.y.reshape(-1, 4)).reshape(times.size, -1)
         found[some] = near.any(axis=0)

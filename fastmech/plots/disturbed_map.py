@@ -40,10 +40,7 @@ def draw_disturbed_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[str
     share = _percent(view, "share_returned")
     time = view.data("time_to_return_quantile").astype(np.float64)
     rows = {
-        "share_returned": (
-            stable,
-            [("proved to return", share, "share that returns [%]")],
-        ),
+        "share_returned": (stable, [("proved to return", share, "share that returns [%]")]),
         "time_to_return": (
             stable,
             [

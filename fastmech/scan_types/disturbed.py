@@ -18,17 +18,9 @@ from fastmech.errors import InputError, shown
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
 from fastmech.results import Dataset
-from fastmech.scan_types.axis import (
-    Axis,
-    arrays,
-    check_duration,
-    check_parameters,
-    check_size,
-    check_steps,
-)
-from fastmech.scan_types.disturbed_layout import TRAJECTORY_VARIABLES
+from fastmech.scan_types.axis import Axis, arrays, check_duration, check_parameters, check_size, check_steps
 from fastmech.scan_types.disturbed_map import MOST_POINTS, MOST_TRAJECTORIES, DisturbedMap
-from fastmech.scan_types.disturbed_tiling import DisturbedTiling
+from fastmech.scan_types.disturbed_tiling import TRAJECTORY_VARIABLES, DisturbedTiling
 from fastmech.scan_types.equilibrium_map import known_parameters
 from fastmech.scan_types.request import Seed, TiledScan, UsualMethod
 from fastmech.scan_types.tiling import RunContext, Tiling

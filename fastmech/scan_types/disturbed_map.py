@@ -19,7 +19,7 @@ from fastmech.ensembles.status import failure_counts
 from fastmech.equilibria.find import Equilibrium, find_equilibria
 from fastmech.errors import InputError
 from fastmech.results import Dataset, Variable, numbers
-from fastmech.scan_types.disturbed_layout import ABOUT_QUANTILES, ABOUT_SHARES, QUANTILE, QUANTILES
+from fastmech.scan_types.disturbed_tiling import ABOUT_QUANTILES, ABOUT_SHARES, QUANTILE, QUANTILES
 from fastmech.scan_types.request import counted_failures
 from fastmech.scan_types.tally import Tally
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling

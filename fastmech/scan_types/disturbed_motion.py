@@ -27,9 +27,8 @@ from fastmech.equilibria.search import MOST
 from fastmech.mechanism.coefficients import reduce
 from fastmech.results import STATE_UNITS, Dataset, Variable, numbers, parts
 from fastmech.scan_types.axis import check_steps
-from fastmech.scan_types.each import Each
 from fastmech.scan_types.request import HALVING, TiledScan, UsualMethod, failures
-from fastmech.scan_types.tiling import Tiling
+from fastmech.scan_types.tiling import Each, Tiling
 from fastmech.scene import Scene
 from fastmech.step_limits.warning import step_warning
 
