@@ -202,7 +202,7 @@ def _estimated(
         )
     found = choose(sample, tol, TYPICAL if quantile == 1.0 else quantile, method, truth)
     if quantile < 1.0:
-        return _once(case, who, found, (tol, quantile), progress, known=truth is not None)
+        return _once(case, who, (members, found), (tol, quantile), progress, known=truth is not None)
     runs = Runs(case, who, found.settings, tol)
     runs.twice(progress)
     runs.calibrate(members, found)
@@ -214,7 +214,7 @@ def _estimated(
 def _once(
     case: Case,
     who: Members,
-    found: Chosen,
+    chosen: tuple[Members, Chosen],
     wanted: tuple[float, float],
     progress: Progress | None,
     known: bool,
@@ -223,13 +223,16 @@ def _once(
 
     ``known``: the reference does not come from runs with shorter steps, and only it tells errors.
     """
-    (tol, quantile), settings = wanted, found.settings
+    (tol, quantile), (members, found) = wanted, chosen
+    settings = found.settings
     pilot, p = _sample(case, who, PILOT), settings.method.order
     part, n = case.part(pilot), pilot.size
     best: tuple[float, Runs] | None = None
     for _ in range(1 if known else PILOTS):
         runs = Runs(part, np.arange(n), settings, tol)
         runs.twice(None)
+        if np.array_equal(members, pilot):
+            runs.calibrate(np.arange(n), found)
         far = np.argsort(-runs.error, kind="stable")[: math.ceil(TAIL * (1.0 - quantile) * n)]
         if far.size <= n // 4:
             runs.measure(np.sort(far))
@@ -314,7 +317,7 @@ class Runs:
         self.error[self.who] = self.share * self.apart[self.who]
 
     def calibrate(self, members: Members, found: Chosen) -> None:
-        """The ratio of errors to distances from a sample whose errors are known."""
+        """The errors of a sample, which are known, and from it the ratio of errors to distances."""
         assert found.trial.truth is not None
         known = found.trial.doubt <= self.tol
         right = distances(part_of(self.kept, members), found.trial.truth)[known]
@@ -326,6 +329,8 @@ class Runs:
             self.share = min(max(seen, self.share / AS_SAID), 1.0)
             self.bound = min(SAFE * float(np.max(right[far] / apart[far])), 1.0)
             self.error[self.who] = self.share * self.apart[self.who]
+        self.error[members[known]] = right
+        self.measured[members[known]] = right <= KEPT * self.tol
 
     def settle(self) -> str:
         """Run those again whose errors may exceed the tolerance; what is said about those that do.

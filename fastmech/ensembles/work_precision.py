@@ -197,7 +197,7 @@ class Trial:
         Where nothing converges, or another method's reference is there, no run of more than :data:`CHEAP`
         operations begins. What is kept is the run in which most trajectories have converged.
         """
-        goal, p, n = REFERRED * self.tol, method.order, max(len(self.case.starts), 1)
+        goal, p, n = REFERRED * self.tol, method.order, max(len(self.case.starts), PROBE)
         kept = int(np.count_nonzero(self.doubt <= goal)) if self.refers else -1
         dt, before, vain, ratio = min(dt, self.longest), math.inf, 0, RATIO
         if self.refers is not None and n * self.work(method, dt) > CHEAP:
@@ -206,16 +206,17 @@ class Trial:
         while not vain or n * self.work(method, dt / ratio) <= CHEAP:
             dt /= ratio
             finer = self.run(method, dt)
-            doubt = error_of_finer(distances(last, finer), ratio, p)
+            distance = distances(last, finer)
+            doubt, apart = error_of_finer(distance, ratio, p), order_statistic(distance, self.level)
             found, settled = order_statistic(doubt, self.level), int(np.count_nonzero(doubt <= goal))
-            if settled > kept or (settled == kept and found < before):
+            if settled > kept or (settled == kept and apart < before):
                 self.truth, self.doubt, self.refers, kept = finer, doubt, (method, dt), settled
-            if found <= goal or (found < ROUNDING and found > 0.5 * before):
+            if found <= goal or (apart < ROUNDING and apart > 0.5 * before):
                 return True
-            vain = vain + 1 if not found <= 0.5 * before else 0
+            vain = vain + 1 if not apart <= 0.5 * before else 0
             if vain >= (VAIN if np.isfinite(found) else 2 * VAIN):
                 break
-            before, last, ratio = found, finer, LEAP
+            before, last, ratio = apart, finer, LEAP
             if np.isfinite(found):
                 ratio = RATIO if vain else min(max((found / goal) ** (1.0 / p) * 1.05, RATIO), LEAP)
         return False
@@ -240,7 +241,7 @@ class Trial:
             else:
                 vain = vain + 1 if good is None and bad < math.inf and found > 0.5 * before else 0
                 before, bad = found, min(bad, dt)
-                dear = len(self.case.starts) * self.work(method, dt) > CHEAP
+                dear = max(len(self.case.starts), PROBE) * self.work(method, dt) > CHEAP
                 if vain > (not dear) or (good is not None and bad <= 1.2 * good[0]):
                     break
                 dt *= 1.0 / RATIO if vain else min(wanted, 0.9)
@@ -332,7 +333,7 @@ def _points(probe: Trial, asked: Method | None) -> list[Point]:
         return [Point(base, dt, math.inf, probe.work(base, dt), False)]
     base, step = probe.refers[0], probe.nearest()
     if asked is not None:
-        equal = 1.0 if base is asked else probe.work(asked, step) / probe.work(base, step)
+        equal = 1.0 if base is asked else probe.work(asked, step) / max(probe.work(base, step), 1.0)
         return [probe.tune(asked, step * equal, 0.5 * NEAR)]
     points = [probe.tune(base, step, 0.5 * NEAR)]
     best = probe.predicted(points[0])
@@ -344,7 +345,7 @@ def _points(probe: Trial, asked: Method | None) -> list[Point]:
     for name in next(names for above, names in TRIED if probe.tol < above) if best.good else ():
         method = find_method(name)
         # With as much work as the reference's method, to begin with.
-        equal = probe.work(method, best.dt) / best.work
+        equal = probe.work(method, best.dt) / max(best.work, 1.0)
         points.append(probe.predicted(probe.tune(method, best.dt * equal, 0.5 * NEAR)))
     return points
 

@@ -30,7 +30,6 @@ from fastmech.kernels.whole_steps import whole_step
 from fastmech.kernels.work import lagrange_work
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
-from fastmech.step_limits.verdicts import judge_states
 
 pytestmark = pytest.mark.skipif(
     not llvm.get_host_cpu_features().get("fma", False),
@@ -102,7 +101,7 @@ def test_machine_code_of_the_loop(name: str) -> None:
         assert not re.search(r"\bcall", loop)
 
 
-@pytest.mark.parametrize("shipped", [tell_broken, highest_energies, judge_states])
+@pytest.mark.parametrize("shipped", [tell_broken, highest_energies])
 def test_passes_over_trajectories_are_packed(shipped: Any) -> None:
     """Their trigonometry is a loop of its own."""
     code = intermediate(shipped)
