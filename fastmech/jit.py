@@ -208,6 +208,12 @@ def kernel(signature: Any, **options: Any) -> Callable[[F], Any]:
     return decorate
 
 
+def interpreted(function: F) -> F:
+    """The Python function of a kernel: the same arithmetic but for fused products, with nothing to compile."""
+    plain: F = getattr(function, "py_func", function)
+    return plain
+
+
 def inlined(function: F) -> F:
     """Make a small scalar function callable from kernels; in Python it stays the plain function.
 
@@ -247,7 +253,7 @@ def _multiply_add(a: Any, b: Any, c: Any) -> Any:
 
 def single(shipped: Any, signature: Any) -> Any:
     """The same source as a kernel's, compiled for lanes of float32."""
-    return kernel(signature)(getattr(shipped, "py_func", shipped))
+    return kernel(signature)(interpreted(shipped))
 
 
 def by_precision(double: F, single: F) -> F:

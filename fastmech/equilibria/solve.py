@@ -121,10 +121,12 @@ def solve(
     """
     at_phi, at_theta, at_radius = np.empty(LAPS), np.empty(LAPS), np.empty(LAPS)
     for row in range(coefficients.shape[0]):
-        phi[row], theta[row], energy[row], radius[row] = np.nan, np.nan, np.nan, np.nan
-        index[row] = NO_EQUILIBRIUM
+        for i in range(MOST):
+            phi[row, i], theta[row, i], energy[row, i], radius[row, i] = np.nan, np.nan, np.nan, np.nan
+            index[row, i] = NO_EQUILIBRIUM
         count[row], expected[row], outcome[row], margin[row] = 0, 0, UNPROVED, np.nan
-        mass, _, lift, spring, gravity, force, _, _ = coefficients[row]
+        mass, lift, spring = coefficients[row, 0], coefficients[row, 2], coefficients[row, 3]
+        gravity, force = coefficients[row, 4], coefficients[row, 5]
         p = pulls(mass, lift, spring, gravity, force)
         if not np.isfinite(lift + spring + gravity + force):
             continue
@@ -145,11 +147,10 @@ def solve(
             outcome[row] = certify(p, n, found, at_phi, at_theta, at_radius)
         if outcome[row] == AT_FOLD:
             found = min(MOST, merge_singular(p, n.error, found, at_phi, at_theta, at_radius))
-        phi[row, :found], theta[row, :found] = at_phi[:found], at_theta[:found]
-        radius[row, :found] = at_radius[:found]
         scale = max(np.hypot(lift, force), np.hypot(gravity, force), spring)
         for i in range(found):
-            energy[row, i] = scale * energy_at(p, phi[row, i], theta[row, i])
+            phi[row, i], theta[row, i], radius[row, i] = at_phi[i], at_theta[i], at_radius[i]
+            energy[row, i] = scale * energy_at(p, at_phi[i], at_theta[i])
         sort_by_energy(found, energy[row], phi[row], theta[row], radius[row])
         for i in range(found):
             index[row, i] = morse_index(p, phi[row, i], theta[row, i], radius[row, i])
