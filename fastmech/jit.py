@@ -18,12 +18,13 @@ from typing import Any, TypeVar
 
 import numpy as np
 from llvmlite import ir
-from numba import types
+from numba import njit, types
 from numba.core import config as numba_config
 from numba.core.caching import FunctionCache
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
-from numba.extending import intrinsic, overload, register_jitable
+from numba.core.typing.templates import infer_global
+from numba.extending import intrinsic, overload
 
 from fastmech.callee import CalleeType
 from fastmech.interrupts import check
@@ -33,8 +34,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 FLAGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 
-#: Options of what is compiled into its caller.
-INLINED: Any = {"forceinline": True, **FLAGS}
+#: Options of what is compiled into its caller: neither C nor Python calls it by itself.
+INLINED: Any = {"forceinline": True, "no_cfunc_wrapper": True, "no_cpython_wrapper": True, **FLAGS}
 
 VECTOR = types.Array(types.float64, 1, "C")
 MATRIX = types.Array(types.float64, 2, "C")
@@ -201,7 +202,10 @@ def kernel(signature: Any, **options: Any) -> Callable[[F], Any]:
         settings: Any = numba_config
         if settings.DISABLE_JIT:
             return function
-        made = Kernel(function, targetoptions={"nopython": True, "nogil": True, **FLAGS, **options})
+        made = Kernel(
+            function,
+            targetoptions={"nopython": True, "nogil": True, "no_cfunc_wrapper": True, **FLAGS, **options},
+        )
         made.declared = signature
         return made
 
@@ -209,18 +213,24 @@ def kernel(signature: Any, **options: Any) -> Callable[[F], Any]:
 
 
 def interpreted(function: F) -> F:
-    """The Python function of a kernel: the same arithmetic but for fused products, with nothing to compile."""
+    """The Python function of a kernel: the same arithmetic but for fused products."""
     plain: F = getattr(function, "py_func", function)
     return plain
 
 
-def inlined(function: F) -> F:
-    """Make a small scalar function callable from kernels; in Python it stays the plain function.
+#: Keeps what ``inlined`` has made: numba's types only refer to it.
+_parts: list[Any] = []
 
-    The same source therefore serves compiled lanes and NumPy arrays.
+
+def inlined(function: F) -> F:
+    """Make a small function callable from kernels; in Python it stays the plain function.
+
+    The same source therefore serves compiled lanes and NumPy arrays. It is compiled once for its arguments'
+    types: numba's ``register_jitable`` does so for kernels and for inlined functions apart.
     """
-    jitable: F = register_jitable(forceinline=True, **FLAGS)(function)
-    return jitable
+    _parts.append(njit(**INLINED)(function))
+    infer_global(function, types.Dispatcher(_parts[-1]))
+    return function
 
 
 def _fuse(typingctx: Any, a: Any, b: Any, c: Any) -> Any:

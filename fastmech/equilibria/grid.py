@@ -24,8 +24,8 @@ _HALVED = 0.5 ** np.arange(53)[:, None]
 def grid_search(lift: float, spring: float, gravity: float, force: float, starts: int = STARTS) -> Floats:
     """Equilibria that Newton's method reaches from a grid of ``starts`` x ``starts``, (count, 2) [rad].
 
-    Angles are in (-pi, pi], duplicates on the torus merged. All starts go on together, as arrays: one scene is
-    searched long before a kernel would be compiled.
+    Angles are in (-pi, pi], duplicates on the torus merged. All starts go on together, as arrays: one
+    scene is searched long before a kernel would be compiled.
     """
     angles = -np.pi + 2.0 * np.pi * (np.arange(starts) + 0.5) / starts
     places = np.stack([np.repeat(angles, starts), np.tile(angles, starts)])
