@@ -5,6 +5,10 @@ division is a branch that may raise). Of the fast-math flags only ``contract`` i
 may fuse, nothing may be reordered, and NaN and infinity keep their meaning because statuses are decided
 by them.
 
+Vectors. LLVM prefers 256 bit on Intel's processors with AVX-512, as if wide registers slowed the clock. Loops
+over lanes are arithmetic from end to end, for which 512 bit are faster all the same: kernels ask for them by
+an attribute of their own functions, which changes nothing else in a process, nor anything without AVX-512.
+
 Laziness. A kernel is loaded from the disk, or compiled, at its first use and not when its module is imported:
 a process pays for the kernels that it calls. ``listeners`` are told which one is being made.
 """
@@ -21,8 +25,12 @@ from llvmlite import ir
 from numba import njit, types
 from numba.core import config as numba_config
 from numba.core.caching import FunctionCache
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.compiler_machinery import register_pass
+from numba.core.lowering import Lower
 from numba.core.registry import CPUDispatcher
+from numba.core.typed_passes import NativeLowering
 from numba.core.typing.templates import infer_global
 from numba.extending import intrinsic, overload
 
@@ -34,8 +42,36 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 FLAGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 
-#: Options of what is compiled into its caller: neither C nor Python calls it by itself.
-INLINED: Any = {"forceinline": True, "no_cfunc_wrapper": True, "no_cpython_wrapper": True, **FLAGS}
+
+class _WideLower(Lower):
+    """Numba's lowering of a function that prefers 512-bit vectors."""
+
+    def setup_function(self, fndesc: Any) -> None:
+        super().setup_function(fndesc)  # type: ignore[no-untyped-call]
+        set.add(self.function.attributes, '"prefer-vector-width"="512"')
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _WideLowering(NativeLowering):
+    _name = "wide_lowering"
+    lowering_class = _WideLower
+
+
+class _WideCompiler(CompilerBase):
+    """Numba's compiler with that lowering."""
+
+    def define_pipelines(self) -> list[Any]:
+        made = DefaultPassBuilder.define_nopython_pipeline(self.state)  # type: ignore[no-untyped-call]
+        made.passes = [(_WideLowering if step is NativeLowering else step, why) for step, why in made.passes]
+        made.finalize()
+        return [made]
+
+
+#: Options of kernels: C does not call them by numba's wrapper, see :mod:`fastmech.callee`.
+KERNEL: Any = {"no_cfunc_wrapper": True, "pipeline_class": _WideCompiler, **FLAGS}
+
+#: Options of what is compiled into its caller; its loops become vectors before it gets there.
+INLINED: Any = {"forceinline": True, "no_cpython_wrapper": True, **KERNEL}
 
 VECTOR = types.Array(types.float64, 1, "C")
 MATRIX = types.Array(types.float64, 2, "C")
@@ -202,14 +238,23 @@ def kernel(signature: Any, **options: Any) -> Callable[[F], Any]:
         settings: Any = numba_config
         if settings.DISABLE_JIT:
             return function
-        made = Kernel(
-            function,
-            targetoptions={"nopython": True, "nogil": True, "no_cfunc_wrapper": True, **FLAGS, **options},
-        )
+        made = _new(function, options)
         made.declared = signature
         return made
 
     return decorate
+
+
+def _new(function: Any, options: dict[str, Any]) -> Kernel:
+    options = {"nopython": True, "nogil": True, **KERNEL, **options}
+    return Kernel(function, pipeline_class=options.pop("pipeline_class"), targetoptions=options)
+
+
+def compiled_anew(function: Any, signature: Any = None) -> Any:
+    """A kernel, or a function of a signature, compiled in this process: what was kept shows no code."""
+    anew = _new(interpreted(function), {})
+    anew.compile(function.signatures[0] if signature is None else signature)
+    return anew
 
 
 def interpreted(function: F) -> F:
