@@ -18,6 +18,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from functools import wraps
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -36,7 +37,7 @@ from numba.extending import intrinsic, overload
 
 from fastmech.callee import CalleeType
 from fastmech.interrupts import check
-from fastmech.kernel_cache import cache_directory, sources_unchanged
+from fastmech.kernel_cache import alone, cache_directory, sources_unchanged
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -169,6 +170,11 @@ class _Kept(FunctionCache):
             finally:
                 settings.CACHE_DIR = previous
 
+    @property
+    def made_by(self) -> Path:
+        """The file that is held by the process that loads or compiles this kernel."""
+        return Path(self._cache_path, f"{self._impl.filename_base}.lock")
+
     def save_overload(self, sig: Any, data: Any) -> None:
         if sources_unchanged():
             super().save_overload(sig, data)  # type: ignore[no-untyped-call]
@@ -177,9 +183,14 @@ class _Kept(FunctionCache):
 #: Told the name of every kernel before it is loaded or compiled, and None when it is there.
 listeners: list[Callable[[str | None], None]] = []
 
+#: Names of the kernels that this process has compiled; the others were on disk.
+compiled: list[str] = []
+
 
 class Kernel(CPUDispatcher):
     """A function compiled for one explicit signature, which is loaded from the disk or made at its first use.
+
+    Where other processes need it too, one compiles it and they wait to load it.
 
     A use is a call, a call of it in another kernel that is being made, and handing it to a kernel as a
     :func:`fastmech.callee.callee`. Importing a module with kernels costs nothing of that.
@@ -204,8 +215,11 @@ class Kernel(CPUDispatcher):
                 return
             for tell in listeners:
                 tell(self.py_func.__name__)
-            self._cache = _Kept.of(self.py_func)
-            self.compile(signature)
+            self._cache = kept = _Kept.of(self.py_func)
+            with alone(kept.made_by):
+                self.compile(signature)
+            if self._cache_misses:
+                compiled.append(self.py_func.__name__)
             self.disable_compile()
             self.declared = None
         for tell in listeners:

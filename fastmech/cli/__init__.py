@@ -28,6 +28,7 @@ COMMANDS = (
     "paper",
     "hardcases",
     "bench",
+    "warmup",
     "faults",
 )
 
