@@ -52,7 +52,7 @@ class _WideLower(Lower):
         set.add(self.function.attributes, '"prefer-vector-width"="512"')
 
 
-@register_pass(mutates_CFG=True, analysis_only=False)
+@register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[no-untyped-call]
 class _WideLowering(NativeLowering):
     _name = "wide_lowering"
     lowering_class = _WideLower
@@ -218,7 +218,7 @@ class Kernel(CPUDispatcher):
             self._cache = kept = _Kept.of(self.py_func)
             with alone(kept.made_by):
                 self.compile(signature)
-            if self._cache_misses:
+            if self.stats.cache_misses:
                 compiled.append(self.py_func.__name__)
             self.disable_compile()
             self.declared = None
@@ -288,7 +288,7 @@ def inlined(function: F) -> F:
     types: numba's ``register_jitable`` does so for kernels and for inlined functions apart.
     """
     _parts.append(njit(**INLINED)(function))
-    infer_global(function, types.Dispatcher(_parts[-1]))
+    infer_global(function, types.Dispatcher(_parts[-1]))  # type: ignore[no-untyped-call]
     return function
 
 

@@ -84,7 +84,7 @@ def newton_with_line_search(
 
 
 def _gradient(s: Floats, c: Floats, loads: tuple[float, float, float, float]) -> Floats:
-    return np.stack(potential_gradient(*_each(s, c), c[0] * c[1] - s[0] * s[1], *loads))  # type: ignore[arg-type]
+    return np.stack(potential_gradient(*_each(s, c), c[0] * c[1] - s[0] * s[1], *loads))
 
 
 def _each(s: Floats, c: Floats) -> tuple[Floats, Floats, Floats, Floats]:
