@@ -140,7 +140,7 @@ def find_equilibria(scene: Scene, at: float = math.inf) -> Equilibria:
     require_scene(scene)
     frozen = frozen_force(scene, at)
     coefficients = reduce(scene)._replace(force=frozen / (scene.m2 * scene.l))
-    solution = solve_rows(np.array([coefficients]))
+    solution = solve_rows(np.array([coefficients]), compiled=False)
     outcome, count = Outcome(int(solution.outcome[0])), int(solution.count[0])
     evidence = gather(
         coefficients, solution.phi[0, :count], solution.theta[0, :count], solution.radius[0, :count]

@@ -7,7 +7,6 @@ from fractions import Fraction
 from math import factorial
 
 import llvmlite.binding as llvm
-import numba
 import numpy as np
 import pytest
 from integrators.driving import A, W, counting, drive, observe_times, rotation
@@ -18,7 +17,7 @@ from fastmech.integrators.method import Adams
 from fastmech.integrators.methods import METHODS
 from fastmech.integrators.multistep_weights import bashforth, moulton
 from fastmech.integrators.sums import TERMS_OF_TWO, add_two_sums
-from fastmech.jit import FLAGS, INTEGERS, MATRIX, RHS_SIGNATURE, VECTOR, kernel
+from fastmech.jit import INTEGERS, MATRIX, RHS_SIGNATURE, VECTOR, compiled_anew, kernel
 
 ADAMS = {name: method for name, method in METHODS.items() if isinstance(method, Adams)}
 EVERY_ADAMS = pytest.mark.parametrize("name", ADAMS)
@@ -166,7 +165,7 @@ def test_stability_intervals_end_where_the_registry_says(name: str, limit: float
 def test_history_sums_are_packed() -> None:
     """A pass of one row, of two and so on to the widest, each for two sums."""
     arguments = (*[VECTOR] * 3, MATRIX, float64, INTEGERS, VECTOR, VECTOR)
-    compiled = numba.njit(arguments, nogil=True, **FLAGS)(add_two_sums)
+    compiled = compiled_anew(add_two_sums, arguments)
     code = "".join(compiled.inspect_asm().values())
     assert len(re.findall(r"\bv(?:f?n?m(?:add|sub)\d*|mul)\w*pd\s.*%[yz]mm", code)) >= 2 * sum(
         range(1, len(TERMS_OF_TWO) + 1)

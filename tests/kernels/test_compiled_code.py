@@ -10,12 +10,12 @@ from functools import cache
 from typing import Any
 
 import llvmlite.binding as llvm
-import numba
 import numpy as np
 import pytest
 from kernels.blocks_of_lanes import COMBINATIONS, MODULES, kernel, lanes
 from numba import float64, int64, none
 
+from fastmech import jit
 from fastmech.ensembles.energies import tell_broken
 from fastmech.ensembles.highest import highest_energies
 from fastmech.integrators.method import Adams
@@ -23,7 +23,7 @@ from fastmech.integrators.methods import METHODS as REGISTRY
 from fastmech.integrators.sums import TERMS, add_stages
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.integrators.whole import IN_WHOLE_STEPS
-from fastmech.jit import FLAGS, INTEGERS, MATRIX, VECTOR
+from fastmech.jit import INTEGERS, MATRIX, VECTOR
 from fastmech.kernels.blocks import DAMPING, DECAY, FORCE
 from fastmech.kernels.whole_adams import whole_adams_steps
 from fastmech.kernels.whole_steps import whole_step
@@ -59,8 +59,7 @@ LIBRARY = re.compile(r"@(?:llvm\.)?(?:sin|cos|sincos|tan|exp|pow)\b")
 @cache
 def compiled_anew(shipped: Any) -> Any:
     """The kernel compiled in this process: numba shows no code of what it loaded from the disk cache."""
-    (signature,) = shipped.signatures
-    return numba.njit(signature, nogil=True, **FLAGS)(shipped.py_func)
+    return jit.compiled_anew(shipped)
 
 
 def intermediate(shipped: Any) -> str:
@@ -114,7 +113,7 @@ def test_passes_over_trajectories_are_packed(shipped: Any) -> None:
 def test_stage_sums_are_packed(start: Any) -> None:
     """A pass of one term, of two and so on to the widest; the second pass of a wide sum adds to the first."""
     arguments = (VECTOR, start, MATRIX, float64, INTEGERS, VECTOR, int64, int64)
-    compiled = numba.njit(arguments, nogil=True, **FLAGS)(add_stages)
+    compiled = jit.compiled_anew(add_stages, arguments)
     assert len(PACKED.findall("".join(compiled.inspect_asm().values()))) >= sum(range(1, len(TERMS) + 1))
 
 
