@@ -69,7 +69,9 @@ def part_of(solution: Solution, who: NDArray[np.int64] | NDArray[np.bool_]) -> S
 
 def put_into(best: Solution, which: NDArray[np.int64], run: Solution) -> None:
     """Put the trajectories of a run into the places ``which`` of a solution."""
-    for old, new in ((best.y, run.y), (best.records, run.records), (best.dt, run.dt)):
+    rows = max(len(best.dt), len(run.dt))
+    best.dt, dt = (np.pad(s.dt, ((0, rows - len(s.dt)), (0, 0)), mode="edge") for s in (best, run))
+    for old, new in ((best.y, run.y), (best.records, run.records), (best.dt, dt)):
         old[:, which] = new
     best.status[which], best.steps[which], best.failed[which] = run.status, run.steps, run.failed
     if best.last is not None or run.last is not None:

@@ -136,11 +136,12 @@ def solve_to_tolerance(
     # None of the runs that follow, whatever their steps, asks again who can be followed.
     begins = starts if usable.all() else np.where(usable[:, None], starts, np.nan)
     who, case = np.flatnonzero(usable), Case(problem, begins, outputs, threads)
-    if not who.size:
+    if not who.size or outputs[-1] == 0.0:
         settings = Settings(find_method(method or REFERENCE), float(outputs[-1]) or 1.0)
         solution = solve(problem, begins, outputs, settings, threads, progress)
-        none = np.full(len(starts), np.inf) if quantile == 1.0 else None
-        estimated = Estimated(solution, settings, "no start has a motion that steps can follow", none, 0.0)
+        none = np.where(usable, 0.0, np.inf) if quantile == 1.0 else None
+        why = "the only output is the start" if who.size else "no start has a motion that steps can follow"
+        estimated = Estimated(solution, settings, why, none, 0.0)
     else:
         estimated = _estimated(case, who, (tol, quantile, method), switches, progress)
     tell_aside(estimated.solution, starts, outputs, finite_rows(starts) & ~usable)
@@ -274,7 +275,6 @@ def _with_others(
     others = np.setdiff1d(np.arange(len(case.starts)), who)
     part, solution = case.part(others), nothing(case.problem, case.outputs.size, *case.starts.shape)
     rest = solve_at(*part[:3], settings, case.threads, progress)
-    solution.dt = np.zeros((max(len(rest.dt), len(done.dt)), len(case.starts)))
     for members, run in ((who, done), (others, rest)):
         put_into(solution, members, run)
     return solution
@@ -329,8 +329,10 @@ class Runs:
             self.share = min(max(seen, self.share / AS_SAID), 1.0)
             self.bound = min(SAFE * float(np.max(right[far] / apart[far])), 1.0)
             self.error[self.who] = self.share * self.apart[self.who]
-        self.error[members[known]] = right
-        self.measured[members[known]] = right <= KEPT * self.tol
+        if found.trial.apart is not None:
+            sure = found.trial.apart[known] <= self.tol
+            self.error[members[known][sure]] = right[sure]
+            self.measured[members[known][sure]] = right[sure] <= KEPT * self.tol
 
     def settle(self) -> str:
         """Run those again whose errors may exceed the tolerance; what is said about those that do.
@@ -382,12 +384,13 @@ class Runs:
         in_vain = ~good & ~(told <= 0.5 * self.before[again])
         self.before[again] = told
         self.vain[again] += in_vain
-        ruled = (told <= RULED * floor) | (in_vain & (told < MAGNIFIED))
+        ruled = (told <= RULED * floor) | ((self.vain[again] > 1) & (told < MAGNIFIED))
         self.rounded[again] |= ~good & ruled
         now = np.where(ruled, told, now)
         bad = again[~good]
         put_into(self.kept, bad, part_of(run, ~good))
-        self.error[bad], self.dt[bad], self.apart[bad] = now[~good], own[~good], apart[~good]
+        self.error[bad], self.dt[bad] = now[~good], own[~good]
+        self.apart[bad] = apart[~good] / self.bound  # of these steps the sample tells nothing
         return True
 
     def _ask_rounding(self, who: Members) -> None:

@@ -33,6 +33,9 @@ Members = NDArray[np.int64]
 #: What gives the reference, and where stability and not accuracy would set its steps.
 REFERENCE, IMPLICIT = "abm10", "radau5"
 
+#: The explicit method with the longest stable steps of high order.
+SINGLE_STEP = "dop853"
+
 #: Methods that are tried beside the reference's, by the tolerance below which they are: high orders pay where
 #: errors are to be small (Hairer, Norsett, Wanner, section II.10).
 TRIED = (
@@ -131,6 +134,7 @@ class Trial:
     fit: tuple[float, ...]
     truth: Solution | None = None
     doubt: Floats = field(default_factory=lambda: np.zeros(0))  #: errors of the reference
+    apart: Floats | None = None  #: its distances from the run before
     refers: tuple[Method, float] | None = None  #: its method and step [s]
     fitted: float = 1.0  #: steps of a trajectory, on average, in those of slow motion
     _runs: dict[tuple[str, float], Solution] = field(default_factory=dict)
@@ -210,7 +214,8 @@ class Trial:
             doubt, apart = error_of_finer(distance, ratio, p), order_statistic(distance, self.level)
             found, settled = order_statistic(doubt, self.level), int(np.count_nonzero(doubt <= goal))
             if settled > kept or (settled == kept and apart < before):
-                self.truth, self.doubt, self.refers, kept = finer, doubt, (method, dt), settled
+                self.truth, self.doubt, self.apart = finer, doubt, distance
+                self.refers, kept = (method, dt), settled
             if found <= goal or (apart < ROUNDING and apart > 0.5 * before):
                 return True
             vain = vain + 1 if not apart <= 0.5 * before else 0
@@ -337,11 +342,14 @@ def _points(probe: Trial, asked: Method | None) -> list[Point]:
         return [probe.tune(asked, step * equal, 0.5 * NEAR)]
     points = [probe.tune(base, step, 0.5 * NEAR)]
     best = probe.predicted(points[0])
+    single_step = find_method(SINGLE_STEP)
     if base is implicit:
-        cheap = limit < math.inf and probe.work(explicit, limit) < best.work
-        return [*points, probe.tune(explicit, limit, 0.5 * NEAR)] if cheap else points
+        limit = math.inf if c is None else explicit_limit(single_step, c) / RATIO
+        cheap = limit < math.inf and probe.work(single_step, limit) < best.work
+        return [*points, probe.tune(single_step, limit, 0.5 * NEAR)] if cheap else points
     if points[0].limited:
-        return [*points, probe.tune(implicit, LEAP * points[0].dt, 0.5 * NEAR)]
+        dt = LEAP * points[0].dt
+        return [*points, *(probe.tune(method, dt, 0.5 * NEAR) for method in (single_step, implicit))]
     for name in next(names for above, names in TRIED if probe.tol < above) if best.good else ():
         method = find_method(name)
         # With as much work as the reference's method, to begin with.
