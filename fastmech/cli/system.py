@@ -12,7 +12,7 @@ from fastmech.cli.vectors import reason
 from fastmech.ensembles.threads import thread_count
 from fastmech.jit import FLAGS
 from fastmech.kernel_cache import cache_directory
-from fastmech.kernels.lagrange import lagrange_damped_constant
+from fastmech.kernels.select import with_terms
 from fastmech.store.provenance import processor_name
 
 LIBRARIES = ("numba", "llvmlite", "numpy", "scipy", "h5py")
@@ -20,8 +20,9 @@ LIBRARIES = ("numba", "llvmlite", "numpy", "scipy", "h5py")
 
 def vector_bits() -> int:
     """Widest registers in the machine code of a shipped right-hand side, compiled here."""
-    (signature,) = lagrange_damped_constant.signatures
-    fresh = numba.njit(signature, nogil=True, **FLAGS)(lagrange_damped_constant.py_func)
+    shipped = with_terms("lagrange", "damped_constant")
+    (signature,) = shipped.signatures
+    fresh = numba.njit(signature, nogil=True, **FLAGS)(shipped.py_func)
     code = "".join(fresh.inspect_asm().values())
     widths = {"zmm": 512, "ymm": 256, "xmm": 128}
     return next((bits for name, bits in widths.items() if re.search(rf"pd\s.*%{name}", code)), 64)

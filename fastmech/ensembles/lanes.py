@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from fastmech.ensembles.spans import Span
 from fastmech.integrators.batch import PHASE, Batch
-from fastmech.integrators.sums import CACHE_LINE
 from fastmech.kernels.blocks import VECTOR_LANES
 
 Floats = NDArray[np.float64]
+
+#: Bytes that processors move at once, and the length of their longest vectors.
+CACHE_LINE = 64
 
 #: Share of the lanes that must have ended before the others move up: moving costs a copy of all.
 WORTH_MOVING = 0.125

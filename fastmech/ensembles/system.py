@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import inspect
 import types
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numba
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from fastmech.ensembles import checks
 from fastmech.ensembles.fingerprint import fingerprint
-from fastmech.ensembles.rebuilding import compiled_callees, raises, reaches, rebuilt
+from fastmech.ensembles.rebuilding import Swaps, compiled_callees, raises, reaches, rebuilt
 from fastmech.ensembles.refusals import explain, reason
 from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
@@ -24,48 +25,15 @@ from fastmech.errors import InputError, shown
 from fastmech.generated import new_module, run_module
 from fastmech.jit import inlined
 from fastmech.kernels.attempt import attempted
+from fastmech.kernels.blocks import Rates, block_kernel
 from fastmech.kernels.sincos import WITHIN
 
-_HEAD = '''"""Made by fastmech: block kernels of {name!r}, whose functions are ``rhs`` and ``stop``.
-
-``rhs_within`` and ``stop_within`` are the same with trigonometry that raises beyond its range.
-"""
+_OBSERVE = '''"""Made by fastmech: watches {name!r} of a user's own system."""
 
 from fastmech.ensembles.stopping import note_stop
-from fastmech.jit import OBSERVER_SIGNATURE, RHS_SIGNATURE, kernel
+from fastmech.jit import OBSERVER_SIGNATURE, kernel
 from fastmech.kernels.attempt import attempt
-from fastmech.kernels.bits import NO_LANE, noted
 
-'''
-
-#: ``+ ()``: only tuples have that, whose length is known before anything runs.
-_TEMPLATE = """
-@kernel(RHS_SIGNATURE)
-def block(t, Y, dY, p):
-    for i in range(Y.shape[1]):
-        ({rates},) = rhs({arguments}) + ()
-{stores}
-"""
-
-#: Lanes whose angles lie beyond the range of the packed trigonometry are done again, one by one: a lane's
-#: result never depends on its neighbours.
-_TEMPLATE_WITHIN = """
-@kernel(RHS_SIGNATURE)
-def block(t, Y, dY, p):
-    beyond = NO_LANE
-    for i in range(Y.shape[1]):
-        raised, ({rates},) = attempt(rhs_within, ({arguments},))
-        beyond = noted(beyond, raised)
-{stores}
-    if beyond:
-        for i in range(Y.shape[1]):
-            raised, ({rates},) = attempt(rhs_within, ({arguments},))
-            if raised:
-                ({rates},) = rhs({arguments}) + ()
-{more_stores}
-"""
-
-_STOP_TEMPLATE = """
 
 @kernel(OBSERVER_SIGNATURE)
 def observe(t, Y, params, record):
@@ -76,7 +44,7 @@ def observe(t, Y, params, record):
     if fresh:
         for i in range(Y.shape[1]):
             note_stop(stop({arguments}) + 0.0, t, Y, record, i)
-"""
+'''
 
 _SWITCHES = '''"""Made by fastmech: notes the decisions of {name!r}."""
 
@@ -129,17 +97,12 @@ class System:
             _check_function("stop", self.stop, state, [])
 
     @property
-    def kernel(self) -> Any:
-        """The compiled block right-hand side."""
-        return self._compiled.block
-
-    @property
     def observation(self) -> Observation:
         """What is watched while the system runs: its stopping condition, if it has one."""
         if self.stop is None:
             return NOTHING
         record = np.zeros(2 + len(self.state))
-        return Observation(self._compiled.observe, np.zeros(0), record, stops=True)
+        return Observation(self._observer, np.zeros(0), record, stops=True)
 
     @cached_property
     def switches(self) -> Any:
@@ -180,51 +143,74 @@ class System:
         return list(inspect.signature(self.rhs).parameters)[1 + len(self.state) :]
 
     @cached_property
-    def _compiled(self) -> types.ModuleType:
-        """The system's kernels, loaded from the disk cache where they are there."""
-        functions: dict[str, Any] = {"rhs": self.rhs} | ({"stop": self.stop} if self.stop else {})
-        for field, function in functions.items():
-            for callee in filter(raises, compiled_callees(function)):
-                raise InputError(
-                    f"{field}: calls {callee.__name__}, which must not raise or assert; "
-                    "nan as a result ends a trajectory"
-                )
-        swaps = {} if numba.config.DISABLE_JIT else WITHIN  # type: ignore[attr-defined]
-        source = self._source(reaches(functions["rhs"], swaps))
-        module = new_module("system", source, [fingerprint(function) for function in functions.values()])
-        for field, function in functions.items():
-            whole = rebuilt(function, module.__name__, {})
-            within = rebuilt(function, module.__name__, swaps)
-            vars(module).update({field: inlined(whole), f"{field}_within": attempted(within)})
-        try:
-            run_module(module, source)
-            for made in (module.block, getattr(module, "observe", module.block)):
-                if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
-                    made.make()
-        except Exception as error:  # numba lets those of the code it looks at pass
-            state, count = list(self.state), 1 + len(self.state)
-            explain(
-                "rhs", rebuilt(functions["rhs"], module.__name__, {}), count + len(self.parameters), state
-            )
-            if self.stop is not None:
-                explain("stop", rebuilt(functions["stop"], module.__name__, {}), count, None)
-            raise InputError(f"rhs or stop: cannot be compiled: {reason(error)}") from None
-        return module
-
-    def _source(self, trigonometry: bool) -> str:
-        """The kernels' text; ``trigonometry``: whether the right-hand side has any that may raise."""
-        dim = len(self.state)
-        states = [f"Y[{d}, i]" for d in range(dim)]
-        given = [f"p[{list(self.parameters).index(name)}, i]" for name in self._parameter_order]
-        stores = [f"        dY[{d}, i] = rate{d}" for d in range(dim)]
-        text = (_HEAD + (_TEMPLATE_WITHIN if trigonometry else _TEMPLATE)).format(
-            name=getattr(self.rhs, "__name__", "rhs"),
-            arguments=", ".join(["t", *states, *given]),
-            rates=", ".join(f"rate{d}" for d in range(dim)),
-            stores="\n".join(stores),
-            more_stores="\n".join(f"        {line}" for line in stores),
+    def rates(self) -> Rates:
+        """What the engine's loops are made from."""
+        dim, names = len(self.state), list(self.parameters)
+        own = tuple(names.index(name) for name in self._parameter_order)
+        return Rates(
+            getattr(self.rhs, "__name__", "rhs"),
+            dim,
+            own,
+            partial(_functions, "rates", self.rhs),
+            (fingerprint(self.rhs),),
+            ranged=reaches(self.rhs, _swaps()),
+            looked_at=dim,
         )
-        return text + (_STOP_TEMPLATE.format(arguments=", ".join(["t", *states])) if self.stop else "")
+
+    @cached_property
+    def kernel(self) -> Any:
+        """The compiled block right-hand side, loaded from the disk cache where it is there."""
+        self._refuse_raising("rhs", self.rhs)
+        with self._explained("rhs", self.rhs, 1 + len(self.state) + len(self.parameters), list(self.state)):
+            made = block_kernel(self.rates)
+            if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+                made.make()
+        return made
+
+    @cached_property
+    def _observer(self) -> Any:
+        """The observer of the stopping condition."""
+        stop: Any = self.stop
+        self._refuse_raising("stop", stop)
+        with self._explained("stop", stop, 1 + len(self.state), None):
+            states = ", ".join(["t", *(f"Y[{d}, i]" for d in range(len(self.state)))])
+            source = _OBSERVE.format(name=stop.__name__, arguments=states)
+            module = new_module("system", source, [fingerprint(stop)])
+            vars(module).update(_functions("stop", stop, module.__name__, "float64"))
+            made = run_module(module, source).observe
+            if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+                made.make()
+        return made
+
+    @staticmethod
+    def _refuse_raising(field: str, function: Any) -> None:
+        for callee in filter(raises, compiled_callees(function)):
+            raise InputError(
+                f"{field}: calls {callee.__name__}, which must not raise or assert; "
+                "nan as a result ends a trajectory"
+            )
+
+    @staticmethod
+    @contextmanager
+    def _explained(field: str, function: Any, arguments: int, states: list[str] | None) -> Iterator[None]:
+        """Tell in one line why a function cannot be compiled."""
+        try:
+            yield
+        except Exception as error:  # numba lets those of the code it looks at pass
+            explain(field, rebuilt(function, "fastmech_user", {}), arguments, states)
+            raise InputError(f"{field}: cannot be compiled: {reason(error)}") from None
+
+
+def _swaps() -> Swaps:
+    """What the packed loops call in the place of what."""
+    return {} if numba.config.DISABLE_JIT else dict(WITHIN)  # type: ignore[attr-defined]
+
+
+def _functions(field: str, function: Any, module: str, precision: str) -> dict[str, Any]:
+    """A user's function for a module of that name, and the same with trigonometry that raises."""
+    numbers: Swaps = {float: np.float32} if precision == "float32" else {}
+    whole = inlined(rebuilt(function, module, numbers))
+    return {field: whole, f"{field}_within": attempted(rebuilt(function, module, _swaps() | numbers))}
 
 
 def stop_codes(records: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -2,7 +2,7 @@
 
 What a run itself shows comes first. No method follows a body that turns by more than 1 rad in a step. An
 Adams method lays a polynomial through its history; where the polynomial's last term moves an angle
-by more than 0.01 rad (:mod:`fastmech.kernels.last_term`), it does not describe the motion, or one of the
+by more than 0.01 rad (:mod:`fastmech.kernels.whole`), it does not describe the motion, or one of the
 method's spurious roots, which stand for no mode, has grown until it shows. By theory alone these are not
 judged: a motion that swings is seldom where they grow, and what does not show does no harm.
 

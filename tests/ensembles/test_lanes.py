@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from ensembles.starts import Floats
 
-from fastmech.ensembles.lanes import Lanes, finite_rows, rows_at
-from fastmech.integrators.sums import CACHE_LINE
+from fastmech.ensembles.lanes import CACHE_LINE, Lanes, finite_rows, rows_at
 from fastmech.kernels.blocks import VECTOR_LANES
 
 pytestmark = pytest.mark.nojit

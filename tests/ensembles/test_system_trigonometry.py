@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import fastmech as fm
 from fastmech.jit import FLAGS
 from fastmech.kernels.sincos import REDUCTION_LIMIT, cos, sin
-from fastmech.kernels.single import in_single
+from fastmech.kernels.blocks import in_single
 
 Floats = NDArray[np.float64]
 
