@@ -183,7 +183,9 @@ def test_an_edit_while_a_process_compiles_spoils_nothing(loaded: str, tmp_path: 
     (tmp_path / "new.py").write_text(changed)
     seen = run(EDITED_MEANWHILE, loaded, source, tmp_path / "new.py", **place)
     Y, dY = np.array([[0.7], [0.3], [0.0], [0.0]]), np.zeros((4, 1))
-    with_terms("lagrange", "free")(0.0, Y, dY, np.array([[0.8], [0.6], [-9.0], [13.0], [8.0], [0.0], [0.0], [0.0]]))
+    with_terms("lagrange", "free")(
+        0.0, Y, dY, np.array([[0.8], [0.6], [-9.0], [13.0], [8.0], [0.0], [0.0], [0.0]])
+    )
     made_from = 1.0 if loaded.endswith("reduced") else 2.0
     assert seen["answer"][2] == pytest.approx(made_from * dY[2, 0], rel=1e-14)
     assert seen["kept"] == []

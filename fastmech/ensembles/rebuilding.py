@@ -38,6 +38,18 @@ def raises(function: types.FunctionType) -> bool:
     return any(instruction.opname == "RAISE_VARARGS" for instruction in dis.get_instructions(function))
 
 
+def returns(function: types.FunctionType) -> bool:
+    """Whether a function gives anything back but None."""
+    before = None
+    for instruction in dis.get_instructions(function):
+        given = before if instruction.opname == "RETURN_VALUE" else instruction
+        gone = instruction.opname in ("RETURN_VALUE", "RETURN_CONST")
+        if gone and given is not None and ("CONST" not in given.opname or given.argval is not None):
+            return True
+        before = instruction
+    return False
+
+
 def compiled_callees(function: types.FunctionType) -> Iterator[types.FunctionType]:
     """Sources of the compiled functions that a function can call, directly or through one another."""
     seen: set[tuple[int, frozenset[str]]] = set()  # another mention of a module may find more in it

@@ -32,7 +32,7 @@ from fastmech.integrators.batch import Batch
 from fastmech.integrators.driver import observe_nothing
 from fastmech.integrators.method import Adams, Method
 from fastmech.interrupts import check
-from fastmech.kernels.blocks import observer_in_single
+from fastmech.kernels.blocks import VECTOR_LANES, observer_in_single
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int], None]
@@ -120,7 +120,8 @@ def run_ensemble(
     ``params`` are the parameters of all trajectories (count,) or of each (n, count); ``dt`` is the longest
     step of all trajectories or of each (n,). A trajectory that has stopped keeps the state in which it did.
     ``progress`` is told the number of trajectories finished since its last call. ``block_lanes`` is
-    :func:`block_width` by default, and always so of a method that has a width.
+    :func:`block_width` by default, and always so of a method that has a width; 1 where a right-hand side
+    takes arrays.
 
     Raises:
         InputError: the step, the times or the number of threads are wrong.
@@ -146,8 +147,12 @@ def run_ensemble(
             begin = begin.astype(precision)
         last_finite_observer(precision)  # compiled here, not in a thread
     usable = finite_rows(begin)
-    if block_lanes is None or method.lanes:
+    if getattr(getattr(rhs, "rates", None), "vector", False):
+        block_lanes = 1
+    elif block_lanes is None or method.lanes:
         block_lanes = block_width(method, begin.shape[1], precision)
+    else:
+        block_lanes = max(block_lanes, VECTOR_LANES)
 
     def most_steps(lanes: Lanes, passed: int) -> int:
         if observation.stops:

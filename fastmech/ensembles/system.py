@@ -6,27 +6,31 @@ import inspect
 import types
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any
 
 import numba
 import numpy as np
+from numba import float64
 from numpy.typing import NDArray
 
 from fastmech.ensembles import checks
 from fastmech.ensembles.fingerprint import fingerprint
-from fastmech.ensembles.rebuilding import Swaps, compiled_callees, raises, reaches, rebuilt
+from fastmech.ensembles.rebuilding import Swaps, compiled_callees, raises, reaches, rebuilt, returns
 from fastmech.ensembles.refusals import explain, reason
 from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
 from fastmech.ensembles.switches import UnclearError, decides_nothing, watching
 from fastmech.errors import InputError, shown
 from fastmech.generated import new_module, run_module
-from fastmech.jit import inlined
+from fastmech.jit import VECTOR, called, inlined
 from fastmech.kernels.attempt import attempted
 from fastmech.kernels.blocks import Rates, block_kernel
 from fastmech.kernels.sincos import WITHIN
+
+#: States of a family at most: a block of an implicit method has the square of it.
+MOST_STATES = 10_000
 
 _OBSERVE = '''"""Made by fastmech: watches {name!r} of a user's own system."""
 
@@ -68,9 +72,11 @@ class System:
             arithmetic on floats. Use :func:`fastmech.sin` and :func:`fastmech.cos`, and values chosen by
             ``a if condition else b`` instead of branches: then the loop over trajectories becomes packed
             instructions.
-        state: names of the states.
+            Of many states the function is ``rhs(t, y, p, rates)``: arrays of one trajectory's states and
+            parameters, and one into which it writes the rates, in loops over indices.
+        state: names of the states, or ``("x", 100)`` for x0, ..., x99 and arrays.
         parameters: the parameters' values by name; ``rhs`` takes arguments of these names after the states.
-        stop: ``stop(t, *state)`` gives 0 while the trajectory runs on, any other whole number as the code of
+        stop: ``stop(t, *state)`` (or ``stop(t, y)``) gives 0 while the trajectory runs on, any other whole number as the code of
             why it stops (True is 1); it is looked at after every step. A trajectory that has stopped costs
             nothing any more.
 
@@ -83,18 +89,23 @@ class System:
     state: Sequence[str]
     parameters: Mapping[str, float]
     stop: Callable[..., float] | None = None
+    vector: bool = field(default=False, init=False)  #: whether functions take arrays
 
     def __post_init__(self) -> None:
-        state = _names("state", self.state, least=1)
+        vector = isinstance(self.state, tuple) and [type(part) for part in self.state] == [str, int]
+        object.__setattr__(self, "vector", vector)
+        state = _names("state", _family(*self.state) if vector else self.state, least=1)
         if not isinstance(self.parameters, Mapping):
             raise InputError(f"parameters = {shown(self.parameters)}: must be a mapping of names to numbers")
         names = _names("parameters", self.parameters, least=0)
         values = [checks.number(f"parameters.{k}", v, "") for k, v in self.parameters.items()]
         object.__setattr__(self, "state", state)
         object.__setattr__(self, "parameters", dict(zip(names, values, strict=True)))
-        _check_function("rhs", self.rhs, state, names)
+        _check_function("rhs", self.rhs, ["y", "p", "rates"] if vector else state, [] if vector else names)
+        if vector and returns(self.rhs):
+            raise InputError("rhs: returns something, must write the rates into its last argument")
         if self.stop is not None:
-            _check_function("stop", self.stop, state, [])
+            _check_function("stop", self.stop, ["y"] if vector else state, [])
 
     @property
     def observation(self) -> Observation:
@@ -117,13 +128,15 @@ class System:
         functions: dict[str, Any] = {}
         time = next(iter(inspect.signature(self.rhs).parameters))
         try:
-            functions["rhs"], places = watching(self.rhs, {time, *self.state})
+            functions["rhs"], places = watching(self.rhs, {time, "y"} if self.vector else {time, *self.state})
         except UnclearError:
             if decides_nothing(self.rhs):
                 return None
             raise
         if not places:
             return None
+        if self.vector:
+            raise UnclearError("decisions on arrays are not located")
         states = [f"y[{d}]" for d in range(len(self.state))]
         own = [f"p[{list(self.parameters).index(name)}]" for name in self._parameter_order]
         name, arguments = getattr(self.rhs, "__name__", "rhs"), ", ".join(["t", *states, *own])
@@ -146,14 +159,15 @@ class System:
     def rates(self) -> Rates:
         """What the engine's loops are made from."""
         dim, names = len(self.state), list(self.parameters)
-        own = tuple(names.index(name) for name in self._parameter_order)
+        own = () if self.vector else tuple(names.index(name) for name in self._parameter_order)
         return Rates(
             getattr(self.rhs, "__name__", "rhs"),
             dim,
             own,
-            partial(_functions, "rates", self.rhs),
+            partial(_array_functions if self.vector else _functions, "rates", self.rhs),
             (fingerprint(self.rhs),),
-            ranged=reaches(self.rhs, _swaps()),
+            ranged=not self.vector and reaches(self.rhs, _swaps()),
+            vector=self.vector,
             looked_at=dim,
         )
 
@@ -161,7 +175,10 @@ class System:
     def kernel(self) -> Any:
         """The compiled block right-hand side, loaded from the disk cache where it is there."""
         self._refuse_raising("rhs", self.rhs)
-        with self._explained("rhs", self.rhs, 1 + len(self.state) + len(self.parameters), list(self.state)):
+        numbers = 1 + len(self.state) + len(self.parameters)
+        with self._explained(
+            "rhs", self.rhs, 3 if self.vector else numbers, [] if self.vector else list(self.state)
+        ):
             made = block_kernel(self.rates)
             if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
                 made.make()
@@ -172,8 +189,12 @@ class System:
         """The observer of the stopping condition."""
         stop: Any = self.stop
         self._refuse_raising("stop", stop)
-        with self._explained("stop", stop, 1 + len(self.state), None):
-            states = ", ".join(["t", *(f"Y[{d}, i]" for d in range(len(self.state)))])
+        with self._explained("stop", stop, 1 if self.vector else 1 + len(self.state), None):
+            states = (
+                "t, Y[:, i]"
+                if self.vector
+                else ", ".join(["t", *(f"Y[{d}, i]" for d in range(len(self.state)))])
+            )
             source = _OBSERVE.format(name=stop.__name__, arguments=states)
             module = new_module("system", source, [fingerprint(stop)])
             vars(module).update(_functions("stop", stop, module.__name__, "float64"))
@@ -190,15 +211,23 @@ class System:
                 "nan as a result ends a trajectory"
             )
 
-    @staticmethod
     @contextmanager
-    def _explained(field: str, function: Any, arguments: int, states: list[str] | None) -> Iterator[None]:
+    def _explained(
+        self, field: str, function: Any, arguments: int, states: list[str] | None
+    ) -> Iterator[None]:
         """Tell in one line why a function cannot be compiled."""
         try:
             yield
         except Exception as error:  # numba lets those of the code it looks at pass
-            explain(field, rebuilt(function, "fastmech_user", {}), arguments, states)
+            kinds = [VECTOR] * arguments if self.vector else [float64] * (arguments - 1)
+            explain(field, rebuilt(function, "fastmech_user", {}), (float64, *kinds), states)
             raise InputError(f"{field}: cannot be compiled: {reason(error)}") from None
+
+
+def _array_functions(field: str, function: Any, module: str, precision: str) -> dict[str, Any]:
+    """The same of one that takes arrays."""
+    numbers: Swaps = {float: np.float32} if precision == "float32" else {}
+    return {field: called(rebuilt(function, module, numbers))}
 
 
 def _swaps() -> Swaps:
@@ -229,6 +258,15 @@ def stop_codes(records: NDArray[np.float64]) -> NDArray[np.int64]:
             "another whole number where it stops"
         )
     return codes.astype(np.int64)
+
+
+def _family(name: str, count: int) -> list[str]:
+    """Names of a family of states."""
+    if not 1 <= count <= MOST_STATES:
+        raise InputError(
+            f"state = {shown((name, count))}: must be a name and a number from 1 to {MOST_STATES}"
+        )
+    return [f"{name}{d}" for d in range(count)]
 
 
 def _names(field: str, given: Any, least: int) -> list[str]:

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
 from fastmech.callee import CalleeType, callee
 from fastmech.integrators.batch import ROUNDED_TIME, Batch
@@ -124,12 +123,19 @@ def driver_signature(precision: Any) -> Any:
 
 
 @called
-def add_rows(total: Floats, rows: Floats, first: int, row: Integers, weight: Floats, begin: int, end: int) -> None:
+def add_rows(
+    total: Floats, rows: Floats, first: int, row: Integers, weight: Floats, begin: int, end: int
+) -> None:
     """total = sum of weight[begin:end] times rows ``first`` + row[begin:end], :data:`TERMS` in a pass."""
     for x in range(total.shape[0]):
         total[x] = 0.0
     for k in range(begin, end, TERMS):
-        a, b, c, d = rows[first + row[k]], rows[first + row[k + 1]], rows[first + row[k + 2]], rows[first + row[k + 3]]
+        a, b, c, d = (
+            rows[first + row[k]],
+            rows[first + row[k + 1]],
+            rows[first + row[k + 2]],
+            rows[first + row[k + 3]],
+        )
         wa, wb = rounded_to(total, weight[k]), rounded_to(total, weight[k + 1])
         wc, wd = rounded_to(total, weight[k + 2]), rounded_to(total, weight[k + 3])
         for x in range(total.shape[0]):
@@ -242,7 +248,7 @@ def drive(
 ) -> None:
     """Take blocks of lanes through all times, some blocks after the others.
 
-    ``start`` are the whole steps of an Adams method's starter, ``advance`` those of the method, if it has any.
+    ``start`` are the whole steps of an Adams method's starter, ``advance`` those of the method, if any.
     ``observe`` is called after every step. A step's time is computed from its index, so rounding does not
     accumulate. An Adams method starts anew wherever the step's length changes; its ``phase`` is how many rows
     of the history are known, the row before the oldest, and the step.
@@ -253,7 +259,10 @@ def drive(
     stages = np.empty((weights.nodes.shape[0] + 2, dim, width), run.Y.dtype)
     lost = np.zeros(group * width, dtype=np.bool_)
     flat = Lanes(
-        run.Y.reshape(run.Y.size), run.params.reshape(run.params.size), run.memory.reshape(run.memory.size), lost
+        run.Y.reshape(run.Y.size),
+        run.params.reshape(run.params.size),
+        run.memory.reshape(run.memory.size),
+        lost,
     )
     given = run.params.shape[1] * width if run.params.shape[0] > 1 else 0
     known, oldest, last = 0, 0, 0.0

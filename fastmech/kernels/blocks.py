@@ -38,7 +38,8 @@ class Rates(NamedTuple):
     what it keeps, and ``rates_near(t, *states, *parameters, *before, kept)`` gives the rates close to the
     states ``before``: what corrects a prediction.
 
-    Of a ``vector`` the function is ``rates(t, y, p, found)``, with arrays of one trajectory's numbers.
+    Of a ``vector`` the function is ``rates(t, y, p, found)``, with arrays of one trajectory's numbers, into the
+    last of which it writes; its blocks have one lane.
     """
 
     name: str  #: for the text of what is made; differs with the functions, or ``prints`` does
@@ -61,7 +62,9 @@ class Rates(NamedTuple):
         found = f"({', '.join(rates)},)"
         if not self.ranged:
             return f"{found} = rates({arguments}) + ()"  # only tuples have that, of a length known before
-        return f"{raised}, {f'({found}, kept)' if self.near else found} = attempt(rates_within, ({arguments},))"
+        return (
+            f"{raised}, {f'({found}, kept)' if self.near else found} = attempt(rates_within, ({arguments},))"
+        )
 
 
 _HEAD = '''"""Made by fastmech: the block right-hand side of {name}, {precision}."""
@@ -102,7 +105,8 @@ _VECTOR = """\
     if Y.shape[1] == 1:
         rates(t, Y.reshape(Y.shape[0]), p.reshape(p.shape[0]), dY.reshape(Y.shape[0]))
         return
-    y, own, found = np.empty(Y.shape[0], Y.dtype), np.empty(p.shape[0], Y.dtype), np.empty(Y.shape[0], Y.dtype)
+    y, found = np.empty(Y.shape[0], Y.dtype), np.empty(Y.shape[0], Y.dtype)
+    own = np.empty(p.shape[0], Y.dtype)
     for i in range(Y.shape[1]):
         for d in range(Y.shape[0]):
             y[d] = Y[d, i]

@@ -35,7 +35,9 @@ def exp_double(x: float) -> float:
     n = shifted - _INTEGERS
     r = (x - n * _LN2_1) - n * _LN2_2
     value = _T8 + r * (_T9 + r * (_T10 + r * (_T11 + r * (_T12 + r * _T13))))
-    value = 1.0 + r * (1.0 + r * (_T2 + r * (_T3 + r * (_T4 + r * (_T5 + r * (_T6 + r * (_T7 + r * value)))))))
+    value = 1.0 + r * (
+        1.0 + r * (_T2 + r * (_T3 + r * (_T4 + r * (_T5 + r * (_T6 + r * (_T7 + r * value))))))
+    )
     return times_power_of_two(value, shifted)
 
 

@@ -1,4 +1,4 @@
-"""Right-hand sides of the mechanism: Lagrange's (13) and the canonical equations (14), of the terms there are.
+"""Right-hand sides of the mechanism: Lagrange's (13) and the canonical equations (14), by their terms.
 
 States are (phi, theta, phi', theta') and (phi, theta, p_phi, p_theta), momenta over m2 l^2; parameters are
 the lanes' reduced coefficients (:class:`fastmech.mechanism.coefficients.Coefficients`). Every combination of
@@ -67,7 +67,8 @@ def _functions(equation: Any, module: str, precision: str) -> dict[str, Any]:
 
     @inlined
     def rates_near(
-        t, phi, theta, u, w, mass, slider, lift, spring, gravity, force, damping, decay, phi0, theta0, u0, w0, kept
+        t, phi, theta, u, w, mass, slider, lift, spring, gravity, force, damping, decay,
+        phi0, theta0, u0, w0, kept,
     ):  # type: ignore[no-untyped-def]  # fmt: skip
         push = force_now(t, force, decay)
         s1, c1 = turned(kept[0], kept[1], phi - phi0)

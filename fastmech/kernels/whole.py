@@ -102,7 +102,9 @@ class Formula(NamedTuple):
     @property
     def products(self) -> int:
         """Products in the sums of a step, for each state."""
-        return sum(weight != 0.0 for row in (*self.a, self.b, self.predictor, self.corrector) for weight in row)
+        return sum(
+            weight != 0.0 for row in (*self.a, self.b, self.predictor, self.corrector) for weight in row
+        )
 
 
 _HEAD = '''"""Made by fastmech: steps of {name} of {rates}, {precision}, each in one loop."""
@@ -207,7 +209,7 @@ class _Writer:
         self.look = ""
 
     def runge_kutta(self, formula: Formula) -> str:
-        """A step of a Runge-Kutta method; y0, y1, ... are the states of its stages, the last one the step's."""
+        """A step of a Runge-Kutta method; y0, y1, ... are the stages' states, and the last one the step's."""
         text, stages = self._begin(), len(formula.b)
         if formula.rows:
             self.prepare += self._history(formula.rows)
@@ -289,7 +291,10 @@ class _Writer:
         if self._rates.ranged:
             # Of a single condition the compiler makes branches; h is a number.
             raised = " | ".join([*(f"lost{number}" for number in evaluated), "(h != h)"])
-            text, kept = f"raised = {raised}\nlost, told[i] = noted(lost, raised), raised\n", "y0_{d} if raised else "
+            text, kept = (
+                f"raised = {raised}\nlost, told[i] = noted(lost, raised), raised\n",
+                "y0_{d} if raised else ",
+            )
         for d in self._states:
             text += f"{self._at('y', d)} = {kept.format(d=d)}y{last}_{d}\n"
         return text

@@ -21,12 +21,18 @@ def exponentials(x: Any, out: Any) -> None:
 
 
 @pytest.mark.nojit
-@pytest.mark.parametrize(("precision", "least", "ulp"), [(np.float64, -708.0, 2.3e-16), (np.float32, -87.0, 1.5e-7)])
+@pytest.mark.parametrize(
+    ("precision", "least", "ulp"), [(np.float64, -708.0, 2.3e-16), (np.float32, -87.0, 1.5e-7)]
+)
 def test_relative_error(precision: Any, least: float, ulp: float) -> None:
     if numba.config.DISABLE_JIT and precision is np.float32:
         pytest.skip("in plain Python there is the double one only")
     random = np.random.default_rng(5)
-    spread = [random.uniform(least, 0.0, 4000), random.uniform(-1.0, 1.0, 4000), -random.exponential(1e-8, 50)]
+    spread = [
+        random.uniform(least, 0.0, 4000),
+        random.uniform(-1.0, 1.0, 4000),
+        -random.exponential(1e-8, 50),
+    ]
     x = np.concatenate([*spread, np.log(2.0) * (np.arange(-60, 4) + 0.5)]).astype(precision)
     found = np.empty_like(x)
     exponentials(x, found)

@@ -21,9 +21,9 @@ from fastmech.ensembles.run import run_ensemble
 from fastmech.errors import InputError
 from fastmech.integrators.methods import METHODS
 from fastmech.jit import FLAGS
+from fastmech.kernels.blocks import in_single
 from fastmech.kernels.select import FORMULATIONS, right_hand_side
 from fastmech.kernels.sincos import REDUCTION_LIMIT_SINGLE, cos, sin, sincos
-from fastmech.kernels.blocks import in_single
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 

@@ -56,7 +56,9 @@ def stepped(
     state = Y.copy().ravel()
     flat = Lanes(state, params.ravel(), memory.ravel(), np.zeros(Y.shape[1], dtype=bool))
     with np.errstate(all="ignore"):  # plain Python warns where compiled code is silent
-        done = whole_steps(rhs.rates, method.formulas[1], "float64")(flat, Steps(BEGIN, H, 0, steps, 0, 1, 0, 0))
+        done = whole_steps(rhs.rates, method.formulas[1], "float64")(
+            flat, Steps(BEGIN, H, 0, steps, 0, 1, 0, 0)
+        )
     newest = (steps - 1) % (rows + 1)
     return state.reshape(Y.shape), flat.memory.reshape(memory.shape)[newest], done
 
