@@ -57,8 +57,8 @@ class Lanes:
     So is what their method carries from call to call, see :class:`fastmech.integrators.batch.Batch`.
     Parameters that all share are in one block for all.
 
-    The last block is filled up with copies of the last trajectory, so every lane runs in whole vectors, unless
-    blocks are narrower.
+    The last block is filled up with copies of the last trajectory, so every lane runs in whole vectors where
+    blocks are not narrower.
     """
 
     def __init__(

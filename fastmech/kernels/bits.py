@@ -120,3 +120,23 @@ def apart() -> None:
 @overload(apart, inline="always", strict=False)
 def _apart() -> Any:
     return lambda: _marked_apart()
+
+
+def _mark_not_inlined(typingctx: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        builder.function.attributes.add("noinline")
+        return context.get_dummy_value()
+
+    return types.void(), generate
+
+
+_marked_not_inlined: Any = intrinsic(_mark_not_inlined)
+
+
+def not_inlined() -> None:
+    """Keep a function out of those that call it: what is done seldom would spoil the loop beside it."""
+
+
+@overload(not_inlined, inline="always", strict=False)
+def _not_inlined() -> Any:
+    return lambda: _marked_not_inlined()

@@ -38,8 +38,8 @@ class Rates(NamedTuple):
     what it keeps, and ``rates_near(t, *states, *parameters, *before, kept)`` gives the rates close to the
     states ``before``: what corrects a prediction.
 
-    Of a ``vector`` the function is ``rates(t, y, p, found)``, with arrays of one trajectory's numbers, into the
-    last of which it writes; its blocks have one lane.
+    Of a ``vector`` the function is ``rates(t, y, p, found)``, with arrays of one trajectory's numbers; it
+    writes into the last one. Its blocks have one lane.
     """
 
     name: str  #: for the text of what is made; differs with the functions, or ``prints`` does

@@ -68,6 +68,10 @@ EVERY = 8
 #: compile than it saves.
 MOST_STATES, MOST_PRODUCTS = 16, 1200
 
+#: Rows of a step above which the compiler does not compare each with each to see whether arrays overlap. It
+#: is told then that they do not; of fewer rows it makes better code by itself.
+MOST_ROWS = 100
+
 
 def lanes_type(precision: Any) -> Any:
     """Type of :class:`Lanes`."""
@@ -112,17 +116,17 @@ _HEAD = '''"""Made by fastmech: steps of {name} of {rates}, {precision}, each in
 from numba.core import types
 from numpy import float32
 
-from fastmech.jit import kernel
+from fastmech.jit import called, kernel
 from fastmech.kernels.attempt import attempt
-from fastmech.kernels.bits import NO_LANE, noted
+from fastmech.kernels.bits import NO_LANE, apart, not_inlined, noted
 from fastmech.kernels.whole import advance_signature
 
-
+{look}
 @kernel(advance_signature(types.{precision}))
 def {function}(lanes, steps):
-    h = {h}
+{apart}    h = {h}
     for chunk in range(steps.first // {every}, (steps.last + {every} - 1) // {every}):
-{look}        for k in range(max(steps.first, {every} * chunk), min(steps.last, {every} * (chunk + 1))):
+{looking}        for k in range(max(steps.first, {every} * chunk), min(steps.last, {every} * (chunk + 1))):
             t = steps.t + k * steps.h
             lost = NO_LANE
             for block in range(steps.begin, steps.end):
@@ -144,14 +148,23 @@ place = (block * {carried} + (steps.oldest + k - steps.first) % {ring}) * {size}
 f = lanes.memory[place : place + {window}]
 """
 
-_LOOK = """\
-k = {every} * chunk
-for block in range(steps.begin, steps.end if k >= steps.first else steps.begin):
-{history}    place = (block * {carried} + {carried} - 1) * {size}
-    greatest = lanes.memory[place : place + {width}]
-    for i in range({width}):
-        term = greatest[i]
-{terms}        greatest[i] = term
+_LOOK = """
+@called
+def look(lanes, steps, k):
+    not_inlined()
+    h = {h}
+    for block in range(steps.begin, steps.end):
+{history}        place = (block * {carried} + {carried} - 1) * {size}
+        greatest = lanes.memory[place : place + {width}]
+        for i in range({width}):
+            term = greatest[i]
+{terms}            greatest[i] = term
+
+"""
+
+_LOOKING = """\
+        if {every} * chunk >= steps.first:
+            look(lanes, steps, {every} * chunk)
 """
 
 
@@ -173,11 +186,13 @@ def source(rates: Rates, formula: Formula, precision: str) -> str:
         rates=rates.name,
         function=_function(rates, formula),
         precision=precision,
-        h="steps.h" if precision == "float64" else "float32(steps.h)",
+        h=writer.h,
         size=writer.size,
         width=VECTOR_LANES,
         every=EVERY,
-        look=indent(writer.look, " " * 8),
+        apart="    apart()\n" if rates.states * (formula.rows + 4) > MOST_ROWS else "",
+        look=writer.look,
+        looking=_LOOKING.format(every=EVERY) if writer.look else "",
         prepare=indent(writer.prepare, " " * 16),
         loop=indent(loop, " " * 20),
     )
@@ -204,7 +219,7 @@ class _Writer:
     def __init__(self, rates: Rates, precision: str) -> None:
         self._rates, self._single = rates, precision == "float32"
         self._states = range(rates.states)
-        self.size = rates.states * VECTOR_LANES
+        self.size, self.h = rates.states * VECTOR_LANES, "float32(steps.h)" if self._single else "steps.h"
         self.prepare = _RANGED.format(width=VECTOR_LANES) if rates.ranged else ""
         self.look = ""
 
@@ -264,12 +279,12 @@ class _Writer:
             term = self._sum({self._past(rows, age, d): weight for age, weight in enumerate(weights)})
             text += f"found = abs(h * ({term}))\nterm = found if found > term else term\n"
         return _LOOK.format(
-            every=EVERY,
-            history=indent(self._history(rows), "    "),
+            h=self.h,
+            history=indent(self._history(rows), " " * 8),
             carried=2 * rows + 3,
             size=self.size,
             width=VECTOR_LANES,
-            terms=indent(text, " " * 8),
+            terms=indent(text, " " * 12),
         )
 
     def _past(self, rows: int, age: int, d: int) -> str:
