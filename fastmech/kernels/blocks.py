@@ -34,9 +34,9 @@ class Rates(NamedTuple):
     ``functions`` gives, for the name of a module and a precision ("float64" or "float32"), what the module's
     loops call: ``rates(t, *states, *parameters)``, a tuple, right for any finite numbers. Where ``ranged`` is
     set also ``rates_within``, an :func:`~fastmech.kernels.attempt.attempted` one that raises in place of
-    calling the library for an angle beyond the packed range. Where ``near`` is set that gives the rates and
-    what it keeps, and ``rates_near(t, *states, *parameters, *before, kept)`` gives the rates close to the
-    states ``before``: what corrects a prediction.
+    calling the library for an angle beyond the packed range. Where ``near`` is set, one that
+    tells instead whether the lane is beyond, and gives the rates and what it keeps; ``rates_near(t, *states, *parameters, *before, kept)`` then
+    gives the rates close to the states ``before``: what corrects a prediction.
 
     Of a ``vector`` the function is ``rates(t, y, p, found)``, with arrays of one trajectory's numbers; it
     writes into the last one. Its blocks have one lane.
@@ -62,9 +62,9 @@ class Rates(NamedTuple):
         found = f"({', '.join(rates)},)"
         if not self.ranged:
             return f"{found} = rates({arguments}) + ()"  # only tuples have that, of a length known before
-        return (
-            f"{raised}, {f'({found}, kept)' if self.near else found} = attempt(rates_within, ({arguments},))"
-        )
+        if self.near:
+            return f"{raised}, {found}, kept = rates_within({arguments})"
+        return f"{raised}, {found} = attempt(rates_within, ({arguments},))"
 
 
 _HEAD = '''"""Made by fastmech: the block right-hand side of {name}, {precision}."""

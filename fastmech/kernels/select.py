@@ -11,11 +11,9 @@ from collections.abc import Callable
 from functools import cache, partial
 from typing import Any
 
-import numba
 import numpy as np
 
 from fastmech.jit import inlined, rounded_to
-from fastmech.kernels.attempt import attempted
 from fastmech.kernels.blocks import Rates, block_kernel
 from fastmech.kernels.exponential import exp
 from fastmech.kernels.sincos import cos, reduction_limit, sin, sincos, turned
@@ -52,18 +50,15 @@ def _functions(equation: Any, module: str, precision: str) -> dict[str, Any]:
         s1, c1, s2, c2 = sin(phi), cos(phi), sin(theta), cos(theta)
         return equation(s1, c1, s2, c2, u, w, mass, slider, lift, spring, gravity, push, damping)
 
+    @inlined
     def rates_within(t, phi, theta, u, w, mass, slider, lift, spring, gravity, force, damping, decay):  # type: ignore[no-untyped-def]
         limit = reduction_limit(phi)
-        if phi * phi + theta * theta > limit * limit:
-            raise OverflowError
+        beyond = phi * phi + theta * theta > limit * limit
         push = force_now(t, force, decay)
         s1, c1 = sincos(phi)
         s2, c2 = sincos(theta)
         found = equation(s1, c1, s2, c2, u, w, mass, slider, lift, spring, gravity, push, damping)
-        return found, (s1, c1, s2, c2)
-
-    def rates_anywhere(t, phi, theta, *others):  # type: ignore[no-untyped-def]
-        return rates(t, phi, theta, *others), (sin(phi), cos(phi), sin(theta), cos(theta))
+        return beyond, found, (s1, c1, s2, c2)
 
     @inlined
     def rates_near(
@@ -75,9 +70,7 @@ def _functions(equation: Any, module: str, precision: str) -> dict[str, Any]:
         s2, c2 = turned(kept[2], kept[3], theta - theta0)
         return equation(s1, c1, s2, c2, u, w, mass, slider, lift, spring, gravity, push, damping)
 
-    plain = numba.config.DISABLE_JIT  # type: ignore[attr-defined]
-    within = rates_anywhere if plain else attempted(rates_within)
-    return {"rates": rates, "rates_within": within, "rates_near": rates_near}
+    return {"rates": rates, "rates_within": rates_within, "rates_near": rates_near}
 
 
 #: Formulations, and what gives the rates of each.
