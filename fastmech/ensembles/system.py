@@ -76,9 +76,9 @@ class System:
             parameters, and one into which it writes the rates, in loops over indices.
         state: names of the states, or ``("x", 100)`` for x0, ..., x99 and arrays.
         parameters: the parameters' values by name; ``rhs`` takes arguments of these names after the states.
-        stop: ``stop(t, *state)`` (or ``stop(t, y)``) gives 0 while the trajectory runs on, any other
-            whole number as the code of why it stops (True is 1); it is looked at after every step. A trajectory that has
-            stopped costs nothing any more.
+        stop: ``stop(t, *state)`` (or ``stop(t, y)``) gives 0 while the trajectory runs on, any other whole
+            number as the code of why it stops (True is 1); it is looked at after every step. A trajectory
+            that has stopped costs nothing any more.
 
     Raises:
         InputError: names do not match the functions' arguments, or values are no finite numbers. A function

@@ -47,7 +47,7 @@ from fastmech.kernels.whole import (
 TERMS = 4
 
 #: Bytes that blocks which take a step together may fill, and how many these are at most.
-GROUP_BYTES, GROUP = 24576, 4
+GROUP_BYTES, GROUP = 65536, 4
 
 
 class Weights(NamedTuple):
