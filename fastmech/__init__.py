@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from fastmech.step_limits.predict import largest_stable_step
     from fastmech.step_limits.warning import step_warning
     from fastmech.store.read import open_results
+    from fastmech.system_info import system_info
     from fastmech.transients.growth import transient_growth
     from fastmech.transients.lyapunov import largest_lyapunov
 
@@ -108,6 +109,7 @@ _MODULES = {
     "shock_limit": "fastmech.basins.shock_limit",
     "sin": "fastmech.kernels.sincos",
     "step_warning": "fastmech.step_limits.warning",
+    "system_info": "fastmech.system_info",
     "trace_folds": "fastmech.atlas.folds",
     "trace_unreached": "fastmech.atlas.damping",
     "track_edge": "fastmech.basins.edge",
@@ -164,6 +166,7 @@ __all__ = [
     "shock_limit",
     "sin",
     "step_warning",
+    "system_info",
     "trace_folds",
     "trace_unreached",
     "track_edge",

@@ -5,6 +5,10 @@ division is a branch that may raise). Of the fast-math flags only ``contract`` i
 may fuse, nothing may be reordered, and NaN and infinity keep their meaning because statuses are decided
 by them.
 
+Vectors. LLVM prefers 256 bit on Intel's processors with AVX-512, as if wide registers slowed the clock. Loops
+over lanes are arithmetic from end to end, for which 512 bit are faster all the same: kernels ask for them by
+an attribute of their own functions, which changes nothing else in a process, nor anything without AVX-512.
+
 Laziness. A kernel is loaded from the disk, or compiled, at its first use and not when its module is imported:
 a process pays for the kernels that it calls. ``listeners`` are told which one is being made.
 """
@@ -14,34 +18,72 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from functools import wraps
+from pathlib import Path
 from typing import Any, TypeVar
 
-import numba
 import numpy as np
 from llvmlite import ir
-from numba import types
+from numba import njit, types
 from numba.core import config as numba_config
 from numba.core.caching import FunctionCache
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.compiler_machinery import register_pass
+from numba.core.lowering import Lower
 from numba.core.registry import CPUDispatcher
-from numba.extending import intrinsic, overload, register_jitable
+from numba.core.typed_passes import NativeLowering
+from numba.core.typing.templates import infer_global
+from numba.extending import intrinsic, overload
 
 from fastmech.callee import CalleeType
 from fastmech.interrupts import check
-from fastmech.kernel_cache import cache_directory, sources_unchanged
+from fastmech.kernel_cache import alone, cache_directory, sources_unchanged
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 FLAGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 
-#: Options of what is compiled into its caller.
-INLINED: Any = {"forceinline": True, **FLAGS}
+
+class _WideLower(Lower):
+    """Numba's lowering of a function that prefers 512-bit vectors."""
+
+    def setup_function(self, fndesc: Any) -> None:
+        super().setup_function(fndesc)  # type: ignore[no-untyped-call]
+        set.add(self.function.attributes, '"prefer-vector-width"="512"')
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[no-untyped-call]
+class _WideLowering(NativeLowering):
+    _name = "wide_lowering"
+    lowering_class = _WideLower
+
+
+class _WideCompiler(CompilerBase):
+    """Numba's compiler with that lowering."""
+
+    def define_pipelines(self) -> list[Any]:
+        made = DefaultPassBuilder.define_nopython_pipeline(self.state)  # type: ignore[no-untyped-call]
+        made.passes = [(_WideLowering if step is NativeLowering else step, why) for step, why in made.passes]
+        made.finalize()
+        return [made]
+
+
+#: Options of kernels: C does not call them by numba's wrapper, see :mod:`fastmech.callee`.
+KERNEL: Any = {"no_cfunc_wrapper": True, "pipeline_class": _WideCompiler, **FLAGS}
+
+#: Options of what is compiled into its caller; its loops become vectors before it gets there.
+INLINED: Any = {"forceinline": True, "no_cpython_wrapper": True, **KERNEL}
 
 VECTOR = types.Array(types.float64, 1, "C")
 MATRIX = types.Array(types.float64, 2, "C")
 CUBE = types.Array(types.float64, 3, "C")
 INTEGERS = types.Array(types.int64, 1, "C")
 STATUSES = types.Array(types.int8, 1, "C")
+
+
+def named_tuple(kinds: list[Any], fields: Any) -> Any:
+    """Type of a ``NamedTuple`` class whose fields have these types."""
+    return types.NamedTuple(kinds, fields)  # type: ignore[no-untyped-call]
 
 
 def lanes(precision: Any, dimensions: int) -> Any:
@@ -93,6 +135,11 @@ class _Kept(FunctionCache):
             finally:
                 settings.CACHE_DIR = previous
 
+    @property
+    def made_by(self) -> Path:
+        """The file that is held by the process that loads or compiles this kernel."""
+        return Path(self._cache_path, f"{self._impl.filename_base}.lock")
+
     def save_overload(self, sig: Any, data: Any) -> None:
         if sources_unchanged():
             super().save_overload(sig, data)  # type: ignore[no-untyped-call]
@@ -101,9 +148,14 @@ class _Kept(FunctionCache):
 #: Told the name of every kernel before it is loaded or compiled, and None when it is there.
 listeners: list[Callable[[str | None], None]] = []
 
+#: Names of the kernels that this process has compiled; the others were on disk.
+compiled: list[str] = []
+
 
 class Kernel(CPUDispatcher):
     """A function compiled for one explicit signature, which is loaded from the disk or made at its first use.
+
+    Where other processes need it too, one compiles it and they wait to load it.
 
     A use is a call, a call of it in another kernel that is being made, and handing it to a kernel as a
     :func:`fastmech.callee.callee`. Importing a module with kernels costs nothing of that.
@@ -128,8 +180,11 @@ class Kernel(CPUDispatcher):
                 return
             for tell in listeners:
                 tell(self.py_func.__name__)
-            self._cache = _Kept.of(self.py_func)
-            self.compile(signature)
+            self._cache = kept = _Kept.of(self.py_func)
+            with alone(kept.made_by):
+                self.compile(signature)
+            if self.stats.cache_misses:
+                compiled.append(self.py_func.__name__)
             self.disable_compile()
             self.declared = None
         for tell in listeners:
@@ -162,25 +217,50 @@ def kernel(signature: Any, **options: Any) -> Callable[[F], Any]:
         settings: Any = numba_config
         if settings.DISABLE_JIT:
             return function
-        made = Kernel(function, targetoptions={"nopython": True, "nogil": True, **FLAGS, **options})
+        made = _new(function, options)
         made.declared = signature
         return made
 
     return decorate
 
 
-def inlined(function: F) -> F:
-    """Make a small scalar function callable from kernels; in Python it stays the plain function.
+def _new(function: Any, options: dict[str, Any]) -> Kernel:
+    options = {"nopython": True, "nogil": True, **KERNEL, **options}
+    return Kernel(function, pipeline_class=options.pop("pipeline_class"), targetoptions=options)
 
-    The same source therefore serves compiled lanes and NumPy arrays.
+
+def compiled_anew(function: Any, signature: Any = None) -> Any:
+    """A kernel, or a function of a signature, compiled in this process: what was kept shows no code."""
+    anew = _new(interpreted(function), {})
+    anew.compile(function.signatures[0] if signature is None else signature)
+    return anew
+
+
+def interpreted(function: F) -> F:
+    """The Python function of a kernel: the same arithmetic but for fused products."""
+    plain: F = getattr(function, "py_func", function)
+    return plain
+
+
+#: Keeps what ``inlined`` has made: numba's types only refer to it.
+_parts: list[Any] = []
+
+
+def inlined(function: F) -> F:
+    """Make a small function callable from kernels; in Python it stays the plain function.
+
+    The same source therefore serves compiled lanes and NumPy arrays. It is compiled once for its arguments'
+    types: numba's ``register_jitable`` does so for kernels and for inlined functions apart.
     """
-    jitable: F = register_jitable(forceinline=True, **FLAGS)(function)
-    return jitable
+    _parts.append(njit(**INLINED)(function))
+    infer_global(function, types.Dispatcher(_parts[-1]))  # type: ignore[no-untyped-call]
+    return function
 
 
 def called(function: F) -> Any:
     """Make a function callable from kernels that is compiled once for all its calls there."""
-    return numba.njit(**FLAGS)(function)
+    options: Any = {"no_cpython_wrapper": True, **KERNEL}
+    return njit(**options)(function)
 
 
 def _fuse(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
@@ -213,7 +293,7 @@ def _multiply_add(a: Any, b: Any, c: Any) -> Any:
 
 def single(shipped: Any, signature: Any) -> Any:
     """The same source as a kernel's, compiled for lanes of float32."""
-    return kernel(signature)(getattr(shipped, "py_func", shipped))
+    return kernel(signature)(interpreted(shipped))
 
 
 def by_precision(double: F, single: F) -> F:

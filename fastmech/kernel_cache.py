@@ -17,6 +17,8 @@ import hashlib
 import os
 import shutil
 import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
@@ -90,3 +92,21 @@ def cache_directory() -> Path:
         temporary = tempfile.mkdtemp(prefix="fastmech-")
         atexit.register(shutil.rmtree, temporary, ignore_errors=True)
         return Path(temporary)
+
+
+@contextmanager
+def alone(path: Path) -> Iterator[None]:
+    """Hold a file against other processes; nothing is held where the system or the folder has no locks.
+
+    Whoever holds it may wait for the kernels that its own kernel calls, never the other way round, and a
+    process that ends holds nothing more.
+    """
+    with ExitStack() as held:
+        with suppress(ImportError, OSError):
+            import fcntl  # not on Windows
+
+            path.parent.mkdir(parents=True, exist_ok=True)
+            file = held.enter_context(path.open("ab"))
+            fcntl.flock(file, fcntl.LOCK_EX)
+            held.callback(fcntl.flock, file, fcntl.LOCK_UN)  # also for a forked process that has the file
+        yield

@@ -179,6 +179,12 @@ class Dataset:
     def __len__(self) -> int:
         return len(self.variables)
 
+    @property
+    def merged(self) -> Dataset:
+        """With the variables of its groups among its own, as pictures want them and older files have them."""
+        among = [self.variables, *(group.variables for group in self.groups.values())]
+        return Dataset({name: variable for part in among for name, variable in part.items()}, self.attrs)
+
     def to_xarray(self) -> xarray.Dataset:
         """The same as an `xarray.Dataset` (no copy of the data), groups left out.
 

@@ -101,6 +101,9 @@ def draw_results(
             kind, scene = kinds[results[name].attrs["kind"]], results.scene_of(name)
             dataset = as_today(kind.read(results[name], scene), int(results.attrs["schema_version"]))
             figures = kind.draw(dataset, scene)
+            if not figures and section is not None:
+                kind_name = results[name].attrs["kind"]
+                raise InputError(f"{path}: {name}: nothing is drawn of this section of kind {kind_name}")
             advance = stage(f"{name}: pictures", len(figures))
             for what, figure in figures.items():
                 picture = folder / f"{name}_{what}.{form}"

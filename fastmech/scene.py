@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 import sys
 import tomllib
 from collections.abc import Mapping
@@ -95,6 +96,10 @@ class Scene(BaseModel):
             f"scene.{name}: a scene does not change; write scene = scene.replace({name}={shown(value)})"
         )
 
+    def __delattr__(self, name: str) -> None:
+        """Refuse it."""
+        raise InputError(f"scene.{shown_name(name)}: a scene does not change; its parameters stay")
+
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:
         """The scene of a TOML file: its table ``[scene]``.
@@ -115,6 +120,16 @@ class Scene(BaseModel):
         }
 
 
+def require_scene(scene: Any) -> None:
+    """Refuse what is no scene.
+
+    Raises:
+        InputError: it is something else.
+    """
+    if not isinstance(scene, Scene):
+        raise InputError(f"scene = {shown(scene)}: must be a Scene")
+
+
 def read_toml(path: str | Path) -> dict[str, Any]:
     """Content of a TOML file.
 
@@ -131,11 +146,22 @@ def read_text(path: str | Path) -> str:
         InputError: the file is missing, unreadable or not UTF-8.
     """
     try:
-        return Path(path).read_bytes().decode("utf-8")
+        return path_of(path).read_bytes().decode("utf-8")
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: is not valid TOML: {error}") from None
+
+
+def path_of(path: Any) -> Path:
+    """The path of a file.
+
+    Raises:
+        InputError: it is none.
+    """
+    if not isinstance(path, str | os.PathLike):
+        raise InputError(f"path = {shown(path)}: must be the path of a file")
+    return Path(path)
 
 
 def parse_toml(text: str, path: str | Path) -> dict[str, Any]:

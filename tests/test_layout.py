@@ -37,6 +37,7 @@ LAYERS = (
     "basins",
     "results",
     "store",
+    "system_info",
     "plots",
     "scan_types",
     "tiles",

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import inspect
+import json
+import os
 import subprocess
 import sys
 
@@ -47,3 +49,29 @@ def test_import_is_cheap() -> None:
     script = f"import sys, fastmech; print([m for m in {heavy} if m in sys.modules])"
     result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert result.stdout.strip() == "[]"
+
+
+STATE = """
+import json, os, signal, sys, threading, warnings, locale
+def state():
+    return [dict(os.environ), [str(signal.getsignal(s)) for s in (signal.SIGINT, signal.SIGTERM)],
+            threading.active_count(), len(warnings.filters), locale.setlocale(locale.LC_ALL), os.getcwd(),
+            sys.path, sys.getrecursionlimit(), str(sys.excepthook)]
+def numba_state():
+    from numba import config
+    return [config.CACHE_DIR, config.CPU_NAME, config.CPU_FEATURES]
+import numpy, numba, scipy.optimize, pydantic
+before, ours = state(), numba_state()
+errors = numpy.geterr()
+import fastmech as fm
+fm.integrate
+fm.Scene
+print(json.dumps([before == state(), ours == numba_state(), errors == numpy.geterr()]))
+"""
+
+
+def test_importing_the_library_changes_nothing_of_the_process():
+    done = subprocess.run(
+        [sys.executable, "-c", STATE], capture_output=True, text=True, check=True, env=os.environ
+    )
+    assert json.loads(done.stdout) == [True, True, True]

@@ -92,3 +92,26 @@ def test_growth_beyond_doubles() -> None:
     saddle = next(e for e in fm.find_equilibria(SCENE) if e.morse_index == 1)
     with pytest.raises(fm.InputError, match=r"^until = 1e\+06 s: by then disturbances are beyond doubles$"):
         fm.transient_growth(SCENE, saddle, 1e6)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: fm.find_equilibria(None),
+        lambda: fm.barrier_tree(None),
+        lambda: fm.disturb(None, None),
+        lambda: fm.disturbed_motion(None, None, np.zeros(4), [1.0]),
+        lambda: fm.linear_range(None, None),
+        lambda: fm.critical_forces(None, fm.Scene()),
+        lambda: fm.Scene.from_toml(None),
+        lambda: fm.open_results(10**5000),
+        lambda: delattr(fm.Scene(), "m1"),
+        lambda: fm.find_folds(fm.Scene(alpha=0.0), "F0", np.zeros(0)),
+        lambda: fm.disturb(fm.Scene(alpha=0.0), fm.find_equilibria(fm.Scene(alpha=0.0))[0], 8, radius=1e6),
+    ],
+)
+def test_what_is_none_at_all_is_told_in_one_line(call: Any) -> None:
+    with pytest.raises(fm.InputError) as refusal:
+        call()
+    assert "\n" not in str(refusal.value)
+    assert len(str(refusal.value)) < 200

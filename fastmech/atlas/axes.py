@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastmech.ensembles.checks import one_way
 from fastmech.errors import InputError, shown
 from fastmech.mechanism.coefficients import reduce
-from fastmech.scene import Scene, nearest
-from fastmech.stability.arguments import require_scene
+from fastmech.scene import Scene, nearest, require_scene
 
 Floats = NDArray[np.float64]
 

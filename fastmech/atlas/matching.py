@@ -67,7 +67,8 @@ def follow(
     before = newton_step(start, phi, theta)[2]
     while at < 1.0:
         stretch = min(stretch, 1.0 - at)
-        between[:] = start + (at + stretch) * (end - start)
+        for k in range(between.shape[0]):
+            between[k] = start[k] + (at + stretch) * (end[k] - start[k])
         x, y = phi, theta
         d1, d2, determinant = newton_step(between, x, y)
         first = np.hypot(d1, d2)

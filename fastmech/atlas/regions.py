@@ -140,7 +140,7 @@ def label_points(
     Returns:
         The number of regions now.
     """
-    axes = len(strides)
+    axes = strides.shape[0]
     partner = np.empty((axes, MOST), dtype=np.int8)
     border = np.empty(axes, dtype=np.bool_)
     between = np.empty(coefficients.shape[1])
@@ -154,7 +154,8 @@ def label_points(
     filled = 0
     for p in range(ghosts, len(count)):
         n = int(count[p])
-        label[p] = NO_LABEL
+        for i in range(MOST):
+            label[p, i] = NO_LABEL
         settled = False
         for axis in range(axes):
             border[axis] = False

@@ -14,8 +14,7 @@ from fastmech.atlas.enclosure import System
 from fastmech.atlas.systems import Plane, fold, point_at, rest
 from fastmech.equilibria.find import Equilibria, Equilibrium, find_equilibria
 from fastmech.errors import InputError, shown
-from fastmech.scene import Scene, nearest
-from fastmech.stability.arguments import require_scene
+from fastmech.scene import Scene, nearest, require_scene
 
 Floats = NDArray[np.float64]
 

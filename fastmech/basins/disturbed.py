@@ -7,18 +7,19 @@ it swings is measured in a run of its own to the end.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.basins.label import labels_of, require_damper
+from fastmech.basins.label import label_starts, require_damper
 from fastmech.basins.ladder import SUBSTEPS
 from fastmech.basins.measures.fractions import Shares, basin_stability
 from fastmech.basins.status import BasinStatus
-from fastmech.basins.steps import coarse_steps
-from fastmech.disturbance.motion import equilibria_to_disturb
+from fastmech.basins.steps import MOST_OCTAVES, PHASE, TURNING, coarse_steps, highest_frequency, method_for
+from fastmech.disturbance.motion import damped_times, equilibria_to_disturb
 from fastmech.disturbance.observe import EXCURSION_PHI, EXCURSION_THETA, LAST_OUTSIDE, observe_departure
 from fastmech.disturbance.size import Size, confining_energy, excess_energy, size_at, uniform_ball
 from fastmech.ensembles import checks
@@ -28,7 +29,7 @@ from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.status import Status, failure_counts, failure_line
 from fastmech.equilibria.find import Equilibria, Equilibrium
 from fastmech.errors import InputError, StepWarning
-from fastmech.integrators.implicit_method import with_jacobian
+from fastmech.integrators.implicit_method import ImplicitRungeKutta, with_jacobian
 from fastmech.integrators.methods import find_method
 from fastmech.kernels.jacobians import lagrange_jacobian
 from fastmech.kernels.select import right_hand_side
@@ -45,8 +46,15 @@ STREAM = 65_536
 #: Trajectories of the largest ensemble: its results take about 150 bytes each in memory.
 MOST_TRAJECTORIES = 100_000_000
 
-#: Share of a start's coarse step, at which labels begin, that measuring takes by default.
+#: Largest disturbance [rad]: times the frequency it is as fast as the shortest steps by default can follow.
+MOST_RADIUS = TURNING * 2.0**MOST_OCTAVES
+
+#: Share of a start's coarse step, at which labels begin, that measuring takes by default; an implicit method,
+#: whose error constant is larger, takes half of it.
 MEASURING = 0.6
+
+#: How often the step of a motion is halved at which Newton's iteration does not converge.
+HALVINGS = 6
 
 
 class Outcome(IntEnum):
@@ -97,9 +105,12 @@ _BY_RUN = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class DisturbedEnsemble:
-    """Random disturbances of one equilibrium and what became of them; arrays over n trajectories."""
+    """Random disturbances of one equilibrium and what became of them; arrays over n trajectories.
+
+    Printed, it says how many return, how soon, and how far they swing.
+    """
 
     equilibria: Equilibria  #: all equilibria of the scene
     index: int  #: which of them was disturbed
@@ -130,6 +141,24 @@ class DisturbedEnsemble:
         known = (self.outcome == Outcome.RETURNED) | (self.outcome == Outcome.ELSEWHERE)
         return basin_stability(np.where(known, self.outcome, -1), int(Outcome.RETURNED))
 
+    def __repr__(self) -> str:
+        e, shares = self.equilibria[self.index], self.returned
+        ended = failure_counts(self.outcome, Outcome)
+        lines = [
+            f"{self.outcome.size:,} disturbances of the {e.kind} at phi = {e.phi:.4g}, "
+            f"theta = {e.theta:.4g} rad, followed for {self.t_end:g} s",
+            "  ended: " + ", ".join(f"{count:,} {name}" for name, count in ended.items()),
+            f"  returned: {shares.fraction:.2%}, at most {shares.at_most:.2%} "
+            f"(95 % interval {shares.lower:.2%} to {shares.upper:.2%})",
+        ]
+        times = self.time_to_return[np.isfinite(self.time_to_return)]
+        if times.size:
+            lines.append(f"  back after {np.median(times):.3g} s (median), {times.max():.3g} s at most")
+        if np.isfinite(self.excursion).any():
+            phi, theta = np.nanmax(self.excursion, axis=0)
+            lines.append(f"  largest excursion: {phi:.3g} rad of phi, {theta:.3g} rad of theta")
+        return "\n".join([*lines, *([f"  {self.failures}"] if self.failures else [])])
+
     @property
     def share_returned(self) -> float:
         """Share of the trajectories that are proved to return."""
@@ -150,7 +179,7 @@ def disturb(
     seed: int = 0,
     t_end: float = 120.0,
     dt: float | None = None,
-    method: str = "dop853",
+    method: str | None = None,
     return_radius: float = 0.01,
     part: slice | None = None,
     threads: int | None = None,
@@ -174,7 +203,8 @@ def disturb(
         t_end: end of the run [s].
         dt: longest step [s]; by default each start's own, from the scene's frequencies, its damping and the
             start's energy, see :func:`measuring_steps`.
-        method: name of the method.
+        method: name of the method; by default ``dop853``, or ``radau5`` (implicit) where the damper would
+            set the explicit method's steps.
         return_radius: radius of the ball of return [rad].
         part: which of the n disturbances to follow, with a step of 1; all by default.
         threads: threads to use; the result does not depend on it.
@@ -189,69 +219,84 @@ def disturb(
     require_damper(scene)
     n = checks.whole_number("n", n, least=1, most=MOST_TRAJECTORIES)
     seed = checks.whole_number("seed", seed, least=0)
-    radius = checks.number("radius", radius, "rad", above=0.0)
+    if (radius := checks.number("radius", radius, "rad", above=0.0)) > MOST_RADIUS:
+        raise InputError(
+            f"radius = {radius:g} rad: must not exceed {MOST_RADIUS:g} rad; no step follows that"
+        )
     return_radius = checks.number("return_radius", return_radius, "rad", above=0.0)
-    times = np.array([0.0, checks.number("t_end", t_end, "s", above=0.0)])
+    t_end = checks.number("t_end", t_end, "s", above=0.0)
+    method = method_for(scene, method)
     if dt is not None:
         dt = checks.number("dt", dt, "s", above=0.0)
         warn_of_step([scene], dt, method)
     index = equilibria.index_of(equilibrium)
-    center = np.array([equilibrium.phi, equilibrium.theta, 0.0, 0.0])
+    c, center = reduce(scene), np.array([equilibrium.phi, equilibrium.theta, 0.0, 0.0])
     size = size_at(scene, equilibrium.phi, equilibrium.theta)
-    _refuse_meeting_balls(equilibria, index, size, return_radius)
+    refuse_meeting_balls(scene, equilibria, return_radius, [index])
     chosen = range(*(part or slice(None)).indices(n))
     starts = center + size.from_ball(radius * _starts_in_ball(seed, index, n, chosen))
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StepWarning)  # it has been told
-        ends = labels_of(scene, starts, times[1], dt=dt, method=method, threads=threads)
+        ends = label_starts(scene, starts, t_end, dt=dt, method=method, threads=threads)
     longest = measuring_steps(scene, starts, method) if dt is None else np.full(len(starts), dt)
-    steps, which = np.unique(longest, return_inverse=True)
-    number = np.array([output_steps(times, float(step))[0] for step in steps])
-    taken = (times[1] / number)[which]
+    at_first = damped_times(scene, method, min(dt or PHASE / highest_frequency(c), t_end))
+    times = np.array([0.0, *at_first, t_end])
     departure = np.abs(starts - center)
-    run = run_ensemble(
-        right_hand_side(reduce(scene)),
-        reduce(scene),
-        starts,
-        times,
-        longest,
-        with_jacobian(find_method(method), lagrange_jacobian, True),
-        _observation(center, size, return_radius),
-        threads=threads,
-        progress=progress,
-    )
-    final = run.states[-1]
-    status = judge(run.status, starts, final, reduce(scene), threads)
-    driven = [drives_rest(scene, float(times[1] / k), float(k), method) for k in number]
-    status[np.array(driven)[which] & (status == Status.OK)] = Status.STEP_TOO_LARGE
+    final, last, failed = np.empty_like(starts), np.empty_like(starts), np.empty(len(starts))
+    reached, records = np.empty(len(starts), dtype=np.int8), np.empty((3, len(starts)))
+    again, halvings = np.arange(len(starts)), 0
+    while again.size:  # with shorter steps where an implicit method finds none
+        run = run_ensemble(
+            right_hand_side(c),
+            c,
+            starts[again],
+            times,
+            longest[again],
+            with_jacobian(find_method(method), lagrange_jacobian, True),
+            _observation(center, size, return_radius),
+            threads=threads,
+            progress=progress if halvings == 0 else None,
+        )
+        final[again], last[again], failed[again] = run.states[-1], run.last, run.failed
+        reached[again], records[:, again] = run.status, run.records
+        again = again[(run.status == Status.NOT_CONVERGED) & (dt is None) & (halvings < HALVINGS)]
+        longest[again] *= 0.5
+        halvings += 1
+    steps, which = np.unique(longest, return_inverse=True)
+    number = np.array([output_steps(times[-2:], float(step))[0] for step in steps])
+    taken = ((t_end - times[-2]) / number)[which]
+    status = judge(reached, starts, final, c, threads)
+    driven = np.array([drives_rest(scene, t_end / float(k), float(k), method) for k in number])[which]
+    status[driven & np.isin(status, (Status.OK, Status.NOT_FINITE))] = Status.STEP_TOO_LARGE
 
     outcome = np.full(len(starts), Outcome.UNDECIDED, dtype=np.int8)
     for kind, told in _BY_LABEL.items():
         outcome[ends.status == kind] = told
     outcome[(ends.well == index) & ~ends.turns.any(axis=1)] = Outcome.RETURNED
-    for reached, told in _BY_RUN.items():
-        outcome[status == reached] = told
+    for seen, told in _BY_RUN.items():
+        outcome[status == seen] = told
     failing = np.isin(outcome, FAILURES)
-    last_outside = run.records[LAST_OUTSIDE]
+    last_outside = records[LAST_OUTSIDE]
     left = (size(starts - center) > return_radius) | (last_outside > 0.0)
-    inside_since = np.where(left, last_outside + taken, 0.0)
+    after = np.append(times, np.inf)[np.searchsorted(times, last_outside * (1.0 + 1e-12), side="right")]
+    inside_since = np.where(left, np.minimum(after, last_outside + taken), 0.0)
     returned = outcome == Outcome.RETURNED
     back = np.zeros(len(starts), dtype=np.bool_)
     back[returned] = (size(final[returned] - center) <= return_radius) & (
         excess_energy(scene, equilibrium, final[returned])
         <= confining_energy(scene, equilibrium, return_radius)
     )
-    excursion = np.maximum(departure[:, :2], run.records[[EXCURSION_PHI, EXCURSION_THETA]].T)
+    excursion = np.maximum(departure[:, :2], records[[EXCURSION_PHI, EXCURSION_THETA]].T)
     return DisturbedEnsemble(
         equilibria=equilibria,
         index=index,
         size=size,
-        t_end=float(times[1]),
+        t_end=t_end,
         dt=taken,
         starts=starts,
-        final=run.last,
-        failed=run.failed,
+        final=last,
+        failed=failed,
         outcome=outcome,
         end_index=np.where(failing, -1, ends.well).astype(np.int8),
         turns=np.where(failing[:, None], 0, ends.turns).astype(np.int64),
@@ -268,20 +313,28 @@ def measuring_steps(scene: Scene, starts: Floats, method: str) -> Floats:
     """
     coarse = coarse_steps(reduce(scene), starts)
     finest = coarse * SUBSTEPS[0] / SUBSTEPS[-1]
-    return np.asarray(np.clip(0.9 * step_limit(scene, method), finest, MEASURING * coarse))
+    share = 0.5 * MEASURING if isinstance(find_method(method), ImplicitRungeKutta) else MEASURING
+    return np.asarray(np.clip(0.9 * step_limit(scene, method), finest, share * coarse))
 
 
-def _refuse_meeting_balls(equilibria: Equilibria, index: int, size: Size, radius: float) -> None:
-    """Refuse a ball of return that reaches half way to another equilibrium."""
+def refuse_meeting_balls(
+    scene: Scene, equilibria: Equilibria, radius: float, which: Sequence[int] | range
+) -> None:
+    """Refuse a ball of return about one of some equilibria that reaches half way to another.
+
+    Raises:
+        InputError: it does.
+    """
     angles = np.column_stack([equilibria.phi, equilibria.theta])
-    away = np.delete(angles, index, axis=0) - angles[index]
-    away -= 2.0 * np.pi * np.round(away / (2.0 * np.pi))
-    nearest = float(size(np.concatenate([away, np.zeros_like(away)], axis=1)).min(initial=np.inf))
-    if radius > 0.5 * nearest:
-        raise InputError(
-            f"return_radius = {radius:g} rad: must not exceed {0.5 * nearest:.3g} rad, "
-            "half the distance of two equilibria"
-        )
+    for index in which:
+        away = np.delete(angles, index, axis=0) - angles[index]
+        away -= 2.0 * np.pi * np.round(away / (2.0 * np.pi))
+        sizes = size_at(scene, *angles[index])(np.concatenate([away, np.zeros_like(away)], axis=1))
+        if radius > 0.5 * (nearest := float(sizes.min(initial=np.inf))):
+            raise InputError(
+                f"return_radius = {radius:g} rad: must not exceed {0.5 * nearest:.3g} rad, "
+                "half the distance of two equilibria"
+            )
 
 
 def _starts_in_ball(seed: int, index: int, n: int, chosen: range) -> Floats:

@@ -16,16 +16,15 @@ from numpy.typing import ArrayLike
 from fastmech.basins.copies import copy_labels, label_name
 from fastmech.basins.measures.labels import Floats, LabelOf, ask, check_point
 from fastmech.basins.measures.norm import kinetic_norm, norm_on
-from fastmech.basins.steps import coarse_steps
-from fastmech.disturbance.motion import require_constant_force
+from fastmech.basins.steps import coarse_steps, method_for
+from fastmech.disturbance.motion import damped_times, require_constant_force
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.system import System
 from fastmech.equilibria.find import Equilibrium, find_equilibria
 from fastmech.errors import InputError
 from fastmech.mechanism.coefficients import reduce
-from fastmech.scene import Scene
-from fastmech.stability.arguments import require_scene
+from fastmech.scene import Scene, require_scene
 
 #: Points between two starts whose labels are asked for at once.
 SECTIONS = 15
@@ -67,7 +66,7 @@ def track_edge(
     tolerance: float = 1e-3,
     interval: float = 0.25,
     dt: float | None = None,
-    method: str = "dop853",
+    method: str | None = None,
 ) -> EdgeTrack:
     """Follow the boundary between two starts until it comes to rest.
 
@@ -87,7 +86,7 @@ def track_edge(
         tolerance: the edge state rests if a whole stretch moves by no more than this, ``far`` or more.
         interval: time between looks at their distance [s].
         dt: longest step [s]. By default, of a scene, it follows from frequencies and the starts' energies.
-        method: name of the method.
+        method: name of the method; ``dop853`` by default, of a scene see ``fm.labels_of``.
 
     Raises:
         InputError: an argument is wrong, the force decays, or the starts' labels are not two known ones.
@@ -121,7 +120,10 @@ def track_edge(
 
     times, states, gaps = [], [], []
     t, moved, lost = 0.0, np.inf, False
-    looks = interval * np.arange(1, OUTPUTS + 1)
+    looks, at_first = interval * np.arange(1, OUTPUTS + 1), np.zeros(0)
+    if isinstance(scene, Scene):
+        method = method_for(scene, method)
+        at_first = damped_times(scene, method, min(dt, interval))
     while True:
         a, b = _bisect(label_of, first, a, b, float(distance(a, b)), near)
         times.append(t)
@@ -129,7 +131,9 @@ def track_edge(
         gaps.append(float(distance(a, b)))
         if t >= t_end or moved <= tolerance:
             break
-        way = integrate(scene, np.stack([a, b]), dt=dt, method=method, t_eval=looks).y
+        times_on_way = np.append(at_first, looks)
+        way = integrate(scene, np.stack([a, b]), dt=dt, method=method or "dop853", t_eval=times_on_way).y
+        way = way[at_first.size :]
         parted = np.flatnonzero(distance(way[:, 0], way[:, 1]) > far)
         last = int(parted[0]) if parted.size else OUTPUTS - 1
         moved = float(distance(way[: last + 1, 0], a).max())
@@ -171,17 +175,21 @@ def saddle_at(scene: Scene, state: ArrayLike) -> tuple[Equilibrium, float]:
 
 def _sides(label_of: LabelOf, a: Floats, b: Floats) -> tuple[int, Floats, Floats] | None:
     """Two points on the line through a and b with different known labels, the nearest, and the first's."""
-    apart = np.concatenate([[0.0], 2.0 ** np.arange(DOUBLINGS)])
-    line = np.concatenate([-apart[:0:-1], apart])
-    points = a + line[:, None] * (b - a)
-    labels = ask(label_of, points)
-    known = np.flatnonzero(labels >= 0)
-    changes = np.flatnonzero(np.diff(labels[known]) != 0)
-    if not changes.size:
-        return None
-    pairs = np.stack([known[changes], known[changes + 1]], axis=1)
-    nearest = pairs[np.abs(line[pairs]).max(axis=1).argmin()]
-    return int(labels[nearest[0]]), points[nearest[0]], points[nearest[1]]
+    line, points, labels = np.zeros(0), np.zeros((0, a.size)), np.zeros(0, dtype=np.int64)
+    further = np.array([0.0, 1.0])
+    for doubling in range(DOUBLINGS):
+        more = a + further[:, None] * (b - a)
+        line, points = np.append(line, further), np.concatenate([points, more])
+        labels = np.append(labels, ask(label_of, more))
+        known = np.flatnonzero(labels >= 0)
+        known = known[np.argsort(line[known])]
+        changes = np.flatnonzero(np.diff(labels[known]) != 0)
+        if changes.size:
+            pairs = np.stack([known[changes], known[changes + 1]], axis=1)
+            nearest = pairs[np.abs(line[pairs]).max(axis=1).argmin()]
+            return int(labels[nearest[0]]), points[nearest[0]], points[nearest[1]]
+        further = np.array([-(2.0**doubling), 2.0 ** (doubling + 1)])
+    return None
 
 
 def _bisect(

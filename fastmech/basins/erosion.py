@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.atlas.map import map_equilibria
-from fastmech.basins.label import labels_of as labels_by_capture
-from fastmech.basins.label import require_damper
+from fastmech.basins.label import label_starts, require_damper
 from fastmech.basins.measures.fractions import basin_stability
 from fastmech.basins.measures.integrity import integrity
 from fastmech.basins.measures.labels import Floats, Integers, check_axes, check_point
@@ -28,8 +27,7 @@ from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
 from fastmech.equilibria.find import Equilibria, find_equilibria
 from fastmech.errors import InputError, shown
-from fastmech.scene import Scene
-from fastmech.stability.arguments import require_scene
+from fastmech.scene import Scene, require_scene
 
 #: Relative tolerance of shocks: what a profile shows.
 TOLERANCE = 1e-3
@@ -264,7 +262,7 @@ def survey_of(
         states,
         tuple(lines),
         low + (high - low) * rng.random((n, len(lines))),
-        labels_of or partial(labels_by_capture, t_end=t_end),
+        labels_of or partial(label_starts, t_end=t_end),
         most_shock,
         directions,
         seed,

@@ -6,25 +6,37 @@ time, so near to each other that what lies between them is captured too. Paths t
 nearer to the stable manifold of a saddle than their error) are computed again with ever smaller steps.
 
 Angles are reduced to one turn first, exactly. As long as a force acts that dies out before the mechanism has
-moved, steps follow its decay; once its work is less than rounding, the motion goes on without it.
+moved, steps follow its decay; once its work is less than rounding, the motion goes on without it. A strong
+damper stops part of a motion as quickly: steps are as short at first, and then those of what remains.
 """
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.atlas.wells import ROUNDING
 from fastmech.basins.ladder import SUBSTEPS, climb, lingering, tell_the_same
+from fastmech.basins.measures.norm import FEW_TURNS, beyond_turns
 from fastmech.basins.runs import Paths, follow, rounds_until
 from fastmech.basins.status import BasinStatus, counts
-from fastmech.basins.steps import coarse_steps, gone_at_once, step_of_fading
+from fastmech.basins.steps import (
+    PHASE,
+    coarse_steps,
+    gone_at_once,
+    highest_frequency,
+    method_for,
+    step_of_fading,
+)
 from fastmech.capture.barriers import BarrierTree
 from fastmech.capture.certificate import Certificate, certificate_of
+from fastmech.disturbance.motion import damped_times
 from fastmech.disturbance.size import confining_energy
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
@@ -37,8 +49,7 @@ from fastmech.integrators.method import Method
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import unit
-from fastmech.scene import Scene
-from fastmech.stability.arguments import require_scene
+from fastmech.scene import Scene, require_scene
 from fastmech.step_limits.beyond import is_beyond
 from fastmech.step_limits.warning import warn_of_step
 
@@ -55,13 +66,22 @@ TURN = (_FIRST, _SECOND, 2.0 * np.pi - _FIRST - _SECOND + 2.4492935982947064e-16
 #: Every piece takes something of everywhere, so that all take about as long and progress tells the time left.
 BATCH, PIECES, LEAST = 1 << 16, 16, 1 << 11
 
+#: Least growth from step to step while a strong damper stops part of a motion.
+FINEST_GROWTH = 0.2
+
+#: Angles larger than this are none in degrees either.
+MOST_DEGREES = 720.0
+
+#: Wells that have a line of their own where ends are printed.
+MOST_LINES = 3
+
 #: Numbers of 8 bytes that memory holds of every start on the way.
 START_NUMBERS = 20
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Labels:
-    """Where n starts end."""
+    """Where n starts end; printed, how many end where, and when."""
 
     tree: BarrierTree | None  #: wells, barriers and equilibria; of a system of your own: None
     well: NDArray[np.int8]  #: index of the well among the equilibria, -1: no label; shape (n,)
@@ -76,6 +96,29 @@ class Labels:
         """How many starts have each status."""
         return counts(self.status)
 
+    def __repr__(self) -> str:
+        return told_ends(f"{self.status.size:,} starts", self)
+
+
+def told_ends(what: str, found: Any) -> str:
+    """At most six lines on ``what`` has the wells, statuses and times of :class:`Labels`, and its tree."""
+    n, well = found.status.size, found.well.ravel()
+    known, number = np.unique(well[well >= 0], return_counts=True)
+    order = np.argsort(-number, kind="stable")
+    statuses = ", ".join(f"{count:,} {name}" for name, count in found.counts.items() if count)
+    lines = [f"{what}: {statuses}"]
+    for k in order[:MOST_LINES]:
+        e = None if found.tree is None else found.tree.equilibria[int(known[k])]
+        place = "" if e is None else f" at phi = {e.phi:.4g}, theta = {e.theta:.4g} rad"
+        name = f"code {known[k]}" if e is None else f"well {known[k]}"
+        lines.append(f"  {name}{place}: {number[k]:,} ({number[k] / n:.1%})")
+    if order.size > MOST_LINES:
+        lines.append(f"  {order.size - MOST_LINES} more: {number[order[MOST_LINES:]].sum():,}")
+    times = found.time[np.isfinite(found.time)]
+    if times.size:
+        lines.append(f"  after {np.median(times):.3g} s (median), {times.max():.3g} s at most")
+    return "\n".join(lines)
+
 
 def labels_of(
     scene: Scene,
@@ -83,7 +126,7 @@ def labels_of(
     t_end: float = 60.0,
     *,
     dt: float | None = None,
-    method: str = "dop853",
+    method: str | None = None,
     settle_radius: float | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
@@ -92,11 +135,14 @@ def labels_of(
 
     Args:
         scene: the mechanism, with a damper. A decaying force leads to the wells of springs and weights.
-        starts: phi, theta [rad], phi', theta' [rad/s], shape (n, 4) or (4,); angles count their turns.
+        starts: phi, theta [rad], phi', theta' [rad/s], shape (n, 4) or (4,); angles count their turns, and
+            more than four give a warning, if they may be degrees.
         t_end: end of the run [s]; what is not captured by then is undecided.
         dt: coarsest step [s]: each path is computed with it and with two thirds of it, and with less where
             these differ. By default it follows from the scene's frequencies and the start's energy.
-        method: name of the integration method.
+        method: name of the integration method; by default ``dop853``, or ``radau5`` (implicit) where the
+            damper stops motion so quickly that explicit steps would have to be far shorter than the rest of
+            the motion asks for.
         settle_radius: if given, also the time from which on a captured motion stays within so many rad of
             its well in the kinetic-energy norm (by its energy, to second order about the well).
         threads: threads to use, all processors by default. The result does not depend on it.
@@ -105,6 +151,36 @@ def labels_of(
     Raises:
         InputError: an argument is wrong, the scene has no damper, or its wells are not certain.
     """
+    states = checks.states("starts", starts, 4)
+    angles = np.abs(states[:, :2])
+    largest = float(np.max(angles, initial=0.0, where=np.isfinite(angles)))
+    if 2.0 * np.pi * FEW_TURNS < largest <= MOST_DEGREES:
+        warnings.warn(f"starts: {beyond_turns(largest)}", stacklevel=2)
+    return label_starts(
+        scene,
+        starts,
+        t_end,
+        dt=dt,
+        method=method,
+        settle_radius=settle_radius,
+        threads=threads,
+        progress=progress,
+    )
+
+
+def label_starts(
+    scene: Scene,
+    starts: ArrayLike,
+    t_end: float = 60.0,
+    *,
+    dt: float | None = None,
+    method: str | None = None,
+    settle_radius: float | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+    ladder: tuple[int, ...] = SUBSTEPS,
+) -> Labels:
+    """As :func:`labels_of`, with these numbers of substeps, one computation after the other."""
     require_damper(scene)
     checks.progress_function(progress, "starts")
     states = checks.states("starts", starts, 4)
@@ -112,10 +188,11 @@ def labels_of(
     begin, turned = _unwound(states)
     thread_count(threads)
     t_end = checks.number("t_end", t_end, "s", above=0.0)
+    method = method_for(scene, method)
     formula, certificate = find_method(method), certificate_of(scene)
-    fading = Fading.of(certificate, formula, threads, t_end)
-    if fading is not None:
-        certificate, t_end = fading.rest, t_end - fading.span
+    prelude = Prelude.of(certificate, formula, threads, t_end)
+    if prelude is not None:
+        certificate, t_end = prelude.rest, t_end - prelude.span
     if dt is not None:
         dt = checks.number("dt", dt, "s", above=0.0)
         warn_of_step([certificate.scene], dt, method)
@@ -129,11 +206,11 @@ def labels_of(
     for some in pieces_of(len(begin)):
         for step in np.unique(coarse[some[finite[some]]]):
             members = some[finite[some] & (coarse[some] == step)]
-            ladder = Ladder(certificate, t_end, float(step), formula, threads, fading)
-            ladder.label(begin, members, found, status)
+            followed = Ladder(certificate, t_end, float(step), formula, threads, prelude, ladder)
+            followed.label(begin, members, found, status)
             if settle is not None and settle_radius is not None:
-                settle[members] = ladder.settle_times(begin, members, found, status, settle_radius)
-            found.steps += ladder.steps
+                settle[members] = followed.settle_times(begin, members, found, status, settle_radius)
+            found.steps += followed.steps
         if progress is not None:
             progress(some.size)
     captured = status == BasinStatus.CAPTURED
@@ -164,33 +241,42 @@ def _unwound(starts: Floats) -> tuple[Floats, Integers]:
 
 
 @dataclass(frozen=True)
-class Fading:
-    """A force that dies out at once: the motion until it is gone."""
+class Prelude:
+    """The motion until a force that dies out at once is gone, and what the damper stops at once rests."""
 
     scene: Scene
-    rest: Certificate  #: without force
-    span: float  #: s, after which all work that the force can still do is less than rounding
+    rest: Certificate  #: of what follows
+    span: float  #: s
     step: float  #: coarsest [s]
     method: Method
     threads: int | None
 
     @classmethod
-    def of(cls, certificate: Certificate, method: Method, threads: int | None, t_end: float) -> Fading | None:
-        """Of a scene whose force is gone long before ``t_end`` [s], else none."""
-        scene, c = certificate.scene, reduce(certificate.scene)
-        if not certificate.decays or not gone_at_once(c):
-            return None
-        rest = Certificate(scene.replace(F0=0.0, alpha=0.0), certificate.tree)
-        span = np.log(40.0 * abs(c.force) / (ROUNDING * rest.amplitudes)) / c.decay
-        if not 0.0 < span < t_end:
-            return None
-        return cls(scene, rest, float(span), step_of_fading(c), method, threads)
+    def of(
+        cls, certificate: Certificate, method: Method, threads: int | None, t_end: float
+    ) -> Prelude | None:
+        """None where nothing is over so quickly, or not before ``t_end`` [s]."""
+        scene, rest, c = certificate.scene, certificate, reduce(certificate.scene)
+        span, step = 0.0, math.inf
+        if certificate.decays and gone_at_once(c):  # once all work that it can still do is less than rounding
+            rest = Certificate(scene.replace(F0=0.0, alpha=0.0), certificate.tree)
+            span = float(np.log(40.0 * abs(c.force) / (ROUNDING * rest.amplitudes)) / c.decay)
+            step = step_of_fading(c)
+        stopped = PHASE / highest_frequency(reduce(rest.scene))
+        if damped_times(scene, method.name, stopped).size:
+            span = max(span, stopped)
+        return cls(scene, rest, span, step, method, threads) if 0.0 < span < t_end else None
 
-    def after(self, starts: Floats, step: float) -> tuple[Floats, NDArray[np.int8]]:
-        """States (n, 4) and statuses (n,) when the force is gone, with no longer step than ``step`` [s]."""
+    def after(self, starts: Floats, step: float, substeps: int) -> tuple[Floats, NDArray[np.int8]]:
+        """States (n, 4) and statuses (n,) at its end, with so many substeps and none above ``step`` [s]."""
+        longest = min(step, self.step) * SUBSTEPS[0] / substeps
+        ratio = 1.0 + max(2.0 / substeps, FINEST_GROWTH)
+        times = np.append(damped_times(self.scene, self.method.name, self.span, ratio), self.span)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", StepWarning)
-            run = integrate(self.scene, starts, self.span, step, self.method.name, threads=self.threads)
+            run = integrate(
+                self.scene, starts, dt=longest, method=self.method.name, t_eval=times, threads=self.threads
+            )
         return run.y[-1], run.status
 
 
@@ -224,7 +310,8 @@ class Ladder:
     coarse: float  #: s
     method: Method
     threads: int | None
-    fading: Fading | None = None  #: what comes before
+    prelude: Prelude | None = None  #: what comes before
+    ladder: tuple[int, ...] = SUBSTEPS
     steps: int = 0
 
     def __post_init__(self) -> None:
@@ -246,8 +333,8 @@ class Ladder:
         paths = follow(
             self.certificate, observer, begin, self.t_end, self.rounds, substeps, self.method, self.threads
         )
-        if self.fading is not None:
-            paths.time += self.fading.span
+        if self.prelude is not None:
+            paths.time += self.prelude.span
             failed = status != Status.OK
             paths.code[failed], paths.status[failed] = 0, status[failed]
         self.steps += paths.steps
@@ -255,14 +342,13 @@ class Ladder:
 
     def begin(self, starts: Floats, substeps: int) -> tuple[Floats, NDArray[np.int8]]:
         """States from which on the certificate holds, and the statuses of the motions until then."""
-        if self.fading is None:
+        if self.prelude is None:
             return starts, np.zeros(len(starts), dtype=np.int8)
-        step = min(self.fading.step, self.coarse) * SUBSTEPS[0] / substeps
-        return self.fading.after(starts, step)
+        return self.prelude.after(starts, self.coarse, substeps)
 
     def label(self, begin: Floats, members: NDArray[np.intp], found: Paths, status: NDArray[np.int8]) -> None:
         """Find labels and statuses of some starts."""
-        c = reduce(self.certificate.scene if self.fading is None else self.fading.scene)
+        c = reduce(self.certificate.scene if self.prelude is None else self.prelude.scene)
         push = c.force if self.certificate.decays else 0.0
         climb(
             self.certificate,
@@ -273,14 +359,15 @@ class Ladder:
             lambda some: self.lingers(begin[some]),
             found,
             status,
+            self.ladder,
         )
 
     def lingers(self, starts: Floats) -> NDArray[np.bool_]:
         """Which motions come to an unstable equilibrium, with the finest step."""
-        finest = self.coarse * SUBSTEPS[0] / SUBSTEPS[-1]
-        if self.grows(SUBSTEPS[-1]):
+        finest = self.coarse * SUBSTEPS[0] / self.ladder[-1]
+        if self.ladder != SUBSTEPS or self.grows(self.ladder[-1]):  # few substeps leave it undecided
             return np.zeros(len(starts), dtype=np.bool_)
-        begin, _ = self.begin(starts, SUBSTEPS[-1])
+        begin, _ = self.begin(starts, self.ladder[-1])
         return lingering(self.certificate, begin, self.t_end, finest, self.method.name, self.threads)
 
     def settle_times(

@@ -52,13 +52,14 @@ def climb(
     lingers: Lingers,
     found: Paths,
     status: NDArray[np.int8],
+    ladder: tuple[int, ...] = SUBSTEPS,
 ) -> None:
     """Find labels and statuses of some starts, and write them where ``members`` says."""
-    coarse = compute(members, SUBSTEPS[0])
-    for substeps in SUBSTEPS[1:]:
+    coarse = compute(members, ladder[0])
+    for substeps in ladder[1:]:
         fine = compute(members, substeps)
         settled = agree(members, coarse, fine)
-        done = np.flatnonzero(settled | (substeps == SUBSTEPS[-1]))
+        done = np.flatnonzero(settled | (substeps == ladder[-1]))
         ends, last = members[done], fine.take(done)
         found.put(ends, last)
         captured = settled[done] & (last.code > 0)
@@ -152,12 +153,7 @@ def _away(states: Floats, place: Floats) -> Floats:
 
 
 def lingering(
-    certificate: Certificate,
-    starts: Floats,
-    t_end: float,
-    dt: float,
-    method: str,
-    threads: int | None,
+    certificate: Certificate, starts: Floats, t_end: float, dt: float, method: str, threads: int | None
 ) -> NDArray[np.bool_]:
     """Which motions from ``starts`` (n, 4) come to an unstable equilibrium by ``t_end`` [s]."""
     times = np.linspace(0.0, t_end, math.ceil(t_end / LOOK) + 1)
@@ -168,12 +164,7 @@ def lingering(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", StepWarning)
             run = integrate(
-                certificate.scene,
-                starts[some],
-                dt=dt,
-                method=method,
-                t_eval=times,
-                threads=threads,
+                certificate.scene, starts[some], dt=dt, method=method, t_eval=times, threads=threads
             )
         near = near_saddle(certificate, run.y.reshape(-1, 4)).reshape(times.size, -1)
         found[some] = near.any(axis=0)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.basins.copies import copy_numbers
-from fastmech.basins.label import Labels, labels_of
+from fastmech.basins.label import Labels, label_starts, told_ends
 from fastmech.basins.measures.labels import number_turns
 from fastmech.basins.measures.norm import STATE as STATE
 from fastmech.basins.measures.norm import check_angles
@@ -30,9 +30,12 @@ Floats = NDArray[np.float64]
 MOST_POINTS, POINT_NUMBERS = 50_000_000, 20
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class BasinMap:
-    """Labels over a grid of starts; arrays have one axis for each of ``axes``, in their order."""
+    """Labels over a grid of starts; arrays have one axis for each of ``axes``, in their order.
+
+    Printed, it says how many starts end where, and when.
+    """
 
     axes: dict[str, Floats]  #: values along each axis [rad, rad/s]
     fixed: dict[str, float]  #: the other coordinates of the starts
@@ -59,6 +62,10 @@ class BasinMap:
         """
         return number_turns(self.well, self.turns)
 
+    def __repr__(self) -> str:
+        grid = " x ".join(f"{name} ({values.size:,})" for name, values in self.axes.items())
+        return told_ends(f"map over {grid}", self)
+
 
 def map_basins(
     scene: Scene | System,
@@ -69,7 +76,7 @@ def map_basins(
     refine: int | None = None,
     parameters: Mapping[str, ArrayLike] | None = None,
     dt: float | None = None,
-    method: str = "dop853",
+    method: str | None = None,
     settle_radius: float | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
@@ -90,7 +97,7 @@ def map_basins(
         parameters: of a system, values of parameters by name that differ between starts, each of a shape that
             broadcasts to the map's: ``values[:, None]`` changes along the first of two axes.
         dt: coarsest step [s], see :func:`fastmech.basins.label.labels_of`; a system needs one.
-        method: name of the integration method.
+        method: name of the integration method; ``dop853`` by default, of a scene see there.
         settle_radius: see there; a scene's only.
         threads: threads to use, all processors by default. The result does not depend on it.
         progress: is told how many starts are done since its last call; of a refined map its share of the work
@@ -119,7 +126,7 @@ def map_basins(
     def compute(points: NDArray[np.intp], tell: Progress | None) -> NDArray[np.int64]:
         starts = grid_starts(values, held, names, points)
         if isinstance(scene, Scene):
-            part = labels_of(
+            part = label_starts(
                 scene,
                 starts,
                 t_end,
@@ -135,7 +142,7 @@ def map_basins(
                 starts,
                 t_end,
                 dt=dt,
-                method=method,
+                method=method or "dop853",
                 parameters={name: value.ravel()[points] for name, value in own.items()},
                 threads=threads,
                 progress=tell,

@@ -7,7 +7,7 @@ touches.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,7 +90,7 @@ def minimal_shock(
     units = _random_units(rng, number, len(rays.to_state))
     if guess is not None:
         units = np.concatenate([_directions_of(guess, rays), units])
-    return rays.result(*rays.turned(units, most, LEVELS, rng))
+    return rays.result(*rays.turned(units, most, rng))
 
 
 def brute_force_shock(
@@ -156,17 +156,12 @@ class Rays:
     label: int  #: of its own basin
     to_state: Floats  #: (k, dim): ``point @ to_state`` is the disturbance whose size is the point's length
     tolerance: float  #: relative, of the size along a ray
-    least: Callable[[Floats], Floats] = lambda units: np.zeros(
-        len(units)
-    )  #: no smaller size leaves along units
     trajectories: int = 1
     undecided: float = np.inf  #: smallest size tried whose end is not known
 
-    def turned(
-        self, units: Floats, most: float, levels: int, rng: np.random.Generator
-    ) -> tuple[Floats, Floats, Integers]:
+    def turned(self, units: Floats, most: float, rng: np.random.Generator) -> tuple[Floats, Floats, Integers]:
         """The rays that leave first, turned for as long as it helps; their sizes and labels."""
-        found, ends = self.first_exits(units[None], np.array([most]), levels, CANDIDATES)
+        found, ends = self.first_exits(units[None], np.array([most]), LEVELS, CANDIDATES)
         best = np.argsort(found[0], kind="stable")[:CANDIDATES]
         units, sizes, labels = units[best], found[0, best], ends[0, best]
         spread, rows = np.full(len(units), 0.5), np.arange(len(units))
@@ -202,7 +197,7 @@ class Rays:
         Args:
             units: directions of rays in groups (groups, rays, k).
             limit: largest size to look at (groups,).
-            levels: radii to look at, evenly spaced, in their logarithm where a least size is known.
+            levels: radii to look at, evenly spaced.
             keep: so many of each group's shortest rays are narrowed down to the tolerance; the others only
                 until they are known not to be among them.
 
@@ -212,9 +207,8 @@ class Rays:
         shape = units.shape[:2]
         units = units.reshape(-1, units.shape[2])
         top = np.repeat(limit, shape[1])[:, None]
-        floor, share = self.least(units)[:, None], np.arange(levels + 1) / levels
-        ladder = np.where(floor > 0.0, floor ** (1.0 - share) * top**share, top * share)
-        lower, upper = np.minimum(floor, top)[:, 0], np.full(len(units), np.inf)
+        ladder = top * (np.arange(levels + 1) / levels)
+        lower, upper = np.zeros(len(units)), np.full(len(units), np.inf)
         label = np.full(len(units), -1, dtype=np.int64)
 
         def promising() -> Floats:

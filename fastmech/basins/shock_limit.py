@@ -2,20 +2,25 @@
 
 A blow is an impulse on M1, M2 or the slider M3. It leaves the position as it is and gives kinetic energy.
 Under a constant force energy never grows: a blow that gives less than the well's depth does not leave, which
-is proved. How much it takes indeed, damping included, is searched for with certified labels.
+is proved. How much it takes indeed, damping included, is searched for with certified labels: blows from the
+bound upwards on a grid of impulses and directions, whose least one that leaves is followed down to the edge
+of its window, and again on finer and finer grids, for windows in which motions leave can be narrow.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import count
 
 import numpy as np
 
 from fastmech.atlas.wells import ROUNDING
-from fastmech.basins.copies import copy_labels, copy_of_label
-from fastmech.basins.measures.labels import Floats
-from fastmech.basins.shock import Rays
+from fastmech.basins.copies import copy_numbers, copy_of_label
+from fastmech.basins.label import label_starts
+from fastmech.basins.ladder import SUBSTEPS
+from fastmech.basins.measures.labels import Floats, Integers
 from fastmech.basins.steps import coarse_steps
 from fastmech.capture.certificate import certificate_of
 from fastmech.disturbance.motion import require_constant_force
@@ -29,9 +34,24 @@ from fastmech.scene import Scene
 from fastmech.stability.arguments import require_rest
 from fastmech.stability.linearize import jacobian
 
-#: Directions that are tried at first, of M2, and by how much one impulse is larger than the one before, where
-#: directions are searched and where there is one alone.
-DIRECTIONS, APART, ALONE = 32, 1.04, 1.004
+#: The first grid: directions all around, and by how much an impulse is larger than the one before, where
+#: directions are searched and where there is one alone. Each further grid is twice as fine, or four times.
+DIRECTIONS, APART, ALONE = 64, 0.04, 0.004
+
+#: Grids at least; the search ends with one that finds nothing less.
+GRIDS = 4
+
+#: Where a grid's impulses begin above the bound, in parts of their distance: golden section.
+SHIFT = 0.6180339887498949
+
+#: Blows of the finest grid, and integration steps of them all: where motions creep, grids stay coarser.
+MOST_BLOWS, MOST_STEPS = 1 << 18, 200_000_000
+
+#: Blows that are followed together, in the order of their impulses.
+TOGETHER = 1 << 12
+
+#: Blows of a grid that are followed with all substeps where the first ones do not tell their end.
+UNCERTAIN = 32
 
 #: Blows are tried up to so many times the sum of the potential's amplitudes: beyond, motions turn and turn.
 ENERGY = 30.0
@@ -42,6 +62,9 @@ LONG, STEPS = 5.0, 20_000.0
 
 #: Relative, of the impulse found, where directions are searched and where there is one alone.
 TOLERANCE, ALONE_TOLERANCE = 1e-4, 1e-5
+
+#: Directions to either side and impulses at which a window's edge is looked for at once, and along one alone.
+SIDES, SIZES, LINE = 4, 8, 32
 
 
 @dataclass(frozen=True)
@@ -66,6 +89,8 @@ class ShockLimit:
     )  #: equilibrium and turns of phi and theta where the found one ends
     undecided_from: float  #: least impulse tried whose end is not known [N s]; NaN: none
     trajectories: int  #: blows that were followed
+    impulses_apart: float  #: relative, of those on the finest grid on which nothing less was found; NaN: none
+    directions_apart: float  #: the same of directions [rad], 0 along one alone
 
 
 def shock_limit(
@@ -83,8 +108,9 @@ def shock_limit(
     a: the metric, paper (11)). While that is less than the well's depth, the mechanism does not leave. So the
     bound ``sqrt(2 depth / w)`` is proved for every damper, with w = u.W u in the direction u, or W's largest
     eigenvalue over all directions. Above it, directions and sizes are searched for blows that end elsewhere,
-    in another well or some turns further, as :func:`fastmech.basins.label.labels_of` proves. A smaller one
-    may have been missed.
+    in another well or some turns further, as :func:`fastmech.basins.label.labels_of` proves. Grids are made
+    finer until nothing less is found; a window between the blows of the finest one, as the result tells how
+    far they are apart, may have been missed.
 
     All is NaN where the point cannot be struck so: M3 across its rail or at a dead centre, M1 along OM1, M2
     along M1M2 where crank and rod are in line. ``found`` is NaN too without damper: nothing comes to rest.
@@ -115,47 +141,132 @@ def shock_limit(
 
     proved = blow(float(impulse_for(depth, moves.along(easiest))), easiest)
     nothing = Blow(math.nan, math.nan if angle is None else angle, math.nan, math.nan)
+    alone = ShockLimit(on, proved, nothing, None, math.nan, 0, math.nan, math.nan)
     if math.isnan(proved.impulse):
-        return ShockLimit(on, nothing, nothing, None, math.nan, 0)
+        return replace(alone, proved=nothing)
     if scene.beta == 0.0:
-        return ShockLimit(on, proved, nothing, None, math.nan, 0)
-
+        return alone
     amplitudes = certificate.amplitudes * unit(scene)
     # Where rounding leaves nothing of the depth, the search begins where rounding ends.
     low, high = max(depth, ROUNDING * amplitudes), ENERGY * amplitudes
-    everywhere = angle is None and moves.least > 0.0
-    turned = np.array([0.0, 0.5 * math.pi]) if everywhere else np.array([easiest])
-    axes = np.stack([np.cos(turned), np.sin(turned)], axis=1)
-
-    def directions(units: Floats) -> Floats:
-        return np.asarray(np.arctan2(*(units @ axes)[:, ::-1].T))
-
-    def least(units: Floats) -> Floats:
-        return np.nan_to_num(impulse_for(low, moves.along(directions(units))), nan=np.inf)
-
-    to_state = np.zeros((len(axes), 4))
-    to_state[:, 2:] = rates_after(scene, place[:2], on, axes)
-    label_of = copy_labels(scene, t_end, threads=threads)
-    tolerance = TOLERANCE if everywhere else ALONE_TOLERANCE
-    rays = Rays(label_of, place, int(label_of(place[None])[0]), to_state, tolerance, least)
-    if rays.label < 0:
-        return ShockLimit(on, proved, nothing, None, proved.impulse, 1)
-    most = float(impulse_for(high, moves.along(easiest)))
-    levels = math.ceil(0.5 * math.log(high / low) / math.log(APART if everywhere else ALONE))
-    if everywhere:
-        round_about = 2.0 * math.pi * np.arange(DIRECTIONS) / DIRECTIONS
-        units = np.stack([np.cos(round_about), np.sin(round_about)], axis=1)
-        units, sizes, labels = rays.turned(units, most, levels, np.random.default_rng(0))
-    else:
-        units = np.array([[1.0], [-1.0]] if angle is None else [[1.0]])
-        first, ends = rays.first_exits(units[None], np.array([most]), levels, 1)
-        sizes, labels = first[0], ends[0]
-    shock, best = rays.result(units, sizes, labels), int(np.argmin(sizes))
+    everywhere = angle is None and bool(moves.least > 0.0)
+    search = _Search(scene, place, rates_after(scene, place[:2], on, np.eye(2)), t_end, threads, everywhere)
+    if search.own < 0:
+        return replace(alone, undecided_from=proved.impulse, trajectories=1)
+    lines = [easiest] if angle is not None else [easiest, math.remainder(easiest + math.pi, 2.0 * math.pi)]
+    search.run(
+        lambda angles: np.nan_to_num(impulse_for(low, moves.along(angles)), nan=np.inf),
+        float(impulse_for(high, moves.along(easiest))),
+        np.array(lines),
+    )
     found, end = nothing, None
-    if shock.label >= 0:
-        found = blow(shock.size, float(directions(units[[best]])[0]) if angle is None else angle)
-        end = copy_of_label(shock.label)
-    return ShockLimit(on, proved, found, end, shock.undecided_from, shock.trajectories)
+    if np.isfinite(search.size):
+        found = blow(search.size, search.angle if angle is None else angle)
+        end = copy_of_label(search.label)
+    unknown = search.unknown if np.isfinite(search.unknown) else math.nan
+    return ShockLimit(on, proved, found, end, unknown, search.blows, *search.apart)
+
+
+@dataclass
+class _Search:
+    """The least blow found to leave, and what was done to find it."""
+
+    scene: Scene
+    place: Floats  #: state of rest (4,)
+    rates: Floats  #: rates after 1 N s along x and along y, (2, 2)
+    t_end: float
+    threads: int | None
+    everywhere: bool  #: whether directions are searched
+    size: float = math.inf  #: N s
+    angle: float = math.nan
+    label: int = -1
+    unknown: float = math.inf  #: least impulse whose end is not known [N s]
+    apart: tuple[float, float] = (math.nan, math.nan)
+    blows: int = 0
+    steps: int = 0
+
+    def __post_init__(self) -> None:
+        self.own = int(self.ends(np.zeros(1), np.zeros(1), SUBSTEPS)[0])
+
+    def ends(self, angles: Floats, sizes: Floats, ladder: tuple[int, ...]) -> Integers:
+        """Labels (n,) after blows; the least one that leaves is kept."""
+        starts = np.tile(self.place, (sizes.size, 1))
+        starts[:, 2:] = (sizes * np.stack([np.cos(angles), np.sin(angles)])).T @ self.rates
+        found = label_starts(self.scene, starts, self.t_end, threads=self.threads, ladder=ladder)
+        labels = copy_numbers(found)
+        self.blows, self.steps = self.blows + sizes.size, self.steps + found.steps
+        if self.blows > 1:
+            out = np.where((labels >= 0) & (labels != self.own), sizes, np.inf)
+            least = int(out.argmin())
+            if out[least] < self.size:
+                self.size, self.label = float(out[least]), int(labels[least])
+                self.angle = math.remainder(float(angles[least]), 2.0 * math.pi)
+        return labels
+
+    def run(self, bound: Callable[[Floats], Floats], most: float, lines: Floats) -> None:
+        """Search grid after grid; ``bound`` gives what is proved along directions [N s]."""
+        for level in count():
+            finer = 2.0**level if self.everywhere else 4.0**level
+            apart, between = (APART if self.everywhere else ALONE) / finer, 0.0
+            angles = lines
+            if self.everywhere:
+                between = 2.0 * math.pi / (DIRECTIONS * finer)
+                angles = lines[0] + between * np.arange(round(DIRECTIONS * finer))
+            before = self.size
+            if not self.look(angles, bound(angles), min(most, before), apart, level):
+                return
+            self.apart = apart, between
+            if self.size < before:
+                self.follow_down(apart, between)
+            elif level + 1 >= GRIDS or not np.isfinite(self.size):
+                return
+
+    def look(self, angles: Floats, least: Floats, most: float, apart: float, level: int) -> bool:
+        """Try blows of a grid in the order of their impulses until one leaves; none if they are too many."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            each = np.maximum(np.ceil(np.log(most / least) / math.log1p(apart)), 0.0)
+        number = float(each.sum())
+        if level and (number > MOST_BLOWS or self.steps * (1.0 + number / self.blows) > MOST_STEPS):
+            return False
+        times = each.astype(np.int64)
+        which = np.repeat(np.arange(angles.size), times)
+        rung = np.arange(which.size) - np.repeat(np.cumsum(times) - times, times)
+        sizes = least[which] * (1.0 + apart) ** (rung + math.modf(SHIFT * level)[0])
+        order = np.argsort(sizes, kind="stable")
+        uncertain = []
+        for first in range(0, order.size, TOGETHER):
+            some = order[first : first + TOGETHER]
+            if sizes[some[0]] >= self.size:
+                break
+            labels = self.ends(angles[which[some]], sizes[some], SUBSTEPS[:2])
+            uncertain.append(some[labels < 0])
+        left = np.concatenate([*uncertain, order[:0]])
+        left = left[sizes[left] < self.size]
+        self.unknown = float(sizes[left[UNCERTAIN:]].min(initial=np.inf))
+        left = left[:UNCERTAIN]
+        if left.size:
+            labels = self.ends(angles[which[left]], sizes[left], SUBSTEPS)
+            self.unknown = min(self.unknown, float(sizes[left[labels < 0]].min(initial=np.inf)))
+        return True
+
+    def follow_down(self, apart: float, between: float) -> None:
+        """From a blow that leaves to the least one at the edge of its window."""
+        while between and apart > TOLERANCE:
+            sides = between * np.arange(-SIDES, SIDES + 1) / SIDES
+            shares = 1.0 - apart * np.arange(1, SIZES + 1) / SIZES
+            size, angle = self.size, self.angle
+            grid = np.meshgrid(self.angle + sides, self.size * shares)
+            self.ends(grid[0].ravel(), grid[1].ravel(), SUBSTEPS[:2])
+            if self.size > (1.0 - 0.9 * apart) * size:  # else it goes on down
+                apart /= 3.0
+            if abs(math.remainder(self.angle - angle, 2.0 * math.pi)) < 0.9 * between:
+                between /= 2.0
+        apart = max(apart, 10.0 * TOLERANCE)
+        while apart > (TOLERANCE if self.everywhere else ALONE_TOLERANCE):
+            sizes, size = self.size * (1.0 - apart * np.arange(1, LINE + 1) / LINE), self.size
+            self.ends(np.full(LINE, self.angle), sizes, SUBSTEPS)
+            if self.size > (1.0 - 0.9 * apart) * size:
+                apart *= 2.0 / LINE
 
 
 def proved_limits(scene: Scene, equilibrium: Equilibrium) -> dict[str, float]:

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastmech.basins.label import require_damper
 from fastmech.basins.measures.labels import Floats, Integers, check_point
 from fastmech.basins.status import BasinStatus, counts
+from fastmech.basins.steps import method_for
 from fastmech.basins.switched import Switched
 from fastmech.capture.certificate import certificate_of
 from fastmech.ensembles import checks
@@ -102,7 +103,7 @@ def map_snapping(
     start: Equilibrium | None = None,
     t_end: float | None = None,
     dt: float | None = None,
-    method: str = "dop853",
+    method: str | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> SnappingMap:
@@ -121,7 +122,7 @@ def map_snapping(
         t_end: end of every run [s]; by default when the force has fallen to a millionth of F0, and 200 s.
         dt: coarsest step [s]; by default it follows from the scene and the force. While a quickly falling
             force acts, steps are shorter by themselves.
-        method: name of the method.
+        method: name of the method, by default as for labels.
         threads: threads to use; the result does not depend on it.
         progress: is told how many motions are done since its last call.
 
@@ -132,7 +133,7 @@ def map_snapping(
     checks.progress_function(progress, "motions")
     force, rate = _forces(F0), _rates(alpha)
     free, equilibria, index = force_free(scene, start)
-    find_method(method)
+    method = find_method(method_for(free, method)).name
     if dt is not None:
         dt = checks.number("dt", dt, "s", above=0.0)
     end = default_end(rate) if t_end is None else checks.number("t_end", t_end, "s", above=0.0)
@@ -182,7 +183,7 @@ def critical_forces(
     tolerance: float = 0.1,
     t_end: float | None = None,
     dt: float | None = None,
-    method: str = "dop853",
+    method: str | None = None,
     threads: int | None = None,
 ) -> Floats:
     """The least force that leaves at every alpha of a map [N], narrowed down between its forces (alphas,).
@@ -199,6 +200,8 @@ def critical_forces(
     Raises:
         InputError: an argument is wrong.
     """
+    if not isinstance(snapping, SnappingMap):
+        raise InputError(f"snapping = {shown(snapping)}: must be what fastmech.map_snapping gives")
     tolerance = checks.number("tolerance", tolerance, "N", above=0.0)
     start = snapping.equilibria[snapping.start]
     sign = float(np.sign(snapping.F0[0]))

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.disturbance.motion import default_method
 from fastmech.ensembles.plausible import energy
-from fastmech.mechanism.coefficients import Coefficients
+from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.mechanism.reduced import metric_11, metric_determinant, potential_hessian, slider_ratio
+from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
 
@@ -23,10 +27,19 @@ MOST_OCTAVES = 7.0
 #: falls by ``exp(-FALL)`` in the coarsest step.
 AT_ONCE, FALL = 4.0, 0.5
 
+#: Share of the scene's own coarse step that must be stable: shorter explicit steps cost more than implicit.
+EXPLICIT = 0.2
+
 #: Points along a turn at which the scene's frequencies are looked up.
 GRID = 48
 
 
+def method_for(scene: Scene, name: str | None) -> str:
+    """The method of this name; by default ``dop853``, or ``radau5`` where the damper would set its steps."""
+    return name or default_method(scene, EXPLICIT * PHASE / highest_frequency(reduce(scene)))
+
+
+@lru_cache(4096)
 def highest_frequency(c: Coefficients) -> float:
     """Largest sqrt|eigenvalue| of Hessian and metric over the torus [rad/s], on a grid."""
     angles = np.linspace(-np.pi, np.pi, GRID, endpoint=False)

@@ -37,7 +37,7 @@ import json, sys, time
 import numpy as np
 from fastmech.bench import package, plain
 from fastmech.bench.problem import rest_starts
-from fastmech.cli.system import vector_bits
+from fastmech.system_info import vector_bits
 problem = rest_starts()
 modules = {"package": package, "plain": plain}
 everyone = {(m, e.family, e.setting): e for m in modules for e in modules[m].entrants(problem)}

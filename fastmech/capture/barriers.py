@@ -12,13 +12,11 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
 from fastmech.equilibria.descent import convex_radius, descend, step_off
 from fastmech.equilibria.find import Equilibria, find_equilibria
 from fastmech.errors import InputError
-from fastmech.jit import MATRIX, VECTOR, kernel
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 
@@ -91,15 +89,9 @@ def barrier_tree(scene: Scene) -> BarrierTree:
     wells, saddles = np.flatnonzero(index == 0), np.flatnonzero(index == 1)
     sides = np.empty((saddles.size, 6))
     radius = np.empty(wells.size)
-    find_sides(
-        coefficients,
-        equilibria.phi[wells],
-        equilibria.theta[wells],
-        radius,
-        equilibria.phi[saddles],
-        equilibria.theta[saddles],
-        sides,
-    )
+    minima = (equilibria.phi[wells], equilibria.theta[wells], radius)
+    with np.errstate(all="ignore"):
+        find_sides(coefficients, *minima, equilibria.phi[saddles], equilibria.theta[saddles], sides)
     if not (radius > 0.0).all() or (sides[:, [0, 3]] < 0).any():
         raise InputError("scene: a minimum and a saddle are too near to each other to tell their sides apart")
     openings = []
@@ -129,7 +121,6 @@ def frozen_coefficients(scene: Scene, equilibria: Equilibria) -> Floats:
     return np.array(reduce(scene)._replace(force=equilibria.force / (scene.m2 * scene.l)), dtype=np.float64)
 
 
-@kernel(types.void(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, MATRIX))
 def find_sides(
     c: Floats, phis: Floats, thetas: Floats, radii: Floats, phi: Floats, theta: Floats, sides: Floats
 ) -> None:

@@ -29,8 +29,7 @@ from fastmech.ensembles.run import CALL_STEPS_WITH_STOPS, Observation
 from fastmech.ensembles.stopping import STOP_CODE
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import unit
-from fastmech.scene import Scene
-from fastmech.stability.arguments import require_scene
+from fastmech.scene import Scene, require_scene
 
 Floats = NDArray[np.float64]
 

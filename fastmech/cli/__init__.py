@@ -15,7 +15,6 @@ import click
 
 from fastmech import __version__
 from fastmech.cli.failure import SUMMARY, Failure, told_in_one_line
-from fastmech.cli.vectors import ask_for_wide_vectors
 from fastmech.errors import shown
 from fastmech.interrupts import listen
 
@@ -29,6 +28,7 @@ COMMANDS = (
     "paper",
     "hardcases",
     "bench",
+    "warmup",
     "faults",
 )
 
@@ -90,5 +90,3 @@ def main(ctx: click.Context) -> None:
     """
     if ctx.invoked_subcommand is None:
         click.echo(ctx.get_help())
-    else:
-        ask_for_wide_vectors()

@@ -23,9 +23,14 @@ def command(file: Path | None, section: str | None, request: bool, system: bool)
         raise click.UsageError("--section, --request and --system exclude each other")
     console = Console(width=None if sys.stdout.isatty() else 100)
     if file is None:
-        from fastmech.cli.system import describe_system
+        from rich.table import Table
 
-        console.print(describe_system())
+        from fastmech.system_info import system_info
+
+        table = Table("", "", show_header=False, box=None)
+        for name, value in system_info().items():
+            table.add_row(f"[bold]{name}[/]", value)
+        console.print(table)
         return
     from fastmech.errors import printable
     from fastmech.store.read import open_results

@@ -27,25 +27,28 @@ from fastmech.interrupts import check, is_noted
 
 
 class _Rate(ProgressColumn):
-    """Items finished per second."""
+    """Items finished per second, loading and compiling apart."""
 
     def render(self, task: Task) -> Text:
         """The rate, or nothing where there is none yet."""
-        speed = task.finished_speed or task.speed
-        if not speed:
+        stage: Stage | None = task.fields["stage"]
+        if stage is None or not stage.rate:
             return Text()
+        speed = stage.rate
         return Text(f"{speed:,.0f}/s" if speed >= 10 else f"{speed:.2g}/s", style="progress.data.speed")
 
 
 class _Time(ProgressColumn):
-    """Time left, and in the end the time taken."""
+    """Time left, and in the end the time taken, loading and compiling apart."""
 
     def render(self, task: Task) -> Text:
         """The time with its meaning."""
-        if task.finished_time is not None:
-            return Text(f"took {task.finished_time:.1f} s")
-        left = task.time_remaining
-        return Text("" if left is None else f"{timedelta(seconds=int(left))} left")
+        stage: Stage | None = task.fields["stage"]
+        if stage is None:
+            return Text()
+        if task.finished:
+            return Text(f"took {stage.seconds:.1f} s")
+        return Text(f"{stage.left} left" if stage.rate else "")
 
 
 #: Seconds between lines in a log file.
@@ -67,17 +70,18 @@ class Stage:
     Args:
         name: the piece of work.
         total: its items; 0 where they are not known yet.
+        clock: seconds that go on while work is done.
     """
 
-    def __init__(self, name: str, total: int) -> None:
-        self.name, self.total, self.done = name, total, 0
-        self._begun = self.last = time.monotonic()
+    def __init__(self, name: str, total: int, clock: Callable[[], float]) -> None:
+        self.name, self.total, self.done, self._clock = name, total, 0, clock
+        self._begun = self.last = clock()
 
     def count(self, done: int, total: int, free: float) -> None:
         """So many items are finished; ``free`` [s]: when other work moved last, which may have come first."""
         if not self.done:
             self._begun = max(self._begun, free)
-        self.done, self.total, self.last = done, total, time.monotonic()
+        self.done, self.total, self.last = done, total, self._clock()
 
     @property
     def seconds(self) -> float:
@@ -88,6 +92,11 @@ class Stage:
     def rate(self) -> float:
         """Items per second."""
         return self.done / self.seconds if self.seconds else 0.0
+
+    @property
+    def left(self) -> timedelta:
+        """Time that the rest takes at that rate."""
+        return timedelta(seconds=int((self.total - self.done) / self.rate))
 
     def summary(self) -> dict[str, str | int | float]:
         """The same for other programs."""
@@ -111,7 +120,7 @@ class LogLine:
         if now - self._told < LOG_PERIOD:
             return
         self._told = now
-        left = timedelta(seconds=int((stage.total - stage.done) / stage.rate)) if stage.rate else "unknown"
+        left = stage.left if stage.rate else "unknown"
         share = stage.done / stage.total if stage.total else 1.0
         line = f"fastmech: {stage.name}: {share:.0%}, {stage.rate:,.3g}/s, {left} left"
         print(line, file=sys.stderr, flush=True)
@@ -125,6 +134,7 @@ class Preparation:
 
     def __init__(self) -> None:
         self._lock, self._in_hand, self._done, self._since = threading.Lock(), list[str](), 0.0, 0.0
+        self.kernels = 0  #: begun so far
 
     def tell(self, name: str | None) -> None:
         """Something is begun, or (None) what was begun last is there."""
@@ -137,6 +147,7 @@ class Preparation:
                 self._in_hand.pop()
             else:
                 self._in_hand.append(name)
+                self.kernels += name != LOADING
 
     def look(self) -> tuple[str | None, float]:
         """What is in hand, if anything, and the seconds so far."""
@@ -186,6 +197,9 @@ class ProgressBars:
             jit.listeners.remove(self._preparation.tell)
         self._progress.stop()
 
+    def _working(self) -> float:
+        return time.monotonic() - self.prepared
+
     @property
     def prepared(self) -> float:
         """Seconds that loading and compiling have taken."""
@@ -211,8 +225,8 @@ class ProgressBars:
         return [stage.summary() for stage in self._stages]
 
     def _begin(self, name: str, total: int | None) -> Callable[[int, int], None]:
-        task = self._progress.add_task(name, total=total)
-        stage = Stage(name, total or 0)
+        stage = Stage(name, total or 0, self._working)
+        task = self._progress.add_task(name, total=total, stage=stage)
         log = LogLine(stage) if self._logs else None
         self._stages.append(stage)
 
@@ -261,13 +275,13 @@ class ProgressBars:
                     self._progress.remove_task(task)
                     task = None
                 continue
-            what = name if name == LOADING else f"compiling {name}"
+            what = name if name == LOADING else f"compiling {name} (kernel {self._preparation.kernels})"
             if not self._quiet and is_noted() and not stopping:
                 stopping = True
                 self._line("stops when the kernel in hand is compiled, at once when interrupted again")
             if task is None:
-                task = self._progress.add_task(what, total=None)
-            self._progress.update(task, description=what)
+                task = self._progress.add_task(what, total=None, stage=None)
+            self._progress.update(task, description=f"{what}, {seconds:.0f} s so far")
             if seconds >= due and self._logs:
                 due = seconds + LOG_PERIOD
                 self._line(f"{what}, {seconds:.0f} s so far")

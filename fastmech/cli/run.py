@@ -150,10 +150,11 @@ def _show(told: Account, report: RunReport) -> None:
     from fastmech.store.read import open_results
 
     target = report.path
+    seconds = {str(stage["name"]).partition(":")[0]: stage["seconds"] for stage in told.bars.stages()}
     with open_results(target) as results:
         for name in results:
             if not report.was_complete:
-                told.say(f"{results[name].attrs['wall_time_s']:9.2f} s  {name}")
+                told.say(f"{seconds.get(name, results[name].attrs['wall_time_s']):9.2f} s  {name}")
             failures = results[name].attrs.get("failures")
             if failures:
                 told.say(f"fastmech: {name}: {failures}", err=True)

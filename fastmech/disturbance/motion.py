@@ -11,9 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 from fastmech.disturbance.size import size_at
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
-from fastmech.equilibria.find import Equilibria, Equilibrium, find_equilibria
+from fastmech.ensembles.stiffness import damping_rate
+from fastmech.equilibria.balance import pulls, vanishing
+from fastmech.equilibria.find import Equilibria, Equilibrium, degenerate_sentence, find_equilibria
 from fastmech.errors import InputError
-from fastmech.scene import Scene
+from fastmech.integrators.implicit_method import ImplicitRungeKutta
+from fastmech.integrators.methods import find_method
+from fastmech.mechanism.coefficients import reduce
+from fastmech.scene import Scene, require_scene
 from fastmech.stability.linearize import jacobian
 
 Floats = NDArray[np.float64]
@@ -21,6 +26,10 @@ Floats = NDArray[np.float64]
 
 #: Default step times the highest frequency [rad].
 PHASE = 0.05
+
+#: An explicit step times the damper's rate above which damped motion grows by the default method (its region
+#: of stability ends at -6.1), and the damper's rate times the first step of a motion that is damped at once.
+STABLE, LAYER = 6.0, 1.0
 
 #: Condition of the eigenvectors beyond which their errors would show beside those of the integration.
 _ILL_CONDITIONED = 1e4
@@ -45,14 +54,14 @@ def disturbed_motion(
     times: ArrayLike,
     *,
     dt: float | None = None,
-    method: str = "dop853",
+    method: str | None = None,
     threads: int | None = None,
 ) -> DisturbedMotion:
     """Motion after disturbances (n, 4) or (4,) of an equilibrium, at ``times`` [s].
 
     The nonlinear motion is integrated with a fixed step of at most ``dt`` [s], by default
-    :func:`default_step`; the linearized one is exact: the matrix exponential of the Jacobian at the
-    equilibrium.
+    :func:`default_step`, and by default with the method of :func:`default_method`; the linearized one is
+    exact: the matrix exponential of the Jacobian at the equilibrium.
 
     Raises:
         InputError: an argument is wrong, the scene's force decays, or the equilibrium is not the scene's.
@@ -62,14 +71,37 @@ def disturbed_motion(
     t = checks.rising_times("times", times)
     center = np.array([equilibrium.phi, equilibrium.theta, 0.0, 0.0])
     dt = default_step(scene, equilibrium) if dt is None else dt
-    run = integrate(scene, center + start, dt=dt, method=method, t_eval=t, threads=threads)
+    dt = checks.number("dt", dt, "s", above=0.0)
+    method = method or default_method(scene, dt)
+    passed = np.union1d(t, damped_times(scene, method, min(dt, float(t[-1]))))
+    run = integrate(scene, center + start, dt=dt, method=method, t_eval=passed, threads=threads)
     linearized = start @ propagators(jacobian(scene, equilibrium), t).mT
-    return DisturbedMotion(t, run.y - center, linearized, run.status)
+    return DisturbedMotion(t, run.y[np.searchsorted(passed, t)] - center, linearized, run.status)
 
 
 def default_step(scene: Scene, equilibrium: Equilibrium) -> float:
     """Longest step [s] of motion about an equilibrium: 0.05 rad of its highest frequency."""
     return PHASE / size_at(scene, equilibrium.phi, equilibrium.theta).omega
+
+
+def default_method(scene: Scene, step: float) -> str:
+    """``dop853``, or ``radau5`` where the damper makes damped motion grow with explicit steps [s] so long."""
+    return "radau5" if float(damping_rate(reduce(scene))) * step > STABLE else "dop853"
+
+
+def damped_times(scene: Scene, method: str, until: float, ratio: float = 2.0) -> Floats:
+    """Times [s] before ``until`` at which an implicit method's first steps end: later ones can be long.
+
+    The damper stops part of a motion at once, and Newton's iteration cannot leap over that. Steps begin with
+    the time that it takes and grow by ``ratio`` at most (Hairer, Wanner, *Solving ODEs II*, section VI.1).
+    Nothing of an explicit method, whose steps are that short in any case.
+    """
+    rate = float(damping_rate(reduce(scene)))
+    if not isinstance(find_method(method), ImplicitRungeKutta) or not rate * until > LAYER:
+        return np.zeros(0)
+    first = (ratio - 1.0) * LAYER / rate
+    number = int(np.ceil(np.log1p((ratio - 1.0) * until / first) / np.log(ratio)))
+    return np.asarray(first * (ratio ** np.arange(1, number) - 1.0) / (ratio - 1.0), dtype=np.float64)
 
 
 def require_constant_force(scene: Scene) -> None:
@@ -78,6 +110,7 @@ def require_constant_force(scene: Scene) -> None:
     Raises:
         InputError: the force decays.
     """
+    require_scene(scene)
     if scene.F0 != 0 and scene.alpha != 0:
         raise InputError(
             f"scene.alpha = {scene.alpha:g}: must be 0 1/s for motion about an equilibrium (or F0 = 0 N); "
@@ -91,11 +124,23 @@ def equilibria_to_disturb(scene: Scene) -> Equilibria:
     Raises:
         InputError: the force decays, or no equilibrium is isolated.
     """
-    require_constant_force(scene)
+    require_isolated(scene)
     equilibria = find_equilibria(scene)
     if not equilibria:
         raise InputError(f"scene: has no equilibrium to disturb: {equilibria.certificate.sentence}")
     return equilibria
+
+
+def require_isolated(scene: Scene) -> None:
+    """Refuse, before equilibria are looked for, a scene whose force changes or that rests all along a line.
+
+    Raises:
+        InputError: it does.
+    """
+    require_constant_force(scene)
+    c = reduce(scene)
+    if vanishing(pulls(c.mass, c.lift, c.spring, c.gravity, c.force)) >= 2:
+        raise InputError(f"scene: has no equilibrium to disturb: {degenerate_sentence(scene, scene.F0)}")
 
 
 def propagators(matrix: Floats, times: Floats) -> Floats:

@@ -94,7 +94,8 @@ class System:
     def __post_init__(self) -> None:
         vector = isinstance(self.state, tuple) and [type(part) for part in self.state] == [str, int]
         object.__setattr__(self, "vector", vector)
-        state = _names("state", _family(*self.state) if vector else self.state, least=1)
+        given: Any = self.state
+        state = _names("state", _family(*given) if vector else given, least=1)
         if not isinstance(self.parameters, Mapping):
             raise InputError(f"parameters = {shown(self.parameters)}: must be a mapping of names to numbers")
         names = _names("parameters", self.parameters, least=0)
@@ -102,7 +103,8 @@ class System:
         object.__setattr__(self, "state", state)
         object.__setattr__(self, "parameters", dict(zip(names, values, strict=True)))
         _check_function("rhs", self.rhs, ["y", "p", "rates"] if vector else state, [] if vector else names)
-        if vector and returns(self.rhs):
+        function: Any = self.rhs
+        if vector and returns(function):
             raise InputError("rhs: returns something, must write the rates into its last argument")
         if self.stop is not None:
             _check_function("stop", self.stop, ["y"] if vector else state, [])
@@ -158,6 +160,7 @@ class System:
     @cached_property
     def rates(self) -> Rates:
         """What the engine's loops are made from."""
+        function: Any = self.rhs
         dim, names = len(self.state), list(self.parameters)
         own = () if self.vector else tuple(names.index(name) for name in self._parameter_order)
         return Rates(
@@ -166,7 +169,7 @@ class System:
             own,
             partial(_array_functions if self.vector else _functions, "rates", self.rhs),
             (fingerprint(self.rhs),),
-            ranged=not self.vector and reaches(self.rhs, _swaps()),
+            ranged=not self.vector and reaches(function, _swaps()),
             vector=self.vector,
             looked_at=dim,
         )
@@ -226,8 +229,13 @@ class System:
 
 def _array_functions(field: str, function: Any, module: str, precision: str) -> dict[str, Any]:
     """The same of one that takes arrays."""
-    numbers: Swaps = {float: np.float32} if precision == "float32" else {}
-    return {field: called(rebuilt(function, module, numbers))}
+    return {field: called(rebuilt(function, module, _numbers(precision)))}
+
+
+def _numbers(precision: str) -> Swaps:
+    """What constants become: a float64 would turn a lane's arithmetic into its own."""
+    single: Any = np.float32
+    return {float: single} if precision == "float32" else {}
 
 
 def _swaps() -> Swaps:
@@ -237,7 +245,7 @@ def _swaps() -> Swaps:
 
 def _functions(field: str, function: Any, module: str, precision: str) -> dict[str, Any]:
     """A user's function for a module of that name, and the same with trigonometry that raises."""
-    numbers: Swaps = {float: np.float32} if precision == "float32" else {}
+    numbers = _numbers(precision)
     whole = inlined(rebuilt(function, module, numbers))
     return {field: whole, f"{field}_within": attempted(rebuilt(function, module, _swaps() | numbers))}
 

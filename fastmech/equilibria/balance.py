@@ -80,7 +80,7 @@ class Normal(NamedTuple):
 @inlined
 def wrap(angle: float) -> float:
     """The angle's representative in (-pi, pi]."""
-    wrapped: float = angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
+    wrapped: float = angle - 2.0 * np.pi * np.rint(angle / (2.0 * np.pi))
     if wrapped <= -np.pi or wrapped > np.pi:
         return np.pi
     return wrapped

@@ -114,8 +114,8 @@ def minimum_at(
 ) -> tuple[int, float, float]:
     """The minimum in whose convex ball a place is (-1: none), and its turns from its listed place."""
     for i in range(count):
-        turns1 = np.round((phi - phis[i]) / TURN)
-        turns2 = np.round((theta - thetas[i]) / TURN)
+        turns1 = np.rint((phi - phis[i]) / TURN)
+        turns2 = np.rint((theta - thetas[i]) / TURN)
         if np.hypot(phi - phis[i] - turns1 * TURN, theta - thetas[i] - turns2 * TURN) < radii[i]:
             return i, turns1, turns2
     return -1, 0.0, 0.0

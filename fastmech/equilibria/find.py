@@ -17,7 +17,7 @@ from fastmech.equilibria.solution import explain, solve_rows
 from fastmech.errors import InputError, shown
 from fastmech.mechanism.coefficients import Coefficients, force, reduce
 from fastmech.mechanism.reduced import potential_hessian
-from fastmech.scene import Scene
+from fastmech.scene import Scene, require_scene
 
 #: Kind of equilibrium by Morse index; an index of -2 stands for a Hessian that is singular within rounding.
 KINDS = {0: "minimum", 1: "saddle", 2: "maximum", -2: "degenerate"}
@@ -137,9 +137,10 @@ def find_equilibria(scene: Scene, at: float = math.inf) -> Equilibria:
     Raises:
         InputError: ``at`` is not a number >= 0.
     """
+    require_scene(scene)
     frozen = frozen_force(scene, at)
     coefficients = reduce(scene)._replace(force=frozen / (scene.m2 * scene.l))
-    solution = solve_rows(np.array([coefficients]))
+    solution = solve_rows(np.array([coefficients]), compiled=False)
     outcome, count = Outcome(int(solution.outcome[0])), int(solution.count[0])
     evidence = gather(
         coefficients, solution.phi[0, :count], solution.theta[0, :count], solution.radius[0, :count]

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
-from fastmech.equilibria.balance import EPS, wrap
-from fastmech.jit import MATRIX, VECTOR, inlined, kernel
+from fastmech.equilibria.balance import EPS
 from fastmech.mechanism.reduced import potential_gradient, potential_hessian
 
 Floats = NDArray[np.float64]
@@ -20,74 +18,79 @@ MERGE = 1e-6
 
 _MOST_STEPS = 60
 _ARMIJO = 1e-4
+_HALVED = 0.5 ** np.arange(53)[:, None]
 
 
-@inlined
+def grid_search(lift: float, spring: float, gravity: float, force: float, starts: int = STARTS) -> Floats:
+    """Equilibria that Newton's method reaches from a grid of ``starts`` x ``starts``, (count, 2) [rad].
+
+    Angles are in (-pi, pi], duplicates on the torus merged. All starts go on together, as arrays: one
+    scene is searched long before a kernel would be compiled.
+    """
+    angles = -np.pi + 2.0 * np.pi * (np.arange(starts) + 0.5) / starts
+    places = np.stack([np.repeat(angles, starts), np.tile(angles, starts)])
+    roots = _wrapped(places[:, newton_with_line_search(lift, spring, gravity, force, places)])
+    found = []
+    while roots.size:
+        found.append(roots[:, 0])
+        roots = roots[:, np.hypot(*_wrapped(roots - roots[:, :1])) >= MERGE]
+    return np.array(found).reshape(-1, 2)
+
+
 def newton_with_line_search(
-    lift: float, spring: float, gravity: float, force: float, phi: float, theta: float
-) -> tuple[float, float, bool]:
-    """Root of the reduced gradient from one start, and whether it was reached.
+    lift: float, spring: float, gravity: float, force: float, places: Floats
+) -> NDArray[np.bool_]:
+    """Take every place (2, n) to a root of the reduced gradient, in place; whether each reached one.
 
     The merit is half the gradient's square. A Newton step is halved until it satisfies Armijo's condition;
     where the Hessian is singular or its step does not descend, the merit's own gradient is followed
     (Nocedal, Wright, *Numerical Optimization*, section 11.2).
     """
-    scale = max(abs(lift), abs(spring), abs(gravity), abs(force))
+    loads = (lift, spring, gravity, force)
+    scale = max(map(abs, loads))
+    reached = np.zeros(places.shape[1], dtype=np.bool_)
+    under_way = np.arange(places.shape[1])
     for _ in range(_MOST_STEPS):
-        s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
-        g1, g2 = potential_gradient(s1, c1, s2, c2, c1 * c2 - s1 * s2, lift, spring, gravity, force)
-        if abs(g1) + abs(g2) <= 8.0 * EPS * scale:
-            return wrap(phi), wrap(theta), True
-        h11, h12, h22 = potential_hessian(s1, c1, s2, c2, s1 * c2 + c1 * s2, lift, spring, gravity, force)
-        merit = 0.5 * (g1 * g1 + g2 * g2)
-        down1, down2 = h11 * g1 + h12 * g2, h12 * g1 + h22 * g2
+        x = places[:, under_way]
+        s, c = np.sin(x), np.cos(x)
+        g = _gradient(s, c, loads)
+        done = np.abs(g).sum(axis=0) <= 8.0 * EPS * scale
+        reached[under_way[done]] = True
+        under_way, x, s, c, g = under_way[~done], x[:, ~done], s[:, ~done], c[:, ~done], g[:, ~done]
+        if not under_way.size:
+            break
+        h11, h12, h22 = potential_hessian(*_each(s, c), s[0] * c[1] + c[0] * s[1], *loads)
+        merit = 0.5 * (g * g).sum(axis=0)
+        down = np.stack([h11 * g[0] + h12 * g[1], h12 * g[0] + h22 * g[1]])
         determinant = h11 * h22 - h12 * h12
-        if abs(determinant) > EPS * scale * scale:
-            step1, step2 = -(h22 * g1 - h12 * g2) / determinant, -(h11 * g2 - h12 * g1) / determinant
-        else:
-            step1, step2 = -down1 / (scale * scale), -down2 / (scale * scale)
-        slope = down1 * step1 + down2 * step2
-        length = min(1.0, 1.0 / (abs(step1) + abs(step2)))
-        accepted = False
-        while length > EPS and not accepted:
-            new_phi, new_theta = phi + length * step1, theta + length * step2
-            s1, c1, s2, c2 = np.sin(new_phi), np.cos(new_phi), np.sin(new_theta), np.cos(new_theta)
-            g1, g2 = potential_gradient(s1, c1, s2, c2, c1 * c2 - s1 * s2, lift, spring, gravity, force)
-            accepted = 0.5 * (g1 * g1 + g2 * g2) <= merit + _ARMIJO * length * slope
-            length = 0.5 * length
-        if not accepted:
-            # At rounding level no step descends any more; else the start fell into a dip that is no root.
-            return wrap(phi), wrap(theta), merit <= (256.0 * EPS * scale) ** 2
-        phi, theta = new_phi, new_theta
-    return wrap(phi), wrap(theta), False
+        regular = np.abs(determinant) > EPS * scale * scale
+        newton = np.stack([h12 * g[1] - h22 * g[0], h12 * g[0] - h11 * g[1]])
+        step = np.where(regular, newton, -down) / np.where(regular, determinant, scale * scale)
+        slope = (down * step).sum(axis=0)
+        length = 1.0 / np.maximum(1.0, np.abs(step).sum(axis=0))
+        waiting = np.arange(under_way.size)
+        for halvings in (_HALVED[:1], _HALVED[1:4], _HALVED[4:]):
+            tried = halvings * length[waiting]
+            new = x[:, None, waiting] + tried * step[:, None, waiting]
+            g = _gradient(np.sin(new), np.cos(new), loads)
+            accepted = 0.5 * (g * g).sum(axis=0) <= merit[waiting] + _ARMIJO * tried * slope[waiting]
+            first, found = accepted.argmax(axis=0), accepted.any(axis=0)
+            places[:, under_way[waiting[found]]] = new[:, first[found], found]
+            waiting = waiting[~found]
+        # At rounding level no step descends any more; else the start fell into a dip that is no root.
+        reached[under_way[waiting]] = merit[waiting] <= (256.0 * EPS * scale) ** 2
+        under_way = np.delete(under_way, waiting)
+    return reached
 
 
-@kernel(types.int64(types.float64, types.float64, types.float64, types.float64, VECTOR, MATRIX))
-def search_grid(
-    lift: float, spring: float, gravity: float, force: float, starts: Floats, found: Floats
-) -> int:
-    """Roots reached from the starts ``starts`` x ``starts``, duplicates on the torus merged.
-
-    ``found`` (k, 2) receives angles phi, theta in (-pi, pi]; returns their number, at most k.
-    """
-    count = 0
-    for start_phi in starts:
-        for start_theta in starts:
-            phi, theta, reached = newton_with_line_search(
-                lift, spring, gravity, force, start_phi, start_theta
-            )
-            known = not reached
-            for i in range(count):
-                if np.hypot(wrap(phi - found[i, 0]), wrap(theta - found[i, 1])) < MERGE:
-                    known = True
-            if not known and count < found.shape[0]:
-                found[count, 0], found[count, 1] = phi, theta
-                count += 1
-    return count
+def _gradient(s: Floats, c: Floats, loads: tuple[float, float, float, float]) -> Floats:
+    return np.stack(potential_gradient(*_each(s, c), c[0] * c[1] - s[0] * s[1], *loads))
 
 
-def grid_search(lift: float, spring: float, gravity: float, force: float, starts: int = STARTS) -> Floats:
-    """Equilibria that Newton's method reaches from a grid of starts, shape (count, 2) [rad]."""
-    found = np.empty((64, 2))
-    angles = -np.pi + 2.0 * np.pi * (np.arange(starts) + 0.5) / starts
-    return found[: search_grid(lift, spring, gravity, force, angles, found)].copy()
+def _each(s: Floats, c: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    return s[0], c[0], s[1], c[1]
+
+
+def _wrapped(angles: Floats) -> Floats:
+    turned: Floats = np.pi - np.remainder(np.pi - angles, 2.0 * np.pi)
+    return turned

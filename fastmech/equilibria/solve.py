@@ -6,7 +6,7 @@ import numpy as np
 from numba import boolean, types
 from numpy.typing import NDArray
 
-from fastmech.equilibria.balance import EPS, Pulls, expected_count, normal_form, pulls, vanishing
+from fastmech.equilibria.balance import EPS, Pulls, expected_count, normal_form, pulls, vanishing, wrap
 from fastmech.equilibria.certificate import AT_FOLD, COMPLETE, UNPROVED, apart, certify, unbalance
 from fastmech.equilibria.outcome import Outcome
 from fastmech.equilibria.search import LAPS, MOST, FloatArray, candidates, hessian, polish
@@ -23,6 +23,9 @@ SINGULAR = -2
 
 #: At a cusp three equilibria merge; rounding displaces them by about EPS^(1/3) rad times a condition number.
 MERGE = 16.0 * EPS ** (1.0 / 3.0)
+
+#: Energies over the scale that differ by no more are equal within rounding.
+EVEN = 32.0 * EPS
 
 INDICES = types.Array(types.int8, 2, "C")
 
@@ -74,13 +77,23 @@ def morse_index(p: Pulls, phi: float, theta: float, radius: float) -> int:
 
 
 @inlined
+def is_before(energy: FloatArray, phi: FloatArray, theta: FloatArray, i: int, j: int) -> bool:
+    """Whether entry i is listed before j: the deeper one; of mirror images the one with the smaller theta."""
+    if abs(energy[i] - energy[j]) > EVEN:
+        return bool(energy[i] < energy[j])
+    if abs(wrap(theta[i] - theta[j])) > MERGE:
+        return bool(theta[i] < theta[j])
+    return bool(phi[i] < phi[j])
+
+
+@inlined
 def sort_by_energy(
     count: int, energy: FloatArray, phi: FloatArray, theta: FloatArray, radius: FloatArray
 ) -> None:
-    """Deepest first; insertion keeps the order of equal ones."""
+    """Deepest first; where a scene is its own mirror image rounding does not decide."""
     for i in range(1, count):
         for j in range(i, 0, -1):
-            if energy[j] >= energy[j - 1]:
+            if not is_before(energy, phi, theta, j, j - 1):
                 break
             energy[j], energy[j - 1] = energy[j - 1], energy[j]
             phi[j], phi[j - 1] = phi[j - 1], phi[j]
@@ -121,10 +134,12 @@ def solve(
     """
     at_phi, at_theta, at_radius = np.empty(LAPS), np.empty(LAPS), np.empty(LAPS)
     for row in range(coefficients.shape[0]):
-        phi[row], theta[row], energy[row], radius[row] = np.nan, np.nan, np.nan, np.nan
-        index[row] = NO_EQUILIBRIUM
+        for i in range(MOST):
+            phi[row, i], theta[row, i], energy[row, i], radius[row, i] = np.nan, np.nan, np.nan, np.nan
+            index[row, i] = NO_EQUILIBRIUM
         count[row], expected[row], outcome[row], margin[row] = 0, 0, UNPROVED, np.nan
-        mass, _, lift, spring, gravity, force, _, _ = coefficients[row]
+        mass, lift, spring = coefficients[row, 0], coefficients[row, 2], coefficients[row, 3]
+        gravity, force = coefficients[row, 4], coefficients[row, 5]
         p = pulls(mass, lift, spring, gravity, force)
         if not np.isfinite(lift + spring + gravity + force):
             continue
@@ -145,12 +160,12 @@ def solve(
             outcome[row] = certify(p, n, found, at_phi, at_theta, at_radius)
         if outcome[row] == AT_FOLD:
             found = min(MOST, merge_singular(p, n.error, found, at_phi, at_theta, at_radius))
-        phi[row, :found], theta[row, :found] = at_phi[:found], at_theta[:found]
-        radius[row, :found] = at_radius[:found]
         scale = max(np.hypot(lift, force), np.hypot(gravity, force), spring)
         for i in range(found):
-            energy[row, i] = scale * energy_at(p, phi[row, i], theta[row, i])
+            phi[row, i], theta[row, i], radius[row, i] = at_phi[i], at_theta[i], at_radius[i]
+            energy[row, i] = energy_at(p, at_phi[i], at_theta[i])
         sort_by_energy(found, energy[row], phi[row], theta[row], radius[row])
         for i in range(found):
+            energy[row, i] *= scale
             index[row, i] = morse_index(p, phi[row, i], theta[row, i], radius[row, i])
         count[row] = found

@@ -25,6 +25,7 @@ from fastmech.jit import (
     called,
     kernel,
     lanes,
+    named_tuple,
     observer_signature,
     rhs_signature,
     rounded_to,
@@ -103,7 +104,7 @@ class Moment(NamedTuple):
     ready: bool  #: the history is known
 
 
-WEIGHTS = types.NamedTuple(
+WEIGHTS = named_tuple(
     [INTEGERS, INTEGERS, VECTOR, VECTOR, INTEGERS, *[VECTOR] * 3, types.float64, types.int64, types.int64],
     Weights,
 )
@@ -113,7 +114,7 @@ def run_type(precision: Any) -> Any:
     """Type of :class:`Run`."""
     three, four = lanes(precision, 3), lanes(precision, 4)
     record = lanes(types.float64, 3)
-    return types.NamedTuple([VECTOR, INTEGERS, three, VECTOR, three, record, four, three, VECTOR], Run)
+    return named_tuple([VECTOR, INTEGERS, three, VECTOR, three, record, four, three, VECTOR], Run)
 
 
 def driver_signature(precision: Any) -> Any:
@@ -348,12 +349,25 @@ def weights_of(
     explicit = np.zeros(0) if predictor is None else predictor
     implicit = np.zeros(0) if corrector is None else corrector
     size = explicit.size
-    past = np.concatenate([np.arange(size), np.zeros(-size % TERMS, dtype=np.int64)]).astype(np.int64)
-    term = np.array(term_weights(explicit)) if size else explicit
-    sums = [np.concatenate([w[::-1], np.zeros(-w.size % TERMS)]) for w in (explicit, implicit[1:], term)]
-    new = float(implicit[0]) if implicit.size else 0.0
-    nodes = np.array(tableau.c, dtype=np.float64)
-    return Weights(start, row, weight, nodes, past, *sums, new, size, group)
+    padding = np.zeros(-size % TERMS)
+    past = np.concatenate([np.arange(size), padding]).astype(np.int64)
+
+    def oldest_first(weights: Floats) -> Floats:
+        return np.concatenate([weights[::-1], padding[: -weights.size % TERMS]])
+
+    return Weights(
+        start=start,
+        row=row,
+        weight=weight,
+        nodes=np.array(tableau.c, dtype=np.float64),
+        past=past,
+        predictor=oldest_first(explicit),
+        corrector=oldest_first(implicit[1:]),
+        term=oldest_first(np.array(term_weights(explicit.tolist()) if size else [], dtype=np.float64)),
+        new=float(implicit[0]) if implicit.size else 0.0,
+        rows=size,
+        group=group,
+    )
 
 
 def formula_of(tableau: Tableau, rows: int = 0) -> Formula:

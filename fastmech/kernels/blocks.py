@@ -35,9 +35,8 @@ class Rates(NamedTuple):
     loops call: ``rates(t, *states, *parameters)``, a tuple, right for any finite numbers. Where ``ranged`` is
     set also ``rates_within``, an :func:`~fastmech.kernels.attempt.attempted` one that raises in place of
     calling the library for an angle beyond the packed range. Where ``near`` is set, one that tells instead
-    whether the lane is beyond, and gives the rates and what it keeps;
-    ``rates_near(t, *states, *parameters, *before, kept)`` then gives the rates close to the states ``before``:
-    what corrects a prediction.
+    whether the lane is beyond, and gives the rates and what it keeps: with that, ``rates_near(t, *states,
+    *parameters, *before, kept)`` gives the rates close to the states ``before``, as a corrector wants them.
 
     Of a ``vector`` the function is ``rates(t, y, p, found)``, with arrays of one trajectory's numbers; it
     writes into the last one. Its blocks have one lane.

@@ -61,10 +61,10 @@ def _functions(equation: Any, module: str, precision: str) -> dict[str, Any]:
         return beyond, found, (s1, c1, s2, c2)
 
     @inlined
-    def rates_near(
+    def rates_near(  # type: ignore[no-untyped-def]
         t, phi, theta, u, w, mass, slider, lift, spring, gravity, force, damping, decay,
         phi0, theta0, u0, w0, kept,
-    ):  # type: ignore[no-untyped-def]  # fmt: skip
+    ):  # fmt: skip
         push = force_now(t, force, decay)
         s1, c1 = turned(kept[0], kept[1], phi - phi0)
         s2, c2 = turned(kept[2], kept[3], theta - theta0)

@@ -29,7 +29,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from fastmech.callee import CalleeType
-from fastmech.jit import lanes
+from fastmech.jit import lanes, named_tuple
 from fastmech.kernels.blocks import VECTOR_LANES, Rates, identifier, loops
 
 Floats = NDArray[np.float64]
@@ -76,10 +76,10 @@ MOST_ROWS = 100
 def lanes_type(precision: Any) -> Any:
     """Type of :class:`Lanes`."""
     flags = types.Array(types.boolean, 1, "C")
-    return types.NamedTuple([*[lanes(precision, 1)] * 3, flags], Lanes)
+    return named_tuple([*[lanes(precision, 1)] * 3, flags], Lanes)
 
 
-STEPS = types.NamedTuple([*[types.float64] * 2, *[types.int64] * 6], Steps)
+STEPS = named_tuple([*[types.float64] * 2, *[types.int64] * 6], Steps)
 
 
 def advance_signature(precision: Any) -> Any:

@@ -103,10 +103,7 @@ def canonical_tangent(
         by_theta,
         by_p1,
         by_p2,
-        (
-            e11 + g11 * by_phi[0] + g12 * by_phi[1],
-            bend - u12 + g21 * by_phi[0] + g22 * by_phi[1],
-        ),
+        (e11 + g11 * by_phi[0] + g12 * by_phi[1], bend - u12 + g21 * by_phi[0] + g22 * by_phi[1]),
         (
             bend - u12 + g11 * by_theta[0] + g12 * by_theta[1],
             bend - u22 + g21 * by_theta[0] + g22 * by_theta[1],

@@ -1,4 +1,4 @@
-"""The colour of a basin: the same label has the same colour in every picture, whatever else is in it."""
+"""Colours and names of basins: a label has the same colour in every picture, whatever else is in it."""
 
 from __future__ import annotations
 
@@ -48,3 +48,11 @@ def well_number(dataset: Dataset, well: int) -> int:
 def basin_color(dataset: Dataset, well: int, turns: tuple[int, int]) -> str:
     """Colour of a copy of a well; ``well`` is an index among the dataset's equilibria."""
     return _COLOR_OF.get((well_number(dataset, well), *turns), FURTHER)
+
+
+def basin_name(dataset: Dataset, well: int, turns: tuple[int, int]) -> str:
+    """Name of a copy of a well; ``well`` is an index among the dataset's equilibria."""
+    wells = int(np.count_nonzero(dataset["equilibrium_morse_index"].data == 0))
+    text = f"well {well_number(dataset, well) + 1}" if wells > 1 else "the well"
+    made = [f"{t:+d} {symbol}" for t, symbol in zip(turns, ("φ", "θ"), strict=True) if t]
+    return f"{text}, {', '.join(made)} turn{'s' * (len(made) > 1 or abs(sum(turns)) > 1)}" if made else text

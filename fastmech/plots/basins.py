@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.plots.basin_colors import FURTHER, basin_color
+from fastmech.plots.basin_colors import FURTHER, basin_color, basin_name
 from fastmech.plots.basin_marks import SYMBOLS, Slice, decisive, mark
-from fastmech.plots.basin_names import basin_name
 from fastmech.plots.labels import Codes, flag_codes
 from fastmech.plots.style import FIELD, new_figure, style
 from fastmech.results import Dataset

@@ -18,16 +18,9 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-LEFT_OVER = {
-    "at_unstable": ("still at an unstable one", "#8c8c8c"),
-    "undecided": ("not decided", "#d0d0d0"),
-}
+LEFT_OVER = {"at_unstable": ("still at an unstable one", "#8c8c8c"), "undecided": ("not decided", "#d0d0d0")}
 #: Outcomes that tell nothing of the motion, in words.
-FAILED = {
-    "not_finite": "not finite",
-    "step_too_large": "step too large",
-    "not_converged": "not converged",
-}
+FAILED = {"not_finite": "not finite", "step_too_large": "step too large", "not_converged": "not converged"}
 #: Colour of outcomes that only another version knows.
 UNKNOWN = "#b3a2c7"
 #: What a picture of outcomes cannot show without a variable, the one that leaves out most first.

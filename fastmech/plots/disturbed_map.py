@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,10 +40,7 @@ def draw_disturbed_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[str
     share = _percent(view, "share_returned")
     time = view.data("time_to_return_quantile").astype(np.float64)
     rows = {
-        "share_returned": (
-            stable,
-            [("proved to return", share, "share that returns [%]")],
-        ),
+        "share_returned": (stable, [("proved to return", share, "share that returns [%]")]),
         "time_to_return": (
             stable,
             [
@@ -100,7 +98,7 @@ def _panels(view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[
                 logarithmic(bar.ax.yaxis)
     if handles := _marks(view, sheets, fields):
         figure.legend(handles=handles, loc="outside lower center", ncols=2)
-    figure.suptitle(_setting(view), fontsize=10.0)
+    _title(figure, _setting(view))
     return figure
 
 
@@ -141,9 +139,15 @@ def _lines(view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[s
     if any(_untold(view, int(sheet)).any() for sheet in sheets):
         panels[0].plot([], [], UNTOLD, color="black", label=ABOUT_UNTOLD)
     legend_below(figure, panels[0], 2)
-    band = "; band: 95 % Wilson interval, undecided ones as none or all" if name == "share_returned" else ""
-    figure.suptitle(_setting(view) + band, fontsize=10.0)
+    band = "\nband: 95 % Wilson interval, undecided ones as none or all" if name == "share_returned" else ""
+    _title(figure, _setting(view) + band)
     return figure
+
+
+def _title(figure: Figure, text: str) -> None:
+    """Over all panels, in as many lines as it takes."""
+    width = int(12 * figure.get_figwidth())
+    figure.suptitle("\n".join(fill(line, width) for line in text.splitlines()), fontsize=10.0)
 
 
 def _look(name: str, field: Floats) -> dict[str, Any]:

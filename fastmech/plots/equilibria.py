@@ -66,13 +66,7 @@ def _number(axes: Axes, dataset: Dataset) -> None:
         offset = (-13.0 if phi > 0 else 13.0, -13.0 if theta > 0 else 13.0)
         box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
         axes.annotate(
-            str(number),
-            (phi, theta),
-            offset,
-            textcoords="offset points",
-            ha="center",
-            va="center",
-            bbox=box,
+            str(number), (phi, theta), offset, textcoords="offset points", ha="center", va="center", bbox=box
         )
 
 

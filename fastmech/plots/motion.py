@@ -86,10 +86,7 @@ def _reactions(dataset: Dataset) -> Figure:
 
 def _mark_extremes(axes: Axes, t: Floats, values: Floats) -> None:
     texts = []
-    for name, i, marker in (
-        ("max", np.nanargmax(values), "^"),
-        ("min", np.nanargmin(values), "v"),
-    ):
+    for name, i, marker in (("max", np.nanargmax(values), "^"), ("min", np.nanargmin(values), "v")):
         axes.plot(t[i], values[i], marker, color="black", ms=6)
         texts.append(f"{'▲' if name == 'max' else '▼'} {name} {values[i]:.4g} N at {t[i]:.3g} s")
     axes.set_title("    ".join(texts), loc="right", fontsize=9)

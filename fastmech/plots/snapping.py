@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fastmech.plots.basin_colors import FURTHER, basin_color
-from fastmech.plots.basin_names import basin_name
+from fastmech.plots.basin_colors import FURTHER, basin_color, basin_name
 from fastmech.plots.basins import FEW, NAMED, unlabelled
 from fastmech.plots.labels import flag_codes
 from fastmech.plots.style import new_figure, style

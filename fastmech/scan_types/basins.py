@@ -1,26 +1,30 @@
 """Basins over two to four coordinates of the start: well and turns in which it ends, when it is captured.
 
-Layout: variables over the grid, one dimension for each axis; what is known about the scene's equilibria along
-``equilibrium``; every (well, turns) that occurs, with its share, along ``basin``. ``label`` points into these
-and is -1 where there is no label; ``status`` says why.
+Layout: variables over the grid, one dimension for each axis. In groups of their own, so that a table of the
+map has a row for each start: ``equilibria``, and ``basins``, every (well, turns) that occurs, with its share.
+``label`` points into the latter and is -1 where there is no label; ``status`` says why.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from fastmech.basins.label import require_damper
-from fastmech.basins.map import STATE
+from fastmech.basins.map import STATE, BasinMap, map_basins
+from fastmech.basins.status import FAILURES, BasinStatus
+from fastmech.basins.steps import method_for
+from fastmech.capture.certificate import certificate_of
 from fastmech.errors import InputError, shown
-from fastmech.results import Dataset
+from fastmech.results import NO_CODE, STATE_UNITS, Dataset, Variable, flags, numbers
 from fastmech.scan_types.axis import Axis, arrays, check_duration, check_rising, check_size, check_starts
-from fastmech.scan_types.basin_tiling import BasinTiling
-from fastmech.scan_types.request import MethodName, TiledScan
-from fastmech.scan_types.tiling import Tiling
+from fastmech.scan_types.request import TiledScan, UsualMethod, failures
+from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
 from fastmech.scene import Number, Scene, nearest
 from fastmech.step_limits.warning import step_warning
 
@@ -29,6 +33,13 @@ if TYPE_CHECKING:
 
 #: Starts of the largest map that is held in memory with its labels, and the numbers of 8 bytes of each.
 MOST_POINTS, POINT_NUMBERS = 20_000_000, 20
+
+#: Starts of a tile, about, and of one whose motions may be longer the fewer: a second or two of one thread.
+TILE_POINTS = 1 << 14
+USUAL_END = 60.0
+
+#: What a tile knows of every start, by the names in `fastmech.basins.map.BasinMap`.
+_ARRAYS = ("well", "turns", "time", "settle_time", "status", "computed")
 
 
 def _known_coordinates(entries: dict[str, Axis] | dict[str, float]) -> dict[str, Axis] | dict[str, float]:
@@ -61,7 +72,7 @@ class Basins(TiledScan):
         None, description="also the time from which on a motion stays so near to its well [rad]"
     )
     dt: Annotated[float | None, Field(gt=0)] = Field(None, description="coarsest step [s]")
-    method: MethodName = "dop853"
+    method: UsualMethod = None
 
     def check(self, scene: Scene) -> None:
         """Without a damper there are no basins; and a map has its limits."""
@@ -77,7 +88,7 @@ class Basins(TiledScan):
 
     def step_warning(self, scene: Scene) -> str | None:
         """By the scene's limit and the decaying force; without ``dt`` each start's step is chosen."""
-        return None if self.dt is None else step_warning(scene, self.dt, self.method)
+        return None if self.dt is None else step_warning(scene, self.dt, method_for(scene, self.method))
 
     def tiling(self, scene: Scene) -> Tiling:
         """Planes of the first axis; a refined map is one tile, because it follows boundaries anywhere."""
@@ -88,4 +99,185 @@ class Basins(TiledScan):
         """Labels, with equilibria and the wells' energy contours on top, and times."""
         from fastmech.plots.basins import draw_basins
 
-        return draw_basins(dataset, scene)
+        return draw_basins(dataset.merged, scene)
+
+
+class BasinTiling(Tiling):
+    """Every tile holds some planes of the first axis, each so many apart.
+
+    Args:
+        request: how to compute.
+        scene: the mechanism.
+        axes: coordinates of the starts with their values.
+    """
+
+    what = "starts of the basin map"
+
+    def __init__(self, request: Basins, scene: Scene, axes: dict[str, NDArray[np.float64]]) -> None:
+        self.request, self.scene, self.axes = request, scene, axes
+        self.first, *others = axes
+        self.others = tuple(len(axes[other]) for other in others)
+        length = len(axes[self.first])
+        points = int(TILE_POINTS * min(1.0, USUAL_END / request.t_end))
+        planes = max(1, points // math.prod(self.others)) if request.refine is None else length
+        self.count = -(-length // planes)
+        # Planes from all over: tiles take about as long as each other, so that progress tells the time left.
+        self.parts = [slice(k, length, self.count) for k in range(self.count)]
+
+    def items(self, index: int) -> int:
+        """Starts."""
+        return math.prod(self._grid(index))
+
+    def compute(self, index: int, context: RunContext) -> Dataset:
+        """Label some planes."""
+        advance = context.stage(self.what, self.items(index)) if self.count == 1 else None
+
+        def told(finished: int) -> None:
+            context.check()
+            if advance is not None:
+                advance(finished)
+
+        found = map_basins(
+            self.scene,
+            {**self.axes, self.first: self.axes[self.first][self.parts[index]]},
+            self.request.t_end,
+            fixed=self.request.fixed,
+            refine=self.request.refine,
+            dt=self.request.dt,
+            method=self.request.method,
+            settle_radius=self.request.settle_radius,
+            threads=context.threads,
+            progress=told,
+        )
+        return self._tile({name: getattr(found, name) for name in _ARRAYS}, found.steps)
+
+    def assemble(self, tile: Tiles) -> Dataset:
+        """Join the planes and number the basins."""
+        tiles = [tile(index) for index in range(self.count)]
+        found = BasinMap(
+            axes=self.axes,
+            fixed={name: self.request.fixed.get(name, 0.0) for name in STATE if name not in self.axes},
+            tree=certificate_of(self.scene).tree,
+            t_end=self.request.t_end,
+            steps=sum(int(part.attrs["steps"]) for part in tiles),
+            **{name: self._joined(tiles, name) for name in _ARRAYS},
+        )
+        attrs: dict[str, Any] = {
+            "axes": tuple(self.axes),
+            "t_end": found.t_end,
+            "method": method_for(self.scene, self.request.method),
+        }
+        attrs |= {"steps": found.steps, "refine": self.request.refine or 0}
+        attrs |= {f"fixed_{name}": value for name, value in found.fixed.items()}
+        groups = {"basins": Dataset(_basins(found)), "equilibria": Dataset(_wells(found))}
+        return Dataset(_variables(found), attrs | found.counts | failures(found.status, FAILURES), groups)
+
+    def missing(self, index: int) -> Dataset:
+        """Starts that have not been computed."""
+        grid = self._grid(index)
+        nothing = np.full(grid, np.nan)
+        arrays: dict[str, NDArray[Any] | None] = {
+            "well": np.full(grid, -1, dtype=np.int8),
+            "turns": np.zeros((*grid, 2), dtype=np.int32),
+            "time": nothing,
+            "status": np.full(grid, BasinStatus.UNDECIDED, dtype=np.int8),
+            "computed": np.zeros(grid, dtype=np.bool_),
+            "settle_time": None if self.request.settle_radius is None else nothing,
+        }
+        return self._tile(arrays, 0)
+
+    def _grid(self, index: int) -> tuple[int, ...]:
+        part = self.parts[index]
+        return (len(range(part.start, part.stop, part.step)), *self.others)
+
+    def _joined(self, tiles: list[Dataset], name: str) -> Any:
+        """An array of all tiles, every plane in its place; None where they have none."""
+        if name not in tiles[0]:
+            return None
+        first = tiles[0][name].data
+        length = len(self.axes[self.first])
+        array = np.empty((length, *first.shape[1:]), np.bool_ if name == "computed" else first.dtype)
+        for part, tile in zip(self.parts, tiles, strict=True):
+            array[part] = tile[name].data
+        return array
+
+    def _tile(self, arrays: dict[str, NDArray[Any] | None], steps: int) -> Dataset:
+        dims = (*self.axes, "angle")
+        there = {name: array for name, array in arrays.items() if array is not None}
+        return Dataset(
+            {name: Variable(dims[: array.ndim], array) for name, array in there.items()}, {"steps": steps}
+        )
+
+
+def _variables(found: BasinMap) -> dict[str, Variable]:
+    """What is known of every start."""
+    described = {
+        "phi": "angle phi",
+        "theta": "angle theta",
+        "phi_dot": "rate of phi",
+        "theta_dot": "rate of theta",
+    }
+    names = tuple(found.axes)
+    variables = {
+        name: Variable((name,), values, STATE_UNITS[name], f"{described[name]} at the start")
+        for name, values in found.axes.items()
+    }
+    variables |= {
+        "label": Variable(names, found.labels[0].astype(np.int32), "1", "basin of the start", NO_CODE),
+        "well": Variable(names, found.well, "1", "equilibrium that captures the start", NO_CODE),
+        "turns_phi": Variable(names, found.turns[..., 0], "1", "full turns of phi of that well"),
+        "turns_theta": Variable(names, found.turns[..., 1], "1", "full turns of theta of that well"),
+        "capture_time": Variable(
+            names, found.time, "s", "time of capture, NaN: not captured or not computed"
+        ),
+        "status": Variable(names, found.status, "1", "what is known of the start", flags(BasinStatus)),
+        "computed": Variable(names, found.computed, "1", "computed, not filled in between equal labels"),
+    }
+    assert found.tree is not None  # a scene's map has one
+    force = np.array(found.tree.equilibria.force)
+    variables["force"] = Variable((), force, "N", "constant force that the wells hold for")
+    if found.settle_time is not None:
+        variables["settle_time"] = Variable(
+            names,
+            found.settle_time,
+            "s",
+            "time from which on the motion stays in the settling ball, NaN: none",
+        )
+    return variables
+
+
+def _basins(found: BasinMap) -> dict[str, Variable]:
+    """Every well and turns that occur."""
+    label, table = found.labels
+    share = np.array([np.mean(label == i) for i in range(len(table))])
+    unknown = np.mean(label < 0)
+    return {
+        **numbers("basin", len(table), "number of the basin"),
+        "basin_well": Variable(("basin",), table[:, 0].astype(np.int8), "1", "equilibrium of the basin"),
+        "basin_turns_phi": Variable(("basin",), table[:, 1].astype(np.int32), "1", "its full turns of phi"),
+        "basin_turns_theta": Variable(
+            ("basin",), table[:, 2].astype(np.int32), "1", "its full turns of theta"
+        ),
+        "basin_share": Variable(("basin",), share, "1", "share of the starts"),
+        "basin_share_at_most": Variable(
+            ("basin",), share + unknown, "1", "share of the starts if all without a label ended there"
+        ),
+    }
+
+
+def _wells(found: BasinMap) -> dict[str, Variable]:
+    """The scene's equilibria."""
+    assert found.tree is not None
+    equilibria, each = found.tree.equilibria, ("equilibrium",)
+    barrier = np.full(len(equilibria), np.nan)
+    barrier[list(found.tree.wells)] = found.tree.barrier
+    return {
+        **numbers("equilibrium", len(equilibria), "number of the equilibrium"),
+        "equilibrium_phi": Variable(each, equilibria.phi, "rad", "angle phi of the equilibrium"),
+        "equilibrium_theta": Variable(each, equilibria.theta, "rad", "angle theta of the equilibrium"),
+        "equilibrium_energy": Variable(each, equilibria.energy, "J", "potential energy of the equilibrium"),
+        "equilibrium_morse_index": Variable(
+            each, equilibria.morse_index, "1", "unstable directions, 0: a well"
+        ),
+        "barrier": Variable(each, barrier, "J", "energy at which the well first meets another, NaN: no well"),
+    }

@@ -9,27 +9,21 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import AfterValidator, Field
 
+from fastmech.basins.disturbed import MOST_RADIUS, DisturbedEnsemble, disturb
 from fastmech.basins.label import require_damper
-from fastmech.basins.steps import shortest_step
-from fastmech.disturbance.motion import require_constant_force
+from fastmech.basins.steps import method_for, shortest_step
+from fastmech.disturbance.motion import require_constant_force, require_isolated
+from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError, shown
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
 from fastmech.results import Dataset
-from fastmech.scan_types.axis import (
-    Axis,
-    arrays,
-    check_duration,
-    check_parameters,
-    check_size,
-    check_steps,
-)
-from fastmech.scan_types.disturbed_layout import TRAJECTORY_VARIABLES
+from fastmech.scan_types.axis import Axis, arrays, check_duration, check_parameters, check_size, check_steps
 from fastmech.scan_types.disturbed_map import MOST_POINTS, MOST_TRAJECTORIES, DisturbedMap
-from fastmech.scan_types.disturbed_tiling import DisturbedTiling
+from fastmech.scan_types.disturbed_tiling import TRAJECTORY_VARIABLES, DisturbedTiling
 from fastmech.scan_types.equilibrium_map import known_parameters
-from fastmech.scan_types.request import MethodName, Seed, TiledScan
-from fastmech.scan_types.tiling import Tiling
+from fastmech.scan_types.request import Seed, TiledScan, UsualMethod
+from fastmech.scan_types.tiling import RunContext, Tiling
 from fastmech.scene import Scene, nearest
 from fastmech.step_limits.warning import step_warning
 
@@ -64,19 +58,21 @@ class Disturbed(TiledScan):
 
     kind: ClassVar[str] = "disturbed"
 
-    axes: Annotated[dict[str, Axis], Field(max_length=3), AfterValidator(known_parameters)] = Field(
+    axes: Annotated[dict[str, Axis], AfterValidator(known_parameters)] = Field(
         default={}, description="parameters over which all equilibria are disturbed; none: the scene's alone"
     )
 
     trajectories: Annotated[int, Field(ge=1, le=100_000_000)] = 4096
-    radius: Annotated[float, Field(gt=0, description="largest size of a disturbance [rad]")] = 0.5
+    radius: Annotated[
+        float, Field(gt=0, le=MOST_RADIUS, description="largest size of a disturbance [rad]")
+    ] = 0.5
     return_radius: Annotated[float, Field(gt=0, description="radius of the ball of return [rad]")] = 0.01
     seed: Seed = 0
     t_end: Annotated[float, Field(gt=0)] = 120.0
     dt: Annotated[float | None, Field(gt=0)] = Field(
         None, description="longest step [s]; by default each start's own, from the scene and its energy"
     )
-    method: MethodName = "dop853"
+    method: UsualMethod = None
     linear_horizon: Annotated[float, Field(gt=0, description="horizon of the comparison [s]")] = 1.0
     linear_tolerance: Annotated[float, Field(gt=0, description="deviation allowed, relative")] = 0.05
     linear_directions: Annotated[int, Field(ge=1, le=1_000_000)] = 256
@@ -89,13 +85,13 @@ class Disturbed(TiledScan):
         """A constant force and a damper all over a map, and no more work than is possible."""
         check_parameters(scene, self.axes, "axes")
         for corner in self._corners(scene):
-            require_constant_force(corner)
             require_damper(corner)
+            (require_constant_force if self.axes else require_isolated)(corner)
             check_duration(corner, self.t_end, self.dt)
             check_steps("linear_horizon", self.linear_horizon, shortest_step(reduce(corner)))
         if not self.axes:
             steps = math.ceil(self.t_end / (self.dt or shortest_step(reduce(scene))))
-            work = self.trajectories * find_method(self.method).evaluations(steps)
+            work = self.trajectories * find_method(method_for(scene, self.method)).evaluations(steps)
             if work > MOST_WORK:
                 raise InputError(
                     f"trajectories, t_end, dt: ask for {work:.3g} right-hand sides about every equilibrium, "
@@ -115,7 +111,9 @@ class Disturbed(TiledScan):
         """By the scene's limit; without ``dt`` each start's step is chosen."""
         if self.dt is None:
             return None
-        told = [step_warning(corner, self.dt, self.method) for corner in self._corners(scene)]
+        told = [
+            step_warning(corner, self.dt, method_for(corner, self.method)) for corner in self._corners(scene)
+        ]
         return next((line for line in told if line is not None), None)
 
     def _corners(self, scene: Scene) -> list[Scene]:
@@ -128,6 +126,25 @@ class Disturbed(TiledScan):
         if self.axes:
             return DisturbedMap(self, scene, arrays(self.axes))
         return DisturbedTiling(self, scene)
+
+    def ensemble(
+        self, scene: Scene, equilibrium: Equilibrium, context: RunContext, part: slice | None = None
+    ) -> DisturbedEnsemble:
+        """Disturb one equilibrium, or a part of its trajectories."""
+        return disturb(
+            scene,
+            equilibrium,
+            self.trajectories,
+            radius=self.radius,
+            return_radius=self.return_radius,
+            seed=self.seed,
+            t_end=self.t_end,
+            dt=self.dt,
+            method=self.method,
+            part=part,
+            threads=context.threads,
+            progress=lambda finished: context.check(),
+        )
 
     @property
     def kept(self) -> list[str]:
@@ -149,7 +166,10 @@ class Disturbed(TiledScan):
             return section.load()
         step = -(-section.sizes.get("trajectory", 1) // DRAWN)
         drawn = [name for name in section if not name.startswith(("start", "final", "linear_direction"))]
-        return section.load(drawn, {"trajectory": slice(None, None, step)})
+        found = section.load(drawn, {"trajectory": slice(None, None, step)})
+        return Dataset(
+            found.variables, found.attrs, {name: group.load() for name, group in section.groups.items()}
+        )
 
     @staticmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
@@ -157,7 +177,7 @@ class Disturbed(TiledScan):
         if "axes" in dataset.attrs:
             from fastmech.plots.disturbed_map import draw_disturbed_map
 
-            return draw_disturbed_map(dataset, scene)
+            return draw_disturbed_map(dataset.merged, scene)
         from fastmech.plots.disturbed import draw_disturbed
 
-        return draw_disturbed(dataset)
+        return draw_disturbed(dataset.merged)

@@ -2,28 +2,31 @@
 
 Layout: arrays over the grid and ``sheet``, NaN where the sheet has no equilibrium; a sheet is one
 equilibrium, continued, as the atlas of these axes numbers them (:mod:`fastmech.atlas.sheets`). Each ensemble
-is that of ``fm.disturb`` with the scene of its point.
+is that of ``fm.disturb`` with the scene of its point. The group ``quantiles`` holds those of times to return.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.atlas.map import map_equilibria
-from fastmech.basins.disturbed import FAILURES, disturb
+from fastmech.basins.disturbed import FAILURES
 from fastmech.ensembles.status import failure_counts
 from fastmech.equilibria.find import Equilibrium, find_equilibria
 from fastmech.errors import InputError
 from fastmech.results import Dataset, Variable, numbers
-from fastmech.scan_types.disturbed_layout import ABOUT_QUANTILES, ABOUT_SHARES, QUANTILES
+from fastmech.scan_types.disturbed_tiling import ABOUT_QUANTILES, ABOUT_SHARES, QUANTILE, QUANTILES
 from fastmech.scan_types.request import counted_failures
 from fastmech.scan_types.tally import Tally
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
 from fastmech.scene import Scene
+
+if TYPE_CHECKING:
+    from fastmech.scan_types.disturbed import Disturbed
 
 Floats = NDArray[np.float64]
 
@@ -41,25 +44,6 @@ _MEASURED: dict[str, tuple[tuple[str, ...], str, str]] = {
 _LENGTHS = {"quantile": len(QUANTILES)}
 
 
-class _Request(Protocol):
-    @property
-    def trajectories(self) -> int: ...
-    @property
-    def radius(self) -> float: ...
-    @property
-    def return_radius(self) -> float: ...
-    @property
-    def seed(self) -> int: ...
-    @property
-    def t_end(self) -> float: ...
-    @property
-    def dt(self) -> float | None: ...
-    @property
-    def method(self) -> str: ...
-    @property
-    def settings(self) -> dict[str, Any]: ...
-
-
 class DisturbedMap(Tiling):
     """A tile is one equilibrium at one point; those of a point follow each other.
 
@@ -71,7 +55,7 @@ class DisturbedMap(Tiling):
 
     what = "disturbed trajectories"
 
-    def __init__(self, request: _Request, scene: Scene, axes: Mapping[str, Floats]) -> None:
+    def __init__(self, request: Disturbed, scene: Scene, axes: Mapping[str, Floats]) -> None:
         self.request, self.scene, self.axes = request, scene, dict(axes)
         self.atlas = map_equilibria(scene, axes)
         self.entries = np.argwhere(self.atlas.sheet >= 0)
@@ -85,19 +69,7 @@ class DisturbedMap(Tiling):
         """Disturb one equilibrium; where its scene is refused, all that is kept is the reason."""
         request, (scene, equilibrium) = self.request, self._place(index)
         try:
-            found = disturb(
-                scene,
-                equilibrium,
-                request.trajectories,
-                radius=request.radius,
-                return_radius=request.return_radius,
-                seed=request.seed,
-                t_end=request.t_end,
-                dt=request.dt,
-                method=request.method,
-                threads=context.threads,
-                progress=lambda finished: context.check(),
-            )
+            found = request.ensemble(scene, equilibrium, context)
         except InputError as refused:
             return self._tile({}, {"refused": str(refused)})
         tally, failed = Tally.of(found.outcome, found.time_to_return), np.isin(found.outcome, FAILURES)
@@ -130,14 +102,15 @@ class DisturbedMap(Tiling):
         about = "equilibrium, continued, as the atlas of these axes numbers them"
         variables |= numbers("sheet", grid[-1], about)
         about = "negative eigenvalues of the Hessian all over a sheet, 0: stable"
-        variables["sheet_morse_index"] = Variable(("sheet",), atlas.sheet_morse_index, "1", about)
-        variables["quantile"] = Variable(("quantile",), np.array(QUANTILES), "1", "quantile")
+        sheet_index = Variable(("sheet",), atlas.sheet_morse_index, "1", about)
+        quantiles = {**variables, "quantile": QUANTILE}
+        variables["sheet_morse_index"] = sheet_index
         for angle in ("phi", "theta"):
             about = f"angle {angle} of the disturbed equilibrium"
             variables[angle] = over_map(getattr(atlas, angle)[slot], (), "rad", about)
         for name, (dims, unit, about) in _MEASURED.items():
             values = np.array([one[name].data for one in tiles]).reshape(len(tiles), *map(_LENGTHS.get, dims))
-            variables[name] = over_map(values, dims, unit, about)
+            (quantiles if dims else variables)[name] = over_map(values, dims, unit, about)
         refused = [str(one.attrs["refused"]) for one in tiles if "refused" in one.attrs]
         counts = {
             k.name.lower(): sum(int(one.attrs.get(k.name.lower(), 0)) for one in tiles) for k in FAILURES
@@ -145,7 +118,8 @@ class DisturbedMap(Tiling):
         attrs = {**self.request.settings, "axes": names, "refused": len(refused)}
         attrs |= {"refused_first": refused[0]} if refused else {}
         followed = self.request.trajectories * (len(tiles) - len(refused))
-        return Dataset(variables, attrs | counted_failures({k: n for k, n in counts.items() if n}, followed))
+        attrs |= counted_failures({k: n for k, n in counts.items() if n}, followed)
+        return Dataset(variables, attrs, {"quantiles": Dataset(quantiles)})
 
     def missing(self, index: int) -> Dataset:
         """An equilibrium that has not been disturbed."""

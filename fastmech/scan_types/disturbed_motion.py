@@ -9,13 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from fastmech.basins.disturbed import MOST_RADIUS
 from fastmech.basins.steps import highest_frequency
 from fastmech.disturbance.motion import (
     PHASE,
+    default_method,
     default_step,
     disturbed_motion,
     equilibria_to_disturb,
-    require_constant_force,
+    require_isolated,
 )
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import FAILURES
@@ -25,9 +27,8 @@ from fastmech.equilibria.search import MOST
 from fastmech.mechanism.coefficients import reduce
 from fastmech.results import STATE_UNITS, Dataset, Variable, numbers, parts
 from fastmech.scan_types.axis import check_steps
-from fastmech.scan_types.each import Each
-from fastmech.scan_types.request import HALVING, MethodName, TiledScan, failures
-from fastmech.scan_types.tiling import Tiling
+from fastmech.scan_types.request import HALVING, TiledScan, UsualMethod, failures
+from fastmech.scan_types.tiling import Each, Tiling
 from fastmech.scene import Scene
 from fastmech.step_limits.warning import step_warning
 
@@ -37,25 +38,28 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
+Size = Annotated[float, Field(ge=-MOST_RADIUS, le=MOST_RADIUS)]
+
+
 class DisturbedMotionScan(TiledScan):
     """The same disturbance of every equilibrium; the default is the paper's: xi1 = 0.1, eta1 = 0.1."""
 
     kind: ClassVar[str] = "disturbed_motion"
 
-    xi_phi: float = Field(default=0.1, description="disturbance of phi [rad]")
-    xi_theta: float = Field(default=0.0, description="disturbance of theta [rad]")
-    eta_phi: float = Field(default=0.1, description="disturbance of phi' [rad/s]")
-    eta_theta: float = Field(default=0.0, description="disturbance of theta' [rad/s]")
+    xi_phi: Size = Field(default=0.1, description="disturbance of phi [rad]")
+    xi_theta: Size = Field(default=0.0, description="disturbance of theta [rad]")
+    eta_phi: Size = Field(default=0.1, description="disturbance of phi' [rad/s]")
+    eta_theta: Size = Field(default=0.0, description="disturbance of theta' [rad/s]")
     t_end: Annotated[float, Field(gt=0)] = 20.0
     outputs: Annotated[int, Field(ge=2, le=10_000_000)] = 1001
     dt: Annotated[float | None, Field(gt=0)] = Field(
         None, description="longest step [s]; by default 0.05 rad of each equilibrium's highest frequency"
     )
-    method: MethodName = "dop853"
+    method: UsualMethod = None
 
     def check(self, scene: Scene) -> None:
         """The force must be constant, so many steps possible, and the outputs fit into memory."""
-        require_constant_force(scene)
+        require_isolated(scene)
         check_steps("t_end", self.t_end, self.dt or PHASE / highest_frequency(reduce(scene)))
         checks.memory(
             self.outputs * 2 * 4 * MOST, 3, "outputs: the motions about equilibria", "fewer outputs"
@@ -63,30 +67,35 @@ class DisturbedMotionScan(TiledScan):
 
     def step_warning(self, scene: Scene) -> str | None:
         """By the scene's limit; without ``dt`` each equilibrium's step is chosen."""
-        return None if self.dt is None else step_warning(scene, self.dt, self.method)
+        return (
+            None
+            if self.dt is None
+            else step_warning(scene, self.dt, self.method or default_method(scene, self.dt))
+        )
 
     def tiling(self, scene: Scene) -> Tiling:
         """The equilibria one by one."""
         equilibria = equilibria_to_disturb(scene)
+        method = self.method or default_method(scene, self.dt or PHASE / highest_frequency(reduce(scene)))
         return Each(
             "disturbed motions",
             len(equilibria),
-            lambda index: self._one(scene, equilibria[index]),
-            lambda tiles: self._joined(equilibria, tiles),
+            lambda index: self._one(scene, equilibria[index], method),
+            lambda tiles: self._joined(equilibria, tiles, method),
         )
 
     @property
     def _times(self) -> Floats:
         return np.linspace(0.0, self.t_end, self.outputs)
 
-    def _one(self, scene: Scene, equilibrium: Equilibrium) -> Dataset:
+    def _one(self, scene: Scene, equilibrium: Equilibrium, method: str) -> Dataset:
         """Integrate one disturbance; the linearized motion is a matrix exponential."""
         t = self._times
         disturbance = [self.xi_phi, self.xi_theta, self.eta_phi, self.eta_theta]
         # The step taken: what divides the intervals between outputs.
         step = t[1] / output_steps(t[:2], self.dt or default_step(scene, equilibrium))[0]
         motion, halved = (
-            disturbed_motion(scene, equilibrium, disturbance, t, dt=dt, method=self.method)
+            disturbed_motion(scene, equilibrium, disturbance, t, dt=dt, method=method)
             for dt in (step, 0.5 * step)
         )
         difference = np.max(np.abs(halved.nonlinear - motion.nonlinear))
@@ -100,7 +109,7 @@ class DisturbedMotionScan(TiledScan):
             }
         )
 
-    def _joined(self, equilibria: Equilibria, tiles: list[Dataset]) -> Dataset:
+    def _joined(self, equilibria: Equilibria, tiles: list[Dataset], method: str) -> Dataset:
         dims = ("equilibrium", "time")
         variables = {
             **numbers("equilibrium", len(equilibria), "number of the equilibrium"),
@@ -113,6 +122,7 @@ class DisturbedMotionScan(TiledScan):
             variables |= parts(kind, dims, motion, STATE_UNITS, f"disturbance of {{}}, {kind} motion")
         steps = [float(tile["step"].data) for tile in tiles]
         attrs = self.model_dump(exclude={"scene"}, exclude_none=True) | {
+            "method": method,
             "shortest_step": min(steps),
             "longest_step": max(steps),
             "error_estimate": float(np.max([tile["difference"].data for tile in tiles])),

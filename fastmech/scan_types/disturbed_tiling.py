@@ -1,35 +1,154 @@
-"""Disturbed ensembles in tiles: blocks of directions and blocks of trajectories, of every equilibrium."""
+"""Disturbed ensembles in tiles: blocks of directions and blocks of trajectories, of every equilibrium.
+
+A table of the section has a row for each trajectory of each equilibrium; what has other dimensions is in the
+groups ``linear``, ``quantiles`` and ``halving``.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
-from typing import Any, Protocol
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.basins.disturbed import FAILURES, STREAM, DisturbedEnsemble, disturb, measuring_steps
+from fastmech.basins.disturbed import (
+    FAILURES,
+    STREAM,
+    DisturbedEnsemble,
+    Outcome,
+    measuring_steps,
+    refuse_meeting_balls,
+)
+from fastmech.basins.steps import method_for
 from fastmech.disturbance.linear_range import linear_range
-from fastmech.disturbance.motion import equilibria_to_disturb
+from fastmech.disturbance.motion import damped_times, equilibria_to_disturb
 from fastmech.disturbance.size import size_at
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.spans import output_steps
 from fastmech.integrators.methods import find_method
-from fastmech.results import Dataset, Variable, numbers
-from fastmech.scan_types.disturbed_layout import (
-    QUANTILES,
-    empty_trajectories,
-    equilibrium_variables,
-    linear_variables,
-    tally_variables,
-    trajectory_variables,
-)
+from fastmech.results import ANGLE_UNITS, NO_CODE, STATE_UNITS, Dataset, Variable, flags, numbers, parts
 from fastmech.scan_types.request import HALVING, counted_failures
 from fastmech.scan_types.tally import SHARES, Tally
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
 from fastmech.scene import Scene
 from fastmech.store.stream import Piece, Stream
+
+if TYPE_CHECKING:
+    from fastmech.scan_types.disturbed import Disturbed
+
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
+QUANTILE = Variable(("quantile",), np.array(QUANTILES), "1", "quantile")
+
+ABOUT_SHARES = {
+    "share_returned": "share that is proved to return",
+    "share_returned_at_most": "share that returned, if all whose end is not known did",
+    "share_returned_lower": "lower end of the 95 % Wilson interval, none of those returning",
+    "share_returned_upper": "upper end of the 95 % Wilson interval, all of those returning",
+}
+ABOUT_QUANTILES = "quantiles of the time to return over those that return, inf: later than the end of the run"
+
+_EACH, _EVERY = ("equilibrium",), ("equilibrium", "trajectory")
+_TURNS = dict.fromkeys(ANGLE_UNITS, "1")
+
+#: What is known of every trajectory: type, what stands for one that is not computed yet, unit, meaning. What
+#: has several units is a variable for each of them.
+_TRAJECTORY: dict[str, tuple[str, float, str | Mapping[str, str], str]] = {
+    "start": ("f8", np.nan, STATE_UNITS, "{} at the start"),
+    "final": ("f8", np.nan, STATE_UNITS, "{} at the end, or of the last finite state"),
+    "failed": ("f8", np.nan, "s", "time of the last finite state where it failed on the way"),
+    "outcome": ("i1", -1, "1", "where it ends"),
+    "end_equilibrium": ("i1", -1, "1", "stable equilibrium at which it is proved to end"),
+    "turns": ("i8", 0, _TURNS, "full turns of {} made on the way there"),
+    "time_to_return": (
+        "f8",
+        np.nan,
+        "s",
+        "end of the first step from which on every step ended in the ball of return, NaN: none by t_end",
+    ),
+    "excursion": ("f8", np.nan, ANGLE_UNITS, "largest departure of {} at the ends of steps, NaN: failed"),
+}
+
+#: Names of what is known of every trajectory.
+TRAJECTORY_VARIABLES = tuple(_TRAJECTORY)
+
+
+def empty_trajectories(names: list[str], count: int) -> dict[str, NDArray[Any]]:
+    """Arrays of so many trajectories that have not been computed."""
+    found = {}
+    for name in names:
+        dtype, nothing, unit, _ = _TRAJECTORY[name]
+        found[name] = np.full((count,) if isinstance(unit, str) else (count, len(unit)), nothing, dtype)
+    return found
+
+
+def trajectory_variables(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Variable]:
+    """Arrays over (equilibrium, trajectory, ...) as variables."""
+    codes: dict[str, Any] = {"outcome": flags(Outcome, fill=-1), "end_equilibrium": NO_CODE}
+    found: dict[str, Variable] = {}
+    for name, (_, _, unit, about) in _TRAJECTORY.items():
+        if name not in arrays:
+            continue
+        if isinstance(unit, str):
+            found[name] = Variable(_EVERY, arrays[name], unit, about, codes.get(name, {}))
+        else:
+            found |= parts(name, _EVERY, arrays[name], unit, about)
+    return found
+
+
+def equilibrium_variables(
+    phi: NDArray[np.float64], theta: NDArray[np.float64], omega: NDArray[np.float64]
+) -> dict[str, Variable]:
+    """The disturbed equilibria."""
+    return {
+        **numbers("equilibrium", len(phi), "number of the equilibrium"),
+        "phi": Variable(_EACH, phi, "rad", "angle phi of the disturbed equilibrium"),
+        "theta": Variable(_EACH, theta, "rad", "angle theta of the disturbed equilibrium"),
+        "omega": Variable(_EACH, omega, "rad/s", "frequency in the norm"),
+    }
+
+
+def share_variables(shares: Mapping[str, NDArray[np.float64]]) -> dict[str, Variable]:
+    """The shares of a tally of each equilibrium."""
+    return {name: Variable(_EACH, shares[name], "1", about) for name, about in ABOUT_SHARES.items()}
+
+
+def quantile_variables(quantiles: NDArray[np.float64]) -> dict[str, Variable]:
+    """Quantiles of the times to return to each equilibrium."""
+    dims = ("equilibrium", "quantile")
+    return {"quantile": QUANTILE, "time_to_return_quantile": Variable(dims, quantiles, "s", ABOUT_QUANTILES)}
+
+
+def halving_variables(errors: NDArray[np.float64]) -> dict[str, Variable]:
+    """How far final states of some trajectories are from those of half the step."""
+    return parts(
+        "halving_difference",
+        ("equilibrium", "sample"),
+        errors,
+        {"angle": "rad", "rate": "rad/s"},
+        "largest difference of a final {} from that with half the step, first trajectories; NaN: failed",
+    )
+
+
+def linear_variables(directions: NDArray[np.float64], limit: NDArray[np.float64]) -> dict[str, Variable]:
+    """How far the linearized motion can be trusted."""
+    return {
+        **parts(
+            "linear_direction",
+            ("equilibrium", "direction"),
+            directions,
+            STATE_UNITS,
+            "{} of a disturbance of size 1 rad",
+        ),
+        "linear_limit": Variable(
+            ("equilibrium", "direction"),
+            limit,
+            "rad",
+            "size up to which the linearized motion keeps the tolerance, inf: beyond all tried, 0: below",
+        ),
+    }
+
 
 Floats = NDArray[np.float64]
 
@@ -46,33 +165,6 @@ DIRECTIONS = 256
 PIECE_BYTES = 1 << 25
 
 
-class _Request(Protocol):
-    @property
-    def trajectories(self) -> int: ...
-    @property
-    def radius(self) -> float: ...
-    @property
-    def return_radius(self) -> float: ...
-    @property
-    def seed(self) -> int: ...
-    @property
-    def t_end(self) -> float: ...
-    @property
-    def dt(self) -> float | None: ...
-    @property
-    def method(self) -> str: ...
-    @property
-    def linear_horizon(self) -> float: ...
-    @property
-    def linear_tolerance(self) -> float: ...
-    @property
-    def linear_directions(self) -> int: ...
-    @property
-    def kept(self) -> list[str]: ...
-    @property
-    def settings(self) -> dict[str, Any]: ...
-
-
 class DisturbedTiling(Tiling):
     """First blocks of directions for the linearized motion, then blocks of trajectories.
 
@@ -85,15 +177,17 @@ class DisturbedTiling(Tiling):
 
     what = "disturbed trajectories"
 
-    def __init__(self, request: _Request, scene: Scene) -> None:
+    def __init__(self, request: Disturbed, scene: Scene) -> None:
         self.request, self.scene = request, scene
         self.equilibria = equilibria_to_disturb(scene)
+        refuse_meeting_balls(scene, self.equilibria, request.return_radius, range(len(self.equilibria)))
+        self.method = method_for(scene, request.method)
         self.rays = _blocks(request.linear_directions, DIRECTIONS)
         rest = np.column_stack(
             [self.equilibria.phi, self.equilibria.theta, *np.zeros((2, len(self.equilibria)))]
         )
-        step = request.dt or float(measuring_steps(scene, rest, request.method).min())
-        self.parts = _blocks(request.trajectories, _tile_length(request, step))
+        step = request.dt or float(measuring_steps(scene, rest, self.method).min())
+        self.parts = _blocks(request.trajectories, self._tile_length(step))
         self.count = len(self.equilibria) * (len(self.rays) + len(self.parts))
 
     def items(self, index: int) -> int:
@@ -118,23 +212,8 @@ class DisturbedTiling(Tiling):
             )
             rays = {"directions": Variable(("ray", "component"), found.directions)}
             return Dataset(rays | {"limit": Variable(("ray",), found.limit)})
-        ensemble = disturb(
-            self.scene,
-            equilibrium,
-            request.trajectories,
-            radius=request.radius,
-            return_radius=request.return_radius,
-            seed=request.seed,
-            t_end=request.t_end,
-            dt=request.dt,
-            method=request.method,
-            part=part,
-            threads=context.threads,
-            progress=lambda finished: context.check(),
-        )
-        errors = (
-            _sampled_errors(self.scene, ensemble, request.method) if part.start == 0 else np.zeros((0, 2))
-        )
+        ensemble = request.ensemble(self.scene, equilibrium, context, part)
+        errors = _sampled_errors(self.scene, ensemble, self.method) if part.start == 0 else np.zeros((0, 2))
         arrays = {name: getattr(ensemble, _FIELDS.get(name, name)) for name in request.kept}
         tally = Tally.of(ensemble.outcome, ensemble.time_to_return)
         return self._tile(arrays, errors, tally, [ensemble.dt.min(), ensemble.dt.max()])
@@ -148,13 +227,10 @@ class DisturbedTiling(Tiling):
         count, request = len(each), self.request
         nothing = empty_trajectories(request.kept, 1)
         arrays = {n: np.broadcast_to(a, (1, request.trajectories, *a.shape[1:])) for n, a in nothing.items()}
-        sample, rays = min(SAMPLE, request.trajectories), request.linear_directions
-        plane = trajectory_variables(arrays)
-        shares = dict.fromkeys(SHARES, np.zeros(1))
-        plane |= tally_variables(shares, np.zeros((1, sample, 2)), np.zeros((1, len(QUANTILES))))
-        plane |= linear_variables(np.broadcast_to(0.0, (1, rays, 4)), np.broadcast_to(0.0, (1, rays)))
+        plane = trajectory_variables(arrays) | share_variables(dict.fromkeys(SHARES, np.zeros(1)))
         attrs = {
             **request.settings,
+            "method": self.method,
             "distribution": "uniform in the ball of the given radius, kinetic-energy norm at the equilibrium",
         }
         return Stream(Dataset(fixed, attrs), plane, "equilibrium", lambda: self._pieces(tile, count))
@@ -170,6 +246,12 @@ class DisturbedTiling(Tiling):
         sample = min(SAMPLE, self.request.trajectories) if part.start == 0 else 0
         nothing = empty_trajectories(self.request.kept, self.items(index))
         return self._tile(nothing, np.full((sample, 2), np.nan), Tally())
+
+    def _tile_length(self, dt: float) -> int:
+        """Trajectories of a tile, by their cost: a power of two, which divides a stream of random numbers."""
+        steps = int(output_steps(np.array([0.0, self.request.t_end]), dt).sum())
+        affordable = EVALUATIONS // find_method(self.method).evaluations(steps)
+        return int(min(STREAM, max(SAMPLE, 1 << max(0, affordable.bit_length() - 1))))
 
     def _part(self, index: int) -> slice | None:
         """The trajectories of a tile; None for a tile of directions."""
@@ -190,10 +272,11 @@ class DisturbedTiling(Tiling):
         return Dataset(columns | tally.variables(), tally.attrs())
 
     def _pieces(self, tile: Tiles, count: int) -> Iterator[Piece]:
-        for number, block in enumerate(self.rays):
-            found = [tile(number * count + e) for e in range(count)]
-            directions, limit = (np.stack([f[name].data for f in found]) for name in ("directions", "limit"))
-            yield (slice(0, count), block), _data(linear_variables(directions, limit))
+        limits = [[tile(number * count + e) for number in range(len(self.rays))] for e in range(count)]
+        directions, limit = (
+            np.stack([np.concatenate([f[name].data for f in found]) for found in limits])
+            for name in ("directions", "limit")
+        )
         first = count * len(self.rays)
         tallies, errors, steps = [Tally() for _ in range(count)], [], []
         held: list[dict[str, NDArray[Any]]] = []
@@ -213,7 +296,12 @@ class DisturbedTiling(Tiling):
         each = [t.shares() for t in tallies]
         shares = {name: np.array([share[name] for share in each]) for name in SHARES}
         quantiles = np.array([t.quantiles(QUANTILES) for t in tallies])
-        yield slice(0, count), _data(tally_variables(shares, np.stack(errors), quantiles))
+        each_one = numbers("equilibrium", count, "number of the equilibrium")
+        groups = {
+            "linear": Dataset(each_one | linear_variables(directions, limit)),
+            "quantiles": Dataset(each_one | quantile_variables(quantiles)),
+            "halving": Dataset(each_one | halving_variables(np.stack(errors))),
+        }
         attrs: dict[str, Any] = {
             "error_estimate": float(np.max(errors)),
             "error_estimate_median": float(np.median(errors)),
@@ -222,7 +310,8 @@ class DisturbedTiling(Tiling):
         attrs |= {"shortest_step": min(steps), "longest_step": max(steps)} if steps else {}
         ended = sum((t.ended for t in tallies), Counter[str]())
         failed = {k.name.lower(): ended[k.name.lower()] for k in FAILURES if ended[k.name.lower()]}
-        yield Dataset({}, attrs | counted_failures(failed, ended.total()))
+        yield slice(0, count), _data(share_variables(shares))
+        yield Dataset({}, attrs | counted_failures(failed, ended.total()), groups)
 
 
 #: Names of variables in `fastmech.basins.disturbed.DisturbedEnsemble`, where they are others.
@@ -237,19 +326,14 @@ def _blocks(total: int, length: int) -> list[slice]:
     return [slice(k, min(k + length, total)) for k in range(0, total, length)]
 
 
-def _tile_length(request: _Request, dt: float) -> int:
-    """Trajectories of a tile, by what they cost: a power of two, which divides a stream of random numbers."""
-    steps = int(output_steps(np.array([0.0, request.t_end]), dt).sum())
-    affordable = EVALUATIONS // find_method(request.method).evaluations(steps)
-    return int(min(STREAM, max(SAMPLE, 1 << max(0, affordable.bit_length() - 1))))
-
-
 def _sampled_errors(scene: Scene, e: DisturbedEnsemble, method: str) -> Floats:
     """Largest differences of the first final angles and rates from those of half the step, (sample, 2)."""
     final, dt = e.final[:SAMPLE], e.dt[:SAMPLE]
     finer = np.empty_like(final)
     for step in np.unique(dt):
         some = np.flatnonzero(dt == step)
-        finer[some] = integrate(scene, e.starts[some], e.t_end, 0.5 * float(step), method).y[-1]
+        half = 0.5 * float(step)
+        times = np.append(damped_times(scene, method, min(half, e.t_end)), e.t_end)
+        finer[some] = integrate(scene, e.starts[some], dt=half, method=method, t_eval=times).y[-1]
     difference = np.abs(finer - final).reshape(-1, 2, 2).max(axis=2)
     return np.where(np.isnan(e.failed[:SAMPLE])[:, None], difference, np.nan)

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import numpy as np
 from pydantic import AfterValidator, Field
 
+from fastmech.basins.disturbed import MOST_RADIUS
 from fastmech.basins.erosion import FLAGS, MEASURES, Ends, survey_of, wells_along
-from fastmech.basins.label import labels_of, require_damper
+from fastmech.basins.label import label_starts, require_damper
 from fastmech.basins.measures.norm import STATE
-from fastmech.basins.steps import MOST_OCTAVES, TURNING
 from fastmech.disturbance.motion import require_constant_force
 from fastmech.errors import InputError, shown
 from fastmech.results import Dataset, Variable
@@ -38,10 +38,6 @@ if TYPE_CHECKING:
 
 #: Points of the largest map of a value.
 MOST_POINTS = 1_000_000
-
-#: Largest shock [rad]: a kick of the rates of this size, times the frequency at the well, is as fast as the
-#: shortest steps by default can follow.
-MOST_SHOCK = TURNING * 2.0**MOST_OCTAVES
 
 _ABOUT = {
     "phi": ("rad", "angle phi of the well"),
@@ -88,7 +84,7 @@ class Erosion(TiledScan):
     axes: Annotated[dict[str, Axis], Field(min_length=1, max_length=4), AfterValidator(_known_states)] = (
         Field(description="the window and the map in it")
     )
-    most_shock: Annotated[float, Field(gt=0, le=MOST_SHOCK)] = Field(
+    most_shock: Annotated[float, Field(gt=0, le=MOST_RADIUS)] = Field(
         2.0, description="largest shock to look for [rad]"
     )
     t_end: Annotated[float, Field(gt=0)] = 60.0
@@ -156,7 +152,7 @@ class ErosionTiling(Tiling):
 
         def ends(scene: Scene, starts: np.ndarray) -> Ends:
             context.check()
-            return labels_of(scene, starts, t_end=self.request.t_end, threads=context.threads)
+            return label_starts(scene, starts, t_end=self.request.t_end, threads=context.threads)
 
         survey = survey_of(
             self.window,

@@ -52,11 +52,7 @@ class Vanishing(IntEnum):
     UNLOADED_ROD = 2
 
 
-_VANISHING = {
-    SIN_PHI: Vanishing.SIN_PHI,
-    SIN_PSI: Vanishing.SIN_PHI_THETA,
-    UNLOADED: Vanishing.UNLOADED_ROD,
-}
+_VANISHING = {SIN_PHI: Vanishing.SIN_PHI, SIN_PSI: Vanishing.SIN_PHI_THETA, UNLOADED: Vanishing.UNLOADED_ROD}
 
 
 def curve_variables(scene: Scene, axes: dict[str, Floats], threads: int | None) -> dict[str, Variable]:

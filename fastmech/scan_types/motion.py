@@ -19,9 +19,8 @@ from fastmech.mechanism.hamilton import momenta
 from fastmech.mechanism.reactions import reactions
 from fastmech.results import STATE_UNITS, Dataset, Variable, parts
 from fastmech.scan_types.axis import check_steps
-from fastmech.scan_types.each import Each
 from fastmech.scan_types.request import HALVING, MethodName, TiledScan, failures
-from fastmech.scan_types.tiling import Tiling
+from fastmech.scan_types.tiling import Each, Tiling
 from fastmech.scene import Scene
 from fastmech.step_limits.warning import step_warning
 

@@ -38,6 +38,8 @@ def _known_method(name: str) -> str:
 #: A field that names an integration method.
 MethodName = Annotated[str, AfterValidator(_known_method)]
 
+#: The same; by default ``dop853``, or ``radau5`` where the damper would set the steps of explicit methods.
+UsualMethod = MethodName | None
 
 #: Seed of random numbers, as long as those that NumPy recommends.
 Seed = Annotated[int, Field(ge=0, lt=2**128)]

@@ -12,9 +12,8 @@ from fastmech.atlas.snap import MOVING, find_snap, stable_at
 from fastmech.equilibria.find import Equilibrium, find_equilibria
 from fastmech.errors import InputError
 from fastmech.results import Dataset, Variable
-from fastmech.scan_types.each import Each
 from fastmech.scan_types.request import TiledScan
-from fastmech.scan_types.tiling import Tiling
+from fastmech.scan_types.tiling import Each, Tiling
 from fastmech.scene import Number, Scene, nearest
 
 if TYPE_CHECKING:

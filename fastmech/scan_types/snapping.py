@@ -1,8 +1,8 @@
 """Dynamic snapping: which suddenly applied, fading force throws the mechanism out of its force-free well.
 
-Layout: ends over ``alpha`` and ``F0``; the smallest force that leaves for each alpha; along ``window`` the
-runs of neighbouring forces that end alike, with the alpha they belong to; what is known about the force-free
-scene's equilibria along ``equilibrium``; and the critical impulse, the limit of F0/alpha as alpha grows.
+Layout: ends over ``alpha`` and ``F0``; the smallest force that leaves for each alpha; and the critical
+impulse, the limit of F0/alpha as alpha grows. In groups of their own ``windows``, the runs of neighbouring
+forces that end alike, with the alpha they belong to, and ``equilibria``, those of the force-free scene.
 """
 
 from __future__ import annotations
@@ -17,10 +17,11 @@ from fastmech.basins.label import require_damper
 from fastmech.basins.shock_limit import shock_limit
 from fastmech.basins.snapping import SnappingMap, critical_forces, default_end, force_free, map_snapping
 from fastmech.basins.status import FAILURES, BasinStatus
+from fastmech.basins.steps import method_for
 from fastmech.errors import InputError
 from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers
 from fastmech.scan_types.axis import Axis, check_duration, check_parameters, check_rising, check_size
-from fastmech.scan_types.request import MethodName, TiledScan, failures
+from fastmech.scan_types.request import TiledScan, UsualMethod, failures
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
 from fastmech.scene import Scene
 
@@ -54,7 +55,7 @@ class Snapping(TiledScan):
     t_end: Annotated[float, Field(gt=0)] | None = Field(
         None, description="end of the runs [s]; by default 200 s after a millionth of the force is left"
     )
-    method: MethodName = "dop853"
+    method: UsualMethod = None
 
     @property
     def forces(self) -> np.ndarray:
@@ -98,7 +99,7 @@ class Snapping(TiledScan):
         """The map with the critical curve."""
         from fastmech.plots.snapping import draw_snapping
 
-        return draw_snapping(dataset, scene)
+        return draw_snapping(dataset.merged, scene)
 
 
 class SnappingTiling(Tiling):
@@ -161,7 +162,7 @@ class SnappingTiling(Tiling):
         )
         side = 0.0 if self.forces[0] > 0.0 else np.pi
         limit = np.cos(side) * shock_limit(free, equilibria[start], "M2", side).found.impulse
-        variables = _ends(found) | _windows(found) | _equilibria(found)
+        variables = _ends(found)
         variables["critical_F0"] = Variable(
             ("alpha",),
             joined["critical"],
@@ -171,8 +172,13 @@ class SnappingTiling(Tiling):
         variables["critical_impulse"] = Variable(
             (), np.array(limit), "N s", "limit of the critical F0/alpha for fast decay, NaN: none was found"
         )
-        attrs = {"start": start, "tolerance": self.request.tolerance, "method": self.request.method}
-        return Dataset(variables, attrs | found.counts | failures(found.status, FAILURES))
+        attrs = {
+            "start": start,
+            "tolerance": self.request.tolerance,
+            "method": method_for(free, self.request.method),
+        }
+        groups = {"windows": Dataset(_windows(found)), "equilibria": Dataset(_equilibria(found))}
+        return Dataset(variables, attrs | found.counts | failures(found.status, FAILURES), groups)
 
     def missing(self, index: int) -> Dataset:
         """Rates that have not been computed."""

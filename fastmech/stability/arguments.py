@@ -9,23 +9,13 @@ from typing import Any
 from fastmech.errors import InputError, shown
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import potential_gradient, unit
-from fastmech.scene import Scene
+from fastmech.scene import require_scene as require_scene
 
 #: What an equilibrium has: its place, its proof and its force.
 ENTRIES = ("phi", "theta", "morse_index", "radius", "force")
 
 #: Share of the loads that may be left unbalanced: far above rounding, far below any other scene's loads.
 NOT_AT_REST = 1e-7
-
-
-def require_scene(scene: Any) -> None:
-    """Refuse what is no scene.
-
-    Raises:
-        InputError: it is something else.
-    """
-    if not isinstance(scene, Scene):
-        raise InputError(f"scene = {shown(scene)}: must be a Scene")
 
 
 def require_rest(scene: Any, equilibrium: Any) -> None:

@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fastmech.errors import InputError, shown
-from fastmech.results import FILL, RESERVED_ATTRS, Variable, check_name
+from fastmech.results import FILL, RESERVED_ATTRS, Variable, check_name, codes_of
 from fastmech.store.schema import DIM_NUMBER, DIM_NUMBERS, DIMENSION_ONLY
 
 _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
@@ -55,12 +55,12 @@ def raised(limit: int) -> int:
     except ValueError:
         factor = math.nan
     if not 0.0 < factor < math.inf:
-        raise InputError(f"{LIMITS} = {shown(text)}: must be a positive number, such as 10")
+        raise TooMuchError(f"{LIMITS} = {shown(text)}: must be a positive number, such as 10")
     return int(limit * factor)
 
 
 class TooMuchError(InputError):
-    """A file asks for more than a file may that need not be trusted."""
+    """A file asks for more than a file may that need not be trusted, or that limit is none."""
 
 
 class Allowance:
@@ -119,7 +119,7 @@ def members(group: h5py.Group, where: str, left: Allowance) -> dict[str, h5py.Gr
             check_name(name, where)
             found[name] = group[name]
             if isinstance(found[name], h5py.Dataset):
-                left.take(variables=1, nbytes=found[name].size * found[name].dtype.itemsize)
+                left.take(variables=1, nbytes=(found[name].size or 0) * found[name].dtype.itemsize)
                 continue
         left.take(groups=1)
     return found
@@ -237,7 +237,9 @@ def get_attrs(stored: h5py.Group | h5py.Dataset) -> dict[str, Any]:
 def _variable_attrs(stored: h5py.Dataset) -> dict[str, Any]:
     """The attributes of a variable, with the one value that stands for none, of integers."""
     fill = {FILL: int(stored.attrs[FILL])} if FILL in stored.attrs and stored.dtype.kind in "iu" else {}
-    return {**get_attrs(stored), **fill}
+    attrs = {**get_attrs(stored), **fill}
+    codes_of(attrs)
+    return attrs
 
 
 def _python_value(value: Any) -> Any:
@@ -257,6 +259,8 @@ def _check_storage(stored: h5py.Dataset) -> None:
     filters = {properties.get_filter(i)[0] for i in range(properties.get_nfilters())}
     if stored.is_virtual or stored.external or not filters <= _FILTERS:
         raise ValueError("its data lie elsewhere or need a plugin")
+    if stored.shape is None:
+        raise ValueError("it has no values")
     if stored.dtype.kind == "O":
         raise ValueError("its values are of variable length")
     if stored.chunks and math.prod(stored.chunks) * stored.dtype.itemsize > raised(MOST_CHUNK_BYTES):

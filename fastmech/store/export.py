@@ -125,7 +125,8 @@ def _write_table(
             for line in _comments(dataset, {d: dataset.variables.get(d) for d in dims} | table)
         )
         writer = csv.writer(file)
-        writer.writerow([*heads, *(_head(name, variable) for name, variable in table.items())])
+        heads += [_head(name, variable) for name, variable in table.items()]
+        writer.writerow([printable(head) for head in heads])
         for start in range(0, total, ROWS):
             rows = slice(start, min(start + ROWS, total))
             places = np.unravel_index(np.arange(rows.start, rows.stop), sizes) if dims else ()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
@@ -12,6 +11,7 @@ import h5py
 
 from fastmech.errors import InputError, shown
 from fastmech.results import Dataset, Variable, no_xarray
+from fastmech.scene import path_of
 from fastmech.store.decode import (
     About,
     Allowance,
@@ -55,9 +55,7 @@ class Results:
     """
 
     def __init__(self, path: str | Path) -> None:
-        if not isinstance(path, str | os.PathLike):
-            raise InputError(f"open_results: path = {path!r}: must be the path of a result file")
-        self.path = Path(path)
+        self.path = path_of(path)
         self._file = _open_file(self.path)
         try:
             with named_damage(str(path)):
@@ -78,6 +76,8 @@ class Results:
                 for name, member in root.items()
                 if isinstance(member, h5py.Group)
             }
+            if not self._sections:
+                raise InputError(f"{path}: holds no section")
         except BaseException:
             self.close()
             raise
@@ -295,6 +295,8 @@ class _StoredVariables(Mapping[str, Variable]):
 
 
 def _open_file(path: Path) -> h5py.File:
+    if path.exists() and not path.is_file() and not path.is_dir():  # reading a pipe would wait for ever
+        raise InputError(f"{path}: is not a regular file")
     try:
         with path.open("rb") as file:
             empty = not file.read(1)
@@ -311,7 +313,7 @@ def _open_file(path: Path) -> h5py.File:
 
 
 def _check_schema(attrs: Mapping[str, Any], path: str | Path) -> None:
-    if attrs.get("format") != FORMAT:
+    if not isinstance(attrs.get("format"), str) or attrs["format"] != FORMAT:
         raise InputError(f"{path}: is an HDF5 file, but not a result file of fastmech")
     version = attrs.get("schema_version")
     if not isinstance(version, int) or not 1 <= version <= SCHEMA_VERSION:

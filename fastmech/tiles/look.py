@@ -79,6 +79,9 @@ class ScanLook:
             if not target.exists():
                 raise InputError(f"{target}: there is neither a result nor a scan in progress")
             with open_results(target) as results:  # says what it is if it is no result
+                for place in results.groups:
+                    for name in results[place]:
+                        results[place].about(name)  # says what is damaged
                 for note in ("partial", "tile"):
                     if note in results.attrs or any(note in results[name].attrs for name in results):
                         what = {"partial": "a snapshot of a scan in progress", "tile": "one tile"}[note]

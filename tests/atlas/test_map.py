@@ -152,6 +152,8 @@ def test_2000_scenes_are_to_a_map_what_they_are_one_by_one() -> None:
             np.testing.assert_allclose(
                 one.eigenvalues[0, slot], c.eigenvalues, atol=c.eigenvalue_errors.max()
             )
+            if np.isinf(e.radius):
+                continue  # merging: its place is a double root, which rounding moves by its square root
             # Beside the degenerate set rounding hides whether U rises or falls: NaN stands for a fall.
             lowest = np.nan_to_num([one.frequency[0, slot], c.natural_frequencies[0]]) ** 2
             highest = np.nan_to_num(c.natural_frequencies[1]) ** 2

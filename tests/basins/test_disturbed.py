@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from disturbance.known import center, equilibria, known, oracle_size, scipy_motion
+from disturbance.known import center, equilibria, known, oracle_size, scipy_motion, stiff_motion
 
 from fastmech.basins.disturbed import FAILURES, DisturbedEnsemble, Outcome, disturb
 from fastmech.basins.label import labels_of
 from fastmech.capture.barriers import barrier_tree
+from fastmech.capture.certificate import trapped
 from fastmech.equilibria.find import find_equilibria
-from fastmech.errors import InputError
+from fastmech.errors import InputError, StepWarning
 from fastmech.mechanism.lagrange import kinetic_energy, potential_energy
 from fastmech.scene import Scene
 
@@ -75,6 +76,37 @@ def test_every_outcome_agrees_with_scipy() -> None:
         assert run.outcome[lane] == (Outcome.RETURNED if home else Outcome.ELSEWHERE)
 
 
+@pytest.mark.parametrize("beta", [1e3, 1e5, 1e7])
+@pytest.mark.parametrize(
+    "scene", [Scene(F0=-150.0, c1=260.0, c2=60.0, alpha=0.0), Scene(alpha=0.0)], ids=["two wells", "table 1"]
+)
+def test_heavy_damping_loses_no_motion(scene: Scene, beta: float) -> None:
+    """By default; ends, and the wells that hold them, by SciPy's Radau at 1e-8."""
+    scene = scene.replace(beta=beta)
+    first = find_equilibria(scene)[0]
+    run = disturb(scene, first, 256, radius=1.2, t_end=10.0)
+    assert run.failures == ""
+    assert np.isfinite(run.excursion).all()
+    ends = np.array([stiff_motion(scene, start, 10.0) for start in run.starts[:4]])
+    np.testing.assert_allclose(run.final[:4], ends, rtol=0, atol=1e-3)
+    held = trapped(scene, ends)
+    proved = held.well >= 0
+    assert (run.outcome != Outcome.UNDECIDED).any()
+    np.testing.assert_array_equal(run.outcome[:4] != Outcome.UNDECIDED, proved)
+    np.testing.assert_array_equal(run.end_index[:4][proved], held.well[proved])
+
+
+def test_steps_that_heavy_damping_forbids_are_told_in_one_word() -> None:
+    scene = SCENE.replace(beta=1e5)
+    e = find_equilibria(scene)[0]
+    with pytest.warns(StepWarning):
+        run = disturb(scene, e, 64, dt=0.05, method="dop853")
+    assert np.all(run.outcome == Outcome.STEP_TOO_LARGE)
+    with pytest.warns(StepWarning):
+        ends = labels_of(scene, run.starts, dt=0.05, method="dop853")
+    assert ends.counts["step_too_large"] == 64
+
+
 @pytest.mark.nojit
 def test_the_unstable_balance_the_undecided_and_the_exploded_are_told_apart() -> None:
     (maximum,) = equilibria("table_1", 2)
@@ -88,10 +120,10 @@ def test_the_unstable_balance_the_undecided_and_the_exploded_are_told_apart() ->
     assert np.all(np.isnan(moving.time_to_return))
 
 
-def test_a_step_too_large_is_not_finite() -> None:
+def test_a_step_too_large_is_told_in_one_word() -> None:
     (stable,) = equilibria("table_1", 0)
     run = disturb(SCENE.replace(c1=162.5), stable, 5, t_end=2000.0, dt=2.0, method="euler")
-    assert np.all(run.outcome == Outcome.NOT_FINITE)
+    assert np.all(run.outcome == Outcome.STEP_TOO_LARGE)
     assert run.share_returned == 0.0
 
 
@@ -268,3 +300,15 @@ def test_failed_trajectories_make_no_noise() -> None:
     (stable,) = [e for e in find_equilibria(scene) if e.kind == "minimum"]
     run = disturb(scene, stable, 100, radius=1.0, t_end=3.0, dt=0.5, method="rk4")
     assert {Outcome.NOT_FINITE, Outcome.STEP_TOO_LARGE} & set(run.outcome.tolist())
+
+
+def test_printed_it_says_what_became_of_them() -> None:
+    (stable,) = equilibria("table_1", 0)
+    run = disturb(SCENE, stable, 300, radius=0.05)
+    lines = str(run).splitlines()
+    assert len(lines) <= 6
+    assert lines[0].startswith("300 disturbances of the minimum at phi = 1.451, theta = -0.2326 rad")
+    assert lines[1] == "  ended: 300 returned"
+    assert lines[2].startswith("  returned: 100.00%, at most 100.00% (95 % interval 98.7")  # 1/(1 + z^2/n)
+    assert f"{np.median(run.time_to_return):.3g} s (median)" in lines[3]
+    assert f"{run.excursion[:, 0].max():.3g} rad of phi" in lines[4]

@@ -113,3 +113,17 @@ def test_wrong_arguments_are_refused(changes: dict[str, Any], message: str) -> N
     with pytest.raises(fm.InputError) as refusal:
         track_edge(**(arguments | changes))
     assert str(refusal.value).startswith(message)
+
+
+def test_two_starts_that_parted_are_not_drawn_further_apart() -> None:
+    """Starts far from both run fast and take minutes: none is asked for where the two differ already."""
+    asked: list[float] = []
+
+    def label_of(y):
+        asked.append(np.abs(y).max())
+        return (y[:, 0] > 0.0).astype(int)
+
+    system = fm.System(two_wells, ["x", "y"], {})
+    track = track_edge(system, [-0.7, -1.0], [1.6, 0.3], label_of, np.eye(2), t_end=5.0, dt=0.02)
+    assert track.t.size > 1
+    assert max(asked) <= 2.0 + 1e-6

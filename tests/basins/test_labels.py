@@ -5,6 +5,7 @@ from __future__ import annotations
 import mpmath
 import numpy as np
 import pytest
+from disturbance.known import stiff_motion
 from scan_types.values import scipy_motion
 
 import fastmech as fm
@@ -215,3 +216,52 @@ def test_progress_that_is_no_function_is_refused() -> None:
 def test_an_end_that_cannot_be_counted_to_is_refused() -> None:
     with pytest.raises(fm.InputError, match=r"t_end = 1e\+308 s: must be at most"):
         fm.labels_of(CONSTANT, np.zeros((1, 4)), 1e308)
+
+
+@pytest.mark.parametrize("beta", [1e5, 1e7])
+def test_heavy_damping_is_labelled_by_default(beta: float) -> None:
+    """No motion is lost, moving or not, and wells are those that hold the ends of SciPy's Radau."""
+    scene = CONSTANT.replace(beta=beta)
+    starts = random_starts(256, fastest=8.0)
+    found = fm.labels_of(scene, starts, 10.0)
+    assert found.counts["captured"] + found.counts["undecided"] == 256
+    proved = np.flatnonzero(found.well >= 0)[:4]
+    assert proved.size == 4
+    for lane in proved:
+        end = fm.trapped(scene, stiff_motion(scene, starts[lane], 10.0))
+        assert end.well[0] == found.well[lane]
+        np.testing.assert_array_equal(end.turns[0], found.turns[lane])
+    alone = fm.labels_of(scene, starts[proved[0]], 10.0)
+    assert alone.time[0] == found.time[proved[0]]
+
+
+def test_heavy_damping_and_a_force_that_is_gone_at_once() -> None:
+    """A blow of 1 N s on M2, along x: the crank stops, the pendulum goes on as after the same rates."""
+    scene = fm.Scene(beta=1e6, F0=1e6, alpha=1e6)
+    free = scene.replace(F0=0.0, alpha=0.0)
+    rest = fm.find_equilibria(free)[0]
+    blow = fm.impulse_start(free, rest, 1.0)
+    still = np.array([rest.phi, rest.theta, 0.0, 0.0])
+    found, same = fm.labels_of(scene, still, 10.0), fm.labels_of(free, blow, 10.0)
+    assert found.counts["captured"] == same.counts["captured"] == 1
+    assert found.well[0] == same.well[0]
+
+
+def test_angles_that_may_be_degrees_give_a_warning() -> None:
+    with pytest.warns(UserWarning, match=r"starts: reaches 180, beyond 4 turns; .*numpy.deg2rad"):
+        fm.labels_of(BISTABLE, [[90.0, 180.0, 0.0, 0.0]], 1.0)
+
+
+def test_printed_it_says_where_they_end() -> None:
+    found = fm.labels_of(BISTABLE, random_starts(200))
+    for lines in (
+        str(found).splitlines(),
+        str(fm.map_basins(BISTABLE, {"phi": [0, 1], "theta": [0, 1]})).split("\n"),
+    ):
+        assert 2 <= len(lines) <= 6
+        assert "captured" in lines[0]
+    largest = np.bincount(found.well[found.well >= 0]).argmax()
+    share = np.mean(found.well == largest)
+    assert f"  well {largest} at phi = " in str(found)
+    assert f"({share:.1%})" in str(found)
+    assert f"{np.nanmax(found.time):.3g} s at most" in str(found)

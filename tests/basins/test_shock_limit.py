@@ -22,6 +22,7 @@ Floats = NDArray[np.float64]
 BISTABLE = fm.Scene(F0=85.3, c1=294.9, c2=92.85, alpha=0.0)
 FRICTIONLESS = BISTABLE.replace(beta=0.0)
 FREE = fm.Scene(F0=0.0, alpha=0.0)
+WINDOWS = fm.Scene(F0=-150.0, c1=260.0, c2=60.0, alpha=0.0)
 TURN = 2.0 * np.pi
 
 
@@ -157,6 +158,35 @@ def test_a_flat_well_beside_a_fold() -> None:
     label, turns, _ = ends(scene, struck(scene, 1, "M2", size, np.full(2, told.found.direction)), 1200.0)
     assert label.tolist() == [0, 1]
     assert not turns.any()
+
+
+@pytest.mark.parametrize(("on", "least"), [("M1", 45.606), ("M2", 39.729), ("M3", 213.55)])
+def test_narrow_windows_are_seen(on: str, least: float) -> None:
+    """The least of brute force; of M1 and M3 all but a narrow window leave only from 47.4 and 222 N s on."""
+    told = limit(WINDOWS, 1, on)
+    assert told.found.impulse <= least * (1.0 + 1e-4)
+    above = np.array([told.found.impulse * (1.0 + 1e-4)])
+    start = struck(WINDOWS, 1, on, above, np.array([told.found.direction]))
+    assert not stays(WINDOWS, 1, start, 150.0).any()
+    assert told.impulses_apart <= (0.005 if on == "M2" else 1e-4)
+    assert (told.directions_apart == 0.0) is (on != "M2")
+    rng = np.random.default_rng(5)
+    size = rng.uniform(told.proved.impulse, told.found.impulse * (1.0 - 1e-3), 1500)
+    along = np.full(1500, told.found.direction) if on != "M2" else rng.uniform(-np.pi, np.pi, 1500)
+    label, turns, _ = ends(WINDOWS, struck(WINDOWS, 1, on, size, along), 200.0)
+    assert ((label == 1) & ~turns.any(axis=1)).all()
+
+
+def test_a_millinewton_beside_a_fold_the_work_is_bounded() -> None:
+    """Motions creep for minutes there; what was tried is told, and what was found leaves."""
+    fold = find_folds(BISTABLE, "F0", np.linspace(600.0, 750.0, 16))[0]
+    scene = BISTABLE.replace(F0=fold.value - 1e-3)
+    told = limit(scene, 1, "M2")
+    assert told.found.impulse == pytest.approx(0.2003, rel=2e-3)  # where finer grids came to
+    assert told.end == (0, (0, 0))
+    assert told.trajectories < 20_000
+    assert told.impulses_apart == 0.04
+    assert told.proved.impulse < told.undecided_from < told.found.impulse
 
 
 def test_the_force_free_impulse_along_x() -> None:

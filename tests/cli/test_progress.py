@@ -110,3 +110,19 @@ def test_short_preparing_is_not(capsys: pytest.CaptureFixture[str]):
     with ProgressBars() as bars, bars.preparing():
         pass
     assert capsys.readouterr() == ("", "")
+
+
+def test_pieces_of_work_do_not_take_the_seconds_of_kernels(monkeypatch: pytest.MonkeyPatch):
+    now = [0.0]
+    for clock in ("perf_counter", "monotonic"):
+        monkeypatch.setattr(f"fastmech.cli.progress.time.{clock}", lambda: now[0])
+    bars = ProgressBars(quiet=True)
+    advance = bars.stage("map: points", 4)
+    for seconds, tell in ((1.0, "solve"), (20.0, None)):
+        now[0] += seconds
+        bars._preparation.tell(tell)
+    now[0] += 3.0
+    advance(4)
+    (stage,) = bars.stages()
+    assert (stage["seconds"], stage["rate"], bars.prepared) == (4.0, 1.0, 20.0)
+    assert bars._preparation.kernels == 1

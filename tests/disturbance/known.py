@@ -57,6 +57,19 @@ def scipy_motion(scene: Scene, start: Floats, t_end: float, tolerance: float = 1
     )
 
 
+def stiff_motion(scene: Scene, start: Floats, t_end: float) -> Floats:
+    """Final state by SciPy's Radau at 1e-8."""
+    found = solve_ivp(
+        lambda t, y: np.concatenate([y[2:], angular_accelerations(scene, y, t)]),
+        (0.0, t_end),
+        start,
+        method="Radau",
+        rtol=1e-8,
+        atol=1e-9,
+    )
+    return np.asarray(found.y[:, -1])
+
+
 def oracle_jacobian(scene: Scene, e: Equilibrium) -> Floats:
     return np.array(oracle().jacobian(scene.model_dump(), center(e), 0.0), dtype=np.float64)
 

@@ -2,10 +2,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from disturbance.known import center, equilibria, known, oracle_jacobian, scipy_motion
+from disturbance.known import center, equilibria, known, oracle_jacobian, scipy_motion, stiff_motion
 from scipy.integrate import solve_ivp
 
 from fastmech.disturbance.motion import disturbed_motion
+from fastmech.equilibria.find import find_equilibria
 from fastmech.errors import InputError
 
 SCENE = known("table_1")[0]
@@ -35,6 +36,18 @@ def test_nonlinear_motion_is_the_mechanism_s() -> None:
     for lane, disturbance in enumerate(DISTURBANCES):
         reference = scipy_motion(SCENE, center(e) + disturbance, 2.0).sol(TIMES).T - center(e)
         np.testing.assert_allclose(motion.nonlinear[:, lane], reference, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("beta", [1e5, 1e7])
+def test_heavy_damping_is_followed_by_default(beta: float) -> None:
+    """The damper stops the crank within a millisecond; ends by SciPy's Radau."""
+    scene = SCENE.replace(beta=beta)
+    e = find_equilibria(scene)[0]
+    motion = disturbed_motion(scene, e, DISTURBANCES, TIMES)
+    assert not motion.status.any()
+    for lane, disturbance in enumerate(DISTURBANCES):
+        end = stiff_motion(scene, center(e) + disturbance, 2.0) - center(e)
+        np.testing.assert_allclose(motion.nonlinear[-1, lane], end, rtol=0, atol=1e-6)
 
 
 @pytest.mark.nojit

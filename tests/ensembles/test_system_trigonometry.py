@@ -14,7 +14,7 @@ from kernels.test_compiled_code import LIBRARY, PACKED, PACKED_QUADRANT, VECTOR_
 from numpy.typing import NDArray
 
 import fastmech as fm
-from fastmech.jit import FLAGS
+from fastmech.jit import compiled_anew
 from fastmech.kernels.blocks import in_single
 from fastmech.kernels.sincos import REDUCTION_LIMIT, cos, sin
 
@@ -112,8 +112,7 @@ def test_a_lane_beyond_leaves_the_others_as_they_are(name: str, far: float) -> N
 @EVERY
 def test_the_loop_over_lanes_is_packed(name: str) -> None:
     shipped = kernel(name)
-    (signature,) = shipped.signatures
-    anew = numba.njit(signature, nogil=True, **FLAGS)(shipped.py_func)
+    anew = compiled_anew(shipped)
     blocks = basic_blocks("".join(anew.inspect_llvm().values()))
     loops = [block for block in blocks if PACKED_QUADRANT.search(block)]
     assert len(VECTOR_ARITHMETIC.findall(loops[0])) >= 40  # the later ones do lanes again

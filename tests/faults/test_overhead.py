@@ -13,7 +13,7 @@ from fastmech.runner import run_request
 
 
 def test_the_scan_in_memory_is_the_durable_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fastmech.scan_types.map_tiling.TILE_POINTS", 1500)
+    monkeypatch.setattr("fastmech.scan_types.equilibrium_map.TILE_POINTS", 1500)
     request = tmp_path / "scan.toml"
     request.write_text(overhead._REQUEST.format(num=7), encoding="utf-8")
     assert run_request(request, tmp_path / "durable.h5").tiles == 4

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from mechanism.draws import canonical_equations
 from numpy.typing import NDArray
 
 from fastmech.kernels.select import FORMULATIONS, with_terms
 from fastmech.mechanism.coefficients import reduce
-from fastmech.mechanism.hamilton import canonical_equations
 from fastmech.mechanism.lagrange import angular_accelerations, unit
 from fastmech.scene import Scene
 

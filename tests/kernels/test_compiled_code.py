@@ -10,18 +10,18 @@ from functools import cache
 from typing import Any
 
 import llvmlite.binding as llvm
-import numba
 import numpy as np
 import pytest
 from kernels.blocks_of_lanes import COMBINATIONS, kernel, lanes
 from numba import int64
 
+from fastmech import jit
 from fastmech.ensembles.energies import tell_broken
 from fastmech.ensembles.highest import highest_energies
 from fastmech.integrators.explicit import add_rows
 from fastmech.integrators.method import Adams, RungeKutta
 from fastmech.integrators.methods import METHODS as REGISTRY
-from fastmech.jit import FLAGS, INTEGERS, MATRIX, VECTOR
+from fastmech.jit import INTEGERS, MATRIX, VECTOR
 from fastmech.kernels.select import DAMPING, DECAY, FORCE, FORMULATIONS
 from fastmech.kernels.whole import whole_steps
 from fastmech.kernels.work import lagrange_work
@@ -60,8 +60,7 @@ LIBRARY = re.compile(r"@(?:llvm\.)?(?:sin|cos|sincos|tan|exp|pow)\b")
 @cache
 def compiled_anew(shipped: Any) -> Any:
     """The kernel compiled in this process: numba shows no code of what it loaded from the disk cache."""
-    (signature,) = shipped.signatures
-    return numba.njit(signature, nogil=True, **FLAGS)(shipped.py_func)
+    return jit.compiled_anew(shipped)
 
 
 def intermediate(shipped: Any) -> str:
@@ -113,7 +112,7 @@ def test_passes_over_trajectories_are_packed(shipped: Any) -> None:
 
 def test_sums_of_rows_are_packed() -> None:
     arguments = (VECTOR, MATRIX, int64, INTEGERS, VECTOR, int64, int64)
-    compiled = numba.njit(arguments, nogil=True, **FLAGS)(add_rows.py_func)
+    compiled = jit.compiled_anew(add_rows, arguments)
     assert len(PACKED.findall("".join(compiled.inspect_asm().values()))) >= 4
 
 

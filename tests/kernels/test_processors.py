@@ -5,8 +5,9 @@ from __future__ import annotations
 import platform
 import re
 
+import llvmlite.binding as llvm
 import pytest
-from kernels.machine_code import KERNELS, PROCESSORS, machine_code
+from kernels.machine_code import KERNELS, MOTIONS, PROCESSORS, machine_code, told_for
 from kernels.test_compiled_code import basic_blocks
 
 pytestmark = pytest.mark.skipif(
@@ -28,3 +29,10 @@ def test_loops_over_lanes_are_as_wide_as_the_vectors(processor: str) -> None:
             rf"\bcall|\bvcvt\w*[ps][sd]2[ps][sd]|\bv(?:f?n?m(?:add|sub)\d*|mul)\w*[ps]{other}\s"
         )
         assert not any(foreign.search(loop) for loop in loops), kernel
+
+
+@pytest.mark.skipif(
+    not llvm.get_host_cpu_features().get("avx512f", False), reason="no 512-bit vectors on this processor"
+)
+def test_bits_of_motions_do_not_depend_on_the_width() -> None:
+    assert told_for("skylake-avx512", MOTIONS) == told_for("haswell", MOTIONS)

@@ -17,6 +17,7 @@ from kernels.test_compiled_code import LIBRARY, basic_blocks
 from numpy.typing import NDArray
 
 import fastmech as fm
+from fastmech import jit
 from fastmech.ensembles.run import run_ensemble
 from fastmech.errors import InputError
 from fastmech.integrators.methods import METHODS
@@ -127,9 +128,7 @@ needs_fma = pytest.mark.skipif(
 
 @cache
 def compiled_anew(formulation: str, terms: str) -> Any:
-    single = in_single(kernel(formulation, terms))
-    (signature,) = single.signatures
-    return numba.njit(signature, nogil=True, **FLAGS)(single.py_func)
+    return jit.compiled_anew(in_single(kernel(formulation, terms)))
 
 
 def lane_loop(code: str) -> str:

@@ -10,9 +10,12 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from oracles import TABLE_1, oracle
 
+from fastmech.mechanism.coefficients import force, reduce
+from fastmech.mechanism.equations import canonical_rates
+from fastmech.mechanism.lagrange import unit
 from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -121,3 +124,17 @@ def reaction_scale(d: Draw) -> float:
     motion = acceleration_scale(d).sum() + np.abs(d.rates).sum() ** 2
     inertia = (s.m1 + s.m2 + s.m3) * (s.l * motion + s.g)
     return float(inertia + 2 * (s.c1 + s.c2) * s.l + abs(s.F0) + s.beta * s.l * abs(d.rates[0]))
+
+
+def canonical_equations(scene: Scene, q: ArrayLike, p: ArrayLike, t: ArrayLike) -> Floats:
+    """(phi', theta', p_phi', p_theta'), paper (14) with dH/dq where it prints dH/dp twice; shape (..., 4)."""
+    q = np.asarray(q, dtype=np.float64)
+    p = np.asarray(p, dtype=np.float64) / unit(scene)
+    c = reduce(scene)
+    now = force(scene, t) / (scene.m2 * scene.l)
+    s1, c1, s2, c2 = np.sin(q[..., 0]), np.cos(q[..., 0]), np.sin(q[..., 1]), np.cos(q[..., 1])
+    derivatives = canonical_rates(
+        s1, c1, s2, c2, p[..., 0], p[..., 1], c.mass, c.slider, c.lift, c.spring, c.gravity, now, c.damping
+    )
+    scale = np.array([1.0, 1.0, unit(scene), unit(scene)])
+    return np.stack(np.broadcast_arrays(*derivatives), axis=-1) * scale

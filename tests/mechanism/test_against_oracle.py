@@ -153,7 +153,7 @@ QUANTITIES: dict[str, tuple[Callable[[Draw], Any], Callable[[Draw], Any], Callab
         draws.hamiltonian_scale,
     ),
     "canonical equations (14)": (
-        lambda d: hamilton.canonical_equations(d.scene, d.q, d.p, d.t),
+        lambda d: draws.canonical_equations(d.scene, d.q, d.p, d.t),
         lambda d: oracle().hamilton_rhs(d.params, d.q, d.p, d.t),
         draws.canonical_scale,
     ),

@@ -207,7 +207,9 @@ def test_outcomes_are_drawn_from_what_was_kept(kept: set[str], told: str):
     apart = {f"{of}_{angle}" for of in ("turns", "excursion") for angle in ("phi", "theta")}
     left_out = {"outcome", "end_equilibrium", "time_to_return", *apart} - kept
     variables = {n: v for n, v in {**dataset.variables, **changed}.items() if n not in left_out}
-    figures = scan_kinds()["disturbed"].draw(Dataset(variables, dataset.attrs), BISTABLE.model_dump())
+    figures = scan_kinds()["disturbed"].draw(
+        Dataset(variables, dataset.attrs, dataset.groups), BISTABLE.model_dump()
+    )
     assert set(figures) == {"outcomes", "linear_range"}
     figure = figures["outcomes"]
     assert_legible(figure)

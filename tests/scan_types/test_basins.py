@@ -51,7 +51,7 @@ def test_tiles_are_the_whole_bit_for_bit(
     scan = Basins(axes=AXES, t_end=20.0, settle_radius=settle_radius)
     values = {name: np.array(axis.array) for name, axis in scan.axes.items()}
     whole = fm.map_basins(BISTABLE, values, t_end=20.0, settle_radius=settle_radius)
-    monkeypatch.setattr("fastmech.scan_types.basin_tiling.TILE_POINTS", 60)
+    monkeypatch.setattr("fastmech.scan_types.basins.TILE_POINTS", 60)
     tiling = scan.tiling(BISTABLE)
     assert tiling.count == 7
     assert sum(map(tiling.items, range(7))) == 21 * 17

@@ -305,10 +305,11 @@ def test_failures_are_counted(tmp_path: Path) -> None:
     outcomes = np.ravel(np.array(decoded(section["outcome"]))).tolist()
     failed = outcomes.count("not_finite") + outcomes.count("step_too_large")
     assert section.attrs["failed"] == failed
-    assert {"not_finite", "step_too_large"} <= set(outcomes)
+    assert "step_too_large" in outcomes
     assert np.isfinite(together(section, "final")).all()  # the last finite states of those that failed
     on_the_way = ~np.isnan(section["failed"].data)
-    assert ((np.array(decoded(section["outcome"])) == "not_finite") == on_the_way).all()
+    assert on_the_way.any()
+    assert (np.array(decoded(section["outcome"]))[on_the_way] == "step_too_large").all()
     assert (section["failed"].data[on_the_way] < 2.0).all()
     assert section.attrs["failures"].startswith(f"{failed} of {len(outcomes)} trajectories failed: ")
 
@@ -353,3 +354,20 @@ def test_a_seed_of_128_bits_is_kept_whole(tmp_path: Path) -> None:
     other = stored(Disturbed(seed=2**64 - 1, **brief), scene, tmp_path)
     assert other.attrs["seed"] == 2**64 - 1
     assert (section["start_phi"].data != other["start_phi"].data).all()
+
+
+def test_heavy_damping_fails_nothing(tmp_path: Path) -> None:
+    heavy = Scene(F0=-150.0, c1=260.0, c2=60.0, alpha=0.0, beta=1e5)
+    section = stored(Disturbed(trajectories=64, radius=1.2, t_end=20.0, linear_directions=2), heavy, tmp_path)
+    assert section.attrs["failed"] == 0
+    assert section.attrs["method"] == "radau5"
+    assert section.attrs["error_estimate_median"] < 1e-4
+
+
+def test_what_cannot_be_disturbed_is_refused_before_anything_is_computed() -> None:
+    """All along a line in closed form; a ball of return by the equilibria alone."""
+    line = Scene(alpha=0.0, F0=0.0, c1=0.0, c2=22.0 * 9.80665 / 1.25)
+    with pytest.raises(fm.InputError, match="equilibria are not isolated: c1 = 0, F = 0"):
+        Disturbed().check(line)
+    with pytest.raises(fm.InputError, match="return_radius = 3 rad: must not exceed"):
+        Disturbed(return_radius=3.0).tiling(Scene(alpha=0.0))

@@ -99,7 +99,7 @@ def test_xarray_opens_a_map_with_names_and_units(tmp_path: Path) -> None:
 
 def test_tiles_agree_with_the_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = mapped()
-    monkeypatch.setattr("fastmech.scan_types.map_tiling.TILE_POINTS", 100)
+    monkeypatch.setattr("fastmech.scan_types.equilibrium_map.TILE_POINTS", 100)
     tiling = EquilibriumMap(axes=AXES).tiling(SCENE)
     assert tiling.count == 9
     assert sum(map(tiling.items, range(tiling.count))) == 31 * 23

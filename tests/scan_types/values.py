@@ -32,7 +32,7 @@ def stored(scan: Scan, scene: Scene, folder: Path) -> Dataset:
     attrs = {**provenance(2), "title": "values"}
     write_results(path, scene_parameters={}, sections={"section": dataset}, attrs=attrs, replace=True)
     with open_results(path) as results:
-        return results["section"].load()
+        return results["section"].load().merged
 
 
 def check_labels(section: Dataset, units: Mapping[str, str]) -> None:

@@ -49,7 +49,7 @@ def test_a_part_of_a_section(write: Write, content: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("path", [3, None, b"result.h5", ["result.h5"]])
 def test_what_is_no_path(path: Any) -> None:
-    with pytest.raises(InputError, match=r"^open_results: path = .*: must be the path of a result file$"):
+    with pytest.raises(InputError, match=r"^path = .*: must be the path of a file$"):
         open_results(path)
 
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import re
+import shutil
 import time
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -16,6 +20,9 @@ from fastmech.store import decode
 from fastmech.store.export import export_results
 from fastmech.store.read import open_results
 from fastmech.store.schema import DIM_NUMBER, DIM_NUMBERS
+from fastmech.tiles.look import ScanLook
+
+SHIPPED = Path(__file__).parents[2] / "data" / "small.h5"
 
 Write = Callable[[], Path]
 
@@ -148,3 +155,49 @@ def test_groups_within_groups_are_followed_no_deeper(write: Write) -> None:
     with open_results(path) as results:
         assert results.groups == ("equilibria", "atlas", "atlas/loop")
         assert "atlas/loop/loop" not in results
+
+
+def test_what_is_no_regular_file_is_not_waited_for(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe.h5"
+    os.mkfifo(pipe)
+    with pytest.raises(InputError, match=r"pipe.h5: is not a regular file"):
+        open_results(pipe)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "told"),
+    [
+        (lambda file: file.attrs.__setitem__("format", [1, 2, 3]), "not a result file of fastmech"),
+        (lambda file: [file.__delitem__(name) for name in list(file)], "holds no section"),
+        (
+            lambda file: next(iter(_sections(file))).create_dataset("hollow", data=h5py.Empty("f8")),
+            "variable 'hollow': is damaged or not written by fastmech: it has no values",
+        ),
+        (
+            lambda file: _flagged(file).attrs.__setitem__("flag_values", np.array([1], dtype=np.int8)),
+            "flag_values, flag_meanings: do not fit together",
+        ),
+    ],
+)
+def test_what_is_wrong_is_named_and_never_called_complete(tmp_path: Path, spoil: Any, told: str) -> None:
+    path = tmp_path / "odd.h5"
+    shutil.copy(SHIPPED, path)
+    with h5py.File(path, "r+") as file:
+        spoil(file)
+    with pytest.raises(InputError, match=re.escape(told)) as refusal:
+        ScanLook(path)
+    assert "odd.h5" in str(refusal.value)
+
+
+def _sections(file: h5py.File) -> Any:
+    return (one for one in file.values() if isinstance(one, h5py.Group))
+
+
+def _flagged(file: h5py.File) -> h5py.Dataset:
+    return next(v for one in _sections(file) for v in one.values() if "flag_values" in v.attrs)
+
+
+def test_a_limit_that_is_none_is_not_the_file_s_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FASTMECH_FILE_LIMITS", "abc")
+    with pytest.raises(InputError, match=r"^FASTMECH_FILE_LIMITS = 'abc': must be a positive number"):
+        open_results(SHIPPED)

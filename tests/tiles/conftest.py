@@ -30,7 +30,7 @@ Run = Callable[..., RunReport]
 
 @pytest.fixture(autouse=True)
 def _small_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fastmech.scan_types.map_tiling.TILE_POINTS", 10)
+    monkeypatch.setattr("fastmech.scan_types.equilibrium_map.TILE_POINTS", 10)
     _tiling.cache_clear()
 
 

@@ -28,7 +28,7 @@ pytestmark = pytest.mark.filterwarnings("default")
 
 def test_a_worker_dies_and_the_result_is_the_same(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     settings = {"dashboard_address": ":0", "silence_logs": 50, "preload": ["fastmech.faults.small_tiles"]}
-    monkeypatch.setattr("fastmech.scan_types.map_tiling.TILE_POINTS", 20)  # as on the workers
+    monkeypatch.setattr("fastmech.scan_types.equilibrium_map.TILE_POINTS", 20)  # as on the workers
     whole = content(run("whole.h5").path)
     with (
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, **settings) as local,
@@ -46,15 +46,15 @@ def test_a_worker_dies_and_the_result_is_the_same(run: Run, monkeypatch: pytest.
 #: A Dask worker that is started with this dies of the line's third tile.
 ABORTS = """
 import os
-from fastmech.scan_types import map_tiling
+from fastmech.scan_types import equilibrium_map
 
 def dask_setup(worker):
-    compute = map_tiling.MapTiling.compute
+    compute = equilibrium_map.MapTiling.compute
     def aborting(self, index, context):
         if index == 2:
             os.abort()
         return compute(self, index, context)
-    map_tiling.MapTiling.compute = aborting
+    equilibrium_map.MapTiling.compute = aborting
 """
 
 
@@ -62,7 +62,7 @@ def dask_setup(worker):
 def test_a_tile_kills_its_worker_and_the_others_are_kept(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, workers: int
 ) -> None:
-    monkeypatch.setattr("fastmech.scan_types.map_tiling.TILE_POINTS", 20)  # as on the workers
+    monkeypatch.setattr("fastmech.scan_types.equilibrium_map.TILE_POINTS", 20)  # as on the workers
     (tmp_path / "aborts.py").write_text(ABORTS, encoding="utf-8")
     preload = ["fastmech.faults.small_tiles", str(tmp_path / "aborts.py")]
     with (

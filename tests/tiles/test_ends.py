@@ -8,7 +8,7 @@ import pytest
 from tiles.conftest import Run
 from tiles.test_run import stopped_after
 
-from fastmech.scan_types.map_tiling import MapTiling
+from fastmech.scan_types.equilibrium_map import MapTiling
 from fastmech.scan_types.request import RunContext
 from fastmech.tiles.ends import Stopped
 

@@ -15,7 +15,7 @@ from tiles.conftest import REQUEST, TILES, Run, content
 
 from fastmech.errors import InputError
 from fastmech.runner import run_request
-from fastmech.scan_types.map_tiling import MapTiling
+from fastmech.scan_types.equilibrium_map import MapTiling
 from fastmech.store.read import open_results
 from fastmech.tiles import identity
 from fastmech.tiles.ends import CrashedTilesError, Stopped

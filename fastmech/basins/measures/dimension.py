@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from fastmech.basins.measures.jackknife import PARTS, half_width, part_of
 from fastmech.basins.measures.labels import Floats, Integers, LabelsLike, check_map, too_thin
-from fastmech.basins.measures.slopes import is_smooth, line
+from fastmech.basins.measures.slopes import PARTS, half_width, is_smooth, line, part_of
 from fastmech.errors import InputError
 
 

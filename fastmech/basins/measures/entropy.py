@@ -25,15 +25,8 @@ from numpy.typing import ArrayLike
 from scipy.special import entr
 
 from fastmech.basins.measures.dimension import BoundaryDimension, boundary_dimension
-from fastmech.basins.measures.jackknife import PARTS, half_width, part_of
-from fastmech.basins.measures.labels import (
-    Floats,
-    Integers,
-    LabelsLike,
-    check_map,
-    check_point,
-    known_labels,
-)
+from fastmech.basins.measures.labels import Floats, Integers, LabelsLike, check_map, check_point, known_labels
+from fastmech.basins.measures.slopes import PARTS, half_width, part_of
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
 

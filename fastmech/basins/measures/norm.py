@@ -25,20 +25,23 @@ STATE = ("phi", "theta", "phi_dot", "theta_dot")
 
 
 #: Angles lie within so many turns of zero: what is beyond was meant in degrees.
-MOST_TURNS = 4
+FEW_TURNS = 4
 
 
 def check_angles(field: str, name: str, values: ArrayLike) -> None:
     """Refuse angles that must be degrees; ``name`` is that of a state, of which rates are no angles.
 
     Raises:
-        InputError: one is beyond ``MOST_TURNS`` turns.
+        InputError: one is beyond ``FEW_TURNS`` turns.
     """
     largest = float(np.abs(values).max())
-    if name in STATE[:2] and largest > 2.0 * np.pi * MOST_TURNS:
-        raise InputError(
-            f"{field}: reaches {largest:g}, beyond {MOST_TURNS} turns; angles are in radians (numpy.deg2rad)"
-        )
+    if name in STATE[:2] and largest > 2.0 * np.pi * FEW_TURNS:
+        raise InputError(f"{field}: {beyond_turns(largest)}")
+
+
+def beyond_turns(largest: float) -> str:
+    """What is wrong with an angle so large."""
+    return f"reaches {largest:g}, beyond {FEW_TURNS} turns; angles are in radians (numpy.deg2rad)"
 
 
 def state_index(name: str) -> int:

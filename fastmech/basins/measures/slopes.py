@@ -8,6 +8,7 @@ of parts of the scales.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm, t
 
-from fastmech.basins.measures.labels import Floats
+from fastmech.basins.measures.labels import Floats, Integers
 
 #: Half width above which an error bar round 1 does not tell a smooth boundary from a fractal one.
 TELLING = 0.15
@@ -85,3 +86,22 @@ def line(x: Floats, y: Floats, weight: Floats) -> tuple[Floats, float]:
     away = x - np.average(x, weights=weight)
     square = np.sum(weight * away * away)
     return np.asarray(np.tensordot(weight * away, y, 1) / square), float(1.0 / square)
+
+
+#: Parts of a map along every axis; odd, for many a map has a boundary in its middle.
+PARTS = 5
+
+
+def part_of(indices: Sequence[NDArray[np.int64]], shape: tuple[int, ...]) -> Integers:
+    """Number of the part, below PARTS^axes, that points with these indices along every axis are in."""
+    part = np.zeros(1, dtype=np.int64)
+    for index, length in zip(indices, shape, strict=True):
+        part = part * PARTS + index * PARTS // length
+    return part
+
+
+def half_width(without: Floats) -> float:
+    """Half width of the 95 % interval from the values with each part left out (parts,)."""
+    m = without.size
+    spread = np.sqrt((m - 1) / m * np.sum((without - without.mean()) ** 2))
+    return float(t.ppf(0.975, m - 1) * spread)

@@ -38,13 +38,7 @@ class UncertaintyExponent:
 
 
 def uncertainty_exponent(
-    label_of: LabelOf,
-    low: ArrayLike,
-    high: ArrayLike,
-    epsilon: ArrayLike,
-    *,
-    n: int = 4096,
-    seed: int = 0,
+    label_of: LabelOf, low: ArrayLike, high: ArrayLike, epsilon: ArrayLike, *, n: int = 4096, seed: int = 0
 ) -> UncertaintyExponent:
     """Uncertainty exponent of the boundaries in a box, from fresh random starts at every distance.
 
