@@ -29,7 +29,7 @@ LOAD_ALL = """
 import importlib, json, pkgutil
 import fastmech
 from fastmech.kernel_cache import COMPILED
-from numba.core.registry import CPUDispatcher
+from fastmech.jit import Kernel
 found = {}
 for place in COMPILED:
     if place.endswith(".py"):
@@ -37,7 +37,7 @@ for place in COMPILED:
     package = importlib.import_module(f"fastmech.{place}")
     for info in pkgutil.walk_packages(package.__path__, f"fastmech.{place}."):
         for name, value in vars(importlib.import_module(info.name)).items():
-            if isinstance(value, CPUDispatcher) and value.__module__ == info.name:
+            if isinstance(value, Kernel) and value.__module__ == info.name:
                 value.make()
                 stats = value.stats
                 found[f"{info.name}.{name}"] = [
