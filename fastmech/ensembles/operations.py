@@ -16,6 +16,9 @@ from fastmech.kernels.sincos import cos, sin
 #: those counted as below.
 MECHANISM = 110.0
 
+#: Operations of a right-hand side that takes arrays, for each state: they are not counted.
+VECTOR_RHS = 10.0
+
 #: Operations that a division, and a function such as sine or root, take the time of.
 DIVISION, FUNCTION = 5.0, 20.0
 
@@ -83,7 +86,7 @@ def operations_of(rhs: types.FunctionType, arguments: list[float]) -> float:
         with np.errstate(all="ignore"):
             rebuilt(rhs, __name__, called)(*given)
     except Exception:  # whatever a user's function may raise: then nothing is known
-        return 10.0 * len(arguments)
+        return VECTOR_RHS * len(arguments)
     return max(count[0], 1.0)
 
 

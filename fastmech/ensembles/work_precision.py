@@ -18,7 +18,13 @@ from numpy.typing import NDArray
 
 from fastmech.ensembles.fitting import fading_force, speed_bound, vibration_frequency
 from fastmech.ensembles.interpolation import STEPS_BETWEEN, solve_at
-from fastmech.ensembles.operations import MECHANISM, operations_of, start_operations, step_operations
+from fastmech.ensembles.operations import (
+    MECHANISM,
+    VECTOR_RHS,
+    operations_of,
+    start_operations,
+    step_operations,
+)
 from fastmech.ensembles.problem import Problem
 from fastmech.ensembles.solve import Settings, Solution, distances
 from fastmech.ensembles.spans import output_steps
@@ -290,6 +296,8 @@ def operations_of_problem(problem: Problem, starts: Floats) -> float:
     """Operations of a right-hand side."""
     if problem.system is None or not len(starts):
         return MECHANISM
+    if problem.system.vector:
+        return VECTOR_RHS * starts.shape[1]
     values = [float(column.flat[0]) for column in problem.params.columns]
     named = dict(zip(problem.system.parameters, values, strict=True))
     own = [named[name] for name in problem.system.parameter_order]

@@ -2,7 +2,7 @@
 
 No method follows a body that turns by more than 1 rad in a step. Where a force decays within a step, its
 impulse comes out wrong. An Adams method lays a polynomial through its history; where the polynomial's last
-term moves an angle by more than 0.01 rad (:mod:`fastmech.kernels.last_term`), it does not describe the
+term moves an angle by more than 0.01 rad (:mod:`fastmech.kernels.whole`), it does not describe the
 motion, or one of the method's spurious roots has grown until it shows. (That a motion ends with an energy
 that it cannot have is told by :mod:`fastmech.ensembles.plausible`.)
 
