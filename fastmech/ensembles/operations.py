@@ -81,7 +81,7 @@ def operations_of(rhs: types.FunctionType, arguments: list[float]) -> float:
     """
     count = [0.0]
     given = [_Counted(value, count) for value in arguments]
-    called = {sin: lambda x: np.sin(x), cos: lambda x: np.cos(x)}
+    called: Any = {sin: lambda x: np.sin(x), cos: lambda x: np.cos(x)}  # NumPy asks the number itself
     try:
         with np.errstate(all="ignore"):
             rebuilt(rhs, __name__, called)(*given)

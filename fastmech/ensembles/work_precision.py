@@ -157,7 +157,8 @@ class Trial:
 
     def settings(self, method: Method, dt: float) -> Settings:
         """How a method runs with steps of dt [s]."""
-        c, early = self.case.problem.coefficients, ()
+        c = self.case.problem.coefficients
+        early: tuple[tuple[float, float], ...] = ()
         if c is not None:
             early = fading_force(c, self.until)
             if isinstance(method, ImplicitRungeKutta):
@@ -310,9 +311,9 @@ def choose(case: Case, tol: float, level: float, method: str | None, truth: Solu
     ``method`` is kept if given; ``truth`` is the sample's, if it is known from elsewhere.
     """
     fit = _fit(case)
-    few = np.unique(np.linspace(0, len(case.starts) - 1, PROBE).astype(np.int64)) if len(case.starts) else []
+    few = np.unique(np.linspace(0, len(case.starts) - 1, PROBE).astype(np.int64))
     small = len(case.starts) <= 2 * PROBE
-    probe = Trial(case if small else case.part(np.asarray(few)), tol, level, fit)
+    probe = Trial(case if small else case.part(few), tol, level, fit)
     points = _points(probe, None if method is None else find_method(method))
     best = min(points, key=lambda point: (not point.good, point.work if point.good else point.error))
     whole = probe
