@@ -81,6 +81,11 @@ INTEGERS = types.Array(types.int64, 1, "C")
 STATUSES = types.Array(types.int8, 1, "C")
 
 
+def named_tuple(kinds: list[Any], fields: Any) -> Any:
+    """Type of a ``NamedTuple`` class whose fields have these types."""
+    return types.NamedTuple(kinds, fields)  # type: ignore[no-untyped-call]
+
+
 def lanes(precision: Any, dimensions: int) -> Any:
     """Type of an array of lanes: states, derivatives, parameters or outputs of a block, or of blocks."""
     return types.Array(precision, dimensions, "C")
@@ -105,50 +110,10 @@ RHS = CalleeType(RHS_SIGNATURE)
 OBSERVER_SIGNATURE = observer_signature(types.float64)
 OBSERVER = CalleeType(OBSERVER_SIGNATURE)
 
-#: ``step(t, h, Y, Z, params, work)``: a whole step of a block from ``Y`` to ``Z``, see
-#: :mod:`fastmech.kernels.whole_steps`.
-STEP_SIGNATURE = types.void(types.float64, types.float64, MATRIX, MATRIX, MATRIX, MATRIX)
-STEP = CalleeType(STEP_SIGNATURE)
-
-#: ``advance(t, h, first, last, F, oldest, Y, params, work, checked)``: whole steps of a block, see
-#: :mod:`fastmech.kernels.whole_adams`.
-ADVANCE_SIGNATURE = types.int64(
-    types.float64,
-    types.float64,
-    types.int64,
-    types.int64,
-    VECTOR,
-    types.int64,
-    MATRIX,
-    MATRIX,
-    MATRIX,
-    types.boolean,
-)
-ADVANCE = CalleeType(ADVANCE_SIGNATURE)
-
 #: ``jacobian(t, Y, J, params)``: row ``r * dim + c`` of ``J`` (dim * dim, lanes) is the derivative of the
 #: rate of state ``r`` by state ``c``.
 JACOBIAN_SIGNATURE = types.void(types.float64, MATRIX, MATRIX, MATRIX)
 JACOBIAN = CalleeType(JACOBIAN_SIGNATURE)
-
-
-def driver_signature(precision: Any, *method: Any) -> Any:
-    """``drive(rhs, observe, *method, times, steps, params, observer_params, Y, record, out)``.
-
-    The last seven are the fields of :class:`fastmech.integrators.batch.Batch`.
-    """
-    return types.void(
-        CalleeType(rhs_signature(precision)),
-        CalleeType(observer_signature(precision)),
-        *method,
-        VECTOR,
-        INTEGERS,
-        lanes(precision, 3),
-        VECTOR,
-        lanes(precision, 3),
-        CUBE,
-        lanes(precision, 4),
-    )
 
 
 #: Held while numba's cache directory, one for the whole process, is the package's.
@@ -290,6 +255,12 @@ def inlined(function: F) -> F:
     _parts.append(njit(**INLINED)(function))
     infer_global(function, types.Dispatcher(_parts[-1]))  # type: ignore[no-untyped-call]
     return function
+
+
+def called(function: F) -> Any:
+    """Make a function callable from kernels that is compiled once for all its calls there."""
+    options: Any = {"no_cpython_wrapper": True, **KERNEL}
+    return njit(**options)(function)
 
 
 def _fuse(typingctx: Any, a: Any, b: Any, c: Any) -> Any:

@@ -11,7 +11,7 @@ from numba.core import config
 from fastmech.ensembles.threads import thread_count
 from fastmech.jit import compiled_anew
 from fastmech.kernel_cache import cache_directory
-from fastmech.kernels.lagrange import lagrange_damped_constant
+from fastmech.kernels.select import with_terms
 from fastmech.store.provenance import processor_name
 
 LIBRARIES = ("numba", "llvmlite", "numpy", "scipy", "h5py")
@@ -19,7 +19,7 @@ LIBRARIES = ("numba", "llvmlite", "numpy", "scipy", "h5py")
 
 def vector_bits() -> int:
     """Widest registers in the machine code of a shipped right-hand side, compiled here."""
-    (code,) = compiled_anew(lagrange_damped_constant).inspect_asm().values()
+    (code,) = compiled_anew(with_terms("lagrange", "damped_constant")).inspect_asm().values()
     widths = {"zmm": 512, "ymm": 256, "xmm": 128}
     return next((bits for name, bits in widths.items() if re.search(rf"pd\s.*%{name}", code)), 64)
 

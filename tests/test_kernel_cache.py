@@ -18,7 +18,7 @@ import pytest
 from numba import types
 
 from fastmech import jit, kernel_cache
-from fastmech.kernels.lagrange import lagrange_free
+from fastmech.kernels.select import with_terms
 
 pytestmark = pytest.mark.skipif(
     numba.config.DISABLE_JIT, reason="nothing is compiled where the just-in-time compiler is off"
@@ -29,7 +29,7 @@ LOAD_ALL = """
 import importlib, json, pkgutil
 import fastmech
 from fastmech.kernel_cache import COMPILED
-from numba.core.registry import CPUDispatcher
+from fastmech.jit import Kernel
 found = {}
 for place in COMPILED:
     if place.endswith(".py"):
@@ -37,7 +37,7 @@ for place in COMPILED:
     package = importlib.import_module(f"fastmech.{place}")
     for info in pkgutil.walk_packages(package.__path__, f"fastmech.{place}."):
         for name, value in vars(importlib.import_module(info.name)).items():
-            if isinstance(value, CPUDispatcher) and value.__module__ == info.name:
+            if isinstance(value, Kernel) and value.__module__ == info.name:
                 value.make()
                 stats = value.stats
                 found[f"{info.name}.{name}"] = [
@@ -53,7 +53,8 @@ import numba, numpy as np
 before = numba.config.CACHE_DIR
 import fastmech
 from fastmech.kernel_cache import cache_directory
-from fastmech.kernels.lagrange import lagrange_free as rhs
+from fastmech.kernels.select import with_terms
+rhs = with_terms("lagrange", "free")
 sys.path.insert(0, sys.argv[1])
 import users_module
 Y = np.array([[0.7], [0.3], [0.0], [0.0]])
@@ -76,7 +77,8 @@ from fastmech import kernel_cache
 kernel_cache.cache_directory()
 importlib.import_module(sys.argv[1])
 shutil.copyfile(sys.argv[3], sys.argv[2])
-from fastmech.kernels.lagrange import lagrange_free as rhs
+from fastmech.kernels.select import with_terms
+rhs = with_terms("lagrange", "free")
 Y = np.array([[0.7], [0.3], [0.0], [0.0]])
 dY = np.zeros((4, 1))
 rhs(0.0, Y, dY, np.array([[0.8], [0.6], [-9.0], [13.0], [8.0], [0.0], [0.0], [0.0]]))
@@ -86,7 +88,7 @@ print(json.dumps({"answer": dY[:, 0].tolist(), "kept": kept}))
 
 USERS_MODULE = """
 import numba
-from fastmech.kernels import lagrange
+from fastmech.kernels import select
 
 @numba.njit(cache=True)
 def twice(x):
@@ -181,7 +183,9 @@ def test_an_edit_while_a_process_compiles_spoils_nothing(loaded: str, tmp_path: 
     (tmp_path / "new.py").write_text(changed)
     seen = run(EDITED_MEANWHILE, loaded, source, tmp_path / "new.py", **place)
     Y, dY = np.array([[0.7], [0.3], [0.0], [0.0]]), np.zeros((4, 1))
-    lagrange_free(0.0, Y, dY, np.array([[0.8], [0.6], [-9.0], [13.0], [8.0], [0.0], [0.0], [0.0]]))
+    with_terms("lagrange", "free")(
+        0.0, Y, dY, np.array([[0.8], [0.6], [-9.0], [13.0], [8.0], [0.0], [0.0], [0.0]])
+    )
     made_from = 1.0 if loaded.endswith("reduced") else 2.0
     assert seen["answer"][2] == pytest.approx(made_from * dY[2, 0], rel=1e-14)
     assert seen["kept"] == []

@@ -17,7 +17,6 @@ from numba import njit
 from fastmech.bench.entrant import Entrant, Prepare, Solve
 from fastmech.bench.package import STEPS
 from fastmech.bench.problem import Problem
-from fastmech.integrators.sums import rows_of
 from fastmech.integrators.tableau import Tableau
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import FLAGS
@@ -32,7 +31,7 @@ LANES = 256
 
 _HEAD = """
 def integrate(starts, final, width, h, steps, mass, slider, lift, spring, gravity, force, damping):
-    Y = rows_of(starts[0], width).reshape((4, width))
+    Y = np.empty((4, width))
     for first in range(0, len(starts), width):
         lanes = min(width, len(starts) - first)
         Y[:, :lanes] = starts[first : first + lanes].T
@@ -68,7 +67,7 @@ def source(tableau: Tableau) -> str:
 def compiled(method: str) -> Any:
     """The loop of a method as machine code."""
     names: dict[str, Any] = {
-        "rows_of": rows_of, "sincos": sincos, "lagrange_accelerations": lagrange_accelerations
+        "np": np, "sincos": sincos, "lagrange_accelerations": lagrange_accelerations
     }  # fmt: skip
     exec(compile(source(TABLEAUS[method]), f"<fused {method}>", "exec"), names)
     return njit(nogil=True, **FLAGS)(names["integrate"])

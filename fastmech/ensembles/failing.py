@@ -11,7 +11,7 @@ from fastmech.ensembles.lanes import Lanes
 from fastmech.ensembles.spans import Span
 from fastmech.integrators.method import Method
 from fastmech.jit import OBSERVER_SIGNATURE, kernel
-from fastmech.kernels.single import observer_in_single
+from fastmech.kernels.blocks import observer_in_single
 
 Floats = NDArray[np.float64]
 

@@ -21,16 +21,17 @@ from fastmech.ensembles.solve import Precision, Settings, Solution, solve
 from fastmech.ensembles.status import Status, failure_counts, failure_line
 from fastmech.ensembles.stopping import STOP_TIME
 from fastmech.ensembles.system import System, stop_codes
-from fastmech.ensembles.threads import in_parts
 from fastmech.ensembles.tolerance import solve_to_tolerance
 from fastmech.ensembles.turning import counted_turns, watched
+from fastmech.ensembles.work_precision import Case
 from fastmech.errors import InputError, called_here, shown
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Method
 from fastmech.integrators.methods import find_method
 from fastmech.kernels.select import FORMULATIONS
 from fastmech.scene import Scene, nearest
-from fastmech.step_limits.beyond import StepJudge, StepsTaken
+from fastmech.step_limits.beyond import StepsTaken, too_long
+from fastmech.step_limits.warning import warn_of_step
 
 #: Longest step [s] where neither a step nor a tolerance is given.
 DEFAULT_DT = 0.01
@@ -135,8 +136,7 @@ def integrate(
         states at the output times and the status of every trajectory: a start that is not finite, a motion
         that became so, and a step too large for a scene are told apart and leave the others as they are. A
         step is too large where the motion ends with an energy it cannot have, where a body turns by more than
-        1 rad in it, where an Adams method's history does not describe the motion, and where small motion
-        about the trajectory's start or its end grows over the steps taken there though it should die out (see
+        1 rad in it, and where an Adams method's history does not describe the motion (see
         :mod:`fastmech.step_limits.beyond`): it keeps its states, but they are not to be trusted. That others
         have no status does not say that they are accurate. With
         ``fit`` or ``tol`` a start too fast for any steps has that status too, does not run, and has NaN after
@@ -166,7 +166,8 @@ def integrate(
             raise InputError(f"quantile = {quantile:g}: must not be greater than 1")
         if method is not None:
             find_method(method)
-        found = solve_to_tolerance(problem, starts, outputs, tol, quantile, method, threads, progress)
+        case = Case(problem, starts, outputs, threads)
+        found = solve_to_tolerance(case, tol, quantile, method, progress)
         return replace(
             _trajectories(problem, outputs, found.solution, found.settings),
             error=found.error,
@@ -182,15 +183,14 @@ def integrate(
         return _trajectories(
             problem, outputs, solve(problem, starts, outputs, settings, threads, progress), settings
         )
-    steps, until = StepJudge(scene, own, starts, formula.name), float(outputs[-1])
-    steps.warn(extreme_scenes(scene, own, problem), step, until / step)
+    warn_of_step(extreme_scenes(scene, own, problem), step, formula.name, starts)
     problem = watched(problem, starts, step, threads)
     solution = solve(problem, starts, outputs, settings, threads, progress)
     longest = solution.dt[0] if len(solution.dt) == 1 else solution.dt.max(axis=0)
     turned = counted_turns(problem, starts, longest, solution.records, threads)
-    taken = StepsTaken(solution.dt[0], longest, solution.steps, until, turned, solution.last_term)
-    ends = solution.y[-1] if solution.last is None else solution.last
-    beyond = steps.beyond(ends, taken, lambda work, n, part: in_parts(work, n, threads, part))
+    taken = StepsTaken(solution.dt[0], turned, solution.last_term)
+    assert problem.coefficients is not None
+    beyond = too_long(formula, problem.coefficients, starts, taken)
     solution.status[beyond & (solution.status == Status.OK)] = Status.STEP_TOO_LARGE
     return _trajectories(problem, outputs, solution, settings)
 

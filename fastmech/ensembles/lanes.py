@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from fastmech.ensembles.spans import Span
 from fastmech.integrators.batch import PHASE, Batch
-from fastmech.integrators.sums import CACHE_LINE
 from fastmech.kernels.blocks import VECTOR_LANES
 
 Floats = NDArray[np.float64]
+
+#: Bytes that processors move at once, and the length of their longest vectors.
+CACHE_LINE = 64
 
 #: Share of the lanes that must have ended before the others move up: moving costs a copy of all.
 WORTH_MOVING = 0.125
@@ -55,7 +57,8 @@ class Lanes:
     So is what their method carries from call to call, see :class:`fastmech.integrators.batch.Batch`.
     Parameters that all share are in one block for all.
 
-    The last block is filled up with copies of the last trajectory, so every lane runs in whole vectors.
+    The last block is filled up with copies of the last trajectory, so every lane runs in whole vectors where
+    blocks are not narrower.
     """
 
     def __init__(
@@ -86,7 +89,8 @@ class Lanes:
 
     def _arrange(self, states: Floats, params: Floats, record: Floats) -> None:
         blocks = max(1, -(-len(states) // self.block_lanes))
-        self._width = -(-len(states) // (blocks * VECTOR_LANES)) * VECTOR_LANES
+        unit = min(self.block_lanes, VECTOR_LANES)
+        self._width = -(-len(states) // (blocks * unit)) * unit
         self.Y, self._shared = self._blocked(states), params.ndim == 1
         self.params = self._filled(params, 1) if self._shared else self._blocked(params)
         self.record = self._filled(record, len(self.Y)) if record.ndim == 1 else self._blocked(record)

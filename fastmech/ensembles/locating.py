@@ -22,8 +22,7 @@ from fastmech.ensembles.run import Observation
 from fastmech.ensembles.spans import Span
 from fastmech.ensembles.stopping import STOP_CODE, STOP_TIME
 from fastmech.integrators.batch import PHASE
-from fastmech.integrators.driver import TABLEAU
-from fastmech.integrators.explicit import integrate_blocks
+from fastmech.integrators.explicit import WEIGHTS, Moment, Stepped, step_by_stages, weights_of
 from fastmech.integrators.implicit import integrate_implicit_block
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Adams, Method
@@ -52,14 +51,11 @@ def observe_before(t: float, Y: Floats, params: Floats, record: Floats) -> None:
                 record[2 + d, i] = Y[d, i]
 
 
-@kernel(types.void(RHS, OBSERVER, *TABLEAU, *_SEARCH))
+@kernel(types.void(RHS, OBSERVER, WEIGHTS, *_SEARCH))
 def halve_steps(
     rhs: Any,
     observe: Any,
-    start: Integers,
-    stage: Integers,
-    weight: Floats,
-    nodes: Floats,
+    weights: Any,
     begin: Floats,
     states: Floats,
     params: Floats,
@@ -70,28 +66,31 @@ def halve_steps(
     """Move the stops in ``record`` (n, rows) to where they happened, by an explicit one-step method.
 
     ``begin`` (n,) and ``states`` (n, dim) are where each trajectory's last step began, ``params`` (n, count)
-    its parameters, ``empty`` (rows,) a record of no stop. ``start`` to ``nodes`` are a packed tableau.
+    its parameters, ``empty`` (rows,) a record of no stop, ``weights`` the method's.
     """
     n, dim = states.shape
-    Y, out = np.empty((1, dim, 1)), np.empty((1, 1, dim, 1))
-    own, seen = np.empty((1, params.shape[1], 1)), np.empty((1, empty.size, 1))
-    times, steps = np.empty(2), np.ones(1, dtype=np.int64)
+    Y, own, seen = np.empty((dim, 1)), np.empty((params.shape[1], 1)), np.empty((empty.size, 1))
+    stages = np.empty((weights.nodes.size + 2, dim, 1))
+    block = Stepped(Y, own, np.empty((0, dim, 1)), stages)
     for i in range(n):
-        own[0, :, 0] = params[i]
+        for row in range(params.shape[1]):
+            own[row, 0] = params[i, row]
         low, high = begin[i], record[i, STOP_TIME]
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
             if not low < middle < high:
                 break
-            times[0], times[1] = begin[i], middle
-            Y[0, :, 0], seen[0, :, 0] = states[i], empty
-            integrate_blocks(
-                rhs, observe, start, stage, weight, nodes,
-                times, steps, own, observer_params, Y, seen, out,
-            )  # fmt: skip
-            if seen[0, STOP_CODE, 0] != 0.0:
+            for d in range(dim):
+                Y[d, 0] = states[i, d]
+            for row in range(empty.size):
+                seen[row, 0] = empty[row]
+            rhs(begin[i], Y, stages[0], own)
+            step_by_stages(rhs, weights, block, Moment(begin[i], middle - begin[i], 0, False))
+            observe(middle, Y, observer_params, seen)
+            if seen[STOP_CODE, 0] != 0.0:
                 high = middle
-                record[i] = seen[0, :, 0]
+                for row in range(empty.size):
+                    record[i, row] = seen[row, 0]
             else:
                 low = middle
 
@@ -192,8 +191,8 @@ def locate_stops(
             )  # fmt: skip
         else:
             one_step: Any = method
-            packed = (method.starter if isinstance(method, Adams) else one_step.tableau).packed
-            halve_steps(*called, packed.start, packed.stage, packed.weight, packed.nodes, *search)
+            tableau = method.starter if isinstance(method, Adams) else one_step.tableau
+            halve_steps(*called, weights_of(tableau), *search)
     return located
 
 

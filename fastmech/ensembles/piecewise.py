@@ -18,13 +18,10 @@ from numpy.typing import NDArray
 from fastmech.callee import callee
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.located import COSTS, ENDED, GRAZES, SINGULAR, SLIDES, UNCLEAR, Course, follow
-from fastmech.ensembles.missed import missed_line
-from fastmech.ensembles.places import part_of, put_into
 from fastmech.ensembles.problem import Problem
-from fastmech.ensembles.richardson import distances
 from fastmech.ensembles.run import Progress
-from fastmech.ensembles.solve import Settings, Solution, solve
-from fastmech.ensembles.stopping import STOP_CODE
+from fastmech.ensembles.solve import Settings, Solution, distances, nothing, part_of, put_into, solve
+from fastmech.ensembles.status import missed_line
 from fastmech.ensembles.threads import in_threads, thread_count
 from fastmech.integrators.methods import find_method
 from fastmech.interrupts import check
@@ -76,19 +73,17 @@ def follow_to_tolerance(
     """
     n, usable = len(starts), finite_rows(starts)
     error, ended = np.full(n, np.inf), np.full(n, ENDED)
-    last, best = None, _nothing(problem, starts, outputs)
+    last, best = None, nothing(problem, outputs.size, *starts.shape)
     who = np.flatnonzero(usable)
     if progress is not None:
         progress(n - who.size)
     for k in range(RUNS):
         local = max(FIRST * tol / FINER**k, LEAST)
         finer, ended[who] = _follow(problem, switches, starts, outputs, local, who, threads, progress)
-        put_into(best, who, finer, np.ones(who.size, dtype=np.bool_))
+        put_into(best, who, finer)
         open_ = ended[who] == ENDED
         if last is not None:
-            apart = distances(last.y, finer.y)
-            if problem.observation.stops:
-                apart[last.records[STOP_CODE] != finer.records[STOP_CODE]] = np.inf
+            apart = distances(last, finer)
             kept = open_ & (apart <= tol)
             error[who[kept]] = apart[kept]
             open_ &= ~kept
@@ -102,18 +97,9 @@ def follow_to_tolerance(
         steps = np.exp2(np.ceil(np.log2(np.clip(best.steps[other], *GIVEN_UP))))
         settings = Settings(find_method(METHOD), float(outputs[-1]) / steps)
         given_up = solve(problem.part(other), starts[other], outputs, settings, threads)
-        put_into(best, other, given_up, np.ones(other.size, dtype=np.bool_))
+        put_into(best, other, given_up)
     missed = usable & np.isinf(error)
     return best, error, missed_line(missed, {why: missed & (ended == code) for code, why in WHY.items()})
-
-
-def _nothing(problem: Problem, starts: Floats, outputs: Floats) -> Solution:
-    """A solution to put trajectories into."""
-    n, dim = starts.shape
-    records = np.repeat(problem.observation.record[:, None], n, axis=1)
-    steps, dt = np.zeros(n, dtype=np.int64), np.zeros((1, n))
-    y, failed = np.zeros((outputs.size, n, dim)), np.full(n, np.nan)
-    return Solution(y, records, np.zeros(n, dtype=np.int8), steps, dt, failed, None, np.zeros(0))
 
 
 def _follow(
@@ -127,7 +113,11 @@ def _follow(
     progress: Progress | None,
 ) -> tuple[Solution, Members]:
     """Some of the trajectories with so large errors of their steps, and what became of each."""
-    solution, n, seen = _nothing(problem, starts[who], outputs), who.size, problem.observation
+    solution, n, seen = (
+        nothing(problem, outputs.size, who.size, starts.shape[1]),
+        who.size,
+        problem.observation,
+    )
     steps = min(MOST, max(MOST_TOGETHER // max(n, 1), int(GIVEN_UP[0])))
     course = Course(
         starts=np.ascontiguousarray(starts[who]),

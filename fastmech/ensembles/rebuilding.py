@@ -8,11 +8,12 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numba
+import numpy as np
 from numba.core.registry import CPUDispatcher
 
 from fastmech.ensembles.fingerprint import FIXED, enclosed
 
-#: Functions to be called in the place of others.
+#: Functions to be called in the place of others; that of ``float`` makes constants another type.
 Swaps = dict[Callable[[float], float], Callable[[float], float]]
 
 
@@ -35,6 +36,18 @@ def reaches(function: types.FunctionType, swaps: Swaps) -> bool:
 def raises(function: types.FunctionType) -> bool:
     """Whether a function raises or asserts itself."""
     return any(instruction.opname == "RAISE_VARARGS" for instruction in dis.get_instructions(function))
+
+
+def returns(function: types.FunctionType) -> bool:
+    """Whether a function gives anything back but None."""
+    before = None
+    for instruction in dis.get_instructions(function):
+        given = before if instruction.opname == "RETURN_VALUE" else instruction
+        gone = instruction.opname in ("RETURN_VALUE", "RETURN_CONST")
+        if gone and given is not None and ("CONST" not in given.opname or given.argval is not None):
+            return True
+        before = instruction
+    return False
 
 
 def compiled_callees(function: types.FunctionType) -> Iterator[types.FunctionType]:
@@ -62,7 +75,10 @@ def compiled_callees(function: types.FunctionType) -> Iterator[types.FunctionTyp
 
 
 def _reaches(function: Any, swaps: Swaps, above: tuple[Any, ...]) -> bool:
-    return bool(_changes(function, "", swaps, above) or _cell_changes(function, "", swaps, above))
+    return (
+        bool(_changes(function, "", swaps, above) or _cell_changes(function, "", swaps, above))
+        or float in swaps
+    )
 
 
 def _copy(function: Any, module: str, swaps: Swaps, above: tuple[Any, ...]) -> types.FunctionType:
@@ -73,9 +89,27 @@ def _copy(function: Any, module: str, swaps: Swaps, above: tuple[Any, ...]) -> t
     exchanged = _cell_changes(function, module, swaps, above)
     if exchanged:
         cells = tuple(exchanged.get(number, cell) for number, cell in enumerate(cells))
-    copy = types.FunctionType(function.__code__, known, function.__name__, function.__defaults__, cells)
+    code = _with_constants(function.__code__, swaps)
+    copy = types.FunctionType(code, known, function.__name__, function.__defaults__, cells)
     copy.__module__ = module
     return copy
+
+
+def _constant(value: Any, swaps: Swaps) -> Any:
+    """A constant of another type, where it then is a number still."""
+    if isinstance(value, types.CodeType):
+        return _with_constants(value, swaps)
+    if isinstance(value, tuple):
+        return tuple(_constant(item, swaps) for item in value)
+    if type(value) is not float or float not in swaps:
+        return value
+    with np.errstate(over="ignore", under="ignore"):
+        other = swaps[float](value)
+    return other if np.isfinite(other) and (other != 0.0) == (value != 0.0) else value
+
+
+def _with_constants(code: types.CodeType, swaps: Swaps) -> types.CodeType:
+    return code.replace(co_consts=tuple(_constant(value, swaps) for value in code.co_consts))
 
 
 def _changes(function: Any, module: str, swaps: Swaps, above: tuple[Any, ...]) -> dict[str, Any]:
@@ -112,8 +146,10 @@ def _names(code: types.CodeType) -> Iterator[str]:
 def _instead(value: Any, names: set[str], module: str, swaps: Swaps, above: tuple[Any, ...]) -> Any:
     """What a copy sees in the place of ``value``: the same, unless it reaches a swapped function."""
     for old, new in swaps.items():
-        if value is old:
+        if value is old and old is not float:
             return new
+    if type(value) is float:
+        return _constant(value, swaps)
     if isinstance(value, CPUDispatcher):
         dispatcher: Any = value
         function = dispatcher.py_func

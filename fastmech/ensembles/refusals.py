@@ -30,17 +30,18 @@ def reason(error: Exception) -> str:
     return f"line {lines[-1]}: {what}" if lines else what
 
 
-def explain(field: str, function: FunctionType, arguments: int, states: list[str] | None) -> None:
-    """Refuse a function that cannot be compiled for numbers, or gives something else than it must.
+def explain(field: str, function: FunctionType, arguments: tuple[Any, ...], states: list[str] | None) -> None:
+    """Refuse a function that cannot be compiled for these types, or gives something else than it must.
 
-    ``states`` are the names for which a right-hand side gives rates, ``None`` for a stopping condition.
+    ``states`` are the names for which a right-hand side gives rates, ``None`` for a stopping condition, empty
+    where it writes them.
 
     Raises:
         InputError: it is refused.
     """
     compiled = attempted(function)
     try:
-        compiled.compile((types.float64,) * arguments)
+        compiled.compile(arguments)
     except Exception as error:  # numba lets those of the code it looks at pass
         raise InputError(
             f"{field}: cannot be compiled (arithmetic, numpy and math only; functions that it calls need "
@@ -51,6 +52,8 @@ def explain(field: str, function: FunctionType, arguments: int, states: list[str
     if states is None:
         if not _real(given):
             raise InputError(f"{field}: returns {given}, must return a real number, 0 while it runs on")
+        return
+    if not states:
         return
     wanted = f"must return a tuple of {len(states)}, the rate{'s' * (len(states) > 1)} of {', '.join(states)}"
     rates: Any = given if isinstance(given, types.BaseTuple) else None

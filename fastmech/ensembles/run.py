@@ -31,10 +31,8 @@ from fastmech.ensembles.threads import in_threads, thread_count
 from fastmech.integrators.batch import Batch
 from fastmech.integrators.driver import observe_nothing
 from fastmech.integrators.method import Adams, Method
-from fastmech.integrators.whole import in_whole_steps
 from fastmech.interrupts import check
-from fastmech.kernels.last_term import LOOKED_AT
-from fastmech.kernels.single import in_single, observer_in_single
+from fastmech.kernels.blocks import VECTOR_LANES, observer_in_single
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int], None]
@@ -88,8 +86,8 @@ class Ensemble:
     records: Floats
     status: NDArray[np.int8]
     failed: Floats
-    #: Greatest last term of an Adams method's predictor in an angle [rad], see
-    #: :mod:`fastmech.kernels.last_term`, shape (n,); of other methods empty.
+    #: Greatest last term of an Adams method's predictor in an angle [rad], or in any state of a system of
+    #: one's own, see :mod:`fastmech.kernels.whole`, shape (n,); of other methods empty.
     last_term: Floats
     #: Members that failed together, and their last finite states.
     lost: list[tuple[NDArray[np.int64], Floats]]
@@ -122,7 +120,8 @@ def run_ensemble(
     ``params`` are the parameters of all trajectories (count,) or of each (n, count); ``dt`` is the longest
     step of all trajectories or of each (n,). A trajectory that has stopped keeps the state in which it did.
     ``progress`` is told the number of trajectories finished since its last call. ``block_lanes`` is
-    :func:`block_width` by default, and always so of a method that has a width.
+    :func:`block_width` by default, and always so of a method that has a width; 1 where a right-hand side
+    takes arrays.
 
     Raises:
         InputError: the step, the times or the number of threads are wrong.
@@ -143,15 +142,17 @@ def run_ensemble(
     interrupted = threading.Event()
     observe = observation.observe
     if precision is np.float32:
-        rhs, observe = in_single(rhs), observer_in_single(observe)
+        observe = observer_in_single(observe)
         with np.errstate(over="ignore"):  # what is too large is set aside
             begin = begin.astype(precision)
         last_finite_observer(precision)  # compiled here, not in a thread
-    else:
-        method = in_whole_steps(method, rhs)
     usable = finite_rows(begin)
-    if block_lanes is None or method.lanes:
+    if getattr(getattr(rhs, "rates", None), "vector", False):
+        block_lanes = 1
+    elif block_lanes is None or method.lanes:
         block_lanes = block_width(method, begin.shape[1], precision)
+    else:
+        block_lanes = max(block_lanes, VECTOR_LANES)
 
     def most_steps(lanes: Lanes, passed: int) -> int:
         if observation.stops:
@@ -180,8 +181,7 @@ def run_ensemble(
                     ended.failed[ended.lost], ended.now[ended.lost] = found
             _store(ensemble, lanes, span, batch, ended)
         if isinstance(method, Adams) and lanes.members.size:
-            terms = lanes.rows(lanes.memory)[:, -begin.shape[1] :][:, :LOOKED_AT]
-            ensemble.last_term[lanes.members] = terms.max(axis=1)
+            ensemble.last_term[lanes.members] = lanes.rows(lanes.memory)[:, -begin.shape[1]]
         return members.size
 
     _set_aside(ensemble, np.flatnonzero(~usable), np.asarray(starts, dtype=np.float64), clock[0])

@@ -14,6 +14,7 @@ from fastmech.ensembles.problem import Problem
 from fastmech.ensembles.run import Ensemble, Progress, run_ensemble
 from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.status import Status
+from fastmech.ensembles.stopping import STOP_CODE
 from fastmech.ensembles.turning import TURNED, TURNS
 from fastmech.integrators.implicit_method import ImplicitRungeKutta, with_jacobian
 from fastmech.integrators.method import Method
@@ -48,13 +49,46 @@ class Solution:
     last_term: Floats  #: of an Adams method's predictor, see :class:`Ensemble`; of other methods empty
 
 
-def mean_shares(solution: Solution, dt: float, outputs: Floats) -> Floats:
-    """The part (n,) of the step ``dt`` [s] of a run's settings that each trajectory's steps were, on average.
+def nothing(problem: Problem, outputs: int, n: int, dim: int) -> Solution:
+    """A solution of n trajectories to put others' into."""
+    records = np.repeat(problem.observation.record[:, None], n, axis=1)
+    number, dt, term = np.zeros(n, dtype=np.int64), np.zeros((1, n)), np.zeros(0)
+    y, failed = np.zeros((outputs, n, dim)), np.full(n, np.nan)
+    return Solution(y, records, np.zeros(n, dtype=np.int8), number, dt, failed, None, term)
 
-    Less than 1 where steps were fitted: what a trajectory costs is known from any run of it.
+
+def part_of(solution: Solution, who: NDArray[np.int64] | NDArray[np.bool_]) -> Solution:
+    """Some of a solution's trajectories."""
+    s = solution
+    last = None if s.last is None else s.last[who]
+    term = s.last_term[who] if s.last_term.size else s.last_term
+    return Solution(
+        s.y[:, who], s.records[:, who], s.status[who], s.steps[who], s.dt[:, who], s.failed[who], last, term
+    )
+
+
+def put_into(best: Solution, which: NDArray[np.int64], run: Solution) -> None:
+    """Put the trajectories of a run into the places ``which`` of a solution."""
+    rows = max(len(best.dt), len(run.dt))
+    best.dt, dt = (np.pad(s.dt, ((0, rows - len(s.dt)), (0, 0)), mode="edge") for s in (best, run))
+    for old, new in ((best.y, run.y), (best.records, run.records), (best.dt, dt)):
+        old[:, which] = new
+    best.status[which], best.steps[which], best.failed[which] = run.status, run.steps, run.failed
+    if best.last is not None or run.last is not None:
+        best.last = best.y[-1].copy() if best.last is None else best.last
+        best.last[which] = run.y[-1] if run.last is None else run.last
+
+
+def distances(a: Solution, b: Solution) -> Floats:
+    """Largest difference of two solutions at any output in any component, shape (n,).
+
+    Infinite where one is not finite, or has stopped otherwise than the other.
     """
-    number = output_steps(np.concatenate([[0.0], outputs]), dt).sum()
-    return np.asarray(number / np.maximum(solution.steps, 1)) if number else np.ones(solution.steps.size)
+    with np.errstate(invalid="ignore", over="ignore"):
+        apart = np.nan_to_num(np.abs(a.y - b.y).max(axis=(0, 2)), nan=np.inf, posinf=np.inf)
+    if a.records.size and b.records.size:
+        apart[a.records[STOP_CODE] != b.records[STOP_CODE]] = np.inf
+    return np.asarray(apart)
 
 
 def solve(

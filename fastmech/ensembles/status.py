@@ -6,7 +6,9 @@ from collections.abc import Iterable, Mapping
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+
+Flags = NDArray[np.bool_]
 
 
 class Status(IntEnum):
@@ -51,3 +53,11 @@ def failure_line(counts: Mapping[str, int], total: int) -> str:
     each = ", ".join(f"{count:,} {name}" for name, count in counts.items())
     advice = "" if set(counts) == {Status.START_NOT_FINITE.name.lower()} else "; use a smaller dt"
     return f"{sum(counts.values()):,} of {total:,} trajectories failed: {each}{advice}"
+
+
+def missed_line(missed: Flags, causes: Mapping[str, Flags]) -> str:
+    """How many of the trajectories (n,) have missed, and why: who for which cause. Empty where none has."""
+    if not missed.any():
+        return ""
+    each = [f"{np.count_nonzero(which):,}: {why}" for why, which in causes.items() if which.any()]
+    return f"; {np.count_nonzero(missed):,} of {missed.size:,} miss it ({'; '.join(each)})"

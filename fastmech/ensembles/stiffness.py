@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.ensembles.fitting import QUICK, RUNGS, vibration_frequency
+from fastmech.ensembles.fitting import QUICK, vibration_frequency
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Method
 from fastmech.integrators.methods import find_method
@@ -29,13 +29,6 @@ DIRECTIONS = np.exp(1j * np.linspace(0.5 * np.pi + 0.1, np.pi, 12))
 
 #: Growth a step that rounding explains.
 ROUNDED = 1e-11
-
-#: Time of an implicit step of the mechanism in right-hand sides of an explicit one: its iterations with their
-#: Jacobians and small linear systems. Measured for ``radau5`` at steps that suit 1e-4 to 1e-8.
-IMPLICIT_STEP = 75
-
-#: Why an explicit method was chosen whose step accuracy sets.
-LEAST_WORK = "least work at this tolerance and these output times"
 
 _PHI = np.linspace(0.0, np.pi, 1001)
 
@@ -79,58 +72,3 @@ def explicit_limit(method: Method, c: Coefficients) -> float:
     """Step [s] at which every mode of every trajectory is stable."""
     rate = np.maximum(damping_rate(c), vibration_frequency(c))
     return stability_radius(method.name) / float(np.max(rate))
-
-
-def work(method: Method, dt: float, outputs: Floats) -> float:
-    """Cost of a trajectory that passes the outputs [s], in right-hand sides of an explicit method."""
-    intervals = np.diff(outputs, prepend=0.0)
-    steps = np.maximum(np.ceil(intervals[intervals > 0.0] / dt), 1.0)
-    if isinstance(method, ImplicitRungeKutta):
-        return float(steps.sum()) * IMPLICIT_STEP
-    if method.start_steps == 0:
-        return float(method.evaluations(1) * steps.sum())
-    return float(sum(method.evaluations(int(number)) for number in steps))
-
-
-def total_work(method: Method, dt: Floats, outputs: Floats, lanes: int = 1) -> float:
-    """Cost of trajectories with steps ``dt`` (n,) [s], in right-hand sides as :func:`work`'s.
-
-    Those of about equal steps run in common blocks and are counted in whole groups of so many ``lanes``.
-    """
-    dt = dt[np.isfinite(dt) & (dt > 0.0)]
-    rungs, numbers = np.unique(np.rint(RUNGS * np.log2(dt)), return_counts=True)
-    whole = -(-numbers // lanes) * lanes
-    return sum(
-        int(number) * work(method, float(length), outputs)
-        for length, number in zip(np.exp2(rungs / RUNGS), whole, strict=True)
-    )
-
-
-def explicit_reason(
-    method: Method,
-    dt: float,
-    share: float,
-    rung: float,
-    c: Coefficients | None,
-    beside: tuple[str, float, float] | None,
-) -> str:
-    """Why an explicit method was chosen, in one line; where stability sets its step ``dt`` [s], that too.
-
-    ``share`` is its error over the tolerance, ``rung`` the ratio of two steps that were compared, ``c`` a
-    scene's coefficients. ``beside`` is the implicit method that was tried because stability sets the step:
-    its name, its step [s] and its work over the explicit method's.
-    """
-    kept = f"least work, though stability keeps {method.name} to {dt:.2g} s"
-    if beside is not None:
-        name, step, ratio = beside
-        return f"{kept}: accuracy allows {name} {step:.2g} s, at {ratio:.2g} times the work"
-    allowed = dt * max(share, 1e-30) ** (-1.0 / method.order)
-    # A rung was compared with one longer step: where that was beyond the limit, no error is known.
-    if (
-        c is None
-        or share == 0.0
-        or allowed <= rung * dt
-        or rung**2 * dt < (1.0 - 1e-9) * explicit_limit(method, c)
-    ):
-        return LEAST_WORK
-    return f"{kept}: accuracy would allow {allowed:.2g} s"

@@ -4,68 +4,40 @@ from __future__ import annotations
 
 import inspect
 import types
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cached_property, partial
 from typing import Any
 
 import numba
 import numpy as np
+from numba import float64
 from numpy.typing import NDArray
 
 from fastmech.ensembles import checks
 from fastmech.ensembles.fingerprint import fingerprint
-from fastmech.ensembles.rebuilding import compiled_callees, raises, reaches, rebuilt
+from fastmech.ensembles.rebuilding import Swaps, compiled_callees, raises, reaches, rebuilt, returns
 from fastmech.ensembles.refusals import explain, reason
 from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
 from fastmech.ensembles.switches import UnclearError, decides_nothing, watching
 from fastmech.errors import InputError, shown
 from fastmech.generated import new_module, run_module
-from fastmech.jit import inlined
+from fastmech.jit import VECTOR, called, inlined
 from fastmech.kernels.attempt import attempted
+from fastmech.kernels.blocks import Rates, block_kernel
 from fastmech.kernels.sincos import WITHIN
 
-_HEAD = '''"""Made by fastmech: block kernels of {name!r}, whose functions are ``rhs`` and ``stop``.
+#: States of a family at most: a block of an implicit method has the square of it.
+MOST_STATES = 10_000
 
-``rhs_within`` and ``stop_within`` are the same with trigonometry that raises beyond its range.
-"""
+_OBSERVE = '''"""Made by fastmech: watches {name!r} of a user's own system."""
 
 from fastmech.ensembles.stopping import note_stop
-from fastmech.jit import OBSERVER_SIGNATURE, RHS_SIGNATURE, kernel
+from fastmech.jit import OBSERVER_SIGNATURE, kernel
 from fastmech.kernels.attempt import attempt
-from fastmech.kernels.bits import NO_LANE, noted
 
-'''
-
-#: ``+ ()``: only tuples have that, whose length is known before anything runs.
-_TEMPLATE = """
-@kernel(RHS_SIGNATURE)
-def block(t, Y, dY, p):
-    for i in range(Y.shape[1]):
-        ({rates},) = rhs({arguments}) + ()
-{stores}
-"""
-
-#: Lanes whose angles lie beyond the range of the packed trigonometry are done again, one by one: a lane's
-#: result never depends on its neighbours.
-_TEMPLATE_WITHIN = """
-@kernel(RHS_SIGNATURE)
-def block(t, Y, dY, p):
-    beyond = NO_LANE
-    for i in range(Y.shape[1]):
-        raised, ({rates},) = attempt(rhs_within, ({arguments},))
-        beyond = noted(beyond, raised)
-{stores}
-    if beyond:
-        for i in range(Y.shape[1]):
-            raised, ({rates},) = attempt(rhs_within, ({arguments},))
-            if raised:
-                ({rates},) = rhs({arguments}) + ()
-{more_stores}
-"""
-
-_STOP_TEMPLATE = """
 
 @kernel(OBSERVER_SIGNATURE)
 def observe(t, Y, params, record):
@@ -76,7 +48,7 @@ def observe(t, Y, params, record):
     if fresh:
         for i in range(Y.shape[1]):
             note_stop(stop({arguments}) + 0.0, t, Y, record, i)
-"""
+'''
 
 _SWITCHES = '''"""Made by fastmech: notes the decisions of {name!r}."""
 
@@ -100,11 +72,13 @@ class System:
             arithmetic on floats. Use :func:`fastmech.sin` and :func:`fastmech.cos`, and values chosen by
             ``a if condition else b`` instead of branches: then the loop over trajectories becomes packed
             instructions.
-        state: names of the states.
+            Of many states the function is ``rhs(t, y, p, rates)``: arrays of one trajectory's states and
+            parameters, and one into which it writes the rates, in loops over indices.
+        state: names of the states, or ``("x", 100)`` for x0, ..., x99 and arrays.
         parameters: the parameters' values by name; ``rhs`` takes arguments of these names after the states.
-        stop: ``stop(t, *state)`` gives 0 while the trajectory runs on, any other whole number as the code of
-            why it stops (True is 1); it is looked at after every step. A trajectory that has stopped costs
-            nothing any more.
+        stop: ``stop(t, *state)`` (or ``stop(t, y)``) gives 0 while the trajectory runs on, any other whole
+            number as the code of why it stops (True is 1); it is looked at after every step. A trajectory
+            that has stopped costs nothing any more.
 
     Raises:
         InputError: names do not match the functions' arguments, or values are no finite numbers. A function
@@ -115,23 +89,25 @@ class System:
     state: Sequence[str]
     parameters: Mapping[str, float]
     stop: Callable[..., float] | None = None
+    vector: bool = field(default=False, init=False)  #: whether functions take arrays
 
     def __post_init__(self) -> None:
-        state = _names("state", self.state, least=1)
+        vector = isinstance(self.state, tuple) and [type(part) for part in self.state] == [str, int]
+        object.__setattr__(self, "vector", vector)
+        given: Any = self.state
+        state = _names("state", _family(*given) if vector else given, least=1)
         if not isinstance(self.parameters, Mapping):
             raise InputError(f"parameters = {shown(self.parameters)}: must be a mapping of names to numbers")
         names = _names("parameters", self.parameters, least=0)
         values = [checks.number(f"parameters.{k}", v, "") for k, v in self.parameters.items()]
         object.__setattr__(self, "state", state)
         object.__setattr__(self, "parameters", dict(zip(names, values, strict=True)))
-        _check_function("rhs", self.rhs, state, names)
+        _check_function("rhs", self.rhs, ["y", "p", "rates"] if vector else state, [] if vector else names)
+        function: Any = self.rhs
+        if vector and returns(function):
+            raise InputError("rhs: returns something, must write the rates into its last argument")
         if self.stop is not None:
-            _check_function("stop", self.stop, state, [])
-
-    @property
-    def kernel(self) -> Any:
-        """The compiled block right-hand side."""
-        return self._compiled.block
+            _check_function("stop", self.stop, ["y"] if vector else state, [])
 
     @property
     def observation(self) -> Observation:
@@ -139,7 +115,7 @@ class System:
         if self.stop is None:
             return NOTHING
         record = np.zeros(2 + len(self.state))
-        return Observation(self._compiled.observe, np.zeros(0), record, stops=True)
+        return Observation(self._observer, np.zeros(0), record, stops=True)
 
     @cached_property
     def switches(self) -> Any:
@@ -154,15 +130,17 @@ class System:
         functions: dict[str, Any] = {}
         time = next(iter(inspect.signature(self.rhs).parameters))
         try:
-            functions["rhs"], places = watching(self.rhs, {time, *self.state})
+            functions["rhs"], places = watching(self.rhs, {time, "y"} if self.vector else {time, *self.state})
         except UnclearError:
             if decides_nothing(self.rhs):
                 return None
             raise
         if not places:
             return None
+        if self.vector:
+            raise UnclearError("decisions on arrays are not located")
         states = [f"y[{d}]" for d in range(len(self.state))]
-        own = [f"p[{list(self.parameters).index(name)}]" for name in self._parameter_order]
+        own = [f"p[{list(self.parameters).index(name)}]" for name in self.parameter_order]
         name, arguments = getattr(self.rhs, "__name__", "rhs"), ", ".join(["t", *states, *own])
         source = _SWITCHES.format(name=name, arguments=arguments)
         if self.stop is not None:
@@ -175,56 +153,101 @@ class System:
         return run_module(module, source).switches
 
     @property
-    def _parameter_order(self) -> list[str]:
+    def parameter_order(self) -> list[str]:
         """Parameters in the order in which the right-hand side takes them."""
         return list(inspect.signature(self.rhs).parameters)[1 + len(self.state) :]
 
     @cached_property
-    def _compiled(self) -> types.ModuleType:
-        """The system's kernels, loaded from the disk cache where they are there."""
-        functions: dict[str, Any] = {"rhs": self.rhs} | ({"stop": self.stop} if self.stop else {})
-        for field, function in functions.items():
-            for callee in filter(raises, compiled_callees(function)):
-                raise InputError(
-                    f"{field}: calls {callee.__name__}, which must not raise or assert; "
-                    "nan as a result ends a trajectory"
-                )
-        swaps = {} if numba.config.DISABLE_JIT else WITHIN  # type: ignore[attr-defined]
-        source = self._source(reaches(functions["rhs"], swaps))
-        module = new_module("system", source, [fingerprint(function) for function in functions.values()])
-        for field, function in functions.items():
-            whole = rebuilt(function, module.__name__, {})
-            within = rebuilt(function, module.__name__, swaps)
-            vars(module).update({field: inlined(whole), f"{field}_within": attempted(within)})
-        try:
-            run_module(module, source)
-            for made in (module.block, getattr(module, "observe", module.block)):
-                if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
-                    made.make()
-        except Exception as error:  # numba lets those of the code it looks at pass
-            state, count = list(self.state), 1 + len(self.state)
-            explain(
-                "rhs", rebuilt(functions["rhs"], module.__name__, {}), count + len(self.parameters), state
-            )
-            if self.stop is not None:
-                explain("stop", rebuilt(functions["stop"], module.__name__, {}), count, None)
-            raise InputError(f"rhs or stop: cannot be compiled: {reason(error)}") from None
-        return module
-
-    def _source(self, trigonometry: bool) -> str:
-        """The kernels' text; ``trigonometry``: whether the right-hand side has any that may raise."""
-        dim = len(self.state)
-        states = [f"Y[{d}, i]" for d in range(dim)]
-        given = [f"p[{list(self.parameters).index(name)}, i]" for name in self._parameter_order]
-        stores = [f"        dY[{d}, i] = rate{d}" for d in range(dim)]
-        text = (_HEAD + (_TEMPLATE_WITHIN if trigonometry else _TEMPLATE)).format(
-            name=getattr(self.rhs, "__name__", "rhs"),
-            arguments=", ".join(["t", *states, *given]),
-            rates=", ".join(f"rate{d}" for d in range(dim)),
-            stores="\n".join(stores),
-            more_stores="\n".join(f"        {line}" for line in stores),
+    def rates(self) -> Rates:
+        """What the engine's loops are made from."""
+        function: Any = self.rhs
+        dim, names = len(self.state), list(self.parameters)
+        own = () if self.vector else tuple(names.index(name) for name in self.parameter_order)
+        return Rates(
+            getattr(self.rhs, "__name__", "rhs"),
+            dim,
+            own,
+            partial(_array_functions if self.vector else _functions, "rates", self.rhs),
+            (fingerprint(self.rhs),),
+            ranged=not self.vector and reaches(function, _swaps()),
+            vector=self.vector,
+            looked_at=dim,
         )
-        return text + (_STOP_TEMPLATE.format(arguments=", ".join(["t", *states])) if self.stop else "")
+
+    @cached_property
+    def kernel(self) -> Any:
+        """The compiled block right-hand side, loaded from the disk cache where it is there."""
+        self._refuse_raising("rhs", self.rhs)
+        numbers = 1 + len(self.state) + len(self.parameters)
+        with self._explained(
+            "rhs", self.rhs, 3 if self.vector else numbers, [] if self.vector else list(self.state)
+        ):
+            made = block_kernel(self.rates)
+            if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+                made.make()
+        return made
+
+    @cached_property
+    def _observer(self) -> Any:
+        """The observer of the stopping condition."""
+        stop: Any = self.stop
+        self._refuse_raising("stop", stop)
+        with self._explained("stop", stop, 1 if self.vector else 1 + len(self.state), None):
+            states = (
+                "t, Y[:, i]"
+                if self.vector
+                else ", ".join(["t", *(f"Y[{d}, i]" for d in range(len(self.state)))])
+            )
+            source = _OBSERVE.format(name=stop.__name__, arguments=states)
+            module = new_module("system", source, [fingerprint(stop)])
+            vars(module).update(_functions("stop", stop, module.__name__, "float64"))
+            made = run_module(module, source).observe
+            if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+                made.make()
+        return made
+
+    @staticmethod
+    def _refuse_raising(field: str, function: Any) -> None:
+        for callee in filter(raises, compiled_callees(function)):
+            raise InputError(
+                f"{field}: calls {callee.__name__}, which must not raise or assert; "
+                "nan as a result ends a trajectory"
+            )
+
+    @contextmanager
+    def _explained(
+        self, field: str, function: Any, arguments: int, states: list[str] | None
+    ) -> Iterator[None]:
+        """Tell in one line why a function cannot be compiled."""
+        try:
+            yield
+        except Exception as error:  # numba lets those of the code it looks at pass
+            kinds = [VECTOR] * arguments if self.vector else [float64] * (arguments - 1)
+            explain(field, rebuilt(function, "fastmech_user", {}), (float64, *kinds), states)
+            raise InputError(f"{field}: cannot be compiled: {reason(error)}") from None
+
+
+def _array_functions(field: str, function: Any, module: str, precision: str) -> dict[str, Any]:
+    """The same of one that takes arrays."""
+    return {field: called(rebuilt(function, module, _numbers(precision)))}
+
+
+def _numbers(precision: str) -> Swaps:
+    """What constants become: a float64 would turn a lane's arithmetic into its own."""
+    single: Any = np.float32
+    return {float: single} if precision == "float32" else {}
+
+
+def _swaps() -> Swaps:
+    """What the packed loops call in the place of what."""
+    return {} if numba.config.DISABLE_JIT else dict(WITHIN)  # type: ignore[attr-defined]
+
+
+def _functions(field: str, function: Any, module: str, precision: str) -> dict[str, Any]:
+    """A user's function for a module of that name, and the same with trigonometry that raises."""
+    numbers = _numbers(precision)
+    whole = inlined(rebuilt(function, module, numbers))
+    return {field: whole, f"{field}_within": attempted(rebuilt(function, module, _swaps() | numbers))}
 
 
 def stop_codes(records: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -243,6 +266,15 @@ def stop_codes(records: NDArray[np.float64]) -> NDArray[np.int64]:
             "another whole number where it stops"
         )
     return codes.astype(np.int64)
+
+
+def _family(name: str, count: int) -> list[str]:
+    """Names of a family of states."""
+    if not 1 <= count <= MOST_STATES:
+        raise InputError(
+            f"state = {shown((name, count))}: must be a name and a number from 1 to {MOST_STATES}"
+        )
+    return [f"{name}{d}" for d in range(count)]
 
 
 def _names(field: str, given: Any, least: int) -> list[str]:

@@ -1,9 +1,11 @@
-"""A tolerance in place of a step: method, step and precision from a calibration, and the error estimated.
+"""A tolerance in place of a step.
 
-The error of a run is estimated by step doubling in its finer form: a second run with steps that differ by
-sqrt(2), see :mod:`fastmech.ensembles.richardson`. A sample of trajectories settles method, step and
-precision. For a quantile of the errors the sample's quantile is the estimate; for the largest error every
-trajectory runs twice, see :mod:`fastmech.ensembles.doubling`.
+A sample chooses method and step (:mod:`fastmech.ensembles.work_precision`). For a quantile of the errors
+everyone then runs once, and the sample tells the error. For the largest error everyone runs twice, the second
+time with steps shorter by sqrt(2). That run is kept; its error is told by the distance of the two (Hairer,
+Norsett, Wanner, *Solving ODEs I*, section II.4), whose ratio to the error is known from the method's order
+and from the sample. Who misses the tolerance runs again with shorter steps. What does not converge has an
+infinite error, and the reason is told.
 """
 
 from __future__ import annotations
@@ -15,41 +17,87 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.ensembles.calibration import CALM, calibrate
-from fastmech.ensembles.doubling import SMOOTH, Doubling
-from fastmech.ensembles.fitting import speed_bound
-from fastmech.ensembles.ladder import Calibrated
+from fastmech.ensembles.fitting import EXPONENT_ONCE, fit_steps, speed_bound, vibration_frequency
+from fastmech.ensembles.interpolation import solve_at
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.piecewise import METHOD, follow_to_tolerance
 from fastmech.ensembles.problem import Problem
-from fastmech.ensembles.repeatable import usable_starts
-from fastmech.ensembles.richardson import RATIO, ROUNDING, distances, half_over, order_statistic, unseen
 from fastmech.ensembles.run import Progress
-from fastmech.ensembles.solve import Settings, Solution, solve, tell_aside
+from fastmech.ensembles.solve import (
+    Settings,
+    Solution,
+    distances,
+    nothing,
+    part_of,
+    put_into,
+    solve,
+    tell_aside,
+)
+from fastmech.ensembles.status import missed_line
 from fastmech.ensembles.switches import UnclearError
+from fastmech.ensembles.work_precision import (
+    AIM,
+    RATIO,
+    REFERENCE,
+    Case,
+    Chosen,
+    choose,
+    error_of_finer,
+    order_statistic,
+)
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.methods import find_method
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Members = NDArray[np.int64]
 
-#: Trajectories of the sample for the largest error, and for a quantile; and neighbours in speed that it takes
+#: Trajectories of the sample: so many, fewer where all are few; and neighbours in speed that it takes
 #: together, because trajectories of equal steps share a block.
-SAMPLE_MAXIMUM, SAMPLE_QUANTILE, NEIGHBOURS = 64, 256, 16
+SAMPLE, LEAST_SAMPLE, SHARE_OF_ALL, NEIGHBOURS = 128, 32, 16, 16
 
-#: Trajectories of the sample that tell a quantile have larger errors, so many at least; and how many it may
-#: have for that.
-BEYOND, SAMPLE_MOST = 16, 4096
-
-#: For the largest error the calibration looks at this quantile of the sample: single trajectories run again.
+#: For the largest error the step is chosen by this quantile of the sample: single trajectories run again.
 TYPICAL = 0.9
 
-#: Steps of :data:`fastmech.ensembles.calibration.CALM` in an Adams method's, of a run that tells rounding.
-CALM_STEPS = 2.0
+#: Runs again at most, and by how much steps are shortened at most from one to the next.
+ROUNDS, LEAP = 6, 2.0
+
+#: Trajectories that run first where a quantile is asked for, how often at most, how many of the worst are
+#: measured (in the share that may miss the tolerance), and by how much longer steps are worth another time.
+PILOT, PILOTS, TAIL, WORTH = 512, 4, 4.0, 1.2
+
+#: An error of more than this share of that with longer steps is taken for one that these do not set.
+IN_VAIN = 0.7
+
+#: Steps of runs again in those of the two first ones, at most; so many more are always allowed.
+BUDGET, CHEAP = 4.0, 1e6
+
+#: Share of the tolerance up to which a measured error keeps it: distances are nearly errors.
+KEPT = 0.9
+
+#: How much larger than any in the sample the ratio of an error to the distance of two runs may be.
+SAFE = 4.0
+
+#: Runs agree with what the order says of their errors within this factor.
+AS_SAID = 8.0
+
+#: Rounding rules where errors are no more than so many times what it makes at least.
+RULED = 3.0
+
+#: Errors below this that shorter steps do not halve are rounding, magnified by the motion.
+MAGNIFIED = 1e-3
+
+#: Changes of starts, in their sizes, by which it is seen how a motion magnifies errors; and what a step's
+#: rounding adds at least: over motions of the mechanism, Lorenz', Henon and Heiles' and Kepler's, by four
+#: methods, quartiles are 0.04, 0.1 and 0.17 of a double's.
+MOVED, A_STEP = 1e-10, 0.04 * 2.0**-52
 
 #: Least tolerance for which lanes of float32 are tried, for quantiles: in the worst trajectories rounding is
-#: magnified more than the distance of two runs tells.
+#: magnified more than a sample tells.
 SINGLE = 3e-5
 
+#: Step times vibration frequency that small tolerances come to.
+SHORT = 0.003
 
 #: What is said of systems whose right-hand sides have branches.
 LOCATED = "the right-hand side has branches: steps end where they are passed"
@@ -67,33 +115,14 @@ class Estimated:
     estimate: float  #: the quantile of the errors that was asked for
 
 
-@dataclass(frozen=True)
-class _Wanted:
-    """What is to be integrated, and whose error counts."""
-
-    problem: Problem
-    starts: Floats
-    outputs: Floats
-    usable: NDArray[np.int64]  #: starts that are finite and not too fast
-    quantile: float
-    threads: int | None
-
-
 def solve_to_tolerance(
-    problem: Problem,
-    starts: Floats,
-    outputs: Floats,
-    tol: float,
-    quantile: float,
-    method: str | None,
-    threads: int | None,
-    progress: Progress | None,
+    case: Case, tol: float, quantile: float, method: str | None, progress: Progress | None
 ) -> Estimated:
     """Integrate so that the quantile (1.0: the largest) of the trajectories' errors is at most ``tol``.
 
     A trajectory's error is that of its worst component at its worst output time, in the units of the state.
-    The estimate says what was reached: rounding may keep it above the tolerance.
     """
+    problem, starts, outputs, threads = case
     if problem.observation.stops:
         problem = replace(problem, observation=replace(problem.observation, locate=True))
     switches, unclear = _switches(problem)
@@ -106,8 +135,15 @@ def solve_to_tolerance(
     usable = usable_starts(problem, starts, float(outputs[-1]), threads)
     # None of the runs that follow, whatever their steps, asks again who can be followed.
     begins = starts if usable.all() else np.where(usable[:, None], starts, np.nan)
-    wanted = _Wanted(problem, begins, outputs, np.flatnonzero(usable), quantile, threads)
-    estimated = _solve(wanted, tol, method, progress)
+    who, case = np.flatnonzero(usable), Case(problem, begins, outputs, threads)
+    if not who.size or outputs[-1] == 0.0:
+        settings = Settings(find_method(method or REFERENCE), float(outputs[-1]) or 1.0)
+        solution = solve(problem, begins, outputs, settings, threads, progress)
+        none = np.where(usable, 0.0, np.inf) if quantile == 1.0 else None
+        why = "the only output is the start" if who.size else "no start has a motion that steps can follow"
+        estimated = Estimated(solution, settings, why, none, 0.0)
+    else:
+        estimated = _estimated(case, who, (tol, quantile, method), switches, progress)
     tell_aside(estimated.solution, starts, outputs, finite_rows(starts) & ~usable)
     if switches is None and not unclear:
         return estimated
@@ -121,9 +157,23 @@ def solve_to_tolerance(
             estimate=np.inf if usable.any() else 0.0,
         )
     other, error, remark = follow_to_tolerance(problem, switches, starts, outputs, tol, threads, None)
-    error += distances(other.y, estimated.solution.y)
+    error += distances(other, estimated.solution)
     largest = float(np.max(error[usable], initial=0.0))
     return replace(estimated, reason=estimated.reason + remark, error=error, estimate=largest)
+
+
+def usable_starts(problem: Problem, starts: Floats, t_end: float, threads: int | None) -> Flags:
+    """Which starts (n, dim) have motions until ``t_end`` [s] that steps can follow.
+
+    That is asked once, with steps that all tolerances may come to: it depends on a start alone.
+
+    Raises:
+        InputError: the number of threads is wrong.
+    """
+    usable, c = finite_rows(starts), problem.coefficients
+    if c is None:
+        return usable
+    return usable & ~fit_steps(c, starts, SHORT / vibration_frequency(c), t_end, EXPONENT_ONCE, threads).aside
 
 
 def _switches(problem: Problem) -> tuple[Any, str]:
@@ -136,81 +186,250 @@ def _switches(problem: Problem) -> tuple[Any, str]:
         return None, str(why)
 
 
-def _solve(wanted: _Wanted, tol: float, method: str | None, progress: Progress | None) -> Estimated:
-    """The same of starts of which all that are finite have motions that steps can follow."""
-    problem, starts, outputs, threads = wanted.problem, wanted.starts, wanted.outputs, wanted.threads
-    usable, quantile = wanted.usable, wanted.quantile
-    if not usable.size:
-        settings = Settings(find_method(method or CALM), float(outputs[-1]) or 1.0)
-        solution = solve(problem, starts, outputs, settings, threads, progress)
-        none = np.full(len(starts), np.inf) if quantile == 1.0 else None
-        return Estimated(solution, settings, "no start has a motion that steps can follow", none, 0.0)
-    sample = _sample(wanted, SAMPLE_MAXIMUM if quantile == 1.0 else SAMPLE_QUANTILE)
-    aim = quantile if quantile < 1.0 else TYPICAL
-    part, begun = problem.part(sample), starts[sample]
-    many = usable.size / max(sample.size, 1)
-    found = calibrate(part, begun, outputs, tol, aim, method, threads, many)
-    if quantile == 1.0:
-        settings, reason = found.settings, found.reason
-        del found  # and with it the sample's runs
-        doubling = Doubling(problem, starts, outputs, settings, tol, threads)
-        solution, errors, remark = doubling.run(progress)
-        largest = float(np.max(errors[usable], initial=0.0))
-        return Estimated(solution, settings, reason + remark, errors, largest)
+def _estimated(
+    case: Case,
+    who: Members,
+    asked: tuple[float, float, str | None],
+    switches: Any,
+    progress: Progress | None,
+) -> Estimated:
+    """The same of starts ``who`` whose motions steps can follow; ``asked``: tolerance, quantile, method."""
+    tol, quantile, method = asked
+    members = _sample(case, who, min(max(who.size // SHARE_OF_ALL, LEAST_SAMPLE), SAMPLE))
+    sample, truth = case.part(members), None
+    if switches is not None and quantile < 1.0:
+        truth, _, _ = follow_to_tolerance(
+            sample.problem, switches, sample.starts, case.outputs, tol, case.threads, None
+        )
+    found = choose(sample, tol, TYPICAL if quantile == 1.0 else quantile, method, truth)
+    if quantile < 1.0:
+        return _once(case, who, (members, found), (tol, quantile), progress, known=truth is not None)
+    runs = Runs(case, who, found.settings, tol)
+    runs.twice(progress)
+    runs.calibrate(members, found)
+    remark = runs.settle()
+    largest = float(np.max(runs.error[who], initial=0.0))
+    return Estimated(runs.kept, found.settings, found.reason + remark, runs.error, largest)
+
+
+def _once(
+    case: Case,
+    who: Members,
+    chosen: tuple[Members, Chosen],
+    wanted: tuple[float, float],
+    progress: Progress | None,
+    known: bool,
+) -> Estimated:
+    """Everyone once, with steps with which the quantile of a larger sample's errors is within the tolerance.
+
+    ``known``: the reference does not come from runs with shorter steps, and only it tells errors.
+    """
+    (tol, quantile), (members, found) = wanted, chosen
     settings = found.settings
-    implicit = isinstance(settings.method, ImplicitRungeKutta)
-    if tol >= SINGLE and not implicit and not problem.observation.stops:
+    pilot, p = _sample(case, who, PILOT), settings.method.order
+    part, n = case.part(pilot), pilot.size
+    best: tuple[float, Runs] | None = None
+    for _ in range(1 if known else PILOTS):
+        runs = Runs(part, np.arange(n), settings, tol)
+        runs.twice(None)
+        if np.array_equal(members, pilot):
+            runs.calibrate(np.arange(n), found)
+        far = np.argsort(-runs.error, kind="stable")[: math.ceil(TAIL * (1.0 - quantile) * n)]
+        if far.size <= n // 4:
+            runs.measure(np.sort(far))
+        estimate = order_statistic(runs.error, quantile)
+        if best is not None and best[0] > tol and not estimate <= IN_VAIN * best[0]:
+            break
+        best = (estimate, runs) if best is None or estimate <= tol or estimate < best[0] else best
+        asked = (AIM * tol / max(estimate, 1e-300)) ** (1.0 / p) if estimate < np.inf else 1.0 / RATIO
+        if estimate <= tol and (asked < WORTH or n == who.size or best[0] < estimate):
+            break
+        settings = replace(settings, dt=float(settings.dt) * min(max(asked, 1.0 / RATIO), RATIO))
+    assert best is not None
+    estimate, runs = best
+    settings = runs.settings
+    if known:
+        assert found.trial.truth is not None
+        right = solve_at(*found.trial.case[:3], settings, case.threads)
+        estimate = order_statistic(distances(right, found.trial.truth), quantile)
+    if tol >= SINGLE and _in_single(settings, case):
         single = replace(settings, precision=np.float32)
-        if (
-            order_statistic(distances(solve(part, begun, outputs, single, threads).y, found.truth), aim)
-            <= tol
-        ):
-            settings = single
-    solution = solve(problem, starts, outputs, settings, threads, progress)
-    error = _sampled_errors(wanted, sample, solution, settings, found)
-    estimate = order_statistic(error, aim)
+        run = solve_at(part.problem, part.starts, case.outputs, single, case.threads)
+        rounded = order_statistic(runs.error + distances(run, runs.kept), quantile)
+        if rounded <= tol:
+            settings, estimate = single, rounded
+    if settings.precision is np.float32:
+        solution = solve_at(*case[:3], settings, case.threads, progress)
+    else:
+        solution = _with_others(case, pilot, runs.kept, settings, progress)
     remark = "" if estimate <= tol else f"; the {quantile:.3g} quantile misses it"
     return Estimated(solution, settings, found.reason + remark, None, estimate)
 
 
-def _sampled_errors(
-    wanted: _Wanted, sample: NDArray[np.int64], solution: Solution, settings: Settings, found: Calibrated
-) -> Floats:
-    """Errors of a sample that is large enough for the quantile, by a run of half the step."""
-    w = wanted
-    size = min(math.ceil(BEYOND / (1.0 - w.quantile)), SAMPLE_MOST)
-    if size > sample.size and sample.size < w.usable.size:
-        sample = _sample(w, size)
-        part, begun = w.problem.part(sample), w.starts[sample]
-        dt = np.asarray(found.settings.dt)
-        truth = solve(part, begun, w.outputs, replace(found.settings, dt=dt / 2.0), w.threads).y
-        longer = solve(part, begun, w.outputs, replace(found.settings, dt=dt * RATIO), w.threads).y
-        distance = distances(solution.y[:, sample], longer)
-    else:
-        truth, distance = found.truth, found.distance
-    error = distances(solution.y[:, sample], truth)
-    if settings.precision is np.float64:
-        # Where rounding rules, the run with longer steps is the nearer one: it rounds less.
-        rounded = np.minimum(error, distance)
-        half, order = error, settings.method.order
-        error = np.where(half < ROUNDING, rounded, unseen(half, distance, order))
-        noisy = np.flatnonzero(half > half_over(SMOOTH * order) * distance)
-        if settings.method.start_steps and noisy.size:
-            # Half the step rounds as much or more: a method that rounds less is nearer to the truth.
-            calm = replace(settings, method=find_method(CALM), dt=CALM_STEPS * np.asarray(settings.dt))
-            who = sample[noisy]
-            right = solve(w.problem.part(who), w.starts[who], w.outputs, calm, w.threads).y
-            error[noisy] = distances(solution.y[:, who], right)
-    return error
+def _with_others(
+    case: Case, who: Members, done: Solution, settings: Settings, progress: Progress | None
+) -> Solution:
+    """All trajectories, of which some are done."""
+    if progress is not None:
+        progress(who.size)
+    others = np.setdiff1d(np.arange(len(case.starts)), who)
+    part, solution = case.part(others), nothing(case.problem, case.outputs.size, *case.starts.shape)
+    rest = solve_at(*part[:3], settings, case.threads, progress)
+    for members, run in ((who, done), (others, rest)):
+        put_into(solution, members, run)
+    return solution
 
 
-def _sample(wanted: _Wanted, size: int) -> NDArray[np.int64]:
+def _in_single(settings: Settings, case: Case) -> bool:
+    """Whether lanes of float32 can run."""
+    return not isinstance(settings.method, ImplicitRungeKutta) and not case.problem.observation.stops
+
+
+class Runs:
+    """Trajectories that run twice, and again where that does not tell their errors."""
+
+    def __init__(self, case: Case, who: Members, settings: Settings, tol: float) -> None:
+        n = len(case.starts)
+        self.case, self.who, self.settings, self.tol = case, who, settings, tol
+        self.order = settings.method.order
+        self.dt = np.full(n, float(settings.dt))
+        self.share = float(error_of_finer(np.ones(1), RATIO, self.order)[0])
+        self.bound = 1.0  #: errors over the distance of two runs, at most
+        self.error = np.full(n, np.inf)  #: estimates
+        self.measured = np.zeros(n, dtype=np.bool_)  #: told by a run with shorter steps
+        self.floor = np.full(n, np.nan)  #: errors that rounding makes, where that has been asked
+        self.before = np.full(n, np.inf)  #: what was last measured
+        self.vain = np.zeros(n, dtype=np.int64)  #: runs that have not halved the error
+        self.unpaid, self.rounded = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
+
+    def solve(self, who: Members | None, dt: float | Floats, progress: Progress | None = None) -> Solution:
+        """A run of some or all with steps of dt [s]."""
+        problem, starts, outputs, threads = self.case if who is None else self.case.part(who)
+        return solve_at(problem, starts, outputs, replace(self.settings, dt=dt), threads, progress)
+
+    def twice(self, progress: Progress | None) -> None:
+        """Everyone, the second time with shorter steps; that run is kept."""
+        dt = float(self.settings.dt)
+        first = self.solve(None, dt * RATIO, progress)
+        self.kept = self.solve(None, dt)
+        self.apart = distances(first, self.kept)
+        self.left = CHEAP + BUDGET * float(first.steps[self.who].sum() + self.kept.steps[self.who].sum())
+        self.error[self.who] = self.share * self.apart[self.who]
+
+    def calibrate(self, members: Members, found: Chosen) -> None:
+        """The errors of a sample, which are known, and from it the ratio of errors to distances."""
+        assert found.trial.truth is not None
+        known = found.trial.doubt <= self.tol
+        right = distances(part_of(self.kept, members), found.trial.truth)[known]
+        apart = self.apart[members][known]
+        told = np.isfinite(apart) & np.isfinite(right) & (apart > 0.0)
+        if told.any():
+            far = told & (apart >= np.median(apart[told]))
+            seen = float(np.median(right[far] / apart[far]))
+            self.share = min(max(seen, self.share / AS_SAID), 1.0)
+            self.bound = min(SAFE * float(np.max(right[far] / apart[far])), 1.0)
+            self.error[self.who] = self.share * self.apart[self.who]
+        if found.trial.apart is not None:
+            sure = found.trial.apart[known] <= self.tol
+            self.error[members[known][sure]] = right[sure]
+            self.measured[members[known][sure]] = right[sure] <= KEPT * self.tol
+
+    def settle(self) -> str:
+        """Run those again whose errors may exceed the tolerance; what is said about those that do.
+
+        Two runs that lie apart by no more than the tolerance keep it, whatever the order. Else it takes an
+        order that the second does, and single trajectories show less of it than most: where the sample's
+        worst would miss the tolerance, a third run measures the error.
+        """
+        for _ in range(ROUNDS):
+            doubtful = ~(np.fmax(self.error, self.bound * self.apart) <= self.tol) & ~self.measured
+            again = self.who[(doubtful & (self.vain < 2) & ~self.unpaid & ~self.rounded)[self.who]]
+            if not self.measure(again):
+                break
+        return self._remark()
+
+    def measure(self, again: Members) -> bool:
+        """Tell the errors of trajectories by a run with shorter steps, or take that run for theirs.
+
+        Whether any could be paid for.
+        """
+        tol, p, error = self.tol, self.order, self.error[again]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            shorter = np.where(error <= tol, 1.0, (AIM * tol / error) ** (1.0 / p))
+        rungs = np.ceil(-2.0 * np.log2(np.clip(shorter, 1.0 / LEAP, 1.0 / RATIO)) - 1e-9)
+        # Longest steps first, as many as the budget allows.
+        steps = self.kept.steps[again] * RATIO**rungs
+        order = np.argsort(steps, kind="stable")
+        spent = np.cumsum(steps[order])
+        self.unpaid[again[order[spent > self.left]]] = True
+        paid = np.sort(order[spent <= self.left])
+        if not paid.size:
+            return False
+        self.left -= float(spent[spent <= self.left][-1])
+        again, rungs = again[paid], rungs[paid]
+        self._ask_rounding(again[~(self.error[again] <= tol) & np.isnan(self.floor[again])])
+        own, said = self.dt[again] * RATIO**-rungs, self.error[again]
+        floor = np.where(np.isfinite(self.floor[again]), self.floor[again], 0.0)
+        run, before = self.solve(again, own), part_of(self.kept, again)
+        apart = distances(run, before)
+        told = np.fmax(apart / (1.0 - RATIO ** (-p * rungs)), floor)
+        good = told <= KEPT * tol
+        self.error[again[good]], self.measured[again[good]] = told[good], True
+        # Where the error is larger than it was said to be, steps are too long for the order, and so may the
+        # new ones be.
+        with np.errstate(invalid="ignore", divide="ignore"):
+            worse = np.fmax(apart / said, 1.0)
+        finer = worse * error_of_finer(apart, RATIO, p) * RATIO ** (-p * (rungs - 1.0))
+        now = np.fmax(np.where(worse <= AS_SAID, finer, apart), floor)
+        in_vain = ~good & ~(told <= 0.5 * self.before[again])
+        self.before[again] = told
+        self.vain[again] += in_vain
+        ruled = (told <= RULED * floor) | ((self.vain[again] > 1) & (told < MAGNIFIED))
+        self.rounded[again] |= ~good & ruled
+        now = np.where(ruled, told, now)
+        bad = again[~good]
+        put_into(self.kept, bad, part_of(run, ~good))
+        self.error[bad], self.dt[bad] = now[~good], own[~good]
+        self.apart[bad] = apart[~good] / self.bound  # of these steps the sample tells nothing
+        return True
+
+    def _ask_rounding(self, who: Members) -> None:
+        """By how much motions magnify a small change of their start, and so the rounding of their steps."""
+        if not who.size:
+            return
+        kept, part = part_of(self.kept, who), self.case.part(who)
+        size = np.fmax(np.abs(kept.y).max(axis=0), np.abs(part.starts))
+        moved = part._replace(starts=part.starts + MOVED * size)
+        run = solve_at(*moved[:3], replace(self.settings, dt=self.dt[who]), moved.threads)
+        self.floor[who] = distances(run, kept) / MOVED * A_STEP * np.sqrt(kept.steps)
+
+    def _remark(self) -> str:
+        """Why trajectories miss the tolerance; those that do not converge have no error that is known."""
+        missed = np.zeros(self.error.size, dtype=np.bool_)
+        missed[self.who] = ~(self.error[self.who] <= self.tol)
+        lost = missed & ~np.isfinite(self.kept.y[-1]).all(axis=1)
+        self.error[missed & ~self.rounded] = np.inf
+        rest = missed & ~lost & ~self.unpaid & ~self.rounded
+        stops = rest & self.case.problem.observation.stops
+        causes = {
+            "two resolutions disagree about their stop": stops,
+            "not finite at any step tried": lost,
+            "shorter steps would cost too much": missed & self.unpaid & ~lost,
+            "rounding, magnified by the motion, is larger": missed & self.rounded,
+            "shorter steps do not reduce their errors as the order says (chaos, a singularity of the "
+            "right-hand side)": rest & ~stops,
+        }
+        return missed_line(missed, causes)
+
+
+def _sample(case: Case, usable: Members, size: int) -> Members:
     """Evenly spaced groups of the trajectories, sorted by what bounds their speed."""
-    usable, coefficients = wanted.usable, wanted.problem.coefficients
+    size = size // NEIGHBOURS * NEIGHBOURS
     if usable.size <= size:
         return usable
-    if coefficients is not None:
-        usable = usable[np.argsort(speed_bound(coefficients, wanted.starts)[usable], kind="stable")]
+    if case.problem.coefficients is not None:
+        bound = speed_bound(case.problem.coefficients, case.starts)
+        usable = usable[np.argsort(bound[usable], kind="stable")]
     groups = size // NEIGHBOURS
     # Each group is from the middle of its share of them: the fastest count no more than the others.
     middle = (np.arange(groups) + 0.5) * usable.size / groups

@@ -12,10 +12,13 @@ from fastmech.ensembles.problem import Problem
 from fastmech.ensembles.run import Observation
 from fastmech.jit import OBSERVER_SIGNATURE, kernel
 from fastmech.mechanism.coefficients import Coefficients
-from fastmech.step_limits.limits import ROUNDED, TURN
+from fastmech.step_limits.warning import TURN
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+
+#: By how much rounding may make a step longer than the dt that it was to be.
+ROUNDED = 1e-6
 
 #: Rows of the record: the greatest turn of an angle in a step [rad], and the angles that the step began with.
 TURNED, BEFORE = 0, 1

@@ -1,7 +1,6 @@
 """What every driver is given besides a method's own numbers: a right-hand side and an observer.
 
-They come as :class:`fastmech.callee.Callee`, one indirect call a stage, or step, and block; a tableau comes
-as arrays.
+They come as :class:`fastmech.callee.Callee`.
 """
 
 from __future__ import annotations
@@ -11,15 +10,12 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.jit import INTEGERS, OBSERVER_SIGNATURE, VECTOR, kernel
+from fastmech.jit import OBSERVER_SIGNATURE, kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 BlockRHS = Callable[[float, Floats, Floats, Floats], None]
 Observer = Callable[[float, Floats, Floats, Floats], None]
-
-#: Types of a packed tableau: start, stage, weight, nodes.
-TABLEAU = (INTEGERS, INTEGERS, VECTOR, VECTOR)
 
 
 @kernel(OBSERVER_SIGNATURE)

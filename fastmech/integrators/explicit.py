@@ -1,75 +1,393 @@
-"""Driver of explicit Runge-Kutta methods with a fixed step over blocks of lanes.
+"""Driver of explicit Runge-Kutta and Adams methods with a fixed step over blocks of lanes.
 
-The driver knows neither the mechanism nor the method: right-hand side and observer come as functions, the
-tableau as arrays.
+The driver knows neither the mechanism nor the method: right-hand side, observer and whole steps
+(:mod:`fastmech.kernels.whole`) come as functions, the method's weights as arrays. By those it takes steps
+stage by stage where there are no whole ones (systems of many states), where an Adams method starts, and for
+single lanes that need the library's trigonometry.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
 from numba import types
 
-from fastmech.integrators.driver import TABLEAU, BlockRHS, Floats, Integers, Observer
-from fastmech.integrators.sums import add_stages, rows_of
-from fastmech.jit import driver_signature, inlined, kernel
+from fastmech.callee import CalleeType, callee
+from fastmech.integrators.batch import ROUNDED_TIME, Batch
+from fastmech.integrators.driver import BlockRHS, Floats, Integers, Observer
+from fastmech.integrators.tableau import Tableau
+from fastmech.jit import (
+    INTEGERS,
+    VECTOR,
+    called,
+    kernel,
+    lanes,
+    named_tuple,
+    observer_signature,
+    rhs_signature,
+    rounded_to,
+    single,
+)
+from fastmech.kernels.blocks import VECTOR_LANES, in_single
+from fastmech.kernels.whole import (
+    EVERY,
+    Advance,
+    Formula,
+    Lanes,
+    Steps,
+    advance_signature,
+    advance_type,
+    term_weights,
+    whole_steps,
+)
+
+#: Rows that a pass of a sum adds.
+TERMS = 4
+
+#: Bytes that blocks which take a step together may fill, and how many these are at most.
+GROUP_BYTES, GROUP = 65536, 4
 
 
-@inlined
-def one_step(
-    rhs: BlockRHS,
-    t: float,
-    h: float,
-    start: Integers,
-    stage: Integers,
-    weight: Floats,
-    nodes: Floats,
-    state: Floats,
-    own: Floats,
-    K: Floats,
-    Z: Floats,
-) -> None:
-    """A step of a block ``state`` (dim, lanes) in place; ``K`` (stages, dim, lanes) and ``Z`` are scratch.
+class Weights(NamedTuple):
+    """A method's weights as sums over rows: ``weight[k]`` belongs to row ``row[k]``.
 
-    The right-hand side takes the arrays as rows, the stage sums take them flat.
+    Sums are filled up with weights of zero to whole :data:`TERMS`. Those of a Runge-Kutta method lie from
+    ``start[s]`` to ``start[s + 1]``, the last ones give the step; an Adams method has such a starter. The
+    history's are counted from its oldest row on.
     """
-    stages, n = nodes.shape[0], state.size
-    y, k_flat, z = state.reshape(n), K.reshape((stages, n)), Z.reshape(n)
-    rhs(t, state, K[0], own)
-    for s in range(1, stages):
-        add_stages(z, y, k_flat, h, stage, weight, int(start[s]), int(start[s + 1]))
-        rhs(t + nodes[s] * h, Z, K[s], own)
-    add_stages(y, None, k_flat, h, stage, weight, int(start[stages]), int(start[stages + 1]))
+
+    start: Integers
+    row: Integers
+    weight: Floats
+    nodes: Floats
+    past: Integers  #: rows of predictor and corrector
+    predictor: Floats
+    corrector: Floats  #: empty for an explicit method; ``new`` belongs to the predicted derivative
+    term: Floats  #: of the predictor's last term
+    new: float
+    rows: int  #: of the history; 0: a Runge-Kutta method
+    group: int  #: blocks that take whole steps together; 0: there are none
 
 
-@kernel(driver_signature(types.float64, *TABLEAU))
-def integrate_blocks(
-    rhs: BlockRHS,
-    observe: Observer,
-    start: Integers,
-    stage: Integers,
-    weight: Floats,
-    nodes: Floats,
-    times: Floats,
-    steps: Integers,
-    params: Floats,
-    observer_params: Floats,
-    Y: Floats,
-    record: Floats,
-    out: Floats,
+class Run(NamedTuple):
+    """The fields of :class:`fastmech.integrators.batch.Batch`."""
+
+    times: Floats
+    steps: Integers
+    params: Floats
+    observer_params: Floats
+    Y: Floats
+    record: Floats
+    out: Floats
+    memory: Floats
+    phase: Floats
+
+
+class Stepped(NamedTuple):
+    """A block that takes a step stage by stage."""
+
+    Y: Floats  #: states (dim, lanes)
+    params: Floats  #: (count, lanes)
+    history: Floats  #: (2 rows + 3, dim, lanes), see :mod:`fastmech.kernels.whole`
+    stages: Floats  #: scratch (stages + 2, dim, lanes)
+
+
+class Moment(NamedTuple):
+    """When a block takes a step."""
+
+    t: float  #: begin [s]
+    h: float  #: step [s]
+    oldest: int  #: row before the oldest of the history
+    ready: bool  #: the history is known
+
+
+WEIGHTS = named_tuple(
+    [INTEGERS, INTEGERS, VECTOR, VECTOR, INTEGERS, *[VECTOR] * 3, types.float64, types.int64, types.int64],
+    Weights,
+)
+
+
+def run_type(precision: Any) -> Any:
+    """Type of :class:`Run`."""
+    three, four = lanes(precision, 3), lanes(precision, 4)
+    record = lanes(types.float64, 3)
+    return named_tuple([VECTOR, INTEGERS, three, VECTOR, three, record, four, three, VECTOR], Run)
+
+
+def driver_signature(precision: Any) -> Any:
+    """``drive(rhs, observe, start, advance, weights, run)``."""
+    functions = CalleeType(rhs_signature(precision)), CalleeType(observer_signature(precision))
+    return types.void(*functions, *[advance_type(precision)] * 2, WEIGHTS, run_type(precision))
+
+
+@called
+def add_rows(
+    total: Floats, rows: Floats, first: int, row: Integers, weight: Floats, begin: int, end: int
 ) -> None:
-    """Take blocks of lanes through all times, one block after the other.
+    """total = sum of weight[begin:end] times rows ``first`` + row[begin:end], :data:`TERMS` in a pass."""
+    for x in range(total.shape[0]):
+        total[x] = 0.0
+    for k in range(begin, end, TERMS):
+        a, b, c, d = (
+            rows[first + row[k]],
+            rows[first + row[k + 1]],
+            rows[first + row[k + 2]],
+            rows[first + row[k + 3]],
+        )
+        wa, wb = rounded_to(total, weight[k]), rounded_to(total, weight[k + 1])
+        wc, wd = rounded_to(total, weight[k + 2]), rounded_to(total, weight[k + 3])
+        for x in range(total.shape[0]):
+            total[x] += wa * a[x] + wb * b[x] + wc * c[x] + wd * d[x]
 
-    ``start``, ``stage``, ``weight`` and ``nodes`` are a packed tableau; the rest are the fields of
-    :class:`fastmech.integrators.batch.Batch`. ``observe`` is called after every
-    step. A step's time is computed from its index, so rounding does not accumulate.
+
+@called
+def move(z: Floats, y: Floats, h: float, total: Floats) -> None:
+    """z = y + h total."""
+    own = rounded_to(z, h)
+    for x in range(z.shape[0]):
+        z[x] = y[x] + own * total[x]
+
+
+@called
+def step_by_stages(rhs: BlockRHS, weights: Weights, block: Stepped, at: Moment) -> None:
+    """A Runge-Kutta step of a block in place; the first stage is there."""
+    n, last = block.Y.size, block.stages.shape[0] - 1
+    y, rows = block.Y.reshape(n), block.stages.reshape((last + 1, n))
+    z, total = rows[last - 1], rows[last]
+    for s in range(1, last):
+        add_rows(total, rows, 0, weights.row, weights.weight, weights.start[s], weights.start[s + 1])
+        if s == last - 1:
+            move(y, y, at.h, total)
+        else:
+            move(z, y, at.h, total)
+            rhs(at.t + weights.nodes[s] * at.h, block.stages[last - 1], block.stages[s], block.params)
+
+
+@called
+def step_by_history(rhs: BlockRHS, weights: Weights, block: Stepped, at: Moment) -> None:
+    """A step of an Adams method of a block in place; its derivative takes the place of the first stage's."""
+    n, last = block.Y.size, block.stages.shape[0] - 1
+    y, rows = block.Y.reshape(n), block.stages.reshape((last + 1, n))
+    history = block.history.reshape((block.history.shape[0], n))
+    z, total, size = rows[last - 1], rows[last], weights.past.shape[0]
+    add_rows(total, history, at.oldest + 1, weights.past, weights.predictor, 0, size)
+    move(z, y, at.h, total)
+    rhs(at.t + at.h, block.stages[last - 1], block.stages[0], block.params)
+    if weights.corrector.shape[0]:
+        add_rows(total, history, at.oldest + 1, weights.past, weights.corrector, 0, size)
+        move(total, total, weights.new, rows[0])
+        move(z, y, at.h, total)
+        rhs(at.t + at.h, block.stages[last - 1], block.stages[0], block.params)
+    for x in range(n):
+        y[x] = z[x]
+
+
+@called
+def look(weights: Weights, block: Stepped, at: Moment) -> None:
+    """Keep the greatest last terms of the predictor, see :mod:`fastmech.kernels.whole`."""
+    (dim, width), last = block.Y.shape, block.stages.shape[0] - 1
+    total = block.stages[last].reshape(dim * width)
+    history = block.history.reshape((block.history.shape[0], dim * width))
+    add_rows(total, history, at.oldest + 1, weights.past, weights.term, 0, weights.past.shape[0])
+    for d in range(dim):
+        for i in range(width):
+            term = abs(at.h * block.stages[last, d, i])
+            greatest = block.history[block.history.shape[0] - 1, 0, i]
+            block.history[block.history.shape[0] - 1, 0, i] = term if term > greatest else greatest
+
+
+@called
+def keep(weights: Weights, block: Stepped, oldest: int) -> None:
+    """Put the first stage's derivative into the history, twice."""
+    if weights.rows:
+        for d in range(block.Y.shape[0]):
+            for i in range(block.Y.shape[1]):
+                value = block.stages[0, d, i]
+                block.history[oldest, d, i] = block.history[oldest + weights.rows + 1, d, i] = value
+
+
+@called
+def step_once(rhs: BlockRHS, weights: Weights, block: Stepped, at: Moment) -> None:
+    """A step of a block in place: the method's, or its starter's."""
+    if at.ready and weights.rows:
+        step_by_history(rhs, weights, block, at)
+    else:
+        rhs(at.t, block.Y, block.stages[0], block.params)
+        step_by_stages(rhs, weights, block, at)
+    keep(weights, block, at.oldest)
+
+
+@called
+def step_alone(rhs: BlockRHS, weights: Weights, block: Stepped, i: int, at: Moment) -> None:
+    """The same of one lane of a block."""
+    dim, count, carried = block.Y.shape[0], block.params.shape[0], block.history.shape[0]
+    alone = Stepped(
+        np.empty((dim, 1), block.Y.dtype),
+        np.empty((count, 1), block.Y.dtype),
+        np.empty((carried, dim, 1), block.Y.dtype),
+        np.empty((block.stages.shape[0], dim, 1), block.Y.dtype),
+    )
+    for row in range(count):
+        alone.params[row, 0] = block.params[row, i]
+    for d in range(dim):
+        alone.Y[d, 0] = block.Y[d, i]
+        for row in range(carried):
+            alone.history[row, d, 0] = block.history[row, d, i]
+    step_once(rhs, weights, alone, at)
+    for d in range(dim):
+        block.Y[d, i] = alone.Y[d, 0]
+        for row in range(carried):
+            block.history[row, d, i] = alone.history[row, d, 0]
+
+
+@kernel(driver_signature(types.float64))
+def drive(
+    rhs: BlockRHS, observe: Observer, start: Advance, advance: Advance, weights: Weights, run: Run
+) -> None:
+    """Take blocks of lanes through all times, some blocks after the others.
+
+    ``start`` are the whole steps of an Adams method's starter, ``advance`` those of the method, if any.
+    ``observe`` is called after every step. A step's time is computed from its index, so rounding does not
+    accumulate. An Adams method starts anew wherever the step's length changes; its ``phase`` is how many rows
+    of the history are known, the row before the oldest, and the step.
     """
-    stages, dim, lanes = nodes.shape[0], Y.shape[1], Y.shape[2]
-    K, Z = rows_of(Y[0], stages).reshape((stages, dim, lanes)), rows_of(Y[0], 1).reshape((dim, lanes))
-    for b in range(Y.shape[0]):
-        state, own, kept = Y[b], params[min(b, params.shape[0] - 1)], record[b]
-        for j in range(steps.shape[0]):
-            h = (times[j + 1] - times[j]) / max(steps[j], 1)
-            for step in range(steps[j]):
-                one_step(rhs, times[j] + step * h, h, start, stage, weight, nodes, state, own, K, Z)
-                if kept.size:
-                    observe(times[j] + (step + 1) * h, state, observer_params, kept)
-            out[b, j] = state
+    (blocks, dim, width), rows = run.Y.shape, weights.rows
+    carried, observed, whole = run.memory.shape[1] // dim, run.record.size > 0, weights.group > 0
+    group = max(weights.group, 1)
+    stages = np.empty((weights.nodes.shape[0] + 2, dim, width), run.Y.dtype)
+    lost = np.zeros(group * width, dtype=np.bool_)
+    flat = Lanes(
+        run.Y.reshape(run.Y.size),
+        run.params.reshape(run.params.size),
+        run.memory.reshape(run.memory.size),
+        lost,
+    )
+    given = run.params.shape[1] * width if run.params.shape[0] > 1 else 0
+    known, oldest, last = 0, 0, 0.0
+    for begin in range(0, blocks, group):
+        end = min(begin + group, blocks)
+        known, oldest, last = int(run.phase[0]), int(run.phase[1]), run.phase[2]
+        for j in range(run.steps.shape[0]):
+            now, taken, wanted = run.times[j], 0, run.steps[j]
+            h = (run.times[j + 1] - now) / max(wanted, 1)
+            if rows and wanted and abs(h - last) > ROUNDED_TIME * max(abs(now), abs(run.times[j + 1])):
+                known, last = 0, h
+            while taken < wanted:
+                fresh = rows > 0 and known == rows - 1  # all but the derivative at the present state
+                oldest, known = (oldest + 1) % (rows + 1) if fresh else oldest, known + fresh
+                ready, done = known >= rows, 1
+                if whole and not fresh:
+                    until = wanted if ready else min(wanted, taken + rows - 1 - known)
+                    steps = Steps(now, h, taken, taken + 1 if observed else until, begin, end, given, oldest)
+                    done = advance(flat, steps) if ready else start(flat, steps)
+                number = abs(done)
+                at = Moment(now + (taken + number - 1) * h, h, (oldest + number - 1) % (rows + 1), ready)
+                for b in range(begin, end if fresh or observed or done < 0 or not whole else begin):
+                    params = run.params[min(b, run.params.shape[0] - 1)]
+                    block = Stepped(run.Y[b], params, run.memory[b].reshape((carried, dim, width)), stages)
+                    if fresh:
+                        rhs(at.t, block.Y, stages[0], params)
+                        keep(weights, block, (oldest - 1) % (rows + 1))
+                    elif not whole:
+                        if ready and rows and taken % EVERY == 0:
+                            look(weights, block, at)
+                        step_once(rhs, weights, block, at)
+                    elif done < 0:
+                        for i in range(width):
+                            if lost[(b - begin) * width + i]:
+                                step_alone(rhs, weights, block, i, at)
+                    if observed and not fresh:
+                        observe(now + (taken + number) * h, block.Y, run.observer_params, run.record[b])
+                if not fresh:
+                    oldest, taken = (oldest + number) % (rows + 1), taken + number
+                    known = known if ready else known + number
+            for b in range(begin, end):
+                for d in range(dim):
+                    for i in range(width):
+                        run.out[b, j, d, i] = run.Y[b, d, i]
+    run.phase[0], run.phase[1], run.phase[2] = known, oldest, last
+
+
+@cache
+def drive_in(precision: str) -> Any:
+    """The driver for a precision."""
+    return drive if precision == "float64" else single(drive, driver_signature(types.float32))
+
+
+@kernel(advance_signature(types.float64))
+def no_steps(flat: Lanes, steps: Steps) -> int:
+    """Where there are no whole steps."""
+    return 0
+
+
+@cache
+def no_steps_in(precision: str) -> Any:
+    """The same for a precision."""
+    return no_steps if precision == "float64" else single(no_steps, advance_signature(types.float32))
+
+
+def _filled(rows: Sequence[Sequence[tuple[int, float]]]) -> tuple[Integers, Integers, Floats]:
+    """Where sums begin, and their rows and weights, without zeros and filled up to whole :data:`TERMS`."""
+    full = []
+    for row in rows:
+        kept = [(place, weight) for place, weight in row if weight]
+        full.append(kept + [(kept[0][0], 0.0)] * (-len(kept) % TERMS) if kept else [])
+    entries = [entry for row in full for entry in row]
+    start = np.cumsum([0, *map(len, full)], dtype=np.int64)
+    places, weights = zip(*entries, strict=True) if entries else ((), ())
+    return start, np.array(places, dtype=np.int64), np.array(weights, dtype=np.float64)
+
+
+def weights_of(
+    tableau: Tableau, predictor: Floats | None = None, corrector: Floats | None = None, group: int = 0
+) -> Weights:
+    """The weights of a Runge-Kutta method, or of an Adams method that it starts."""
+    start, row, weight = _filled([list(enumerate(line)) for line in (*tableau.a, tableau.b)])
+    explicit = np.zeros(0) if predictor is None else predictor
+    implicit = np.zeros(0) if corrector is None else corrector
+    size = explicit.size
+    padding = np.zeros(-size % TERMS)
+    past = np.concatenate([np.arange(size), padding]).astype(np.int64)
+
+    def oldest_first(weights: Floats) -> Floats:
+        return np.concatenate([weights[::-1], padding[: -weights.size % TERMS]])
+
+    return Weights(
+        start=start,
+        row=row,
+        weight=weight,
+        nodes=np.array(tableau.c, dtype=np.float64),
+        past=past,
+        predictor=oldest_first(explicit),
+        corrector=oldest_first(implicit[1:]),
+        term=oldest_first(np.array(term_weights(explicit.tolist()) if size else [], dtype=np.float64)),
+        new=float(implicit[0]) if implicit.size else 0.0,
+        rows=size,
+        group=group,
+    )
+
+
+def formula_of(tableau: Tableau, rows: int = 0) -> Formula:
+    """A Runge-Kutta method, or the starter of an Adams method with a history of so many rows."""
+    a = tuple(tuple(map(float, row)) for row in tableau.a)
+    return Formula(tableau.name, a, tuple(map(float, tableau.b)), tuple(map(float, tableau.c)), rows=rows)
+
+
+def take_steps(method: Any, rhs: Any, observe: Any, batch: Batch) -> None:
+    """Take a batch through its times with an explicit method's ``weights`` and ``formulas``."""
+    precision, rates, group = batch.Y.dtype.name, getattr(rhs, "rates", None), 0
+    advance = (no_steps_in(precision),) * 2
+    if rates is not None and batch.Y.shape[2] == VECTOR_LANES:
+        made = tuple(whole_steps(rates, formula, precision) for formula in method.formulas)
+        if None not in made:
+            advance, numbers = made, batch.Y.shape[1] * (method.carried + 2) * VECTOR_LANES
+            group = max(1, min(GROUP, GROUP_BYTES // (batch.Y.itemsize * numbers)))
+    run = Run(
+        batch.times, batch.steps, batch.params, batch.observer_params, batch.Y, batch.record, batch.out,
+        batch.memory_of(method.carried), batch.phase,
+    )  # fmt: skip
+    functions = rhs if precision == "float64" else in_single(rhs), observe, *advance
+    drive_in(precision)(*map(callee, functions), method.weights._replace(group=group), run)

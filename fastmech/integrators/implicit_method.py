@@ -30,6 +30,11 @@ class ImplicitRungeKutta(OneStep):
     second_order: bool = False
 
     @property
+    def lanes(self) -> int:
+        """Any."""
+        return 0
+
+    @property
     def carried(self) -> int:
         """The last step's increments, from which the next one's are guessed, and the sum's compensation."""
         return int(self.tableau.stages) + 1

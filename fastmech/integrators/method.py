@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from importlib import import_module
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.callee import callee
 from fastmech.integrators.batch import Batch, Floats
+from fastmech.integrators.explicit import Weights, formula_of, take_steps, weights_of
 from fastmech.integrators.multistep_weights import bashforth, moulton
 from fastmech.integrators.tableau import Tableau
+from fastmech.kernels.blocks import VECTOR_LANES
+from fastmech.kernels.whole import Formula
 
 
 class Method(Protocol):
@@ -59,22 +60,7 @@ class Method(Protocol):
         """
 
 
-def _driver(module: str, name: str, batch: Batch) -> Any:
-    """The driver of a module for the batch's precision, compiled or loaded on first use."""
-    single = batch.Y.dtype == np.float32
-    return getattr(import_module(f"fastmech.integrators.{'single' if single else module}"), name)
-
-
-class AnyWidth:
-    """A method that works on blocks of any width."""
-
-    @property
-    def lanes(self) -> int:
-        """Any."""
-        return 0
-
-
-class OneStep(AnyWidth):
+class OneStep:
     """What a Runge-Kutta method takes from its tableau, explicit or implicit."""
 
     tableau: Any
@@ -120,28 +106,28 @@ class RungeKutta(OneStep):
         """Right-hand sides that so many steps take."""
         return steps * self.tableau.stages
 
+    @property
+    def lanes(self) -> int:
+        """Those of whole steps."""
+        return VECTOR_LANES
+
+    @property
+    def formulas(self) -> tuple[Formula, Formula]:
+        """What whole steps are made from: those of the start, and the others."""
+        return (formula_of(self.tableau),) * 2
+
+    @cached_property
+    def weights(self) -> Weights:
+        """Its weights as arrays."""
+        return weights_of(self.tableau)
+
     def run(self, rhs: Any, observe: Any, batch: Batch) -> None:
         """Take a batch through its times."""
-        packed = self.tableau.packed
-        _driver("explicit", "integrate_blocks", batch)(
-            callee(rhs),
-            callee(observe),
-            packed.start,
-            packed.stage,
-            packed.weight,
-            packed.nodes,
-            batch.times,
-            batch.steps,
-            batch.params,
-            batch.observer_params,
-            batch.Y,
-            batch.record,
-            batch.out,
-        )
+        take_steps(self, rhs, observe, batch)
 
 
 @dataclass(frozen=True)
-class Adams(AnyWidth):
+class Adams:
     """An Adams method, started by a Runge-Kutta method.
 
     Explicit (Adams-Bashforth): one right-hand side a step, a history of ``order`` derivatives; error constant
@@ -182,33 +168,32 @@ class Adams(AnyWidth):
 
     @property
     def carried(self) -> int:
-        """History, and the greatest last terms of the predictor."""
-        return self.predictor.size + 1
+        """History, twice, and the greatest last terms of the predictor, see :mod:`fastmech.kernels.whole`."""
+        return 2 * self.predictor.size + 3
+
+    @property
+    def lanes(self) -> int:
+        """Those of whole steps."""
+        return VECTOR_LANES
+
+    @property
+    def formulas(self) -> tuple[Formula, Formula]:
+        """What whole steps are made from: the starter's, and its own."""
+        predictor, corrector = tuple(self.predictor.tolist()), tuple(self.corrector.tolist())
+        own = Formula(self.name, predictor=predictor, corrector=corrector, rows=len(predictor))
+        return formula_of(self.starter, len(predictor)), own
+
+    @cached_property
+    def weights(self) -> Weights:
+        """Its weights and its starter's as arrays."""
+        return weights_of(self.starter, self.predictor, self.corrector)
 
     def evaluations(self, steps: int) -> int:
-        """Right-hand sides that so many steps of equal length take, the starter's included."""
+        """Right-hand sides that so many steps of equal length take, the first and the starter's included."""
         start = min(steps, self.start_steps)
-        return start * self.starter.stages + (steps - start) * (2 if self.corrects else 1)
+        others = (steps > start) + (steps - start) * (2 if self.corrects else 1)
+        return start * self.starter.stages + others
 
     def run(self, rhs: Any, observe: Any, batch: Batch) -> None:
         """Take a batch through its times."""
-        packed = self.starter.packed
-        _driver("multistep", "integrate_multistep_blocks", batch)(
-            callee(rhs),
-            callee(observe),
-            packed.start,
-            packed.stage,
-            packed.weight,
-            packed.nodes,
-            self.predictor,
-            self.corrector,
-            batch.memory_of(self.carried),
-            batch.phase,
-            batch.times,
-            batch.steps,
-            batch.params,
-            batch.observer_params,
-            batch.Y,
-            batch.record,
-            batch.out,
-        )
+        take_steps(self, rhs, observe, batch)

@@ -53,16 +53,6 @@ def _size_and_density(tree: Tree) -> tuple[int, int]:
     return size, density * size
 
 
-@dataclass(frozen=True)
-class Packed:
-    """A tableau without its zeros, row after row (the last row holds the weights): what the driver reads."""
-
-    start: NDArray[np.int64]
-    stage: NDArray[np.int64]
-    weight: NDArray[np.float64]
-    nodes: NDArray[np.float64]
-
-
 @dataclass(frozen=True, eq=False)
 class Tableau:
     """An explicit Runge-Kutta method.
@@ -142,15 +132,3 @@ class Tableau:
         for child in tree:
             weights *= self._branch(child)
         return weights
-
-    @cached_property
-    def packed(self) -> Packed:
-        """The tableau without its zeros."""
-        rows = [*self.a, self.b]
-        entries = [[(j, w) for j, w in enumerate(row) if w != 0.0] for row in rows]
-        return Packed(
-            start=np.cumsum([0, *(len(row) for row in entries)], dtype=np.int64),
-            stage=np.array([j for row in entries for j, _ in row], dtype=np.int64),
-            weight=np.array([w for row in entries for _, w in row], dtype=np.float64),
-            nodes=np.array(self.c, dtype=np.float64),
-        )

@@ -1,4 +1,4 @@
-"""The bits of a double as an integer and back, and flags of a loop over lanes: what keeps loops packed."""
+"""What keeps loops over lanes packed: the bits of a number, flags, arrays that do not overlap."""
 
 from __future__ import annotations
 
@@ -48,6 +48,30 @@ def _from_bits(bits: Any) -> Any:
     return lambda bits: _double(bits)
 
 
+def _scale(typingctx: Any, value: Any, shifted: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        number = args[0].type
+        size, digits = (32, 23) if number == ir.FloatType() else (64, 52)
+        whole = ir.IntType(size)
+        power = builder.shl(builder.bitcast(args[1], whole), ir.Constant(whole, digits))
+        return builder.bitcast(builder.add(builder.bitcast(args[0], whole), power), number)
+
+    return value(value, value), generate
+
+
+_scaled: Any = intrinsic(_scale)
+
+
+def times_power_of_two(value: Any, shifted: Any) -> Any:
+    """``value`` 2^n; ``shifted`` is n + 1.5 2^52 (in float32 n + 1.5 2^23), which ends in the bits of n."""
+    return np.ldexp(value, np.int64(shifted - 1.5 * 2.0**52)) if np.isfinite(shifted) else value * shifted
+
+
+@overload(times_power_of_two, jit_options=INLINED, strict=False)
+def _times_power_of_two(value: Any, shifted: Any) -> Any:
+    return lambda value, shifted: _scaled(value, shifted)
+
+
 #: What a loop over lanes begins with where it asks whether any lane has something. LLVM packs as many lanes
 #: as numbers of the loop's widest type fit into a vector: a flag of 64 bits would halve loops of float32.
 NO_LANE = np.int32(0)
@@ -73,3 +97,46 @@ def noted(flag: Any, condition: Any) -> Any:
 @overload(noted, jit_options=INLINED, strict=False)
 def _noted(flag: Any, condition: Any) -> Any:
     return lambda flag, condition: _either_of(flag, condition)
+
+
+def _mark_apart(typingctx: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        for argument in builder.function.args:
+            kind = getattr(argument.type, "pointee", None)
+            if kind in (ir.DoubleType(), ir.FloatType()):
+                argument.add_attribute("noalias")
+        return context.get_dummy_value()
+
+    return types.void(), generate
+
+
+_marked_apart: Any = intrinsic(_mark_apart)
+
+
+def apart() -> None:
+    """Tell the compiler that none of the arrays of numbers overlap which a kernel is given."""
+
+
+@overload(apart, inline="always", strict=False)
+def _apart() -> Any:
+    return lambda: _marked_apart()
+
+
+def _mark_not_inlined(typingctx: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        builder.function.attributes.add("noinline")
+        return context.get_dummy_value()
+
+    return types.void(), generate
+
+
+_marked_not_inlined: Any = intrinsic(_mark_not_inlined)
+
+
+def not_inlined() -> None:
+    """Keep a function out of those that call it: what is done seldom would spoil the loop beside it."""
+
+
+@overload(not_inlined, inline="always", strict=False)
+def _not_inlined() -> Any:
+    return lambda: _marked_not_inlined()

@@ -1,130 +1,166 @@
-"""The lane loop of the equations of motion: branch-free, over contiguous rows of a small block.
+"""Right-hand sides as data, and the loop over lanes that is made from them.
 
-``lagrange_block`` and ``canonical_block`` are what every block right-hand side of the mechanism calls with
-the terms it has. Every lane has its own parameters, rows of ``mechanism.coefficients.Coefficients``: loading
-them costs nothing beside the arithmetic. Lanes whose angles exceed the range of the fast trigonometry are
-done again, one by one, with the library's functions: a lane's result never depends on its neighbours.
+What is integrated is handed over as :class:`Rates`: a function of one trajectory's numbers, and what is known
+of it. From that the package writes loops over lanes (trajectories side by side in memory): here the block
+right-hand side, in :mod:`fastmech.kernels.whole` the steps of explicit methods. They are branch-free, over
+contiguous rows of a small block, so that they become packed instructions. Lanes whose angles exceed the range
+of the packed trigonometry are done again, one by one: a lane's result never depends on its neighbours.
 """
 
 from __future__ import annotations
 
-import math
-from typing import Any
+import re
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 
-from fastmech.jit import inlined
-from fastmech.kernels.bits import NO_LANE, noted
-from fastmech.kernels.sincos import reduction_limit, sincos
-from fastmech.mechanism.equations import canonical_rates, lagrange_accelerations
+from fastmech.generated import new_module, run_module
+from fastmech.jit import observer_signature, rhs_signature, single
 
 Block = NDArray[np.float64]
 
-#: Widths of blocks are multiples of this: whole vectors of any processor, in either precision.
+#: Width of the blocks of explicit methods, of which other widths are multiples: whole vectors of any
+#: processor, in either precision.
 VECTOR_LANES = 16
 
-#: Rows of the parameters that belong to terms which a scene may lack.
-FORCE, DAMPING, DECAY = 5, 6, 7
 
+class Rates(NamedTuple):
+    """A right-hand side: rates of one trajectory's states.
 
-@inlined
-def is_beyond(Y: Block, i: int) -> bool:
-    """Whether a lane's angles exceed the range of the fast trigonometry; false for NaN."""
-    limit = reduction_limit(Y[0, i])
-    return (abs(Y[0, i]) > limit) | (abs(Y[1, i]) > limit)
+    ``functions`` gives, for the name of a module and a precision ("float64" or "float32"), what the module's
+    loops call: ``rates(t, *states, *parameters)``, a tuple, right for any finite numbers. Where ``ranged`` is
+    set also ``rates_within``, an :func:`~fastmech.kernels.attempt.attempted` one that raises in place of
+    calling the library for an angle beyond the packed range. Where ``near`` is set, one that tells instead
+    whether the lane is beyond, and gives the rates and what it keeps: with that, ``rates_near(t, *states,
+    *parameters, *before, kept)`` gives the rates close to the states ``before``, as a corrector wants them.
 
-
-@inlined
-def lane_damping(p: Block, i: int, damping: int | None) -> Any:
-    """A lane's damping, ``None`` in a kernel without damper."""
-    if damping is None:
-        return None
-    return p[damping, i]
-
-
-@inlined
-def lane_force(p: Block, i: int, force: int | None, decay: int | None, decayed: Block) -> Any:
-    """A lane's reduced force now, ``None`` in a kernel without force; ``decayed`` holds exp(-alpha t)."""
-    if force is None:
-        return None
-    if decay is None:
-        return p[force, i]
-    return p[force, i] * decayed[0, i]
-
-
-@inlined
-def write_decay(t: float, p: Block, decay: int | None, decayed: Block) -> None:
-    """Write exp(-alpha t) of every lane into the first row of ``decayed``: one call where all agree."""
-    if decay is not None:
-        differs = 0
-        for i in range(p.shape[1]):
-            differs |= p[decay, i] != p[decay, 0]
-        if differs:
-            for i in range(p.shape[1]):
-                decayed[0, i] = math.exp(-p[decay, i] * t)
-        else:
-            decayed[0] = math.exp(-p[decay, 0] * t)
-
-
-@inlined
-def lagrange_block(
-    t: float, Y: Block, dY: Block, p: Block, force: int | None, damping: int | None, decay: int | None
-) -> None:
-    """Derivatives of lanes ``Y`` = (phi, theta, phi', theta') into ``dY``; both (4, lanes), ``p`` (8, lanes).
-
-    ``force``, ``damping`` and ``decay`` are the rows of these parameters; ``None`` leaves the term out of the
-    compiled code. The first row of ``dY`` serves as scratch for the force's decay.
+    Of a ``vector`` the function is ``rates(t, y, p, found)``, with arrays of one trajectory's numbers; it
+    writes into the last one. Its blocks have one lane.
     """
-    write_decay(t, p, decay, dY)
-    beyond = NO_LANE
+
+    name: str  #: for the text of what is made; differs with the functions, or ``prints`` does
+    states: int
+    parameters: tuple[int | None, ...]  #: their rows, in the function's order; None: a term that is not there
+    functions: Callable[[str, str], dict[str, Any]]
+    prints: tuple[str, ...] = ()  #: fingerprints of the functions
+    ranged: bool = False
+    near: bool = False
+    vector: bool = False
+    looked_at: int = 0  #: first states that tell steps too large, see :mod:`fastmech.kernels.whole`
+
+    def arguments(self, t: str, states: Sequence[str], parameter: str) -> str:
+        """Text of the function's arguments; ``parameter`` is that of one, with its row as ``{}``."""
+        own = ["None" if row is None else parameter.format(row) for row in self.parameters]
+        return ", ".join([t, *states, *own])
+
+    def evaluation(self, raised: str, rates: Sequence[str], arguments: str) -> str:
+        """Text that gives the ``rates`` their values, and says whether the lane ``raised``."""
+        found = f"({', '.join(rates)},)"
+        if not self.ranged:
+            return f"{found} = rates({arguments}) + ()"  # only tuples have that, of a length known before
+        if self.near:
+            return f"{raised}, {found}, kept = rates_within({arguments})"
+        return f"{raised}, {found} = attempt(rates_within, ({arguments},))"
+
+
+_HEAD = '''"""Made by fastmech: the block right-hand side of {name}, {precision}."""
+
+import numpy as np
+from numba.core.types import {precision}
+
+from fastmech.jit import kernel, rhs_signature
+from fastmech.kernels.attempt import attempt
+from fastmech.kernels.bits import apart
+
+
+@kernel(rhs_signature({precision}))
+def {function}(t, Y, dY, p):
+    apart()
+'''
+
+_LOOP = """\
     for i in range(Y.shape[1]):
-        s1, c1 = sincos(Y[0, i])
-        s2, c2 = sincos(Y[1, i])
-        phi_dot, theta_dot = Y[2, i], Y[3, i]
-        push, damp = lane_force(p, i, force, decay, dY), lane_damping(p, i, damping)
-        beyond = noted(beyond, is_beyond(Y, i))
-        dY[0, i] = phi_dot
-        dY[1, i] = theta_dot
-        dY[2, i], dY[3, i] = lagrange_accelerations(
-            s1, c1, s2, c2, phi_dot, theta_dot, p[0, i], p[1, i], p[2, i], p[3, i], p[4, i], push, damp
-        )
-    if beyond:
-        for i in range(Y.shape[1]):
-            if is_beyond(Y, i):
-                s1, c1, s2, c2 = np.sin(Y[0, i]), np.cos(Y[0, i]), np.sin(Y[1, i]), np.cos(Y[1, i])
-                write_decay(t, p[:, i : i + 1], decay, dY[:, i : i + 1])
-                push, damp = lane_force(p, i, force, decay, dY), lane_damping(p, i, damping)
-                dY[0, i] = Y[2, i]
-                dY[2, i], dY[3, i] = lagrange_accelerations(
-                    s1, c1, s2, c2, Y[2, i], Y[3, i], p[0, i], p[1, i], p[2, i], p[3, i], p[4, i], push, damp
-                )
+        {evaluation}
+{stores}
+"""
 
-
-@inlined
-def canonical_block(
-    t: float, Y: Block, dY: Block, p: Block, force: int | None, damping: int | None, decay: int | None
-) -> None:
-    """Derivatives of lanes ``Y`` = (phi, theta, p_phi, p_theta), momenta over m2 l^2, into ``dY``.
-
-    Arguments as those of ``lagrange_block``.
-    """
-    write_decay(t, p, decay, dY)
-    beyond = NO_LANE
+#: NaN tells which lanes are to be done again; a sum over lanes would need blocks of several vectors.
+_AGAIN = """\
+        dY[0, i] = {precision}(np.nan) if raised else rate0
+    lost = 0
     for i in range(Y.shape[1]):
-        s1, c1 = sincos(Y[0, i])
-        s2, c2 = sincos(Y[1, i])
-        push, damp = lane_force(p, i, force, decay, dY), lane_damping(p, i, damping)
-        beyond = noted(beyond, is_beyond(Y, i))
-        dY[0, i], dY[1, i], dY[2, i], dY[3, i] = canonical_rates(
-            s1, c1, s2, c2, Y[2, i], Y[3, i], p[0, i], p[1, i], p[2, i], p[3, i], p[4, i], push, damp
-        )
-    if beyond:
+        lost += dY[0, i] != dY[0, i]
+    if lost:
         for i in range(Y.shape[1]):
-            if is_beyond(Y, i):
-                s1, c1, s2, c2 = np.sin(Y[0, i]), np.cos(Y[0, i]), np.sin(Y[1, i]), np.cos(Y[1, i])
-                write_decay(t, p[:, i : i + 1], decay, dY[:, i : i + 1])
-                push, damp = lane_force(p, i, force, decay, dY), lane_damping(p, i, damping)
-                dY[0, i], dY[1, i], dY[2, i], dY[3, i] = canonical_rates(
-                    s1, c1, s2, c2, Y[2, i], Y[3, i], p[0, i], p[1, i], p[2, i], p[3, i], p[4, i], push, damp
-                )
+            if dY[0, i] != dY[0, i]:
+                ({rates},) = rates({arguments}) + ()
+{again}
+"""
+
+_VECTOR = """\
+    if Y.shape[1] == 1:
+        rates(t, Y.reshape(Y.shape[0]), p.reshape(p.shape[0]), dY.reshape(Y.shape[0]))
+        return
+    y, found = np.empty(Y.shape[0], Y.dtype), np.empty(Y.shape[0], Y.dtype)
+    own = np.empty(p.shape[0], Y.dtype)
+    for i in range(Y.shape[1]):
+        for d in range(Y.shape[0]):
+            y[d] = Y[d, i]
+        for row in range(p.shape[0]):
+            own[row] = p[row, i]
+        rates(t, y, own, found)
+        for d in range(Y.shape[0]):
+            dY[d, i] = found[d]
+"""
+
+
+@cache
+def block_kernel(rates: Rates, precision: str = "float64") -> Any:
+    """``rhs(t, Y, dY, p)`` over a block of lanes, see :func:`fastmech.jit.rhs_signature`."""
+    found = [f"rate{d}" for d in range(rates.states)]
+    stores = "\n".join(f"        dY[{d}, i] = {rate}" for d, rate in enumerate(found))
+    arguments = rates.arguments("t", [f"Y[{d}, i]" for d in range(rates.states)], "p[{}, i]")
+    loop = _VECTOR if rates.vector else _LOOP + (_AGAIN if rates.ranged else "")
+    function = identifier(f"rates_of_{rates.name}")
+    text = (_HEAD + loop).format(
+        name=rates.name,
+        function=function,
+        precision=precision,
+        evaluation=rates.evaluation("raised", found, arguments),
+        rates=", ".join(found),
+        arguments=arguments,
+        stores=stores,
+        again=stores.replace("        ", " " * 16),
+    )
+    made = loops(rates, precision, text, function)
+    made.rates = rates
+    return made
+
+
+def identifier(text: str) -> str:
+    """A name for Python made from a text."""
+    return re.sub(r"\W", "_", text)
+
+
+def loops(rates: Rates, precision: str, text: str, function: str) -> Any:
+    """A function of a module's text that calls those of a right-hand side."""
+    module = new_module("loop", text, rates.prints)
+    vars(module).update(rates.functions(module.__name__, precision))
+    return getattr(run_module(module, text), function)
+
+
+@cache
+def in_single(rhs: Any) -> Any:
+    """A block right-hand side for lanes of float32, compiled when a run asks for it."""
+    rates = getattr(rhs, "rates", None)
+    return single(rhs, rhs_signature(types.float32)) if rates is None else block_kernel(rates, "float32")
+
+
+@cache
+def observer_in_single(observe: Any) -> Any:
+    """An observer for lanes of float32; its record stays float64."""
+    return single(observe, observer_signature(types.float32))

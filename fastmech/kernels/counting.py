@@ -7,8 +7,11 @@ first lane.
 from __future__ import annotations
 
 from fastmech.jit import JACOBIAN_SIGNATURE, RHS_SIGNATURE, kernel
-from fastmech.kernels.blocks import DAMPING, DECAY, FORCE, Block, lagrange_block
+from fastmech.kernels.blocks import Block
 from fastmech.kernels.jacobians import lagrange_jacobian
+from fastmech.kernels.select import with_terms
+
+_LAGRANGE = with_terms("lagrange", "damped_decaying")
 
 #: Rows of the parameters that count.
 CALLS, JACOBIANS = 8, 9
@@ -18,7 +21,7 @@ CALLS, JACOBIANS = 8, 9
 def counting_lagrange(t: float, Y: Block, dY: Block, p: Block) -> None:
     """As the kernel with damper and decaying force; counts a call."""
     p[CALLS, 0] += 1.0
-    lagrange_block(t, Y, dY, p, FORCE, DAMPING, DECAY)
+    _LAGRANGE(t, Y, dY, p)
 
 
 @kernel(JACOBIAN_SIGNATURE)

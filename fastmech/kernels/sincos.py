@@ -92,6 +92,15 @@ sincos = by_precision(sincos_double, sincos_single)
 
 
 @inlined
+def turned(s: float, c: float, d: float) -> tuple[float, float]:
+    """Sine and cosine of x + ``d`` from those of x, right to the fourth order in the small ``d`` [rad]."""
+    q = d * d
+    sine = d - d * q * rounded_to(d, 1.0 / 6.0)
+    versine = q * (rounded_to(d, 0.5) - q * rounded_to(d, 1.0 / 24.0))
+    return s + (c * sine - s * versine), c - (s * sine + c * versine)
+
+
+@inlined
 def limit_double(x: float) -> float:
     """Largest angle [rad] for which the reduction is used."""
     return REDUCTION_LIMIT

@@ -15,8 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Adams, Method, RungeKutta
-from fastmech.step_limits.circle import history_weight
-from fastmech.step_limits.many_roots import find_roots, tell_outside
 
 Floats = NDArray[np.float64]
 
@@ -57,24 +55,13 @@ def stability_function(method: Method, z: ArrayLike) -> NDArray[np.complex128]:
 
 def history_row(method: Adams, z: ArrayLike) -> NDArray[np.complex128]:
     """Weights (..., k) of the history (y_n, y_(n-1), ...) of y' = lambda y in the next y."""
-    points = np.asarray(z, dtype=np.complex128)
-    ages = range(method.predictor.size)
-    return np.stack(
-        [history_weight(points, age, method.predictor, method.corrector) for age in ages], axis=-1
-    )
-
-
-def principal_root(method: Adams, z: ArrayLike) -> NDArray[np.complex128]:
-    """The root for exp(z), of the shape of ``z``, by Newton's method from there; NaN: none is near."""
-    points = np.asarray(z, dtype=np.complex128)
-    found = np.empty((2, points.size))
-    find_roots(*_parts(points), method.predictor, method.corrector, *found)
-    return (found[0] + 1j * found[1]).reshape(points.shape)
-
-
-def _parts(points: NDArray[np.complex128]) -> tuple[Floats, Floats]:
-    """Real and imaginary parts, each in a row."""
-    return points.real.flatten(), points.imag.flatten()
+    points = np.asarray(z, dtype=np.complex128)[..., None]
+    now = np.zeros(method.predictor.size)
+    now[0] = 1.0
+    weights = points * method.predictor + now
+    if method.corrects:
+        weights = points * (method.corrector[0] * weights + method.corrector[1:]) + now
+    return np.asarray(weights)
 
 
 def companion(method: Adams, z: ArrayLike) -> NDArray[np.complex128]:
@@ -101,7 +88,23 @@ def amplifies(method: Method, z: ArrayLike, factor: ArrayLike) -> NDArray[np.boo
     if not isinstance(method, Adams):
         return np.asarray(~(np.abs(stability_function(method, z)) <= factor))  # too large for a number, too
     points = np.asarray(z, dtype=np.complex128)
-    radius = np.array(np.broadcast_to(factor, points.shape), dtype=np.float64).ravel()
-    outside = np.empty(points.size, dtype=np.bool_)
-    tell_outside(*_parts(points), radius, method.predictor, method.corrector, outside)
-    return outside.reshape(points.shape)
+    radius = np.asarray(np.broadcast_to(factor, points.shape), dtype=np.float64)[..., None]
+    return _outside(history_row(method, points) * radius ** -np.arange(1.0, method.predictor.size + 1.0))
+
+
+def _outside(weights: NDArray[np.complex128]) -> NDArray[np.bool_]:
+    """Whether x^k - w_1 x^(k-1) - ... - w_k, of weights (..., k), has a root outside the unit circle.
+
+    By Schur's recursion (Henrici, *Applied and Computational Complex Analysis I*, section 6.8): all roots lie
+    inside if the last coefficient is smaller than the first, and if so do those of the polynomial of one
+    degree less from which the last has been eliminated.
+    """
+    rest = -weights
+    outside = np.zeros(rest.shape[:-1], dtype=np.bool_)
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        while rest.shape[-1]:
+            last, rest = rest[..., -1:], rest[..., :-1]
+            size = (last * last.conj()).real
+            outside |= ~(size[..., 0] < 1.0)
+            rest = (rest - last * rest[..., ::-1].conj()) / (1.0 - size)
+    return outside

@@ -17,9 +17,8 @@ from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import potential_energy, potential_gradient, potential_hessian
 from fastmech.scene import Scene
 from fastmech.stability.arguments import require_scene
+from fastmech.stability.linearize import fill_state_matrix, small_motion
 from fastmech.step_limits.impulse import impulse_limit, impulse_ratio
-from fastmech.step_limits.limits import PASSING, TURN
-from fastmech.step_limits.local import eigenvalues, state_matrices
 from fastmech.step_limits.predict import is_stable, stable_step
 
 Floats = NDArray[np.float64]
@@ -29,6 +28,12 @@ SIDE = 24
 
 #: Angle [rad] within which eigenvalues of the same direction are told by their largest alone.
 DIRECTION = 0.03
+
+#: Growth a step that is let pass where a motion only crosses the configurations that set the limit.
+PASSING = 0.01
+
+#: Angle [rad] by which a body may turn in one step.
+TURN = 1.0
 
 #: Newton iterations from the grid to a minimum: a few are enough, flat minima take more.
 DESCENTS = 40
@@ -58,7 +63,10 @@ def _grid() -> list[Any]:
 def local_eigenvalues(scene: Scene, force: float, phi: Any, theta: Any) -> NDArray[np.complex128]:
     """Eigenvalues [1/s] of the motion linearized at rest in configurations (n,), shape (n, 4)."""
     c = reduce(scene)._replace(force=force / (scene.m2 * scene.l))
-    return eigenvalues(state_matrices(c, phi, theta))
+    matrices = np.empty((4, 4, phi.size))
+    own = c.mass, c.slider, c.lift, c.spring, c.gravity, c.force, c.damping
+    fill_state_matrix(small_motion(phi, theta, *own), matrices)
+    return np.asarray(np.linalg.eigvals(np.moveaxis(matrices, -1, 0)), dtype=np.complex128)
 
 
 def resting_eigenvalues(scene: Scene, force: float) -> NDArray[np.complex128]:
@@ -172,15 +180,14 @@ def warn_of_step(
     method: str,
     starts: ArrayLike | None = None,
     stacklevel: int = 2,
-    others: Sequence[Limit] = (),
 ) -> None:
-    """Warn, in the caller's caller, if a step cannot be right for one of some scenes, or by ``others``.
+    """Warn, in the caller's caller, if a step cannot be right for one of some scenes.
 
     Raises:
         InputError: no such method.
     """
     fastest = 0.0 if starts is None else _fastest(starts)
-    told = _told(min([*(_first_limit(scene, dt, method, fastest) for scene in scenes), *others]), dt, method)
+    told = _told(min(_first_limit(scene, dt, method, fastest) for scene in scenes), dt, method)
     if told:
         warnings.warn(told, StepWarning, stacklevel=stacklevel + 1)
 

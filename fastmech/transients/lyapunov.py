@@ -16,9 +16,11 @@ from fastmech.ensembles.problem import extreme_scenes, own_values, scene_problem
 from fastmech.ensembles.status import Status, failure_counts, failure_line
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
+from fastmech.integrators.methods import find_method
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.scene import Scene
-from fastmech.step_limits.beyond import StepJudge, StepsTaken
+from fastmech.step_limits.beyond import StepsTaken, too_long
+from fastmech.step_limits.warning import warn_of_step
 from fastmech.transients.tangent import advance_tangents
 
 Floats = NDArray[np.float64]
@@ -92,8 +94,7 @@ def largest_lyapunov(
         starts = checks.states("y0", y0, 4)
         own = own_values(parameters, scene.model_dump(), len(starts))
         problem = scene_problem(scene, len(starts), own, "lagrange")
-        judge_of_steps = StepJudge(scene, own, starts, METHOD)
-        judge_of_steps.warn(extreme_scenes(scene, own, problem), dt, t_end / dt)
+        warn_of_step(extreme_scenes(scene, own, problem), dt, METHOD, starts)
     else:
         raise InputError(f"scene = {shown(scene)}: must be a Scene or a System")
     Y = np.array(starts.T, order="C")
@@ -129,8 +130,8 @@ def largest_lyapunov(
     reached = np.where(np.isfinite(Y).all(axis=0) & np.isfinite(growth), Status.OK, Status.NOT_FINITE)
     status = judge(reached.astype(np.int8), starts, np.ascontiguousarray(Y.T), problem.coefficients)
     if isinstance(scene, Scene):
-        each = np.full(len(starts), h)
-        taken = StepsTaken(each, each, np.full(len(starts), PIECES * steps), t_end)
-        beyond = judge_of_steps.beyond(np.ascontiguousarray(Y.T), taken)
+        assert problem.coefficients is not None
+        taken = StepsTaken(np.full(len(starts), h))
+        beyond = too_long(find_method(METHOD), problem.coefficients, starts, taken)
         status[beyond & (status == Status.OK)] = Status.STEP_TOO_LARGE
     return LyapunovExponents(times[1:], exponents, status)

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 import fastmech as fm
 from fastmech.jit import compiled_anew
+from fastmech.kernels.blocks import in_single
 from fastmech.kernels.sincos import REDUCTION_LIMIT, cos, sin
-from fastmech.kernels.single import in_single
 
 Floats = NDArray[np.float64]
 

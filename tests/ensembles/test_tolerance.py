@@ -15,8 +15,9 @@ from ensembles.references import Floats, errors, motions, motions_of, rest_start
 from ensembles.starts import random_starts
 
 import fastmech as fm
-from fastmech.ensembles.richardson import ROUNDING
+from fastmech.ensembles.work_precision import ROUNDING
 from fastmech.errors import InputError
+from fastmech.integrators.methods import METHODS
 from fastmech.scene import Scene
 
 N = 24
@@ -133,17 +134,28 @@ def test_the_method_asked_for_is_kept() -> None:
 
 
 def test_what_was_chosen_is_reported() -> None:
-    """Adams methods where outputs are few, a Runge-Kutta one where they are many; float32 for quantiles."""
     scene, starts, _ = case("constant")
-    few = fm.integrate(scene, starts, 4.0, tol=1e-5)
-    assert few.method.startswith("ab")
-    many = fm.integrate(scene, starts, t_eval=np.linspace(0.0, 4.0, 201), tol=1e-5)
-    assert not many.method.startswith("ab")
+    run = fm.integrate(scene, starts, 4.0, tol=1e-5)
+    assert run.method in METHODS
+    assert run.own_dt.shape == (1, N)
+    assert run.own_steps.shape == (N,)
+    assert run.dt == run.own_dt.max()
     rough = fm.integrate(scene, starts, 4.0, tol=1e-2, quantile=0.5)
     assert rough.precision == "float32"
-    assert few.own_dt.shape == (1, N)
-    assert few.own_steps.shape == (N,)
-    assert few.dt == few.own_dt.max()
+
+
+@pytest.mark.parametrize("quantile", [0.5, 1.0])
+@pytest.mark.parametrize("formulation", ["lagrange", "hamilton"])
+def test_outputs_between_steps_are_as_accurate(quantile: float, formulation: str) -> None:
+    """801 outputs take no more steps than a few do: they are interpolated, as accurately as asked for."""
+    scene, starts, _ = case("constant")
+    times, tol = np.linspace(0.0, 4.0, 801), 1e-4
+    run = fm.integrate(scene, starts, t_eval=times, tol=tol, quantile=quantile, formulation=formulation)
+    few = fm.integrate(scene, starts, 4.0, tol=tol, quantile=quantile, formulation=formulation)
+    true = np.sort(errors(run.y, motions_of(scene, starts, times)))[math.ceil(quantile * N) - 1]
+    assert run.steps < 800
+    assert run.own_steps.sum() < 2.0 * few.own_steps.sum()
+    assert tol / 100.0 < true <= tol
 
 
 @CASES

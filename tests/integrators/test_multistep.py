@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import re
 from fractions import Fraction
 from math import factorial
 
-import llvmlite.binding as llvm
 import numpy as np
 import pytest
 from integrators.driving import A, W, counting, drive, observe_times, rotation
 from integrators.systems import Floats
-from numba import float64
 
 from fastmech.integrators.method import Adams
 from fastmech.integrators.methods import METHODS
 from fastmech.integrators.multistep_weights import bashforth, moulton
-from fastmech.integrators.sums import TERMS_OF_TWO, add_two_sums
-from fastmech.jit import INTEGERS, MATRIX, RHS_SIGNATURE, VECTOR, compiled_anew, kernel
+from fastmech.jit import RHS_SIGNATURE, kernel
 
 ADAMS = {name: method for name, method in METHODS.items() if isinstance(method, Adams)}
 EVERY_ADAMS = pytest.mark.parametrize("name", ADAMS)
@@ -156,17 +152,3 @@ def test_stability_intervals_end_where_the_registry_says(name: str, limit: float
             decay, name, np.array([[1.0]]), np.array([0.0, 1.0 * steps]), [steps], np.array([limit * factor])
         )
         assert (not abs(last[0, 0]) < 1.0) == grows
-
-
-@pytest.mark.skipif(
-    not llvm.get_host_cpu_features().get("fma", False),
-    reason="no packed fused instructions on this processor",
-)
-def test_history_sums_are_packed() -> None:
-    """A pass of one row, of two and so on to the widest, each for two sums."""
-    arguments = (*[VECTOR] * 3, MATRIX, float64, INTEGERS, VECTOR, VECTOR)
-    compiled = compiled_anew(add_two_sums, arguments)
-    code = "".join(compiled.inspect_asm().values())
-    assert len(re.findall(r"\bv(?:f?n?m(?:add|sub)\d*|mul)\w*pd\s.*%[yz]mm", code)) >= 2 * sum(
-        range(1, len(TERMS_OF_TWO) + 1)
-    )

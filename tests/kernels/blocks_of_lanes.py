@@ -8,15 +8,12 @@ import numpy as np
 from mechanism.draws import canonical_equations
 from numpy.typing import NDArray
 
-from fastmech.kernels import canonical, lagrange
+from fastmech.kernels.select import FORMULATIONS, with_terms
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import angular_accelerations, unit
 from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
-
-MODULES = {"lagrange": lagrange, "hamilton": canonical}
-PREFIX = {"lagrange": "lagrange", "hamilton": "canonical"}
 
 #: Combination of terms -> the parameters that lack what it lacks.
 TERMS: dict[str, dict[str, float]] = {
@@ -28,11 +25,11 @@ TERMS: dict[str, dict[str, float]] = {
     "damped_decaying": {},
 }
 
-COMBINATIONS = [(formulation, terms) for formulation in MODULES for terms in TERMS]
+COMBINATIONS = [(formulation, terms) for formulation in FORMULATIONS for terms in TERMS]
 
 
 def kernel(formulation: str, terms: str) -> Any:
-    return getattr(MODULES[formulation], f"{PREFIX[formulation]}_{terms}")
+    return with_terms(formulation, terms)
 
 
 def evaluate(rhs: Any, scene: Scene, Y: Floats, t: float = 0.0) -> Floats:

@@ -25,40 +25,49 @@ PROCESSORS = {
 KERNELS = {
     "lagrange float64": 60,
     "hamilton float64": 60,
-    "rk4 float64": 240,
-    "abm8 float64": 160,
     "own float64": 20,
+    "lagrange rk4 float64": 240,
+    "lagrange abm8 float64": 160,
+    "hamilton tsit5 float64": 300,
+    "own ab6 float64": 30,
     "lagrange float32": 40,
     "hamilton float32": 40,
     "own float32": 20,
+    "lagrange rk4 float32": 160,
+    "lagrange abm8 float32": 120,
+    "hamilton tsit5 float32": 200,
+    "own ab6 float32": 30,
 }
 
 SCRIPT = """
 import json
 import fastmech as fm
 from fastmech.integrators.methods import METHODS
-from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import compiled_anew
-from fastmech.kernels.canonical import canonical_damped_decaying
-from fastmech.kernels.lagrange import lagrange_damped_constant
-from fastmech.kernels.single import in_single
-from fastmech.kernels.whole_adams import whole_adams_steps
-from fastmech.kernels.whole_steps import whole_step
+from fastmech.kernels.blocks import in_single
+from fastmech.kernels.select import with_terms
+from fastmech.kernels.whole import whole_steps
 
 def pendulum(t, x, v, damping):
     return v, -damping * v - fm.sin(x)
 
 own = fm.System(pendulum, ["x", "v"], {"damping": 0.1}).kernel
-kernels = {
-    "lagrange float64": lagrange_damped_constant,
-    "hamilton float64": canonical_damped_decaying,
-    "rk4 float64": whole_step(lagrange_damped_constant, TABLEAUS["rk4"]),
-    "abm8 float64": whole_adams_steps(lagrange_damped_constant, METHODS["abm8"]),
-    "own float64": own,
-    "lagrange float32": in_single(lagrange_damped_constant),
-    "hamilton float32": in_single(canonical_damped_decaying),
-    "own float32": in_single(own),
-}
+lagrange, hamilton = with_terms("lagrange", "damped_constant"), with_terms("hamilton", "damped_decaying")
+
+def steps(rhs, method, precision):
+    return whole_steps(rhs.rates, METHODS[method].formulas[1], precision)
+
+kernels = {}
+for precision, chosen in (("float64", lambda rhs: rhs), ("float32", in_single)):
+    kernels |= {
+        "lagrange " + precision: chosen(lagrange),
+        "hamilton " + precision: chosen(hamilton),
+        "own " + precision: chosen(own),
+        "lagrange rk4 " + precision: steps(lagrange, "rk4", precision),
+        "lagrange abm8 " + precision: steps(lagrange, "abm8", precision),
+        "hamilton tsit5 " + precision: steps(hamilton, "tsit5", precision),
+        "own ab6 " + precision: steps(own, "ab6", precision),
+    }
 told = {}
 for name, kernel in kernels.items():
     told[name] = "".join(compiled_anew(kernel).inspect_asm().values())

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from kernels.blocks_of_lanes import Floats, evaluate, lanes
+from kernels.blocks_of_lanes import Floats, evaluate, kernel, lanes
 from oracles import oracle
 
 from fastmech.kernels.jacobians import canonical_jacobian, lagrange_jacobian
@@ -77,13 +77,11 @@ def test_own_decay_rates() -> None:
 
 def test_differences_of_the_block_right_hand_side() -> None:
     """The Jacobian belongs to the kernel that is integrated, row by row."""
-    from fastmech.kernels.lagrange import lagrange_damped_decaying
-
     Y, step = lanes(3), 1e-5
     found = blocks(lagrange_jacobian, SCENE, Y, 0.3)
     for column in range(4):
         ahead, behind = Y.copy(), Y.copy()
         ahead[column] += step
         behind[column] -= step
-        rates = [evaluate(lagrange_damped_decaying, SCENE, y, 0.3) for y in (ahead, behind)]
+        rates = [evaluate(kernel("lagrange", "damped_decaying"), SCENE, y, 0.3) for y in (ahead, behind)]
         np.testing.assert_allclose(found[:, :, column], ((rates[0] - rates[1]) / (2 * step)).T, atol=1e-5)

@@ -12,7 +12,7 @@ import numba
 import numpy as np
 import pytest
 from ensembles.references import errors, rest_starts
-from kernels.blocks_of_lanes import MODULES, evaluate, kernel, lanes
+from kernels.blocks_of_lanes import evaluate, kernel, lanes
 from kernels.test_compiled_code import LIBRARY, basic_blocks
 from numpy.typing import NDArray
 
@@ -22,9 +22,9 @@ from fastmech.ensembles.run import run_ensemble
 from fastmech.errors import InputError
 from fastmech.integrators.methods import METHODS
 from fastmech.jit import FLAGS
-from fastmech.kernels.select import right_hand_side
+from fastmech.kernels.blocks import in_single
+from fastmech.kernels.select import FORMULATIONS, right_hand_side
 from fastmech.kernels.sincos import REDUCTION_LIMIT_SINGLE, cos, sin, sincos
-from fastmech.kernels.single import in_single
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 
@@ -102,7 +102,7 @@ def test_beyond_the_limit_and_not_finite() -> None:
 
 
 NAMES = ("free", "damped_constant", "damped_decaying")
-KERNELS = {f"{formulation}-{terms}": (formulation, terms) for formulation in MODULES for terms in NAMES}
+KERNELS = {f"{formulation}-{terms}": (formulation, terms) for formulation in FORMULATIONS for terms in NAMES}
 SCENES = {"free": Scene(beta=0.0, F0=0.0), "damped_constant": SCENE, "damped_decaying": Scene()}
 
 

@@ -1,0 +1,420 @@
+"""Work against precision on a sample: which method, with which steps, keeps a tolerance with least work.
+
+A method of order p has errors e(h) ~ h^p (Hairer, Norsett, Wanner, *Solving ODEs I*, section II.4): two runs
+with different steps tell the error of the shorter, and how long the steps for another error must be. So a
+method of high order runs with shorter and shorter steps until its error is far below the tolerance: that is
+the reference. Other methods are compared with it, each with steps that its own error asks for. A few
+trajectories choose the method, the whole sample its steps.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.ensembles.fitting import fading_force, speed_bound, vibration_frequency
+from fastmech.ensembles.interpolation import STEPS_BETWEEN, solve_at
+from fastmech.ensembles.operations import (
+    MECHANISM,
+    VECTOR_RHS,
+    operations_of,
+    start_operations,
+    step_operations,
+)
+from fastmech.ensembles.problem import Problem
+from fastmech.ensembles.solve import Settings, Solution, distances
+from fastmech.ensembles.spans import output_steps
+from fastmech.ensembles.stiffness import explicit_limit, initial_layer
+from fastmech.integrators.implicit_method import ImplicitRungeKutta
+from fastmech.integrators.method import Method
+from fastmech.integrators.methods import find_method
+
+Floats = NDArray[np.float64]
+Members = NDArray[np.int64]
+
+#: What gives the reference, and where stability and not accuracy would set its steps.
+REFERENCE, IMPLICIT = "abm10", "radau5"
+
+#: The explicit method with the longest stable steps of high order.
+SINGLE_STEP = "dop853"
+
+#: Methods that are tried beside the reference's, by the tolerance below which they are: high orders pay where
+#: errors are to be small (Hairer, Norsett, Wanner, section II.10).
+TRIED = (
+    (1e-8, ("abm12", "dop853")),
+    (1e-5, ("abm8", "dop853")),
+    (3e-4, ("ab6", "dop853")),
+    (math.inf, ("ab6", "tsit5")),
+)
+
+#: Lengths of the steps of two runs that tell an error.
+RATIO = math.sqrt(2.0)
+
+#: Shares of the tolerance: what steps aim at, what is near enough, and the reference's error.
+AIM, NEAR, REFERRED = 0.5, 0.25, 1.0 / 16.0
+
+#: By how much steps change at most from run to run.
+LEAP = 4.0
+
+#: Steps of a run at least.
+FEWEST = 8.0
+
+#: Trajectories that choose the method: whole vectors.
+PROBE = 16
+
+#: Runs to a step that suits, and runs in vain (infinite, or an error not halved) before that is given up.
+RUNS, VAIN = 6, 3
+
+#: Operations of a run that may be in vain: about a second.
+CHEAP = 1e9
+
+#: Differences [the state's units] that may be rounding, magnified by the motion.
+ROUNDING = 1e-9
+
+#: An explicit method's steps are set by stability where its error is below this share of the tolerance, and
+#: so is it from the begin where its stable step is so many times below what accuracy may allow.
+OVERSHOT, STIFF = 1e-3, 4.0
+
+#: Step of the reference's method, times the vibrations' frequency, with an error of about 1e-6 on the
+#: mechanism: the first guess.
+GUESS, GUESSED = 0.14, 1e-6
+
+#: Steps of the first guess for a user's system, at least and at most.
+FEW_STEPS, MANY_STEPS = 64.0, 2.0**14
+
+#: Where fast motion slows down, steps are fitted again at these shares of the run.
+AGAIN = (0.0, 0.125, 0.5)
+
+LEAST_WORK = "least work at this tolerance and these output times"
+
+
+class Case(NamedTuple):
+    """Trajectories to be integrated."""
+
+    problem: Problem
+    starts: Floats
+    outputs: Floats
+    threads: int | None
+
+    def part(self, members: Members) -> Case:
+        """Some of them."""
+        return self._replace(problem=self.problem.part(members), starts=self.starts[members])
+
+
+def order_statistic(errors: Floats, level: float) -> float:
+    """The error that a share ``level`` of the trajectories does not exceed."""
+    return float(np.sort(errors)[math.ceil(level * errors.size) - 1]) if errors.size else 0.0
+
+
+def error_of_finer(distance: Floats, ratio: float, order: int) -> Floats:
+    """Errors of runs from their distances to those with steps longer by ``ratio``: Richardson.
+
+    The order is trusted up to a ratio of 2.
+    """
+    return np.asarray(distance / (min(ratio, 2.0) ** order - 1.0))
+
+
+@dataclass(frozen=True)
+class Point:
+    """A method with its steps, on a sample."""
+
+    method: Method
+    dt: float  #: step [s]
+    error: float  #: the quantile of the sample's errors
+    work: float  #: operations of a trajectory
+    good: bool  #: whether the tolerance is kept
+    limited: bool = False  #: stability, not accuracy, sets the step
+
+
+@dataclass
+class Trial:
+    """Runs of a sample by several methods, and their errors against a reference."""
+
+    case: Case
+    tol: float
+    level: float  #: the quantile of the errors that counts
+    fit: tuple[float, ...]
+    truth: Solution | None = None
+    doubt: Floats = field(default_factory=lambda: np.zeros(0))  #: errors of the reference
+    apart: Floats | None = None  #: its distances from the run before
+    refers: tuple[Method, float] | None = None  #: its method and step [s]
+    fitted: float = 1.0  #: steps of a trajectory, on average, in those of slow motion
+    _runs: dict[tuple[str, float], Solution] = field(default_factory=dict)
+
+    @property
+    def until(self) -> float:
+        """End of the run [s]."""
+        return float(self.case.outputs[-1])
+
+    @property
+    def longest(self) -> float:
+        """Step [s] at most."""
+        return self.until / FEWEST or 1.0
+
+    def settings(self, method: Method, dt: float) -> Settings:
+        """How a method runs with steps of dt [s]."""
+        c = self.case.problem.coefficients
+        early: tuple[tuple[float, float], ...] = ()
+        if c is not None:
+            early = fading_force(c, self.until)
+            if isinstance(method, ImplicitRungeKutta):
+                early += initial_layer(c, self.case.starts)
+        return Settings(method, dt, self.fit, early=early, bounded=False)
+
+    def run(self, method: Method, dt: float) -> Solution:
+        """The sample's run."""
+        if (method.name, dt) not in self._runs:
+            problem, starts, outputs, threads = self.case
+            run = solve_at(problem, starts, outputs, self.settings(method, dt), threads)
+            self._runs[method.name, dt] = run
+            if self.fit and self.until and len(starts):
+                self.fitted = max(float(run.steps.mean()) * dt / self.until, 1.0)
+        return self._runs[method.name, dt]
+
+    def work(self, method: Method, dt: float) -> float:
+        """Operations of a trajectory with steps of dt [s]."""
+        problem, starts, outputs, _ = self.case
+        operations, dim = operations_of_problem(problem, starts), starts.shape[1]
+        intervals = np.diff(outputs, prepend=0.0)
+        steps = np.maximum(output_steps(np.concatenate([[0.0], outputs]), dt), 1)
+        taken, starts_anew = float(steps[intervals > 0.0].sum()), 1.0
+        if outputs.size * STEPS_BETWEEN * dt > self.until:
+            taken = self.until / dt
+        elif outputs.size > 1:
+            lengths = intervals / steps
+            starts_anew += np.count_nonzero(~np.isclose(lengths[1:], lengths[:-1], rtol=1e-9))
+        own = step_operations(method, operations, dim)
+        return taken * self.fitted * own + starts_anew * start_operations(method, operations, dim)
+
+    def typical(self, errors: Floats) -> float:
+        """The quantile that counts; of those that have a reference where it is not known of all."""
+        found = order_statistic(errors, self.level)
+        known = np.isfinite(errors) & (self.doubt <= self.tol)
+        return found if np.isfinite(found) or not known.any() else order_statistic(errors[known], self.level)
+
+    def errors(self, method: Method, dt: float) -> Floats:
+        """Against the reference (n,)."""
+        assert self.truth is not None
+        found = distances(self.run(method, dt), self.truth)
+        return np.where(self.doubt <= self.tol, found, np.inf)
+
+    def refer(self, method: Method, dt: float) -> bool:
+        """Find a reference with steps from dt [s] on; whether it is good enough for the sample's quantile.
+
+        Where nothing converges, or another method's reference is there, no run of more than :data:`CHEAP`
+        operations begins. What is kept is the run in which most trajectories have converged.
+        """
+        goal, p, n = REFERRED * self.tol, method.order, max(len(self.case.starts), PROBE)
+        kept = int(np.count_nonzero(self.doubt <= goal)) if self.refers else -1
+        dt, before, vain, ratio = min(dt, self.longest), math.inf, 0, RATIO
+        if self.refers is not None and n * self.work(method, dt) > CHEAP:
+            return False
+        last = self.run(method, dt)
+        while not vain or n * self.work(method, dt / ratio) <= CHEAP:
+            dt /= ratio
+            finer = self.run(method, dt)
+            distance = distances(last, finer)
+            doubt, apart = error_of_finer(distance, ratio, p), order_statistic(distance, self.level)
+            found, settled = order_statistic(doubt, self.level), int(np.count_nonzero(doubt <= goal))
+            if settled > kept or (settled == kept and apart < before):
+                self.truth, self.doubt, self.apart = finer, doubt, distance
+                self.refers, kept = (method, dt), settled
+            if found <= goal or (apart < ROUNDING and apart > 0.5 * before):
+                return True
+            vain = vain + 1 if not apart <= 0.5 * before else 0
+            if vain >= (VAIN if np.isfinite(found) else 2 * VAIN):
+                break
+            before, last, ratio = apart, finer, LEAP
+            if np.isfinite(found):
+                ratio = RATIO if vain else min(max((found / goal) ** (1.0 / p) * 1.05, RATIO), LEAP)
+        return False
+
+    def tune(self, method: Method, dt: float, near: float) -> Point:
+        """The step with which a method's error is between ``near`` times the tolerance and it."""
+        good: tuple[float, float] | None = None
+        bad, best, dt = math.inf, (math.inf, dt), min(dt, self.longest)
+        before, vain = math.inf, 0
+        for _ in range(RUNS):
+            found = self.typical(self.errors(method, dt))
+            best = min(best, (found, dt))
+            wanted = 1.0 / LEAP
+            if found < math.inf:
+                wanted = (AIM * self.tol / max(found, 1e-300)) ** (1.0 / method.order)
+                wanted = min(max(wanted, 1.0 / LEAP), LEAP)
+            if found <= self.tol:
+                good = (dt, found) if good is None or dt > good[0] else good
+                if found >= near * self.tol or dt >= self.longest or bad <= 1.2 * dt:
+                    break
+                dt = min(dt * wanted, self.longest, math.sqrt(dt * bad))
+            else:
+                vain = vain + 1 if good is None and bad < math.inf and found > 0.5 * before else 0
+                before, bad = found, min(bad, dt)
+                dear = max(len(self.case.starts), PROBE) * self.work(method, dt) > CHEAP
+                if vain > (not dear) or (good is not None and bad <= 1.2 * good[0]):
+                    break
+                dt *= 1.0 / RATIO if vain else min(wanted, 0.9)
+                dt = dt if good is None else max(dt, math.sqrt(good[0] * bad))
+        error, dt = best if good is None else (good[1], good[0])
+        limited = good is not None and error < OVERSHOT * self.tol and bad < math.inf
+        return Point(method, dt, error, self.work(method, dt), good is not None, limited)
+
+    def nearest(self) -> float:
+        """Step [s] of the reference's method that the error of one of its runs asks for."""
+        assert self.refers is not None
+        method, dt = self.refers
+        steps = [step for name, step in self._runs if name == method.name and step > dt]
+        errors = {step: self.typical(self.errors(method, step)) for step in steps}
+        known = {step: error for step, error in errors.items() if 0.0 < error < math.inf}
+        if not known:
+            return dt * (AIM / REFERRED) ** (1.0 / method.order)
+        step = min(known, key=lambda step: abs(math.log(known[step] / (AIM * self.tol))))
+        if NEAR * self.tol <= known[step] <= self.tol:
+            return step
+        return step * min(max((AIM * self.tol / known[step]) ** (1.0 / method.order), 1.0 / LEAP), LEAP)
+
+    def predicted(self, point: Point) -> Point:
+        """With the step that the point's error asks for, if that is near."""
+        if point.limited or not 0.0 < point.error < math.inf:
+            return point
+        factor = (AIM * self.tol / point.error) ** (1.0 / point.method.order)
+        dt = min(point.dt * min(max(factor, 0.5), 1.5), self.longest)
+        return Point(point.method, dt, point.error, self.work(point.method, dt), point.good)
+
+
+class Chosen(NamedTuple):
+    """A method and its steps for a tolerance."""
+
+    settings: Settings
+    reason: str  #: why, one line
+    trial: Trial  #: the whole sample's runs
+
+
+def operations_of_problem(problem: Problem, starts: Floats) -> float:
+    """Operations of a right-hand side."""
+    if problem.system is None or not len(starts):
+        return MECHANISM
+    if problem.system.vector:
+        return VECTOR_RHS * starts.shape[1]
+    values = [float(column.flat[0]) for column in problem.params.columns]
+    named = dict(zip(problem.system.parameters, values, strict=True))
+    own = [named[name] for name in problem.system.parameter_order]
+    return operations_of(problem.system.rhs, [0.0, *starts[0].tolist(), *own])  # type: ignore[arg-type]
+
+
+def choose(case: Case, tol: float, level: float, method: str | None, truth: Solution | None) -> Chosen:
+    """The method and the step with which the quantile ``level`` of a sample's errors is within ``tol``.
+
+    ``method`` is kept if given; ``truth`` is the sample's, if it is known from elsewhere.
+    """
+    fit = _fit(case)
+    few = np.unique(np.linspace(0, len(case.starts) - 1, PROBE).astype(np.int64))
+    small = len(case.starts) <= 2 * PROBE
+    probe = Trial(case if small else case.part(few), tol, level, fit)
+    points = _points(probe, None if method is None else find_method(method))
+    best = min(points, key=lambda point: (not point.good, point.work if point.good else point.error))
+    whole = probe
+    if not small:
+        whole = Trial(case, tol, level, fit)
+        finer = min((REFERRED / AIM) ** (1.0 / best.method.order), 1.0 / RATIO)
+        whole.truth, whole.doubt = whole.run(best.method, finer * best.dt), np.zeros(len(case.starts))
+    if truth is not None:
+        whole.truth, whole.doubt = truth, np.zeros(len(case.starts))
+    if best.error < math.inf and not best.limited and not (small and NEAR * tol <= best.error <= tol):
+        best = whole.tune(best.method, probe.predicted(best).dt, NEAR)
+    reason = "as asked for" if method is not None else _reason(best, points, tol)
+    return Chosen(whole.settings(best.method, best.dt), reason, whole)
+
+
+def _points(probe: Trial, asked: Method | None) -> list[Point]:
+    """Methods and their steps on the trajectories that choose."""
+    explicit, implicit = find_method(REFERENCE), find_method(IMPLICIT)
+    c, dt, limit = probe.case.problem.coefficients, _guess(probe.case, probe.tol), math.inf
+    if c is not None and len(probe.case.starts):
+        limit = explicit_limit(explicit, c) / RATIO
+    if isinstance(asked, ImplicitRungeKutta):
+        implicit = asked
+    stiff = STIFF * limit < dt or implicit is asked
+    base = implicit if stiff else explicit
+    if not probe.refer(base, dt if stiff else min(dt, limit)) and not stiff and np.isinf(probe.doubt).all():
+        probe.refer(implicit, dt)
+    assert probe.refers is not None
+    if not (probe.doubt <= probe.tol).any():  # nothing converges
+        base, dt = probe.refers if asked is None else (asked, probe.refers[1])
+        return [Point(base, dt, math.inf, probe.work(base, dt), False)]
+    base, step = probe.refers[0], probe.nearest()
+    if asked is not None:
+        equal = 1.0 if base is asked else probe.work(asked, step) / max(probe.work(base, step), 1.0)
+        return [probe.tune(asked, step * equal, 0.5 * NEAR)]
+    points = [probe.tune(base, step, 0.5 * NEAR)]
+    best = probe.predicted(points[0])
+    single_step = find_method(SINGLE_STEP)
+    if base is implicit:
+        limit = math.inf if c is None else explicit_limit(single_step, c) / RATIO
+        cheap = limit < math.inf and probe.work(single_step, limit) < best.work
+        return [*points, probe.tune(single_step, limit, 0.5 * NEAR)] if cheap else points
+    if points[0].limited:
+        dt = LEAP * points[0].dt
+        return [*points, *(probe.tune(method, dt, 0.5 * NEAR) for method in (single_step, implicit))]
+    for name in next(names for above, names in TRIED if probe.tol < above) if best.good else ():
+        method = find_method(name)
+        # With as much work as the reference's method, to begin with.
+        equal = probe.work(method, best.dt) / max(best.work, 1.0)
+        points.append(probe.predicted(probe.tune(method, best.dt * equal, 0.5 * NEAR)))
+    return points
+
+
+def _reason(best: Point, points: list[Point], tol: float) -> str:
+    """Why a method was chosen, in one line; where stability sets its step, that too."""
+    name, dt = best.method.name, best.dt
+    if not best.good:
+        return "nearest to a tolerance that no method tried has kept"
+    others = {isinstance(p.method, ImplicitRungeKutta): p for p in points if p.method is not best.method}
+    if isinstance(best.method, ImplicitRungeKutta):
+        if False in others:
+            beside = others[False]
+            return f"stability keeps {beside.method.name} to {beside.dt:.1g} s, accuracy allows {dt:.1g} s"
+        return f"stability would set an explicit method's step, accuracy allows {dt:.1g} s"
+    if not best.limited:
+        return LEAST_WORK
+    kept = f"least work, though stability keeps {name} to {dt:.2g} s"
+    if True in others:
+        beside = others[True]
+        ratio = beside.work / best.work
+        return (
+            f"{kept}: accuracy allows {beside.method.name} {beside.dt:.2g} s, at {ratio:.2g} times the work"
+        )
+    allowed = dt * (tol / max(best.error, 1e-30)) ** (1.0 / best.method.order)
+    return f"{kept}: accuracy would allow {allowed:.2g} s"
+
+
+def _fit(case: Case) -> tuple[float, ...]:
+    """When to fit steps [s]: never for a user's system, again later where the motion begins fast."""
+    c = case.problem.coefficients
+    if c is None or not len(case.starts):
+        return ()
+    fast = np.median(speed_bound(c, case.starts) / vibration_frequency(c)) > 2.0
+    return tuple(share * float(case.outputs[-1]) for share in (AGAIN if fast else AGAIN[:1]))
+
+
+def _guess(case: Case, tol: float) -> float:
+    """Step [s] of the reference's method that accuracy may allow.
+
+    For a user's system the time in which it would move as far as its starts are from zero.
+    """
+    problem, starts, outputs, _ = case
+    c, t_end = problem.coefficients, float(outputs[-1])
+    order = find_method(REFERENCE).order
+    if c is not None:
+        return GUESS * (tol / GUESSED) ** (1.0 / order) / float(np.max(vibration_frequency(c)))
+    Y = starts.T.copy()
+    rates = np.zeros_like(Y)
+    problem.rhs(0.0, Y, rates, problem.params.block(Y.shape[1]))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        times = np.abs(Y).max(axis=0) / np.abs(rates).max(axis=0)
+    times = times[np.isfinite(times) & (times > 0.0)]
+    longest, shortest = t_end / FEW_STEPS, t_end / MANY_STEPS
+    return float(np.clip(np.median(times), shortest, longest)) if times.size else longest
