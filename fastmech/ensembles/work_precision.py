@@ -310,7 +310,7 @@ def choose(case: Case, tol: float, level: float, method: str | None, truth: Solu
 
     ``method`` is kept if given; ``truth`` is the sample's, if it is known from elsewhere.
     """
-    fit = _fit(case)
+    fit = times_to_fit(case)
     few = np.unique(np.linspace(0, len(case.starts) - 1, PROBE).astype(np.int64))
     small = len(case.starts) <= 2 * PROBE
     probe = Trial(case if small else case.part(few), tol, level, fit)
@@ -332,7 +332,7 @@ def choose(case: Case, tol: float, level: float, method: str | None, truth: Solu
 def _points(probe: Trial, asked: Method | None) -> list[Point]:
     """Methods and their steps on the trajectories that choose."""
     explicit, implicit = find_method(REFERENCE), find_method(IMPLICIT)
-    c, dt, limit = probe.case.problem.coefficients, _guess(probe.case, probe.tol), math.inf
+    c, dt, limit = probe.case.problem.coefficients, first_guess(probe.case, probe.tol), math.inf
     if c is not None and len(probe.case.starts):
         limit = explicit_limit(explicit, c) / RATIO
     if isinstance(asked, ImplicitRungeKutta):
@@ -391,7 +391,7 @@ def _reason(best: Point, points: list[Point], tol: float) -> str:
     return f"{kept}: accuracy would allow {allowed:.2g} s"
 
 
-def _fit(case: Case) -> tuple[float, ...]:
+def times_to_fit(case: Case) -> tuple[float, ...]:
     """When to fit steps [s]: never for a user's system, again later where the motion begins fast."""
     c = case.problem.coefficients
     if c is None or not len(case.starts):
@@ -400,7 +400,7 @@ def _fit(case: Case) -> tuple[float, ...]:
     return tuple(share * float(case.outputs[-1]) for share in (AGAIN if fast else AGAIN[:1]))
 
 
-def _guess(case: Case, tol: float) -> float:
+def first_guess(case: Case, tol: float) -> float:
     """Step [s] of the reference's method that accuracy may allow.
 
     For a user's system the time in which it would move as far as its starts are from zero.
