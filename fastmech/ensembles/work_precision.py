@@ -213,13 +213,17 @@ class Trial:
         dt, before, vain, ratio = min(dt, self.longest), math.inf, 0, RATIO
         if self.refers is not None and n * self.work(method, dt) > CHEAP:
             return False
-        last = self.run(method, dt)
+        last, finite = self.run(method, dt), np.zeros(len(self.case.starts), dtype=np.bool_)
         while not vain or n * self.work(method, dt / ratio) <= CHEAP:
             dt /= ratio
             finer = self.run(method, dt)
             distance = distances(last, finer)
-            doubt, apart = error_of_finer(distance, ratio, p), order_statistic(distance, self.level)
-            found, settled = order_statistic(doubt, self.level), int(np.count_nonzero(doubt <= goal))
+            doubt, ended = error_of_finer(distance, ratio, p), np.isfinite(distance)
+            # Who is infinite again, though steps are shorter, is so by its motion.
+            counts = ended if ended.any() and np.array_equal(ended, finite) else np.ones_like(ended)
+            finite = ended
+            found, apart = (order_statistic(values[counts], self.level) for values in (doubt, distance))
+            settled = int(np.count_nonzero(doubt <= goal))
             if settled > kept or (settled == kept and apart < before):
                 self.truth, self.doubt, self.apart = finer, doubt, distance
                 self.refers, kept = (method, dt), settled
