@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from fastmech.basins.shock_limit import impulse_start, shock_limit
     from fastmech.basins.snapping import critical_forces, map_snapping
     from fastmech.basins.status import BasinStatus
+    from fastmech.bench.frontier import work_precision
     from fastmech.capture.barriers import barrier_tree
     from fastmech.capture.certificate import trapped
     from fastmech.disturbance.linear_range import linear_range
@@ -118,6 +119,7 @@ _MODULES = {
     "uncertainty_exponent": "fastmech.basins.measures.uncertainty",
     "wada_merge_test": "fastmech.basins.measures.wada",
     "wilson": "fastmech.basins.measures.fractions",
+    "work_precision": "fastmech.bench.frontier",
 }
 
 __all__ = [
@@ -175,6 +177,7 @@ __all__ = [
     "uncertainty_exponent",
     "wada_merge_test",
     "wilson",
+    "work_precision",
 ]
 
 

@@ -145,7 +145,7 @@ def test_a_second_process_loads_every_kernel() -> None:
     run(LOAD_ALL)
     second = run(LOAD_ALL)
     assert len(second) >= 15
-    assert "fastmech.integrators.explicit.integrate_blocks" in second
+    assert "fastmech.integrators.explicit.drive" in second
     for name, (path, hits, misses) in second.items():
         assert (hits, misses) == (1, 0), name
         assert Path(path).is_relative_to(kernel_cache.cache_directory()), name

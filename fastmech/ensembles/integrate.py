@@ -150,7 +150,7 @@ def integrate(
     """
     outputs = _output_times(t_end, t_eval)
     checks.progress_function(progress, "trajectories")
-    starts, problem, own = _problem(scene, y0, {} if parameters is None else parameters, formulation)
+    starts, problem, own = problem_of(scene, y0, {} if parameters is None else parameters, formulation)
     fitted_at = _fit_times(fit, scene, outputs[-1])
     kept = starts.shape[1] * (outputs.size + max(len(fitted_at) - 1, 0) + problem.canonical)
     beside = BESIDE + OWN * sum(column.ndim for column in problem.params.columns)
@@ -260,7 +260,7 @@ def _output_times(t_end: float | None, t_eval: ArrayLike | None) -> NDArray[np.f
     return outputs
 
 
-def _problem(
+def problem_of(
     scene: Scene | System, y0: ArrayLike, parameters: Mapping[str, ArrayLike], formulation: str | None
 ) -> tuple[NDArray[np.float64], Problem, dict[str, NDArray[np.float64]]]:
     """Checked starts, what to integrate from them, and a scene's parameters that differ between them."""

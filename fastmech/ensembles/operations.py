@@ -19,6 +19,10 @@ MECHANISM = 110.0
 #: Operations of a right-hand side that takes arrays, for each state: they are not counted.
 VECTOR_RHS = 10.0
 
+#: Operations that a product with a row of an Adams method's history takes the time of: it lies in memory. Of
+#: ``fm.work_precision``'s rates on Henon and Heiles' system and on the mechanism, beside ``dop853``'s.
+HISTORY = 1.7
+
 #: Operations that a division, and a function such as sine or root, take the time of.
 DIVISION, FUNCTION = 5.0, 20.0
 
@@ -96,7 +100,7 @@ def step_operations(method: Method, operations: float, dim: int) -> float:
         return IMPLICIT_STEP * operations
     if isinstance(method, Adams):
         sums = 2 if method.corrects else 1
-        return sums * (operations + method.rows * dim)
+        return sums * (operations + HISTORY * method.rows * dim)
     tableau: Any = getattr(method, "tableau")  # noqa: B009
     weights = sum(1 for row in (*tableau.a, tableau.b) for weight in row if weight)
     return float(tableau.stages * operations + weights * dim)

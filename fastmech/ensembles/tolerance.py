@@ -195,7 +195,7 @@ def _estimated(
 ) -> Estimated:
     """The same of starts ``who`` whose motions steps can follow; ``asked``: tolerance, quantile, method."""
     tol, quantile, method = asked
-    members = _sample(case, who, min(max(who.size // SHARE_OF_ALL, LEAST_SAMPLE), SAMPLE))
+    members = evenly(case, who, min(max(who.size // SHARE_OF_ALL, LEAST_SAMPLE), SAMPLE))
     sample, truth = case.part(members), None
     if switches is not None and quantile < 1.0:
         truth, _, _ = follow_to_tolerance(
@@ -226,7 +226,7 @@ def _once(
     """
     (tol, quantile), (members, found) = wanted, chosen
     settings = found.settings
-    pilot, p = _sample(case, who, PILOT), settings.method.order
+    pilot, p = evenly(case, who, PILOT), settings.method.order
     part, n = case.part(pilot), pilot.size
     best: tuple[float, Runs] | None = None
     for _ in range(1 if known else PILOTS):
@@ -422,7 +422,7 @@ class Runs:
         return missed_line(missed, causes)
 
 
-def _sample(case: Case, usable: Members, size: int) -> Members:
+def evenly(case: Case, usable: Members, size: int) -> Members:
     """Evenly spaced groups of the trajectories, sorted by what bounds their speed."""
     size = size // NEIGHBOURS * NEIGHBOURS
     if usable.size <= size:

@@ -213,13 +213,17 @@ class Trial:
         dt, before, vain, ratio = min(dt, self.longest), math.inf, 0, RATIO
         if self.refers is not None and n * self.work(method, dt) > CHEAP:
             return False
-        last = self.run(method, dt)
+        last, finite = self.run(method, dt), np.zeros(len(self.case.starts), dtype=np.bool_)
         while not vain or n * self.work(method, dt / ratio) <= CHEAP:
             dt /= ratio
             finer = self.run(method, dt)
             distance = distances(last, finer)
-            doubt, apart = error_of_finer(distance, ratio, p), order_statistic(distance, self.level)
-            found, settled = order_statistic(doubt, self.level), int(np.count_nonzero(doubt <= goal))
+            doubt, ended = error_of_finer(distance, ratio, p), np.isfinite(distance)
+            # Who is infinite again, though steps are shorter, is so by its motion.
+            counts = ended if ended.any() and np.array_equal(ended, finite) else np.ones_like(ended)
+            finite = ended
+            found, apart = (order_statistic(values[counts], self.level) for values in (doubt, distance))
+            settled = int(np.count_nonzero(doubt <= goal))
             if settled > kept or (settled == kept and apart < before):
                 self.truth, self.doubt, self.apart = finer, doubt, distance
                 self.refers, kept = (method, dt), settled
@@ -310,7 +314,7 @@ def choose(case: Case, tol: float, level: float, method: str | None, truth: Solu
 
     ``method`` is kept if given; ``truth`` is the sample's, if it is known from elsewhere.
     """
-    fit = _fit(case)
+    fit = times_to_fit(case)
     few = np.unique(np.linspace(0, len(case.starts) - 1, PROBE).astype(np.int64))
     small = len(case.starts) <= 2 * PROBE
     probe = Trial(case if small else case.part(few), tol, level, fit)
@@ -332,7 +336,7 @@ def choose(case: Case, tol: float, level: float, method: str | None, truth: Solu
 def _points(probe: Trial, asked: Method | None) -> list[Point]:
     """Methods and their steps on the trajectories that choose."""
     explicit, implicit = find_method(REFERENCE), find_method(IMPLICIT)
-    c, dt, limit = probe.case.problem.coefficients, _guess(probe.case, probe.tol), math.inf
+    c, dt, limit = probe.case.problem.coefficients, first_guess(probe.case, probe.tol), math.inf
     if c is not None and len(probe.case.starts):
         limit = explicit_limit(explicit, c) / RATIO
     if isinstance(asked, ImplicitRungeKutta):
@@ -391,7 +395,7 @@ def _reason(best: Point, points: list[Point], tol: float) -> str:
     return f"{kept}: accuracy would allow {allowed:.2g} s"
 
 
-def _fit(case: Case) -> tuple[float, ...]:
+def times_to_fit(case: Case) -> tuple[float, ...]:
     """When to fit steps [s]: never for a user's system, again later where the motion begins fast."""
     c = case.problem.coefficients
     if c is None or not len(case.starts):
@@ -400,7 +404,7 @@ def _fit(case: Case) -> tuple[float, ...]:
     return tuple(share * float(case.outputs[-1]) for share in (AGAIN if fast else AGAIN[:1]))
 
 
-def _guess(case: Case, tol: float) -> float:
+def first_guess(case: Case, tol: float) -> float:
     """Step [s] of the reference's method that accuracy may allow.
 
     For a user's system the time in which it would move as far as its starts are from zero.

@@ -84,17 +84,19 @@ def test_wrong_arguments() -> None:
 
 
 def test_motions_that_fail_have_a_status() -> None:
-    """Two fail, one of them at the start; a step beyond the limit is warned of and has a status."""
+    """Two fail, one of them at the start; steps too long are warned of; what shows has a status."""
     starts = [[0.9, 0.4, 0.0, 0.0], [np.nan, 0.0, 0.0, 0.0], [0.0, 0.0, 1e200, 0.0]]
     found = largest_lyapunov(CONSERVATIVE, starts, 1.0)
     assert found.status.tolist() == [fm.Status.OK, fm.Status.START_NOT_FINITE, fm.Status.NOT_FINITE]
     assert np.isfinite(found.largest).tolist() == [True, False, False]
     assert "2 of 3 trajectories failed: 1 not_finite, 1 start_not_finite" in repr(found)
     with pytest.warns(fm.StepWarning, match=r"too long for dop853 here"):
-        beyond = largest_lyapunov(fm.Scene(alpha=0.0, beta=1e4), [0.8, -1.4, 0.0, 0.0], 0.5, 0.02)
-    assert beyond.status.tolist() == [fm.Status.STEP_TOO_LARGE]
-    assert np.isfinite(beyond.largest).all()
-    assert beyond.failures
+        largest_lyapunov(fm.Scene(alpha=0.0, beta=1e4), [0.8, -1.4, 0.0, 0.0], 0.5, 0.02)
+    with pytest.warns(fm.StepWarning, match=r"too long for dop853 here"):
+        turning = largest_lyapunov(CONSERVATIVE, [0.9, 0.4, 30.0, 0.0], 0.5, 0.05)
+    assert turning.status.tolist() == [fm.Status.STEP_TOO_LARGE]
+    assert np.isfinite(turning.largest).all()
+    assert turning.failures
 
 
 @pytest.mark.parametrize("change", [{}, {"beta": 0.0}, {"c1": 294.9, "c2": 92.85, "F0": 85.3}])

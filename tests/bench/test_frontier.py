@@ -1,0 +1,53 @@
+"""Speed against error of methods on a problem of one's own."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from ensembles.references import errors, motions_of, rest_starts
+
+import fastmech as fm
+
+
+def oscillate(t: float, x: float, v: float) -> tuple[float, float]:
+    return v, -x
+
+
+def test_errors_are_those_of_the_call_to_copy() -> None:
+    """Against the closed form: a unit oscillator turns its state."""
+    system, starts = fm.System(oscillate, ["x", "v"], {}), np.random.default_rng(0).normal(size=(40, 2))
+    found = fm.work_precision(system, starts, 20.0, errors=[1e-3, 1e-6], methods=["rk4", "dop853", "abm8"])
+    assert {point.method for point in found.points} == {"rk4", "dop853", "abm8"}
+    c, s = np.cos(20.0), np.sin(20.0)
+    right = starts @ np.array([[c, -s], [s, c]])
+    for point in found.points:
+        run = fm.integrate(system, starts, 20.0, dt=point.dt, method=point.method)
+        assert errors(run.y, right[None]).max() == pytest.approx(point.largest, rel=0.1)
+        assert point.error_99 <= point.largest
+    for error, point in zip(found.errors, found.frontier, strict=True):
+        assert point.rate == max(p.rate for p in found.points if p.largest <= error)
+    scope = {"fm": fm, "problem": system, "starts": starts, "t_end": 20.0}
+    assert errors(eval(found.call(1e-5), scope).y, right[None]).max() <= 1.1e-5
+    with pytest.raises(fm.InputError, match="no method keeps it"):
+        found.call(1e-14)
+    assert str(found).count("\n") < 6
+
+
+def test_a_scene_s_steps_are_fitted_and_a_picture_is_drawn() -> None:
+    scene, starts = fm.Scene(alpha=0.0), rest_starts(24)
+    found = fm.work_precision(scene, starts, 2.0, errors=[1e-5], methods=["abm8", "tsit5"])
+    assert found.fit
+    run = eval(found.call(1e-5), {"fm": fm, "problem": scene, "starts": starts, "t_end": 2.0})
+    assert errors(run.y, motions_of(scene, starts, [2.0])).max() <= 1.1e-5
+    ax = found.plot()
+    assert "largest error" in ax.get_xlabel()
+    assert {line.get_label() for line in ax.get_lines()} >= {"abm8", "tsit5"}
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [({"errors": []}, "errors: must not be empty"), ({"methods": ["rk5"]}, "method = 'rk5': unknown")],
+)
+def test_wrong_arguments(change: dict[str, object], message: str) -> None:
+    with pytest.raises(fm.InputError, match=message):
+        fm.work_precision(fm.Scene(), rest_starts(2), 1.0, **change)  # type: ignore[arg-type]
