@@ -75,9 +75,6 @@ BUDGET, CHEAP = 4.0, 1e6
 #: Share of the tolerance up to which a measured error keeps it: distances are nearly errors.
 KEPT = 0.9
 
-#: How much larger than any in the sample the ratio of an error to the distance of two runs may be.
-SAFE = 4.0
-
 #: Runs agree with what the order says of their errors within this factor.
 AS_SAID = 8.0
 
@@ -294,7 +291,6 @@ class Runs:
         self.order = settings.method.order
         self.dt = np.full(n, float(settings.dt))
         self.share = float(error_of_finer(np.ones(1), RATIO, self.order)[0])
-        self.bound = 1.0  #: errors over the distance of two runs, at most
         self.error = np.full(n, np.inf)  #: estimates
         self.measured = np.zeros(n, dtype=np.bool_)  #: told by a run with shorter steps
         self.floor = np.full(n, np.nan)  #: errors that rounding makes, where that has been asked
@@ -327,7 +323,6 @@ class Runs:
             far = told & (apart >= np.median(apart[told]))
             seen = float(np.median(right[far] / apart[far]))
             self.share = min(max(seen, self.share / AS_SAID), 1.0)
-            self.bound = min(SAFE * float(np.max(right[far] / apart[far])), 1.0)
             self.error[self.who] = self.share * self.apart[self.who]
         if found.trial.apart is not None:
             sure = found.trial.apart[known] <= self.tol
@@ -338,11 +333,11 @@ class Runs:
         """Run those again whose errors may exceed the tolerance; what is said about those that do.
 
         Two runs that lie apart by no more than the tolerance keep it, whatever the order. Else it takes an
-        order that the second does, and single trajectories show less of it than most: where the sample's
-        worst would miss the tolerance, a third run measures the error.
+        order that the second does, and single trajectories show less of it than most: a third run measures
+        the error.
         """
         for _ in range(ROUNDS):
-            doubtful = ~(np.fmax(self.error, self.bound * self.apart) <= self.tol) & ~self.measured
+            doubtful = ~(np.fmax(self.error, self.apart) <= self.tol) & ~self.measured
             again = self.who[(doubtful & (self.vain < 2) & ~self.unpaid & ~self.rounded)[self.who]]
             if not self.measure(again):
                 break
@@ -390,7 +385,7 @@ class Runs:
         bad = again[~good]
         put_into(self.kept, bad, part_of(run, ~good))
         self.error[bad], self.dt[bad] = now[~good], own[~good]
-        self.apart[bad] = apart[~good] / self.bound  # of these steps the sample tells nothing
+        self.apart[bad] = apart[~good]
         return True
 
     def _ask_rounding(self, who: Members) -> None:
