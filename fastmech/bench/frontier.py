@@ -13,9 +13,17 @@ from numpy.typing import ArrayLike
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import problem_of
 from fastmech.ensembles.interpolation import solve_at
+from fastmech.ensembles.problem import Case
 from fastmech.ensembles.system import System
 from fastmech.ensembles.tolerance import SAMPLE, evenly, usable_starts
-from fastmech.ensembles.work_precision import Case, Trial, first_guess, order_statistic, times_to_fit
+from fastmech.ensembles.work_precision import (
+    IMPLICIT,
+    REFERENCE,
+    Trial,
+    first_guess,
+    order_statistic,
+    times_to_fit,
+)
 from fastmech.errors import InputError, called_here, shown
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Method
@@ -150,7 +158,7 @@ def work_precision(
     sample = case.part(evenly(case, usable, SAMPLE))
     trial = Trial(sample, wanted[-1], 1.0, times_to_fit(sample))
     guess = first_guess(sample, wanted[-1])
-    base = find_method("radau5") if isinstance(tried[0], ImplicitRungeKutta) else find_method("abm10")
+    base = find_method(IMPLICIT if isinstance(tried[0], ImplicitRungeKutta) else REFERENCE)
     trial.refer(base, guess)
     points: list[WorkPoint] = []
     for method in tried:
@@ -170,7 +178,7 @@ def _timed(case: Case, trial: Trial, method: Method, dt: float) -> WorkPoint:
     taken: list[float] = []
     while len(taken) < 1 + TIMED or sum(taken[1:]) < LONG:
         began = time.perf_counter()
-        solve_at(*case[:3], settings, case.threads)
+        solve_at(case, settings)
         taken.append(time.perf_counter() - began)
     found = trial.errors(method, dt)
     rate = len(case.starts) / float(np.median(taken[1:]))

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastmech.ensembles import checks
 from fastmech.ensembles.problem import (
+    Case,
     Problem,
     extreme_scenes,
     own_values,
@@ -23,7 +24,6 @@ from fastmech.ensembles.stopping import STOP_TIME
 from fastmech.ensembles.system import System, stop_codes
 from fastmech.ensembles.tolerance import solve_to_tolerance
 from fastmech.ensembles.turning import counted_turns, watched
-from fastmech.ensembles.work_precision import Case
 from fastmech.errors import InputError, called_here, shown
 from fastmech.integrators.implicit_method import ImplicitRungeKutta
 from fastmech.integrators.method import Method
@@ -54,7 +54,7 @@ class Trajectories:
     status: NDArray[np.int8]  #: :class:`fastmech.ensembles.status.Status` of each trajectory, shape (n,)
     steps: int  #: most steps of a trajectory that runs to the end
     dt: float  #: longest step taken [s]
-    method: str  #: name of the method; under ``tol`` trajectories that rounding rules are run by ``dop853``
+    method: str  #: name of the method
     own_steps: NDArray[np.int64]  #: steps of each trajectory that runs to the end, shape (n,)
     own_dt: NDArray[
         np.float64
@@ -113,11 +113,11 @@ def integrate(
         method: a name from :data:`fastmech.integrators.methods.METHODS`; "rk4" by default, or the tolerance's
             choice.
         tol: in place of ``dt``: the error to be kept, absolute, in the state's units, of the worst component
-            at the worst output time. Method, step and precision are chosen by a calibration on a sample:
-            an implicit method where stability, not accuracy, would set an explicit one's step.
+            at the worst output time. A sample chooses method, step and precision: an implicit method where
+            stability, not accuracy, would set an explicit one's step.
         quantile: whose error ``tol`` is: 1.0, the default, the largest of all trajectories, for which every
             one runs twice or three times and bad ones again; less: that quantile, estimated from a
-            sample. Where a system's right-hand side has branches, of the largest each error is within
+            sample of 512. Where a system's right-hand side has branches, of the largest each error is within
             ``tol`` or infinite, see :mod:`fastmech.ensembles.piecewise`; of a quantile none is known.
         fit: whether each trajectory's step is fitted to its energy: ``dt`` then belongs to slow motions, and
             the faster a trajectory can become, the shorter its own step, see
@@ -181,11 +181,11 @@ def integrate(
     settings = Settings(formula, step, fitted_at, _precision(dtype, problem, formula))
     if not isinstance(scene, Scene):
         return _trajectories(
-            problem, outputs, solve(problem, starts, outputs, settings, threads, progress), settings
+            problem, outputs, solve(Case(problem, starts, outputs, threads), settings, progress), settings
         )
     warn_of_step(extreme_scenes(scene, own, problem), step, formula.name, starts)
     problem = watched(problem, starts, step, threads)
-    solution = solve(problem, starts, outputs, settings, threads, progress)
+    solution = solve(Case(problem, starts, outputs, threads), settings, progress)
     longest = solution.dt[0] if len(solution.dt) == 1 else solution.dt.max(axis=0)
     turned = counted_turns(problem, starts, longest, solution.records, threads)
     taken = StepsTaken(solution.dt[0], turned, solution.last_term)

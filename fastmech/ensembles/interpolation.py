@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.ensembles.fitting import EXPONENT_ONCE, fit_steps
-from fastmech.ensembles.problem import Problem
+from fastmech.ensembles.problem import Case, Problem
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.solve import Settings, Solution, nothing, put_into, solve
 from fastmech.kernels.select import right_hand_side
@@ -28,14 +28,7 @@ Floats = NDArray[np.float64]
 STEPS_BETWEEN = 2.2
 
 
-def solve_at(
-    problem: Problem,
-    starts: Floats,
-    outputs: Floats,
-    settings: Settings,
-    threads: int | None = None,
-    progress: Progress | None = None,
-) -> Solution:
+def solve_at(case: Case, settings: Settings, progress: Progress | None = None) -> Solution:
     """Integrate from t = 0; states are interpolated where output times [s] are closer than steps.
 
     Not so with a stopping condition, or where steps are shorter at first than later.
@@ -43,10 +36,11 @@ def solve_at(
     Raises:
         InputError: the step or the number of threads are wrong.
     """
+    problem, starts, outputs, threads = case
     until = float(outputs[-1])
     few = outputs.size * STEPS_BETWEEN * np.asarray(settings.dt) <= until
     if problem.observation.stops or settings.early or until == 0.0 or np.all(few):
-        return solve(problem, starts, outputs, settings, threads, progress)
+        return solve(case, settings, progress)
     steps: Any = np.broadcast_to(np.asarray(settings.dt, dtype=np.float64), len(starts))
     if settings.fit and problem.coefficients is not None:
         fitted = fit_steps(problem.coefficients, starts, 1.0, until, EXPONENT_ONCE, threads)
@@ -55,33 +49,27 @@ def solve_at(
     for length in np.unique(steps):
         who = np.flatnonzero(steps == length)
         own = replace(settings, dt=float(length), fit=())
-        part = problem.part(who)
+        part = case.part(who)
         if outputs.size * STEPS_BETWEEN * length <= until:
-            run = solve(part, starts[who], outputs, own, threads, progress)
+            run = solve(part, own, progress)
         else:
-            run = _interpolated(part, starts[who], outputs, own, threads, progress)
+            run = _interpolated(part, own, progress)
         if found is None:
             if who.size == len(starts):
                 return run
             found = nothing(problem, outputs.size, *starts.shape)
         put_into(found, who, run)
-    return solve(problem, starts, outputs, settings, threads, progress) if found is None else found
+    return solve(case, settings, progress) if found is None else found
 
 
-def _interpolated(
-    problem: Problem,
-    starts: Floats,
-    outputs: Floats,
-    settings: Settings,
-    threads: int | None,
-    progress: Progress | None,
-) -> Solution:
+def _interpolated(case: Case, settings: Settings, progress: Progress | None) -> Solution:
     """The same with equal steps of all trajectories, over the whole run."""
+    problem, starts, outputs, _ = case
     until, nodes = float(outputs[-1]), (settings.method.order + 5) // 2
     number = max(math.ceil(until / float(settings.dt) * (1.0 - 1e-12)), nodes - 1)
     grid = until / number * np.arange(number + 1.0)
     grid[-1] = until
-    run = solve(problem, starts, grid, settings, threads, progress)
+    run = solve(case._replace(outputs=grid), settings, progress)
     rates = _rates(problem, grid, run.y)
     y = np.empty((outputs.size, *starts.shape))
     for state, t in zip(y, outputs, strict=True):

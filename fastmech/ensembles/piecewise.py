@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from fastmech.callee import callee
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.located import COSTS, ENDED, GRAZES, SINGULAR, SLIDES, UNCLEAR, Course, follow
-from fastmech.ensembles.problem import Problem
+from fastmech.ensembles.problem import Case
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.solve import Settings, Solution, distances, nothing, part_of, put_into, solve
 from fastmech.ensembles.status import missed_line
@@ -59,18 +59,13 @@ WHY = {
 
 
 def follow_to_tolerance(
-    problem: Problem,
-    switches: Any,
-    starts: Floats,
-    outputs: Floats,
-    tol: float,
-    threads: int | None,
-    progress: Progress | None,
+    case: Case, switches: Any, tol: float, progress: Progress | None
 ) -> tuple[Solution, Floats, str]:
     """The solution, errors (n,), infinite where none is known, and what is to be said about those.
 
     ``switches`` notes the decisions of the right-hand side, see :mod:`fastmech.ensembles.switches`.
     """
+    problem, starts, outputs, _ = case
     n, usable = len(starts), finite_rows(starts)
     error, ended = np.full(n, np.inf), np.full(n, ENDED)
     last, best = None, nothing(problem, outputs.size, *starts.shape)
@@ -79,7 +74,7 @@ def follow_to_tolerance(
         progress(n - who.size)
     for k in range(RUNS):
         local = max(FIRST * tol / FINER**k, LEAST)
-        finer, ended[who] = _follow(problem, switches, starts, outputs, local, who, threads, progress)
+        finer, ended[who] = _follow(case.part(who), switches, local, progress)
         put_into(best, who, finer)
         open_ = ended[who] == ENDED
         if last is not None:
@@ -96,32 +91,21 @@ def follow_to_tolerance(
         other = np.union1d(lost, np.flatnonzero(~usable))
         steps = np.exp2(np.ceil(np.log2(np.clip(best.steps[other], *GIVEN_UP))))
         settings = Settings(find_method(METHOD), float(outputs[-1]) / steps)
-        given_up = solve(problem.part(other), starts[other], outputs, settings, threads)
+        given_up = solve(case.part(other), settings)
         put_into(best, other, given_up)
     missed = usable & np.isinf(error)
     return best, error, missed_line(missed, {why: missed & (ended == code) for code, why in WHY.items()})
 
 
-def _follow(
-    problem: Problem,
-    switches: Any,
-    starts: Floats,
-    outputs: Floats,
-    local: float,
-    who: Members,
-    threads: int | None,
-    progress: Progress | None,
-) -> tuple[Solution, Members]:
-    """Some of the trajectories with so large errors of their steps, and what became of each."""
-    solution, n, seen = (
-        nothing(problem, outputs.size, who.size, starts.shape[1]),
-        who.size,
-        problem.observation,
-    )
+def _follow(case: Case, switches: Any, local: float, progress: Progress | None) -> tuple[Solution, Members]:
+    """The trajectories with so large errors of their steps, and what became of each."""
+    problem, starts, outputs, threads = case
+    n, seen = len(starts), problem.observation
+    solution = nothing(problem, outputs.size, *starts.shape)
     steps = min(MOST, max(MOST_TOGETHER // max(n, 1), int(GIVEN_UP[0])))
     course = Course(
-        starts=np.ascontiguousarray(starts[who]),
-        params=np.ascontiguousarray(problem.params.part(who).block(n).T),
+        starts=np.ascontiguousarray(starts),
+        params=np.ascontiguousarray(problem.params.block(n).T),
         outputs=outputs,
         observer_params=seen.params,
         empty=seen.record,

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -71,6 +71,19 @@ class Problem:
             values: Any = (np.asarray(c)[members] for c in own)
             own = Coefficients(*values)
         return replace(self, params=self.params.part(members), coefficients=own)
+
+
+class Case(NamedTuple):
+    """A problem, from where its trajectories start, and when they are asked for."""
+
+    problem: Problem
+    starts: Floats  #: public states at t = 0, shape (n, dim)
+    outputs: Floats  #: times [s], rising, not negative
+    threads: int | None = None  #: to use; None: all processors
+
+    def part(self, members: NDArray[np.int64]) -> Case:
+        """Some of the trajectories."""
+        return self._replace(problem=self.problem.part(members), starts=self.starts[members])
 
 
 def scene_problem(scene: Scene, n: int, own: Mapping[str, Floats], formulation: str) -> Problem:

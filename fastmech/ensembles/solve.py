@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fastmech.ensembles.fitting import EXPONENT_AGAIN, EXPONENT_ONCE, fit_steps, fitted_steps
 from fastmech.ensembles.plausible import judge
-from fastmech.ensembles.problem import Problem
+from fastmech.ensembles.problem import Case, Problem
 from fastmech.ensembles.run import Ensemble, Progress, run_ensemble
 from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.status import Status
@@ -92,11 +92,8 @@ def distances(a: Solution, b: Solution) -> Floats:
 
 
 def solve(
-    problem: Problem,
-    starts: Floats,
-    outputs: Floats,
+    case: Case,
     settings: Settings,
-    threads: int | None = None,
     progress: Progress | None = None,
 ) -> Solution:
     """Integrate from t = 0 through the output times [s].
@@ -107,6 +104,7 @@ def solve(
     Raises:
         InputError: the step or the number of threads are wrong.
     """
+    problem, starts, outputs, threads = case
     ends, again = _ends(settings, outputs)
     fitted_to = problem.coefficients if settings.fit else None
     exponent = EXPONENT_AGAIN if again else EXPONENT_ONCE

@@ -1,10 +1,11 @@
 """A tolerance in place of a step.
 
 A sample chooses method and step (:mod:`fastmech.ensembles.work_precision`). For a quantile of the errors
-everyone then runs once, and the sample tells the error. For the largest error everyone runs twice, the second
-time with steps shorter by sqrt(2). That run is kept; its error is told by the distance of the two (Hairer,
-Norsett, Wanner, *Solving ODEs I*, section II.4), whose ratio to the error is known from the method's order
-and from the sample. Who misses the tolerance runs again with shorter steps. What does not converge has an
+everyone then runs once; a larger sample, the pilot, runs twice and tells the error. For the largest error
+everyone runs twice, the second time with steps shorter by sqrt(2). That run is kept. Its error is told by the
+distance of the two (Hairer, Norsett, Wanner, *Solving ODEs I*, section II.4), whose ratio to the error is
+known from the method's order and from the sample. Where the two lie further apart than the tolerance, a third
+run measures the error. Who misses the tolerance runs again with shorter steps. What does not converge has an
 infinite error, and the reason is told.
 """
 
@@ -21,7 +22,7 @@ from fastmech.ensembles.fitting import EXPONENT_ONCE, fit_steps, speed_bound, vi
 from fastmech.ensembles.interpolation import solve_at
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.piecewise import METHOD, follow_to_tolerance
-from fastmech.ensembles.problem import Problem
+from fastmech.ensembles.problem import Case, Problem
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.solve import (
     Settings,
@@ -39,7 +40,6 @@ from fastmech.ensembles.work_precision import (
     AIM,
     RATIO,
     REFERENCE,
-    Case,
     Chosen,
     choose,
     error_of_finer,
@@ -124,9 +124,8 @@ def solve_to_tolerance(
         problem = replace(problem, observation=replace(problem.observation, locate=True))
     switches, unclear = _switches(problem)
     if switches is not None and quantile == 1.0 and method is None:
-        solution, error, remark = follow_to_tolerance(
-            problem, switches, starts, outputs, tol, threads, progress
-        )
+        case = case._replace(problem=problem)
+        solution, error, remark = follow_to_tolerance(case, switches, tol, progress)
         largest = float(np.max(error[finite_rows(starts)], initial=0.0))
         return Estimated(solution, Settings(find_method(METHOD), 0.0), LOCATED + remark, error, largest)
     usable = usable_starts(problem, starts, float(outputs[-1]), threads)
@@ -135,7 +134,7 @@ def solve_to_tolerance(
     who, case = np.flatnonzero(usable), Case(problem, begins, outputs, threads)
     if not who.size or outputs[-1] == 0.0:
         settings = Settings(find_method(method or REFERENCE), float(outputs[-1]) or 1.0)
-        solution = solve(problem, begins, outputs, settings, threads, progress)
+        solution = solve(case, settings, progress)
         none = np.where(usable, 0.0, np.inf) if quantile == 1.0 else None
         why = "the only output is the start" if who.size else "no start has a motion that steps can follow"
         estimated = Estimated(solution, settings, why, none, 0.0)
@@ -153,7 +152,8 @@ def solve_to_tolerance(
             error=np.full(len(starts), np.inf),
             estimate=np.inf if usable.any() else 0.0,
         )
-    other, error, remark = follow_to_tolerance(problem, switches, starts, outputs, tol, threads, None)
+    whole = case._replace(starts=starts)
+    other, error, remark = follow_to_tolerance(whole, switches, tol, None)
     error += distances(other, estimated.solution)
     largest = float(np.max(error[usable], initial=0.0))
     return replace(estimated, reason=estimated.reason + remark, error=error, estimate=largest)
@@ -195,9 +195,7 @@ def _estimated(
     members = evenly(case, who, min(max(who.size // SHARE_OF_ALL, LEAST_SAMPLE), SAMPLE))
     sample, truth = case.part(members), None
     if switches is not None and quantile < 1.0:
-        truth, _, _ = follow_to_tolerance(
-            sample.problem, switches, sample.starts, case.outputs, tol, case.threads, None
-        )
+        truth, _, _ = follow_to_tolerance(sample, switches, tol, None)
     found = choose(sample, tol, TYPICAL if quantile == 1.0 else quantile, method, truth)
     if quantile < 1.0:
         return _once(case, who, (members, found), (tol, quantile), progress, known=truth is not None)
@@ -235,11 +233,11 @@ def _once(
         if far.size <= n // 4:
             runs.measure(np.sort(far))
         estimate = order_statistic(runs.error, quantile)
-        if best is not None and best[0] > tol and not estimate <= IN_VAIN * best[0]:
+        if best is not None and estimate > (IN_VAIN * best[0] if best[0] > tol else tol):
             break
-        best = (estimate, runs) if best is None or estimate <= tol or estimate < best[0] else best
+        best = estimate, runs
         asked = (AIM * tol / max(estimate, 1e-300)) ** (1.0 / p) if estimate < np.inf else 1.0 / RATIO
-        if estimate <= tol and (asked < WORTH or n == who.size or best[0] < estimate):
+        if estimate <= tol and (asked < WORTH or n == who.size):
             break
         settings = replace(settings, dt=float(settings.dt) * min(max(asked, 1.0 / RATIO), RATIO))
     assert best is not None
@@ -247,16 +245,16 @@ def _once(
     settings = runs.settings
     if known:
         assert found.trial.truth is not None
-        right = solve_at(*found.trial.case[:3], settings, case.threads)
+        right = solve_at(found.trial.case, settings)
         estimate = order_statistic(distances(right, found.trial.truth), quantile)
     if tol >= SINGLE and _in_single(settings, case):
         single = replace(settings, precision=np.float32)
-        run = solve_at(part.problem, part.starts, case.outputs, single, case.threads)
+        run = solve_at(part, single)
         rounded = order_statistic(runs.error + distances(run, runs.kept), quantile)
         if rounded <= tol:
             settings, estimate = single, rounded
     if settings.precision is np.float32:
-        solution = solve_at(*case[:3], settings, case.threads, progress)
+        solution = solve_at(case, settings, progress)
     else:
         solution = _with_others(case, pilot, runs.kept, settings, progress)
     remark = "" if estimate <= tol else f"; the {quantile:.3g} quantile misses it"
@@ -270,8 +268,8 @@ def _with_others(
     if progress is not None:
         progress(who.size)
     others = np.setdiff1d(np.arange(len(case.starts)), who)
-    part, solution = case.part(others), nothing(case.problem, case.outputs.size, *case.starts.shape)
-    rest = solve_at(*part[:3], settings, case.threads, progress)
+    solution = nothing(case.problem, case.outputs.size, *case.starts.shape)
+    rest = solve_at(case.part(others), settings, progress)
     for members, run in ((who, done), (others, rest)):
         put_into(solution, members, run)
     return solution
@@ -300,8 +298,8 @@ class Runs:
 
     def solve(self, who: Members | None, dt: float | Floats, progress: Progress | None = None) -> Solution:
         """A run of some or all with steps of dt [s]."""
-        problem, starts, outputs, threads = self.case if who is None else self.case.part(who)
-        return solve_at(problem, starts, outputs, replace(self.settings, dt=dt), threads, progress)
+        case = self.case if who is None else self.case.part(who)
+        return solve_at(case, replace(self.settings, dt=dt), progress)
 
     def twice(self, progress: Progress | None) -> None:
         """Everyone, the second time with shorter steps; that run is kept."""
@@ -395,7 +393,7 @@ class Runs:
         kept, part = part_of(self.kept, who), self.case.part(who)
         size = np.fmax(np.abs(kept.y).max(axis=0), np.abs(part.starts))
         moved = part._replace(starts=part.starts + MOVED * size)
-        run = solve_at(*moved[:3], replace(self.settings, dt=self.dt[who]), moved.threads)
+        run = solve_at(moved, replace(self.settings, dt=self.dt[who]))
         self.floor[who] = distances(run, kept) / MOVED * A_STEP * np.sqrt(kept.steps)
 
     def _remark(self) -> str:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +26,7 @@ from fastmech.ensembles.operations import (
     start_operations,
     step_operations,
 )
-from fastmech.ensembles.problem import Problem
+from fastmech.ensembles.problem import Case
 from fastmech.ensembles.solve import Settings, Solution, distances
 from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.stiffness import explicit_limit, initial_layer
@@ -34,7 +35,6 @@ from fastmech.integrators.method import Method
 from fastmech.integrators.methods import find_method
 
 Floats = NDArray[np.float64]
-Members = NDArray[np.int64]
 
 #: What gives the reference, and where stability and not accuracy would set its steps.
 REFERENCE, IMPLICIT = "abm10", "radau5"
@@ -92,19 +92,6 @@ AGAIN = (0.0, 0.125, 0.5)
 LEAST_WORK = "least work at this tolerance and these output times"
 
 
-class Case(NamedTuple):
-    """Trajectories to be integrated."""
-
-    problem: Problem
-    starts: Floats
-    outputs: Floats
-    threads: int | None
-
-    def part(self, members: Members) -> Case:
-        """Some of them."""
-        return self._replace(problem=self.problem.part(members), starts=self.starts[members])
-
-
 def order_statistic(errors: Floats, level: float) -> float:
     """The error that a share ``level`` of the trajectories does not exceed."""
     return float(np.sort(errors)[math.ceil(level * errors.size) - 1]) if errors.size else 0.0
@@ -155,6 +142,19 @@ class Trial:
         """Step [s] at most."""
         return self.until / FEWEST or 1.0
 
+    @cached_property
+    def operations(self) -> float:
+        """Operations of a right-hand side."""
+        problem, starts = self.case.problem, self.case.starts
+        if problem.system is None or not len(starts):
+            return MECHANISM
+        if problem.system.vector:
+            return VECTOR_RHS * starts.shape[1]
+        values = [float(column.flat[0]) for column in problem.params.columns]
+        named = dict(zip(problem.system.parameters, values, strict=True))
+        own = [named[name] for name in problem.system.parameter_order]
+        return operations_of(problem.system.rhs, [0.0, *starts[0].tolist(), *own])  # type: ignore[arg-type]
+
     def settings(self, method: Method, dt: float) -> Settings:
         """How a method runs with steps of dt [s]."""
         c = self.case.problem.coefficients
@@ -168,17 +168,15 @@ class Trial:
     def run(self, method: Method, dt: float) -> Solution:
         """The sample's run."""
         if (method.name, dt) not in self._runs:
-            problem, starts, outputs, threads = self.case
-            run = solve_at(problem, starts, outputs, self.settings(method, dt), threads)
+            run = solve_at(self.case, self.settings(method, dt))
             self._runs[method.name, dt] = run
-            if self.fit and self.until and len(starts):
+            if self.fit and self.until and len(self.case.starts):
                 self.fitted = max(float(run.steps.mean()) * dt / self.until, 1.0)
         return self._runs[method.name, dt]
 
     def work(self, method: Method, dt: float) -> float:
         """Operations of a trajectory with steps of dt [s]."""
-        problem, starts, outputs, _ = self.case
-        operations, dim = operations_of_problem(problem, starts), starts.shape[1]
+        outputs, operations, dim = self.case.outputs, self.operations, self.case.starts.shape[1]
         intervals = np.diff(outputs, prepend=0.0)
         steps = np.maximum(output_steps(np.concatenate([[0.0], outputs]), dt), 1)
         taken, starts_anew = float(steps[intervals > 0.0].sum()), 1.0
@@ -295,18 +293,6 @@ class Chosen(NamedTuple):
     settings: Settings
     reason: str  #: why, one line
     trial: Trial  #: the whole sample's runs
-
-
-def operations_of_problem(problem: Problem, starts: Floats) -> float:
-    """Operations of a right-hand side."""
-    if problem.system is None or not len(starts):
-        return MECHANISM
-    if problem.system.vector:
-        return VECTOR_RHS * starts.shape[1]
-    values = [float(column.flat[0]) for column in problem.params.columns]
-    named = dict(zip(problem.system.parameters, values, strict=True))
-    own = [named[name] for name in problem.system.parameter_order]
-    return operations_of(problem.system.rhs, [0.0, *starts[0].tolist(), *own])  # type: ignore[arg-type]
 
 
 def choose(case: Case, tol: float, level: float, method: str | None, truth: Solution | None) -> Chosen:
