@@ -18,7 +18,7 @@ import numpy as np
 
 from fastmech.atlas.wells import ROUNDING
 from fastmech.basins.copies import copy_numbers, copy_of_label
-from fastmech.basins.label import label_starts
+from fastmech.basins.label import How, label_starts
 from fastmech.basins.ladder import SUBSTEPS
 from fastmech.basins.measures.labels import Floats, Integers
 from fastmech.basins.steps import coarse_steps
@@ -192,7 +192,7 @@ class _Search:
         """Labels (n,) after blows; the least one that leaves is kept."""
         starts = np.tile(self.place, (sizes.size, 1))
         starts[:, 2:] = (sizes * np.stack([np.cos(angles), np.sin(angles)])).T @ self.rates
-        found = label_starts(self.scene, starts, self.t_end, threads=self.threads, ladder=ladder)
+        found = label_starts(self.scene, starts, self.t_end, How(threads=self.threads, ladder=ladder))
         labels = copy_numbers(found)
         self.blows, self.steps = self.blows + sizes.size, self.steps + found.steps
         if self.blows > 1:

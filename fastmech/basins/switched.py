@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from fastmech.basins.ladder import SUBSTEPS, Indices, climb, near_saddle, tell_the_same
 from fastmech.basins.runs import Paths
-from fastmech.basins.status import BasinStatus
 from fastmech.basins.steps import coarse_steps
 from fastmech.capture.certificate import Certificate
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.plausible import breaks_energy_bounds, energy
 from fastmech.ensembles.run import Progress
+from fastmech.ensembles.status import Status
 from fastmech.mechanism.coefficients import reduce
 
 Floats = NDArray[np.float64]
@@ -77,7 +77,7 @@ class Switched:
     def label(self, progress: Progress | None) -> tuple[Paths, NDArray[np.int8]]:
         """Ends and statuses of all of them."""
         found = Paths.empty(self.F0.size)
-        status = np.full(self.F0.size, BasinStatus.UNDECIDED, dtype=np.int8)
+        status = np.full(self.F0.size, Status.UNDECIDED, dtype=np.int8)
         pieces = -(-self.F0.size // TOGETHER)
         for first in range(pieces):
             # Each piece takes something of everywhere, so that all take about as long.

@@ -25,8 +25,7 @@ from fastmech.ensembles.work_precision import (
     times_to_fit,
 )
 from fastmech.errors import InputError, called_here, shown
-from fastmech.integrators.implicit_method import ImplicitRungeKutta
-from fastmech.integrators.method import Method
+from fastmech.integrators.method import ImplicitRungeKutta, Method
 from fastmech.integrators.methods import METHODS, find_method
 from fastmech.plots.style import LINES, new_figure, style
 from fastmech.scene import Scene

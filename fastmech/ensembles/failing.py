@@ -23,7 +23,8 @@ FINITE, TIME, STATE = 0, 1, 2
 @kernel(OBSERVER_SIGNATURE)
 def observe_last_finite(t: float, Y: Floats, params: Floats, record: Floats) -> None:
     """Keep time and state of every lane as long as all of its states are finite; branch-free."""
-    record[FINITE] = 0.0
+    for i in range(Y.shape[1]):
+        record[FINITE, i] = 0.0
     for d in range(Y.shape[0]):
         for i in range(Y.shape[1]):
             record[FINITE, i] += Y[d, i] - Y[d, i]  # NaN where it is not finite

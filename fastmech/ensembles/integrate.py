@@ -25,8 +25,7 @@ from fastmech.ensembles.system import System, stop_codes
 from fastmech.ensembles.tolerance import solve_to_tolerance
 from fastmech.ensembles.turning import counted_turns, watched
 from fastmech.errors import InputError, called_here, shown
-from fastmech.integrators.implicit_method import ImplicitRungeKutta
-from fastmech.integrators.method import Method
+from fastmech.integrators.method import ImplicitRungeKutta, Method
 from fastmech.integrators.methods import find_method
 from fastmech.kernels.select import FORMULATIONS
 from fastmech.scene import Scene, nearest
@@ -38,9 +37,6 @@ DEFAULT_DT = 0.01
 
 #: Numbers beside the states that a run holds of each trajectory, and of each coefficient of its own.
 BESIDE, OWN = 9, 2
-
-#: Statuses of trajectories that have failed.
-FAILURES = [status for status in Status if status != Status.OK]
 
 
 @dataclass(frozen=True, repr=False)
@@ -73,7 +69,7 @@ class Trajectories:
     @property
     def failures(self) -> str:
         """One line: how many trajectories have failed, and with which status; empty where none has."""
-        return failure_line(failure_counts(self.status, FAILURES), self.status.size)
+        return failure_line(failure_counts(self.status), self.status.size)
 
     def __repr__(self) -> str:
         n, dim = self.y.shape[1:]

@@ -10,7 +10,7 @@ is halved: no secant would know better.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -21,13 +21,20 @@ from fastmech.ensembles.failing import Resumption
 from fastmech.ensembles.run import Observation
 from fastmech.ensembles.spans import Span
 from fastmech.ensembles.stopping import STOP_CODE, STOP_TIME
-from fastmech.integrators.batch import PHASE
+from fastmech.integrators.batch import PHASE, Batch
 from fastmech.integrators.explicit import WEIGHTS, Moment, Stepped, step_by_stages, weights_of
-from fastmech.integrators.implicit import integrate_implicit_block
-from fastmech.integrators.implicit_method import ImplicitRungeKutta
-from fastmech.integrators.method import Adams, Method
-from fastmech.integrators.newton import DIFFERENCES
-from fastmech.jit import MATRIX, OBSERVER, OBSERVER_SIGNATURE, RHS, VECTOR, kernel
+from fastmech.integrators.implicit import CALLS, SCHEME, Calls, drive_implicit, inverse_by_elimination
+from fastmech.integrators.method import Adams, ImplicitRungeKutta, Method
+from fastmech.jit import (
+    MATRIX,
+    OBSERVER,
+    OBSERVER_SIGNATURE,
+    RHS,
+    VECTOR,
+    inlined,
+    kernel,
+    named_tuple,
+)
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -38,7 +45,19 @@ HALVINGS = 60
 #: Trajectories that look for the begin of their step together.
 TOGETHER = 256
 
-_SEARCH = (VECTOR, MATRIX, MATRIX, VECTOR, VECTOR, MATRIX)
+
+class Search(NamedTuple):
+    """Trajectories (n) that have stopped, and where their last steps began."""
+
+    begin: Floats  #: times [s] (n,)
+    states: Floats  #: (n, dim)
+    params: Floats  #: (n, count)
+    observer_params: Floats
+    empty: Floats  #: a record of no stop (rows,)
+    record: Floats  #: (n, rows); its stops move to where they happened
+
+
+SEARCH = named_tuple([VECTOR, MATRIX, MATRIX, VECTOR, VECTOR, MATRIX], Search)
 
 
 @kernel(OBSERVER_SIGNATURE)
@@ -51,113 +70,73 @@ def observe_before(t: float, Y: Floats, params: Floats, record: Floats) -> None:
                 record[2 + d, i] = Y[d, i]
 
 
-@kernel(types.void(RHS, OBSERVER, WEIGHTS, *_SEARCH))
-def halve_steps(
-    rhs: Any,
-    observe: Any,
-    weights: Any,
-    begin: Floats,
-    states: Floats,
-    params: Floats,
-    observer_params: Floats,
-    empty: Floats,
-    record: Floats,
-) -> None:
-    """Move the stops in ``record`` (n, rows) to where they happened, by an explicit one-step method.
-
-    ``begin`` (n,) and ``states`` (n, dim) are where each trajectory's last step began, ``params`` (n, count)
-    its parameters, ``empty`` (rows,) a record of no stop, ``weights`` the method's.
-    """
-    n, dim = states.shape
-    Y, own, seen = np.empty((dim, 1)), np.empty((params.shape[1], 1)), np.empty((empty.size, 1))
+@kernel(types.void(RHS, OBSERVER, WEIGHTS, SEARCH))
+def halve_steps(rhs: Any, observe: Any, weights: Any, of: Search) -> None:
+    """Find the stops of a search by an explicit one-step method of these weights."""
+    (n, dim), count = of.states.shape, of.params.shape[1]
+    Y, own, seen = np.empty((dim, 1)), np.empty((count, 1)), np.empty((of.empty.size, 1))
     stages = np.empty((weights.nodes.size + 2, dim, 1))
     block = Stepped(Y, own, np.empty((0, dim, 1)), stages)
     for i in range(n):
-        for row in range(params.shape[1]):
-            own[row, 0] = params[i, row]
-        low, high = begin[i], record[i, STOP_TIME]
+        for row in range(count):
+            own[row, 0] = of.params[i, row]
+        begin, low, high = of.begin[i], of.begin[i], of.record[i, STOP_TIME]
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
             if not low < middle < high:
                 break
             for d in range(dim):
-                Y[d, 0] = states[i, d]
-            for row in range(empty.size):
-                seen[row, 0] = empty[row]
-            rhs(begin[i], Y, stages[0], own)
-            step_by_stages(rhs, weights, block, Moment(begin[i], middle - begin[i], 0, False))
-            observe(middle, Y, observer_params, seen)
-            if seen[STOP_CODE, 0] != 0.0:
-                high = middle
-                for row in range(empty.size):
-                    record[i, row] = seen[row, 0]
-            else:
-                low = middle
+                Y[d, 0] = of.states[i, d]
+            for row in range(of.empty.size):
+                seen[row, 0] = of.empty[row]
+            rhs(begin, Y, stages[0], own)
+            step_by_stages(rhs, weights, block, Moment(begin, middle - begin, 0, False))
+            observe(middle, Y, of.observer_params, seen)
+            low, high = _narrowed(of, i, seen, (low, middle, high))
 
 
-@kernel(
-    types.void(
-        RHS,
-        OBSERVER,
-        MATRIX,
-        VECTOR,
-        VECTOR,
-        MATRIX,
-        MATRIX,
-        VECTOR,
-        MATRIX,
-        types.float64,
-        types.int64,
-        *_SEARCH,
-    )
-)
-def halve_implicit_steps(
-    rhs: Any,
-    observe: Any,
-    a: Floats,
-    nodes: Floats,
-    final: Floats,
-    back: Floats,
-    forth: Floats,
-    eigenvalues: Floats,
-    extrapolation: Floats,
-    remainder: float,
-    carried: int,
-    begin: Floats,
-    states: Floats,
-    params: Floats,
-    observer_params: Floats,
-    empty: Floats,
-    record: Floats,
-) -> None:
-    """The same by an implicit method: see :func:`halve_steps`; ``a`` to ``carried`` are its tableau.
+@kernel(types.void(CALLS, SCHEME, SEARCH))
+def halve_implicit_steps(call: Any, scheme: Any, of: Search) -> None:
+    """The same by an implicit method.
 
     A shortened step of which Newton's iteration finds no solution counts as one that does not reach the stop.
     """
-    n, dim = states.shape
-    Y, out = np.empty((dim, 1)), np.empty((1, dim, 1))
-    own, seen = np.empty((params.shape[1], 1)), np.empty((empty.size, 1))
-    times, steps, failed = np.empty(2), np.ones(1, dtype=np.int64), np.empty(1)
-    memory, phase = np.empty((carried * dim, 1)), np.zeros(PHASE)
+    (n, dim), count, stages = of.states.shape, of.params.shape[1], scheme.nodes.shape[0]
+    failed = np.empty((1, 1))
+    batch = Batch(
+        np.empty(2), np.ones(1, dtype=np.int64), np.empty((1, count, 1)), of.observer_params,
+        np.empty((1, dim, 1)), np.empty((1, of.empty.size, 1)), np.empty((1, 1, dim, 1)),
+        np.empty((1, (stages + 1) * dim, 1)), np.zeros(PHASE),
+    )  # fmt: skip
     for i in range(n):
-        own[:, 0] = params[i]
-        low, high = begin[i], record[i, STOP_TIME]
+        for row in range(count):
+            batch.params[0, row, 0] = of.params[i, row]
+        low, high = of.begin[i], of.record[i, STOP_TIME]
+        batch.times[0] = low
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
             if not low < middle < high:
                 break
-            times[0], times[1] = begin[i], middle
-            Y[:, 0], seen[:, 0], failed[0] = states[i], empty, np.nan
-            memory[:], phase[:] = 0.0, 0.0
-            integrate_implicit_block(
-                rhs, rhs, observe, DIFFERENCES, a, nodes, final, back, forth, eigenvalues, extrapolation,
-                remainder, times, steps, Y, own, observer_params, seen, out, failed, memory, phase,
-            )  # fmt: skip
-            if seen[STOP_CODE, 0] != 0.0:
-                high = middle
-                record[i] = seen[:, 0]
-            else:
-                low = middle
+            batch.times[1], batch.phase[0], failed[0, 0] = middle, 0.0, np.nan
+            for d in range(dim):
+                batch.Y[0, d, 0] = of.states[i, d]
+            for row in range(batch.memory.shape[1]):
+                batch.memory[0, row, 0] = 0.0
+            for row in range(of.empty.size):
+                batch.record[0, row, 0] = of.empty[row]
+            drive_implicit(call, scheme, batch, failed)
+            low, high = _narrowed(of, i, batch.record[0], (low, middle, high))
+
+
+@inlined
+def _narrowed(of: Search, i: int, seen: Floats, times: tuple[float, float, float]) -> tuple[float, float]:
+    """Where trajectory ``i`` stops, after a step to the middle one of three times."""
+    low, middle, high = times
+    if seen[STOP_CODE, 0] == 0.0:
+        return middle, high
+    for row in range(of.empty.size):
+        of.record[i, row] = seen[row, 0]
+    return low, middle
 
 
 def locate_stops(
@@ -181,18 +160,15 @@ def locate_stops(
         found = located[first : first + TOGETHER]
         begin, states = _step_begins(rhs, method, before, span, part, found[:, STOP_TIME])
         own = np.ascontiguousarray(before.params(part))
-        called = callee(rhs), callee(observation.observe)
-        search = (begin, states, own, observation.params, observation.record, found)
+        search = Search(begin, states, own, observation.params, observation.record, found)
         if isinstance(method, ImplicitRungeKutta):
-            p = method.tableau.prepared
-            halve_implicit_steps(
-                *called, p.a, p.nodes, p.final, p.back, p.forth, p.eigenvalues,
-                p.extrapolation, p.remainder, method.carried, *search,
-            )  # fmt: skip
+            functions = rhs, rhs, inverse_by_elimination, observation.observe
+            scheme = method.tableau.scheme._replace(differences=True)
+            halve_implicit_steps(Calls(*map(callee, functions)), scheme, search)
         else:
             one_step: Any = method
             tableau = method.starter if isinstance(method, Adams) else one_step.tableau
-            halve_steps(*called, weights_of(tableau), *search)
+            halve_steps(callee(rhs), callee(observation.observe), weights_of(tableau), search)
     return located
 
 

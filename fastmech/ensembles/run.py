@@ -13,7 +13,6 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 from itertools import chain
 from typing import Any
 
@@ -28,8 +27,7 @@ from fastmech.ensembles.status import Status
 from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
 from fastmech.ensembles.tasks import Task, block_width, task_lanes, tasks_of
 from fastmech.ensembles.threads import in_threads, thread_count
-from fastmech.integrators.batch import Batch
-from fastmech.integrators.driver import observe_nothing
+from fastmech.integrators.batch import Batch, observe_nothing
 from fastmech.integrators.method import Adams, Method
 from fastmech.interrupts import check
 from fastmech.kernels.blocks import VECTOR_LANES, observer_in_single
@@ -223,9 +221,10 @@ def _locate(
     which: NDArray[np.int64],
 ) -> None:
     """Put code, time and state of the stops themselves into the batch's record."""
-    locate = import_module("fastmech.ensembles.locating").locate_stops  # kernels that few runs need
+    from fastmech.ensembles.locating import locate_stops  # kernels that few runs need
+
     block, lane = np.divmod(which, batch.record.shape[2])
-    batch.record[block, :, lane] = locate(
+    batch.record[block, :, lane] = locate_stops(
         rhs, observation, method, before, span, which, batch.record[block, :, lane]
     )
 

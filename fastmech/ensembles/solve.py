@@ -16,7 +16,6 @@ from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.stopping import STOP_CODE
 from fastmech.ensembles.turning import TURNED, TURNS
-from fastmech.integrators.implicit_method import ImplicitRungeKutta, with_jacobian
 from fastmech.integrators.method import Method
 
 Floats = NDArray[np.float64]
@@ -116,9 +115,7 @@ def solve(
         aside &= settings.bounded
         if aside.any():  # they never enter a block, and their step is that of slow motion
             now, shares[aside] = np.where(aside[:, None], np.nan, now), 1.0
-    method = settings.method
-    if isinstance(method, ImplicitRungeKutta):
-        method = with_jacobian(method, problem.jacobian, problem.second_order)
+    method = problem.method(settings.method)
     course = _Course(problem)
     for piece, end in enumerate(ends):
         inside = (outputs <= end) & ((outputs > begin) | (piece == 0))

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.ensembles.fitting import QUICK, vibration_frequency
-from fastmech.integrators.implicit_method import ImplicitRungeKutta
-from fastmech.integrators.method import Method
+from fastmech.integrators.method import ImplicitRungeKutta, Method
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import Coefficients
 from fastmech.mechanism.reduced import slider_ratio

@@ -45,7 +45,7 @@ from fastmech.ensembles.work_precision import (
     error_of_finer,
     order_statistic,
 )
-from fastmech.integrators.implicit_method import ImplicitRungeKutta
+from fastmech.integrators.method import ImplicitRungeKutta
 from fastmech.integrators.methods import find_method
 
 Floats = NDArray[np.float64]

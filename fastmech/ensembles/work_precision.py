@@ -30,8 +30,7 @@ from fastmech.ensembles.problem import Case
 from fastmech.ensembles.solve import Settings, Solution, distances
 from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.stiffness import explicit_limit, initial_layer
-from fastmech.integrators.implicit_method import ImplicitRungeKutta
-from fastmech.integrators.method import Method
+from fastmech.integrators.method import ImplicitRungeKutta, Method
 from fastmech.integrators.methods import find_method
 
 Floats = NDArray[np.float64]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,18 +20,23 @@ Floats = NDArray[np.float64]
 FORGETTING, SYMPLECTIC = 1e-15, 1e-20
 
 
-@dataclass(frozen=True)
-class Prepared:
-    """A tableau as :func:`fastmech.integrators.implicit.integrate_implicit_block` reads it."""
+class Scheme(NamedTuple):
+    """A tableau as :func:`fastmech.integrators.implicit.drive_implicit` reads it.
+
+    Stages are solved in groups of ``back.shape[0]``: with A_g the group's part of ``a``, ``back`` is T and
+    ``forth`` T^-1 A_g^-1, where T^-1 A_g^-1 T holds the real eigenvalue ``eigenvalues[0]`` (0: none) and then
+    the block [[re, -im], [im, re]] of ``eigenvalues[1:]`` (im = 0: none).
+    """
 
     a: Floats
     nodes: Floats
-    final: Floats
+    final: Floats  #: b A^-1 makes the step of the stages' increments
     back: Floats
     forth: Floats
     eigenvalues: Floats
-    extrapolation: Floats
-    remainder: float
+    extrapolation: Floats  #: makes the next step's first guess of this step's increments; empty: none
+    remainder: float  #: what an accepted iteration may leave, relative to the lane's largest state
+    differences: bool = False  #: the Jacobian is that of differences of the right-hand side
 
 
 @dataclass(frozen=True)
@@ -68,7 +74,7 @@ class ImplicitTableau(Tableau):
         return np.asarray(weights)
 
     @cached_property
-    def prepared(self) -> Prepared:
+    def scheme(self) -> Scheme:
         """The tableau with its eigenvalues, see the driver."""
         nodes, matrix = np.array(self.c), self.matrix
         group = matrix[:1, :1] if self.diagonal else matrix
@@ -80,7 +86,7 @@ class ImplicitTableau(Tableau):
             powers = np.arange(1, self.stages + 1)
             through = nodes[:, None] ** powers
             extrapolation = (1.0 + nodes[:, None]) ** powers @ np.linalg.inv(through) - self.final
-        return Prepared(
+        return Scheme(
             a=matrix,
             nodes=nodes,
             final=self.final,

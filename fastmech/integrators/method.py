@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.callee import callee
 from fastmech.integrators.batch import Batch, Floats
 from fastmech.integrators.explicit import Weights, formula_of, take_steps, weights_of
+from fastmech.integrators.implicit_tableau import ImplicitTableau
 from fastmech.integrators.multistep_weights import bashforth, moulton
 from fastmech.integrators.tableau import Tableau
 from fastmech.kernels.blocks import VECTOR_LANES
@@ -197,3 +199,58 @@ class Adams:
     def run(self, rhs: Any, observe: Any, batch: Batch) -> None:
         """Take a batch through its times."""
         take_steps(self, rhs, observe, batch)
+
+
+#: Newton iterations that a step of ordinary length takes: what ``evaluations`` reckons with.
+TYPICAL_ITERATIONS = 4
+
+
+@dataclass(frozen=True)
+class ImplicitRungeKutta(OneStep):
+    """An implicit Runge-Kutta method, and the Jacobian of what it is to integrate.
+
+    ``jacobian`` and ``inverse`` are block kernels (:data:`fastmech.jit.JACOBIAN_SIGNATURE`,
+    :data:`fastmech.jit.INVERSE_SIGNATURE`); ``None`` takes forward differences of the right-hand side, and
+    elimination.
+    """
+
+    tableau: ImplicitTableau
+    jacobian: Any = None
+    inverse: Any = None
+
+    @property
+    def lanes(self) -> int:
+        """Any."""
+        return 0
+
+    @property
+    def carried(self) -> int:
+        """The last step's increments, from which the next one's are guessed, and the sum's compensation."""
+        return int(self.tableau.stages) + 1
+
+    def evaluations(self, steps: int) -> int:
+        """Right-hand sides that so many steps take where Newton's iteration converges as usual."""
+        return steps * self.tableau.stages * TYPICAL_ITERATIONS
+
+    def run(self, rhs: Any, observe: Any, batch: Batch) -> Floats | None:
+        """Take a batch through its times.
+
+        Returns:
+            (blocks, lanes): NaN, or the time [s] at which Newton's iteration no longer converged; such a lane
+            keeps the state that it had then.
+        """
+        from fastmech.integrators.implicit import Calls, drive_implicit, inverse_by_elimination
+
+        jacobian, inverse = self.jacobian or rhs, self.inverse or inverse_by_elimination
+        failed = np.full(batch.Y.shape[::2], np.nan)
+        calls = Calls(*map(callee, (rhs, jacobian, inverse, observe)))
+        scheme = self.tableau.scheme._replace(differences=self.jacobian is None)
+        drive_implicit(calls, scheme, batch.ready(self.carried), failed)
+        return failed
+
+
+def with_jacobian(method: Method, jacobian: Any, inverse: Any = None) -> Method:
+    """The method, told the Jacobian, and how to solve its systems, if it is one that needs them."""
+    if isinstance(method, ImplicitRungeKutta) and jacobian is not None:
+        return replace(method, jacobian=jacobian, inverse=inverse)
+    return method

@@ -25,8 +25,7 @@ accuracy would set the step.
 from __future__ import annotations
 
 from fastmech.errors import InputError, shown
-from fastmech.integrators.implicit_method import ImplicitRungeKutta
-from fastmech.integrators.method import Adams, Method, RungeKutta
+from fastmech.integrators.method import Adams, ImplicitRungeKutta, Method, RungeKutta
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.integrators.tableaus.implicit import IMPLICIT_TABLEAUS
 

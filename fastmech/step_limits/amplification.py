@@ -13,8 +13,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.integrators.implicit_method import ImplicitRungeKutta
-from fastmech.integrators.method import Adams, Method, RungeKutta
+from fastmech.integrators.method import Adams, ImplicitRungeKutta, Method, RungeKutta
 
 Floats = NDArray[np.float64]
 

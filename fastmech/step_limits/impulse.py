@@ -11,8 +11,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.integrators.implicit_method import ImplicitRungeKutta
-from fastmech.integrators.method import Adams, Method, RungeKutta
+from fastmech.integrators.method import Adams, ImplicitRungeKutta, Method, RungeKutta
 from fastmech.integrators.methods import METHODS
 from fastmech.step_limits.crossing import first_crossing
 

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastmech.callee import callee
 from fastmech.ensembles import checks
-from fastmech.ensembles.integrate import FAILURES
 from fastmech.ensembles.plausible import judge
 from fastmech.ensembles.problem import extreme_scenes, own_values, scene_problem, system_problem
 from fastmech.ensembles.status import Status, failure_counts, failure_line
@@ -52,7 +51,7 @@ class LyapunovExponents:
     @property
     def failures(self) -> str:
         """One line: how many motions have failed, and with which status; empty where none has."""
-        return failure_line(failure_counts(self.status, FAILURES), self.status.size)
+        return failure_line(failure_counts(self.status), self.status.size)
 
     def __repr__(self) -> str:
         what = f"{self.status.size:,} motions to t = {self.t[-1]:g} s"
