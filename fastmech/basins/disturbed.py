@@ -21,7 +21,7 @@ from fastmech.disturbance.motion import damped_times, equilibria_to_disturb
 from fastmech.disturbance.observe import EXCURSION_PHI, EXCURSION_THETA, LAST_OUTSIDE, observe_departure
 from fastmech.disturbance.size import Size, confining_energy, excess_energy, size_at, uniform_ball
 from fastmech.ensembles import checks
-from fastmech.ensembles.plausible import judge
+from fastmech.ensembles.energy_bounds import breaks_energy_bounds
 from fastmech.ensembles.run import Observation, Progress, run_ensemble
 from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.status import ENDS, FAILURES, Status, failure_counts, failure_line
@@ -33,8 +33,7 @@ from fastmech.kernels.jacobians import lagrange_inverse, lagrange_jacobian
 from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
-from fastmech.step_limits.beyond import drives_rest
-from fastmech.step_limits.warning import step_limit, warn_of_step
+from fastmech.step_limits.warning import drives_rest, step_limit, warn_of_step
 
 Floats = NDArray[np.float64]
 
@@ -216,7 +215,8 @@ def disturb(
     steps, which = np.unique(longest, return_inverse=True)
     number = np.array([output_steps(times[-2:], float(step))[0] for step in steps])
     taken = ((t_end - times[-2]) / number)[which]
-    status = judge(reached, starts, final, c, threads)
+    broken, status = breaks_energy_bounds(c, starts, final, threads), reached.copy()
+    status[broken & (reached == Status.OK)] = Status.STEP_TOO_LARGE
     driven = np.array([drives_rest(scene, t_end / float(k), float(k), method) for k in number])[which]
     status[driven & np.isin(status, (Status.OK, Status.NOT_FINITE))] = Status.STEP_TOO_LARGE
 

@@ -38,8 +38,8 @@ from fastmech.capture.certificate import Certificate, certificate_of
 from fastmech.disturbance.motion import damped_times
 from fastmech.disturbance.size import confining_energy
 from fastmech.ensembles import checks
+from fastmech.ensembles.energy_bounds import breaks_energy_bounds
 from fastmech.ensembles.integrate import integrate
-from fastmech.ensembles.plausible import breaks_energy_bounds
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import LABELS, Status, counts
 from fastmech.ensembles.threads import thread_count
@@ -49,8 +49,7 @@ from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import unit
 from fastmech.scene import Scene, require_scene
-from fastmech.step_limits.beyond import is_beyond
-from fastmech.step_limits.warning import warn_of_step
+from fastmech.step_limits.warning import is_beyond, warn_of_step
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

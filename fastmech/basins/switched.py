@@ -11,8 +11,8 @@ from fastmech.basins.ladder import SUBSTEPS, Indices, climb, near_saddle, tell_t
 from fastmech.basins.runs import Paths
 from fastmech.basins.steps import coarse_steps
 from fastmech.capture.certificate import Certificate
+from fastmech.ensembles.energy_bounds import breaks_energy_bounds, energies
 from fastmech.ensembles.integrate import integrate
-from fastmech.ensembles.plausible import breaks_energy_bounds, energy
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import Status
 from fastmech.mechanism.coefficients import reduce
@@ -152,7 +152,7 @@ class Switched:
         place = np.zeros(len(self.certificate.tree.equilibria) + 1, dtype=np.int8)
         place[list(self.certificate.tree.wells)] = np.arange(1, len(self.certificate.tree.wells) + 1)
         code = place[captured.well]
-        bound = energy(reduce(self.certificate.scene), state, np.zeros(running.size))[0]
+        bound = energies(reduce(self.certificate.scene)._replace(force=0.0), state)[0]
         push = self.push(members[running], clock[running])
         bound = bound + 2.0 * np.abs(push) - push * (np.cos(state[:, 0]) - np.sin(state[:, 1]))
         held = (code > 0) & (bound < np.append(-np.inf, self.certificate.levels)[code])

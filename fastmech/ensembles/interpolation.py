@@ -32,9 +32,6 @@ def solve_at(case: Case, settings: Settings, progress: Progress | None = None) -
     """Integrate from t = 0; states are interpolated where output times [s] are closer than steps.
 
     Not so with a stopping condition, or where steps are shorter at first than later.
-
-    Raises:
-        InputError: the step or the number of threads are wrong.
     """
     problem, starts, outputs, threads = case
     until = float(outputs[-1])

@@ -1,32 +1,327 @@
 """A tolerance for systems whose right-hand sides have branches.
 
-Every trajectory runs twice with steps that end where branches are passed
-(:mod:`fastmech.ensembles.located`), the second time with smaller errors of its steps. Where the two are
-apart by no more than the tolerance the second is kept, and their distance, which is nearly the error of the
-first, is taken for its error. Else a third is compared with the second, and so on. What is not settled so
-has no error that is known.
+Every trajectory runs twice, alone, with steps that end where branches are passed, the second time with
+smaller errors of its steps. Where the two are apart by no more than the tolerance the second is kept, and
+their distance, which is nearly the error of the first, is taken for its error. Else a third is compared with
+the second, and so on. What is not settled so has no error that is known.
+
+Between two switches a motion is smooth, and a method keeps its order there; so no step may pass a switch.
+Steps are those of Dormand and Prince with control of their error (Hairer, Norsett, Wanner, *Solving ODEs
+I*, sections II.4 and II.5). A step at whose end other decisions are taken than at its begin
+(:mod:`fastmech.ensembles.switches`) is shortened until the switch is known to rounding (section II.6).
+Where a decision may have turned over and back inside a step, because its value comes nearer to zero and
+goes away again so fast that the tangents of both ends meet beyond it, the step ends there: a branch however
+narrow is not stepped over. (A value that is far from zero and flat at both ends, and not between them,
+deceives the tangents, as a narrow pulse deceives any steps.)
 """
 
 from __future__ import annotations
 
 import threading
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 
 from fastmech.callee import callee
+from fastmech.ensembles.ends import STOP_CODE
 from fastmech.ensembles.lanes import finite_rows
-from fastmech.ensembles.located import COSTS, ENDED, GRAZES, SINGULAR, SLIDES, UNCLEAR, Course, follow
 from fastmech.ensembles.problem import Case
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.solve import Settings, Solution, distances, nothing, part_of, put_into, solve
 from fastmech.ensembles.status import missed_line
+from fastmech.ensembles.switches import MOST_NOTES, SWITCHES
 from fastmech.ensembles.threads import in_threads, thread_count
 from fastmech.integrators.methods import find_method
 from fastmech.interrupts import check
+from fastmech.jit import CUBE, INTEGERS, MATRIX, OBSERVER, RHS, VECTOR, inlined, kernel
 
 Floats = NDArray[np.float64]
+
+#: What becomes of a trajectory.
+ENDED, SLIDES, GRAZES, COSTS, SINGULAR, UNCLEAR = range(6)
+
+_PAIR: Any = find_method("dopri5")
+_A = np.zeros((7, 7))
+for _row, _weights in enumerate([*_PAIR.tableau.a, _PAIR.tableau.b]):
+    _A[_row, : len(_weights)] = _weights
+_C = np.append(_PAIR.tableau.c, 1.0)
+
+#: Weights of the error, over all seven stages: those of order 5 less those of order 4.
+_E = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
+
+#: A switch is known to this part of the longest step; so many in a row, each less than that part of it after
+#: the last one, slide along a border.
+RESOLUTION, SHORT, SLIDING = 1e-12, 1e-4, 32
+
+#: A switch inside a step whose error is too large is known to this part of it.
+COARSE = 0.01
+
+#: A slope is told by this part of a step; steps in which a decision may turn over and back are not refined
+#: below this part of the longest.
+SLOPE, FINEST = 1e-5, 1e-11
+
+#: Rounding of a state in its local error.
+ROUNDED = 1e-14
+
+
+class Course(NamedTuple):
+    """Trajectories (n) that run, and where what they bring is put."""
+
+    starts: Floats  #: (n, dim)
+    params: Floats  #: (n, count)
+    outputs: Floats  #: times [s]
+    observer_params: Floats
+    empty: Floats  #: record of no stop (rows,)
+    limits: Floats  #: longest step [s], most steps, error of a step
+    y: Floats  #: (outputs, n, dim)
+    records: Floats  #: (n, rows)
+    told: Floats  #: steps tried, and the longest taken [s] (n, 2)
+    ended: NDArray[np.int64]  #: what became of each (n,)
+
+
+_tuple: Any = types.NamedTuple
+COURSE = _tuple([MATRIX, MATRIX, VECTOR, VECTOR, VECTOR, VECTOR, CUBE, MATRIX, MATRIX, INTEGERS], Course)
+
+
+class Work(NamedTuple):
+    """Memory of one trajectory."""
+
+    y: Floats  #: state (dim,)
+    trial: Floats  #: state after the step tried (dim,)
+    near: Floats  #: a state beside one of them (dim,)
+    seen: Floats  #: states of the stages (7, dim)
+    stages: Floats  #: rates (7, dim)
+    Y: Floats  #: as a block (dim, 1)
+    rates: Floats  #: of the block
+    p: Floats  #: parameters as a block (count, 1)
+    own: Floats  #: parameters (count,)
+
+
+@inlined
+def _rates(rhs: Any, t: float, y: Floats, w: Any, row: int) -> None:
+    """Rates of a state into a stage."""
+    for d in range(y.size):
+        w.Y[d, 0] = y[d]
+    rhs(t, w.Y, w.rates, w.p)
+    for d in range(y.size):
+        w.stages[row, d] = w.rates[d, 0]
+
+
+@inlined
+def _step(rhs: Any, t: float, h: float, w: Any, local: float) -> float:
+    """Step from ``w.y`` to ``w.trial``; the first stage is there. The error over the one allowed."""
+    for stage in range(1, 7):
+        for d in range(w.y.size):
+            total = 0.0
+            for k in range(stage):
+                total += _A[stage, k] * w.stages[k, d]
+            w.trial[d] = w.seen[stage, d] = w.y[d] + h * total
+        _rates(rhs, t + _C[stage] * h, w.trial, w, stage)
+    worst = 0.0
+    for d in range(w.y.size):
+        total = 0.0
+        for k in range(7):
+            total += _E[k] * w.stages[k, d]
+        error = abs(h * total) / (local + ROUNDED * abs(w.trial[d]))
+        if not error <= worst:
+            worst = error
+        if not np.isfinite(w.trial[d]):
+            return np.inf
+    return worst if np.isfinite(worst) else np.inf
+
+
+@inlined
+def _turned(a: Floats, b: Floats) -> int:
+    """Place of the value of the first decision that is another one; 0: all are the same."""
+    for k in range(min(int(a[0]), int(b[0]), MOST_NOTES)):
+        if a[2 + 2 * k] != b[2 + 2 * k]:
+            return 1 + 2 * k
+    return 0
+
+
+@inlined
+def _left(switches: Any, t: float, h: float, w: Any, before: Floats, after: Floats) -> int:
+    """The same for a step and all its stages: else it would be of neither side."""
+    turned = 0
+    for stage in range(1, 7):
+        if not turned:
+            for d in range(w.y.size):
+                w.near[d] = w.seen[stage, d]
+            switches(t + _C[stage] * h, w.near, w.own, after)
+            turned = _turned(before, after)
+    return turned
+
+
+@inlined
+def _slopes(switches: Any, t: float, dt: float, row: int, w: Any, seen: Floats, slopes: Floats) -> None:
+    """How fast the values of decisions change at ``t``, after it or else before; 0: not known."""
+    for sign in (1.0, -1.0):
+        for d in range(w.y.size):
+            w.near[d] = w.trial[d] + sign * dt * w.stages[row, d]
+        switches(t + sign * dt, w.near, w.own, slopes)
+        told = not _turned(seen, slopes)
+        for k in range(min(int(seen[0]), MOST_NOTES)):
+            slopes[1 + 2 * k] = (slopes[1 + 2 * k] - seen[1 + 2 * k]) / (sign * dt) if told else 0.0
+        if told:
+            return
+
+
+@inlined
+def _meet(a: Floats, a_slopes: Floats, b: Floats, b_slopes: Floats, h: float) -> float:
+    """Where in a step of length ``h`` a decision may have turned over and back; 0: nowhere."""
+    for k in range(min(int(a[0]), MOST_NOTES)):
+        first, last = a[1 + 2 * k], b[1 + 2 * k]
+        if first * last > 0.0:
+            sign = 1.0 if first > 0.0 else -1.0
+            down, up = sign * a_slopes[1 + 2 * k], sign * b_slopes[1 + 2 * k]
+            if down < 0.0 < up:
+                at = (sign * (first - last) + up * h) / (up - down)
+                if 0.0 < at < h and sign * first + down * at <= 0.0:
+                    return at
+    return 0.0
+
+
+@inlined
+def _switch(
+    rhs: Any, switches: Any, t: float, high: float, w: Any, seen: Any, limits: tuple[float, float]
+) -> tuple[float, float]:
+    """Lengths of two steps to both sides of a switch, which the second one passes.
+
+    ``seen`` are the decisions at the step's begin and at its end ``high`` after it, and memory;
+    ``limits`` the error of a step, and how near to each other both ends must be.
+    """
+    before, after, at = seen
+    local, resolution = limits
+    low, number = 0.0, 0
+    for k in range(1 + 2 * min(int(before[0]), MOST_NOTES)):
+        at[k] = before[k]
+    first = _turned(before, after)
+    below, above = before[first], after[first]
+    while high - low > resolution:
+        # Where the straight line between both values is zero, and a little beyond: both ends must come near.
+        share = below / (below - above) if below * above <= 0.0 and below != above else 0.5
+        share = 0.5 if number % 3 == 2 else share
+        middle = low + share * (high - low)
+        middle += 0.4 * resolution if share < 0.5 else -0.4 * resolution
+        middle = min(max(middle, low + 0.4 * resolution), high - 0.4 * resolution)
+        _step(rhs, t, middle, w, local)
+        turned = _left(switches, t, middle, w, before, after)
+        if turned:
+            high, first = middle, turned
+            below, above = at[first], after[first]
+        else:
+            low, below = middle, after[first]
+            for k in range(1 + 2 * min(int(before[0]), MOST_NOTES)):
+                at[k] = after[k]
+        number += 1
+    return low, high
+
+
+@inlined
+def _follow(rhs: Any, switches: Any, observe: Any, course: Any, i: int) -> None:
+    """Trajectory ``i`` of a course; what it has not reached is NaN."""
+    dim, longest, local = course.starts.shape[1], course.limits[0], course.limits[2]
+    count, size = course.params.shape[1], 1 + 2 * MOST_NOTES
+    w = Work(
+        np.empty(dim), np.empty(dim), np.empty(dim), np.empty((7, dim)), np.empty((7, dim)),
+        np.empty((dim, 1)), np.empty((dim, 1)), np.empty((count, 1)), np.empty(count),
+    )  # fmt: skip
+    before, after, at = np.zeros(size), np.zeros(size), np.zeros(size)
+    slopes, after_slopes = np.zeros(size), np.zeros(size)
+    record = np.empty((course.empty.size, 1))
+    for d in range(dim):
+        w.y[d] = w.trial[d] = course.starts[i, d]
+        for o in range(course.outputs.size):
+            course.y[o, i, d] = np.nan
+    for k in range(count):
+        w.p[k, 0] = w.own[k] = course.params[i, k]
+    for k in range(course.empty.size):
+        record[k, 0] = course.empty[k]
+    t, h, cross, last = 0.0, COARSE * longest, 0.0, -longest
+    steps, short, o, ended = 0, 0, 0, ENDED
+    _rates(rhs, t, w.y, w, 0)
+    switches(t, w.y, w.own, before)
+    _slopes(switches, t, SLOPE * h, 0, w, before, slopes)
+    while True:
+        while o < course.outputs.size and t >= course.outputs[o]:
+            for d in range(dim):
+                course.y[o, i, d] = w.y[d]
+            o += 1
+        if o == course.outputs.size:
+            break
+        end = course.outputs[o]
+        steps += 1
+        if steps > course.limits[1] or before[0] > MOST_NOTES:
+            ended = COSTS if before[0] <= MOST_NOTES else UNCLEAR
+            break
+        tried = cross if cross > 0.0 else (h if t + h < end else end - t)
+        cross, resolution = 0.0, max(RESOLUTION * longest, 1e-15 * abs(end))
+        error = _step(rhs, t, tried, w, local)
+        switched = error < np.inf and _left(switches, t, tried, w, before, after) > 0
+        if switched and tried > resolution:
+            near = resolution if error <= 1.0 else max(resolution, COARSE * tried)
+            low, high = _switch(rhs, switches, t, tried, w, (before, after, at), (local, near))
+            if near == resolution or low > 0.0:
+                # The last point of this piece, and then the first one of the next.
+                cross = high - low if near == resolution and low > resolution else 0.0
+                switched = near == resolution and low <= resolution
+                tried = high if switched else low
+                error = _step(rhs, t, tried, w, local)
+                switches(t + tried, w.trial, w.own, after)
+        if error > 1.0:
+            h, cross = tried * (0.1 if error == np.inf else max(0.2, 0.9 * error**-0.2)), 0.0
+            if h < 0.01 * resolution:
+                ended = SINGULAR
+                break
+            continue
+        if not switched:
+            _slopes(switches, t + tried, SLOPE * tried, 6, w, after, after_slopes)
+            turn = _meet(before, slopes, after, after_slopes, tried)
+            if turn > 0.0:
+                if tried < FINEST * longest:
+                    ended = SLIDES if short else GRAZES
+                    break
+                h, cross = min(max(turn, 0.1 * tried), 0.9 * tried), 0.0
+                continue
+        grown = tried * min(5.0, 0.9 * max(error, 1e-10) ** -0.2)
+        h = min(longest, max(grown, h) if tried < h else grown)
+        t = end if t + tried >= end else t + tried
+        course.told[i, 1] = max(course.told[i, 1], tried)
+        for d in range(dim):
+            w.y[d] = w.Y[d, 0] = w.trial[d]
+            w.stages[0, d] = w.stages[6, d]
+        for k in range(1 + 2 * min(int(after[0]), MOST_NOTES)):
+            before[k], slopes[k] = after[k], after_slopes[k]
+        if switched:
+            switches(t, w.y, w.own, before)
+            _slopes(switches, t, SLOPE * h, 0, w, before, slopes)
+            short = short + 1 if t < last + SHORT * longest else 0
+            last = t
+            if short > SLIDING:
+                ended = SLIDES
+                break
+        if record.shape[0]:
+            observe(t, w.Y, course.observer_params, record)
+            if record[STOP_CODE, 0] != 0.0:
+                while o < course.outputs.size:
+                    for d in range(dim):
+                        course.y[o, i, d] = w.y[d]
+                    o += 1
+                break
+    for k in range(course.empty.size):
+        course.records[i, k] = record[k, 0]
+    course.told[i, 0], course.ended[i] = steps, ended
+
+
+@kernel(types.void(RHS, SWITCHES, OBSERVER, COURSE, types.int64, types.int64))
+def follow(rhs: Any, switches: Any, observe: Any, course: Any, first: int, last: int) -> None:
+    """Trajectories from ``first`` on, before ``last``."""
+    for i in range(first, last):
+        _follow(rhs, switches, observe, course, i)
+
+
 Members = NDArray[np.int64]
 
 #: Error of a step in the first run over the tolerance, how many times smaller it is in the next one, the
@@ -74,7 +369,7 @@ def follow_to_tolerance(
         progress(n - who.size)
     for k in range(RUNS):
         local = max(FIRST * tol / FINER**k, LEAST)
-        finer, ended[who] = _follow(case.part(who), switches, local, progress)
+        finer, ended[who] = _followed(case.part(who), switches, local, progress)
         put_into(best, who, finer)
         open_ = ended[who] == ENDED
         if last is not None:
@@ -97,7 +392,7 @@ def follow_to_tolerance(
     return best, error, missed_line(missed, {why: missed & (ended == code) for code, why in WHY.items()})
 
 
-def _follow(case: Case, switches: Any, local: float, progress: Progress | None) -> tuple[Solution, Members]:
+def _followed(case: Case, switches: Any, local: float, progress: Progress | None) -> tuple[Solution, Members]:
     """The trajectories with so large errors of their steps, and what became of each."""
     problem, starts, outputs, threads = case
     n, seen = len(starts), problem.observation

@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.ensembles import checks
-from fastmech.ensembles.fitting import vibration_frequency
+from fastmech.ensembles.fitting import damping_rate, vibration_frequency
 from fastmech.ensembles.parameters import Parameters
 from fastmech.ensembles.run import NOTHING, Observation
-from fastmech.ensembles.stiffness import damping_rate
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
 from fastmech.integrators.method import Method, with_jacobian

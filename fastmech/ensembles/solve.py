@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.ensembles.ends import STOP_CODE
+from fastmech.ensembles.energy_bounds import breaks_energy_bounds
 from fastmech.ensembles.fitting import EXPONENT_AGAIN, EXPONENT_ONCE, fit_steps, fitted_steps
-from fastmech.ensembles.plausible import judge
 from fastmech.ensembles.problem import Case, Problem
 from fastmech.ensembles.run import Ensemble, Progress, run_ensemble
 from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.status import Status
-from fastmech.ensembles.stopping import STOP_CODE
 from fastmech.ensembles.turning import TURNED, TURNS
 from fastmech.integrators.method import Method
 
@@ -90,18 +90,11 @@ def distances(a: Solution, b: Solution) -> Floats:
     return np.asarray(apart)
 
 
-def solve(
-    case: Case,
-    settings: Settings,
-    progress: Progress | None = None,
-) -> Solution:
+def solve(case: Case, settings: Settings, progress: Progress | None = None) -> Solution:
     """Integrate from t = 0 through the output times [s].
 
     Where steps are fitted again, the times at which that is done end a piece of the run. Starts to whose
     motions no steps can be fitted do not run: any step is too large for them.
-
-    Raises:
-        InputError: the step or the number of threads are wrong.
     """
     problem, starts, outputs, threads = case
     ends, again = _ends(settings, outputs)
@@ -142,7 +135,9 @@ def solve(
         begin, now = end, run.states[-1]
     solution = course.solution()
     tell_aside(solution, starts, outputs, aside)
-    solution.status = judge(solution.status, starts, solution.y[-1], problem.coefficients, threads)
+    if problem.coefficients is not None:
+        broken = breaks_energy_bounds(problem.coefficients, starts, solution.y[-1], threads)
+        solution.status[broken & (solution.status == Status.OK)] = Status.STEP_TOO_LARGE
     return solution
 
 

@@ -163,9 +163,6 @@ def usable_starts(problem: Problem, starts: Floats, t_end: float, threads: int |
     """Which starts (n, dim) have motions until ``t_end`` [s] that steps can follow.
 
     That is asked once, with steps that all tolerances may come to: it depends on a start alone.
-
-    Raises:
-        InputError: the number of threads is wrong.
     """
     usable, c = finite_rows(starts), problem.coefficients
     if c is None:
@@ -184,11 +181,7 @@ def _switches(problem: Problem) -> tuple[Any, str]:
 
 
 def _estimated(
-    case: Case,
-    who: Members,
-    asked: tuple[float, float, str | None],
-    switches: Any,
-    progress: Progress | None,
+    case: Case, who: Members, asked: tuple[float, float, str | None], switches: Any, progress: Progress | None
 ) -> Estimated:
     """The same of starts ``who`` whose motions steps can follow; ``asked``: tolerance, quantile, method."""
     tol, quantile, method = asked

@@ -16,15 +16,7 @@ import numpy as np
 from numba import types
 
 from fastmech.callee import CalleeType, callee
-from fastmech.integrators.batch import (
-    ROUNDED_TIME,
-    Batch,
-    BlockRHS,
-    Floats,
-    Integers,
-    Observer,
-    batch_type,
-)
+from fastmech.integrators.batch import ROUNDED_TIME, Batch, BlockRHS, Floats, Integers, Observer, batch_type
 from fastmech.integrators.tableau import Tableau
 from fastmech.jit import (
     INTEGERS,

@@ -20,16 +20,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from fastmech.integrators.batch import (
-    ROUNDED_TIME,
-    Batch,
-    BlockRHS,
-    Floats,
-    Integers,
-    Observer,
-    batch_type,
-)
-from fastmech.integrators.implicit_tableau import Scheme
+from fastmech.integrators.batch import ROUNDED_TIME, Batch, BlockRHS, Floats, Integers, Observer, batch_type
+from fastmech.integrators.tableau import Scheme
 from fastmech.jit import (
     INVERSE,
     INVERSE_SIGNATURE,
@@ -345,22 +337,22 @@ def solve_stages(call: Calls, scheme: Scheme, block: Block, at: Moment) -> int:
     z = block.Z.reshape((stages + 1) * dim, lanes)
     own_z = chosen(z, which)
     own = Block(
-        chosen(block.Y, which),
-        chosen(block.params, which),
-        own_z.reshape((stages + 1, dim, width)),
-        chosen(block.E.reshape(stages * dim, lanes), which).reshape((stages, dim, width)),
-        block.ahead,
-        block.within,
-        block.scaled,
-        np.empty((dim * dim, width)),
-        chosen(block.X, which),
-        chosen(block.U, which),
-        chosen(block.V, which),
-        np.empty((8 * dim * dim + 1, width)),
-        np.ones(width),
-        chosen(block.last.reshape(1, lanes), which).reshape(width),
-        chosen(block.base.reshape(1, lanes), which).reshape(width),
-        block.alive,
+        Y=chosen(block.Y, which),
+        params=chosen(block.params, which),
+        Z=own_z.reshape((stages + 1, dim, width)),
+        E=chosen(block.E.reshape(stages * dim, lanes), which).reshape((stages, dim, width)),
+        ahead=block.ahead,
+        within=block.within,
+        scaled=block.scaled,
+        J=np.empty((dim * dim, width)),
+        X=chosen(block.X, which),
+        U=chosen(block.U, which),
+        V=chosen(block.V, which),
+        G=np.empty((8 * dim * dim + 1, width)),
+        active=np.ones(width),
+        last=chosen(block.last.reshape(1, lanes), which).reshape(width),
+        base=chosen(block.base.reshape(1, lanes), which).reshape(width),
+        alive=block.alive,
     )
     left, iteration = iterate(call, scheme, own, at, (iteration, 0))
     for i in range(found):
@@ -435,22 +427,22 @@ def block_of(scheme: Scheme, run: Batch, b: int) -> Block:
     (_, dim, lanes), stages, group = run.Y.shape, scheme.nodes.shape[0], scheme.back.shape[0]
     rows = dim * dim
     return Block(
-        run.Y[b],
-        run.params[min(b, run.params.shape[0] - 1)],
-        run.memory[b].reshape((stages + 1, dim, lanes)),
-        np.empty((stages, dim, lanes)),
-        np.empty(stages),
-        np.empty((group, group)),
-        np.empty((group, group)),
-        np.empty((rows, lanes)),
-        np.empty((rows, lanes)),
-        np.empty((rows, lanes)),
-        np.empty((rows, lanes)),
-        np.empty((8 * rows + 1, lanes)),
-        np.empty(lanes),
-        np.empty(lanes),
-        np.empty(lanes),
-        np.empty(lanes),
+        Y=run.Y[b],
+        params=run.params[min(b, run.params.shape[0] - 1)],
+        Z=run.memory[b].reshape((stages + 1, dim, lanes)),
+        E=np.empty((stages, dim, lanes)),
+        ahead=np.empty(stages),
+        within=np.empty((group, group)),
+        scaled=np.empty((group, group)),
+        J=np.empty((rows, lanes)),
+        X=np.empty((rows, lanes)),
+        U=np.empty((rows, lanes)),
+        V=np.empty((rows, lanes)),
+        G=np.empty((8 * rows + 1, lanes)),
+        active=np.empty(lanes),
+        last=np.empty(lanes),
+        base=np.empty(lanes),
+        alive=np.empty(lanes),
     )
 
 

@@ -29,9 +29,7 @@ from fastmech.integrators.method import Adams, ImplicitRungeKutta, Method, Runge
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.integrators.tableaus.implicit import IMPLICIT_TABLEAUS
 
-_EXPLICIT = (
-    "Adams; Bashforth, Adams, Theories of Capillary Action, 1883; weights derived in multistep_weights"
-)
+_EXPLICIT = "Adams; Bashforth, Adams, Theories of Capillary Action, 1883; weights derived exactly"
 _CORRECTED = (
     "Moulton, New Methods in Exterior Ballistics, 1926, with Adams-Bashforth of one order less as predictor"
 )

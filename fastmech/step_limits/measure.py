@@ -21,7 +21,7 @@ from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 from fastmech.stability.linearize import Rest, jacobian
-from fastmech.step_limits.crossing import first_crossing
+from fastmech.step_limits.amplification import first_crossing
 
 Floats = NDArray[np.float64]
 

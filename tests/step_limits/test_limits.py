@@ -18,10 +18,9 @@ from fastmech.integrators.method import ImplicitRungeKutta, RungeKutta
 from fastmech.integrators.methods import METHODS
 from fastmech.step_limits.amplification import amplification, stability_function, stability_polynomial
 from fastmech.step_limits.axes import imaginary_limit, real_limit
-from fastmech.step_limits.impulse import impulse_limit, impulse_ratio
 from fastmech.step_limits.measure import measured_stable_step
 from fastmech.step_limits.predict import largest_stable_step, stable_step
-from fastmech.step_limits.warning import step_limit, step_warning
+from fastmech.step_limits.warning import impulse_limit, impulse_ratio, step_limit, step_warning
 
 EXPLICIT = [name for name, method in METHODS.items() if not isinstance(method, ImplicitRungeKutta)]
 RUNGE_KUTTA = [name for name, method in METHODS.items() if isinstance(method, RungeKutta)]
