@@ -217,7 +217,7 @@ class Resumption:
             seen = self._watched(observe_before, self._span, some, self._states(some), found[:, STOP_TIME])
             begin, states = np.ascontiguousarray(seen[:, TIME]), np.ascontiguousarray(seen[:, STATE:])
             own = np.repeat(params[None], some.size, axis=0) if params.ndim == 1 else params[some]
-            search = Search(begin, states, own, observation.params, observation.record, found)
+            search = Search(begin, states, own, observation.params, empty=observation.record, record=found)
             method: Any = self._method
             if isinstance(method, ImplicitRungeKutta):
                 functions = self._rhs, self._rhs, inverse_by_elimination, observation.observe
@@ -246,7 +246,9 @@ class Resumption:
         carried = self._method.carried if memory is None else lanes.rows(memory)[which]
         params = lanes.own_params()
         params = params if params.ndim == 1 else params[which]
-        again = Lanes(np.arange(which.size), begin, params, record, lanes.block_lanes, carried)
+        again = Lanes(
+            np.arange(which.size), begin, params, record, block_lanes=lanes.block_lanes, carried=carried
+        )
         again.phase[:] = self._phase
         batch = again.batch(span, np.zeros(0))
         self._method.run(self._rhs, observe, batch)

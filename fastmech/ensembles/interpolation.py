@@ -40,7 +40,7 @@ def solve_at(case: Case, settings: Settings, progress: Progress | None = None) -
         return solve(case, settings, progress)
     steps: Any = np.broadcast_to(np.asarray(settings.dt, dtype=np.float64), len(starts))
     if settings.fit and problem.coefficients is not None:
-        fitted = fit_steps(problem.coefficients, starts, 1.0, until, EXPONENT_ONCE, threads)
+        fitted = fit_steps(problem.coefficients, starts, 1.0, until, EXPONENT_ONCE, threads=threads)
         steps = steps * fitted.shares
     found: Solution | None = None
     for length in np.unique(steps):

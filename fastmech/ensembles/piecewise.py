@@ -93,38 +93,33 @@ class Work(NamedTuple):
     near: Floats  #: a state beside one of them (dim,)
     seen: Floats  #: states of the stages (7, dim)
     stages: Floats  #: rates (7, dim)
-    Y: Floats  #: as a block (dim, 1)
-    rates: Floats  #: of the block
-    p: Floats  #: parameters as a block (count, 1)
-    own: Floats  #: parameters (count,)
+    p: Floats  #: parameters (count,)
+    notes: Floats  #: decisions and their slopes, by the rows below
+    local: float  #: error of a step
+
+
+#: Rows of notes: decisions at a step's begin and at its end, how fast their values change there, and those
+#: that are remembered.
+BEFORE, AFTER, SLOPES, AFTER_SLOPES, AT = range(5)
 
 
 @inlined
-def _rates(rhs: Any, t: float, y: Floats, w: Any, row: int) -> None:
-    """Rates of a state into a stage."""
-    for d in range(y.size):
-        w.Y[d, 0] = y[d]
-    rhs(t, w.Y, w.rates, w.p)
-    for d in range(y.size):
-        w.stages[row, d] = w.rates[d, 0]
-
-
-@inlined
-def _step(rhs: Any, t: float, h: float, w: Any, local: float) -> float:
+def _step(rhs: Any, t: float, h: float, w: Any) -> float:
     """Step from ``w.y`` to ``w.trial``; the first stage is there. The error over the one allowed."""
+    dim = w.y.size
     for stage in range(1, 7):
-        for d in range(w.y.size):
+        for d in range(dim):
             total = 0.0
             for k in range(stage):
                 total += _A[stage, k] * w.stages[k, d]
             w.trial[d] = w.seen[stage, d] = w.y[d] + h * total
         _rates(rhs, t + _C[stage] * h, w.trial, w, stage)
     worst = 0.0
-    for d in range(w.y.size):
+    for d in range(dim):
         total = 0.0
         for k in range(7):
             total += _E[k] * w.stages[k, d]
-        error = abs(h * total) / (local + ROUNDED * abs(w.trial[d]))
+        error = abs(h * total) / (w.local + ROUNDED * abs(w.trial[d]))
         if not error <= worst:
             worst = error
         if not np.isfinite(w.trial[d]):
@@ -133,49 +128,70 @@ def _step(rhs: Any, t: float, h: float, w: Any, local: float) -> float:
 
 
 @inlined
-def _turned(a: Floats, b: Floats) -> int:
+def _rates(rhs: Any, t: float, y: Floats, w: Any, row: int) -> None:
+    """Rates of a state into a stage."""
+    block = (y.size, 1)
+    rhs(t, y.reshape(block), w.stages[row].reshape(block), w.p.reshape((w.p.size, 1)))
+
+
+@inlined
+def _decisions(w: Any, row: int) -> int:
+    """How many are noted."""
+    return min(int(w.notes[row, 0]), MOST_NOTES)
+
+
+@inlined
+def _remember(w: Any, row: int, into: int) -> None:
+    """Copy notes."""
+    for k in range(w.notes.shape[1]):
+        w.notes[into, k] = w.notes[row, k]
+
+
+@inlined
+def _turned(w: Any, a: int, b: int) -> int:
     """Place of the value of the first decision that is another one; 0: all are the same."""
-    for k in range(min(int(a[0]), int(b[0]), MOST_NOTES)):
-        if a[2 + 2 * k] != b[2 + 2 * k]:
+    for k in range(min(_decisions(w, a), _decisions(w, b))):
+        if w.notes[a, 2 + 2 * k] != w.notes[b, 2 + 2 * k]:
             return 1 + 2 * k
     return 0
 
 
 @inlined
-def _left(switches: Any, t: float, h: float, w: Any, before: Floats, after: Floats) -> int:
+def _left(switches: Any, t: float, h: float, w: Any) -> int:
     """The same for a step and all its stages: else it would be of neither side."""
     turned = 0
     for stage in range(1, 7):
         if not turned:
             for d in range(w.y.size):
                 w.near[d] = w.seen[stage, d]
-            switches(t + _C[stage] * h, w.near, w.own, after)
-            turned = _turned(before, after)
+            switches(t + _C[stage] * h, w.near, w.p, w.notes[AFTER])
+            turned = _turned(w, BEFORE, AFTER)
     return turned
 
 
 @inlined
-def _slopes(switches: Any, t: float, dt: float, row: int, w: Any, seen: Floats, slopes: Floats) -> None:
-    """How fast the values of decisions change at ``t``, after it or else before; 0: not known."""
+def _slopes(switches: Any, t: float, dt: float, w: Any, row: int) -> None:
+    """How fast the values of decisions ``row`` change at ``t``, after it or else before; 0: not known."""
+    stage, slopes = 6 if row == AFTER else 0, row + SLOPES
     for sign in (1.0, -1.0):
         for d in range(w.y.size):
-            w.near[d] = w.trial[d] + sign * dt * w.stages[row, d]
-        switches(t + sign * dt, w.near, w.own, slopes)
-        told = not _turned(seen, slopes)
-        for k in range(min(int(seen[0]), MOST_NOTES)):
-            slopes[1 + 2 * k] = (slopes[1 + 2 * k] - seen[1 + 2 * k]) / (sign * dt) if told else 0.0
+            w.near[d] = w.trial[d] + sign * dt * w.stages[stage, d]
+        switches(t + sign * dt, w.near, w.p, w.notes[slopes])
+        told = not _turned(w, row, slopes)
+        for k in range(1, 1 + 2 * _decisions(w, row), 2):
+            w.notes[slopes, k] = (w.notes[slopes, k] - w.notes[row, k]) / (sign * dt) if told else 0.0
         if told:
             return
 
 
 @inlined
-def _meet(a: Floats, a_slopes: Floats, b: Floats, b_slopes: Floats, h: float) -> float:
+def _meet(w: Any, h: float) -> float:
     """Where in a step of length ``h`` a decision may have turned over and back; 0: nowhere."""
-    for k in range(min(int(a[0]), MOST_NOTES)):
-        first, last = a[1 + 2 * k], b[1 + 2 * k]
+    for k in range(1, 1 + 2 * _decisions(w, BEFORE), 2):
+        first, last = w.notes[BEFORE, k], w.notes[AFTER, k]
         if first * last > 0.0:
             sign = 1.0 if first > 0.0 else -1.0
-            down, up = sign * a_slopes[1 + 2 * k], sign * b_slopes[1 + 2 * k]
+            down, up = sign * w.notes[SLOPES, k], sign * w.notes[AFTER_SLOPES, k]
             if down < 0.0 < up:
                 at = (sign * (first - last) + up * h) / (up - down)
                 if 0.0 < at < h and sign * first + down * at <= 0.0:
@@ -184,21 +200,15 @@ def _meet(a: Floats, a_slopes: Floats, b: Floats, b_slopes: Floats, h: float) ->
 
 
 @inlined
-def _switch(
-    rhs: Any, switches: Any, t: float, high: float, w: Any, seen: Any, limits: tuple[float, float]
-) -> tuple[float, float]:
+def _switch(rhs: Any, switches: Any, t: float, w: Any, within: tuple[float, float]) -> tuple[float, float]:
     """Lengths of two steps to both sides of a switch, which the second one passes.
 
-    ``seen`` are the decisions at the step's begin and at its end ``high`` after it, and memory;
-    ``limits`` the error of a step, and how near to each other both ends must be.
+    ``within`` are the length of a step that passes it, and how near to each other both ends must be.
     """
-    before, after, at = seen
-    local, resolution = limits
-    low, number = 0.0, 0
-    for k in range(1 + 2 * min(int(before[0]), MOST_NOTES)):
-        at[k] = before[k]
-    first = _turned(before, after)
-    below, above = before[first], after[first]
+    low, number, (high, resolution) = 0.0, 0, within
+    _remember(w, BEFORE, AT)
+    first = _turned(w, BEFORE, AFTER)
+    below, above = w.notes[BEFORE, first], w.notes[AFTER, first]
     while high - low > resolution:
         # Where the straight line between both values is zero, and a little beyond: both ends must come near.
         share = below / (below - above) if below * above <= 0.0 and below != above else 0.5
@@ -206,15 +216,14 @@ def _switch(
         middle = low + share * (high - low)
         middle += 0.4 * resolution if share < 0.5 else -0.4 * resolution
         middle = min(max(middle, low + 0.4 * resolution), high - 0.4 * resolution)
-        _step(rhs, t, middle, w, local)
-        turned = _left(switches, t, middle, w, before, after)
+        _step(rhs, t, middle, w)
+        turned = _left(switches, t, middle, w)
         if turned:
             high, first = middle, turned
-            below, above = at[first], after[first]
+            below, above = w.notes[AT, first], w.notes[AFTER, first]
         else:
-            low, below = middle, after[first]
-            for k in range(1 + 2 * min(int(before[0]), MOST_NOTES)):
-                at[k] = after[k]
+            low, below = middle, w.notes[AFTER, first]
+            _remember(w, AFTER, AT)
         number += 1
     return low, high
 
@@ -222,28 +231,29 @@ def _switch(
 @inlined
 def _follow(rhs: Any, switches: Any, observe: Any, course: Any, i: int) -> None:
     """Trajectory ``i`` of a course; what it has not reached is NaN."""
-    dim, longest, local = course.starts.shape[1], course.limits[0], course.limits[2]
-    count, size = course.params.shape[1], 1 + 2 * MOST_NOTES
+    dim, longest = course.starts.shape[1], course.limits[0]
     w = Work(
-        np.empty(dim), np.empty(dim), np.empty(dim), np.empty((7, dim)), np.empty((7, dim)),
-        np.empty((dim, 1)), np.empty((dim, 1)), np.empty((count, 1)), np.empty(count),
-    )  # fmt: skip
-    before, after, at = np.zeros(size), np.zeros(size), np.zeros(size)
-    slopes, after_slopes = np.zeros(size), np.zeros(size)
+        y=np.empty(dim),
+        trial=np.empty(dim),
+        near=np.empty(dim),
+        seen=np.empty((7, dim)),
+        stages=np.empty((7, dim)),
+        p=course.params[i],
+        notes=np.zeros((5, 1 + 2 * MOST_NOTES)),
+        local=course.limits[2],
+    )
     record = np.empty((course.empty.size, 1))
     for d in range(dim):
         w.y[d] = w.trial[d] = course.starts[i, d]
         for o in range(course.outputs.size):
             course.y[o, i, d] = np.nan
-    for k in range(count):
-        w.p[k, 0] = w.own[k] = course.params[i, k]
     for k in range(course.empty.size):
         record[k, 0] = course.empty[k]
     t, h, cross, last = 0.0, COARSE * longest, 0.0, -longest
     steps, short, o, ended = 0, 0, 0, ENDED
     _rates(rhs, t, w.y, w, 0)
-    switches(t, w.y, w.own, before)
-    _slopes(switches, t, SLOPE * h, 0, w, before, slopes)
+    switches(t, w.y, w.p, w.notes[BEFORE])
+    _slopes(switches, t, SLOPE * h, w, BEFORE)
     while True:
         while o < course.outputs.size and t >= course.outputs[o]:
             for d in range(dim):
@@ -253,23 +263,23 @@ def _follow(rhs: Any, switches: Any, observe: Any, course: Any, i: int) -> None:
             break
         end = course.outputs[o]
         steps += 1
-        if steps > course.limits[1] or before[0] > MOST_NOTES:
-            ended = COSTS if before[0] <= MOST_NOTES else UNCLEAR
+        if steps > course.limits[1] or w.notes[BEFORE, 0] > MOST_NOTES:
+            ended = COSTS if w.notes[BEFORE, 0] <= MOST_NOTES else UNCLEAR
             break
         tried = cross if cross > 0.0 else (h if t + h < end else end - t)
         cross, resolution = 0.0, max(RESOLUTION * longest, 1e-15 * abs(end))
-        error = _step(rhs, t, tried, w, local)
-        switched = error < np.inf and _left(switches, t, tried, w, before, after) > 0
+        error = _step(rhs, t, tried, w)
+        switched = error < np.inf and _left(switches, t, tried, w) > 0
         if switched and tried > resolution:
             near = resolution if error <= 1.0 else max(resolution, COARSE * tried)
-            low, high = _switch(rhs, switches, t, tried, w, (before, after, at), (local, near))
+            low, high = _switch(rhs, switches, t, w, (tried, near))
             if near == resolution or low > 0.0:
                 # The last point of this piece, and then the first one of the next.
                 cross = high - low if near == resolution and low > resolution else 0.0
                 switched = near == resolution and low <= resolution
                 tried = high if switched else low
-                error = _step(rhs, t, tried, w, local)
-                switches(t + tried, w.trial, w.own, after)
+                error = _step(rhs, t, tried, w)
+                switches(t + tried, w.trial, w.p, w.notes[AFTER])
         if error > 1.0:
             h, cross = tried * (0.1 if error == np.inf else max(0.2, 0.9 * error**-0.2)), 0.0
             if h < 0.01 * resolution:
@@ -277,8 +287,8 @@ def _follow(rhs: Any, switches: Any, observe: Any, course: Any, i: int) -> None:
                 break
             continue
         if not switched:
-            _slopes(switches, t + tried, SLOPE * tried, 6, w, after, after_slopes)
-            turn = _meet(before, slopes, after, after_slopes, tried)
+            _slopes(switches, t + tried, SLOPE * tried, w, AFTER)
+            turn = _meet(w, tried)
             if turn > 0.0:
                 if tried < FINEST * longest:
                     ended = SLIDES if short else GRAZES
@@ -290,26 +300,21 @@ def _follow(rhs: Any, switches: Any, observe: Any, course: Any, i: int) -> None:
         t = end if t + tried >= end else t + tried
         course.told[i, 1] = max(course.told[i, 1], tried)
         for d in range(dim):
-            w.y[d] = w.Y[d, 0] = w.trial[d]
-            w.stages[0, d] = w.stages[6, d]
-        for k in range(1 + 2 * min(int(after[0]), MOST_NOTES)):
-            before[k], slopes[k] = after[k], after_slopes[k]
+            w.y[d], w.stages[0, d] = w.trial[d], w.stages[6, d]
+        _remember(w, AFTER, BEFORE)
+        _remember(w, AFTER_SLOPES, SLOPES)
         if switched:
-            switches(t, w.y, w.own, before)
-            _slopes(switches, t, SLOPE * h, 0, w, before, slopes)
+            switches(t, w.y, w.p, w.notes[BEFORE])
+            _slopes(switches, t, SLOPE * h, w, BEFORE)
             short = short + 1 if t < last + SHORT * longest else 0
             last = t
             if short > SLIDING:
                 ended = SLIDES
                 break
         if record.shape[0]:
-            observe(t, w.Y, course.observer_params, record)
+            observe(t, w.y.reshape((dim, 1)), course.observer_params, record)
             if record[STOP_CODE, 0] != 0.0:
-                while o < course.outputs.size:
-                    for d in range(dim):
-                        course.y[o, i, d] = w.y[d]
-                    o += 1
-                break
+                t = np.inf
     for k in range(course.empty.size):
         course.records[i, k] = record[k, 0]
     course.told[i, 0], course.ended[i] = steps, ended

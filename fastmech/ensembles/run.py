@@ -156,7 +156,14 @@ def run_ensemble(
     def run_task(task: Task) -> int:
         members, piece, passed = task.members, 0, 0
         states, params = rows_at(begin, members), own.at(members, precision)
-        lanes = Lanes(members, states, params, observation.empty(states), block_lanes, method.carried)
+        lanes = Lanes(
+            members,
+            states,
+            params,
+            observation.empty(states),
+            block_lanes=block_lanes,
+            carried=method.carried,
+        )
         while piece < task.way.steps.size and lanes.members.size and not interrupted.is_set():
             check()
             span = task.way.span(piece, most_steps(lanes, passed))

@@ -104,7 +104,7 @@ def solve(case: Case, settings: Settings, progress: Progress | None = None) -> S
     dt: Any = np.asarray(settings.dt, dtype=np.float64)
     shares: Any = 1.0
     if fitted_to is not None:
-        shares, aside = fit_steps(fitted_to, starts, dt, float(outputs[-1]), exponent, threads)
+        shares, aside = fit_steps(fitted_to, starts, dt, float(outputs[-1]), exponent, threads=threads)
         aside &= settings.bounded
         if aside.any():  # they never enter a block, and their step is that of slow motion
             now, shares[aside] = np.where(aside[:, None], np.nan, now), 1.0
@@ -125,8 +125,8 @@ def solve(case: Case, settings: Settings, progress: Progress | None = None) -> S
             now,
             times,
             steps,
-            method,
-            problem.observation,
+            method=method,
+            observation=problem.observation,
             threads=threads,
             precision=settings.precision,
             progress=progress if end == ends[-1] else None,

@@ -167,7 +167,8 @@ def usable_starts(problem: Problem, starts: Floats, t_end: float, threads: int |
     usable, c = finite_rows(starts), problem.coefficients
     if c is None:
         return usable
-    return usable & ~fit_steps(c, starts, SHORT / vibration_frequency(c), t_end, EXPONENT_ONCE, threads).aside
+    longest = SHORT / vibration_frequency(c)
+    return usable & ~fit_steps(c, starts, longest, t_end, EXPONENT_ONCE, threads=threads).aside
 
 
 def _switches(problem: Problem) -> tuple[Any, str]:

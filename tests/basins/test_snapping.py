@@ -110,7 +110,8 @@ def test_windows_are_runs_of_equal_ends() -> None:
     turns[0, 2] = [0, -1]
     snapping = SnappingMap(
         np.arange(1.0, 6.0), np.array([2.0]), fm.find_equilibria(fm.Scene()), 0,
-        np.array([[0, 0, 0, 0, -1]]), turns, np.full((1, 5), 3.0), np.array([[0, 0, 0, 0, 1]], dtype=np.int8),
+        np.array([[0, 0, 0, 0, -1]]), turns, np.full((1, 5), 3.0),
+        np.array([[*[Status.CAPTURED] * 4, Status.UNDECIDED]], dtype=np.int8),
     )  # fmt: skip
     assert snapping.windows(0) == [
         Window(1.0, 2.0, 0, (0, 0), False),
