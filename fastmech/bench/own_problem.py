@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import runpy
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -87,8 +87,10 @@ def run_problem(
         InputError: as :func:`problem_named` and :func:`work_precision`.
     """
     problem, starts, t_end, keywords = problem_named(where)
-    methods = keywords.get("methods")
-    advance = stage("methods", len(EXPLICIT if methods is None else methods))
+    methods = keywords.get("methods", EXPLICIT)
+    if not isinstance(methods, Sequence):
+        raise InputError(f"methods = {shown(methods)}: must be a list of names")
+    advance = stage("methods", len(methods))
     try:
         found = work_precision(problem, starts, t_end, progress=advance, **keywords)
     except TypeError as error:

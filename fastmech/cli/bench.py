@@ -54,8 +54,8 @@ def command(
         raise click.UsageError("--problem: goes without --only and --quick")
     with account("bench", quiet, as_json) as told:
         with told.bars.preparing():
-            from fastmech.bench.report import STUDIES, run_bench
             from fastmech.bench.own_problem import run_problem
+            from fastmech.bench.report import STUDIES, run_bench
         if problem is not None:
             lines, written = run_problem(problem, out, told.bars.stage)
             told.say("\n".join([*lines, ""]))
