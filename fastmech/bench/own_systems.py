@@ -13,10 +13,11 @@ from math import sqrt
 from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from fastmech.ensembles.system import System
-from fastmech.jit import inlined
+from fastmech.jit import FLAGS
 from fastmech.kernels.sincos import cos, sin
 
 Floats = NDArray[np.float64]
@@ -28,7 +29,7 @@ STARTS = 16_384
 MU = 0.01215
 
 
-@inlined
+@njit(**FLAGS)  # type: ignore[untyped-decorator]
 def inverse_cube(s: float) -> float:
     """s^(-3/2)."""
     return 1.0 / (s * sqrt(s))

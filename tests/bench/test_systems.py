@@ -69,7 +69,7 @@ def made(n: int = 16) -> Measured:
     tol = {(n, level, t): row("tol", 50.0, t / 2) for level in (0.99, 1.0) for t in (1e-3, 1e-5)}
     estimates = {key: key[2] for key in tol}
     return Measured(
-        "made", {n: fixed}, tol, estimates, [row("heyoka", 200.0, 1e-3), row("heyoka", 20.0, 1e-5)]
+        "made", {n: fixed}, tol, estimates, [row("heyoka", 200.0, 1e-3), row("heyoka", 20.0, 1e-5)], 0.001
     )
 
 
