@@ -408,7 +408,7 @@ class Runs:
             "two resolutions disagree about their stop": stops,
             "not finite at any step tried": lost,
             "shorter steps would cost too much": missed & self.unpaid & ~lost,
-            "rounding, magnified by the motion, is larger": missed & self.rounded,
+            "rounding is larger, as slight changes of their starts show": missed & self.rounded,
             "shorter steps do not reduce their errors as the order says (chaos, a singularity of the "
             "right-hand side)": rest & ~stops,
         }
