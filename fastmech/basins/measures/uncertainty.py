@@ -82,7 +82,7 @@ def uncertainty_exponent(
     n = checks.whole_number("n", n, least=1)
     seed = checks.whole_number("seed", seed, least=0)
     free = edges > 0.0
-    counts, shares = [], []
+    counts, disordered = [], []
     for k, eps in enumerate(scales):
         rng = np.random.default_rng([seed, k])
         starts = corner + rng.random((n, len(edges))) * edges
@@ -91,10 +91,11 @@ def uncertainty_exponent(
         labels = ask(label_of, np.concatenate([starts, starts - aside, starts + aside])).reshape(3, n)
         known = (labels >= 0).all(axis=0)
         uncertain = known & ((labels[1] != labels[0]) | (labels[2] != labels[0]))
-        counts.append([np.count_nonzero(uncertain), np.count_nonzero(known)])
-        shares.append(np.unique(labels[0, known], return_counts=True)[1] / max(counts[-1][1], 1))
+        each = np.unique(labels[0, known], return_counts=True)[1]
+        counts.append((int(np.count_nonzero(uncertain)), int(each.sum())))
+        disordered.append(1.0 - float(np.sum((each / max(each.sum(), 1)) ** 3)))
     hits, trials = np.array(counts, dtype=np.int64).T
-    fitted = hits <= DISORDER * trials * np.array([1.0 - np.sum(share**3) for share in shares])
+    fitted = hits <= DISORDER * trials * np.array(disordered)
     law = fit_counts(scales, hits, trials, fitted)
     dimension = float(np.count_nonzero(free) - law.exponent)
     return UncertaintyExponent(scales, hits, trials, n - trials, fitted, law, dimension)
