@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from fastmech.atlas.map import map_equilibria
     from fastmech.atlas.snap import find_snap
     from fastmech.basins.copies import copy_labels, copy_of_label
-    from fastmech.basins.disturbed import Outcome, disturb
+    from fastmech.basins.disturbed import disturb
     from fastmech.basins.edge import saddle_at, track_edge
     from fastmech.basins.erosion import erosion
     from fastmech.basins.label import labels_of
@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from fastmech.basins.shock import brute_force_shock, minimal_shock
     from fastmech.basins.shock_limit import impulse_start, shock_limit
     from fastmech.basins.snapping import critical_forces, map_snapping
-    from fastmech.basins.status import BasinStatus
     from fastmech.bench.frontier import work_precision
     from fastmech.capture.barriers import barrier_tree
     from fastmech.capture.certificate import trapped
@@ -65,9 +64,7 @@ except metadata.PackageNotFoundError:  # run from its sources, not installed
     __version__ = "unknown"
 
 _MODULES = {
-    "BasinStatus": "fastmech.basins.status",
     "InputError": "fastmech.errors",
-    "Outcome": "fastmech.basins.disturbed",
     "Scene": "fastmech.scene",
     "Status": "fastmech.ensembles.status",
     "StepWarning": "fastmech.errors",
@@ -123,9 +120,7 @@ _MODULES = {
 }
 
 __all__ = [
-    "BasinStatus",
     "InputError",
-    "Outcome",
     "Scene",
     "Status",
     "StepWarning",

@@ -115,6 +115,11 @@ OBSERVER = CalleeType(OBSERVER_SIGNATURE)
 JACOBIAN_SIGNATURE = types.void(types.float64, MATRIX, MATRIX, MATRIX)
 JACOBIAN = CalleeType(JACOBIAN_SIGNATURE)
 
+#: ``inverse(J, mu, G, X, V)``: X + i V = (mu - J)^-1 in the same order of rows; ``V`` is left where mu is
+#: real. ``G`` (8 dim * dim + 1, lanes) is scratch.
+INVERSE_SIGNATURE = types.void(MATRIX, types.complex128, MATRIX, MATRIX, MATRIX)
+INVERSE = CalleeType(INVERSE_SIGNATURE)
+
 
 #: Held while numba's cache directory, one for the whole process, is the package's.
 _DIRECTORY_SET = threading.Lock()

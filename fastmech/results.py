@@ -13,7 +13,7 @@ complex numbers are two variables, `NAME_re` and `NAME_im`; strings are object a
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -258,7 +258,7 @@ def codes_of(attrs: Mapping[str, Any]) -> dict[str, int]:
         raise InputError("flag_values, flag_meanings: do not fit together") from None
 
 
-def flags(members: type[IntEnum], fill: int | None = None) -> dict[str, Any]:
+def flags(members: Iterable[IntEnum], fill: int | None = None) -> dict[str, Any]:
     """The attributes that explain int8 codes by the CF conventions.
 
     Args:
@@ -273,11 +273,10 @@ def flags(members: type[IntEnum], fill: int | None = None) -> dict[str, Any]:
         InputError: no members, or a value beyond int8.
     """
     members_left = [member for member in members if member != fill]
+    name = getattr(members, "__name__", "statuses")
     values = [int(member) for member in members_left]
     if not values or min(values) < -128 or max(values) > 127:
-        raise InputError(
-            f"flags of {members.__name__} = {values}: must be one or more values from -128 to 127"
-        )
+        raise InputError(f"flags of {name} = {values}: must be one or more values from -128 to 127")
     meanings = " ".join(member.name.lower() for member in members_left)
     none = {} if fill is None else {FILL: fill}
     return {"flag_values": np.array(values, dtype=np.int8), "flag_meanings": meanings, **none}

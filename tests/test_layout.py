@@ -178,6 +178,34 @@ def test_compiled_places_exist_and_hold_kernels() -> None:
     assert sum(bool(decorators(tree(path)) & {"kernel", "inlined"}) for path in sources) >= 10
 
 
+ENGINE = {"kernels", "integrators", "step_limits", "ensembles"}
+
+
+def compiled_functions(code: ast.Module, kinds: set[str]) -> Iterator[ast.FunctionDef]:
+    """Functions decorated by one of ``kinds``, called or not."""
+    for node in code.body:
+        if isinstance(node, ast.FunctionDef) and decorators(ast.Module([node], [])) & kinds:
+            yield node
+
+
+@EVERY_MODULE
+def test_engine_s_kernels_take_few_arguments_and_no_slices(path: Path) -> None:
+    """Of many arguments two of a type change places unseen; a slice makes the compiler write messages."""
+    if layer(path) in ENGINE:
+        for function in compiled_functions(tree(path), {"kernel"}):
+            assert len(function.args.args) <= 8, function.name
+        for function in compiled_functions(tree(path), {"kernel", "called", "inlined"}):
+            assert not any(isinstance(node, ast.Slice) for node in ast.walk(function)), function.name
+
+
+@EVERY_MODULE
+def test_imports_are_seen(path: Path) -> None:
+    """A literal name given to ``import_module`` hides an import from the type checker and from this file."""
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "import_module":
+            assert not isinstance(node.args[0], ast.Constant), ast.unparse(node)
+
+
 @EVERY_MODULE
 def test_only_one_module_decides_what_is_cached(path: Path) -> None:
     """``cache=True`` appears in jit.py alone, where the cache directory is set."""

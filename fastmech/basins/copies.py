@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastmech.basins.label import Labels, label_starts, require_damper
+from fastmech.basins.label import How, Labels, label_starts, require_damper
 from fastmech.basins.measures.labels import Floats, Integers, LabelOf, check_point
 from fastmech.basins.measures.norm import STATE, kinetic_norm
 from fastmech.ensembles import checks
@@ -30,7 +30,7 @@ class CopyLabels:
 
     def __call__(self, starts: Floats) -> Integers:
         """Labels (n,) of starts (n, 4)."""
-        return copy_numbers(label_starts(self.scene, starts, self.t_end, threads=self.threads))
+        return copy_numbers(label_starts(self.scene, starts, self.t_end, How(threads=self.threads)))
 
 
 def copy_labels(scene: Scene, t_end: float = 60.0, *, threads: int | None = None) -> CopyLabels:

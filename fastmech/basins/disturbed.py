@@ -9,34 +9,31 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.basins.label import label_starts, require_damper
+from fastmech.basins.label import How, label_starts, require_damper
 from fastmech.basins.ladder import SUBSTEPS
 from fastmech.basins.measures.fractions import Shares, basin_stability
-from fastmech.basins.status import BasinStatus
 from fastmech.basins.steps import MOST_OCTAVES, PHASE, TURNING, coarse_steps, highest_frequency, method_for
 from fastmech.disturbance.motion import damped_times, equilibria_to_disturb
 from fastmech.disturbance.observe import EXCURSION_PHI, EXCURSION_THETA, LAST_OUTSIDE, observe_departure
 from fastmech.disturbance.size import Size, confining_energy, excess_energy, size_at, uniform_ball
 from fastmech.ensembles import checks
-from fastmech.ensembles.plausible import judge
+from fastmech.ensembles.energy_bounds import breaks_energy_bounds
 from fastmech.ensembles.run import Observation, Progress, run_ensemble
 from fastmech.ensembles.spans import output_steps
-from fastmech.ensembles.status import Status, failure_counts, failure_line
+from fastmech.ensembles.status import ENDS, FAILURES, Status, failure_counts, failure_line
 from fastmech.equilibria.find import Equilibria, Equilibrium
 from fastmech.errors import InputError, StepWarning
-from fastmech.integrators.implicit_method import ImplicitRungeKutta, with_jacobian
+from fastmech.integrators.method import ImplicitRungeKutta, with_jacobian
 from fastmech.integrators.methods import find_method
-from fastmech.kernels.jacobians import lagrange_jacobian
+from fastmech.kernels.jacobians import lagrange_inverse, lagrange_jacobian
 from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
-from fastmech.step_limits.beyond import drives_rest
-from fastmech.step_limits.warning import step_limit, warn_of_step
+from fastmech.step_limits.warning import drives_rest, step_limit, warn_of_step
 
 Floats = NDArray[np.float64]
 
@@ -57,54 +54,6 @@ MEASURING = 0.6
 HALVINGS = 6
 
 
-class Outcome(IntEnum):
-    """Where a disturbed trajectory ends."""
-
-    RETURNED = 0
-    ELSEWHERE = 1
-    AT_UNSTABLE = 2
-    UNDECIDED = 3
-    NOT_FINITE = 4
-    STEP_TOO_LARGE = 5
-    NOT_CONVERGED = 6
-
-    @property
-    def advice(self) -> str:
-        """What it means and what to do."""
-        return _ADVICE[self]
-
-
-#: Outcomes of trajectories that have failed.
-FAILURES = (Outcome.NOT_FINITE, Outcome.STEP_TOO_LARGE, Outcome.NOT_CONVERGED)
-
-_ADVICE = {
-    Outcome.RETURNED: "proved to end at its equilibrium without a full turn",
-    Outcome.ELSEWHERE: "proved to end at another stable equilibrium, or at its own some turns further",
-    Outcome.AT_UNSTABLE: "comes to an unstable equilibrium, and what follows is not decided; "
-    "use a larger t_end",
-    Outcome.UNDECIDED: "nothing is proved by t_end (use a larger one), or the finest steps disagree",
-    Outcome.NOT_FINITE: "became NaN or infinite on the way; use a smaller dt",
-    Outcome.NOT_CONVERGED: "Newton's iteration found no solution of a step; use a smaller dt",
-    Outcome.STEP_TOO_LARGE: "has energy that it cannot have, or dt is beyond the limit; use a smaller dt",
-}
-
-#: What the label's status and that of the measured run say; those captured are told apart by where.
-_BY_LABEL = {
-    BasinStatus.CAPTURED: Outcome.ELSEWHERE,
-    BasinStatus.AT_SADDLE: Outcome.AT_UNSTABLE,
-    BasinStatus.NOT_FINITE: Outcome.NOT_FINITE,
-    BasinStatus.START_NOT_FINITE: Outcome.NOT_FINITE,
-    BasinStatus.STEP_TOO_LARGE: Outcome.STEP_TOO_LARGE,
-    BasinStatus.NOT_CONVERGED: Outcome.NOT_CONVERGED,
-}
-_BY_RUN = {
-    Status.NOT_FINITE: Outcome.NOT_FINITE,
-    Status.START_NOT_FINITE: Outcome.NOT_FINITE,
-    Status.STEP_TOO_LARGE: Outcome.STEP_TOO_LARGE,
-    Status.NOT_CONVERGED: Outcome.NOT_CONVERGED,
-}
-
-
 @dataclass(frozen=True, repr=False)
 class DisturbedEnsemble:
     """Random disturbances of one equilibrium and what became of them; arrays over n trajectories.
@@ -120,7 +69,7 @@ class DisturbedEnsemble:
     starts: Floats  #: states at t = 0, shape (n, 4)
     final: Floats  #: states at t_end, of those that failed the last finite ones, shape (n, 4)
     failed: Floats  #: time of the last finite state of those that failed on the way [s], else NaN; shape (n,)
-    outcome: NDArray[np.int8]  #: :class:`Outcome`, shape (n,)
+    outcome: NDArray[np.int8]  #: :class:`fastmech.ensembles.status.Status`, one of its ``ENDS``, shape (n,)
     end_index: NDArray[np.int8]  #: the stable equilibrium at which it is proved to end, -1: none; shape (n,)
     turns: NDArray[np.int64]  #: full turns of phi and theta on the way there, 0 where none; shape (n, 2)
     time_to_return: Floats  #: s, first step from which on it was in the ball; NaN: not by t_end; (n,)
@@ -129,7 +78,7 @@ class DisturbedEnsemble:
     @property
     def failures(self) -> str:
         """One line: how many trajectories have failed, and how; empty where none has."""
-        return failure_line(failure_counts(self.outcome, FAILURES), self.outcome.size)
+        return failure_line(failure_counts(self.outcome), self.outcome.size)
 
     @property
     def returned(self) -> Shares:
@@ -138,12 +87,12 @@ class DisturbedEnsemble:
         Whose end is not known, be it undecided or failed, is without a label: not returned at the lower end,
         returned in ``at_most`` and at the upper end.
         """
-        known = (self.outcome == Outcome.RETURNED) | (self.outcome == Outcome.ELSEWHERE)
-        return basin_stability(np.where(known, self.outcome, -1), int(Outcome.RETURNED))
+        known = (self.outcome == Status.RETURNED) | (self.outcome == Status.ELSEWHERE)
+        return basin_stability(np.where(known, self.outcome, -1), int(Status.RETURNED))
 
     def __repr__(self) -> str:
         e, shares = self.equilibria[self.index], self.returned
-        ended = failure_counts(self.outcome, Outcome)
+        ended = failure_counts(self.outcome, ENDS)
         lines = [
             f"{self.outcome.size:,} disturbances of the {e.kind} at phi = {e.phi:.4g}, "
             f"theta = {e.theta:.4g} rad, followed for {self.t_end:g} s",
@@ -238,7 +187,7 @@ def disturb(
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StepWarning)  # it has been told
-        ends = label_starts(scene, starts, t_end, dt=dt, method=method, threads=threads)
+        ends = label_starts(scene, starts, t_end, How(dt, method, threads=threads))
     longest = measuring_steps(scene, starts, method) if dt is None else np.full(len(starts), dt)
     at_first = damped_times(scene, method, min(dt or PHASE / highest_frequency(c), t_end))
     times = np.array([0.0, *at_first, t_end])
@@ -253,7 +202,7 @@ def disturb(
             starts[again],
             times,
             longest[again],
-            with_jacobian(find_method(method), lagrange_jacobian, True),
+            with_jacobian(find_method(method), lagrange_jacobian, lagrange_inverse),
             _observation(center, size, return_radius),
             threads=threads,
             progress=progress if halvings == 0 else None,
@@ -266,22 +215,20 @@ def disturb(
     steps, which = np.unique(longest, return_inverse=True)
     number = np.array([output_steps(times[-2:], float(step))[0] for step in steps])
     taken = ((t_end - times[-2]) / number)[which]
-    status = judge(reached, starts, final, c, threads)
+    broken, status = breaks_energy_bounds(c, starts, final, threads), reached.copy()
+    status[broken & (reached == Status.OK)] = Status.STEP_TOO_LARGE
     driven = np.array([drives_rest(scene, t_end / float(k), float(k), method) for k in number])[which]
     status[driven & np.isin(status, (Status.OK, Status.NOT_FINITE))] = Status.STEP_TOO_LARGE
 
-    outcome = np.full(len(starts), Outcome.UNDECIDED, dtype=np.int8)
-    for kind, told in _BY_LABEL.items():
-        outcome[ends.status == kind] = told
-    outcome[(ends.well == index) & ~ends.turns.any(axis=1)] = Outcome.RETURNED
-    for seen, told in _BY_RUN.items():
-        outcome[status == seen] = told
+    outcome = np.where(ends.status == Status.CAPTURED, Status.ELSEWHERE, ends.status).astype(np.int8)
+    outcome[(ends.well == index) & ~ends.turns.any(axis=1)] = Status.RETURNED
+    outcome[status != Status.OK] = status[status != Status.OK]
     failing = np.isin(outcome, FAILURES)
     last_outside = records[LAST_OUTSIDE]
     left = (size(starts - center) > return_radius) | (last_outside > 0.0)
     after = np.append(times, np.inf)[np.searchsorted(times, last_outside * (1.0 + 1e-12), side="right")]
     inside_since = np.where(left, np.minimum(after, last_outside + taken), 0.0)
-    returned = outcome == Outcome.RETURNED
+    returned = outcome == Status.RETURNED
     back = np.zeros(len(starts), dtype=np.bool_)
     back[returned] = (size(final[returned] - center) <= return_radius) & (
         excess_energy(scene, equilibrium, final[returned])

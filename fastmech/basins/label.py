@@ -16,7 +16,7 @@ import math
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,7 +25,6 @@ from fastmech.atlas.wells import ROUNDING
 from fastmech.basins.ladder import SUBSTEPS, climb, lingering, tell_the_same
 from fastmech.basins.measures.norm import FEW_TURNS, beyond_turns
 from fastmech.basins.runs import Paths, follow, rounds_until
-from fastmech.basins.status import BasinStatus, counts
 from fastmech.basins.steps import (
     PHASE,
     coarse_steps,
@@ -39,10 +38,10 @@ from fastmech.capture.certificate import Certificate, certificate_of
 from fastmech.disturbance.motion import damped_times
 from fastmech.disturbance.size import confining_energy
 from fastmech.ensembles import checks
+from fastmech.ensembles.energy_bounds import breaks_energy_bounds
 from fastmech.ensembles.integrate import integrate
-from fastmech.ensembles.plausible import breaks_energy_bounds
 from fastmech.ensembles.run import Progress
-from fastmech.ensembles.status import Status
+from fastmech.ensembles.status import LABELS, Status, counts
 from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError, StepWarning
 from fastmech.integrators.method import Method
@@ -50,8 +49,7 @@ from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import unit
 from fastmech.scene import Scene, require_scene
-from fastmech.step_limits.beyond import is_beyond
-from fastmech.step_limits.warning import warn_of_step
+from fastmech.step_limits.warning import is_beyond, warn_of_step
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -88,13 +86,13 @@ class Labels:
     turns: NDArray[np.int32]  #: full turns of phi and theta of that well from its listed place, (n, 2)
     time: Floats  #: of capture [s], NaN: not captured; the end of a step; (n,)
     settle_time: Floats | None  #: s, from then on within the settling ball; NaN: not by t_end; (n,)
-    status: NDArray[np.int8]  #: :class:`BasinStatus`, (n,)
+    status: NDArray[np.int8]  #: :class:`Status`, (n,)
     steps: int  #: integration steps of all computations of all starts
 
     @property
     def counts(self) -> dict[str, int]:
         """How many starts have each status."""
-        return counts(self.status)
+        return counts(self.status, LABELS)
 
     def __repr__(self) -> str:
         return told_ends(f"{self.status.size:,} starts", self)
@@ -156,34 +154,26 @@ def labels_of(
     largest = float(np.max(angles, initial=0.0, where=np.isfinite(angles)))
     if 2.0 * np.pi * FEW_TURNS < largest <= MOST_DEGREES:
         warnings.warn(f"starts: {beyond_turns(largest)}", stacklevel=2)
-    return label_starts(
-        scene,
-        starts,
-        t_end,
-        dt=dt,
-        method=method,
-        settle_radius=settle_radius,
-        threads=threads,
-        progress=progress,
-    )
+    return label_starts(scene, states, t_end, How(dt, method, settle_radius, threads), progress)
+
+
+class How(NamedTuple):
+    """How starts are labelled: see :func:`labels_of`."""
+
+    dt: float | None = None
+    method: str | None = None
+    settle_radius: float | None = None
+    threads: int | None = None
+    ladder: tuple[int, ...] = SUBSTEPS  #: numbers of substeps, one computation after the other
 
 
 def label_starts(
-    scene: Scene,
-    starts: ArrayLike,
-    t_end: float = 60.0,
-    *,
-    dt: float | None = None,
-    method: str | None = None,
-    settle_radius: float | None = None,
-    threads: int | None = None,
-    progress: Progress | None = None,
-    ladder: tuple[int, ...] = SUBSTEPS,
+    scene: Scene, states: Floats, t_end: float, how: How | None = None, progress: Progress | None = None
 ) -> Labels:
-    """As :func:`labels_of`, with these numbers of substeps, one computation after the other."""
+    """As :func:`labels_of`, of states (n, 4)."""
+    dt, method, settle_radius, threads, ladder = How() if how is None else how
     require_damper(scene)
     checks.progress_function(progress, "starts")
-    states = checks.states("starts", starts, 4)
     checks.memory(len(states), START_NUMBERS, f"starts: labels of {len(states):.3g}", "fewer")
     begin, turned = _unwound(states)
     thread_count(threads)
@@ -201,7 +191,7 @@ def label_starts(
     finite = np.asarray(np.isfinite(begin)).all(axis=1).reshape(-1)
     coarse = coarse_steps(reduce(scene), begin) if dt is None else np.full(len(begin), dt)
     found = Paths.empty(len(begin))
-    status = np.where(finite, BasinStatus.UNDECIDED, BasinStatus.START_NOT_FINITE).astype(np.int8)
+    status = np.where(finite, Status.UNDECIDED, Status.START_NOT_FINITE).astype(np.int8)
     settle = None if settle_radius is None else np.full(len(begin), np.nan)
     for some in pieces_of(len(begin)):
         for step in np.unique(coarse[some[finite[some]]]):
@@ -213,7 +203,7 @@ def label_starts(
             found.steps += followed.steps
         if progress is not None:
             progress(some.size)
-    captured = status == BasinStatus.CAPTURED
+    captured = status == Status.CAPTURED
     return Labels(
         certificate.tree,
         np.where(captured, np.append(-1, certificate.tree.wells)[found.code], -1).astype(np.int8),
@@ -381,7 +371,7 @@ class Ladder:
         energy = np.array([confining_energy(held, e, radius) for e in wells]) / unit(held)
         levels = np.minimum(floor + energy, certificate.levels)
         times = np.full(members.size, np.nan)
-        captured = np.flatnonzero(status[members] == BasinStatus.CAPTURED)
+        captured = np.flatnonzero(status[members] == Status.CAPTURED)
         paths = self.follow(begin[members[captured]], SUBSTEPS[1], certificate.params(levels))
         same = paths.code == found.code[members[captured]]
         times[captured[same]] = paths.time[same]

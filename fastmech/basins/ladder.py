@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.basins.runs import Paths
-from fastmech.basins.status import BasinStatus
 from fastmech.capture.certificate import Certificate
 from fastmech.disturbance.size import size_at
 from fastmech.ensembles.integrate import integrate
@@ -63,21 +62,21 @@ def climb(
         ends, last = members[done], fine.take(done)
         found.put(ends, last)
         captured = settled[done] & (last.code > 0)
-        status[ends] = np.where(captured, BasinStatus.CAPTURED, BasinStatus.UNDECIDED)
+        status[ends] = np.where(captured, Status.CAPTURED, Status.UNDECIDED)
         free = np.flatnonzero(last.code == 0)
-        status[ends[free[near_saddle(certificate, last.state[free])]]] = BasinStatus.AT_SADDLE
+        status[ends[free[near_saddle(certificate, last.state[free])]]] = Status.AT_SADDLE
         # Steps that do not agree: a stable manifold between the paths leads them to its equilibrium first.
         torn = ends[~settled[done]]
         if torn.size:
-            status[torn[lingers(torn)]] = BasinStatus.AT_SADDLE
+            status[torn[lingers(torn)]] = Status.AT_SADDLE
         bad = free[impossible(ends[free], last.state[free])]
-        status[ends[bad]] = BasinStatus.STEP_TOO_LARGE
-        status[ends[free[~np.isfinite(last.state[free]).all(axis=1)]]] = BasinStatus.NOT_FINITE
+        status[ends[bad]] = Status.STEP_TOO_LARGE
+        status[ends[free[~np.isfinite(last.state[free]).all(axis=1)]]] = Status.NOT_FINITE
         for kind in (Status.NOT_CONVERGED, Status.STEP_TOO_LARGE):
-            status[ends[free[last.status[free] == kind]]] = BasinStatus[kind.name]
+            status[ends[free[last.status[free] == kind]]] = kind
         # The finest step alone is within the limit: nothing bears it out.
         alone = ~settled[done] & (coarse.status[done] == Status.STEP_TOO_LARGE) & (last.status == Status.OK)
-        status[ends[alone]] = BasinStatus.STEP_TOO_LARGE
+        status[ends[alone]] = Status.STEP_TOO_LARGE
         rest = np.flatnonzero(~settled)
         members, coarse = members[rest], fine.take(rest)
         if not members.size:

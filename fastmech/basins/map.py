@@ -10,16 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.basins.copies import copy_numbers
-from fastmech.basins.label import Labels, label_starts, told_ends
+from fastmech.basins.label import How, Labels, label_starts, told_ends
 from fastmech.basins.measures.labels import number_turns
 from fastmech.basins.measures.norm import STATE as STATE
 from fastmech.basins.measures.norm import check_angles
 from fastmech.basins.refine import LevelProgress, refine_grid
-from fastmech.basins.status import BasinStatus, counts
 from fastmech.basins.system import system_labels_of
 from fastmech.capture.barriers import BarrierTree
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
+from fastmech.ensembles.status import LABELS, Status, counts
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
 from fastmech.scene import Scene, nearest
@@ -44,7 +44,7 @@ class BasinMap:
     turns: NDArray[np.int32]  #: full turns of phi and theta of that well from its listed place, (..., 2)
     time: Floats  #: of capture [s]; NaN: not captured, or not computed (refinement)
     settle_time: Floats | None  #: s, from then on within the settling ball; NaN as in ``time``
-    status: NDArray[np.int8]  #: :class:`fastmech.basins.status.BasinStatus`
+    status: NDArray[np.int8]  #: :class:`fastmech.ensembles.status.Status`
     computed: NDArray[np.bool_]  #: which points were computed; the others have their surroundings' label
     t_end: float  #: s
     steps: int  #: integration steps of all computations
@@ -52,7 +52,7 @@ class BasinMap:
     @property
     def counts(self) -> dict[str, int]:
         """How many starts have each status."""
-        return counts(self.status)
+        return counts(self.status, LABELS)
 
     @property
     def labels(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -126,16 +126,7 @@ def map_basins(
     def compute(points: NDArray[np.intp], tell: Progress | None) -> NDArray[np.int64]:
         starts = grid_starts(values, held, names, points)
         if isinstance(scene, Scene):
-            part = label_starts(
-                scene,
-                starts,
-                t_end,
-                dt=dt,
-                method=method,
-                settle_radius=settle_radius,
-                threads=threads,
-                progress=tell,
-            )
+            part = label_starts(scene, starts, t_end, How(dt, method, settle_radius, threads), tell)
         else:
             part = system_labels_of(
                 scene,
@@ -201,7 +192,7 @@ class _Collected:
         self.well = np.full(size, -1, dtype=np.int8)
         self.turns = np.zeros((size, 2), dtype=np.int32)
         self.time, self.settle = np.full(size, np.nan), np.full(size, np.nan)
-        self.status = np.full(size, BasinStatus.UNDECIDED, dtype=np.int8)
+        self.status = np.full(size, Status.UNDECIDED, dtype=np.int8)
         self.tree: BarrierTree | None = None
         self.steps = 0
 

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from fastmech.capture.certificate import Certificate
 from fastmech.capture.observe import CAPTURE_TIME, STOP_ENERGY, TURNS_PHI, TURNS_THETA
+from fastmech.ensembles.ends import STOP_CODE, STOP_TIME
 from fastmech.ensembles.run import run_ensemble
 from fastmech.ensembles.spans import MOST_STEPS
-from fastmech.ensembles.stopping import STOP_CODE, STOP_TIME
 from fastmech.errors import InputError
 from fastmech.integrators.method import Method
 from fastmech.kernels.select import right_hand_side

@@ -18,7 +18,7 @@ import numpy as np
 
 from fastmech.atlas.wells import ROUNDING
 from fastmech.basins.copies import copy_numbers, copy_of_label
-from fastmech.basins.label import label_starts
+from fastmech.basins.label import How, label_starts
 from fastmech.basins.ladder import SUBSTEPS
 from fastmech.basins.measures.labels import Floats, Integers
 from fastmech.basins.steps import coarse_steps
@@ -88,6 +88,7 @@ class ShockLimit:
         tuple[int, tuple[int, int]] | None
     )  #: equilibrium and turns of phi and theta where the found one ends
     undecided_from: float  #: least impulse tried whose end is not known [N s]; NaN: none
+    tried_to: float  #: largest impulse of the search [N s]: beyond it nothing is known; NaN: no search
     trajectories: int  #: blows that were followed
     impulses_apart: float  #: relative, of those on the finest grid on which nothing less was found; NaN: none
     directions_apart: float  #: the same of directions [rad], 0 along one alone
@@ -113,7 +114,9 @@ def shock_limit(
     far they are apart, may have been missed.
 
     All is NaN where the point cannot be struck so: M3 across its rail or at a dead centre, M1 along OM1, M2
-    along M1M2 where crank and rod are in line. ``found`` is NaN too without damper: nothing comes to rest.
+    along M1M2 where crank and rod are in line. ``found`` is NaN too without damper, for nothing comes to rest
+    then, and where no blow up to ``tried_to`` was found to leave. That one gives, where the mechanism yields
+    most, 30 times the sum of the potential's amplitudes; heavier blows may leave.
 
     Args:
         scene: the mechanism with a constant force, or none.
@@ -129,7 +132,7 @@ def shock_limit(
             the scene's wells are not certain.
     """
     place, moves, depth = _well(scene, equilibrium, on)
-    angle = None if direction is None else checks.number("direction", direction, "rad")
+    angle = None if direction is None else _direction(direction)
     certificate = certificate_of(scene)
     if t_end is None:
         t_end = _long_enough(scene, certificate.tree.equilibria, place)
@@ -141,7 +144,7 @@ def shock_limit(
 
     proved = blow(float(impulse_for(depth, moves.along(easiest))), easiest)
     nothing = Blow(math.nan, math.nan if angle is None else angle, math.nan, math.nan)
-    alone = ShockLimit(on, proved, nothing, None, math.nan, 0, math.nan, math.nan)
+    alone = ShockLimit(on, proved, nothing, None, math.nan, math.nan, 0, math.nan, math.nan)
     if math.isnan(proved.impulse):
         return replace(alone, proved=nothing)
     if scene.beta == 0.0:
@@ -154,17 +157,26 @@ def shock_limit(
     if search.own < 0:
         return replace(alone, undecided_from=proved.impulse, trajectories=1)
     lines = [easiest] if angle is not None else [easiest, math.remainder(easiest + math.pi, 2.0 * math.pi)]
+    most = float(impulse_for(high, moves.along(easiest)))
     search.run(
-        lambda angles: np.nan_to_num(impulse_for(low, moves.along(angles)), nan=np.inf),
-        float(impulse_for(high, moves.along(easiest))),
-        np.array(lines),
+        lambda angles: np.nan_to_num(impulse_for(low, moves.along(angles)), nan=np.inf), most, np.array(lines)
     )
     found, end = nothing, None
     if np.isfinite(search.size):
         found = blow(search.size, search.angle if angle is None else angle)
         end = copy_of_label(search.label)
     unknown = search.unknown if np.isfinite(search.unknown) else math.nan
-    return ShockLimit(on, proved, found, end, unknown, search.blows, *search.apart)
+    return ShockLimit(on, proved, found, end, unknown, most, search.blows, *search.apart)
+
+
+def _direction(given: float) -> float:
+    """A direction of an impulse [rad], within a turn: more of them are most often degrees."""
+    angle = checks.number("direction", given, "rad")
+    if abs(angle) > 2.0 * math.pi:
+        raise InputError(
+            f"direction = {shown(given)}: must lie within -2 pi and 2 pi rad; {angle:g} degrees?"
+        )
+    return angle
 
 
 @dataclass
@@ -192,7 +204,7 @@ class _Search:
         """Labels (n,) after blows; the least one that leaves is kept."""
         starts = np.tile(self.place, (sizes.size, 1))
         starts[:, 2:] = (sizes * np.stack([np.cos(angles), np.sin(angles)])).T @ self.rates
-        found = label_starts(self.scene, starts, self.t_end, threads=self.threads, ladder=ladder)
+        found = label_starts(self.scene, starts, self.t_end, How(threads=self.threads, ladder=ladder))
         labels = copy_numbers(found)
         self.blows, self.steps = self.blows + sizes.size, self.steps + found.steps
         if self.blows > 1:
@@ -328,7 +340,7 @@ def impulse_start(
     require_rest(scene, rest)
     _require_point(on)
     impulse = checks.number("impulse", impulse, "N s")
-    direction = checks.number("direction", direction, "rad")
+    direction = _direction(direction)
     place = (rest.phi, rest.theta)
     along = np.array([np.cos(direction), np.sin(direction)])
     return np.array([*place, *rates_after(scene, place, on, impulse * along)])

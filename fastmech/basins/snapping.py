@@ -21,12 +21,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastmech.basins.label import require_damper
 from fastmech.basins.measures.labels import Floats, Integers, check_point
-from fastmech.basins.status import BasinStatus, counts
 from fastmech.basins.steps import method_for
 from fastmech.basins.switched import Switched
 from fastmech.capture.certificate import certificate_of
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
+from fastmech.ensembles.status import LABELS, Status, counts
 from fastmech.equilibria.find import Equilibria, Equilibrium, find_equilibria
 from fastmech.errors import InputError, shown
 from fastmech.integrators.methods import find_method
@@ -60,7 +60,7 @@ class SnappingMap:
     label: Integers  #: index of the well that captures the motion; -1: none is proved to
     turns: Integers  #: full turns of phi and theta, (alphas, forces, 2); 0 without a label
     time: Floats  #: when its capture was found [s], looked for every second; NaN: it was not
-    status: NDArray[np.int8]  #: :class:`fastmech.basins.status.BasinStatus`
+    status: NDArray[np.int8]  #: :class:`fastmech.ensembles.status.Status`
 
     @property
     def left(self) -> NDArray[np.bool_]:
@@ -70,7 +70,7 @@ class SnappingMap:
     @property
     def counts(self) -> dict[str, int]:
         """How many have each status."""
-        return counts(self.status)
+        return counts(self.status, LABELS)
 
     @property
     def smallest(self) -> Floats:
@@ -156,7 +156,7 @@ def map_snapping(
         threads=threads,
     )
     found, status = switched.label(progress)
-    captured = status == BasinStatus.CAPTURED
+    captured = status == Status.CAPTURED
     label = np.where(captured, np.append(-1, certificate.tree.wells)[found.code], -1)
     turns = np.where(captured[:, None], found.turns, 0).astype(np.int64)
     return SnappingMap(

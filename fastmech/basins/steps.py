@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.disturbance.motion import default_method
-from fastmech.ensembles.plausible import energy
+from fastmech.ensembles.energy_bounds import energies
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.mechanism.reduced import metric_11, metric_determinant, potential_hessian, slider_ratio
 from fastmech.scene import Scene
@@ -75,7 +75,7 @@ def fastest_rate(c: Coefficients, starts: Floats) -> Floats:
     )
     lowest = -(abs(c.lift) + c.gravity + c.spring)
     with np.errstate(invalid="ignore", over="ignore"):
-        total, _ = energy(c, starts, np.zeros(len(starts)))
+        total = energies(c._replace(force=0.0), starts)[0]
         room, push = np.maximum(total - lowest, 0.0), abs(c.force)
         speed = np.sqrt(2.0 * (room + 4.0 * push))
         if c.decay > 0.0:

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from fastmech.basins.ladder import SUBSTEPS, Indices, climb, near_saddle, tell_the_same
 from fastmech.basins.runs import Paths
-from fastmech.basins.status import BasinStatus
 from fastmech.basins.steps import coarse_steps
 from fastmech.capture.certificate import Certificate
+from fastmech.ensembles.energy_bounds import breaks_energy_bounds, energies
 from fastmech.ensembles.integrate import integrate
-from fastmech.ensembles.plausible import breaks_energy_bounds, energy
 from fastmech.ensembles.run import Progress
+from fastmech.ensembles.status import Status
 from fastmech.mechanism.coefficients import reduce
 
 Floats = NDArray[np.float64]
@@ -77,7 +77,7 @@ class Switched:
     def label(self, progress: Progress | None) -> tuple[Paths, NDArray[np.int8]]:
         """Ends and statuses of all of them."""
         found = Paths.empty(self.F0.size)
-        status = np.full(self.F0.size, BasinStatus.UNDECIDED, dtype=np.int8)
+        status = np.full(self.F0.size, Status.UNDECIDED, dtype=np.int8)
         pieces = -(-self.F0.size // TOGETHER)
         for first in range(pieces):
             # Each piece takes something of everywhere, so that all take about as long.
@@ -152,7 +152,7 @@ class Switched:
         place = np.zeros(len(self.certificate.tree.equilibria) + 1, dtype=np.int8)
         place[list(self.certificate.tree.wells)] = np.arange(1, len(self.certificate.tree.wells) + 1)
         code = place[captured.well]
-        bound = energy(reduce(self.certificate.scene), state, np.zeros(running.size))[0]
+        bound = energies(reduce(self.certificate.scene)._replace(force=0.0), state)[0]
         push = self.push(members[running], clock[running])
         bound = bound + 2.0 * np.abs(push) - push * (np.cos(state[:, 0]) - np.sin(state[:, 1]))
         held = (code > 0) & (bound < np.append(-np.inf, self.certificate.levels)[code])

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from fastmech.basins.label import Labels, pieces_of
 from fastmech.basins.ladder import SUBSTEPS
-from fastmech.basins.status import BasinStatus
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.run import Progress
@@ -48,7 +47,7 @@ def system_labels_of(
     dt, t_end = checks.number("dt", dt, "s", above=0.0), checks.number("t_end", t_end, "s", above=0.0)
     n = len(starts)
     before: tuple[NDArray[np.int64], Floats] | None
-    status = np.full(n, BasinStatus.UNDECIDED, dtype=np.int8)
+    status = np.full(n, Status.UNDECIDED, dtype=np.int8)
     code, time, steps = np.zeros(n, dtype=np.int64), np.full(n, np.nan), 0
     own = parameters or {}
     for piece in pieces_of(n):
@@ -72,15 +71,11 @@ def system_labels_of(
             if before is not None:
                 agrees = (before[0] == run.stop_code) & (np.abs(before[1] - ended) <= dt)
             failed = run.status != Status.OK
-            status[members] = np.where(
-                agrees & (run.stop_code != 0), BasinStatus.CAPTURED, BasinStatus.UNDECIDED
-            )
-            status[members[failed]] = BasinStatus.NOT_FINITE
-            status[members[run.status == Status.NOT_CONVERGED]] = BasinStatus.NOT_CONVERGED
-            status[members[run.status == Status.START_NOT_FINITE]] = BasinStatus.START_NOT_FINITE
+            status[members] = np.where(agrees & (run.stop_code != 0), Status.CAPTURED, Status.UNDECIDED)
+            status[members[failed]] = run.status[failed]
             if before is not None and substeps == SUBSTEPS[-1]:
                 split = ~agrees & (before[0] != run.stop_code) & (before[0] != 0) & (run.stop_code != 0)
-                status[members[split]] = BasinStatus.AT_SADDLE
+                status[members[split]] = Status.AT_SADDLE
             rest = np.flatnonzero(~agrees | failed)
             members, before = members[rest], (run.stop_code[rest], ended[rest])
             if not members.size:
@@ -89,7 +84,7 @@ def system_labels_of(
             raise InputError(f"stop: gave the code {code[(code < 0) | (code > 127)][0]}, must be 0 to 127")
         if progress is not None:
             progress(piece.size)
-    captured = status == BasinStatus.CAPTURED
+    captured = status == Status.CAPTURED
     return Labels(
         None,
         np.where(captured, code, -1).astype(np.int8),

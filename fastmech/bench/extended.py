@@ -9,6 +9,8 @@ the two runs say so.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,6 +20,9 @@ from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
 Extended = NDArray[np.longdouble]
+
+#: Times (n,) and states (dim, n) to derivatives (dim, n).
+Rates = Callable[[Extended, Extended], Extended]
 
 #: Columns of the extrapolation: its order is twice as many.
 COLUMNS = 9
@@ -32,23 +37,28 @@ LEAST, MOST, SAFETY, SHORTEST = 0.2, 2.0, 0.8, 1e-5
 _plain = getattr(accelerations, "py_func", accelerations)
 
 
-def _rates(t: Extended, y: Extended, p: Extended) -> Extended:
-    """Derivatives (4, n) of states (4, n) at their times (n,)."""
-    now = list(p)
-    now[5] = p[5] * np.exp(-p[7] * t) if p[5] * p[7] != 0.0 else p[5]
-    return np.stack([y[2], y[3], *_plain(*y, now)])
+def scene_rates(scene: Scene) -> Rates:
+    """Derivatives (4, n) of a scene's states (4, n) at their times (n,)."""
+    p = np.array(reduce(scene), dtype=np.float64).astype(np.longdouble)
+
+    def rates(t: Extended, y: Extended) -> Extended:
+        now = list(p)
+        now[5] = p[5] * np.exp(-p[7] * t) if p[5] * p[7] != 0.0 else p[5]
+        return np.stack([y[2], y[3], *_plain(*y, now)])
+
+    return rates
 
 
-def _step(t: Extended, y: Extended, h: Extended, p: Extended) -> tuple[Extended, Extended]:
-    """Changes (4, n) over steps h (n,) and their errors (n,)."""
+def _step(t: Extended, y: Extended, h: Extended, rates: Rates) -> tuple[Extended, Extended]:
+    """Changes (dim, n) over steps h (n,) and their errors (n,)."""
     table: list[Extended] = []
-    begin, last = _rates(t, y, p), np.zeros_like(y)
+    begin, last = rates(t, y), np.zeros_like(y)
     for j in range(COLUMNS):
         n = 2 * (j + 1)
         part = h / n
         before, middle = np.zeros_like(y), part * begin
         for k in range(1, n):
-            before, middle = middle, before + 2.0 * part * _rates(t + k * part, y + middle, p)
+            before, middle = middle, before + 2.0 * part * rates(t + k * part, y + middle)
         table.append(middle)
         for m in range(j - 1, -1, -1):
             last = table[m + 1]
@@ -57,17 +67,17 @@ def _step(t: Extended, y: Extended, h: Extended, p: Extended) -> tuple[Extended,
     return table[0], np.abs(table[0] - last).max(axis=0)
 
 
-def extended(starts: Floats, p: Floats, t_end: float, roundings: float) -> Extended:
-    """Final states (n, 4) from starts (n, 4) and reduced coefficients (8,)."""
+def extended(rates: Rates, starts: Floats, t_end: float, roundings: float) -> Extended:
+    """Final states (n, dim) from starts (n, dim)."""
     end, tolerance = np.longdouble(t_end), np.longdouble(roundings) * np.finfo(np.longdouble).eps
-    y, q = starts.T.astype(np.longdouble), p.astype(np.longdouble)
+    y = starts.T.astype(np.longdouble)
     t, h = np.zeros(len(starts), np.longdouble), np.full(len(starts), end / 128)
     final, who = np.empty_like(y), np.arange(len(starts))
     while who.size:
         last = t + h >= end
         h = np.where(last, end - t, h)
         with np.errstate(invalid="ignore", over="ignore"):
-            change, error = _step(t, y, h, q)
+            change, error = _step(t, y, h, rates)
             error = error / np.maximum(np.abs(y).max(axis=0), 1)
             wanted = SAFETY * (tolerance / np.maximum(error, np.finfo(np.longdouble).tiny)) ** (
                 np.longdouble(1) / (2 * COLUMNS - 1)
@@ -82,8 +92,7 @@ def extended(starts: Floats, p: Floats, t_end: float, roundings: float) -> Exten
     return np.ascontiguousarray(final.T)
 
 
-def extended_truth(scene: Scene, starts: Floats, t_end: float) -> tuple[Floats, Floats]:
-    """Final states (n, 4) and their uncertainties (n,): the largest difference of two runs."""
-    p = np.array(reduce(scene), dtype=np.float64)
-    fine, coarse = (extended(starts, p, t_end, roundings) for roundings in ROUNDINGS)
+def extended_truth(rates: Rates, starts: Floats, t_end: float) -> tuple[Floats, Floats]:
+    """Final states (n, dim) and their uncertainties (n,): the largest difference of two runs."""
+    fine, coarse = (extended(rates, starts, t_end, roundings) for roundings in ROUNDINGS)
     return fine.astype(np.float64), np.abs(fine - coarse).max(axis=1).astype(np.float64)

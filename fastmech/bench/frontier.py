@@ -14,6 +14,7 @@ from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import problem_of
 from fastmech.ensembles.interpolation import solve_at
 from fastmech.ensembles.problem import Case
+from fastmech.ensembles.run import Progress
 from fastmech.ensembles.system import System
 from fastmech.ensembles.tolerance import SAMPLE, evenly, usable_starts
 from fastmech.ensembles.work_precision import (
@@ -25,8 +26,7 @@ from fastmech.ensembles.work_precision import (
     times_to_fit,
 )
 from fastmech.errors import InputError, called_here, shown
-from fastmech.integrators.implicit_method import ImplicitRungeKutta
-from fastmech.integrators.method import Method
+from fastmech.integrators.method import ImplicitRungeKutta, Method
 from fastmech.integrators.methods import METHODS, find_method
 from fastmech.plots.style import LINES, new_figure, style
 from fastmech.scene import Scene
@@ -39,6 +39,9 @@ TIMED, LONG = 3, 0.1
 
 #: Markers that tell methods of one colour apart.
 MARKERS = "osD^vPX*"
+
+#: Methods that are tried by default.
+EXPLICIT = tuple(m.name for m in METHODS.values() if m.order >= 4 and not isinstance(m, ImplicitRungeKutta))
 
 #: Errors that are asked for by default, in the state's units.
 ERRORS = (1e-3, 1e-5, 1e-7, 1e-9)
@@ -121,6 +124,7 @@ def work_precision(
     methods: Sequence[str] | None = None,
     parameters: Mapping[str, ArrayLike] | None = None,
     threads: int | None = 1,
+    progress: Progress | None = None,
 ) -> WorkPrecision:
     """Measure speed against error on your problem.
 
@@ -137,6 +141,7 @@ def work_precision(
             more by default.
         parameters: values of parameters that differ between trajectories, each of shape (n,).
         threads: threads to use, one by default, so that rates are those of a core.
+        progress: is told 1 after each method.
 
     Returns:
         a point for each method and each error that it keeps.
@@ -147,8 +152,8 @@ def work_precision(
     starts, problem, _ = problem_of(scene, y0, {} if parameters is None else parameters, None)
     outputs = np.array([checks.number("t_end", t_end, "s", above=0.0)])
     wanted = sorted((checks.number("errors", e, "", above=0.0) for e in errors), reverse=True)
-    explicit = [m for m in METHODS.values() if m.order >= 4 and not isinstance(m, ImplicitRungeKutta)]
-    tried: list[Method] = explicit if methods is None else [find_method(name) for name in methods]
+    checks.progress_function(progress, "methods")
+    tried = [find_method(name) for name in (EXPLICIT if methods is None else methods)]
     usable = np.flatnonzero(usable_starts(problem, starts, float(outputs[-1]), threads))
     if not usable.size or not wanted:
         raise InputError(
@@ -169,6 +174,8 @@ def work_precision(
             if found.good and not (points and (points[-1].method, points[-1].dt) == (method.name, found.dt)):
                 dt = found.dt
                 points.append(_timed(case, trial, method, dt))
+        if progress is not None:
+            progress(1)
     return WorkPrecision(tuple(points), tuple(wanted), trial.fit)
 
 

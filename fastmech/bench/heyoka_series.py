@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.bench.entrant import Entrant, Prepare, Solve
+from fastmech.bench.own_systems import spoken
 from fastmech.bench.problem import Problem
+from fastmech.ensembles.system import System
 from fastmech.mechanism.coefficients import reduce
 
 Floats = NDArray[np.float64]
@@ -23,9 +25,13 @@ TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10, 1e-12, 1e-14, 2.2
 
 
 def equations(problem: Problem) -> list[Any]:
-    """Lagrange's equations over m2 l^2, parameters as numbers: the shortest decomposition of those tried."""
+    """Those of a system, or Lagrange's over m2 l^2: the shortest decomposition of those tried."""
     import heyoka as hy
 
+    if isinstance(problem.scene, System):
+        rhs = spoken(problem.scene.rhs, sin=hy.sin, cos=hy.cos, inverse_cube=lambda s: s**-1.5)
+        state = hy.make_vars(*problem.scene.state)
+        return list(zip(state, rhs(hy.time, *state), strict=True))
     p = reduce(problem.scene)
     phi, theta, u, w = hy.make_vars("phi", "theta", "u", "w")
     s, c, s12, c12 = hy.sin(phi), hy.cos(phi), hy.sin(phi + theta), hy.cos(phi + theta)
@@ -55,7 +61,7 @@ def prepared(tolerance: float) -> Prepare:
         width = hy.recommended_simd_size()
         first = hy.taylor_adaptive_batch(
             equations(problem),
-            np.zeros((4, width)),
+            np.zeros((problem.starts.shape[1], width)),
             tol=tolerance,
             high_accuracy=False,
             compact_mode=False,

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,9 +27,9 @@ class Problem:
 
     name: str
     description: str
-    scene: Scene
-    starts: Floats  #: shape (n, 4), n at most STARTS
-    truth: Floats  #: final states, shape (n, 4)
+    scene: Any  #: Scene, or a System
+    starts: Floats  #: shape (n, dim)
+    truth: Floats  #: final states, shape (n, dim)
     t_end: float  #: s
     pace: float  #: steps of fixed-step methods relative to those of the rest starts
 

@@ -26,6 +26,7 @@ from fastmech.bench.picture import draw_bench
 from fastmech.bench.problem import PROBLEMS, Problem
 from fastmech.bench.startup import STARTED, Start, started
 from fastmech.bench.stiff import run_stiff
+from fastmech.bench.systems import run_systems
 from fastmech.bench.terms import TURNS, Cost, costs
 from fastmech.bench.threads import run_threads
 from fastmech.bench.tolerances import run_tolerances
@@ -54,6 +55,7 @@ STUDIES: dict[str, Callable[..., list[Path]]] = {
     "atlas": run_atlas,
     "basins": run_basins,
     "stiff": run_stiff,
+    "systems": run_systems,
     "threads": run_threads,
     "tolerances": run_tolerances,
     "vectors": run_vectors,

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.bench.extended import extended_truth
+from fastmech.bench.extended import extended_truth, scene_rates
 from fastmech.bench.extrapolation import truth
 from fastmech.bench.tables import table
 from fastmech.ensembles.integrate import integrate
@@ -142,7 +142,7 @@ def _true(scene: Scene, starts: Floats, t_end: float, ends: list[Floats]) -> lis
         who = np.flatnonzero(matters & ~extended)
         if not who.size:
             return found
-        right[who], doubts[who] = extended_truth(scene, starts[who], t_end)
+        right[who], doubts[who] = extended_truth(scene_rates(scene), starts[who], t_end)
         extended[who] = True
 
 

@@ -25,8 +25,8 @@ from fastmech.capture.observe import (
     observe_capture_decaying,
 )
 from fastmech.ensembles import checks
+from fastmech.ensembles.ends import STOP_CODE
 from fastmech.ensembles.run import CALL_STEPS_WITH_STOPS, Observation
-from fastmech.ensembles.stopping import STOP_CODE
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import unit
 from fastmech.scene import Scene, require_scene

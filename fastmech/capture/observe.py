@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.capture.locate import AMPLITUDE, FIRST_WELL, INTERVAL, RATE, WELLS, locate
-from fastmech.ensembles.stopping import STOP_CODE, note_stop
+from fastmech.ensembles.ends import STOP_CODE, note_stop
 from fastmech.jit import OBSERVER_SIGNATURE, inlined, kernel
 from fastmech.kernels.sincos import REDUCTION_LIMIT, sincos
 from fastmech.mechanism.reduced import metric_11, potential, slider_ratio

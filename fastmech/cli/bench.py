@@ -21,8 +21,14 @@ from fastmech.cli.reporting import account, reporting_options
 @click.option("--quick", is_flag=True, help="Fewer trajectories and methods.")
 @click.option(
     "--only",
-    type=click.Choice(["atlas", "basins", "stiff", "threads", "tolerances", "vectors"]),
+    type=click.Choice(["atlas", "basins", "stiff", "systems", "threads", "tolerances", "vectors"]),
     help="One study alone.",
+)
+@click.option(
+    "--problem",
+    metavar="FILE",
+    help="Every method on a problem of your own instead: FILE.py:NAME, a function that returns problem, "
+    "starts, t_end (and keywords of fm.work_precision); or the scene of a scan request, REQUEST.toml.",
 )
 @click.option("--scenes", metavar="N", type=click.IntRange(min=1), help="Random scenes of `tolerances`.")
 @click.option(
@@ -33,6 +39,7 @@ def command(
     out: Path,
     quick: bool,
     only: str | None,
+    problem: str | None,
     scenes: int | None,
     starts: int | None,
     quiet: bool,
@@ -43,10 +50,16 @@ def command(
     for name in chosen:
         if only != "tolerances":
             raise click.UsageError(f"--{name}: goes with --only tolerances")
+    if problem is not None and (only is not None or quick):
+        raise click.UsageError("--problem: goes without --only and --quick")
     with account("bench", quiet, as_json) as told:
         with told.bars.preparing():
+            from fastmech.bench.own_problem import run_problem
             from fastmech.bench.report import STUDIES, run_bench
-        if only is None:
+        if problem is not None:
+            lines, written = run_problem(problem, out, told.bars.stage)
+            told.say("\n".join([*lines, ""]))
+        elif only is None:
             written = run_bench(out, quick=quick, stage=told.bars.stage)
         else:
             written = STUDIES[only](out, quick=quick, stage=told.bars.stage, **chosen)

@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import timedelta
-from importlib import import_module
 from typing import Self
 
 from rich.console import Console
@@ -261,7 +260,9 @@ class ProgressBars:
         self._teller.start()
         try:
             yield
-            import_module("fastmech.jit").listeners.append(self._preparation.tell)
+            from fastmech.jit import listeners
+
+            listeners.append(self._preparation.tell)
         finally:
             self._preparation.tell(None)
         check()

@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastmech.disturbance.size import size_at
 from fastmech.ensembles import checks
+from fastmech.ensembles.fitting import damping_rate
 from fastmech.ensembles.integrate import integrate
-from fastmech.ensembles.stiffness import damping_rate
 from fastmech.equilibria.balance import pulls, vanishing
 from fastmech.equilibria.find import Equilibria, Equilibrium, degenerate_sentence, find_equilibria
 from fastmech.errors import InputError
-from fastmech.integrators.implicit_method import ImplicitRungeKutta
+from fastmech.integrators.method import ImplicitRungeKutta
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene, require_scene

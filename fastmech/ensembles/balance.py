@@ -66,7 +66,7 @@ def energy_balance(
     with_works = np.concatenate([start, np.zeros((1, 2))], axis=1)
     params = np.array(reduce(scene), dtype=np.float64)
     dt = checks.number("dt", dt, "s", above=0.0)
-    run = run_ensemble(lagrange_work, params, with_works, times, dt, find_method(method), threads=1)
+    run = run_ensemble(lagrange_work, params, with_works, times, dt, method=find_method(method), threads=1)
     y = run.states[:, 0, :4]
     works = unit(scene) * run.states[:, 0, 4:]
     kinetic, potential = kinetic_energy(scene, y), potential_energy(scene, y[:, :2])

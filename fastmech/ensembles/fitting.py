@@ -4,21 +4,28 @@ Energy bounds the motion before it starts: with a constant force T + U never gro
 at most its greatest work. Half the square of the rates' kinetic-energy norm is T over m2 l^2, so no rate of
 that norm can exceed sqrt(2 (E - U_min)). A trajectory slower than the linear vibrations of the mechanism
 gains nothing from a longer step; a faster one needs a shorter one.
+
+A damper that acts on light bodies stops them at a rate far above the frequencies of the motion that remains.
+An explicit method must then step with that rate although nothing moves so fast; an L-stable one need not
+(Hairer, Wanner, *Solving ODEs II*, section IV.1).
 """
 
 from __future__ import annotations
 
+import math
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.ensembles.energies import is_constant
-from fastmech.ensembles.highest import highest_energies
+from fastmech.ensembles.energy_bounds import highest_energies
 from fastmech.ensembles.lanes import finite_rows
-from fastmech.ensembles.threads import in_parts
-from fastmech.kernels.passes import columns
+from fastmech.integrators.method import ImplicitRungeKutta, Method
+from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import Coefficients
+from fastmech.mechanism.reduced import slider_ratio
+from fastmech.step_limits.amplification import amplifies, first_crossing
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -58,9 +65,6 @@ def fitted_steps(
     ``dt`` belongs to motions as slow as the linear vibrations; the others have it divided by
     (speed bound / vibration's frequency)^``exponent``, rounded up to a power of 2^(1/4). A trajectory's step
     depends on its own start and parameters alone.
-
-    Raises:
-        InputError: the number of threads is wrong.
     """
     return dt * _shares(c, speed_bound(c, starts, threads), exponent)
 
@@ -84,9 +88,6 @@ def fit_steps(
 
     ``dt`` [s] is the longest step of all or of each (n,). Whether a start is set aside depends on it and on
     the settings alone.
-
-    Raises:
-        InputError: the number of threads is wrong.
     """
     bound = speed_bound(c, starts, threads)
     with np.errstate(invalid="ignore", over="ignore"):
@@ -113,16 +114,9 @@ def _shares(c: Coefficients, bound: Floats, exponent: float) -> Floats:
 
 
 def speed_bound(c: Coefficients, starts: Floats, threads: int | None = None) -> Floats:
-    """Bound (n,) on the kinetic-energy norm of the rates, sqrt(2 T / (m2 l^2)) [rad/s], for all time.
-
-    Raises:
-        InputError: the number of threads is wrong.
-    """
-    starts, highest = np.ascontiguousarray(starts, dtype=np.float64), np.empty(len(starts))
-    in_parts(
-        lambda part: highest_energies(starts[part], columns(c, part), highest[part]), len(starts), threads
-    )
-    force = np.where(is_constant(np.asarray(c.force), np.asarray(c.decay)), c.force, 0.0)
+    """Bound (n,) on the kinetic-energy norm of the rates, sqrt(2 T / (m2 l^2)) [rad/s], for all time."""
+    highest = highest_energies(c, starts, threads)
+    force = np.where(np.asarray(c.decay) == 0.0, c.force, 0.0)
     # U = lift sin phi - force cos phi + force sin theta - gravity cos theta - spring sin(phi + theta)
     lowest = -np.hypot(c.lift, force) - np.hypot(c.gravity, force) - np.abs(c.spring)
     with np.errstate(invalid="ignore", over="ignore"):
@@ -150,3 +144,53 @@ def fading_force(c: Coefficients, t_end: float) -> tuple[tuple[float, float], ..
     if not quick.size or GONE / quick.min() >= t_end:
         return ()
     return ((GONE / float(quick.min()), float(np.min(slowest) / quick.max())),)
+
+
+#: Directions of damped motion: from almost undamped to overdamped.
+DIRECTIONS = np.exp(1j * np.linspace(0.5 * np.pi + 0.1, np.pi, 12))
+
+#: Growth a step that rounding explains.
+ROUNDED = 1e-11
+
+_PHI = np.linspace(0.0, np.pi, 1001)
+
+#: Largest square of the slider's speed over the crank's, in units of l.
+_SLIDER_RATIO = float(np.max(np.asarray(slider_ratio(np.sin(_PHI), np.cos(_PHI))[0]) ** 2))
+
+
+@cache
+def stability_radius(name: str) -> float:
+    """Largest r such that damped modes with step times eigenvalue of size r die out; inf if implicit."""
+    method = find_method(name)
+    if isinstance(method, ImplicitRungeKutta):
+        return math.inf
+    return first_crossing(
+        lambda r: np.any(amplifies(method, r[:, None] * DIRECTIONS, 1.0 + ROUNDED), axis=1), 1e-3, 1e3
+    )
+
+
+def damping_rate(c: Coefficients) -> Floats:
+    """Bound [1/s] on the rate at which the damper stops motion, over all configurations; 0 without damper."""
+    square = _SLIDER_RATIO
+    return np.asarray(c.damping * square / (c.mass + c.slider * square))
+
+
+def initial_layer(c: Coefficients, starts: Floats) -> tuple[tuple[float, float], ...]:
+    """Times [s] until which steps are shorter, and by what share, where the damper stops motion at first.
+
+    Starts that move lose the damped part of their motion at once. A step far longer than that takes them to
+    the right slow motion, but not to its right place: an error that falls with the step only when the step
+    is as short as the layer (Hairer, Wanner, *Solving ODEs II*, section VI.1). So steps grow with the time,
+    from the layer's length to the vibrations'. Nothing where nothing moves, or no damping is that quick.
+    """
+    slow, rate = float(np.min(vibration_frequency(c))), float(np.max(damping_rate(c)))
+    if not rate > QUICK * slow or not np.any(starts[:, 2:]):
+        return ()
+    doublings = np.arange(math.ceil(math.log2(2.0 * rate / slow)))
+    return tuple((float(t), slow * float(t)) for t in 0.5 / rate * 2.0**doublings)
+
+
+def explicit_limit(method: Method, c: Coefficients) -> float:
+    """Step [s] at which every mode of every trajectory is stable."""
+    rate = np.maximum(damping_rate(c), vibration_frequency(c))
+    return stability_radius(method.name) / float(np.max(rate))

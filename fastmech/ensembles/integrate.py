@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.ensembles import checks
+from fastmech.ensembles.ends import STOP_TIME
 from fastmech.ensembles.problem import (
     Case,
     Problem,
@@ -20,27 +21,25 @@ from fastmech.ensembles.problem import (
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.solve import Precision, Settings, Solution, solve
 from fastmech.ensembles.status import Status, failure_counts, failure_line
-from fastmech.ensembles.stopping import STOP_TIME
 from fastmech.ensembles.system import System, stop_codes
 from fastmech.ensembles.tolerance import solve_to_tolerance
 from fastmech.ensembles.turning import counted_turns, watched
 from fastmech.errors import InputError, called_here, shown
-from fastmech.integrators.implicit_method import ImplicitRungeKutta
-from fastmech.integrators.method import Method
+from fastmech.integrators.method import ImplicitRungeKutta, Method
 from fastmech.integrators.methods import find_method
 from fastmech.kernels.select import FORMULATIONS
 from fastmech.scene import Scene, nearest
-from fastmech.step_limits.beyond import StepsTaken, too_long
-from fastmech.step_limits.warning import warn_of_step
+from fastmech.step_limits.warning import TURN, too_long, warn_of_step
 
 #: Longest step [s] where neither a step nor a tolerance is given.
 DEFAULT_DT = 0.01
 
+#: Last term of an Adams method's predictor in an angle [rad] that is let pass: the polynomial through its
+#: history does not describe the motion beyond, or a spurious root of the method has grown until it shows.
+LAST_TERM = 0.01
+
 #: Numbers beside the states that a run holds of each trajectory, and of each coefficient of its own.
 BESIDE, OWN = 9, 2
-
-#: Statuses of trajectories that have failed.
-FAILURES = [status for status in Status if status != Status.OK]
 
 
 @dataclass(frozen=True, repr=False)
@@ -73,7 +72,7 @@ class Trajectories:
     @property
     def failures(self) -> str:
         """One line: how many trajectories have failed, and with which status; empty where none has."""
-        return failure_line(failure_counts(self.status, FAILURES), self.status.size)
+        return failure_line(failure_counts(self.status), self.status.size)
 
     def __repr__(self) -> str:
         n, dim = self.y.shape[1:]
@@ -137,7 +136,7 @@ def integrate(
         that became so, and a step too large for a scene are told apart and leave the others as they are. A
         step is too large where the motion ends with an energy it cannot have, where a body turns by more than
         1 rad in it, and where an Adams method's history does not describe the motion (see
-        :mod:`fastmech.step_limits.beyond`): it keeps its states, but they are not to be trusted. That others
+        :mod:`fastmech.step_limits.warning`): it keeps its states, but they are not to be trusted. That others
         have no status does not say that they are accurate. With
         ``fit`` or ``tol`` a start too fast for any steps has that status too, does not run, and has NaN after
         t = 0. Of a system nothing is known beforehand. One that fails on the way has NaN from the next output
@@ -188,18 +187,18 @@ def integrate(
     solution = solve(Case(problem, starts, outputs, threads), settings, progress)
     longest = solution.dt[0] if len(solution.dt) == 1 else solution.dt.max(axis=0)
     turned = counted_turns(problem, starts, longest, solution.records, threads)
-    taken = StepsTaken(solution.dt[0], turned, solution.last_term)
     assert problem.coefficients is not None
-    beyond = too_long(formula, problem.coefficients, starts, taken)
+    beyond = too_long(formula, problem.coefficients, starts, solution.dt[0])
+    if turned is not None:
+        beyond |= turned > TURN
+    if solution.last_term.size:
+        beyond |= solution.last_term > LAST_TERM
     solution.status[beyond & (solution.status == Status.OK)] = Status.STEP_TOO_LARGE
     return _trajectories(problem, outputs, solution, settings)
 
 
 def _trajectories(
-    problem: Problem,
-    outputs: NDArray[np.float64],
-    solution: Solution,
-    settings: Settings,
+    problem: Problem, outputs: NDArray[np.float64], solution: Solution, settings: Settings
 ) -> Trajectories:
     code = time = None
     if problem.observation.stops:

@@ -32,9 +32,6 @@ def solve_at(case: Case, settings: Settings, progress: Progress | None = None) -
     """Integrate from t = 0; states are interpolated where output times [s] are closer than steps.
 
     Not so with a stopping condition, or where steps are shorter at first than later.
-
-    Raises:
-        InputError: the step or the number of threads are wrong.
     """
     problem, starts, outputs, threads = case
     until = float(outputs[-1])
@@ -43,7 +40,7 @@ def solve_at(case: Case, settings: Settings, progress: Progress | None = None) -
         return solve(case, settings, progress)
     steps: Any = np.broadcast_to(np.asarray(settings.dt, dtype=np.float64), len(starts))
     if settings.fit and problem.coefficients is not None:
-        fitted = fit_steps(problem.coefficients, starts, 1.0, until, EXPONENT_ONCE, threads)
+        fitted = fit_steps(problem.coefficients, starts, 1.0, until, EXPONENT_ONCE, threads=threads)
         steps = steps * fitted.shares
     found: Solution | None = None
     for length in np.unique(steps):

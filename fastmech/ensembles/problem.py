@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.ensembles import checks
-from fastmech.ensembles.fitting import vibration_frequency
+from fastmech.ensembles.fitting import damping_rate, vibration_frequency
 from fastmech.ensembles.parameters import Parameters
 from fastmech.ensembles.run import NOTHING, Observation
-from fastmech.ensembles.stiffness import damping_rate
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
-from fastmech.kernels.jacobians import canonical_jacobian, lagrange_jacobian
+from fastmech.integrators.method import Method, with_jacobian
+from fastmech.kernels.jacobians import canonical_jacobian, lagrange_inverse, lagrange_jacobian
 from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.mechanism.equations import momenta_from_rates, rates_from_momenta
@@ -43,16 +43,15 @@ class Problem:
     system: System | None = None  #: of the user's own
 
     @property
-    def second_order(self) -> bool:
-        """Whether the state is two angles and then their velocities."""
-        return self.coefficients is not None and not self.canonical
-
-    @property
     def jacobian(self) -> Any:
         """Block Jacobian for implicit methods; ``None``: they take differences."""
         if self.coefficients is None:
             return None
         return canonical_jacobian if self.canonical else lagrange_jacobian
+
+    def method(self, method: Method) -> Method:
+        """A method that knows the Jacobian, and how to solve its systems, if it needs them."""
+        return with_jacobian(method, self.jacobian, None if self.canonical else lagrange_inverse)
 
     def inward(self, y: Floats) -> Floats:
         """Integrated states from public ones (..., n, dim)."""

@@ -25,12 +25,12 @@ def rebuilt(function: types.FunctionType, module: str, swaps: Swaps) -> types.Fu
     that the function calls are rebuilt with it where they reach a swapped one; those given types of their
     own stay as they are.
     """
-    return _copy(function, module, swaps, ())
+    return _Rebuilder(module, swaps).copy(function)
 
 
 def reaches(function: types.FunctionType, swaps: Swaps) -> bool:
     """Whether a copy calls anything in the place of something else."""
-    return _reaches(function, swaps, ())
+    return _Rebuilder("", swaps).reaches(function)
 
 
 def raises(function: types.FunctionType) -> bool:
@@ -74,67 +74,6 @@ def compiled_callees(function: types.FunctionType) -> Iterator[types.FunctionTyp
         reached += [(item, mentioned) for item in [*known, *enclosed(value).values()]]
 
 
-def _reaches(function: Any, swaps: Swaps, above: tuple[Any, ...]) -> bool:
-    return (
-        bool(_changes(function, "", swaps, above) or _cell_changes(function, "", swaps, above))
-        or float in swaps
-    )
-
-
-def _copy(function: Any, module: str, swaps: Swaps, above: tuple[Any, ...]) -> types.FunctionType:
-    known, cells = function.__globals__, function.__closure__
-    changed = _changes(function, module, swaps, above)
-    if changed:
-        known = {**known, **changed}
-    exchanged = _cell_changes(function, module, swaps, above)
-    if exchanged:
-        cells = tuple(exchanged.get(number, cell) for number, cell in enumerate(cells))
-    code = _with_constants(function.__code__, swaps)
-    copy = types.FunctionType(code, known, function.__name__, function.__defaults__, cells)
-    copy.__module__ = module
-    return copy
-
-
-def _constant(value: Any, swaps: Swaps) -> Any:
-    """A constant of another type, where it then is a number still."""
-    if isinstance(value, types.CodeType):
-        return _with_constants(value, swaps)
-    if isinstance(value, tuple):
-        return tuple(_constant(item, swaps) for item in value)
-    if type(value) is not float or float not in swaps:
-        return value
-    with np.errstate(over="ignore", under="ignore"):
-        other = swaps[float](value)
-    return other if np.isfinite(other) and (other != 0.0) == (value != 0.0) else value
-
-
-def _with_constants(code: types.CodeType, swaps: Swaps) -> types.CodeType:
-    return code.replace(co_consts=tuple(_constant(value, swaps) for value in code.co_consts))
-
-
-def _changes(function: Any, module: str, swaps: Swaps, above: tuple[Any, ...]) -> dict[str, Any]:
-    """Globals that a copy sees otherwise."""
-    names = set(_names(function.__code__))
-    found = {}
-    for name in names & function.__globals__.keys():
-        value = function.__globals__[name]
-        other = _instead(value, names, module, swaps, above)
-        if other is not value:
-            found[name] = other
-    return found
-
-
-def _cell_changes(function: Any, module: str, swaps: Swaps, above: tuple[Any, ...]) -> dict[int, Any]:
-    """Variables of enclosing functions that a copy sees otherwise."""
-    names = set(_names(function.__code__))
-    found = {}
-    for number, value in enumerate(enclosed(function).values()):
-        other = _instead(value, names, module, swaps, above)
-        if other is not value:
-            found[number] = types.CellType(other)
-    return found
-
-
 def _names(code: types.CodeType) -> Iterator[str]:
     """Globals and attributes that code mentions, nested functions' too."""
     yield from code.co_names
@@ -143,35 +82,82 @@ def _names(code: types.CodeType) -> Iterator[str]:
             yield from _names(constant)
 
 
-def _instead(value: Any, names: set[str], module: str, swaps: Swaps, above: tuple[Any, ...]) -> Any:
-    """What a copy sees in the place of ``value``: the same, unless it reaches a swapped function."""
-    for old, new in swaps.items():
-        if value is old and old is not float:
-            return new
-    if type(value) is float:
-        return _constant(value, swaps)
-    if isinstance(value, CPUDispatcher):
-        dispatcher: Any = value
-        function = dispatcher.py_func
-        if value in above or not dispatcher._can_compile or not _reaches(function, swaps, (*above, value)):
+class _Rebuilder:
+    """Makes copies that are said to be of one module, with the same swaps."""
+
+    def __init__(self, module: str, swaps: Swaps) -> None:
+        self._module, self._swaps = module, swaps
+        self._above: list[Any] = []  # compiled functions that are being copied
+
+    def copy(self, function: Any) -> types.FunctionType:
+        """The copy of a function."""
+        known, cells = self._changes(function)
+        code, closure = function.__code__, function.__closure__
+        if cells:
+            own = zip(code.co_freevars, closure, strict=True)
+            closure = tuple(types.CellType(cells[name]) if name in cells else cell for name, cell in own)
+        known = {**function.__globals__, **known} if known else function.__globals__
+        made = self._constant(code)
+        copy = types.FunctionType(made, known, function.__name__, function.__defaults__, closure)
+        copy.__module__ = self._module
+        return copy
+
+    def reaches(self, function: Any) -> bool:
+        """Whether its copy differs."""
+        return any(self._changes(function)) or float in self._swaps
+
+    def _changes(self, function: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Globals, and variables of enclosing functions, that a copy sees otherwise."""
+        names, known = set(_names(function.__code__)), function.__globals__
+        mentioned = {name: known[name] for name in names & known.keys()}
+        return self._changed(mentioned, names), self._changed(enclosed(function), names)
+
+    def _changed(self, values: dict[str, Any], names: set[str]) -> dict[str, Any]:
+        others = {name: self._instead(value, names) for name, value in values.items()}
+        return {name: other for name, other in others.items() if other is not values[name]}
+
+    def _constant(self, value: Any) -> Any:
+        """A constant of another type, where it then is a number still."""
+        if isinstance(value, types.CodeType):
+            return value.replace(co_consts=tuple(self._constant(item) for item in value.co_consts))
+        if isinstance(value, tuple):
+            return tuple(self._constant(item) for item in value)
+        if type(value) is not float or float not in self._swaps:
             return value
-        return numba.jit(**dispatcher.targetoptions)(_copy(function, module, swaps, (*above, value)))
-    if isinstance(value, types.ModuleType):
-        return _module_instead(value, names, module, swaps, above)
-    return value
+        with np.errstate(over="ignore", under="ignore"):
+            other = self._swaps[float](value)
+        return other if np.isfinite(other) and (other != 0.0) == (value != 0.0) else value
 
+    def _instead(self, value: Any, names: set[str]) -> Any:
+        """What a copy sees in the place of ``value``: the same, unless it reaches a swapped function."""
+        for old, new in self._swaps.items():
+            if value is old and old is not float:
+                return new
+        if type(value) is float:
+            return self._constant(value)
+        if isinstance(value, types.ModuleType):
+            return self._module_instead(value, names)
+        if not isinstance(value, CPUDispatcher):
+            return value
+        dispatcher: Any = value
+        if value in self._above or not dispatcher._can_compile:
+            return value
+        self._above.append(value)
+        try:
+            if not self.reaches(dispatcher.py_func):
+                return value
+            return numba.jit(**dispatcher.targetoptions)(self.copy(dispatcher.py_func))
+        finally:
+            self._above.pop()
 
-def _module_instead(
-    value: types.ModuleType, names: set[str], module: str, swaps: Swaps, above: tuple[Any, ...]
-) -> types.ModuleType:
-    changed = {}
-    for name in names & vars(value).keys() | ({old.__name__ for old in swaps} & names):
-        item = getattr(value, name, None)
-        other = item if isinstance(item, types.ModuleType) else _instead(item, names, module, swaps, above)
-        if other is not item:
-            changed[name] = other
-    if not changed:
-        return value
-    copy = types.ModuleType(value.__name__)
-    vars(copy).update(vars(value) | changed)
-    return copy
+    def _module_instead(self, value: types.ModuleType, names: set[str]) -> types.ModuleType:
+        own = names & vars(value).keys() | ({old.__name__ for old in self._swaps} & names)
+        items = {name: getattr(value, name, None) for name in own}
+        changed = self._changed(
+            {name: item for name, item in items.items() if not isinstance(item, types.ModuleType)}, names
+        )
+        if not changed:
+            return value
+        copy = types.ModuleType(value.__name__)
+        vars(copy).update(vars(value) | changed)
+        return copy

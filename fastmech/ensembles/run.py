@@ -13,23 +13,19 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 from itertools import chain
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.ensembles.failing import Resumption, last_finite_observer
+from fastmech.ensembles.ends import STOP_CODE, STOP_STATE, STOP_TIME, Resumption, last_finite_observer
 from fastmech.ensembles.lanes import Lanes, finite_rows, rows_at
 from fastmech.ensembles.parameters import Parameters
-from fastmech.ensembles.spans import Span
+from fastmech.ensembles.spans import Span, Task, block_width, task_lanes, tasks_of
 from fastmech.ensembles.status import Status
-from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
-from fastmech.ensembles.tasks import Task, block_width, task_lanes, tasks_of
 from fastmech.ensembles.threads import in_threads, thread_count
-from fastmech.integrators.batch import Batch
-from fastmech.integrators.driver import observe_nothing
+from fastmech.integrators.batch import Batch, observe_nothing
 from fastmech.integrators.method import Adams, Method
 from fastmech.interrupts import check
 from fastmech.kernels.blocks import VECTOR_LANES, observer_in_single
@@ -49,7 +45,7 @@ class Observation:
     """An observer (see :data:`fastmech.jit.OBSERVER_SIGNATURE`), its parameters and its empty record.
 
     ``record`` holds the start value of every row of a lane's record. Where ``stops`` is set, the rows begin
-    with those of :mod:`fastmech.ensembles.stopping` (its own may follow), and a lane whose code is not zero
+    with those of :mod:`fastmech.ensembles.ends` (its own may follow), and a lane whose code is not zero
     is taken out after about ``call_steps`` steps. With ``locate`` a stop is looked for inside the step after
     which it was seen. The last rows begin as so many of a lane's first states as ``states`` says.
     """
@@ -122,9 +118,6 @@ def run_ensemble(
     ``progress`` is told the number of trajectories finished since its last call. ``block_lanes`` is
     :func:`block_width` by default, and always so of a method that has a width; 1 where a right-hand side
     takes arrays.
-
-    Raises:
-        InputError: the step, the times or the number of threads are wrong.
     """
     begin = np.asarray(starts, dtype=np.float64)
     clock = np.asarray(times, dtype=np.float64)
@@ -163,21 +156,32 @@ def run_ensemble(
     def run_task(task: Task) -> int:
         members, piece, passed = task.members, 0, 0
         states, params = rows_at(begin, members), own.at(members, precision)
-        lanes = Lanes(members, states, params, observation.empty(states), block_lanes, method.carried)
+        lanes = Lanes(
+            members,
+            states,
+            params,
+            observation.empty(states),
+            block_lanes=block_lanes,
+            carried=method.carried,
+        )
         while piece < task.way.steps.size and lanes.members.size and not interrupted.is_set():
             check()
-            span, before = task.way.span(piece, most_steps(lanes, passed)), Resumption(lanes)
+            span = task.way.span(piece, most_steps(lanes, passed))
+            before = Resumption(lanes, rhs, method, span)
             batch = lanes.batch(span, observation.params)
             given_up = method.run(rhs, observe, batch)
             piece, passed = piece + span.steps.size, passed + int(span.steps.sum())
             ended = _ended(lanes, batch, given_up, observation)
             if ended is not None:
                 if observation.locate and ended.stopped.any():
-                    _locate(rhs, method, observation, before, span, batch, np.flatnonzero(ended.stopped))
+                    which = np.flatnonzero(ended.stopped)
+                    block, lane = np.divmod(which, batch.record.shape[2])
+                    seen = batch.record[block, :, lane]
+                    batch.record[block, :, lane] = before.locate_stops(observation, which, seen)
                 ensemble.status[lanes.members[~np.isnan(ended.failed)]] = Status.NOT_CONVERGED
                 ensemble.status[lanes.members[ended.lost]] = Status.NOT_FINITE
                 if ended.lost.size:
-                    found = before.last_finite(rhs, method, span, batch.out, ended.lost)
+                    found = before.last_finite(batch.out, ended.lost)
                     ended.failed[ended.lost], ended.now[ended.lost] = found
             _store(ensemble, lanes, span, batch, ended)
         if isinstance(method, Adams) and lanes.members.size:
@@ -211,23 +215,6 @@ class _Ended:
     failed: Floats  #: time [s] of the last state of those that failed, NaN for the others
     lost: NDArray[np.int64]  #: places of those that are not finite now, of which no time is known yet
     now: Floats  #: states of all (n, dim)
-
-
-def _locate(
-    rhs: Any,
-    method: Method,
-    observation: Observation,
-    before: Resumption,
-    span: Span,
-    batch: Batch,
-    which: NDArray[np.int64],
-) -> None:
-    """Put code, time and state of the stops themselves into the batch's record."""
-    locate = import_module("fastmech.ensembles.locating").locate_stops  # kernels that few runs need
-    block, lane = np.divmod(which, batch.record.shape[2])
-    batch.record[block, :, lane] = locate(
-        rhs, observation, method, before, span, which, batch.record[block, :, lane]
-    )
 
 
 def _ended(lanes: Lanes, batch: Batch, given_up: Floats | None, observation: Observation) -> _Ended | None:

@@ -8,15 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.ensembles.ends import STOP_CODE
+from fastmech.ensembles.energy_bounds import breaks_energy_bounds
 from fastmech.ensembles.fitting import EXPONENT_AGAIN, EXPONENT_ONCE, fit_steps, fitted_steps
-from fastmech.ensembles.plausible import judge
 from fastmech.ensembles.problem import Case, Problem
 from fastmech.ensembles.run import Ensemble, Progress, run_ensemble
 from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.status import Status
-from fastmech.ensembles.stopping import STOP_CODE
 from fastmech.ensembles.turning import TURNED, TURNS
-from fastmech.integrators.implicit_method import ImplicitRungeKutta, with_jacobian
 from fastmech.integrators.method import Method
 
 Floats = NDArray[np.float64]
@@ -91,18 +90,11 @@ def distances(a: Solution, b: Solution) -> Floats:
     return np.asarray(apart)
 
 
-def solve(
-    case: Case,
-    settings: Settings,
-    progress: Progress | None = None,
-) -> Solution:
+def solve(case: Case, settings: Settings, progress: Progress | None = None) -> Solution:
     """Integrate from t = 0 through the output times [s].
 
     Where steps are fitted again, the times at which that is done end a piece of the run. Starts to whose
     motions no steps can be fitted do not run: any step is too large for them.
-
-    Raises:
-        InputError: the step or the number of threads are wrong.
     """
     problem, starts, outputs, threads = case
     ends, again = _ends(settings, outputs)
@@ -112,13 +104,11 @@ def solve(
     dt: Any = np.asarray(settings.dt, dtype=np.float64)
     shares: Any = 1.0
     if fitted_to is not None:
-        shares, aside = fit_steps(fitted_to, starts, dt, float(outputs[-1]), exponent, threads)
+        shares, aside = fit_steps(fitted_to, starts, dt, float(outputs[-1]), exponent, threads=threads)
         aside &= settings.bounded
         if aside.any():  # they never enter a block, and their step is that of slow motion
             now, shares[aside] = np.where(aside[:, None], np.nan, now), 1.0
-    method = settings.method
-    if isinstance(method, ImplicitRungeKutta):
-        method = with_jacobian(method, problem.jacobian, problem.second_order)
+    method = problem.method(settings.method)
     course = _Course(problem)
     for piece, end in enumerate(ends):
         inside = (outputs <= end) & ((outputs > begin) | (piece == 0))
@@ -135,8 +125,8 @@ def solve(
             now,
             times,
             steps,
-            method,
-            problem.observation,
+            method=method,
+            observation=problem.observation,
             threads=threads,
             precision=settings.precision,
             progress=progress if end == ends[-1] else None,
@@ -145,7 +135,9 @@ def solve(
         begin, now = end, run.states[-1]
     solution = course.solution()
     tell_aside(solution, starts, outputs, aside)
-    solution.status = judge(solution.status, starts, solution.y[-1], problem.coefficients, threads)
+    if problem.coefficients is not None:
+        broken = breaks_energy_bounds(problem.coefficients, starts, solution.y[-1], threads)
+        solution.status[broken & (solution.status == Status.OK)] = Status.STEP_TOO_LARGE
     return solution
 
 

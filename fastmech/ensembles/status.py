@@ -1,4 +1,4 @@
-"""What became of a trajectory: distinct statuses, each with its advice."""
+"""What became of a trajectory: one enumeration for all that follows motions, each value with its advice."""
 
 from __future__ import annotations
 
@@ -12,13 +12,18 @@ Flags = NDArray[np.bool_]
 
 
 class Status(IntEnum):
-    """Status of an integrated trajectory."""
+    """Status of an integrated trajectory, of the label of a start, or of a disturbance."""
 
     OK = 0
     NOT_FINITE = 1
     STEP_TOO_LARGE = 2
     START_NOT_FINITE = 3
     NOT_CONVERGED = 4
+    CAPTURED = 5
+    UNDECIDED = 6
+    AT_SADDLE = 7
+    RETURNED = 8
+    ELSEWHERE = 9
 
     @property
     def advice(self) -> str:
@@ -28,19 +33,34 @@ class Status(IntEnum):
 
 _ADVICE = {
     Status.OK: "reached the end of the run, or its stopping condition",
-    Status.NOT_FINITE: "became NaN or infinite on the way; use a smaller dt",
-    Status.STEP_TOO_LARGE: "dt is beyond the method's limit or too long for the motion, or it ends with an "
+    Status.NOT_FINITE: "became NaN or infinite on the way, with every step tried; use a smaller dt",
+    Status.STEP_TOO_LARGE: "dt is beyond the method's limit or too long for the motion, or it comes to an "
     "energy that it cannot have; use a smaller dt (with fit or tol, unless it begins too fast for any steps)",
+    Status.START_NOT_FINITE: "the start is NaN or infinite, or too many turns away for a label",
     Status.NOT_CONVERGED: "Newton's iteration found no solution of a step; use a smaller dt",
-    Status.START_NOT_FINITE: "the start is NaN or infinite",
+    Status.CAPTURED: "proved to end in its well: energy and position leave no other way",
+    Status.UNDECIDED: "nothing is proved by t_end (use a larger one), or it is too fast or too near a "
+    "boundary for the finest steps to agree (no t_end helps)",
+    Status.AT_SADDLE: "comes to an unstable equilibrium, and what follows is not decided",
+    Status.RETURNED: "proved to end at its equilibrium without a full turn",
+    Status.ELSEWHERE: "proved to end at another stable equilibrium, or at its own some turns further",
 }
 
+#: Statuses of motions that have failed; of labels; and of where disturbances end.
+FAILURES = (Status.NOT_FINITE, Status.STEP_TOO_LARGE, Status.NOT_CONVERGED, Status.START_NOT_FINITE)
+LABELS = (Status.CAPTURED, Status.UNDECIDED, Status.AT_SADDLE, *FAILURES)
+ENDS = (Status.RETURNED, Status.ELSEWHERE, Status.AT_SADDLE, Status.UNDECIDED, *FAILURES)
 
-def failure_counts(status: ArrayLike, failing: Iterable[IntEnum]) -> dict[str, int]:
-    """How many trajectories have which of the ``failing`` statuses, by name; what none has is left out."""
+
+def counts(status: ArrayLike, kinds: Iterable[IntEnum]) -> dict[str, int]:
+    """How many have which status, by its name in lower case."""
     values = np.asarray(status)
-    found = {kind.name.lower(): int(np.count_nonzero(values == kind)) for kind in failing}
-    return {name: count for name, count in found.items() if count}
+    return {kind.name.lower(): int(np.count_nonzero(values == kind)) for kind in kinds}
+
+
+def failure_counts(status: ArrayLike, failing: Iterable[IntEnum] = FAILURES) -> dict[str, int]:
+    """The same of the ``failing`` ones; what none has is left out."""
+    return {name: count for name, count in counts(status, failing).items() if count}
 
 
 def failure_line(counts: Mapping[str, int], total: int) -> str:

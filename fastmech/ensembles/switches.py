@@ -206,14 +206,39 @@ def _names(node: ast.AST) -> set[str]:
     return {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}
 
 
+def _shared(*nodes: ast.AST) -> set[str]:
+    """Names whose arrays or lists these expressions hand on, whole or in part."""
+    found = set()
+    for node in nodes:
+        while isinstance(node, ast.Subscript | ast.Attribute | ast.Starred):
+            node = node.value
+        if isinstance(node, ast.Name):
+            found.add(node.id)
+    return found
+
+
 def _depending(node: ast.FunctionDef, depend: set[str]) -> set[str]:
-    """Names whose values depend on the arguments ``depend``."""
+    """Names whose values depend on the arguments ``depend``.
+
+    What is called may write what it is given into an array that it is given too, and two names may mean one
+    array. So may names of its own that a function hands on; its arguments are its caller's to judge.
+    """
+    stored = {n.id for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+    own = stored - {argument.arg for argument in node.args.args}
     found, before = set(depend), -1
     while len(found) != before:
         before = len(found)
         for part in ast.walk(node):
             if isinstance(part, ast.Assign) and _names(part.value) & found:
                 found |= set().union(*(_names(target) for target in part.targets))
+            elif isinstance(part, ast.Assign) and _shared(*part.targets) & found:
+                found |= _shared(part.value) & own
+            elif isinstance(part, ast.Call):
+                given = [*part.args, *(keyword.value for keyword in part.keywords)]
+                if any(_names(one) & found for one in given):
+                    found |= (
+                        _shared(*given, *([part.func] if isinstance(part.func, ast.Attribute) else [])) & own
+                    )
             elif isinstance(part, ast.AugAssign | ast.AnnAssign | ast.NamedExpr):
                 if part.value is not None and _names(part.value) & found:
                     found |= _names(part.target)
@@ -315,7 +340,9 @@ class _Watch(ast.NodeTransformer):
         if node.keywords:
             raise UnclearError(f"it calls {ast.unparse(node.func)} with names of arguments")
         names = function.__code__.co_varnames
-        changing = {name for name, one in zip(names, depends, strict=False) if one}
+        # An array made for the call may be written into by what is called.
+        changes = [one or isinstance(part, ast.Call) for one, part in zip(depends, node.args, strict=True)]
+        changing = {name for name, one in zip(names, changes, strict=False) if one}
         copy, places = watching(function, changing)
         self.places += places
         name = f"_fastmech_callee{len(self.callees)}"

@@ -16,11 +16,11 @@ from numba import float64
 from numpy.typing import NDArray
 
 from fastmech.ensembles import checks
+from fastmech.ensembles.ends import STOP_CODE, STOP_STATE, STOP_TIME
 from fastmech.ensembles.fingerprint import fingerprint
 from fastmech.ensembles.rebuilding import Swaps, compiled_callees, raises, reaches, rebuilt, returns
 from fastmech.ensembles.refusals import explain, reason
 from fastmech.ensembles.run import NOTHING, Observation
-from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
 from fastmech.ensembles.switches import UnclearError, decides_nothing, watching
 from fastmech.errors import InputError, shown
 from fastmech.generated import new_module, run_module
@@ -34,7 +34,7 @@ MOST_STATES = 10_000
 
 _OBSERVE = '''"""Made by fastmech: watches {name!r} of a user's own system."""
 
-from fastmech.ensembles.stopping import note_stop
+from fastmech.ensembles.ends import note_stop
 from fastmech.jit import OBSERVER_SIGNATURE, kernel
 from fastmech.kernels.attempt import attempt
 

@@ -47,11 +47,7 @@ def in_threads(
 
 
 def in_parts(work: Callable[[slice], None], n: int, threads: int | None, size: int = PART) -> None:
-    """Do a work on all of ``n`` trajectories, which share nothing, in parts of so many.
-
-    Raises:
-        InputError: not a number of threads.
-    """
+    """Do a work on all of ``n`` trajectories, which share nothing, in parts of so many."""
 
     def part(first: int) -> int:
         with np.errstate(invalid="ignore", over="ignore"):  # what is not finite has a status of its own

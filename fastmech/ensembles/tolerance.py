@@ -45,7 +45,7 @@ from fastmech.ensembles.work_precision import (
     error_of_finer,
     order_statistic,
 )
-from fastmech.integrators.implicit_method import ImplicitRungeKutta
+from fastmech.integrators.method import ImplicitRungeKutta
 from fastmech.integrators.methods import find_method
 
 Floats = NDArray[np.float64]
@@ -163,14 +163,12 @@ def usable_starts(problem: Problem, starts: Floats, t_end: float, threads: int |
     """Which starts (n, dim) have motions until ``t_end`` [s] that steps can follow.
 
     That is asked once, with steps that all tolerances may come to: it depends on a start alone.
-
-    Raises:
-        InputError: the number of threads is wrong.
     """
     usable, c = finite_rows(starts), problem.coefficients
     if c is None:
         return usable
-    return usable & ~fit_steps(c, starts, SHORT / vibration_frequency(c), t_end, EXPONENT_ONCE, threads).aside
+    longest = SHORT / vibration_frequency(c)
+    return usable & ~fit_steps(c, starts, longest, t_end, EXPONENT_ONCE, threads=threads).aside
 
 
 def _switches(problem: Problem) -> tuple[Any, str]:
@@ -184,11 +182,7 @@ def _switches(problem: Problem) -> tuple[Any, str]:
 
 
 def _estimated(
-    case: Case,
-    who: Members,
-    asked: tuple[float, float, str | None],
-    switches: Any,
-    progress: Progress | None,
+    case: Case, who: Members, asked: tuple[float, float, str | None], switches: Any, progress: Progress | None
 ) -> Estimated:
     """The same of starts ``who`` whose motions steps can follow; ``asked``: tolerance, quantile, method."""
     tol, quantile, method = asked
@@ -408,7 +402,7 @@ class Runs:
             "two resolutions disagree about their stop": stops,
             "not finite at any step tried": lost,
             "shorter steps would cost too much": missed & self.unpaid & ~lost,
-            "rounding, magnified by the motion, is larger": missed & self.rounded,
+            "rounding is larger, as slight changes of their starts show": missed & self.rounded,
             "shorter steps do not reduce their errors as the order says (chaos, a singularity of the "
             "right-hand side)": rest & ~stops,
         }

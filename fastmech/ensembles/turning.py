@@ -42,9 +42,6 @@ def may_turn(c: Coefficients, starts: Floats, dt: float | Floats, threads: int |
 
     Of rates whose kinetic-energy norm is 1 none is greater than sqrt((mass + 1) / mass): the inverse of
     the mass matrix has no greater diagonal entry in any configuration.
-
-    Raises:
-        InputError: the number of threads is wrong.
     """
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         turn = speed_bound(c, starts, threads)
@@ -54,11 +51,7 @@ def may_turn(c: Coefficients, starts: Floats, dt: float | Floats, threads: int |
 
 
 def watched(problem: Problem, starts: Floats, dt: float, threads: int | None = None) -> Problem:
-    """The problem, with turns observed where the steps of ``dt`` [s] are long enough for them.
-
-    Raises:
-        InputError: the number of threads is wrong.
-    """
+    """The problem, with turns observed where the steps of ``dt`` [s] are long enough for them."""
     c = problem.coefficients
     some = c is not None and may_turn(c, starts, (1.0 + ROUNDED) * dt, threads).any()
     return replace(problem, observation=TURNS) if some else problem
@@ -71,9 +64,6 @@ def counted_turns(
 
     Only those count that the energy allows in a trajectory's own steps, else they are 0: they do not depend
     on whether its companions' were a reason to watch. ``None``: nobody is watched.
-
-    Raises:
-        InputError: the number of threads is wrong.
     """
     c = problem.coefficients
     if c is None or problem.observation is not TURNS:

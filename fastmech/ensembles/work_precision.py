@@ -17,7 +17,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.ensembles.fitting import fading_force, speed_bound, vibration_frequency
+from fastmech.ensembles.fitting import (
+    explicit_limit,
+    fading_force,
+    initial_layer,
+    speed_bound,
+    vibration_frequency,
+)
 from fastmech.ensembles.interpolation import STEPS_BETWEEN, solve_at
 from fastmech.ensembles.operations import (
     MECHANISM,
@@ -29,9 +35,7 @@ from fastmech.ensembles.operations import (
 from fastmech.ensembles.problem import Case
 from fastmech.ensembles.solve import Settings, Solution, distances
 from fastmech.ensembles.spans import output_steps
-from fastmech.ensembles.stiffness import explicit_limit, initial_layer
-from fastmech.integrators.implicit_method import ImplicitRungeKutta
-from fastmech.integrators.method import Method
+from fastmech.integrators.method import ImplicitRungeKutta, Method
 from fastmech.integrators.methods import find_method
 
 Floats = NDArray[np.float64]

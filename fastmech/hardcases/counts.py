@@ -8,13 +8,12 @@ import numpy as np
 
 from fastmech.hardcases.case import Floats
 from fastmech.hardcases.walk import Goal
-from fastmech.integrators.batch import Batch
-from fastmech.integrators.driver import observe_nothing
-from fastmech.integrators.implicit_method import ImplicitRungeKutta
+from fastmech.integrators.batch import Batch, observe_nothing
+from fastmech.integrators.method import ImplicitRungeKutta
 from fastmech.integrators.methods import METHODS
 from fastmech.integrators.tableaus.implicit import IMPLICIT_TABLEAUS
 from fastmech.kernels.counting import CALLS, JACOBIANS, counting_jacobian, counting_lagrange
-from fastmech.kernels.jacobians import lagrange_jacobian
+from fastmech.kernels.jacobians import lagrange_inverse, lagrange_jacobian
 from fastmech.mechanism.coefficients import reduce
 from fastmech.step_limits.predict import stable_step
 
@@ -40,7 +39,7 @@ def counted(goal: Goal, method: str, steps: int) -> Work:
         record=np.zeros((1, 0, 1)),
         out=np.empty((1, steps, 4, 1)),
     )
-    formula = ImplicitRungeKutta(IMPLICIT_TABLEAUS[method], counting_jacobian, True)
+    formula = ImplicitRungeKutta(IMPLICIT_TABLEAUS[method], counting_jacobian, lagrange_inverse)
     formula.run(counting_lagrange, observe_nothing, batch)
     calls, jacobians = (int(batch.params[0, row, 0]) for row in (CALLS, JACOBIANS))
     path = np.concatenate([goal.start[None], batch.out[0, :, :, 0]])

@@ -8,14 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fastmech.ensembles.status import Status
+from fastmech.ensembles.status import FAILURES, Status
 from fastmech.hardcases.case import REFUSED, HardCase, Row
 from fastmech.hardcases.registry import CASES
 from fastmech.results import Dataset, Variable, flags
 
 #: Statuses of rows in the file: the trajectories', and one for a request that is refused before the run.
 RowStatus = IntEnum(  # type: ignore[misc]
-    "RowStatus", {status.name: status.value for status in Status} | {REFUSED.upper(): 100}
+    "RowStatus",
+    {status.name: status.value for status in sorted((Status.OK, *FAILURES))} | {REFUSED.upper(): 100},
 )
 
 

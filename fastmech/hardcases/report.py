@@ -24,8 +24,7 @@ from fastmech.hardcases.cases.conservative import (
 from fastmech.hardcases.containment import CONTAINED, contained, containment, containment_markdown
 from fastmech.hardcases.gallery import gallery_dataset, gallery_markdown, run_gallery, verdict
 from fastmech.hardcases.registry import CASES
-from fastmech.integrators.implicit_method import ImplicitRungeKutta
-from fastmech.integrators.method import Adams, RungeKutta
+from fastmech.integrators.method import Adams, ImplicitRungeKutta, RungeKutta
 from fastmech.integrators.methods import METHODS
 from fastmech.plots.energy_drift import draw_energy_drift
 from fastmech.plots.stability_region import draw_stability_regions

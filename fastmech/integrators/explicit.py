@@ -16,15 +16,13 @@ import numpy as np
 from numba import types
 
 from fastmech.callee import CalleeType, callee
-from fastmech.integrators.batch import ROUNDED_TIME, Batch
-from fastmech.integrators.driver import BlockRHS, Floats, Integers, Observer
+from fastmech.integrators.batch import ROUNDED_TIME, Batch, BlockRHS, Floats, Integers, Observer, batch_type
 from fastmech.integrators.tableau import Tableau
 from fastmech.jit import (
     INTEGERS,
     VECTOR,
     called,
     kernel,
-    lanes,
     named_tuple,
     observer_signature,
     rhs_signature,
@@ -54,36 +52,28 @@ GROUP_BYTES, GROUP = 65536, 4
 class Weights(NamedTuple):
     """A method's weights as sums over rows: ``weight[k]`` belongs to row ``row[k]``.
 
-    Sums are filled up with weights of zero to whole :data:`TERMS`. Those of a Runge-Kutta method lie from
-    ``start[s]`` to ``start[s + 1]``, the last ones give the step; an Adams method has such a starter. The
-    history's are counted from its oldest row on.
+    Sum s lies from ``start[s]`` to ``start[s + 1]``, filled up with weights of zero to whole :data:`TERMS`.
+    The first ones are those of a Runge-Kutta method's stages and of its step; an Adams method has such a
+    starter. Its own follow: predictor, the predictor's last term, and corrector, whose rows are those of the
+    history, counted from the oldest on.
     """
 
     start: Integers
     row: Integers
     weight: Floats
     nodes: Floats
-    past: Integers  #: rows of predictor and corrector
-    predictor: Floats
-    corrector: Floats  #: empty for an explicit method; ``new`` belongs to the predicted derivative
-    term: Floats  #: of the predictor's last term
-    new: float
+    new: float  #: belongs to the predicted derivative in the corrector; 0: there is none
     rows: int  #: of the history; 0: a Runge-Kutta method
     group: int  #: blocks that take whole steps together; 0: there are none
 
 
-class Run(NamedTuple):
-    """The fields of :class:`fastmech.integrators.batch.Batch`."""
+class Calls(NamedTuple):
+    """What the driver calls."""
 
-    times: Floats
-    steps: Integers
-    params: Floats
-    observer_params: Floats
-    Y: Floats
-    record: Floats
-    out: Floats
-    memory: Floats
-    phase: Floats
+    rhs: BlockRHS
+    observe: Observer
+    start: Advance  #: whole steps of an Adams method's starter
+    advance: Advance  #: those of the method, if any
 
 
 class Stepped(NamedTuple):
@@ -104,33 +94,23 @@ class Moment(NamedTuple):
     ready: bool  #: the history is known
 
 
-WEIGHTS = named_tuple(
-    [INTEGERS, INTEGERS, VECTOR, VECTOR, INTEGERS, *[VECTOR] * 3, types.float64, types.int64, types.int64],
-    Weights,
-)
-
-
-def run_type(precision: Any) -> Any:
-    """Type of :class:`Run`."""
-    three, four = lanes(precision, 3), lanes(precision, 4)
-    record = lanes(types.float64, 3)
-    return named_tuple([VECTOR, INTEGERS, three, VECTOR, three, record, four, three, VECTOR], Run)
+WEIGHTS = named_tuple([INTEGERS, INTEGERS, VECTOR, VECTOR, types.float64, types.int64, types.int64], Weights)
 
 
 def driver_signature(precision: Any) -> Any:
-    """``drive(rhs, observe, start, advance, weights, run)``."""
-    functions = CalleeType(rhs_signature(precision)), CalleeType(observer_signature(precision))
-    return types.void(*functions, *[advance_type(precision)] * 2, WEIGHTS, run_type(precision))
+    """``drive(calls, weights, batch)``."""
+    kinds = [CalleeType(rhs_signature(precision)), CalleeType(observer_signature(precision))]
+    calls = named_tuple([*kinds, *[advance_type(precision)] * 2], Calls)
+    return types.void(calls, WEIGHTS, batch_type(precision))
 
 
 @called
-def add_rows(
-    total: Floats, rows: Floats, first: int, row: Integers, weight: Floats, begin: int, end: int
-) -> None:
-    """total = sum of weight[begin:end] times rows ``first`` + row[begin:end], :data:`TERMS` in a pass."""
+def add_rows(total: Floats, rows: Floats, first: int, weights: Weights, s: int) -> None:
+    """total = sum ``s`` of the weights, over rows from ``first`` on, :data:`TERMS` in a pass."""
+    row, weight = weights.row, weights.weight
     for x in range(total.shape[0]):
         total[x] = 0.0
-    for k in range(begin, end, TERMS):
+    for k in range(weights.start[s], weights.start[s + 1], TERMS):
         a, b, c, d = (
             rows[first + row[k]],
             rows[first + row[k + 1]],
@@ -158,7 +138,7 @@ def step_by_stages(rhs: BlockRHS, weights: Weights, block: Stepped, at: Moment) 
     y, rows = block.Y.reshape(n), block.stages.reshape((last + 1, n))
     z, total = rows[last - 1], rows[last]
     for s in range(1, last):
-        add_rows(total, rows, 0, weights.row, weights.weight, weights.start[s], weights.start[s + 1])
+        add_rows(total, rows, 0, weights, s)
         if s == last - 1:
             move(y, y, at.h, total)
         else:
@@ -172,12 +152,12 @@ def step_by_history(rhs: BlockRHS, weights: Weights, block: Stepped, at: Moment)
     n, last = block.Y.size, block.stages.shape[0] - 1
     y, rows = block.Y.reshape(n), block.stages.reshape((last + 1, n))
     history = block.history.reshape((block.history.shape[0], n))
-    z, total, size = rows[last - 1], rows[last], weights.past.shape[0]
-    add_rows(total, history, at.oldest + 1, weights.past, weights.predictor, 0, size)
+    z, total, own = rows[last - 1], rows[last], weights.nodes.shape[0] + 1
+    add_rows(total, history, at.oldest + 1, weights, own)
     move(z, y, at.h, total)
     rhs(at.t + at.h, block.stages[last - 1], block.stages[0], block.params)
-    if weights.corrector.shape[0]:
-        add_rows(total, history, at.oldest + 1, weights.past, weights.corrector, 0, size)
+    if weights.new != 0.0:
+        add_rows(total, history, at.oldest + 1, weights, own + 2)
         move(total, total, weights.new, rows[0])
         move(z, y, at.h, total)
         rhs(at.t + at.h, block.stages[last - 1], block.stages[0], block.params)
@@ -191,7 +171,7 @@ def look(weights: Weights, block: Stepped, at: Moment) -> None:
     (dim, width), last = block.Y.shape, block.stages.shape[0] - 1
     total = block.stages[last].reshape(dim * width)
     history = block.history.reshape((block.history.shape[0], dim * width))
-    add_rows(total, history, at.oldest + 1, weights.past, weights.term, 0, weights.past.shape[0])
+    add_rows(total, history, at.oldest + 1, weights, weights.nodes.shape[0] + 2)
     for d in range(dim):
         for i in range(width):
             term = abs(at.h * block.stages[last, d, i])
@@ -244,13 +224,10 @@ def step_alone(rhs: BlockRHS, weights: Weights, block: Stepped, i: int, at: Mome
 
 
 @kernel(driver_signature(types.float64))
-def drive(
-    rhs: BlockRHS, observe: Observer, start: Advance, advance: Advance, weights: Weights, run: Run
-) -> None:
+def drive(calls: Calls, weights: Weights, run: Batch) -> None:
     """Take blocks of lanes through all times, some blocks after the others.
 
-    ``start`` are the whole steps of an Adams method's starter, ``advance`` those of the method, if any.
-    ``observe`` is called after every step. A step's time is computed from its index, so rounding does not
+    The observer is called after every step. A step's time is computed from its index, so rounding does not
     accumulate. An Adams method starts anew wherever the step's length changes; its ``phase`` is how many rows
     of the history are known, the row before the oldest, and the step.
     """
@@ -282,25 +259,25 @@ def drive(
                 if whole and not fresh:
                     until = wanted if ready else min(wanted, taken + rows - 1 - known)
                     steps = Steps(now, h, taken, taken + 1 if observed else until, begin, end, given, oldest)
-                    done = advance(flat, steps) if ready else start(flat, steps)
+                    done = calls.advance(flat, steps) if ready else calls.start(flat, steps)
                 number = abs(done)
                 at = Moment(now + (taken + number - 1) * h, h, (oldest + number - 1) % (rows + 1), ready)
                 for b in range(begin, end if fresh or observed or done < 0 or not whole else begin):
                     params = run.params[min(b, run.params.shape[0] - 1)]
                     block = Stepped(run.Y[b], params, run.memory[b].reshape((carried, dim, width)), stages)
                     if fresh:
-                        rhs(at.t, block.Y, stages[0], params)
+                        calls.rhs(at.t, block.Y, stages[0], params)
                         keep(weights, block, (oldest - 1) % (rows + 1))
                     elif not whole:
                         if ready and rows and taken % EVERY == 0:
                             look(weights, block, at)
-                        step_once(rhs, weights, block, at)
+                        step_once(calls.rhs, weights, block, at)
                     elif done < 0:
                         for i in range(width):
                             if lost[(b - begin) * width + i]:
-                                step_alone(rhs, weights, block, i, at)
+                                step_alone(calls.rhs, weights, block, i, at)
                     if observed and not fresh:
-                        observe(now + (taken + number) * h, block.Y, run.observer_params, run.record[b])
+                        calls.observe(now + (taken + number) * h, block.Y, run.observer_params, run.record[b])
                 if not fresh:
                     oldest, taken = (oldest + number) % (rows + 1), taken + number
                     known = known if ready else known + number
@@ -341,33 +318,16 @@ def _filled(rows: Sequence[Sequence[tuple[int, float]]]) -> tuple[Integers, Inte
     return start, np.array(places, dtype=np.int64), np.array(weights, dtype=np.float64)
 
 
-def weights_of(
-    tableau: Tableau, predictor: Floats | None = None, corrector: Floats | None = None, group: int = 0
-) -> Weights:
+def weights_of(tableau: Tableau, predictor: Floats | None = None, corrector: Floats | None = None) -> Weights:
     """The weights of a Runge-Kutta method, or of an Adams method that it starts."""
-    start, row, weight = _filled([list(enumerate(line)) for line in (*tableau.a, tableau.b)])
-    explicit = np.zeros(0) if predictor is None else predictor
-    implicit = np.zeros(0) if corrector is None else corrector
-    size = explicit.size
-    padding = np.zeros(-size % TERMS)
-    past = np.concatenate([np.arange(size), padding]).astype(np.int64)
-
-    def oldest_first(weights: Floats) -> Floats:
-        return np.concatenate([weights[::-1], padding[: -weights.size % TERMS]])
-
-    return Weights(
-        start=start,
-        row=row,
-        weight=weight,
-        nodes=np.array(tableau.c, dtype=np.float64),
-        past=past,
-        predictor=oldest_first(explicit),
-        corrector=oldest_first(implicit[1:]),
-        term=oldest_first(np.array(term_weights(explicit.tolist()) if size else [], dtype=np.float64)),
-        new=float(implicit[0]) if implicit.size else 0.0,
-        rows=size,
-        group=group,
-    )
+    sums = [list(enumerate(line)) for line in (*tableau.a, tableau.b)]
+    size = 0 if predictor is None else predictor.size
+    if predictor is not None and corrector is not None:
+        own = predictor, term_weights(predictor.tolist()), corrector[1:]
+        sums += [list(enumerate(list(weights)[::-1])) for weights in own]
+    start, row, weight = _filled(sums)
+    new = 0.0 if corrector is None or not corrector.size else float(corrector[0])
+    return Weights(start, row, weight, np.array(tableau.c, dtype=np.float64), new, size, 0)
 
 
 def formula_of(tableau: Tableau, rows: int = 0) -> Formula:
@@ -385,9 +345,6 @@ def take_steps(method: Any, rhs: Any, observe: Any, batch: Batch) -> None:
         if None not in made:
             advance, numbers = made, batch.Y.shape[1] * (method.carried + 2) * VECTOR_LANES
             group = max(1, min(GROUP, GROUP_BYTES // (batch.Y.itemsize * numbers)))
-    run = Run(
-        batch.times, batch.steps, batch.params, batch.observer_params, batch.Y, batch.record, batch.out,
-        batch.memory_of(method.carried), batch.phase,
-    )  # fmt: skip
     functions = rhs if precision == "float64" else in_single(rhs), observe, *advance
-    drive_in(precision)(*map(callee, functions), method.weights._replace(group=group), run)
+    calls = Calls(*map(callee, functions))
+    drive_in(precision)(calls, method.weights._replace(group=group), batch.ready(method.carried))

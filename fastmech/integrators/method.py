@@ -1,55 +1,77 @@
-"""What a fixed-step method is to those who run it: a name, what a step costs, and one call."""
+"""What a fixed-step method is to those who run it: a name, what a step costs, and one call.
+
+An Adams formula advances by the integral over one step of the polynomial that interpolates the derivative
+at equidistant times (Hairer, Norsett, Wanner, *Solving ODEs I*, section III.1); its weights are computed
+exactly from that.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, Protocol
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cache, cached_property
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastmech.callee import callee
 from fastmech.integrators.batch import Batch, Floats
 from fastmech.integrators.explicit import Weights, formula_of, take_steps, weights_of
-from fastmech.integrators.multistep_weights import bashforth, moulton
-from fastmech.integrators.tableau import Tableau
+from fastmech.integrators.implicit import Calls, drive_implicit, inverse_by_elimination
+from fastmech.integrators.tableau import ImplicitTableau, Tableau
 from fastmech.kernels.blocks import VECTOR_LANES
 from fastmech.kernels.whole import Formula
 
 
-class Method(Protocol):
+def interpolatory_weights(nodes: Sequence[int]) -> list[Fraction]:
+    """Weights of the quadrature over [0, 1] that is exact for polynomials of degree below ``len(nodes)``.
+
+    The integral of each Lagrange polynomial on ``nodes`` (times in steps, relative to the step's start).
+    """
+    weights = []
+    for node in nodes:
+        polynomial, scale = [Fraction(1)], Fraction(1)  # coefficients by rising power
+        for other in nodes:
+            if other != node:
+                scale *= node - other
+                shifted, scaled = [Fraction(0), *polynomial], [other * c for c in (*polynomial, Fraction(0))]
+                polynomial = [a - b for a, b in zip(shifted, scaled, strict=True)]
+        integral = sum((c / (power + 1) for power, c in enumerate(polynomial)), Fraction(0))
+        weights.append(integral / scale)
+    return weights
+
+
+@cache
+def bashforth(order: int) -> tuple[Fraction, ...]:
+    """Explicit formula: weights of f at t_n, t_(n-1), ..., t_(n-order+1)."""
+    return tuple(interpolatory_weights(range(0, -order, -1)))
+
+
+@cache
+def moulton(order: int) -> tuple[Fraction, ...]:
+    """Implicit formula: weights of f at t_(n+1), t_n, ..., t_(n-order+2)."""
+    return tuple(interpolatory_weights(range(1, 1 - order, -1)))
+
+
+#: Newton iterations that a step of ordinary length takes: what ``evaluations`` reckons with.
+TYPICAL_ITERATIONS = 4
+
+
+class Method:
     """A fixed-step method, whatever its family."""
 
-    @property
-    def name(self) -> str:
-        """Name in the registry."""
-
-    @property
-    def order(self) -> int:
-        """Order of the error in the step's length."""
-
-    @property
-    def source(self) -> str:
-        """Where its formula comes from."""
-
-    @property
-    def start_steps(self) -> int:
-        """Steps at the start, and where the step's length changes, of a starter; 0 for most methods."""
-
-    @property
-    def rows(self) -> int:
-        """Derivatives of a block that a step works on: stages or history."""
-
-    @property
-    def carried(self) -> int:
-        """What it carries of each lane from call to call, in states' sizes; 0: nothing."""
-
-    @property
-    def lanes(self) -> int:
-        """Width of its blocks; 0: any."""
+    name: str  #: in the registry
+    order: int  #: of the error in the step's length
+    source: str  #: where its formula comes from
+    rows: int  #: derivatives of a block that a step works on: stages or history
+    start_steps: int = 0  #: steps at the start, and where the step's length changes, of a starter
+    carried: int = 0  #: what it carries of each lane from call to call, in states' sizes
+    lanes: int = 0  #: width of its blocks; 0: any
 
     def evaluations(self, steps: int) -> int:
         """Right-hand sides that so many steps of equal length take, the starter's included."""
+        return steps * self.rows
 
     def run(self, rhs: Any, observe: Any, batch: Batch) -> Floats | None:
         """Take a batch through its times.
@@ -58,60 +80,34 @@ class Method(Protocol):
             ``None``, or of a method that can fail (blocks, lanes): NaN, or the time [s] of the last state of
             a lane that has failed, which it keeps.
         """
+        raise NotImplementedError
+
+    def _named_by(self, tableau: Tableau, carried: int = 0) -> None:
+        """What a Runge-Kutta method takes from its tableau."""
+        own = {"name": tableau.name, "order": tableau.order, "source": tableau.source}
+        vars(self).update(own, rows=tableau.stages, carried=carried)
 
 
-class OneStep:
-    """What a Runge-Kutta method takes from its tableau, explicit or implicit."""
+class Explicit(Method):
+    """A method whose driver is :func:`fastmech.integrators.explicit.drive`."""
 
-    tableau: Any
+    lanes = VECTOR_LANES
 
-    @property
-    def name(self) -> str:
-        """Name in the registry."""
-        return str(self.tableau.name)
-
-    @property
-    def order(self) -> int:
-        """Order of the error in the step's length."""
-        return int(self.tableau.order)
-
-    @property
-    def source(self) -> str:
-        """Where its coefficients come from."""
-        return str(self.tableau.source)
-
-    @property
-    def start_steps(self) -> int:
-        """None: every step stands alone."""
-        return 0
-
-    @property
-    def rows(self) -> int:
-        """Stages."""
-        return int(self.tableau.stages)
-
-    @property
-    def carried(self) -> int:
-        """Nothing."""
-        return 0
+    def run(self, rhs: Any, observe: Any, batch: Batch) -> None:
+        """Take a batch through its times."""
+        take_steps(self, rhs, observe, batch)
 
 
 @dataclass(frozen=True)
-class RungeKutta(OneStep):
+class RungeKutta(Explicit):
     """An explicit Runge-Kutta method: its tableau."""
 
     tableau: Tableau
 
-    def evaluations(self, steps: int) -> int:
-        """Right-hand sides that so many steps take."""
-        return steps * self.tableau.stages
+    def __post_init__(self) -> None:
+        self._named_by(self.tableau)
 
-    @property
-    def lanes(self) -> int:
-        """Those of whole steps."""
-        return VECTOR_LANES
-
-    @property
+    @cached_property
     def formulas(self) -> tuple[Formula, Formula]:
         """What whole steps are made from: those of the start, and the others."""
         return (formula_of(self.tableau),) * 2
@@ -121,13 +117,9 @@ class RungeKutta(OneStep):
         """Its weights as arrays."""
         return weights_of(self.tableau)
 
-    def run(self, rhs: Any, observe: Any, batch: Batch) -> None:
-        """Take a batch through its times."""
-        take_steps(self, rhs, observe, batch)
-
 
 @dataclass(frozen=True)
-class Adams:
+class Adams(Explicit):
     """An Adams method, started by a Runge-Kutta method.
 
     Explicit (Adams-Bashforth): one right-hand side a step, a history of ``order`` derivatives; error constant
@@ -146,37 +138,21 @@ class Adams:
     starter: Tableau
     source: str
 
-    @cached_property
-    def predictor(self) -> NDArray[np.float64]:
-        """Weights of the derivatives at t_n, t_(n-1), ...: explicit formula."""
-        return np.array(bashforth(self.order - 1 if self.corrects else self.order), dtype=np.float64)
+    def __post_init__(self) -> None:
+        rows = self.order - self.corrects
+        vars(self).update(rows=rows, start_steps=rows - 1, carried=2 * rows + 3)
 
     @cached_property
-    def corrector(self) -> NDArray[np.float64]:
+    def predictor(self) -> Floats:
+        """Weights of the derivatives at t_n, t_(n-1), ...: explicit formula."""
+        return np.array(bashforth(self.rows), dtype=np.float64)
+
+    @cached_property
+    def corrector(self) -> Floats:
         """Weights of the derivatives at t_(n+1), t_n, ...: implicit formula; empty without a corrector."""
         return np.array(moulton(self.order) if self.corrects else [], dtype=np.float64)
 
-    @property
-    def start_steps(self) -> int:
-        """Steps that the history is short of."""
-        return self.predictor.size - 1
-
-    @property
-    def rows(self) -> int:
-        """History."""
-        return self.predictor.size
-
-    @property
-    def carried(self) -> int:
-        """History, twice, and the greatest last terms of the predictor, see :mod:`fastmech.kernels.whole`."""
-        return 2 * self.predictor.size + 3
-
-    @property
-    def lanes(self) -> int:
-        """Those of whole steps."""
-        return VECTOR_LANES
-
-    @property
+    @cached_property
     def formulas(self) -> tuple[Formula, Formula]:
         """What whole steps are made from: the starter's, and its own."""
         predictor, corrector = tuple(self.predictor.tolist()), tuple(self.corrector.tolist())
@@ -194,6 +170,45 @@ class Adams:
         others = (steps > start) + (steps - start) * (2 if self.corrects else 1)
         return start * self.starter.stages + others
 
-    def run(self, rhs: Any, observe: Any, batch: Batch) -> None:
-        """Take a batch through its times."""
-        take_steps(self, rhs, observe, batch)
+
+@dataclass(frozen=True)
+class ImplicitRungeKutta(Method):
+    """An implicit Runge-Kutta method, and the Jacobian of what it is to integrate.
+
+    ``jacobian`` and ``inverse`` are block kernels (:data:`fastmech.jit.JACOBIAN_SIGNATURE`,
+    :data:`fastmech.jit.INVERSE_SIGNATURE`); ``None`` takes forward differences of the right-hand side, and
+    elimination.
+    """
+
+    tableau: ImplicitTableau
+    jacobian: Any = None
+    inverse: Any = None
+
+    def __post_init__(self) -> None:
+        # The last step's increments, from which the next one's are guessed, and the sum's compensation.
+        self._named_by(self.tableau, carried=self.tableau.stages + 1)
+
+    def evaluations(self, steps: int) -> int:
+        """Right-hand sides that so many steps take where Newton's iteration converges as usual."""
+        return steps * self.rows * TYPICAL_ITERATIONS
+
+    def run(self, rhs: Any, observe: Any, batch: Batch) -> Floats | None:
+        """Take a batch through its times.
+
+        Returns:
+            (blocks, lanes): NaN, or the time [s] at which Newton's iteration no longer converged; such a lane
+            keeps the state that it had then.
+        """
+        jacobian, inverse = self.jacobian or rhs, self.inverse or inverse_by_elimination
+        failed = np.full(batch.Y.shape[::2], np.nan)
+        calls = Calls(*map(callee, (rhs, jacobian, inverse, observe)))
+        scheme = self.tableau.scheme._replace(differences=self.jacobian is None)
+        drive_implicit(calls, scheme, batch.ready(self.carried), failed)
+        return failed
+
+
+def with_jacobian(method: Method, jacobian: Any, inverse: Any = None) -> Method:
+    """The method, told the Jacobian, and how to solve its systems, if it is one that needs them."""
+    if isinstance(method, ImplicitRungeKutta) and jacobian is not None:
+        return replace(method, jacobian=jacobian, inverse=inverse)
+    return method

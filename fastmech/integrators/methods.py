@@ -25,14 +25,11 @@ accuracy would set the step.
 from __future__ import annotations
 
 from fastmech.errors import InputError, shown
-from fastmech.integrators.implicit_method import ImplicitRungeKutta
-from fastmech.integrators.method import Adams, Method, RungeKutta
+from fastmech.integrators.method import Adams, ImplicitRungeKutta, Method, RungeKutta
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.integrators.tableaus.implicit import IMPLICIT_TABLEAUS
 
-_EXPLICIT = (
-    "Adams; Bashforth, Adams, Theories of Capillary Action, 1883; weights derived in multistep_weights"
-)
+_EXPLICIT = "Adams; Bashforth, Adams, Theories of Capillary Action, 1883; weights derived exactly"
 _CORRECTED = (
     "Moulton, New Methods in Exterior Ballistics, 1926, with Adams-Bashforth of one order less as predictor"
 )

@@ -18,9 +18,17 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-LEFT_OVER = {"at_unstable": ("still at an unstable one", "#8c8c8c"), "undecided": ("not decided", "#d0d0d0")}
+UNSTABLE = ("still at an unstable one", "#8c8c8c")
+LEFT_OVER = {
+    "at_saddle": UNSTABLE,
+    "at_unstable": UNSTABLE,  # in older files
+    "undecided": ("not decided", "#d0d0d0"),
+}
 #: Outcomes that tell nothing of the motion, in words.
-FAILED = {"not_finite": "not finite", "step_too_large": "step too large", "not_converged": "not converged"}
+FAILED = {
+    name: name.replace("_", " ")
+    for name in ("not_finite", "step_too_large", "not_converged", "start_not_finite")
+}
 #: Colour of outcomes that only another version knows.
 UNKNOWN = "#b3a2c7"
 #: What a picture of outcomes cannot show without a variable, the one that leaves out most first.

@@ -17,9 +17,9 @@ from pydantic import AfterValidator, Field
 
 from fastmech.basins.label import require_damper
 from fastmech.basins.map import STATE, BasinMap, map_basins
-from fastmech.basins.status import FAILURES, BasinStatus
 from fastmech.basins.steps import method_for
 from fastmech.capture.certificate import certificate_of
+from fastmech.ensembles.status import FAILURES, LABELS, Status
 from fastmech.errors import InputError, shown
 from fastmech.results import NO_CODE, STATE_UNITS, Dataset, Variable, flags, numbers
 from fastmech.scan_types.axis import Axis, arrays, check_duration, check_rising, check_size, check_starts
@@ -180,7 +180,7 @@ class BasinTiling(Tiling):
             "well": np.full(grid, -1, dtype=np.int8),
             "turns": np.zeros((*grid, 2), dtype=np.int32),
             "time": nothing,
-            "status": np.full(grid, BasinStatus.UNDECIDED, dtype=np.int8),
+            "status": np.full(grid, Status.UNDECIDED, dtype=np.int8),
             "computed": np.zeros(grid, dtype=np.bool_),
             "settle_time": None if self.request.settle_radius is None else nothing,
         }
@@ -230,7 +230,7 @@ def _variables(found: BasinMap) -> dict[str, Variable]:
         "capture_time": Variable(
             names, found.time, "s", "time of capture, NaN: not captured or not computed"
         ),
-        "status": Variable(names, found.status, "1", "what is known of the start", flags(BasinStatus)),
+        "status": Variable(names, found.status, "1", "what is known of the start", flags(LABELS)),
         "computed": Variable(names, found.computed, "1", "computed, not filled in between equal labels"),
     }
     assert found.tree is not None  # a scene's map has one

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.atlas.map import map_equilibria
-from fastmech.basins.disturbed import FAILURES
-from fastmech.ensembles.status import failure_counts
+from fastmech.ensembles.status import FAILURES, failure_counts
 from fastmech.equilibria.find import Equilibrium, find_equilibria
 from fastmech.errors import InputError
 from fastmech.results import Dataset, Variable, numbers

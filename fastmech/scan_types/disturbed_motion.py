@@ -20,8 +20,8 @@ from fastmech.disturbance.motion import (
     require_isolated,
 )
 from fastmech.ensembles import checks
-from fastmech.ensembles.integrate import FAILURES
 from fastmech.ensembles.spans import output_steps
+from fastmech.ensembles.status import FAILURES
 from fastmech.equilibria.find import Equilibria, Equilibrium
 from fastmech.equilibria.search import MOST
 from fastmech.mechanism.coefficients import reduce

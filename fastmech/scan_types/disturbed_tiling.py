@@ -14,10 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.basins.disturbed import (
-    FAILURES,
     STREAM,
     DisturbedEnsemble,
-    Outcome,
     measuring_steps,
     refuse_meeting_balls,
 )
@@ -27,6 +25,7 @@ from fastmech.disturbance.motion import damped_times, equilibria_to_disturb
 from fastmech.disturbance.size import size_at
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.spans import output_steps
+from fastmech.ensembles.status import ENDS, FAILURES
 from fastmech.integrators.methods import find_method
 from fastmech.results import ANGLE_UNITS, NO_CODE, STATE_UNITS, Dataset, Variable, flags, numbers, parts
 from fastmech.scan_types.request import HALVING, counted_failures
@@ -85,7 +84,7 @@ def empty_trajectories(names: list[str], count: int) -> dict[str, NDArray[Any]]:
 
 def trajectory_variables(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Variable]:
     """Arrays over (equilibrium, trajectory, ...) as variables."""
-    codes: dict[str, Any] = {"outcome": flags(Outcome, fill=-1), "end_equilibrium": NO_CODE}
+    codes: dict[str, Any] = {"outcome": flags(ENDS, fill=-1), "end_equilibrium": NO_CODE}
     found: dict[str, Variable] = {}
     for name, (_, _, unit, about) in _TRAJECTORY.items():
         if name not in arrays:

@@ -15,7 +15,7 @@ from pydantic import AfterValidator, Field
 
 from fastmech.basins.disturbed import MOST_RADIUS
 from fastmech.basins.erosion import FLAGS, MEASURES, Ends, survey_of, wells_along
-from fastmech.basins.label import label_starts, require_damper
+from fastmech.basins.label import How, label_starts, require_damper
 from fastmech.basins.measures.norm import STATE
 from fastmech.disturbance.motion import require_constant_force
 from fastmech.errors import InputError, shown
@@ -152,7 +152,7 @@ class ErosionTiling(Tiling):
 
         def ends(scene: Scene, starts: np.ndarray) -> Ends:
             context.check()
-            return label_starts(scene, starts, t_end=self.request.t_end, threads=context.threads)
+            return label_starts(scene, starts, self.request.t_end, How(threads=context.threads))
 
         survey = survey_of(
             self.window,

@@ -11,8 +11,9 @@ from pydantic import Field
 
 from fastmech.ensembles import checks
 from fastmech.ensembles.balance import energy_balance
-from fastmech.ensembles.integrate import FAILURES, integrate
+from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.spans import output_steps
+from fastmech.ensembles.status import FAILURES
 from fastmech.mechanism.coefficients import force
 from fastmech.mechanism.geometry import constraints, positions
 from fastmech.mechanism.hamilton import momenta

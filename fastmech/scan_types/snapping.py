@@ -16,8 +16,8 @@ from pydantic import Field
 from fastmech.basins.label import require_damper
 from fastmech.basins.shock_limit import shock_limit
 from fastmech.basins.snapping import SnappingMap, critical_forces, default_end, force_free, map_snapping
-from fastmech.basins.status import FAILURES, BasinStatus
 from fastmech.basins.steps import method_for
+from fastmech.ensembles.status import FAILURES, LABELS, Status
 from fastmech.errors import InputError
 from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers
 from fastmech.scan_types.axis import Axis, check_duration, check_parameters, check_rising, check_size
@@ -189,7 +189,7 @@ class SnappingTiling(Tiling):
                 "label": Variable(grid, np.full(shape, -1)),
                 "turns": Variable((*grid, "angle"), np.zeros((*shape, 2), dtype=np.int64)),
                 "time": Variable(grid, np.full(shape, np.nan)),
-                "status": Variable(grid, np.full(shape, BasinStatus.UNDECIDED, dtype=np.int8)),
+                "status": Variable(grid, np.full(shape, Status.UNDECIDED, dtype=np.int8)),
                 "critical": Variable(("alpha",), np.full(shape[0], np.nan)),
             }
         )
@@ -209,7 +209,7 @@ def _ends(found: SnappingMap) -> dict[str, Variable]:
         "capture_time": Variable(
             grid, found.time, "s", "time at which its capture was found, NaN: not captured"
         ),
-        "status": Variable(grid, found.status, "1", "what is known of the motion", flags(BasinStatus)),
+        "status": Variable(grid, found.status, "1", "what is known of the motion", flags(LABELS)),
     }
 
 

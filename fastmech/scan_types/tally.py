@@ -9,9 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.basins.disturbed import Outcome
 from fastmech.basins.measures.fractions import wilson
-from fastmech.ensembles.status import failure_counts
+from fastmech.ensembles.status import ENDS, failure_counts
 from fastmech.results import Dataset, Variable
 
 Floats = NDArray[np.float64]
@@ -37,7 +36,7 @@ class Tally:
     def of(cls, outcome: NDArray[np.int8], time_to_return: Floats) -> Tally:
         """The tally of a block; NaN stands for no return by the end of the run."""
         times, counts = np.unique(time_to_return[np.isfinite(time_to_return)], return_counts=True)
-        return cls(Counter(failure_counts(outcome, Outcome)), times, counts.astype(np.int64))
+        return cls(Counter(failure_counts(outcome, ENDS)), times, counts.astype(np.int64))
 
     def variables(self) -> dict[str, Variable]:
         """The times and counts as a tile keeps them."""

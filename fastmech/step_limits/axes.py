@@ -7,10 +7,8 @@ from math import factorial
 
 import numpy as np
 
-from fastmech.integrators.method import Adams, Method, RungeKutta
-from fastmech.integrators.multistep_weights import bashforth, moulton
-from fastmech.step_limits.amplification import amplifies, stability_polynomial
-from fastmech.step_limits.crossing import first_crossing
+from fastmech.integrators.method import Adams, Method, RungeKutta, bashforth, moulton
+from fastmech.step_limits.amplification import amplifies, first_crossing, stability_polynomial
 
 #: Growth a step that rounding explains.
 ROUNDED = 1e-11

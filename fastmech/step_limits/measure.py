@@ -13,17 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.integrators.batch import Batch
-from fastmech.integrators.driver import observe_nothing
-from fastmech.integrators.implicit_method import with_jacobian
-from fastmech.integrators.method import Adams, Method
+from fastmech.integrators.batch import Batch, observe_nothing
+from fastmech.integrators.method import Adams, Method, with_jacobian
 from fastmech.integrators.methods import find_method
-from fastmech.kernels.jacobians import lagrange_jacobian
+from fastmech.kernels.jacobians import lagrange_inverse, lagrange_jacobian
 from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 from fastmech.stability.linearize import Rest, jacobian
-from fastmech.step_limits.crossing import first_crossing
+from fastmech.step_limits.amplification import first_crossing
 
 Floats = NDArray[np.float64]
 
@@ -37,7 +35,7 @@ def measured_stable_step(scene: Scene, equilibrium: Rest, method: str) -> float:
     Raises:
         InputError: an argument is wrong.
     """
-    formula = with_jacobian(find_method(method), lagrange_jacobian, True)
+    formula = with_jacobian(find_method(method), lagrange_jacobian, lagrange_inverse)
     fastest = float(np.abs(np.linalg.eigvals(jacobian(scene, equilibrium))).max())
     frozen = scene.replace(F0=equilibrium.force, alpha=0.0)
     at = np.array([equilibrium.phi, equilibrium.theta, 0.0, 0.0])

@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.integrators.implicit_method import ImplicitRungeKutta
-from fastmech.integrators.method import Method
+from fastmech.integrators.method import ImplicitRungeKutta, Method
 from fastmech.integrators.methods import find_method
 from fastmech.scene import Scene
 from fastmech.stability.linearize import Rest, jacobian
-from fastmech.step_limits.amplification import amplifies
-from fastmech.step_limits.crossing import DIVISIONS, first_crossing
+from fastmech.step_limits.amplification import DIVISIONS, amplifies, first_crossing
 
 #: Error of a mode's growth, a radian, that is let pass. A mode without damping sits on the edge of every
 #: region of stability; one that decays by less than this a radian is as good as undamped.

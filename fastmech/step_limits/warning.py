@@ -1,10 +1,19 @@
-"""What is wrong with a step before the run begins, in one line with the number that would do."""
+"""What is wrong with a step: before the run begins, in one line with the number that would do, and after it.
+
+No method follows a body that turns by more than 1 rad in a step. Where a force decays within a step, its
+impulse comes out wrong. Linear theory, which tells where small motion grows though it should die out, warns
+and judges no trajectory: one that only passes is not where it holds.
+
+After the run each trajectory is judged by its own parameters, step and states: its companions make no
+difference. One that passes may still be wrong, by steps too long for accuracy and within these limits. Only a
+run with shorter steps tells.
+"""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 from numbers import Real
 from typing import Any, NamedTuple
 
@@ -12,14 +21,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.errors import InputError, StepWarning, shown
-from fastmech.integrators.methods import find_method
-from fastmech.mechanism.coefficients import reduce
+from fastmech.integrators.method import Adams, ImplicitRungeKutta, Method, RungeKutta
+from fastmech.integrators.methods import METHODS, find_method
+from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.mechanism.lagrange import potential_energy, potential_gradient, potential_hessian
 from fastmech.scene import Scene
 from fastmech.stability.arguments import require_scene
 from fastmech.stability.linearize import fill_state_matrix, small_motion
-from fastmech.step_limits.impulse import impulse_limit, impulse_ratio
-from fastmech.step_limits.predict import is_stable, stable_step
+from fastmech.step_limits.amplification import amplifies, first_crossing
+from fastmech.step_limits.predict import GROWTH_PER_RADIAN, UNDAMPED, is_stable, stable_step
 
 Floats = NDArray[np.float64]
 
@@ -105,9 +115,6 @@ def step_limit(scene: Scene, method: str) -> float:
 
     At the minima no motion may grow that should die out; elsewhere, where it only passes, by 1 % a step.
     Both with the force at full strength and with the force gone.
-
-    Raises:
-        InputError: no such method.
     """
     formula = find_method(method)
     resting, passing = scene_eigenvalues(scene)
@@ -132,11 +139,7 @@ def scene_eigenvalues(scene: Scene) -> tuple[NDArray[np.complex128], NDArray[np.
 
 @lru_cache(KEPT)
 def beyond_stability(scene: Scene, dt: float, method: str) -> bool:
-    """Whether a step [s] is longer than :func:`step_limit`, which takes longer to find.
-
-    Raises:
-        InputError: no such method.
-    """
+    """Whether a step [s] is longer than :func:`step_limit`, which takes longer to find."""
     formula = find_method(method)
     resting, passing = scene_eigenvalues(scene)
     return not (is_stable(formula, resting, dt) and is_stable(formula, passing, dt, PASSING))
@@ -175,17 +178,9 @@ def _told(limit: Limit, dt: float, method: str) -> str | None:
 
 
 def warn_of_step(
-    scenes: Sequence[Scene],
-    dt: float,
-    method: str,
-    starts: ArrayLike | None = None,
-    stacklevel: int = 2,
+    scenes: Sequence[Scene], dt: float, method: str, starts: ArrayLike | None = None, stacklevel: int = 2
 ) -> None:
-    """Warn, in the caller's caller, if a step cannot be right for one of some scenes.
-
-    Raises:
-        InputError: no such method.
-    """
+    """Warn, in the caller's caller, if a step cannot be right for one of some scenes."""
     fastest = 0.0 if starts is None else _fastest(starts)
     told = _told(min(_first_limit(scene, dt, method, fastest) for scene in scenes), dt, method)
     if told:
@@ -234,3 +229,87 @@ def _first_limit(scene: Scene, dt: float, method: str, fastest: float) -> Limit:
 def _below(limit: float) -> float:
     """The limit less a tenth, to two digits."""
     return float(f"{0.9 * limit:.1e}")
+
+
+def too_long(method: Method, c: Coefficients, starts: Floats, dt: Floats) -> NDArray[np.bool_]:
+    """Which trajectories of states (n, 4) begin with steps ``dt`` (n,) [s] that are too long for them, (n,).
+
+    Then force and rates are great. ``c`` are reduced coefficients, numbers or of shape (n,).
+    """
+    with np.errstate(invalid="ignore", over="ignore"):  # starts that are not finite have their own status
+        beyond = np.asarray(np.abs(starts[:, 2:]).max(axis=1, initial=0.0) * dt > TURN)
+        if np.any(c.decay):
+            beyond |= (c.force != 0.0) & (dt * c.decay > impulse_limit(method))
+    return beyond
+
+
+def is_beyond(scene: Scene, dt: float, steps: float, method: str) -> bool:
+    """Whether so many steps of dt [s] make damped motion grow that rests, or one step motion that passes.
+
+    It is asked at the minima and all over the torus.
+    """
+    return _grows_in(scene, dt, steps, method, -GROWTH_PER_RADIAN)
+
+
+def drives_rest(scene: Scene, dt: float, steps: float, method: str) -> bool:
+    """Whether so many steps of dt [s] make motion grow, damped or not: where it rests is then their doing."""
+    return _grows_in(scene, dt, steps, method, UNDAMPED)
+
+
+def _grows_in(scene: Scene, dt: float, steps: float, method: str, direction: float) -> bool:
+    formula = find_method(method)
+    if isinstance(formula, ImplicitRungeKutta) or dt == 0.0:
+        return False
+    for values, growth in zip(scene_eigenvalues(scene), (PASSING / max(steps, 1.0), PASSING), strict=True):
+        decaying = values[values.real <= direction * np.abs(values)]
+        if amplifies(formula, dt * decaying, 1.0 + growth).any():
+            return True
+    return False
+
+
+#: Relative error of the impulse that a step may make.
+TOLERATED = 1e-2
+
+
+def impulse_ratio(method: Method, x: float) -> float:
+    """Impulse by the method over the true one, for x = h alpha > 0, of a run that starts with the force.
+
+    F0 exp(-alpha t) gives F0/alpha in all. A method sees the force at its nodes only; where it decays within
+    a step, almost nothing of that is the true impulse: RK4 at x = 1e4 takes the first node's share, h F0 / 6.
+    """
+    return float(_ratios(method, np.array([x]))[0])
+
+
+def _ratios(method: Method, x: Floats) -> Floats:
+    """The same for many x (m,)."""
+
+    def summed(weights: ArrayLike, times: ArrayLike) -> Floats:
+        return np.asarray(np.exp(-np.multiply.outer(x, np.asarray(times))) @ np.asarray(weights))
+
+    if isinstance(method, Adams):
+        starter, taken = method.starter, method.start_steps
+        ages = np.arange(float(method.predictor.size))
+        if method.corrects:
+            weights, times = method.corrector, 1.0 - np.arange(float(method.corrector.size))
+        else:
+            weights, times = method.predictor, -ages
+        beyond = summed(weights, taken + times)
+    else:
+        assert isinstance(method, RungeKutta | ImplicitRungeKutta)
+        starter, taken = method.tableau, 0
+        beyond = summed(starter.b, starter.c)
+    first = summed(starter.b, starter.c)
+    share = -np.expm1(-x)
+    return np.asarray(x * (first * -np.expm1(-taken * x) + beyond) / share)
+
+
+def impulse_limit(method: Method) -> float:
+    """Largest h alpha up to which the impulse is right to :data:`TOLERATED`."""
+    return _limit_of(method.name)
+
+
+@cache
+def _limit_of(name: str) -> float:
+    """The same by the registry's name: every run asks for it."""
+    method = METHODS[name]
+    return first_crossing(lambda x: np.abs(_ratios(method, x) - 1.0) > TOLERATED, 1e-3, 1e3)

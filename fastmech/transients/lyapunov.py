@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastmech.callee import callee
 from fastmech.ensembles import checks
-from fastmech.ensembles.integrate import FAILURES
-from fastmech.ensembles.plausible import judge
+from fastmech.ensembles.energy_bounds import breaks_energy_bounds
+from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.problem import extreme_scenes, own_values, scene_problem, system_problem
 from fastmech.ensembles.status import Status, failure_counts, failure_line
 from fastmech.ensembles.system import System
@@ -19,8 +19,7 @@ from fastmech.errors import InputError, shown
 from fastmech.integrators.methods import find_method
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.scene import Scene
-from fastmech.step_limits.beyond import StepsTaken, too_long
-from fastmech.step_limits.warning import warn_of_step
+from fastmech.step_limits.warning import too_long, warn_of_step
 from fastmech.transients.tangent import advance_tangents
 
 Floats = NDArray[np.float64]
@@ -52,7 +51,7 @@ class LyapunovExponents:
     @property
     def failures(self) -> str:
         """One line: how many motions have failed, and with which status; empty where none has."""
-        return failure_line(failure_counts(self.status, FAILURES), self.status.size)
+        return failure_line(failure_counts(self.status), self.status.size)
 
     def __repr__(self) -> str:
         what = f"{self.status.size:,} motions to t = {self.t[-1]:g} s"
@@ -127,11 +126,11 @@ def largest_lyapunov(
             growth,
         )
         exponents[piece] = growth / times[piece + 1]
-    reached = np.where(np.isfinite(Y).all(axis=0) & np.isfinite(growth), Status.OK, Status.NOT_FINITE)
-    status = judge(reached.astype(np.int8), starts, np.ascontiguousarray(Y.T), problem.coefficients)
+    reached = np.where(finite_rows(Y.T) & np.isfinite(growth), Status.OK, Status.NOT_FINITE)
+    status = np.where(finite_rows(starts), reached, Status.START_NOT_FINITE).astype(np.int8)
     if isinstance(scene, Scene):
         assert problem.coefficients is not None
-        taken = StepsTaken(np.full(len(starts), h))
-        beyond = too_long(find_method(METHOD), problem.coefficients, starts, taken)
+        beyond = too_long(find_method(METHOD), problem.coefficients, starts, np.full(len(starts), h))
+        beyond |= breaks_energy_bounds(problem.coefficients, starts, Y.T)
         status[beyond & (status == Status.OK)] = Status.STEP_TOO_LARGE
     return LyapunovExponents(times[1:], exponents, status)

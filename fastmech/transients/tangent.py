@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import types
 
-from fastmech.integrators.driver import BlockRHS, Floats
-from fastmech.integrators.newton import difference_jacobian
+from fastmech.integrators.batch import BlockRHS, Floats
+from fastmech.integrators.implicit import difference_jacobian
 from fastmech.jit import JACOBIAN, MATRIX, RHS, VECTOR, kernel
 
 
@@ -52,7 +52,7 @@ def advance_tangents(
     dim, lanes = Y.shape
     K, L = np.empty((stages, dim, lanes)), np.empty((stages, dim, lanes))
     Z, W = np.empty((dim, lanes)), np.empty((dim, lanes))
-    J, work = np.empty((dim * dim, lanes)), np.empty((3, dim, lanes))
+    J = np.empty((dim * dim, lanes))
     for step in range(steps):
         t = begin + step * h
         for s in range(stages):
@@ -68,7 +68,7 @@ def advance_tangents(
             if analytic:
                 jacobian(t + c[s] * h, Z, J, params)
             else:
-                difference_jacobian(rhs, t + c[s] * h, Z, J, params, work)
+                difference_jacobian(rhs, t + c[s] * h, Z, J, params)
             for x in range(dim):
                 for i in range(lanes):
                     total = 0.0

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from disturbance.known import center, equilibria, known, oracle_size, scipy_motion, stiff_motion
 
-from fastmech.basins.disturbed import FAILURES, DisturbedEnsemble, Outcome, disturb
+from fastmech.basins.disturbed import DisturbedEnsemble, disturb
 from fastmech.basins.label import labels_of
 from fastmech.capture.barriers import barrier_tree
 from fastmech.capture.certificate import trapped
+from fastmech.ensembles.status import ENDS, FAILURES, Status
 from fastmech.equilibria.find import find_equilibria
 from fastmech.errors import InputError, StepWarning
 from fastmech.mechanism.lagrange import kinetic_energy, potential_energy
@@ -31,7 +32,7 @@ def resting_place(run: DisturbedEnsemble) -> Any:
 def test_small_disturbances_of_the_stable_equilibrium_return() -> None:
     (stable,) = equilibria("table_1", 0)
     run = disturb(SCENE, stable, 300, radius=0.05)
-    assert np.all(run.outcome == Outcome.RETURNED)
+    assert np.all(run.outcome == Status.RETURNED)
     assert run.share_returned == 1.0
     assert run.equilibria[run.index].kind == "minimum"
     assert np.all(run.end_index == run.index)
@@ -46,7 +47,7 @@ def test_disturbances_of_unstable_equilibria_never_return(morse_index: int) -> N
         run = disturb(SCENE, unstable, 200, radius=0.05, t_end=300.0)
         assert run.share_returned == 0.0
         assert np.all(np.isnan(run.time_to_return))
-        assert np.mean(run.outcome == Outcome.ELSEWHERE) > 0.95
+        assert np.mean(run.outcome == Status.ELSEWHERE) > 0.95
         rests, place = resting_place(run)
         assert {run.equilibria[i].kind for i in run.end_index[rests]} == {"minimum"}
         assert np.abs(run.final[rests, :2] - place[rests]).max() < 0.02
@@ -58,7 +59,7 @@ def test_every_outcome_agrees_with_scipy() -> None:
     minima = angles[[index == 0 for index in indices]]
     first = equilibria("bistable", 0)[0]
     run = disturb(scene, first, 400, radius=2.5, seed=4, t_end=40.0, dt=0.01, return_radius=0.2)
-    assert {Outcome.RETURNED, Outcome.ELSEWHERE} <= set(run.outcome)
+    assert {Status.RETURNED, Status.ELSEWHERE} <= set(run.outcome)
     assert np.any(run.turns != 0)
     for lane in [*range(5), *np.flatnonzero((run.turns != 0).any(axis=1))[:3]]:
         end = scipy_motion(scene, run.starts[lane], 40.0, 1e-9).y[:, -1]
@@ -66,14 +67,14 @@ def test_every_outcome_agrees_with_scipy() -> None:
         away = end[:2] - minima
         turns = np.round(away / (2 * np.pi))
         near = np.argmin(np.abs(away - 2 * np.pi * turns).max(axis=1))
-        if run.outcome[lane] == Outcome.UNDECIDED:
+        if run.outcome[lane] == Status.UNDECIDED:
             assert run.end_index[lane] == -1
             continue
         np.testing.assert_array_equal(run.turns[lane], turns[near])
         e = run.equilibria[run.end_index[lane]]
         np.testing.assert_allclose([e.phi, e.theta], minima[near], atol=1e-12)
         home = np.allclose(minima[near], [first.phi, first.theta]) and not turns[near].any()
-        assert run.outcome[lane] == (Outcome.RETURNED if home else Outcome.ELSEWHERE)
+        assert run.outcome[lane] == (Status.RETURNED if home else Status.ELSEWHERE)
 
 
 @pytest.mark.parametrize("beta", [1e3, 1e5, 1e7])
@@ -91,8 +92,8 @@ def test_heavy_damping_loses_no_motion(scene: Scene, beta: float) -> None:
     np.testing.assert_allclose(run.final[:4], ends, rtol=0, atol=1e-3)
     held = trapped(scene, ends)
     proved = held.well >= 0
-    assert (run.outcome != Outcome.UNDECIDED).any()
-    np.testing.assert_array_equal(run.outcome[:4] != Outcome.UNDECIDED, proved)
+    assert (run.outcome != Status.UNDECIDED).any()
+    np.testing.assert_array_equal(run.outcome[:4] != Status.UNDECIDED, proved)
     np.testing.assert_array_equal(run.end_index[:4][proved], held.well[proved])
 
 
@@ -101,7 +102,7 @@ def test_steps_that_heavy_damping_forbids_are_told_in_one_word() -> None:
     e = find_equilibria(scene)[0]
     with pytest.warns(StepWarning):
         run = disturb(scene, e, 64, dt=0.05, method="dop853")
-    assert np.all(run.outcome == Outcome.STEP_TOO_LARGE)
+    assert np.all(run.outcome == Status.STEP_TOO_LARGE)
     with pytest.warns(StepWarning):
         ends = labels_of(scene, run.starts, dt=0.05, method="dop853")
     assert ends.counts["step_too_large"] == 64
@@ -111,11 +112,11 @@ def test_steps_that_heavy_damping_forbids_are_told_in_one_word() -> None:
 def test_the_unstable_balance_the_undecided_and_the_exploded_are_told_apart() -> None:
     (maximum,) = equilibria("table_1", 2)
     still_there = disturb(SCENE, maximum, 3, radius=1e-6, t_end=0.5, dt=0.1)
-    assert np.all(still_there.outcome == Outcome.AT_UNSTABLE)
+    assert np.all(still_there.outcome == Status.AT_SADDLE)
     assert np.all(still_there.end_index == -1)
     assert (still_there.share_returned, still_there.share_returned_at_most) == (0.0, 1.0)
     moving = disturb(SCENE, maximum, 3, radius=0.5, t_end=0.1, dt=0.1)
-    assert np.all(moving.outcome == Outcome.UNDECIDED)
+    assert np.all(moving.outcome == Status.UNDECIDED)
     assert np.all(moving.end_index == -1)
     assert np.all(np.isnan(moving.time_to_return))
 
@@ -123,7 +124,7 @@ def test_the_unstable_balance_the_undecided_and_the_exploded_are_told_apart() ->
 def test_a_step_too_large_is_told_in_one_word() -> None:
     (stable,) = equilibria("table_1", 0)
     run = disturb(SCENE.replace(c1=162.5), stable, 5, t_end=2000.0, dt=2.0, method="euler")
-    assert np.all(run.outcome == Outcome.STEP_TOO_LARGE)
+    assert np.all(run.outcome == Status.STEP_TOO_LARGE)
     assert run.share_returned == 0.0
 
 
@@ -134,7 +135,7 @@ def test_time_to_return_and_excursions_against_dense_solutions() -> None:
     run = disturb(SCENE, stable, 40, radius=0.6, seed=8, t_end=t_end, dt=dt)
     times = dt * np.arange(2401)
     for lane in range(3):
-        assert run.outcome[lane] == Outcome.RETURNED
+        assert run.outcome[lane] == Status.RETURNED
         departures = scipy_motion(SCENE, run.starts[lane], t_end, 1e-10).sol(times).T - center(stable)
         outside = np.flatnonzero(oracle_size(SCENE, stable, departures) > 0.01)
         assert run.time_to_return[lane] == pytest.approx(times[outside[-1] + 1], abs=1e-9)
@@ -162,12 +163,12 @@ def test_what_is_proved_to_return_need_not_be_back() -> None:
     run = disturb(scene, first, 512, radius=1.2, t_end=300.0)
     labels = labels_of(scene, run.starts, 300.0)
     home = (labels.well == 0) & ~labels.turns.any(axis=1)
-    np.testing.assert_array_equal(run.outcome == Outcome.RETURNED, home)
+    np.testing.assert_array_equal(run.outcome == Status.RETURNED, home)
     assert np.all(labels.well >= 0)
     assert run.share_returned == run.share_returned_at_most == pytest.approx(0.984, abs=5e-4)
     assert run.failures == ""
     assert np.isnan(run.time_to_return).all()
-    lanes = [*range(8), *np.flatnonzero(run.outcome == Outcome.ELSEWHERE)[:2]]
+    lanes = [*range(8), *np.flatnonzero(run.outcome == Status.ELSEWHERE)[:2]]
     barrier = barrier_tree(scene).barrier.min()
     for lane in lanes:
         end = scipy_motion(scene, run.starts[lane], 300.0, 1e-9).y[:, -1]
@@ -181,9 +182,9 @@ def test_shares_cover_what_is_not_decided() -> None:
     """Undecided starts are none at the lower end and all at the upper end, by Wilson's formula itself."""
     scene = known("bistable")[0]
     run = disturb(scene, equilibria("bistable", 0)[1], 300, radius=1.0, t_end=20.0)
-    ends = {name: int(np.sum(run.outcome == Outcome[name.upper()])) for name in ("returned", "undecided")}
+    ends = {name: int(np.sum(run.outcome == Status[name.upper()])) for name in ("returned", "undecided")}
     assert min(ends.values()) > 10
-    at_most = 300 - int(np.sum(run.outcome == Outcome.ELSEWHERE))
+    at_most = 300 - int(np.sum(run.outcome == Status.ELSEWHERE))
     assert at_most >= sum(ends.values())
     assert (run.share_returned, run.share_returned_at_most) == (ends["returned"] / 300, at_most / 300)
     z = 1.959963984540054
@@ -291,7 +292,7 @@ def test_a_decaying_force_and_a_foreign_equilibrium_are_refused() -> None:
 
 @pytest.mark.nojit
 def test_every_outcome_has_its_own_advice() -> None:
-    assert len({outcome.advice for outcome in Outcome}) == len(Outcome)
+    assert len({status.advice for status in ENDS}) == len(ENDS)
 
 
 def test_failed_trajectories_make_no_noise() -> None:
@@ -299,7 +300,7 @@ def test_failed_trajectories_make_no_noise() -> None:
     scene = SCENE.replace(m3=0.5, beta=30.0)
     (stable,) = [e for e in find_equilibria(scene) if e.kind == "minimum"]
     run = disturb(scene, stable, 100, radius=1.0, t_end=3.0, dt=0.5, method="rk4")
-    assert {Outcome.NOT_FINITE, Outcome.STEP_TOO_LARGE} & set(run.outcome.tolist())
+    assert {Status.NOT_FINITE, Status.STEP_TOO_LARGE} & set(run.outcome.tolist())
 
 
 def test_printed_it_says_what_became_of_them() -> None:

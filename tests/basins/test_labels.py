@@ -11,7 +11,7 @@ from scan_types.values import scipy_motion
 import fastmech as fm
 from fastmech.atlas.fold_points import find_folds
 from fastmech.basins.copies import copy_labels, copy_of_label
-from fastmech.basins.status import BasinStatus
+from fastmech.ensembles.status import Status
 from fastmech.mechanism.lagrange import metric
 
 TURN = 2.0 * np.pi
@@ -42,7 +42,7 @@ def test_every_label_of_a_map_is_where_scipy_comes_to_rest(
     final = scipy_motion(scene.model_dump(), starts, np.array([0.0, 25.0]))[-1]
     turns = np.round((final[:, :2] - well) / TURN)
     assert np.abs(final[:, :2] - TURN * turns - well).max() < 0.7
-    assert (found.status == BasinStatus.CAPTURED).all()
+    assert (found.status == Status.CAPTURED).all()
     np.testing.assert_array_equal(found.turns.reshape(-1, 2), turns)
     assert len(np.unique(turns, axis=0)) >= 4
 
@@ -129,7 +129,7 @@ def test_a_start_many_turns_away_is_brought_back_exactly() -> None:
     assert far.counts["captured"] == 200
     np.testing.assert_array_equal(far.turns - near.turns, np.tile([500_000, -300_000], (200, 1)))
     lone = fm.labels_of(CONSTANT, [[away[2] + 1.0, 0.0, 0.0, 0.0], [1e300, 0.0, 0.0, 0.0]])
-    assert lone.status.tolist() == [BasinStatus.CAPTURED, BasinStatus.START_NOT_FINITE]
+    assert lone.status.tolist() == [Status.CAPTURED, Status.START_NOT_FINITE]
     assert lone.turns[0, 0] == 2**28
     numbers = copy_labels(CONSTANT)(np.array([[away[2] + 1.0, 0.0, 0.0, 0.0]]))
     assert copy_of_label(int(numbers[0])) == (0, (2**28, 0))
@@ -160,15 +160,15 @@ def test_statuses() -> None:
         ]
     )
     found = fm.labels_of(fm.Scene(F0=0.0, alpha=0.0), starts, 4.0)
-    kinds = [BasinStatus(s).name for s in found.status]
+    kinds = [Status(s).name for s in found.status]
     assert kinds[:3] == ["CAPTURED", "AT_SADDLE", "START_NOT_FINITE"]
     assert kinds[3] in ("NOT_FINITE", "STEP_TOO_LARGE")
     assert sum(found.counts.values()) == 4
     implicit = fm.labels_of(fm.Scene(F0=0.0, alpha=0.0), starts[[0, 3]], 4.0, method="radau5")
-    assert implicit.status.tolist() == [BasinStatus.CAPTURED, BasinStatus.NOT_CONVERGED]
+    assert implicit.status.tolist() == [Status.CAPTURED, Status.NOT_CONVERGED]
     undecided = fm.labels_of(BISTABLE, random_starts(50), 2.0)
     assert undecided.counts["undecided"] > 25
-    assert (undecided.well[undecided.status == BasinStatus.UNDECIDED] == -1).all()
+    assert (undecided.well[undecided.status == Status.UNDECIDED] == -1).all()
 
 
 def test_a_slow_passage_beside_a_fold_is_at_no_saddle() -> None:
@@ -178,20 +178,20 @@ def test_a_slow_passage_beside_a_fold_is_at_no_saddle() -> None:
     ghost = np.array([fold.phi, fold.theta, 0.0, 0.0])
     starts = ghost + np.array([[0.0], [1e-5], [-1e-5]]) * [1.0, 0.0, 0.0, 0.0]
     before = fm.labels_of(scene.replace(F0=fold.value - 1e-6), starts, 60.0)
-    assert (before.status == BasinStatus.UNDECIDED).all()
+    assert (before.status == Status.UNDECIDED).all()
 
 
 @pytest.mark.parametrize("scene", [CONSTANT, fm.Scene(F0=300.0, alpha=0.0), fm.Scene(F0=0.0, alpha=0.0)])
 def test_saddles_are_at_a_saddle(scene: fm.Scene) -> None:
     saddles = [e for e in fm.find_equilibria(scene) if e.kind == "saddle"]
     starts = [[e.phi, e.theta, 0.0, 0.0] for e in saddles]
-    assert (fm.labels_of(scene, starts).status == BasinStatus.AT_SADDLE).all()
+    assert (fm.labels_of(scene, starts).status == Status.AT_SADDLE).all()
 
 
 def test_motions_too_fast_to_tell_are_at_no_saddle() -> None:
     starts = np.random.default_rng(3).uniform(-1000.0, 1000.0, (10, 4)) * [0.0, 0.0, 1.0, 1.0]
     found = fm.labels_of(CONSTANT, starts)
-    assert set(found.status.tolist()) <= {BasinStatus.CAPTURED, BasinStatus.UNDECIDED}
+    assert set(found.status.tolist()) <= {Status.CAPTURED, Status.UNDECIDED}
 
 
 def test_without_damper_there_are_no_basins() -> None:

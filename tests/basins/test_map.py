@@ -10,7 +10,7 @@ import pytest
 import fastmech as fm
 from fastmech.basins import label
 from fastmech.basins.refine import refine_grid
-from fastmech.basins.status import BasinStatus
+from fastmech.ensembles.status import Status
 
 CONSTANT = fm.Scene(alpha=0.0)
 BISTABLE = fm.Scene(F0=85.3, c1=294.9, c2=92.85, alpha=0.0)
@@ -84,7 +84,7 @@ def test_parameters_of_starts_own_bend_their_own_boundaries() -> None:
 
 def test_a_start_on_the_boundary_of_a_system_is_undecided() -> None:
     found = fm.map_basins(BENT, {"x": [-1.0, 0.0, 1.0]}, 20.0, dt=0.1)
-    assert found.status.tolist() == [BasinStatus.CAPTURED, BasinStatus.UNDECIDED, BasinStatus.CAPTURED]
+    assert found.status.tolist() == [Status.CAPTURED, Status.UNDECIDED, Status.CAPTURED]
     assert found.tree is None
 
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from own_ends import depths, ends
-from scan_types.values import scipy_motion
+from scan_types.values import motion_rates, scipy_motion
+from scipy.integrate import solve_ivp
 
 import fastmech as fm
 from fastmech.atlas.fold_points import find_folds
@@ -225,3 +226,25 @@ def test_wrong_arguments_are_refused(changes: dict[str, Any], message: str) -> N
         fm.shock_limit(**(arguments | changes))
     assert str(refusal.value).startswith(message)
     assert "\n" not in str(refusal.value)
+
+
+def test_a_search_that_finds_nothing_tells_how_far_it_went() -> None:
+    """A heavy damper holds what the search tries; SciPy's Radau shows a heavier blow that leaves."""
+    stiff = {"m1": 11.0034, "m2": 0.421206, "m3": 6.54221, "l": 0.535831, "c1": 24.237, "c2": 121.559}
+    scene = fm.Scene(**stiff, beta=757.96, F0=133.265, alpha=0.0)
+    told = limit(scene, 0, "M1")
+    assert np.isnan(told.found.impulse)
+    assert told.proved.impulse < told.tried_to < 640.0
+    start = struck(scene, 0, "M1", np.array([640.0]), np.array([1.178]))[0]
+    rates = motion_rates(scene.model_dump())
+    final = solve_ivp(rates, (0.0, 200.0), start, method="Radau", rtol=1e-9, atol=1e-10).y[:, -1]
+    np.testing.assert_allclose(
+        final - struck(scene, 0, "M1", np.zeros(1), np.zeros(1))[0], [TURN, 0, 0, 0], atol=1e-4
+    )
+
+
+def test_a_direction_in_degrees_is_refused() -> None:
+    with pytest.raises(fm.InputError, match=r"direction = 90\.0: must lie within"):
+        fm.shock_limit(FREE, fm.find_equilibria(FREE)[0], "M2", 90.0)
+    with pytest.raises(fm.InputError, match=r"direction = 90\.0: must lie within"):
+        fm.impulse_start(FREE, fm.find_equilibria(FREE)[0], 1.0, "M2", 90.0)

@@ -9,8 +9,8 @@ from scipy.integrate import solve_ivp
 import fastmech as fm
 from fastmech.basins.shock_limit import impulse_start
 from fastmech.basins.snapping import SnappingMap, Window, critical_forces, map_snapping
-from fastmech.basins.status import BasinStatus
 from fastmech.ensembles.integrate import integrate
+from fastmech.ensembles.status import Status
 from fastmech.mechanism.lagrange import angular_accelerations, kinetic_energy, metric, potential_energy
 
 #: Forces about the known changes at alpha = 5, and whether each leaves.
@@ -110,7 +110,8 @@ def test_windows_are_runs_of_equal_ends() -> None:
     turns[0, 2] = [0, -1]
     snapping = SnappingMap(
         np.arange(1.0, 6.0), np.array([2.0]), fm.find_equilibria(fm.Scene()), 0,
-        np.array([[0, 0, 0, 0, -1]]), turns, np.full((1, 5), 3.0), np.array([[0, 0, 0, 0, 1]], dtype=np.int8),
+        np.array([[0, 0, 0, 0, -1]]), turns, np.full((1, 5), 3.0),
+        np.array([[*[Status.CAPTURED] * 4, Status.UNDECIDED]], dtype=np.int8),
     )  # fmt: skip
     assert snapping.windows(0) == [
         Window(1.0, 2.0, 0, (0, 0), False),
@@ -125,7 +126,7 @@ def test_windows_are_runs_of_equal_ends() -> None:
 def test_what_is_not_captured_by_the_end_has_no_label() -> None:
     """A force that still pushes with 6 kN may do any work; one of 1 N may not."""
     snapping = map_snapping(fm.Scene(), [1.0, 6000.0], [0.001], t_end=0.5)
-    assert snapping.status.tolist() == [[BasinStatus.CAPTURED, BasinStatus.UNDECIDED]]
+    assert snapping.status.tolist() == [[Status.CAPTURED, Status.UNDECIDED]]
     assert snapping.label.tolist() == [[0, -1]]
     assert not snapping.left.any()
     assert snapping.time.tolist()[0] == [0.5, pytest.approx(np.nan, nan_ok=True)]
@@ -153,7 +154,7 @@ def test_a_force_that_drives_onto_a_saddle_is_not_given_a_label() -> None:
             break
         at = map_snapping(fm.Scene(), [middle], [5.0], t_end=30.0)
         if at.label[0, 0] < 0:
-            assert BasinStatus(at.status[0, 0]) in (BasinStatus.AT_SADDLE, BasinStatus.UNDECIDED)
+            assert Status(at.status[0, 0]) in (Status.AT_SADDLE, Status.UNDECIDED)
             return
         low, high = (low, middle) if at.left[0, 0] else (middle, high)
     pytest.fail("every force has a label")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from fastmech.bench.extended import extended_truth
+from fastmech.bench.extended import extended_truth, scene_rates
 from fastmech.bench.extrapolation import truth
 from fastmech.bench.problem import fast_starts, rest_starts
 from fastmech.bench.tolerances import Estimate, estimates, random_case, report
@@ -25,7 +25,7 @@ def test_the_truth_is_that_of_the_bench() -> None:
 def test_extended_precision_knows_every_digit_of_a_double() -> None:
     """Passages close to saddles magnify rounding; the reference has 24 digits."""
     problem = fast_starts(4)
-    found, uncertainty = extended_truth(problem.scene, problem.starts, problem.t_end)
+    found, uncertainty = extended_truth(scene_rates(problem.scene), problem.starts, problem.t_end)
     assert np.abs(found - problem.truth).max() < 1e-14
     assert uncertainty.max() < 1e-14
 
@@ -38,7 +38,7 @@ def test_extended_precision_knows_the_decay() -> None:
         return np.concatenate([y[2:], angular_accelerations(scene, y[None], t)[0]])
 
     right = solve_ivp(rates, (0.0, 0.5), start, "DOP853", rtol=1e-12, atol=1e-12).y[:, -1]
-    assert np.abs(extended_truth(scene, start[None], 0.5)[0][0] - right).max() < 1e-9
+    assert np.abs(extended_truth(scene_rates(scene), start[None], 0.5)[0][0] - right).max() < 1e-9
 
 
 def test_the_truth_knows_the_decay() -> None:

@@ -70,3 +70,23 @@ def test_random_scenes_without_their_study(invoke):
     result = invoke("bench", "--scenes", "3")
     assert result.exit_code == 2
     assert "--scenes: goes with --only tolerances" in result.stderr
+
+
+def test_bench_on_a_problem_of_one_s_own(invoke, monkeypatch):
+    def run_problem(where, out, stage):
+        assert where == "mine.py:name"
+        return ["a table"], [out / "problem.md"]
+
+    monkeypatch.setattr("fastmech.bench.own_problem.run_problem", run_problem)
+    result = invoke("bench", "--problem", "mine.py:name")
+    assert result.exit_code == 0
+    assert result.stdout.splitlines() == ["a table", "", "results/bench/problem.md"]
+
+
+@pytest.mark.parametrize(
+    "args", [("--problem", "none.py:x"), ("--problem", "x"), ("--problem", "x.toml", "--quick")]
+)
+def test_no_problem_of_one_s_own(invoke, args):
+    result = invoke("bench", *args)
+    assert result.exit_code == 2
+    assert len(result.stderr.splitlines()) == 1

@@ -10,9 +10,9 @@ import pytest
 
 import fastmech as fm
 from fastmech.ensembles import run as running
+from fastmech.ensembles.ends import STOP_CODE, STOP_STATE, STOP_TIME
 from fastmech.ensembles.problem import system_problem
 from fastmech.ensembles.run import Ensemble, run_ensemble
-from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
 from fastmech.integrators.batch import Batch
 from fastmech.integrators.methods import METHODS
 

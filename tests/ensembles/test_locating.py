@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import fastmech as fm
+from fastmech.ensembles.ends import STOP_CODE, STOP_STATE, STOP_TIME
 from fastmech.ensembles.run import run_ensemble
-from fastmech.ensembles.stopping import STOP_CODE, STOP_STATE, STOP_TIME
 from fastmech.ensembles.system import System
 from fastmech.integrators.methods import find_method
 

@@ -120,6 +120,52 @@ def test_no_claim_about_a_narrow_branch_is_wrong(
         assert np.mean(np.ptp(run.y[:, :, 0], axis=0) < 0.1) == np.mean(np.ptp(right[:, :, 0], axis=0) < 0.1)
 
 
+@numba.njit
+def write(w: Floats, x: float) -> None:
+    w[0] = x
+
+
+@numba.njit
+def kick(w: Floats, p: Floats) -> float:
+    return 1.0 / p[0] if 0.3 < w[0] < 0.3 + p[0] else 0.0
+
+
+def written(t: float, x: float, v: float, p: float) -> tuple[float, float]:
+    w = np.empty(1)
+    write(w, x)
+    return v, -x + (1.0 / p if 0.3 < w[0] < 0.3 + p else 0.0)
+
+
+def shared(t: float, x: float, v: float, p: float) -> tuple[float, float]:
+    w = np.empty(2)
+    u = w
+    write(u, x)
+    return v, -x + (1.0 / p if 0.3 < w[0] < 0.3 + p else 0.0)
+
+
+def written_array(t: float, y: Floats, p: Floats, rates: Floats) -> None:
+    w = np.empty(1)
+    write(w, y[0])
+    rates[0] = y[1]
+    rates[1] = -y[0] + kick(w, p)
+
+
+@pytest.mark.parametrize("field", [written, shared, written_array])
+def test_a_branch_on_what_was_written_into_an_array_is_seen(field: Any) -> None:
+    """Energy tells what steps over the window miss: each pass through it changes v^2/2 + x^2/2 by 1."""
+    width, state = 1e-3, ("y", 2) if field is written_array else ["x", "v"]
+    starts = np.random.default_rng(11).uniform(-1.5, 1.5, (40, 2))
+    run = fm.integrate(fm.System(field, state, {"p": width}), starts, t_end=20.0, tol=1e-4)
+    assert run.error is not None
+    known = run.error <= 1e-4
+    assert known.all() == (field is not written_array)  # whose decisions are not located, which is said
+
+    def energy(y: Floats) -> Floats:
+        return 0.5 * (y**2).sum(axis=1) - np.clip((y[:, 0] - 0.3) / width, 0.0, 1.0)
+
+    assert (np.abs(energy(run.y[-1]) - energy(starts))[known] < 0.15).all()
+
+
 def bilinear(t: float, x: float, v: float, stiff: float) -> tuple[float, float]:
     return v, -x - 0.1 * v - max(0.0, stiff * (x - 0.5)) + 0.6 * fm.cos(1.3 * t)
 

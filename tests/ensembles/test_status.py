@@ -1,10 +1,13 @@
 from __future__ import annotations
 
+import ast
+
 import numpy as np
 import pytest
 
 from fastmech.ensembles.integrate import integrate
-from fastmech.ensembles.status import Status
+from fastmech.ensembles.status import ENDS, FAILURES, LABELS, Status
+from fastmech.kernel_cache import PACKAGE
 from fastmech.scene import Scene
 
 SCENE = Scene()
@@ -62,3 +65,23 @@ def test_resolved_motions_keep_within_the_energy_bounds(change: dict[str, float]
 def test_every_status_has_its_own_advice() -> None:
     assert all(status.advice for status in Status)
     assert len({status.advice for status in Status}) == len(Status)
+
+
+@pytest.mark.nojit
+def test_no_other_enumeration_tells_what_became_of_a_motion() -> None:
+    """A name of a status has one number, whoever uses it."""
+    names = set(Status.__members__)
+    for path in PACKAGE.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ClassDef) and node.name != "Status":
+                members = {
+                    t.id
+                    for a in node.body
+                    if isinstance(a, ast.Assign)
+                    for t in a.targets
+                    if isinstance(t, ast.Name)
+                }
+                assert not names & members - {"UNDECIDED"}, f"{path}: {node.name}"
+    assert len({int(status) for status in Status}) == len(Status)
+    for kinds in (FAILURES, LABELS, ENDS):
+        assert len(set(kinds)) == len(kinds)

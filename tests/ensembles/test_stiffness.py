@@ -8,7 +8,7 @@ from ensembles.references import Floats, errors, motions_of, rest_starts
 from scipy.integrate import solve_ivp
 
 import fastmech as fm
-from fastmech.ensembles.stiffness import damping_rate, stability_radius
+from fastmech.ensembles.fitting import damping_rate, stability_radius
 from fastmech.hardcases.references import motion
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import angular_accelerations

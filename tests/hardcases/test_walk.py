@@ -16,8 +16,7 @@ from fastmech.hardcases.walk import (
     status_row,
     walked,
 )
-from fastmech.integrators.implicit_method import ImplicitRungeKutta
-from fastmech.integrators.method import Adams, RungeKutta
+from fastmech.integrators.method import Adams, ImplicitRungeKutta, RungeKutta
 from fastmech.integrators.methods import METHODS
 from fastmech.scene import Scene
 from fastmech.step_limits.warning import step_warning

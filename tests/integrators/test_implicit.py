@@ -8,10 +8,10 @@ from integrators.driving import A, W, drive, one_block, polynomial, rotation
 from integrators.systems import Floats
 
 import fastmech as fm
-from fastmech.integrators.driver import observe_nothing
-from fastmech.integrators.implicit_method import ImplicitRungeKutta
-from fastmech.integrators.implicit_tableau import ImplicitTableau
+from fastmech.integrators.batch import observe_nothing
+from fastmech.integrators.method import ImplicitRungeKutta
 from fastmech.integrators.methods import METHODS
+from fastmech.integrators.tableau import ImplicitTableau
 from fastmech.integrators.tableaus.implicit import IMPLICIT_TABLEAUS
 from fastmech.jit import RHS_SIGNATURE, kernel
 
@@ -137,7 +137,7 @@ def test_a_lane_that_does_not_converge_keeps_its_last_state(method: str) -> None
 def test_the_form_that_the_driver_reads() -> None:
     """T^-1 A^-1 T is the real block form that the driver solves."""
     for tableau in IMPLICIT_TABLEAUS.values():
-        p = tableau.prepared
+        p = tableau.scheme
         real, re, im = p.eigenvalues
         form = np.linalg.inv(p.back) @ np.linalg.inv(p.a[: len(p.back), : len(p.back)]) @ p.back
         expected = np.zeros_like(form)

@@ -14,7 +14,8 @@ from functools import cache
 #: The processor, features beside those that LLVM knows it has, and the width [bit] of its loops.
 PROCESSORS = {
     "haswell": ("haswell", "", 256),
-    "skylake-avx512": ("skylake-avx512", "", 512),
+    "skylake-avx512 with 512 bit": ("skylake-avx512", "-prefer-256-bit", 512),
+    "skylake-avx512 with 256 bit": ("skylake-avx512", "+prefer-256-bit", 512),
     "cascadelake": ("cascadelake", "", 512),
     "sapphirerapids": ("sapphirerapids", "", 512),
     "znver3": ("znver3", "", 256),

@@ -16,12 +16,11 @@ from kernels.blocks_of_lanes import COMBINATIONS, kernel, lanes
 from numba import int64
 
 from fastmech import jit
-from fastmech.ensembles.energies import tell_broken
-from fastmech.ensembles.highest import highest_energies
-from fastmech.integrators.explicit import add_rows
+from fastmech.ensembles.energy_bounds import tell_energies
+from fastmech.integrators.explicit import WEIGHTS, add_rows
 from fastmech.integrators.method import Adams, RungeKutta
 from fastmech.integrators.methods import METHODS as REGISTRY
-from fastmech.jit import INTEGERS, MATRIX, VECTOR
+from fastmech.jit import MATRIX, VECTOR
 from fastmech.kernels.select import DAMPING, DECAY, FORCE, FORMULATIONS
 from fastmech.kernels.whole import whole_steps
 from fastmech.kernels.work import lagrange_work
@@ -100,17 +99,16 @@ def test_machine_code_of_the_loop(name: str) -> None:
         assert not re.search(r"\bcall", loop)
 
 
-@pytest.mark.parametrize("shipped", [tell_broken, highest_energies])
-def test_passes_over_trajectories_are_packed(shipped: Any) -> None:
+def test_passes_over_trajectories_are_packed() -> None:
     """Their trigonometry is a loop of its own."""
-    code = intermediate(shipped)
+    code = intermediate(tell_energies)
     assert PACKED_QUADRANT.search(code)
     assert PACKED_ROOT.search(code)
     assert len(VECTOR_ARITHMETIC.findall(code)) >= 80
 
 
 def test_sums_of_rows_are_packed() -> None:
-    arguments = (VECTOR, MATRIX, int64, INTEGERS, VECTOR, int64, int64)
+    arguments = (VECTOR, MATRIX, int64, WEIGHTS, int64)
     compiled = jit.compiled_anew(add_rows, arguments)
     assert len(PACKED.findall("".join(compiled.inspect_asm().values()))) >= 4
 

@@ -221,6 +221,23 @@ def test_outcomes_are_drawn_from_what_was_kept(kept: set[str], told: str):
         assert sum(b.get_width() for b in bars if b.get_hatch()) == (12.5 if len(apart) == 4 else 0.0)
 
 
+def test_older_files_are_drawn_by_the_meanings_of_their_codes():
+    """Once outcomes had numbers of their own, and motions at an unstable equilibrium another name."""
+    dataset = run("disturbed", BISTABLE, **SMALL | {"t_end": 0.5})
+    names = "returned elsewhere at_unstable undecided not_finite step_too_large not_converged"
+    codes = {"flag_values": np.arange(7, dtype=np.int8), "flag_meanings": names}
+    outcome = np.tile(np.repeat([0, 2, 3, 5], 6), (6, 1)).astype(np.int8)
+    attrs = dict(dataset["outcome"].attrs) | codes
+    changed = {"outcome": replace(dataset["outcome"], data=outcome, attrs=attrs)}
+    older = Dataset({**dataset.variables, **changed}, dataset.attrs, dataset.groups)
+    figure = scan_kinds()["disturbed"].draw(older, BISTABLE.model_dump())["outcomes"]
+    known = {text.get_text() for text in figure.legends[0].get_texts()}
+    assert {"still at an unstable one", "not decided"} <= known
+    for place in range(6):
+        bars = [b for b in figure.axes[0].patches if round(b.get_y() + b.get_height() / 2) == place]
+        assert [b.get_width() for b in bars] == [25.0, 25.0, 25.0]
+
+
 def test_counts_have_their_legend_and_the_scene_its_star():
     figure = draw("equilibrium_map", CONSTANT, axes={"F0": axis(-100.0, 100.0, 3), "c2": axis(0.0, 400.0, 5)})
     counts = panel(figure["count"], "Number of equilibria")

@@ -72,7 +72,7 @@ def test_numbers_are_those_of_disturb(section: Dataset) -> None:
                 assert section[f"share_returned{end}"].data[at] == pytest.approx(float(value), rel=1e-14)
             farthest = [section[f"largest_excursion_{angle}"].data[at] for angle in ("phi", "theta")]
             np.testing.assert_array_equal(farthest, run.excursion.max(axis=0))
-            late = run.outcome == fm.Outcome.RETURNED
+            late = run.outcome == fm.Status.RETURNED
             times = np.where(np.isnan(run.time_to_return[late]), 1e9, run.time_to_return[late])
             quantiles = section["time_to_return_quantile"].data[at]
             if not late.any():

@@ -11,18 +11,16 @@ import pytest
 import sympy
 
 import fastmech as fm
-from fastmech.basins.disturbed import Outcome
+from fastmech.ensembles.status import Status
 from fastmech.equilibria.find import find_equilibria
 from fastmech.errors import InputError
-from fastmech.integrators.implicit_method import ImplicitRungeKutta
-from fastmech.integrators.method import RungeKutta
+from fastmech.integrators.method import ImplicitRungeKutta, RungeKutta
 from fastmech.integrators.methods import METHODS
 from fastmech.step_limits.amplification import amplification, stability_function, stability_polynomial
 from fastmech.step_limits.axes import imaginary_limit, real_limit
-from fastmech.step_limits.impulse import impulse_limit, impulse_ratio
 from fastmech.step_limits.measure import measured_stable_step
 from fastmech.step_limits.predict import largest_stable_step, stable_step
-from fastmech.step_limits.warning import step_limit, step_warning
+from fastmech.step_limits.warning import impulse_limit, impulse_ratio, step_limit, step_warning
 
 EXPLICIT = [name for name, method in METHODS.items() if not isinstance(method, ImplicitRungeKutta)]
 RUNGE_KUTTA = [name for name, method in METHODS.items() if isinstance(method, RungeKutta)]
@@ -184,7 +182,7 @@ def test_no_label_comes_out_beyond_the_limit() -> None:
     assert within.share_returned == 1.0
     with pytest.warns(fm.StepWarning):
         beyond = fm.disturb(SCENE, minimum, 64, dt=1.2 * limit, method="rk4")
-    assert set(beyond.outcome) == {Outcome.STEP_TOO_LARGE}
+    assert set(beyond.outcome) == {Status.STEP_TOO_LARGE}
     assert (beyond.end_index == -1).all()
     assert beyond.failures.startswith("64 of 64 trajectories failed: 64 step_too_large")
 
@@ -229,9 +227,9 @@ def test_no_label_from_steps_beyond_the_limit() -> None:
     scene, starts = SCENE.replace(beta=1e5), [[0.9, 0.4, 0.0, 0.0], [0.1, 0.2, 0.0, 0.0]]
     with pytest.warns(fm.StepWarning):
         beyond = fm.labels_of(scene, starts, 20.0, dt=0.05, method="rk4")
-    assert set(beyond.status) == {fm.BasinStatus.STEP_TOO_LARGE}
+    assert set(beyond.status) == {fm.Status.STEP_TOO_LARGE}
     assert (beyond.well == -1).all()
-    assert set(fm.labels_of(scene, starts, 20.0, method="radau5").status) == {fm.BasinStatus.CAPTURED}
+    assert set(fm.labels_of(scene, starts, 20.0, method="radau5").status) == {fm.Status.CAPTURED}
 
 
 def test_no_step_will_do() -> None:

@@ -27,7 +27,7 @@ class PowerLaw:
     """f(scale) ~ scale^exponent. Slopes belong to neighbouring scales, the last two of which fix the last."""
 
     exponent: float  #: weighted least squares of log f over log scale; NaN: fewer than two scales with f > 0
-    error: float  #: half width of the exponent's interval, of 95 % or more; inf: fewer than five scales
+    error: float  #: half width of the exponent's 95 % interval; inf: fewer than five scales
     local_slopes: Floats  #: between neighbouring scales (scales - 1,), NaN where f = 0
     local_errors: Floats  #: half widths of their 95 % intervals by counting alone (scales - 1,)
 
@@ -39,8 +39,12 @@ def is_smooth(exponent: float, error: float) -> bool | None:
     return True if error <= TELLING else None
 
 
-def fit_counts(scales: Floats, hits: NDArray[np.int64], trials: NDArray[np.int64]) -> PowerLaw:
+def fit_counts(
+    scales: Floats, hits: NDArray[np.int64], trials: NDArray[np.int64], fitted: NDArray[np.bool_]
+) -> PowerLaw:
     """Fit shares ``hits / trials`` of independent trials at rising ``scales``, all of shape (scales,).
+
+    Scales that are not ``fitted`` have local slopes and take no part in the exponent.
 
     The logarithm of a share f has the variance (1 - f)/hits. Scatter about the line beyond that is added to
     every scale's variance (DerSimonian and Laird, Control. Clin. Trials 7 (1986) 177), so that coarse scales,
@@ -56,7 +60,7 @@ def fit_counts(scales: Floats, hits: NDArray[np.int64], trials: NDArray[np.int64
         local_errors = norm.ppf(0.975) * np.sqrt(variance[1:] + variance[:-1]) / steps
     local[~np.isfinite(local)] = np.nan
     local_errors[~np.isfinite(local_errors)] = np.nan
-    known = hits > 0
+    known = (hits > 0) & fitted
     if np.count_nonzero(known) < 2:
         return PowerLaw(np.nan, np.nan, local, local_errors)
     x, y, variance = np.log(scales[known]), y[known], variance[known]
@@ -69,7 +73,7 @@ def fit_counts(scales: Floats, hits: NDArray[np.int64], trials: NDArray[np.int64
     rest = y - np.average(y, weights=weight) - exponent * (x - np.average(x, weights=weight))
     beyond = (np.sum(weight * rest * rest) - free) / (weight.sum() - np.trace(hat))
     exponent, spread = line(x, y, 1.0 / (variance + max(beyond, 0.0)))
-    quantile = t.ppf(0.975, free) if beyond > 0.0 else norm.ppf(0.975)
+    quantile = t.ppf(0.975, free)  # few scales may hide a scatter that is there
     ends = combinations(range(len(x)), 2)
     halves = [slice(i, j + 1) for i, j in ends if j > i + 1 and x[j] - x[i] >= 0.5 * (x[-1] - x[0]) - 1e-9]
     fits = [line(x[part], y[part], weight[part]) for part in halves]

@@ -12,12 +12,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from fastmech.basins.measures.labels import Floats, Integers, LabelOf, ask, check_point
 from fastmech.basins.measures.slopes import PowerLaw, fit_counts, is_smooth
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
+
+#: Part of the share of labels in no order above which a distance is as large as the basins' pieces: straight
+#: stripes are exactly linear below it.
+DISORDER = 0.75
 
 
 @dataclass(frozen=True)
@@ -28,6 +32,7 @@ class UncertaintyExponent:
     uncertain: Integers  #: uncertain starts (scales,)
     starts: Integers  #: starts whose labels and whose neighbours' are all known (scales,)
     missing: Integers  #: starts with a label missing, not counted among ``starts`` (scales,)
+    fitted: NDArray[np.bool_]  #: distances that take part in the law (scales,)
     law: PowerLaw  #: exponent alpha, its error, local slopes
     dimension: float  #: D - alpha; its error is that of alpha
 
@@ -46,7 +51,14 @@ def uncertainty_exponent(
     random direction of the box scaled to a unit cube. States whose edges have no length stay fixed and do not
     count in D. Starts of different distances are independent. The error bar joins counting and the largest
     difference between exponents of half of the distances (:mod:`fastmech.basins.measures.slopes`), so it
-    needs five of them, and is the narrower the more decades they span; keep the largest well below the box.
+    needs five of them, and is the narrower the more decades they span. A fractal that is similar to itself
+    at one ratio makes shares oscillate; distances whose ratio is near the half of that one see too little of
+    it, and the bar comes out too narrow.
+
+    At a distance as large as the basins' pieces the share no longer tells of their boundary. So a distance is
+    left out of the fit where it is more than three quarters of the share of labels in no order. That is 1
+    less the sum of the cubes of the labels' shares (a start and its two neighbours). ``fitted`` tells which
+    distances are left.
 
     Args:
         label_of: labels (n,) of starts (n, dim); negative: none.
@@ -70,7 +82,7 @@ def uncertainty_exponent(
     n = checks.whole_number("n", n, least=1)
     seed = checks.whole_number("seed", seed, least=0)
     free = edges > 0.0
-    counts = []
+    counts, disordered = [], []
     for k, eps in enumerate(scales):
         rng = np.random.default_rng([seed, k])
         starts = corner + rng.random((n, len(edges))) * edges
@@ -79,9 +91,11 @@ def uncertainty_exponent(
         labels = ask(label_of, np.concatenate([starts, starts - aside, starts + aside])).reshape(3, n)
         known = (labels >= 0).all(axis=0)
         uncertain = known & ((labels[1] != labels[0]) | (labels[2] != labels[0]))
-        counts.append([np.count_nonzero(uncertain), np.count_nonzero(known)])
+        each = np.unique(labels[0, known], return_counts=True)[1]
+        counts.append((int(np.count_nonzero(uncertain)), int(each.sum())))
+        disordered.append(1.0 - float(np.sum((each / max(each.sum(), 1)) ** 3)))
     hits, trials = np.array(counts, dtype=np.int64).T
-    law = fit_counts(scales, hits, trials)
-    return UncertaintyExponent(
-        scales, hits, trials, n - trials, law, float(np.count_nonzero(free) - law.exponent)
-    )
+    fitted = hits <= DISORDER * trials * np.array(disordered)
+    law = fit_counts(scales, hits, trials, fitted)
+    dimension = float(np.count_nonzero(free) - law.exponent)
+    return UncertaintyExponent(scales, hits, trials, n - trials, fitted, law, dimension)

@@ -9,7 +9,7 @@ from fastmech.hardcases.case import HardCase, Row, row_of
 from fastmech.hardcases.cases.references import ORACLE, goal_of
 from fastmech.hardcases.counts import counted, explicit_calls
 from fastmech.hardcases.walk import Goal, claimed_row, fixed_row, status_row, walked
-from fastmech.integrators.implicit_method import ImplicitRungeKutta
+from fastmech.integrators.method import ImplicitRungeKutta
 from fastmech.integrators.methods import find_method
 from fastmech.step_limits.warning import step_warning
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from fastmech.atlas.fold_points import find_folds
 from fastmech.basins.label import labels_of
-from fastmech.basins.status import BasinStatus
 from fastmech.ensembles.integrate import integrate
+from fastmech.ensembles.status import Status
 from fastmech.equilibria.find import Equilibria, find_equilibria
 from fastmech.hardcases.case import Floats, HardCase, Row, row_of
 from fastmech.hardcases.walk import admitted_step, labellers, walked
@@ -117,7 +117,7 @@ def _labels(passage: _Passage, side: float, method: str) -> Row:
     starts[:, :2] = passage.middle + (saddle + OUTWARDS[:, None]) * passage.way
     found = labels_of(scene, starts, LABELLED, method=method, settle_radius=SETTLED)
     assert found.settle_time is not None
-    captured = found.status == BasinStatus.CAPTURED
+    captured = found.status == Status.CAPTURED
     # Before the fold starts on the saddle, and inwards of it, are not the deep well's.
     inside = (OUTWARDS <= 0.0) & (side < 0.0)
     right = np.where(inside, np.isin(found.well, shallow) & (OUTWARDS < 0.0), found.well == deep)

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.basins.label import labels_of
-from fastmech.basins.status import BasinStatus
 from fastmech.ensembles.integrate import Trajectories, integrate
+from fastmech.ensembles.status import Status
 from fastmech.errors import InputError
 from fastmech.hardcases.case import REFUSED, Floats, HardCase, Row, row_of
 from fastmech.hardcases.references import Boundary, boundary
@@ -88,11 +88,11 @@ def _certified(
     assert tree is not None
     places = np.array([[tree.equilibria[w].phi, tree.equilibria[w].theta] for w in found.well])
     ends = places + 2.0 * np.pi * found.turns
-    proved = found.status == BasinStatus.CAPTURED
+    proved = found.status == Status.CAPTURED
     right = np.where(above[:, None], edge.above, edge.below)
     wrong = proved & (np.abs(ends - right).max(axis=1) > 0.1)
     nearest = float(distance[proved].min(initial=np.inf))
-    others = ", ".join(sorted({BasinStatus(s).name.lower() for s in found.status[~proved]}))
+    others = ", ".join(sorted({Status(s).name.lower() for s in found.status[~proved]}))
     remark = f"labels: {proved.sum()} of {above.size} proved, to {nearest:.0e} rad; nearer: {others}"
     return Row(
         method, np.nan, found.steps, float(wrong.sum()), 0.0, np.nan, "ok", True, remark, "fm.labels_of"

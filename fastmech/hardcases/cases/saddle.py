@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.basins.label import labels_of
-from fastmech.basins.status import BasinStatus
 from fastmech.ensembles.integrate import Trajectories, integrate
+from fastmech.ensembles.status import Status
 from fastmech.equilibria.find import find_equilibria
 from fastmech.hardcases.case import Floats, HardCase, Row, row_of
 from fastmech.hardcases.walk import admitted_step, labellers, without_euler
@@ -95,10 +95,10 @@ def _labels(saddle: _Saddle, root: float, method: str) -> Row:
     distance = 10.0 ** -np.arange(2.0, 13.0)
     sides = np.array([-1.0, 1.0])
     far = labels_of(SCENE, _starts(saddle, root + sides * distance[0]), LABELLED)
-    assert (far.status == BasinStatus.CAPTURED).all()
+    assert (far.status == Status.CAPTURED).all()
     offsets = np.concatenate([-distance, [0.0], distance])
     found = labels_of(SCENE, _starts(saddle, root + offsets), LABELLED, method=method)
-    captured = found.status == BasinStatus.CAPTURED
+    captured = found.status == Status.CAPTURED
     right = (offsets > 0.0).astype(int)
     wrong = captured & (
         (found.well != far.well[right]) | (found.turns != far.turns[right]).any(axis=1) | (offsets == 0.0)

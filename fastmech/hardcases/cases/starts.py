@@ -15,9 +15,8 @@ from fastmech.hardcases.references import motion
 from fastmech.hardcases.walk import Goal, claimed_row, walked
 from fastmech.integrators.methods import find_method
 from fastmech.scene import Scene
-from fastmech.step_limits.impulse import impulse_ratio
 from fastmech.step_limits.predict import largest_stable_step
-from fastmech.step_limits.warning import step_warning
+from fastmech.step_limits.warning import impulse_ratio, step_warning
 
 SCENE = Scene(c2=1100 / 3, alpha=0.0)
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from fastmech.integrators.implicit_tableau import ImplicitTableau
+from fastmech.integrators.tableau import ImplicitTableau
 
 GAUSS2 = ImplicitTableau(
     name="gauss2", order=2, a=[[1 / 2]], b=[1.0], c=[1 / 2], source="Gauss; the implicit midpoint rule"

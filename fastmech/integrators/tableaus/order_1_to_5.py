@@ -5,12 +5,7 @@ from __future__ import annotations
 from fastmech.integrators.tableau import Tableau
 
 EULER = Tableau(
-    name="euler",
-    order=1,
-    a=[[]],
-    b=[1.0],
-    c=[0.0],
-    source="Euler, Institutionum calculi integralis, 1768",
+    name="euler", order=1, a=[[]], b=[1.0], c=[0.0], source="Euler, Institutionum calculi integralis, 1768"
 )
 
 MIDPOINT = Tableau(

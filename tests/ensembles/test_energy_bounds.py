@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 from ensembles.starts import Floats, random_starts
 
-import fastmech as fm
 from fastmech.ensembles import threads
+from fastmech.ensembles.energy_bounds import LANES, SLACK, breaks_energy_bounds, energies
 from fastmech.ensembles.fitting import speed_bound
-from fastmech.ensembles.plausible import SLACK, breaks_energy_bounds, energy, judge
-from fastmech.kernels.passes import LANES
 from fastmech.kernels.sincos import REDUCTION_LIMIT
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.mechanism.geometry import positions, velocities
@@ -73,7 +71,7 @@ def test_energies_are_those_of_the_points(scene: Scene) -> None:
     y = random_starts(50)
     y[::5, :2] += 2.0**21
     c, right = reduce(scene), energy_of_points(scene, y) / unit(scene)
-    total, _ = energy(c, y, np.full(50, c.force))
+    total = energies(c, y)[0]
     np.testing.assert_allclose(total - total[0], right - right[0], rtol=1e-12, atol=1e-11)
     highest = 0.5 * speed_bound(c, y) ** 2  # above the least that the potential can be
     np.testing.assert_allclose(highest - highest[0], right - right[0], rtol=1e-12, atol=1e-11)
@@ -85,11 +83,10 @@ def test_where_the_bounds_lie(scene: Scene) -> None:
     n, c = 200, reduce(scene)
     start, final = random_starts(n), random_starts(n, seed=1)
     decays = c.decay != 0.0 and c.force != 0.0
-    force = np.full(n, 0.0 if decays else c.force)
-    before, scale = energy(c, start, force)
+    before, *_, scale = energies(c, start)
     reach = 2.0 - np.sign(c.force) * (np.cos(start[:, 0]) - np.sin(start[:, 1]))
     final[:, 2:] = 0.0
-    rest = energy(c, final, force)[0]
+    rest = energies(c, final)[0]
     gained = before + (abs(c.force) * reach if decays else 0.0)
     fallen = before - (abs(c.force) * (4.0 - reach) if decays else 0.0)
     for bound, sign, holds in ((gained, 1.0, True), (fallen, -1.0, c.damping == 0.0)):
@@ -107,7 +104,6 @@ def test_company_place_and_threads_change_nothing(own: bool, n: int, monkeypatch
     c = own_scenes(n, seed=n) if own else reduce(UNDAMPED.replace(alpha=0.4))
     start, final = odd_states(n, seed=1), odd_states(n, seed=2)
     broken, bound = breaks_energy_bounds(c, start, final), speed_bound(c, start)
-    status = judge(np.zeros(n, dtype=np.int8), start, final, c, 1)
     for k in range(n):
         alone = part(c, slice(k, k + 1))
         assert breaks_energy_bounds(alone, start[k : k + 1], final[k : k + 1])[0] == broken[k]
@@ -115,28 +111,22 @@ def test_company_place_and_threads_change_nothing(own: bool, n: int, monkeypatch
     order = np.random.default_rng(n).permutation(n)
     np.testing.assert_array_equal(speed_bound(part(c, order), start[order]), bound[order])
     monkeypatch.setattr(threads, "PART", 13)
-    np.testing.assert_array_equal(judge(np.zeros(n, dtype=np.int8), start, final, c, 3), status)
+    np.testing.assert_array_equal(breaks_energy_bounds(c, start, final, 3), broken)
     np.testing.assert_array_equal(speed_bound(c, start, 3), bound)
 
 
-def test_what_is_not_finite_and_what_a_run_has_seen() -> None:
-    """A start that is not finite comes first, then what the run itself has seen, then the energy."""
+def test_ends_that_are_not_finite_and_states_that_are_locked() -> None:
+    """What is not finite has an energy that no motion can have; whatever a start makes of it."""
     start, final = random_starts(8), random_starts(8)
-    start[0, 0], start[1, 3], start[2, 1] = np.nan, -np.inf, 1e300
+    start[0, 0], start[2, 1] = np.nan, 1e300
     final[3, 2], final[4, 3], final[5, 0], final[6, 2] = 1e200, np.inf, np.nan, 90.0
-    reached = np.zeros(8, dtype=np.int8)
-    reached[[1, 6]] = fm.Status.NOT_CONVERGED
     for states in (start, final):
         states.flags.writeable = False
-    found = judge(reached, start, final, reduce(CONSTANT))
-    bad, large = fm.Status.START_NOT_FINITE, fm.Status.STEP_TOO_LARGE
-    assert found[[0, 1]].tolist() == [bad, bad]
-    assert found[3:].tolist() == [large, large, large, fm.Status.NOT_CONVERGED, fm.Status.OK]
-    assert judge(reached, start, final, None).tolist() == [bad, bad, 0, 0, 0, 0, fm.Status.NOT_CONVERGED, 0]
-    assert not reached[0]
+    found = breaks_energy_bounds(reduce(CONSTANT), start, final)
+    assert found[3:].tolist() == [True, True, True, True, False]
 
 
 def test_no_trajectories() -> None:
     none = np.empty((0, 4))
-    assert judge(np.zeros(0, dtype=np.int8), none, none, reduce(CONSTANT)).shape == (0,)
+    assert breaks_energy_bounds(reduce(CONSTANT), none, none).shape == (0,)
     assert speed_bound(own_scenes(0, seed=0), none).shape == (0,)

@@ -1,0 +1,257 @@
+"""Own systems: fixed steps and ``tol`` beside heyoka, at equal errors of everyone and of 99 %.
+
+Systems, starts and ends are those of :mod:`fastmech.bench.own_systems`. The truth is that of
+:mod:`fastmech.bench.extended`. heyoka has the rate of the setting with the error asked for, in hindsight.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fastmech.bench import heyoka_series
+from fastmech.bench.entrant import Entrant, Floats, Prepare, Solve
+from fastmech.bench.entrants import missing
+from fastmech.bench.extended import ROUNDINGS, extended
+from fastmech.bench.frontier import work_precision
+from fastmech.bench.measure import Row, measure
+from fastmech.bench.own_systems import STARTS, SYSTEMS, OwnSystem, spoken
+from fastmech.bench.package import prepared
+from fastmech.bench.precision import rate_at
+from fastmech.bench.problem import Problem
+from fastmech.bench.tables import table
+from fastmech.ensembles.integrate import integrate
+from fastmech.ensembles.run import Progress
+from fastmech.ensembles.work_precision import order_statistic
+from fastmech.integrators.methods import find_method
+
+#: Errors at which rates are compared.
+TARGETS = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
+
+#: Starts of the small ensembles, of those from which methods are picked, and of `--quick`.
+SMALL, PICKED, QUICK = 1024, 2048, 256
+
+#: Fastest methods of the small ensemble that run with everyone, at each error.
+METHODS = 2
+
+#: heyoka's tolerances.
+HEYOKA = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13, 1e-14)
+
+#: An estimate is right within this factor, both ways.
+FACTOR = 3.0
+
+LEVELS = {0.99: "99 %", 1.0: "largest"}
+
+
+class Measured(NamedTuple):
+    """What was measured on one system."""
+
+    name: str
+    fixed: dict[int, list[Row]]  #: by number of starts
+    tol: dict[tuple[int, float, float], Row]  #: by number of starts, quantile and tolerance
+    estimates: dict[tuple[int, float, float], float]
+    heyoka: list[Row]
+    call: float  #: seconds of heyoka's time on a trajectory in which a batch's call takes no step
+
+
+def problem_of(name: str, own: OwnSystem, n: int) -> Problem:
+    """A system with its first n starts and their truth."""
+    rhs, starts = spoken(own.rhs, sin=np.sin, cos=np.cos, inverse_cube=lambda s: s**-1.5), own.starts(n)
+    truth = extended(lambda t, y: np.stack(rhs(t, *y)), starts, own.t_end, ROUNDINGS[1])
+    return Problem(name, name, own.system(), starts, truth.astype(np.float64), own.t_end, 1.0)
+
+
+def candidates(problem: Problem, targets: Sequence[float]) -> Iterator[dict[str, Any]]:
+    """Methods with steps by which everyone, or 99 %, has the errors asked for."""
+    starts, t_end = problem.starts, problem.t_end
+    found = work_precision(problem.scene, starts[:PICKED], t_end, errors=targets)
+    for target in targets:
+        kept = sorted((p for p in found.points if p.largest <= target), key=lambda p: -p.rate)
+        best = {p.method: p.dt for p in reversed(kept)}
+        for method in list(dict.fromkeys(p.method for p in kept))[:METHODS]:
+            for dtype in ("float64", "float32") if target >= 1e-4 else ("float64",):
+                keywords = {"method": method, "dt": best[method], "dtype": dtype}
+                final = prepared(keywords)(problem, 1)(starts)
+                errors = np.abs(final - problem.truth).max(axis=1)
+                for level in LEVELS:
+                    ratio = 0.9 * target / max(order_statistic(errors, level), 1e-300)
+                    factor = ratio ** (1.0 / find_method(method).order)
+                    yield keywords | {"dt": best[method] * float(np.clip(factor, 0.4, 2.5))}
+
+
+def measured(
+    problem: Problem, targets: Sequence[float], advance: Callable[[int], None] = lambda done: None
+) -> Measured:
+    """Everyone on one system, timed in turns."""
+    n, estimates = len(problem.starts), dict[tuple[int, float, float], float]()
+    sizes = {size: cut(problem, size) for size in (min(SMALL, n), n)}
+
+    def to_tolerance(tol: float, quantile: float) -> Prepare:
+        def prepare(problem: Problem, threads: int) -> Solve:
+            def solve(starts: Floats) -> Floats:
+                run = integrate(
+                    problem.scene, starts, problem.t_end, tol=tol, quantile=quantile, threads=threads
+                )
+                estimates[len(starts), quantile, tol] = float(run.error_estimate or 0.0)
+                return np.asarray(run.y[-1])
+
+            return solve
+
+        return prepare
+
+    settings = list(candidates(problem, targets))
+    advance(1)
+    fixed: dict[int, list[Row]] = {}
+    tol: dict[tuple[int, float, float], Row] = {}
+    heyoka: list[Row] = []
+    for size, part in sizes.items():
+        everyone = [
+            Entrant(f"fastmech {k['method']}", f"{k['dt']:.4g} s, {k['dtype']}", prepared(k), most=size)
+            for k in settings
+        ]
+        asked = [(quantile, target) for quantile in LEVELS for target in targets]
+        everyone += [Entrant("tol", f"{t:g}, {q:g}", to_tolerance(t, q), most=size) for q, t in asked]
+        if size == n and heyoka_series.NEEDS not in missing():
+            everyone += [
+                Entrant("heyoka", f"{t:g}", heyoka_series.prepared(t), most=size)
+                for t in HEYOKA
+                if t >= 1e-3 * min(targets)
+            ]
+        rows = measure(part, [(entrant, 1) for entrant in everyone])
+        fixed[size] = [row for row in rows if row.family.startswith("fastmech")]
+        told = [row for row in rows if row.family == "tol"]
+        tol |= {(size, *key): row for key, row in zip(asked, told, strict=True)}
+        heyoka += [row for row in rows if row.family == "heyoka"]
+        advance(1)
+    call = 0.0
+    if heyoka:
+        still = replace(problem, truth=problem.starts, t_end=0.0)
+        (idle,) = measure(still, [(Entrant("heyoka", "", heyoka_series.prepared(1e-5), most=n), 1)])
+        call = 1.0 / idle.rate
+    return Measured(problem.name, fixed, tol, estimates, heyoka, call)
+
+
+def cut(problem: Problem, n: int) -> Problem:
+    """The problem of the first n starts."""
+    return replace(problem, starts=problem.starts[:n], truth=problem.truth[:n])
+
+
+def rate(rows: list[Row], error: float, level: float) -> float:
+    """Trajectories a second where this share of the errors is at most ``error``; NaN: none is as accurate."""
+    of_level = [replace(row, errors=np.array([order_statistic(row.errors, level)])) for row in rows]
+    return rate_at(of_level, error) or math.nan
+
+
+def ratios(found: Measured, target: float) -> dict[str, float]:
+    """What is compared at one error, by column."""
+    small, n = min(found.fixed), max(found.fixed)
+    mine, theirs = (rate(rows, target, 1.0) for rows in (found.fixed[n], found.heyoka))
+    columns = {
+        "fixed over heyoka": mine / theirs,
+        "the same, its calls free": mine * (1.0 / theirs - found.call),
+    }
+    for level, name in LEVELS.items():
+        mine = found.tol[n, level, target].rate
+        columns[f"`tol`, {name}, over heyoka"] = mine / rate(found.heyoka, target, level)
+    for level, name in LEVELS.items():
+        for size in dict.fromkeys((small, n)):
+            best = rate(found.fixed[size], target, level)
+            columns[f"time of `tol` over fixed, {name}, {size:,}"] = (
+                best / found.tol[size, level, target].rate
+            )
+    return columns
+
+
+def estimate_ratios(found: Measured) -> list[float]:
+    """Estimates of ``tol`` over the truth, where both are finite."""
+    pairs = [(found.estimates[key], order_statistic(row.errors, key[1])) for key, row in found.tol.items()]
+    return [estimate / true for estimate, true in pairs if 0.0 < true < math.inf and estimate < math.inf]
+
+
+def summary(found: list[Measured], targets: Sequence[float]) -> list[str]:
+    """Geometric means over systems, and the worst."""
+    each = {target: [ratios(one, target) for one in found] for target in targets}
+    lines = []
+    for column in each[targets[0]][0]:
+        line = [column]
+        for target in targets:
+            known = [(one[column], m.name.split(",")[0]) for one, m in zip(each[target], found, strict=True)]
+            known = [pair for pair in known if math.isfinite(pair[0])]
+            if not known:
+                line.append("-")
+                continue
+            mean = math.exp(sum(math.log(value) for value, _ in known) / len(known))
+            worst = (max if column.startswith("time") else min)(known)
+            few = f"; {len(known)} of {len(found)}" if len(known) < len(found) else ""
+            line.append(f"{mean:.2f} ({worst[1]} {worst[0]:.2f}{few})")
+        lines.append(line)
+    every = np.array([r for one in found for r in estimate_ratios(one)])
+    good = (every >= 1.0 / FACTOR) & (every <= FACTOR)
+    return [
+        "Geometric mean over systems, in brackets the worst.",
+        "",
+        *table(["", *(f"{target:.0e}" for target in targets)], lines),
+        f"`tol`'s estimate is within a factor {FACTOR:g} of the truth in {good.sum()} of {good.size} runs "
+        f"({every.min():.2g} to {every.max():.2g} times it).",
+        "",
+    ]
+
+
+def section(found: Measured, targets: Sequence[float]) -> list[str]:
+    """One system: best settings, rates, ratios."""
+    n, lines = max(found.fixed), []
+    for target in targets:
+        keeping = [row for row in found.fixed[n] if row.max_error() <= target]
+        best = max(keeping, key=lambda row: row.rate, default=None)
+        setting = "-" if best is None else f"{best.family.removeprefix('fastmech ')}, {best.setting}"
+        rates = (rate(rows, target, 1.0) for rows in (found.fixed[n], found.heyoka))
+        told = (ratios(found, target)).values()
+        lines.append([f"{target:.0e}", setting, *(f"{r:,.0f}" for r in rates), *(f"{r:.2f}" for r in told)])
+    head = ["error", "fastest fixed steps that keep it", "its rate [1/s]", "heyoka's [1/s]"]
+    return [f"## {found.name}", "", *table([*head, *ratios(found, targets[0])], lines)]
+
+
+def run_systems(
+    out: Path,
+    *,
+    quick: bool = False,
+    stage: Callable[[str, int], Progress] = lambda name, total: lambda done: None,
+) -> list[Path]:
+    """Measure and write ``systems.md`` into the folder ``out``; ``quick`` takes few starts and systems."""
+    systems = dict(list(SYSTEMS.items())[:2]) if quick else SYSTEMS
+    n, targets = (QUICK, TARGETS[:2]) if quick else (STARTS, TARGETS)
+    advance = stage("systems", 4 * len(systems))
+    found = []
+    for name, own in systems.items():
+        problem = problem_of(name, own, n)
+        advance(1)
+        found.append(measured(problem, targets, advance))
+    out.mkdir(parents=True, exist_ok=True)
+    path = out / "systems.md"
+    path.write_text("\n".join(report(found, targets)) + "\n", encoding="utf-8")
+    return [path]
+
+
+def report(found: list[Measured], targets: Sequence[float]) -> list[str]:
+    """The study as Markdown."""
+    n = max(found[0].fixed)
+    lines = [
+        "# Own systems beside heyoka",
+        "",
+        f"{n:,} starts, one thread, all timed in turns, rates by processor time, compiling apart. Errors are "
+        "those of final states against extended precision; rates at equal error are interpolated in "
+        "logarithms. heyoka runs in batches with fast-math and has the rate of the tolerance that gives the "
+        "error, in hindsight. Each batch is a call from Python; `its calls free` deducts what a call takes "
+        "that makes no step. `tol` has its rate at that tolerance, whatever error it keeps.",
+        "",
+        *([] if found[0].heyoka else ["Not installed: heyoka.", ""]),
+        *summary(found, targets),
+    ]
+    for one in found:
+        lines += section(one, targets)
+    return lines

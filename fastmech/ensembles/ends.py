@@ -1,0 +1,255 @@
+"""How trajectories end on the way: by a stopping condition, or by failing; when, and in which state.
+
+Healthy trajectories pay nothing for it: those that ended in a call go through it once more, alone and
+watched, by the same arithmetic.
+
+A stopping condition is looked at after whole steps, so a stop is seen up to a step too late. Where that is
+too late, the step is taken again from its begin, shorter and shorter or longer and longer, until the time of
+the stop is known to rounding. The shortened steps are those of a one-step method of the order of the run, so
+the time of a stop and the state at it have that order too (Hairer, Norsett, Wanner, *Solving ODEs I*,
+section II.6), wherever the condition's border is smooth. A condition gives codes, not values, so the interval
+is halved: no secant would know better.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from fastmech.callee import callee
+from fastmech.ensembles.lanes import Lanes
+from fastmech.ensembles.spans import Span
+from fastmech.integrators.batch import PHASE, Batch
+from fastmech.integrators.explicit import WEIGHTS, Moment, Stepped, step_by_stages, weights_of
+from fastmech.integrators.implicit import CALLS, SCHEME, Calls, drive_implicit, inverse_by_elimination
+from fastmech.integrators.method import Adams, ImplicitRungeKutta, Method
+from fastmech.jit import MATRIX, OBSERVER, OBSERVER_SIGNATURE, RHS, VECTOR, inlined, kernel, named_tuple
+from fastmech.kernels.blocks import observer_in_single
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+#: Rows of the record of a stopping condition: the stop's code (0: runs on), its time [s], then the state.
+STOP_CODE, STOP_TIME, STOP_STATE = 0, 1, 2
+
+#: Rows of the record of failures: whether the lane is finite now, time and state when it was so last.
+FINITE, TIME, STATE = 0, 1, 2
+
+#: Halvings at most: of a step that begins at t = 0, where times have no last digit.
+HALVINGS = 60
+
+#: Trajectories that look for the begin of their step together.
+TOGETHER = 256
+
+
+@inlined
+def note_stop(code: float, t: float, Y: NDArray[np.float64], record: NDArray[np.float64], i: int) -> None:
+    """Keep code, time and state of lane ``i`` when its code is not zero for the first time.
+
+    A state that is not finite stops nothing, whatever its code: the trajectory has failed before.
+    """
+    if code != 0.0 and record[STOP_CODE, i] == 0.0:
+        for d in range(Y.shape[0]):
+            if not np.isfinite(Y[d, i]):
+                return
+        record[STOP_CODE, i], record[STOP_TIME, i] = code, t
+        for d in range(Y.shape[0]):
+            record[STOP_STATE + d, i] = Y[d, i]
+
+
+@kernel(OBSERVER_SIGNATURE)
+def observe_last_finite(t: float, Y: Floats, params: Floats, record: Floats) -> None:
+    """Keep time and state of every lane as long as all of its states are finite; branch-free."""
+    for i in range(Y.shape[1]):
+        record[FINITE, i] = 0.0
+    for d in range(Y.shape[0]):
+        for i in range(Y.shape[1]):
+            record[FINITE, i] += Y[d, i] - Y[d, i]  # NaN where it is not finite
+    for i in range(Y.shape[1]):
+        record[TIME, i] = t if record[FINITE, i] == 0.0 else record[TIME, i]
+    for d in range(Y.shape[0]):
+        for i in range(Y.shape[1]):
+            record[STATE + d, i] = Y[d, i] if record[FINITE, i] == 0.0 else record[STATE + d, i]
+
+
+def last_finite_observer(precision: Any) -> Any:
+    """:func:`observe_last_finite` for lanes of a precision."""
+    return observer_in_single(observe_last_finite) if precision is np.float32 else observe_last_finite
+
+
+@kernel(OBSERVER_SIGNATURE)
+def observe_before(t: float, Y: Floats, params: Floats, record: Floats) -> None:
+    """Keep time and state, rows 1 and 2.., of every lane until the time in row 0."""
+    for i in range(Y.shape[1]):
+        if t < record[0, i]:
+            record[1, i] = t
+            for d in range(Y.shape[0]):
+                record[2 + d, i] = Y[d, i]
+
+
+class Search(NamedTuple):
+    """Trajectories (n) that have stopped, and where their last steps began."""
+
+    begin: Floats  #: times [s] (n,)
+    states: Floats  #: (n, dim)
+    params: Floats  #: (n, count)
+    observer_params: Floats
+    empty: Floats  #: a record of no stop (rows,)
+    record: Floats  #: (n, rows); its stops move to where they happened
+
+
+SEARCH = named_tuple([VECTOR, MATRIX, MATRIX, VECTOR, VECTOR, MATRIX], Search)
+
+
+@inlined
+def _narrowed(of: Search, i: int, seen: Floats, times: tuple[float, float, float]) -> tuple[float, float]:
+    """Where trajectory ``i`` stops, after a step to the middle one of three times."""
+    low, middle, high = times
+    if seen[STOP_CODE, 0] == 0.0:
+        return middle, high
+    for row in range(of.empty.size):
+        of.record[i, row] = seen[row, 0]
+    return low, middle
+
+
+@kernel(types.void(RHS, OBSERVER, WEIGHTS, SEARCH))
+def halve_steps(rhs: Any, observe: Any, weights: Any, of: Search) -> None:
+    """Find the stops of a search by an explicit one-step method of these weights."""
+    (n, dim), count = of.states.shape, of.params.shape[1]
+    Y, own, seen = np.empty((dim, 1)), np.empty((count, 1)), np.empty((of.empty.size, 1))
+    stages = np.empty((weights.nodes.size + 2, dim, 1))
+    block = Stepped(Y, own, np.empty((0, dim, 1)), stages)
+    for i in range(n):
+        for row in range(count):
+            own[row, 0] = of.params[i, row]
+        begin, low, high = of.begin[i], of.begin[i], of.record[i, STOP_TIME]
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            if not low < middle < high:
+                break
+            for d in range(dim):
+                Y[d, 0] = of.states[i, d]
+            for row in range(of.empty.size):
+                seen[row, 0] = of.empty[row]
+            rhs(begin, Y, stages[0], own)
+            step_by_stages(rhs, weights, block, Moment(begin, middle - begin, 0, False))
+            observe(middle, Y, of.observer_params, seen)
+            low, high = _narrowed(of, i, seen, (low, middle, high))
+
+
+@kernel(types.void(CALLS, SCHEME, SEARCH))
+def halve_implicit_steps(call: Any, scheme: Any, of: Search) -> None:
+    """The same by an implicit method.
+
+    A shortened step of which Newton's iteration finds no solution counts as one that does not reach the stop.
+    """
+    (n, dim), count, stages = of.states.shape, of.params.shape[1], scheme.nodes.shape[0]
+    failed = np.empty((1, 1))
+    batch = Batch(
+        times=np.empty(2),
+        steps=np.ones(1, dtype=np.int64),
+        params=np.empty((1, count, 1)),
+        observer_params=of.observer_params,
+        Y=np.empty((1, dim, 1)),
+        record=np.empty((1, of.empty.size, 1)),
+        out=np.empty((1, 1, dim, 1)),
+        memory=np.empty((1, (stages + 1) * dim, 1)),
+        phase=np.zeros(PHASE),
+    )
+    for i in range(n):
+        for row in range(count):
+            batch.params[0, row, 0] = of.params[i, row]
+        low, high = of.begin[i], of.record[i, STOP_TIME]
+        batch.times[0] = low
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            if not low < middle < high:
+                break
+            batch.times[1], batch.phase[0], failed[0, 0] = middle, 0.0, np.nan
+            for d in range(dim):
+                batch.Y[0, d, 0] = of.states[i, d]
+            for row in range(batch.memory.shape[1]):
+                batch.memory[0, row, 0] = 0.0
+            for row in range(of.empty.size):
+                batch.record[0, row, 0] = of.empty[row]
+            drive_implicit(call, scheme, batch, failed)
+            low, high = _narrowed(of, i, batch.record[0], (low, middle, high))
+
+
+class Resumption:
+    """What lanes were like before a call, so that some of them can be taken through it once more."""
+
+    def __init__(self, lanes: Lanes, rhs: Any, method: Method, span: Span) -> None:
+        """From the lanes as they are, and what the call does."""
+        self._lanes, self._rhs, self._method, self._span = lanes, rhs, method, span
+        self._Y, self._phase = lanes.states_before(), lanes.phase.copy()
+        self._memory = lanes.memory_before() if lanes.phase.any() else None  # None: the method starts
+
+    def last_finite(self, out: Floats, which: Integers) -> tuple[Floats, Floats]:
+        """Times (n,) and states (n, dim) of lanes that began a call finite and did not end it so.
+
+        ``which`` (n,) are their places, ``out`` is what the call wrote. They go once more through the pieces
+        in which they failed, and through those before of which a method carries anything.
+        """
+        block, lane = np.divmod(which, out.shape[3])
+        reached = out[block, :, :, lane]
+        failing = np.argmin(np.isfinite(reached).all(axis=2), axis=1)
+        first, end = 0 if self._method.carried else int(failing.min()), int(failing.max()) + 1
+        begin = reached[:, first - 1] if first else self._states(which)
+        seen = self._watched(
+            last_finite_observer(begin.dtype.type), self._span.part(first, end), which, begin
+        )
+        return seen[:, TIME], seen[:, STATE:]
+
+    def locate_stops(self, observation: Any, which: Integers, record: Floats) -> Floats:
+        """Records (n, rows) of trajectories that stopped in a call, of the stops themselves.
+
+        ``which`` (n,) are their places, ``record`` (n, rows) is what the observer of ``observation`` saw
+        after a whole step.
+        """
+        located = np.ascontiguousarray(record)
+        params = self._lanes.own_params()
+        for first in range(0, which.size, TOGETHER):
+            some, found = which[first : first + TOGETHER], located[first : first + TOGETHER]
+            seen = self._watched(observe_before, self._span, some, self._states(some), found[:, STOP_TIME])
+            begin, states = np.ascontiguousarray(seen[:, TIME]), np.ascontiguousarray(seen[:, STATE:])
+            own = np.repeat(params[None], some.size, axis=0) if params.ndim == 1 else params[some]
+            search = Search(begin, states, own, observation.params, empty=observation.record, record=found)
+            method: Any = self._method
+            if isinstance(method, ImplicitRungeKutta):
+                functions = self._rhs, self._rhs, inverse_by_elimination, observation.observe
+                scheme = method.tableau.scheme._replace(differences=True)
+                halve_implicit_steps(Calls(*map(callee, functions)), scheme, search)
+            else:
+                tableau = method.starter if isinstance(method, Adams) else method.tableau
+                called = callee(self._rhs), callee(observation.observe)
+                halve_steps(*called, weights_of(tableau), search)
+        return located
+
+    def _states(self, which: Integers) -> Floats:
+        """States (n, dim) at the places ``which`` (n,)."""
+        return self._lanes.rows(self._Y)[which]
+
+    def _watched(
+        self, observe: Any, span: Span, which: Integers, begin: Floats, first_row: Floats | float = 0.0
+    ) -> Floats:
+        """Records (n, 2 + dim) that ``observe`` makes of lanes which go through pieces of the call once more.
+
+        They begin with the states ``begin`` (n, dim), and the records with ``first_row``, time and state.
+        """
+        lanes, memory = self._lanes, self._memory
+        record = np.empty((which.size, STATE + begin.shape[1]))
+        record[:, FINITE], record[:, TIME], record[:, STATE:] = first_row, span.times[0], begin
+        carried = self._method.carried if memory is None else lanes.rows(memory)[which]
+        params = lanes.own_params()
+        params = params if params.ndim == 1 else params[which]
+        again = Lanes(
+            np.arange(which.size), begin, params, record, block_lanes=lanes.block_lanes, carried=carried
+        )
+        again.phase[:] = self._phase
+        batch = again.batch(span, np.zeros(0))
+        self._method.run(self._rhs, observe, batch)
+        return again.rows(batch.record)
