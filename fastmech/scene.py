@@ -130,6 +130,10 @@ def require_scene(scene: Any) -> None:
         raise InputError(f"scene = {shown(scene)}: must be a Scene")
 
 
+#: How HDF5 files begin.
+HDF5 = b"\x89HDF\r\n\x1a\n"
+
+
 def read_toml(path: str | Path) -> dict[str, Any]:
     """Content of a TOML file.
 
@@ -146,7 +150,12 @@ def read_text(path: str | Path) -> str:
         InputError: the file is missing, unreadable or not UTF-8.
     """
     try:
-        return path_of(path).read_bytes().decode("utf-8")
+        content = path_of(path).read_bytes()
+        if content.startswith(HDF5):
+            raise InputError(
+                f"{path}: is an HDF5 file, not TOML; fastmech run --from FILE.h5 computes a result again"
+            )
+        return content.decode("utf-8")
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
@@ -194,4 +203,9 @@ def explain(error: ValidationError, where: str, model: type[BaseModel]) -> str:
     if first["type"] == "missing":
         return f"{path}: missing"
     message = first["msg"].removeprefix("Value error, ")
+    limits = first.get("ctx", {})
+    if first["type"] == "too_long":
+        message = f"at most {limits['max_length']:,} entries are allowed"
+    elif first["type"] == "too_short":
+        message = f"at least {limits['min_length']} must be given"
     return f"{path} = {shown(first['input'])}: {message[0].lower() + message[1:]}"

@@ -208,6 +208,9 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     binary.write_bytes(b"\xff\xfe[scene]")
     with pytest.raises(InputError, match=r"binary\.toml: is not valid TOML: "):
         read_toml(binary)
+    binary.write_bytes(b"\x89HDF\r\n\x1a\n\0\0")
+    with pytest.raises(InputError, match=r"binary\.toml: is an HDF5 file, not TOML; fastmech run --from"):
+        read_toml(binary)
 
 
 @given(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.ensembles.checks import one_way
-from fastmech.errors import InputError, shown
+from fastmech.errors import InputError, shown, shown_name
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene, nearest, require_scene
 
@@ -68,9 +68,9 @@ def check_axis(scene: Scene, name: str, values: ArrayLike) -> Floats:
 
 def _check_values(scene: Scene, name: str, values: ArrayLike) -> Floats:
     names = list(Scene.model_fields)
-    if name not in names:
+    if not isinstance(name, str) or name not in names:
         hint = nearest(name, names) if isinstance(name, str) else f"allowed: {', '.join(names)}"
-        raise InputError(f"axes.{name}: unknown parameter; {hint}")
+        raise InputError(f"axes.{shown_name(name)}: unknown parameter; {hint}")
     try:
         array = np.asarray(values)
     except (TypeError, ValueError):

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import click
 
-from fastmech.cli.reporting import account, reporting_options
+from fastmech.cli.reporting import account, reporting_options, section_option
 
 
 @click.command(name="export")
 @click.argument("file", metavar="FILE.h5", type=click.Path(path_type=Path))
 @click.option("--to", "form", type=click.Choice(["csv", "nc", "npz"]), required=True, help="Format.")
-@click.option("--section", metavar="NAME", help="Only this section.")
+@section_option("Only this section.")
 @click.option(
     "--variable", "variables", metavar="NAME", multiple=True, help="Only this variable; repeatable."
 )

@@ -7,10 +7,12 @@ from pathlib import Path
 
 import click
 
+from fastmech.cli.reporting import section_option
+
 
 @click.command(name="info")
 @click.argument("file", metavar="[FILE]", required=False, type=click.Path(path_type=Path))
-@click.option("--section", metavar="NAME", help="Only this section, or a group in it: SECTION/GROUP.")
+@section_option("Only this section, or a group in it: SECTION/GROUP.")
 @click.option("--request", is_flag=True, help="Print the request that FILE was made from, as TOML.")
 @click.option("--system", is_flag=True, help="Show what fastmech runs on here: processor, vectors, caches.")
 def command(file: Path | None, section: str | None, request: bool, system: bool) -> None:

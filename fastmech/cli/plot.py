@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from fastmech.cli.reporting import account, reporting_options
+from fastmech.cli.reporting import account, reporting_options, section_option
 
 
 @click.command(name="plot")
@@ -17,7 +17,7 @@ from fastmech.cli.reporting import account, reporting_options
     type=click.Path(file_okay=False, path_type=Path),
     help="Folder for the pictures [default: FILE without its ending].",
 )
-@click.option("--section", metavar="NAME", help="Only this section.")
+@section_option("Only this section.")
 @click.option(
     "--format", "form", type=click.Choice(["png", "pdf", "svg"]), default="png", help="Format [default: png]."
 )

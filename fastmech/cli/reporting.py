@@ -33,6 +33,17 @@ def reporting_options(function: Command) -> Command:
     return function
 
 
+def section_option(about: str) -> Callable[[Command], Command]:
+    """Add ``--section NAME`` to a command, which may be given once."""
+
+    def once(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> str | None:
+        if len(given) > 1:
+            raise click.UsageError(f"--section is given {len(given)} times; give it once", context)
+        return given[0] if given else None
+
+    return click.option("--section", metavar="NAME", multiple=True, callback=once, help=about)
+
+
 class Account:
     """What a command has done, told line by line or as JSON in the end.
 

@@ -131,7 +131,10 @@ def check_rising(name: str, axis: Axis) -> None:
         InputError: they do.
     """
     if not axis.rises:
-        raise InputError(f"{name}: falls from {axis.array[0]:g} to {axis.array[-1]:g}, must rise")
+        raise InputError(
+            f"{name}: falls from {axis.array[0]:g} to {axis.array[-1]:g}, must rise; "
+            "give its values the other way round"
+        )
 
 
 def check_parameters(scene: Scene, axes: Mapping[str, Axis], where: str) -> None:

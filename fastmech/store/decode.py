@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from fastmech.errors import InputError, shown
 from fastmech.results import FILL, RESERVED_ATTRS, Variable, check_name, codes_of
-from fastmech.store.schema import DIM_NUMBER, DIM_NUMBERS, DIMENSION_ONLY
+from fastmech.store.schema import DIM_NUMBER, DIM_NUMBERS, DIMENSION_ONLY, ENCODING
 
 _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
 
@@ -125,6 +125,11 @@ def members(group: h5py.Group, where: str, left: Allowance) -> dict[str, h5py.Gr
     return found
 
 
+def is_characters(stored: h5py.Dataset) -> bool:
+    """Whether a stored array holds the characters of texts."""
+    return stored.dtype == np.dtype("S1") and stored.ndim > 0 and ENCODING in stored.attrs
+
+
 def is_dimension_only(stored: h5py.Dataset) -> bool:
     """Whether a stored array is a dimension without coordinate."""
     mark = stored.attrs.get("NAME", b"") if stored.is_scale else b""
@@ -138,7 +143,8 @@ def dimensions(stored: Iterable[h5py.Dataset]) -> dict[int, str]:
 
 def own_dimensions(stored: h5py.Dataset, dims: Mapping[int, str]) -> tuple[str, ...]:
     """Names of a variable's dimensions; ``dims`` are the group's."""
-    return tuple(dims[number] for number in stored.attrs[DIM_NUMBERS]) if stored.ndim else ()
+    own = tuple(dims[number] for number in stored.attrs[DIM_NUMBERS]) if stored.ndim else ()
+    return own[:-1] if is_characters(stored) else own
 
 
 @dataclass(frozen=True)
@@ -169,7 +175,7 @@ def about_variable(stored: h5py.Dataset, dims: Mapping[int, str], where: str) ->
         attrs = _variable_attrs(stored)
         text = h5py.check_string_dtype(stored.dtype) is not None
         return About(
-            dict(zip(own_dimensions(stored, dims), stored.shape, strict=True)),
+            dict(zip(own_dimensions(stored, dims), stored.shape, strict=False)),
             np.dtype(object) if text else stored.dtype,
             attrs.pop("units"),
             attrs.pop("long_name"),
@@ -201,7 +207,11 @@ def get_variable(
         attrs = _variable_attrs(stored)
         own_dims = own_dimensions(stored, dims)
         wanted = [(part or {}).get(dim, slice(None)) for dim in own_dims]
-        if text:
+        if is_characters(stored):
+            raw = np.ascontiguousarray(stored[()])
+            whole = raw.reshape(-1).view(f"S{raw.shape[-1]}").reshape(raw.shape[:-1])
+            data = np.char.decode(whole, "utf-8").astype(object)[tuple(wanted)]
+        elif text:  # schema 1 and 2
             data = np.asarray(stored.asstr()[()], dtype=object)[tuple(wanted)]
         elif all(piece == slice(None) for piece in wanted):
             data = np.asarray(stored[()])

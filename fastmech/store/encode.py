@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import h5py
@@ -10,7 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from fastmech.results import Dataset, Variable, cf_attrs
-from fastmech.store.schema import COMPACT_BYTES, DIM_NUMBER, DIM_NUMBERS, DIMENSION_ONLY
+from fastmech.store.schema import (
+    CHARACTERS,
+    COMPACT_BYTES,
+    DIM_NUMBER,
+    DIM_NUMBERS,
+    DIMENSION_ONLY,
+    ENCODING,
+)
 
 
 def put_dataset(group: h5py.Group, dataset: Dataset, numbers: Iterator[int]) -> None:
@@ -23,11 +31,13 @@ def put_dataset(group: h5py.Group, dataset: Dataset, numbers: Iterator[int]) -> 
         dataset: what.
         numbers: gives a number to each dimension, unique in the file.
     """
-    dim_numbers = {dim: np.int32(next(numbers)) for dim in dataset.sizes}
-    scales = {dim: _put_scale(group, dim, size, dataset) for dim, size in dataset.sizes.items()}
+    variables = {name: _characters(variable) for name, variable in dataset.variables.items()}
+    sizes = {dim: size for variable in variables.values() for dim, size in variable.sizes.items()}
+    dim_numbers = {dim: np.int32(next(numbers)) for dim in sizes}
+    scales = {dim: _put_scale(group, dim, size, variables) for dim, size in sizes.items()}
     for dim, scale in scales.items():
         scale.attrs[DIM_NUMBER] = dim_numbers[dim]
-    for name, variable in dataset.variables.items():
+    for name, variable in variables.items():
         if name in scales:
             stored = scales[name]
         else:
@@ -41,7 +51,7 @@ def put_dataset(group: h5py.Group, dataset: Dataset, numbers: Iterator[int]) -> 
         put_dataset(group.create_group(name, track_order=True), inner, numbers)
 
 
-def put_variable_attrs(stored: h5py.Dataset, variable: Variable) -> None:
+def put_variable_attrs(stored: h5py.Dataset, variable: Variable | _Characters) -> None:
     """Write what is said of a variable."""
     put_attrs(stored, cf_attrs(variable.units, variable.long_name, variable.attrs, variable.data.dtype))
 
@@ -49,18 +59,50 @@ def put_variable_attrs(stored: h5py.Dataset, variable: Variable) -> None:
 def put_attrs(target: h5py.Group | h5py.Dataset, attrs: Mapping[str, Any]) -> None:
     """Write attributes as `fastmech.results.checked_attrs` returns them."""
     for name, value in attrs.items():
-        target.attrs[name] = _fixed_length(value, 1) if isinstance(value, (str, tuple)) else value
+        if isinstance(value, (str, tuple)):
+            encoded = _encoded(value)
+            value = encoded.astype(h5py.string_dtype("utf-8", encoded.dtype.itemsize))
+        target.attrs[name] = value
 
 
-def _fixed_length(texts: npt.ArrayLike, least: int) -> npt.NDArray[np.bytes_]:
-    """UTF-8, padded with null bytes, which reading drops, to the longest text or to `least` bytes."""
+def _encoded(texts: npt.ArrayLike) -> npt.NDArray[np.bytes_]:
+    """UTF-8, padded with null bytes, which reading drops, to the longest text."""
     encoded = np.char.encode(np.asarray(texts, dtype=str), "utf-8")
-    return encoded.astype(h5py.string_dtype("utf-8", max(least, encoded.dtype.itemsize)))
+    return encoded.astype(f"S{max(1, encoded.dtype.itemsize)}")
 
 
-def _put_scale(group: h5py.Group, dim: str, size: int, dataset: Dataset) -> h5py.Dataset:
-    if dim in dataset.variables:
-        scale = _put_variable(group, dim, dataset.variables[dim])
+@dataclass(frozen=True)
+class _Characters:
+    """A variable of texts as its bytes, with one more dimension."""
+
+    dims: tuple[str, ...]
+    data: npt.NDArray[np.bytes_]
+    units: str
+    long_name: str
+    attrs: Mapping[str, Any]
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """Length of each dimension."""
+        return dict(zip(self.dims, self.data.shape, strict=True))
+
+
+def _characters(variable: Variable) -> Variable | _Characters:
+    """Texts as arrays of characters, which all netCDF readers decode alike; other variables as they are."""
+    if variable.data.dtype != object:
+        return variable
+    encoded = _encoded(variable.data)
+    length = encoded.dtype.itemsize
+    data = encoded.reshape(-1).view("S1").reshape(*encoded.shape, length)
+    dims = (*variable.dims, f"{CHARACTERS}{length}")
+    return _Characters(dims, data, variable.units, variable.long_name, variable.attrs)
+
+
+def _put_scale(
+    group: h5py.Group, dim: str, size: int, variables: Mapping[str, Variable | _Characters]
+) -> h5py.Dataset:
+    if dim in variables:
+        scale = _put_variable(group, dim, variables[dim])
         scale.make_scale(dim)
     else:
         # never written, so it takes no room: only its shape counts
@@ -69,10 +111,8 @@ def _put_scale(group: h5py.Group, dim: str, size: int, dataset: Dataset) -> h5py
     return scale
 
 
-def _put_variable(group: h5py.Group, name: str, variable: Variable) -> h5py.Dataset:
-    text = variable.data.dtype == object
-    # of two bytes at least: netCDF readers take strings of one byte for the characters of longer ones
-    data = _fixed_length(variable.data, 2) if text else variable.data
+def _put_variable(group: h5py.Group, name: str, variable: Variable | _Characters) -> h5py.Dataset:
+    data = variable.data
     if data.nbytes <= COMPACT_BYTES:
         stored = _create_compact(group, name, data.shape, data.dtype)
     else:
@@ -88,8 +128,8 @@ def _put_variable(group: h5py.Group, name: str, variable: Variable) -> h5py.Data
         )
     if data.size:
         stored[...] = data
-    if text:
-        put_attrs(stored, {"_Encoding": "utf-8"})
+    if isinstance(variable, _Characters):
+        put_attrs(stored, {ENCODING: "utf-8"})
     put_variable_attrs(stored, variable)
     return stored
 

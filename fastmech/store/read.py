@@ -19,12 +19,13 @@ from fastmech.store.decode import (
     dimensions,
     get_attrs,
     get_variable,
+    is_characters,
     is_dimension_only,
     members,
     named_damage,
     own_dimensions,
 )
-from fastmech.store.schema import CHANGE, FORMAT, SCHEMA_VERSION
+from fastmech.store.schema import CHANGE, DIM_NUMBERS, FORMAT, SCHEMA_VERSION
 from fastmech.store.select import Wanted, choose, take
 
 if TYPE_CHECKING:
@@ -167,7 +168,8 @@ class Section:
             stored = {n: member for n, member in all_members.items() if isinstance(member, h5py.Dataset)}
             variables = {name: member for name, member in stored.items() if not is_dimension_only(member)}
             dims = dimensions(stored.values())
-            self.sizes = {dim: int(stored[dim].size) for dim in dims.values()}
+            letters = {dims[m.attrs[DIM_NUMBERS][-1]] for m in variables.values() if is_characters(m)}
+            self.sizes = {dim: int(stored[dim].shape[0]) for dim in dims.values() if dim not in letters}
             self.attrs: dict[str, Any] = get_attrs(group)
         self.groups = {
             name: Section(member, f"{where}/{name}", left, inner=True)

@@ -9,8 +9,8 @@ A result file is an HDF5 file that netCDF-4 readers open:
   dimensions are HDF5 dimension scales of the same group: the coordinate variable of that name or, where
   there is none, an empty dataset with netCDF's own mark (`DIMENSION_ONLY`). They are attached as HDF5 asks,
   and by number as netCDF-4 does (`DIM_NUMBER`, `DIM_NUMBERS`), unique in the file.
-- Texts, in attributes and in variables, are UTF-8 of fixed length; string variables say so to xarray by the
-  attribute `_Encoding`.
+- Texts are UTF-8 padded with null bytes: in attributes strings of fixed length, in variables arrays of
+  characters with a last dimension of their own (`CHARACTERS`) and the attribute `_Encoding`, as in netCDF-3.
 - The root's attributes are `format`, `schema_version`, `Conventions` (CF), all of `PROVENANCE`, `title` and
   whatever the run adds, such as `request` (the TOML text), `seed`, `wall_time_s`, `method`.
 - A variable has one unit, which UDUNITS reads; integers that stand for no value are its `_FillValue`.
@@ -27,11 +27,11 @@ from __future__ import annotations
 FORMAT = "fastmech results"
 """Value of the root attribute `format`, by which a result file is known."""
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 """Value of the root attribute `schema_version`: raised when an older reader would misread a newer file.
 
 1: states as one variable with several units along `component`, curves among the variables of their map, no
-coordinates of `equilibrium` and `trajectory`.
+coordinates of `equilibrium` and `trajectory`. 2: texts of variables as strings of fixed length.
 """
 
 CONVENTIONS = "CF-1.11"
@@ -76,3 +76,9 @@ DIM_NUMBERS = "_Netcdf4Coordinates"
 
 DIMENSION_ONLY = "This is a netCDF dimension but not a netCDF variable."
 """netCDF-4's mark of a dimension without coordinate; the size follows, right-aligned in ten columns."""
+
+CHARACTERS = "string"
+"""Name of the last dimension of texts; the number of bytes follows."""
+
+ENCODING = "_Encoding"
+"""Attribute of arrays of characters: the encoding of their texts."""

@@ -76,7 +76,7 @@ class ScanLook:
         manifest = self.parts.manifest()
         self.manifest: Manifest | None = manifest
         if manifest is None:
-            if not target.exists():
+            if not (target.exists() or target.is_symlink()):  # reading says what is wrong with a link
                 raise InputError(f"{target}: there is neither a result nor a scan in progress")
             with open_results(target) as results:  # says what it is if it is no result
                 for place in results.groups:

@@ -341,3 +341,8 @@ def test_closed_curve_is_closed() -> None:
 def test_wrong_planes_are_refused(x: Any, y: Any, message: str) -> None:
     with pytest.raises(InputError, match=message):
         trace_folds(PAPER, x, y)
+
+
+def test_an_array_for_the_name_of_a_parameter_is_refused_in_a_line() -> None:
+    with pytest.raises(InputError, match=r"^axes\.\[\]: unknown parameter; allowed: m1, "):
+        find_folds(PAPER, np.zeros(0), [0.0, 1.0])  # type: ignore[arg-type]

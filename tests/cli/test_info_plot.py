@@ -134,3 +134,9 @@ def test_codes_are_named_by_the_file(invoke, done):
         "maximum": 1, "novel": 2, "minimum": 1,
     }  # fmt: skip
     assert "saddle" not in labels
+
+
+@pytest.mark.parametrize("command", [["info"], ["plot"], ["export", "--to", "csv"]])
+def test_section_given_twice_is_refused(invoke, done, command):
+    refused = invoke(*command, done, "--section", "rest", "--section", "swing")
+    assert_refused(refused, "--section is given 2 times; give it once")

@@ -163,6 +163,13 @@ def test_status_of_a_truncated_result(invoke, result, kept):
     assert_refused(invoke("status", result), f"{result}: is damaged", "truncated")
 
 
+@pytest.mark.parametrize("command", ["status", "info"])
+def test_a_loop_of_links_is_told(invoke, command):
+    Path("a.h5").symlink_to("b.h5")
+    Path("b.h5").symlink_to("a.h5")
+    assert_refused(invoke(command, "a.h5"), "a.h5: cannot be read: Too many levels of symbolic links")
+
+
 def test_status_of_a_snapshot_and_of_a_tile(invoke, tiny):
     assert invoke("run", tiny, "--tile", "swing:1", "--keep", "t1.h5").exit_code == 0
     assert_refused(invoke("status", "t1.h5"), "t1.h5: is one tile, not the result of a scan")

@@ -114,6 +114,10 @@ MISTAKES = {
         "scan.a.axes.F0 = {'start': 0.0, 'num': 2}: stop is missing",
     ),
     "axis of no point": (MAP + "axes.F0 = { start = 0.0, stop = 1.0, num = 0 }", "scan.a.axes.F0.num = 0: "),
+    "five axes": (
+        '[scan.a]\nkind = "basins"\n' + "".join(f"axes.a{k} = {{values = [0.0]}}\n" for k in range(5)),
+        ": at most 4 entries are allowed",
+    ),
     "not TOML": ("[scan", "is not valid TOML"),
 }
 

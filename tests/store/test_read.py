@@ -108,13 +108,13 @@ def test_other_hdf5_file(tmp_path: Path) -> None:
         open_results(tmp_path / "x.h5")
 
 
-@pytest.mark.parametrize("version", [3, 0, "1", 1.5])
+@pytest.mark.parametrize("version", [4, 0, "1", 1.5])
 def test_other_schema(version: Any, write: Write) -> None:
     path = write()
     with h5py.File(path, "r+") as file:
         file.attrs["schema_version"] = version
     with pytest.raises(
-        InputError, match=f"schema version {version!r}, but this fastmech reads versions 1 to 2"
+        InputError, match=f"schema version {version!r}, but this fastmech reads versions 1 to 3"
     ):
         open_results(path)
 

@@ -82,7 +82,7 @@ def test_xarray_opens_the_root(write: Callable[[], Path]) -> None:
     with xarray.open_dataset(write(), engine="h5netcdf") as root:
         assert float(root.m1) == 10.0
         assert root.m1.attrs == {"units": "kg", "long_name": "mass of M1"}
-        assert root.attrs["schema_version"] == 2
+        assert root.attrs["schema_version"] == 3
         assert root.attrs["Conventions"] == "CF-1.11"
         assert root.attrs["history"].startswith(root.attrs["created"])
         assert root.attrs["request"] == "[scene]\nm1 = 10\n"
@@ -106,6 +106,54 @@ def test_xarray_opens_the_tree(write: Callable[[], Path]) -> None:
         assert equilibria["kind"].attrs["flag_meanings"] == "stable unstable degenerate"
         assert equilibria["kind"].dtype == np.int8
         assert equilibria.attrs["methods"] == ["grid", "newton"]
+
+
+TEXTS = {
+    "end": Variable(("end",), ["A", "größer"]),
+    "sentence": Variable((), "one"),
+    "table": Variable(("end", "n"), [["", "b", "c"], ["d", "ef", ""]]),
+    "none": Variable(("empty",), np.empty(0, dtype=object)),
+}
+
+
+@pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
+def test_texts_in_every_reader(engine: str, tmp_path: Path, content: dict[str, Any]) -> None:
+    if engine == "netcdf4":
+        pytest.importorskip("netCDF4")
+    write_results(tmp_path / "t.h5", **{**content, "sections": {"s": Dataset(TEXTS)}})
+    with xarray.open_dataset(tmp_path / "t.h5", engine=engine, group="s") as opened:
+        assert dict(opened.sizes) == {"end": 2, "n": 3, "empty": 0}
+        for name, variable in TEXTS.items():
+            assert opened[name].dims == variable.dims
+            np.testing.assert_array_equal(opened[name].values, variable.data)
+
+
+def test_texts_are_stored_as_the_characters_that_netcdf_knows(
+    tmp_path: Path, content: dict[str, Any]
+) -> None:
+    import h5py
+
+    write_results(tmp_path / "t.h5", **{**content, "sections": {"s": Dataset(TEXTS)}})
+    with h5py.File(tmp_path / "t.h5") as file:
+        for name, variable in TEXTS.items():
+            stored = file["s"][name]
+            assert stored.dtype == np.dtype("S1")
+            assert stored.shape[:-1] == variable.data.shape
+    with open_results(tmp_path / "t.h5") as results:
+        assert results["s"].sizes == {"end": 2, "n": 3, "empty": 0}
+        assert results["s"].about("table").sizes == {"end": 2, "n": 3}
+        assert_same(results["s"].load(), Dataset(TEXTS))
+
+
+def test_texts_of_schema_2_are_read() -> None:
+    import h5py
+
+    path = Path(__file__).parents[1] / "older" / "schema_2.h5"
+    with open_results(path) as results, h5py.File(path) as file:
+        assert results.attrs["schema_version"] == 2
+        for section, name in (("snap", "end"), ("equilibria", "explanation")):
+            assert results[section][name].data.tolist() == file[section][name].asstr()[()].tolist()
+        assert results["equilibria"]["explanation"].dims == ("equilibrium",)
 
 
 @pytest.mark.parametrize("length", [100, 300_000])
