@@ -51,13 +51,15 @@ def problem_named(where: str) -> tuple[Any, Any, float, dict[str, Any]]:
         raise
     except Exception as error:
         told = one_line(f"{type(error).__name__}: {error}")
-        raise InputError(f"{shown_name(where)}: cannot be run: {told}") from None
+        raise InputError(f"{shown_name(file)}: {shown_name(name)}: cannot be run: {told}") from None
     match given:
         case (problem, starts, t_end):
             return problem, starts, t_end, {}
         case (problem, starts, t_end, dict(keywords)):
             return problem, starts, t_end, keywords
-    raise InputError(f"{shown_name(where)}: must return problem, starts, t_end, or these and keywords")
+    raise InputError(
+        f"{shown_name(file)}: {shown_name(name)}: must return problem, starts, t_end, or these and keywords"
+    )
 
 
 def tabled(found: WorkPrecision) -> list[str]:

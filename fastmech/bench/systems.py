@@ -222,8 +222,8 @@ def run_systems(
     quick: bool = False,
     stage: Callable[[str, int], Progress] = lambda name, total: lambda done: None,
 ) -> list[Path]:
-    """Measure and write ``systems.md`` into the folder ``out``; ``quick`` takes few starts and systems."""
-    systems = dict(list(SYSTEMS.items())[:2]) if quick else SYSTEMS
+    """Measure and write ``systems.md`` into the folder ``out``; ``quick`` takes few starts of one system."""
+    systems = dict(list(SYSTEMS.items())[1:2]) if quick else SYSTEMS
     n, targets = (QUICK, TARGETS[:2]) if quick else (STARTS, TARGETS)
     advance = stage("systems", 4 * len(systems))
     found = []

@@ -232,7 +232,7 @@ def test_a_search_that_finds_nothing_tells_how_far_it_went() -> None:
     """A heavy damper holds what the search tries; SciPy's Radau shows a heavier blow that leaves."""
     stiff = {"m1": 11.0034, "m2": 0.421206, "m3": 6.54221, "l": 0.535831, "c1": 24.237, "c2": 121.559}
     scene = fm.Scene(**stiff, beta=757.96, F0=133.265, alpha=0.0)
-    told = limit(scene, 0, "M1")
+    told = limit(scene, 0, "M1", 1.178)
     assert np.isnan(told.found.impulse)
     assert told.proved.impulse < told.tried_to < 640.0
     start = struck(scene, 0, "M1", np.array([640.0]), np.array([1.178]))[0]

@@ -71,11 +71,11 @@ def test_the_scene_of_a_request() -> None:
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("none", "mine.py: has no function none"),
-        ("number", "mine.py: has no function number"),
-        ("two", "mine.py:two: must return problem, starts, t_end"),
-        ("oscillate", "mine.py:oscillate: cannot be run: TypeError"),
-        ("wrong", "mine.py:wrong: .*unexpected keyword argument 'error'"),
+        ("none", ": has no function none"),
+        ("number", ": has no function number"),
+        ("two", ": two: must return problem, starts, t_end"),
+        ("oscillate", ": oscillate: cannot be run: TypeError"),
+        ("wrong", ": wrong: .*unexpected keyword argument 'error'"),
         ("unruly", "methods = 3: must be a list of names"),
     ],
 )
