@@ -51,15 +51,19 @@ def problem_named(where: str) -> tuple[Any, Any, float, dict[str, Any]]:
         raise
     except Exception as error:
         told = one_line(f"{type(error).__name__}: {error}")
-        raise InputError(f"{shown_name(file)}: {shown_name(name)}: cannot be run: {told}") from None
+        raise InputError(f"{_named(where)}: cannot be run: {told}") from None
     match given:
         case (problem, starts, t_end):
             return problem, starts, t_end, {}
         case (problem, starts, t_end, dict(keywords)):
             return problem, starts, t_end, keywords
-    raise InputError(
-        f"{shown_name(file)}: {shown_name(name)}: must return problem, starts, t_end, or these and keywords"
-    )
+    raise InputError(f"{_named(where)}: must return problem, starts, t_end, or these and keywords")
+
+
+def _named(where: str) -> str:
+    """File and function, so that a long path does not cut the function's name."""
+    file, _, name = where.rpartition(":")
+    return f"{shown_name(file)}: {shown_name(name)}"
 
 
 def tabled(found: WorkPrecision) -> list[str]:
@@ -96,7 +100,7 @@ def run_problem(
     try:
         found = work_precision(problem, starts, t_end, progress=advance, **keywords)
     except TypeError as error:
-        raise InputError(f"{shown_name(where)}: {error}") from None
+        raise InputError(f"{_named(where)}: {error}") from None
     lines = tabled(found)
     out.mkdir(parents=True, exist_ok=True)
     written, picture = out / "problem.md", out / "problem.png"
