@@ -210,7 +210,7 @@ def section(found: Measured, targets: Sequence[float]) -> list[str]:
         best = max(keeping, key=lambda row: row.rate, default=None)
         setting = "-" if best is None else f"{best.family.removeprefix('fastmech ')}, {best.setting}"
         rates = (rate(rows, target, 1.0) for rows in (found.fixed[n], found.heyoka))
-        told = (ratios(found, target)).values()
+        told = ratios(found, target).values()
         lines.append([f"{target:.0e}", setting, *(f"{r:,.0f}" for r in rates), *(f"{r:.2f}" for r in told)])
     head = ["error", "fastest fixed steps that keep it", "its rate [1/s]", "heyoka's [1/s]"]
     return [f"## {found.name}", "", *table([*head, *ratios(found, targets[0])], lines)]
