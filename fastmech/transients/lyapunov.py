@@ -109,8 +109,8 @@ def largest_lyapunov(
     times = np.linspace(0.0, t_end, PIECES + 1)
     exponents = np.empty((PIECES, len(starts)))
     analytic = problem.jacobian is not None
-    own = callee(problem.rhs), callee(problem.jacobian if analytic else problem.rhs)
-    flow, lanes = Flow(*own, analytic), Disturbed(Y, D, params, growth)
+    called = callee(problem.rhs), callee(problem.jacobian if analytic else problem.rhs)
+    flow, lanes = Flow(*called, analytic), Disturbed(Y, D, params, growth)
     method = Stages(TABLEAU.matrix, np.array(TABLEAU.b), np.array(TABLEAU.c))
     for piece in range(PIECES):
         advance_tangents(flow, method, lanes, float(times[piece]), h, steps)
