@@ -13,7 +13,7 @@ from fastmech.atlas.continuation import Curve, newton
 from fastmech.atlas.cover import apart, solutions
 from fastmech.atlas.enclosure import System
 from fastmech.atlas.folds import RESIDUAL, merging, sifted
-from fastmech.atlas.systems import Plane, families, fold, point_at, rest, suited
+from fastmech.atlas.systems import Plane, families, point_at, rest, suited
 from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
