@@ -43,8 +43,9 @@ def decides(function: Any, arguments: list[Any], steady: Collection[str]) -> boo
     """
     # Trigonometry as the mathematics library has it: the package's own looks whether angles are large.
     plain = rebuilt(function, __name__, {sin: math.sin, cos: math.cos})
-    options: Any = {"error_model": "numpy", "fastmath": {"nsz"}}  # NaN stays: asking for it is a decision
-    made: Any = numba.njit(tuple(arguments), no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)(plain)
+    options: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "error_model": "numpy"}
+    options["fastmath"] = {"nsz"}  # NaN stays: asking for it is a decision
+    made: Any = numba.njit(tuple(arguments), **options)(plain)
     text = made.inspect_llvm(made.signatures[0])
     outside = re.findall(r"^declare .*?@([\w.$]+)\(", text, re.MULTILINE)
     if not all(_SMOOTH.fullmatch(name) for name in outside):

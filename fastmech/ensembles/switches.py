@@ -111,11 +111,13 @@ def _blind_int(seen: Blind, x: float) -> int:
 
 #: What the copy calls in its own globals, and what one calls whose decisions nothing takes.
 _HELPERS = {f"_fastmech{f.__name__}": f for f in (_less, _at_most, _equal, _beside, _whole)}
-_BLIND = dict.fromkeys(("_fastmech_less", "_fastmech_at_most", "_fastmech_equal"), _blind_bool)
+_BLIND: dict[str, Any] = dict.fromkeys(
+    ("_fastmech_less", "_fastmech_at_most", "_fastmech_equal"), _blind_bool
+)
 _BLIND |= {"_fastmech_beside": _blind_beside, "_fastmech_whole": _blind_whole, "_fastmech_int": _blind_int}
-
+# type: ignore[no-untyped-call]
 #: Type of the first argument of such a copy.
-BLIND = kinds.Tuple((kinds.Array(kinds.int64, 1, "C"), VECTOR))
+BLIND: Any = kinds.Tuple((kinds.Array(kinds.int64, 1, "C"), VECTOR))
 
 _COMPARED = {
     ast.Lt: ("_less", 1),
