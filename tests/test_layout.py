@@ -177,7 +177,9 @@ def test_compiled_places_exist_and_hold_kernels() -> None:
     sources = compiled_sources()
     assert sources == sorted(path for path in MODULES if is_compiled(path))
     assert PACKAGE / "jit.py" in sources
-    assert sum(bool(decorators(tree(path)) & {"kernel", "inlined", "inlined_exactly"}) for path in sources) >= 10
+    assert (
+        sum(bool(decorators(tree(path)) & {"kernel", "inlined", "inlined_exactly"}) for path in sources) >= 10
+    )
 
 
 ENGINE = {"kernels", "integrators", "step_limits", "ensembles"}

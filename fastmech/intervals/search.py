@@ -26,7 +26,7 @@ FORCES = CalleeType(FORCES_SIGNATURE)
 TWO_PI = 2.0 * np.pi
 
 #: Why a box is left: numbers in ``Found.reason``.
-SMALL, UNDEFINED, LIMIT, AT_END, UNCLEAR = range(1, 6)
+SMALL, LIMIT, UNDEFINED, AT_END, UNCLEAR = range(1, 6)
 
 #: A box of this part of the domain is left as it is: about a fold, forces of order one are rounding in it.
 SMALLEST = 2.0**-30
@@ -170,12 +170,12 @@ def _note_left(box: Any, reason: int, found: Any, row: int) -> None:
 def _note_zero(forces: Any, p: Any, domain: Any, w: Any, count: int, found: Any, row: int) -> int:
     """Keep the one zero of ``w.whole[count]``, which lies in ``w.box``; how many such boxes there are now."""
     n = len(w.box)
-    for _ in range(10):  # K converges quadratically, to the rounding of the forces
+    for _ in range(50):  # K converges quadratically in the end, down to the rounding of the forces
         _shrink(forces, p, w)
-        halved = False
+        narrower = False
         for i in range(n):
-            halved |= w.box[i, 1] - w.box[i, 0] < 0.5 * (w.before[i, 1] - w.before[i, 0])
-        if not halved:
+            narrower |= w.box[i, 1] - w.box[i, 0] < 0.95 * (w.before[i, 1] - w.before[i, 0])
+        if not narrower:
             break
     for k in range(count):
         if _lies_in(w.box, w.whole[k], domain) or _lies_in(w.inner[k], w.whole[count], domain):

@@ -51,8 +51,10 @@ def source(statics: Statics) -> str:
     """The kernel's source: subexpressions are shared, and what only the Jacobian needs comes last."""
     q = [coordinate.symbol for coordinate in statics.coordinates]
     n = len(q)
-    forces = [sympy.sympify(force).rewrite(sympy.tan, sympy.sin) for force in statics.forces]
-    forces = [force.replace(sympy.tan, lambda x: sympy.sin(x) / sympy.cos(x)) for force in forces]
+    forces = [
+        sympy.sympify(force).replace(sympy.tan, lambda x: sympy.sin(x) / sympy.cos(x))
+        for force in statics.forces
+    ]
     jacobian = [force.diff(symbol) for force in forces for symbol in q]
     names = {symbol: f"q{i}" for i, symbol in enumerate(q)}
     names |= {symbol: f"p{i}" for i, symbol in enumerate(statics.parameters)}
@@ -61,12 +63,19 @@ def source(statics: Statics) -> str:
     needed = set().union(*(output.free_symbols for output in outputs[:n]))
     for symbol, expression in reversed(shared):
         needed |= expression.free_symbols if symbol in needed else set()
-    lines = [f"{names[s]} = {k}[{i}, 0], {k}[{i}, 1]" for k, x in (("q", q), ("p", statics.parameters)) for i, s in enumerate(x)]
+    lines = [
+        f"{names[s]} = {k}[{i}, 0], {k}[{i}, 1]"
+        for k, x in (("q", q), ("p", statics.parameters))
+        for i, s in enumerate(x)
+    ]
     written = {symbol: f"{names[symbol]} = {_text(expression, names)}" for symbol, expression in shared}
     lines += [written[symbol] for symbol, _ in shared if symbol in needed]
     for i, force in enumerate(outputs[:n]):
         lines.append(f"f[{i}, 0], f[{i}, 1] = {_text(force, names)}")
-    lines += ["if " + " or ".join(f"f[{i}, 0] > 0.0 or f[{i}, 1] < 0.0" for i in range(n)) + ":", "    return False"]
+    lines += [
+        "if " + " or ".join(f"f[{i}, 0] > 0.0 or f[{i}, 1] < 0.0" for i in range(n)) + ":",
+        "    return False",
+    ]
     lines += [written[symbol] for symbol, _ in shared if symbol not in needed]
     for k, slope in enumerate(outputs[n:]):
         lines.append(f"J[{k // n}, {k % n}, 0], J[{k // n}, {k % n}, 1] = {_text(slope, names)}")
@@ -77,6 +86,8 @@ def _text(x: Any, names: dict[Any, str]) -> str:
     """An expression as calls of interval operations."""
     if x in names:
         return names[x]
+    if x.is_Symbol:
+        raise InputError(f"forces: {shown(str(x))} is neither a coordinate nor a parameter")
     if x.is_Number or x in (sympy.pi, sympy.E):
         return _constant(x)
     if x.is_Add:
@@ -120,4 +131,9 @@ def _constant(x: Any) -> str:
             raise InputError(f"forces: {shown(str(x))} is not a finite number")
         return f"({value!r}, {value!r})"
     exact, value = Fraction(int(x.p), int(x.q)), float(x)
-    return repr((value if value <= exact else nextafter(value, -inf), value if value >= exact else nextafter(value, inf)))
+    return repr(
+        (
+            value if value <= exact else nextafter(value, -inf),
+            value if value >= exact else nextafter(value, inf),
+        )
+    )
