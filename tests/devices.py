@@ -43,7 +43,7 @@ def chain(n: int) -> Statics:
 
 
 def truss(width: float = 0.7) -> Statics:
-    """Von Mises: two bars of stiffness k and length L0 from (-1, 0) and (1, 0) to (x, y), load P downwards."""
+    """Von Mises: bars of stiffness k and length L0 from (-1, 0) and (1, 0) to (x, y), load P downwards."""
     k, L0, P = sp.symbols("k L0 P", real=True)
     bars = [sp.sqrt((x - side) ** 2 + y**2) for side in (-1, 1)]
     U = sum(k / 2 * (bar - L0) ** 2 for bar in bars) + P * y

@@ -1,12 +1,12 @@
-"""Intervals of real numbers as pairs (low, high), every operation rounded outward; compiled or in Python.
+"""Intervals of real numbers as pairs (low, high), each operation rounded outward; compiled or in Python.
 
-An operation gives an interval that holds the exact result for all numbers of its operands. What may lie beyond
-``LARGEST``, and what is not defined everywhere on its operand, is ``(-inf, inf)``; an end is never NaN, and
-none is infinite alone.
+An operation gives an interval that holds the exact result for all numbers of its operands. What may lie
+beyond ``LARGEST``, and what is not defined everywhere on its operands, is ``(-inf, inf)``; an end is never
+NaN, and none is infinite alone.
 
 The processor rounds to nearest. ``below`` and ``above`` step from a rounded result past its neighbours by two
-operations without a branch (Rump, Zimmermann, Boldo, Melquiond: Computing predecessor and successor in rounding
-to nearest, BIT 49, 2009, theorem 2.2). Nothing may be fused or reordered for that, see ``fastmech.jit.EXACT``.
+operations without a branch (Rump, Zimmermann, Boldo, Melquiond: Computing predecessor and successor in
+rounding to nearest, BIT 49, 2009). Nothing may be fused or reordered for that, see ``fastmech.jit.EXACT``.
 Sine, cosine, exponential, logarithm and arctangent are the C library's; those in use err by about one unit in
 the last place, four are allowed here.
 """
@@ -171,7 +171,7 @@ def cos(a: Interval) -> Interval:
     """Cosine."""
     if a[0] >= -_FARTHEST and a[1] <= _FARTHEST:
         return _wave(a, (np.cos(a[0]), np.cos(a[1])), 0.0)
-    return -1.0, 1.0
+    return (-1.0, 1.0) if magnitude(a) < np.inf else (-np.inf, np.inf)
 
 
 @inlined_exactly
@@ -179,7 +179,7 @@ def sin(a: Interval) -> Interval:
     """Sine."""
     if a[0] >= -_FARTHEST and a[1] <= _FARTHEST:
         return _wave(a, (np.sin(a[0]), np.sin(a[1])), 0.5)
-    return -1.0, 1.0
+    return (-1.0, 1.0) if magnitude(a) < np.inf else (-np.inf, np.inf)
 
 
 @inlined_exactly
@@ -199,4 +199,4 @@ def log(a: Interval) -> Interval:
 @inlined_exactly
 def atan(a: Interval) -> Interval:
     """Arctangent."""
-    return _library(np.arctan(a[0]), np.arctan(a[1]))
+    return _library(np.arctan(a[0]), np.arctan(a[1])) if magnitude(a) < np.inf else (-np.inf, np.inf)

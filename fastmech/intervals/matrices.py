@@ -46,9 +46,9 @@ def invert(J: Any, A: Any, C: Any) -> bool:
 
 @called
 def orientation(J: Any, A: Any) -> int:
-    """Sign of the determinant of every matrix in ``J`` (n, n, 2), 0 if not proved; ``A`` like ``J`` is scratch.
+    """Sign of the determinant of every matrix in ``J`` (n, n, 2), 0 if not proved.
 
-    Gaussian elimination; a pivot is the entry that is proved to be farthest from zero.
+    Gaussian elimination in ``A``, of J's shape; a pivot is the entry that is proved farthest from zero.
     """
     n = len(J)
     sign = 1

@@ -1,11 +1,11 @@
 """Branch and prune: all zeros of forces in a box or on a torus, each proved to be there and to be alone.
 
 A box is dropped where a force, or the mean-value form of one, cannot be zero in it, and shrinks to what the
-Krawczyk operator K leaves of it (Neumaier: Interval methods for systems of equations, 1990, section 5.1). Where
-K maps a box that holds the one at hand into its own inside, there is one zero in that larger box and no other:
-boxes that lie in it are dropped, so that a zero on the face of two boxes is listed once. Other boxes are cut in
-two. Boxes are treated in the order of their making, all about equally small: a limit on their number leaves
-the small ones, at the places that need a closer look.
+Krawczyk operator K leaves of it (Neumaier: Interval methods for systems of equations, 1990, section 5.1).
+Where K maps a box that holds the one at hand into its own inside, that larger box has one zero: boxes in it
+are dropped, so that a zero on the face of two boxes is listed once. Other boxes are cut in two. Boxes are
+treated in the order of their making, all about equally small: a limit on their number leaves the small ones,
+at the places that need a closer look.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Found(NamedTuple):
 
 
 class _Work(NamedTuple):
-    """Scratch arrays of a search in n coordinates."""
+    """Scratch arrays of a search."""
 
     box: Any  #: the box at hand (n, 2)
     before: Any  #: as it was before it shrank (n, 2)
@@ -68,6 +68,13 @@ class _Work(NamedTuple):
     inner: Any  #: where it lies in them (most, n, 2)
 
 
+def work(n: int, most: int) -> _Work:
+    """Scratch arrays for ``n`` coordinates and at most ``most`` zeros."""
+    shapes = [(n, 2)] * 8 + [(n, n, 2)] * 2 + [(n, n)] * 2 + [(most, n, 2)] * 2
+    return _Work(*map(np.empty, shapes))
+
+
+_WORK = named_tuple([MATRIX] * 8 + [CUBE] * 2 + [MATRIX] * 2 + [CUBE] * 2, _Work)
 _CUBES = lanes(types.float64, 4)
 _BYTES = types.Array(types.int8, 2, "C")
 _FOUND = named_tuple([_CUBES, _BYTES, _BYTES, _CUBES, _BYTES, types.Array(types.int64, 2, "C")], Found)
@@ -78,7 +85,7 @@ _EMPTY, _ONE, _SHRUNK, _UNKNOWN = range(4)
 
 @called
 def _shrink(forces: Any, p: Any, w: Any) -> int:
-    """Shrink ``w.box`` to what K leaves of it; ``_ONE`` where K lies in its inside, so that it has one zero."""
+    """Shrink ``w.box`` to what K leaves of it; ``_ONE`` where K lies in its inside: it has one zero."""
     n = len(w.box)
     for i in range(n):
         w.before[i, 0], w.before[i, 1] = w.box[i, 0], w.box[i, 1]
@@ -220,7 +227,7 @@ def _inflate(w: Any) -> bool:
 
 @called
 def _cut(w: Any, domain: Any) -> int:
-    """The coordinate along which the forces change most over the box; -1 where it is as small as any may be."""
+    """The coordinate along which forces change most over the box; -1 where it is as small as any may be."""
     n = len(w.box)
     widest, smeared, direction, known = 0.0, -1.0, 0, True
     for j in range(n):
@@ -253,7 +260,7 @@ def _treat(forces: Any, p: Any, domain: Any, w: Any) -> tuple[int, int, float]:
     With ``_ONE`` the box ``w.before`` has one zero, which lies in ``w.box``.
     """
     became = _shrink(forces, p, w)
-    if became == _EMPTY or became == _ONE:
+    if became in (_EMPTY, _ONE):
         return became, 0, 0.0
     part = 1.0
     for i in range(len(w.box)):
@@ -262,7 +269,7 @@ def _treat(forces: Any, p: Any, domain: Any, w: Any) -> tuple[int, int, float]:
     _copy(w.box, w.rest)
     if became == _SHRUNK and _inflate(w):
         again = _shrink(forces, p, w)
-        if again == _EMPTY or again == _ONE:
+        if again in (_EMPTY, _ONE):
             return again, 0, 0.0
         _copy(w.rest, w.box)
     return became, direction, part
@@ -303,7 +310,7 @@ def _search(forces: Any, p: Any, domain: Any, boxes: Any, w: Any, found: Any, ro
     kept = 0
     for k in range(min(found.count[row, 1], found.left.shape[1])):  # some lie in what was proved later
         _copy(found.left[row, k], w.box)
-        if found.reason[row, k] == AT_END or not _known(w, count, domain):
+        if found.reason[row, k] >= AT_END or not _known(w, count, domain):
             _copy(w.box, found.left[row, kept])
             found.reason[row, kept] = found.reason[row, k]
             kept += 1
@@ -311,8 +318,8 @@ def _search(forces: Any, p: Any, domain: Any, boxes: Any, w: Any, found: Any, ro
             found.count[row, 1] -= 1
 
 
-@kernel(types.void(FORCES, MATRIX, CUBE, CUBE, _FOUND), **EXACT)
-def search(forces: Any, domain: Any, parameters: Any, boxes: Any, found: Any) -> None:
+@kernel(types.void(FORCES, MATRIX, CUBE, CUBE, _WORK, _FOUND), **EXACT)
+def search(forces: Any, domain: Any, parameters: Any, boxes: Any, w: Any, found: Any) -> None:
     """All zeros of ``forces`` in a domain, for each row of ``parameters`` (rows, count, 2).
 
     Args:
@@ -320,24 +327,8 @@ def search(forces: Any, domain: Any, parameters: Any, boxes: Any, found: Any) ->
         domain: (n, 3): lowest and highest value of each coordinate and its period, 0 if it has none.
         parameters: lowest and highest value of each parameter; what is found holds for all in between.
         boxes: scratch (2 limit + 2, n, 2): ``limit`` boxes are treated at most for each row.
+        w: scratch of :func:`work`.
         found: what was found; its counts are zero.
     """
-    n, most = len(domain), found.zeros.shape[1]
-    w = _Work(
-        np.empty((n, 2)),
-        np.empty((n, 2)),
-        np.empty((n, 2)),
-        np.empty((n, 2)),
-        np.empty((n, 2)),
-        np.empty((n, 2)),
-        np.empty((n, 2)),
-        np.empty((n, 2)),
-        np.empty((n, n, 2)),
-        np.empty((n, n, 2)),
-        np.empty((n, n)),
-        np.empty((n, n)),
-        np.empty((most, n, 2)),
-        np.empty((most, n, 2)),
-    )
     for row in range(len(parameters)):
         _search(forces, parameters[row], domain, boxes, w, found, row)

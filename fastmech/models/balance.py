@@ -36,9 +36,10 @@ _FUNCTIONS = {
 
 
 def balance_kernel(statics: Statics) -> Any:
-    """``forces(q, p, f, J)``: enclosures of forces (n, 2) and Jacobian (n, n, 2) over a box ``q`` (n, 2).
+    """``forces(q, p, f, J)`` writes enclosures of forces (n, 2) and Jacobian (n, n, 2) over a box (n, 2).
 
-    Parameters ``p`` (count, 2) are intervals too. False, with ``J`` not written, where a force cannot be zero.
+    The box ``q`` and the parameters ``p`` (count, 2) are intervals. Where a force cannot be zero the kernel
+    returns False and does not write ``J``.
 
     Raises:
         InputError: an expression has a function or a symbol of which no enclosure is known.
@@ -99,7 +100,8 @@ def _text(x: Any, names: dict[Any, str]) -> str:
         return text
     if x.is_Mul:
         sign, factors = ("neg({})", (-x).as_ordered_factors()) if x.args[0] == -1 else ("{}", x.args)
-        above, below = [], []
+        above: list[str] = []
+        below: list[str] = []
         for factor in factors:
             falls = factor.is_Pow and factor.exp.is_Rational and factor.exp < 0
             (below if falls else above).append(_text(1 / factor if falls else factor, names))

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Protocol, overload
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,8 @@ from fastmech.callee import callee
 from fastmech.equilibria import find
 from fastmech.equilibria.outcome import Outcome
 from fastmech.errors import InputError, shown
-from fastmech.intervals.search import AT_END, LIMIT, TWO_PI, UNCLEAR, UNDEFINED, Found, search
+from fastmech.intervals.search import AT_END, LIMIT, TWO_PI, UNCLEAR, UNDEFINED, Found, search, work
 from fastmech.models.statics import Statics
-from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
 
@@ -38,19 +37,6 @@ CURVE = 20.0
 
 #: Boxes that are tried to show the sign of a force on one end of a range.
 FACES = 1000
-
-
-class HasStatics(Protocol):
-    """A mechanism, for what is found here."""
-
-    @property
-    def parameters(self) -> Mapping[str, float]:
-        """Values in the order of its statics."""
-        ...
-
-    def statics(self) -> Statics:
-        """Coordinates, parameters and forces at rest."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,10 +124,6 @@ class RestingPlaces(Sequence[RestingPlace]):
         return "\n".join([*lines, self.certificate.sentence])
 
 
-@overload
-def find_equilibria(system: Scene, at: float = math.inf) -> find.Equilibria: ...
-@overload
-def find_equilibria(system: HasStatics, at: float = math.inf) -> RestingPlaces: ...
 def find_equilibria(system: Any, at: float = math.inf) -> find.Equilibria | RestingPlaces:
     """All equilibria of a scene or a mechanism, with a proof that none is missing.
 
@@ -212,7 +194,7 @@ def search_rows(statics: Statics, rows: Floats, limit: int | None = None, most_l
     )
     boxes = np.empty((2 * (limit or LIMITS[n]) + 2, n, 2))
     forces = callee(_balance(statics))
-    search(forces, _domain(statics), np.repeat(rows[:, :, None], 2, 2), boxes, found)
+    search(forces, _domain(statics), np.repeat(rows[:, :, None], 2, 2), boxes, work(n, MOST), found)
     return found
 
 
@@ -333,11 +315,11 @@ def _merged(
 
 
 def expected_sum(statics: Statics, p: Floats) -> int | None:
-    """The sum of the signs of the stiffness' determinants over all equilibria: the degree of the forces.
+    """The sum over all equilibria of the signs of the stiffness' determinants: the degree of the forces.
 
-    Without ranges it is 0, the Euler characteristic of a torus. With ranges it is known where on each of their
-    ends the force along the coordinate keeps one sign, which is proved by boxes: then the forces can be
-    deformed, without a zero on the boundary, into ones that point along the coordinate at both ends, and are
+    Without ranges it is 0, the Euler characteristic of a torus. With ranges it is known where on each of
+    their ends the force along the coordinate keeps one sign, which is proved by boxes: then forces can be
+    deformed, without a zero on the boundary, into ones that depend on that coordinate alone, and are
     constant along a periodic angle if there is one. Else None.
     """
     domain = _domain(statics)
@@ -355,24 +337,21 @@ def _sign_on_end(statics: Statics, p: Floats, domain: Floats, k: int, end: int) 
     """Sign of the force along coordinate ``k`` on one end of its range; 0 if it is not proved to have one."""
     face = domain[:, :2].copy()
     face[k] = domain[k, end]
-    n = len(face)
-    f, J, todo, signs = np.empty((n, 2)), np.empty((n, n, 2)), [face], set()
-    forces = _balance(statics)
+    n, todo, signs = len(face), [face], set[int]()
+    f, J, forces = np.empty((n, 2)), np.empty((n, n, 2)), _balance(statics)
     for _ in range(FACES):
         if not todo:
-            return int(signs.pop())
-        box = todo.pop(0)
+            return signs.pop()
+        box = todo.pop()
         forces(box, p, f, J)
-        if f[k, 0] <= 0.0 <= f[k, 1]:
-            j = int(np.argmax((box[:, 1] - box[:, 0]) / (domain[:, 1] - domain[:, 0])))
-            if box[j, 1] == box[j, 0]:
-                return 0
-            for side in (0, 1):
-                half = box.copy()
-                half[j, side] = box[j].mean()
-                todo.append(half)
-        else:
+        if not f[k, 0] <= 0.0 <= f[k, 1]:
             signs.add(1 if f[k, 0] > 0.0 else -1)
-            if len(signs) > 1:
-                return 0
+        elif n > 1:
+            j = int(np.argmax(np.diff(box)[:, 0] / (domain[:, 1] - domain[:, 0])))
+            todo += [box.copy(), box.copy()]
+            todo[-1][j, 0] = todo[-2][j, 1] = box[j].mean()
+        elif not signs:
+            return 0
+        if len(signs) > 1:
+            return 0
     return 0

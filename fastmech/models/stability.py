@@ -1,4 +1,4 @@
-"""Stability of a mechanism's equilibrium: by its potential, by Hurwitz, by the eigenvalues, and in one word."""
+"""Stability of a mechanism's equilibrium: by its potential, by Hurwitz, by the eigenvalues, in one word."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def assess(linear: Linear, morse_index: int | None) -> Stability:
     undamped = not damping.any()
     if undamped:
         squares, square_errors = _eigenvalues(-k)
-        half = np.sqrt(squares.astype(np.complex128))
+        half = np.sqrt(squares)
         size = np.maximum(np.abs(half), np.sqrt(square_errors))
         roots, errors = np.concatenate([half, -half]), np.tile(square_errors / np.maximum(size, 1e-300), 2)
     else:
@@ -121,7 +121,9 @@ def _eigenvalues(matrix: Floats) -> tuple[NDArray[np.complex128], Floats]:
     overlap = np.abs(np.einsum("ik,ik->k", left.conj(), right))
     conditions = np.linalg.norm(left, axis=0) * np.linalg.norm(right, axis=0) / np.maximum(overlap, 1e-300)
     size = _ROUNDING * len(matrix) * np.linalg.norm(matrix)
-    return values, np.minimum(size * conditions, np.linalg.norm(matrix) * (size ** (1.0 / len(matrix))))
+    return values.astype(np.complex128), np.minimum(
+        size * conditions, np.linalg.norm(matrix) * (size ** (1.0 / len(matrix)))
+    )
 
 
 def _by_spectrum(

@@ -13,7 +13,7 @@ CRITICAL_LOAD = 3.5 - math.sqrt(2.0)
 
 
 def ziegler(load: float, b: float = 0.0, k: float = 1.0) -> Linear:
-    """Masses 2 m at the joint and m at the tip, m = l = 1; torsion springs k and dashpots b (Ziegler 1952)."""
+    """Masses 2 m at the joint and m at the tip, m = l = 1; torsion springs k and dashpots b (Ziegler)."""
     mass = np.array([[3.0, 1.0], [1.0, 1.0]])
     stiffness = np.array([[2.0 * k - load, load - k], [-k, k]])
     return Linear(mass, b * np.array([[2.0, -1.0], [-1.0, 1.0]]), stiffness)
@@ -86,7 +86,7 @@ def test_what_the_potential_decides() -> None:
 
 
 def test_gyroscopic_forces_may_hold_a_maximum_but_not_with_damping() -> None:
-    """Kelvin, Tait, Chetaev: q'' + (g J + d) q' - q = 0 is bounded for g > 2, d = 0, and unstable for d > 0."""
+    """Kelvin, Tait, Chetaev: q'' + (g J + d) q' - q = 0 is bounded for g > 2 and d = 0 alone."""
     turn = np.array([[0.0, -1.0], [1.0, 0.0]])
     for gyro, damping, word in ((2.1, 0.0, "critical"), (1.9, 0.0, "unstable"), (2.1, 0.01, "unstable")):
         linear = Linear(np.eye(2), gyro * turn + damping * np.eye(2), -np.eye(2))
