@@ -31,6 +31,10 @@ SMALL, LIMIT, UNDEFINED, AT_END, UNCLEAR = range(1, 6)
 #: A box of this part of the domain is left as it is: about a fold, forces of order one are rounding in it.
 SMALLEST = 2.0**-30
 
+#: Factor at most by which a box that is as small as any may be is widened for a proof: where derivatives are
+#: large beside each other, K of the box itself may be all rounding.
+MOST_WIDENED = 1e5
+
 #: Part of its width at which a box is cut: symmetric mechanisms have zeros in the middles.
 CUT = 0.487
 
@@ -212,17 +216,21 @@ def _note_zero(forces: Any, p: Any, domain: Any, w: Any, count: int, found: Any,
 
 
 @called
-def _inflate(w: Any) -> bool:
-    """Widen the box that is left by a fifth, where K was narrower than the box that it was of."""
-    n = len(w.box)
-    for i in range(n):
+def _narrower(w: Any) -> bool:
+    """Whether K was narrower than the box that it was of, along every coordinate."""
+    for i in range(len(w.box)):
         if not (w.image[i, 1] - w.image[i, 0] < 0.9 * (w.before[i, 1] - w.before[i, 0])):
             return False
-    for i in range(n):
-        c = 0.5 * w.box[i, 0] + 0.5 * w.box[i, 1]
-        half = 0.6 * (w.box[i, 1] - w.box[i, 0]) + MARGIN * (1.0 + abs(c))
-        w.box[i, 0], w.box[i, 1] = c - half, c + half
     return True
+
+
+@called
+def _widen(w: Any, domain: Any, factor: float) -> None:
+    """The rest of a box, wider by a factor and by no less than rounding."""
+    for i in range(len(w.box)):
+        c, width = 0.5 * w.rest[i, 0] + 0.5 * w.rest[i, 1], w.rest[i, 1] - w.rest[i, 0]
+        half = 0.5 * factor * (width + MARGIN * (abs(c) + domain[i, 1] - domain[i, 0]))
+        w.box[i, 0], w.box[i, 1] = c - half, c + half
 
 
 @called
@@ -264,14 +272,19 @@ def _treat(forces: Any, p: Any, domain: Any, w: Any) -> tuple[int, int, float]:
         return became, 0, 0.0
     part = 1.0
     for i in range(len(w.box)):
-        part *= (w.box[i, 1] - w.box[i, 0]) / max(w.before[i, 1] - w.before[i, 0], 1e-300)
+        width = w.before[i, 1] - w.before[i, 0]
+        if width > SMALLEST * (domain[i, 1] - domain[i, 0]):  # a narrower one says nothing about the others
+            part *= (w.box[i, 1] - w.box[i, 0]) / width
     direction = _cut(w, domain)
     _copy(w.box, w.rest)
-    if became == _SHRUNK and _inflate(w):
+    factor, last = 1.2, 1.2 if direction >= 0 else MOST_WIDENED
+    while became == _SHRUNK and factor <= last and (direction < 0 or _narrower(w)):
+        _widen(w, domain, factor)
         again = _shrink(forces, p, w)
         if again in (_EMPTY, _ONE):
             return again, 0, 0.0
-        _copy(w.rest, w.box)
+        factor *= 8.0
+    _copy(w.rest, w.box)
     return became, direction, part
 
 

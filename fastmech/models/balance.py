@@ -8,6 +8,7 @@ from math import inf, isfinite, nextafter
 from typing import Any
 
 import sympy
+from sympy.simplify.fu import TR8
 
 from fastmech.errors import InputError, shown
 from fastmech.generated import new_module, run_module
@@ -49,13 +50,18 @@ def balance_kernel(statics: Statics) -> Any:
 
 
 def source(statics: Statics) -> str:
-    """The kernel's source: subexpressions are shared, and what only the Jacobian needs comes last."""
+    """The kernel's source: subexpressions are shared, and what only the Jacobian needs comes last.
+
+    Products of sines and cosines become sums where that is shorter: then an angle occurs less often, and
+    what is counted twice over a box less.
+    """
     q = [coordinate.symbol for coordinate in statics.coordinates]
     n = len(q)
     forces = [
         sympy.sympify(force).replace(sympy.tan, lambda x: sympy.sin(x) / sympy.cos(x))
         for force in statics.forces
     ]
+    forces = [min(force, sympy.expand(TR8(sympy.expand(force))), key=sympy.count_ops) for force in forces]
     jacobian = [force.diff(symbol) for force in forces for symbol in q]
     names = {symbol: f"q{i}" for i, symbol in enumerate(q)}
     names |= {symbol: f"p{i}" for i, symbol in enumerate(statics.parameters)}

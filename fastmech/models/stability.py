@@ -84,11 +84,13 @@ def assess(linear: Linear, morse_index: int | None) -> Stability:
     rate = float(max(np.sqrt(np.abs(by_mass[1]).max()), np.abs(by_mass[0]).max())) or 1.0
     c, k = by_mass[0] / rate, by_mass[1] / rate**2
     undamped = not damping.any()
+    roots: NDArray[np.complex128]
     if undamped:
         squares, square_errors = _eigenvalues(-k)
         half = np.sqrt(squares)
         size = np.maximum(np.abs(half), np.sqrt(square_errors))
-        roots, errors = np.concatenate([half, -half]), np.tile(square_errors / np.maximum(size, 1e-300), 2)
+        roots = np.concatenate([half, -half])
+        errors = np.tile(square_errors / np.maximum(size, 1e-300), 2)
     else:
         roots, errors = _eigenvalues(np.block([[np.zeros((n, n)), np.eye(n)], [-k, -c]]))
     order = np.lexsort((-roots.imag, -roots.real))

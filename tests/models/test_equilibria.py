@@ -156,6 +156,19 @@ def test_chains_of_pendulums(n: int, indices: list[int]) -> None:
         )
 
 
+def test_pendulums_that_do_not_know_each_other() -> None:
+    """Zeros at 0, where rounding knows no bound, beside ones at pi, where it does."""
+    m, g, k = sp.symbols("m g k", real=True)
+    U = -2 * m * g * sp.cos(phi) - m * g * sp.cos(theta) - k * sp.cos(phi - theta)
+    found = prove_equilibria(of_potential([angle(phi), angle(theta)], (m, g, k), U), [1.0, 9.81, 0.0])
+    assert found.certificate.complete
+    assert found.certificate.boxes < 200
+    assert found.kind == ("minimum", "saddle", "saddle", "maximum")
+    np.testing.assert_allclose(
+        np.cos(found.position), [[1, 1], [1, -1], [-1, 1], [-1, -1]], rtol=0, atol=1e-15
+    )
+
+
 def test_von_mises_truss() -> None:
     """On the symmetric path it snaps at P = 2 k L0 (1 - cos^(2/3) a)^(3/2)."""
     k, a = 100.0, 0.5
