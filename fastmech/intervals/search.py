@@ -181,12 +181,14 @@ def _note_left(box: Any, reason: int, found: Any, row: int) -> None:
 def _note_zero(forces: Any, p: Any, domain: Any, w: Any, count: int, found: Any, row: int) -> int:
     """Keep the one zero of ``w.whole[count]``, which lies in ``w.box``; how many such boxes there are now."""
     n = len(w.box)
-    for _ in range(50):  # K converges quadratically in the end, down to the rounding of the forces
+    for _ in range(200):  # K converges quadratically in the end, down to the rounding of the forces
         _shrink(forces, p, w)
-        narrower = False
+        again = False
         for i in range(n):
-            narrower |= w.box[i, 1] - w.box[i, 0] < 0.95 * (w.before[i, 1] - w.before[i, 0])
-        if not narrower:
+            width = w.box[i, 1] - w.box[i, 0]
+            again |= width < 0.95 * (w.before[i, 1] - w.before[i, 0])
+            again |= width > SMALLEST * (domain[i, 1] - domain[i, 0])
+        if not again:
             break
     for k in range(count):
         if _lies_in(w.box, w.whole[k], domain) or _lies_in(w.inner[k], w.whole[count], domain):

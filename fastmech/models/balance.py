@@ -50,18 +50,14 @@ def balance_kernel(statics: Statics) -> Any:
 
 
 def source(statics: Statics) -> str:
-    """The kernel's source: subexpressions are shared, and what only the Jacobian needs comes last.
-
-    Products of sines and cosines become sums where that is shorter: then an angle occurs less often, and
-    what is counted twice over a box less.
-    """
+    """The kernel's source: subexpressions are shared, and what only the Jacobian needs comes last."""
     q = [coordinate.symbol for coordinate in statics.coordinates]
     n = len(q)
     forces = [
         sympy.sympify(force).replace(sympy.tan, lambda x: sympy.sin(x) / sympy.cos(x))
         for force in statics.forces
     ]
-    forces = [min(force, sympy.expand(TR8(sympy.expand(force))), key=sympy.count_ops) for force in forces]
+    forces = [min(force, _sums(force), key=sympy.count_ops) for force in forces]
     jacobian = [force.diff(symbol) for force in forces for symbol in q]
     names = {symbol: f"q{i}" for i, symbol in enumerate(q)}
     names |= {symbol: f"p{i}" for i, symbol in enumerate(statics.parameters)}
@@ -87,6 +83,16 @@ def source(statics: Statics) -> str:
     for k, slope in enumerate(outputs[n:]):
         lines.append(f"J[{k // n}, {k % n}, 0], J[{k // n}, {k % n}, 1] = {_text(slope, names)}")
     return _SOURCE.format(body="\n".join(f"    {line}" for line in lines))
+
+
+def _sums(force: Any) -> Any:
+    """Products of sines and cosines as sums: angles occur less often, so that bounds are closer.
+
+    Quotients and roots stay: expanded, they are bounded worse.
+    """
+    if any(not (power.exp.is_Integer and power.exp > 0) for power in force.atoms(sympy.Pow)):
+        return force
+    return sympy.expand(TR8(sympy.expand(force)))
 
 
 def _text(x: Any, names: dict[Any, str]) -> str:
