@@ -113,8 +113,16 @@ def unlisted(statics: Statics, values: Any, starts: int, seed: int = 0) -> list[
     return missing
 
 
+def slider_metric_and_damping(scene: fm.Scene, phi: float, theta: float) -> tuple[Any, Any]:
+    """The masses of three points, and a damper on the third, which slides."""
+    slide = math.sin(phi) * (1 + math.cos(phi) / math.sqrt(4 - math.sin(phi) ** 2))
+    a12 = scene.m2 * math.sin(phi + theta)
+    metric = np.array([[scene.m1 + scene.m2 + scene.m3 * slide**2, a12], [a12, scene.m2]])
+    return scene.l**2 * metric, scene.l**2 * np.diag([scene.beta * slide**2, 0.0])
+
+
 def test_the_paper_s_mechanism_has_the_equilibria_of_its_theory() -> None:
-    """Two hundred random scenes: positions, Morse indices and Hessians as the counting theorem gives them."""
+    """Two hundred random scenes: positions, Morse indices, Hessians and verdicts."""
     statics = slider_pendulum()
     rng = np.random.default_rng(18)
     counts = set()
@@ -140,6 +148,8 @@ def test_the_paper_s_mechanism_has_the_equilibria_of_its_theory() -> None:
             ]
             assert mine.morse_index == item.morse_index
             assert mine.kind == item.kind
+            linear = Linear(*slider_metric_and_damping(scene, item.phi, item.theta), mine.stiffness)
+            assert assess(linear, mine.morse_index).verdict == fm.classify(scene, item).verdict
             np.testing.assert_allclose(mine.stiffness, item.hessian, atol=1e-8 * np.abs(item.hessian).max())
     assert counts == {4, 6}
 
