@@ -45,12 +45,12 @@ if TYPE_CHECKING:
     from fastmech.ensembles.integrate import integrate
     from fastmech.ensembles.status import Status
     from fastmech.ensembles.system import System
-    from fastmech.equilibria.find import find_equilibria
     from fastmech.errors import InputError
     from fastmech.kernels.sincos import cos, sin
     from fastmech.mechanism.reactions import reactions
+    from fastmech.models.equilibria import find_equilibria
+    from fastmech.models.stability import classify
     from fastmech.scene import Scene
-    from fastmech.stability.classify import classify
     from fastmech.step_limits.predict import largest_stable_step
     from fastmech.step_limits.warning import step_warning
     from fastmech.store.read import open_results
@@ -75,7 +75,7 @@ _MODULES = {
     "basin_stability": "fastmech.basins.measures.fractions",
     "boundary_dimension": "fastmech.basins.measures.dimension",
     "brute_force_shock": "fastmech.basins.shock",
-    "classify": "fastmech.stability.classify",
+    "classify": "fastmech.models.stability",
     "copy_labels": "fastmech.basins.copies",
     "copy_of_label": "fastmech.basins.copies",
     "cos": "fastmech.kernels.sincos",
@@ -83,7 +83,7 @@ _MODULES = {
     "disturb": "fastmech.basins.disturbed",
     "disturbed_motion": "fastmech.disturbance.motion",
     "erosion": "fastmech.basins.erosion",
-    "find_equilibria": "fastmech.equilibria.find",
+    "find_equilibria": "fastmech.models.equilibria",
     "find_folds": "fastmech.atlas.fold_points",
     "find_snap": "fastmech.atlas.snap",
     "finite_time_basin_stability": "fastmech.basins.measures.fractions",

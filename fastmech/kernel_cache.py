@@ -32,6 +32,7 @@ COMPILED = (
     "generated.py",
     "mechanism",
     "kernels",
+    "intervals",
     "integrators",
     "ensembles",
     "equilibria",
