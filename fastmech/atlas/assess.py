@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fastmech.equilibria.solve import INDICES
-from fastmech.jit import CUBE, MATRIX, STATUSES, kernel
+from fastmech.equilibria.solve import SOLUTION, Solution
+from fastmech.jit import CUBE, MATRIX, kernel, named_tuple
 from fastmech.stability.criteria import assess_one
 
 Floats = NDArray[np.float64]
@@ -17,42 +19,34 @@ ROOTS = types.Array(types.complex128, 3, "C")
 VERDICTS = types.Array(types.int8, 3, "C")
 
 
-@kernel(types.void(MATRIX, MATRIX, MATRIX, MATRIX, INDICES, STATUSES, CUBE, ROOTS, MATRIX, MATRIX, VERDICTS))
-def assess(
-    coefficients: Floats,
-    phi: Floats,
-    theta: Floats,
-    radius: Floats,
-    index: Codes,
-    count: Codes,
-    hessian: Floats,
-    eigenvalues: NDArray[np.complex128],
-    frequency: Floats,
-    decay: Floats,
-    verdict: Codes,
-) -> None:
-    """Stability of the first ``count`` equilibria of every row; the other slots get NaN and -1.
+class Assessed(NamedTuple):
+    """What :func:`assess` writes for n scenes; slots without an equilibrium hold NaN and -1."""
 
-    Args:
-        coefficients: (n, 8) rows of ``fastmech.mechanism.coefficients.Coefficients``, the force frozen.
-        phi, theta, radius, index: (n, slots) from ``fastmech.equilibria.solve.solve``.
-        count: (n,).
-        hessian: (n, slots, 3) second derivatives of U over m2 l^2 (phi phi, phi theta, theta theta); written.
-        eigenvalues: (n, slots, 4) [1/s], largest real part first; written.
-        frequency: (n, slots) lowest undamped natural frequency [rad/s], NaN where U falls; written.
-        decay: (n, slots) decay rate of the slowest mode [1/s], NaN unless U has a minimum; written.
-        verdict: (n, slots, 4) Sylvester's, Hurwitz's, the eigenvalues' and the joint ``Verdict``; written.
-    """
+    hessian: Floats  #: (n, slots, 3) derivatives of U over m2 l^2 (phi phi, phi theta, theta theta)
+    eigenvalues: NDArray[np.complex128]  #: (n, slots, 4) [1/s], largest real part first
+    frequency: Floats  #: (n, slots) lowest undamped natural frequency [rad/s], NaN where U falls
+    decay: Floats  #: (n, slots) decay rate of the slowest mode [1/s], NaN unless U has a minimum
+    verdict: Codes  #: (n, slots, 4) Sylvester's, Hurwitz's, the eigenvalues' and the joint ``Verdict``
+
+
+ASSESSED: Any = named_tuple([CUBE, ROOTS, MATRIX, MATRIX, VERDICTS], Assessed)
+
+
+@kernel(types.void(MATRIX, SOLUTION, ASSESSED))
+def assess(coefficients: Floats, found: Solution, out: Assessed) -> None:
+    """Stability of the equilibria of every row of (n, 8) reduced coefficients, the force frozen."""
+    hessian, eigenvalues, verdict = out.hessian, out.eigenvalues, out.verdict
+    frequency, decay = out.frequency, out.decay
     for row in range(coefficients.shape[0]):
-        for i in range(phi.shape[1]):
-            if i >= count[row]:
+        for i in range(found.phi.shape[1]):
+            if i >= found.count[row]:
                 frequency[row, i], decay[row, i] = np.nan, np.nan
                 for k in range(3):
                     hessian[row, i, k] = np.nan
                 for k in range(4):
                     eigenvalues[row, i, k], verdict[row, i, k] = complex(np.nan, np.nan), -1
                 continue
-            place = (phi[row, i], theta[row, i], radius[row, i], int(index[row, i]))
+            place = (found.phi[row, i], found.theta[row, i], found.radius[row, i], int(found.index[row, i]))
             a = assess_one(coefficients[row], place, eigenvalues[row, i])
             hessian[row, i, 0], hessian[row, i, 1], hessian[row, i, 2] = a.s.k11, a.s.k12, a.s.k22
             low = a.squares[0]

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from fastmech.atlas.axes import coefficient_columns
 from fastmech.atlas.margin import margins
-from fastmech.atlas.regions import RANKS, label_points
+from fastmech.atlas.regions import Edges, Forest, Place, Points, label_points
 from fastmech.equilibria.outcome import Outcome
 from fastmech.equilibria.search import MOST
-from fastmech.equilibria.solution import Solution, solve_rows
+from fastmech.equilibria.solution import solve_rows
+from fastmech.equilibria.solve import Solution
 from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -109,10 +110,10 @@ def continued(ground: Ground, start: Floats, end: Floats, count: int) -> tuple[S
         return None
     n = len(rows)
     label = np.empty((n, MOST), dtype=np.int32)
-    regions = label_points(
-        rows, found.phi, found.theta, found.index, found.count, 0, 0,
-        np.ones(1, dtype=np.int64), np.array([n]), 0, np.empty(n, dtype=np.int32),
-        np.empty((n, RANKS), dtype=np.int8), np.empty((n, RANKS), dtype=np.int8), label,
-        np.empty((n, 2), dtype=np.int64), np.empty((n, MOST), dtype=np.int8), np.empty(1, dtype=np.int64),
-    )  # fmt: skip
+    forest = Forest()
+    forest.make_room(n)
+    edges = Edges(np.empty((n, 2), np.int64), np.empty((n, MOST), np.int8), np.empty(1, np.int64))
+    points = Points(rows, found.phi, found.theta, found.index, found.count)
+    line = Place(0, 0, np.ones(1, dtype=np.int64), np.array([n]))
+    regions = label_points(points, line, 0, forest.trees, label, edges)
     return (found, label) if regions == 1 else None

@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.atlas.assess import assess
+from fastmech.atlas.assess import Assessed, assess
 from fastmech.atlas.axes import Floats, check_axes, grid_coefficients
 from fastmech.atlas.coincidence import coincidences
 from fastmech.atlas.sheets import SheetBuilder
@@ -18,7 +18,7 @@ from fastmech.atlas.wells import barriers, least_impulses
 from fastmech.ensembles import checks
 from fastmech.ensembles.threads import thread_count
 from fastmech.equilibria.search import MOST
-from fastmech.equilibria.solve import solve
+from fastmech.equilibria.solve import Solution, solve
 from fastmech.mechanism.impulse import POINTS
 from fastmech.scene import Scene
 
@@ -216,15 +216,14 @@ def solve_block(
     """
     places = (coefficients, out.phi, out.theta)
     expected = np.empty(len(coefficients), dtype=np.int8)
-    solve(
-        coefficients, True, out.phi, out.theta, out.energy, out.radius,
-        out.morse_index, out.count, expected, out.outcome, out.fold_margin,
+    found = Solution(
+        out.phi, out.theta, out.energy, out.radius, out.morse_index, out.count, expected, out.outcome,
+        out.fold_margin,
     )  # fmt: skip
+    solve(coefficients, True, found)
     out.count_stable[:] = np.count_nonzero(out.morse_index == 0, axis=1)
-    assess(
-        *places, out.radius, out.morse_index, out.count,
-        out.hessian, out.eigenvalues, out.frequency, out.decay_time, out.verdict,
-    )  # fmt: skip
+    own = out.hessian, out.eigenvalues, out.frequency, out.decay_time, out.verdict
+    assess(coefficients, found, Assessed(*own))
     coincidences(*places, out.radius, out.morse_index, out.count, out.outcome, out.coincidence)
     limits = out.shock_limit_m1, out.shock_limit_m2, out.shock_limit_m3
     for array in (out.depth, *limits):

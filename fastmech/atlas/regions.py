@@ -12,6 +12,7 @@ regions.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numba import types
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 from fastmech.atlas.matching import match, trust
 from fastmech.equilibria.search import MOST
 from fastmech.equilibria.solve import INDICES
-from fastmech.jit import INTEGERS, MATRIX, STATUSES, inlined, kernel
+from fastmech.jit import INTEGERS, MATRIX, STATUSES, inlined, kernel, named_tuple
 
 Floats = NDArray[np.float64]
 Codes = NDArray[np.int8]
@@ -81,66 +82,59 @@ def join(parent: Labels, rank: Codes, mine: Labels, other: Labels, partner: Code
     return True
 
 
-@kernel(
-    types.int64(
-        MATRIX,
-        MATRIX,
-        MATRIX,
-        INDICES,
-        STATUSES,
-        types.int64,
-        types.int64,
-        INTEGERS,
-        INTEGERS,
-        types.int64,
-        LABEL_LIST,
-        INDICES,
-        INDICES,
-        LABELS,
-        PLACES,
-        INDICES,
-        INTEGERS,
-    )
-)
-def label_points(
-    coefficients: Floats,
-    phi: Floats,
-    theta: Floats,
-    index: Codes,
-    count: Codes,
-    ghosts: int,
-    offset: int,
-    strides: NDArray[np.int64],
-    lengths: NDArray[np.int64],
-    regions: int,
-    parent: Labels,
-    rank: Codes,
-    morse: Codes,
-    label: Labels,
-    borders: NDArray[np.int64],
-    partners: Codes,
-    border_count: NDArray[np.int64],
-) -> int:
-    """Label the points after the first ``ghosts``, which have their labels already.
+class Points(NamedTuple):
+    """Points of a grid, consecutive in memory order, as ``solve`` fills them."""
 
-    Args:
-        coefficients, phi, theta, index, count: rows as ``solve`` fills them, consecutive in memory order.
-        ghosts: rows that are known from before.
-        offset: position of row 0 in the whole grid.
-        strides, lengths: of the grid's axes, in points.
-        regions: number of regions so far.
-        parent, rank: trees of regions, with room for one more region for every point; written.
-        morse: (room, 8) Morse index of every label; written.
-        label: (n, 6); written.
-        borders: (room, 2) receives the edges of the grid across which not everything continues: row of
-            the second end, and axis.
-        partners: (room, 6) slot of the second end that each slot of the first continues to, -1: none.
-        border_count: (1,) how many such edges; written.
+    coefficients: Floats  #: (n, 8)
+    phi: Floats  #: (n, 6)
+    theta: Floats
+    index: Codes  # type: ignore[assignment]
+    count: Codes  # type: ignore[assignment]  #: (n,)
+
+
+class Place(NamedTuple):
+    """Where points lie in their grid."""
+
+    ghosts: int  #: first points, which have their labels already
+    offset: int  #: position of point 0 in the whole grid
+    strides: NDArray[np.int64]  #: of the grid's axes, in points
+    lengths: NDArray[np.int64]  #: the same
+
+
+class Trees(NamedTuple):
+    """Trees of regions, with room for one more region for every point."""
+
+    parent: Labels
+    rank: Codes
+    morse: Codes  #: (room, 8) Morse index of every label
+
+
+class Edges(NamedTuple):
+    """Edges of the grid across which not everything continues."""
+
+    borders: NDArray[np.int64]  #: (room, 2) point of the second end, and axis
+    partners: Codes  #: (room, 6) slot of the second end that each slot of the first continues to, -1: none
+    filled: NDArray[np.int64]  #: (1,) how many
+
+
+POINTS = named_tuple([MATRIX, MATRIX, MATRIX, INDICES, STATUSES], Points)
+PLACE = named_tuple([types.int64, types.int64, INTEGERS, INTEGERS], Place)
+TREES = named_tuple([LABEL_LIST, INDICES, INDICES], Trees)
+EDGES = named_tuple([PLACES, INDICES, INTEGERS], Edges)
+
+
+@kernel(types.int64(POINTS, PLACE, types.int64, TREES, LABELS, EDGES))
+def label_points(
+    points: Points, place: Place, regions: int, trees: Trees, label: Labels, edges: Edges
+) -> int:
+    """Label points (n, 6) of which some may have their labels already; all but the first two are written.
 
     Returns:
-        The number of regions now.
+        The number of regions, of which there were so many before.
     """
-    axes = strides.shape[0]
+    coefficients, phi, theta, index, count = points
+    parent, rank, borders = trees.parent, trees.rank, edges.borders
+    axes = place.strides.shape[0]
     partner = np.empty((axes, MOST), dtype=np.int8)
     border = np.empty(axes, dtype=np.bool_)
     between = np.empty(coefficients.shape[1])
@@ -152,16 +146,16 @@ def label_points(
                 regular[p, i] = trust(coefficients[p], phi[p, i], theta[p, i])
                 known[p] += 1
     filled = 0
-    for p in range(ghosts, len(count)):
+    for p in range(place.ghosts, len(count)):
         n = int(count[p])
         for i in range(MOST):
             label[p, i] = NO_LABEL
         settled = False
         for axis in range(axes):
             border[axis] = False
-            if ((offset + p) // strides[axis]) % lengths[axis] == 0:
+            if ((place.offset + p) // place.strides[axis]) % place.lengths[axis] == 0:
                 continue
-            q = p - strides[axis]
+            q = p - place.strides[axis]
             m = int(count[q])
             pairs = match(
                 coefficients[q],
@@ -194,16 +188,16 @@ def label_points(
             for i in range(n):
                 if index[p, i] >= 0:
                     label[p, i] = regions * RANKS + i
-                    morse[regions, i] = index[p, i]
+                    trees.morse[regions, i] = index[p, i]
             regions += 1
         for axis in range(axes):
             if border[axis]:
-                q = p - strides[axis]
+                q = p - place.strides[axis]
                 borders[filled, 0], borders[filled, 1] = p, axis
                 for i in range(MOST):
-                    partners[filled, i] = partner[axis, i] if i < count[q] else -1
+                    edges.partners[filled, i] = partner[axis, i] if i < count[q] else -1
                 filled += 1
-    border_count[0] = filled
+    edges.filled[0] = filled
     return regions
 
 
@@ -224,6 +218,11 @@ class Forest:
     parent: Labels = field(default_factory=lambda: np.empty(0, dtype=np.int32))
     rank: Codes = field(default_factory=lambda: np.empty((0, RANKS), dtype=np.int8))
     morse: Codes = field(default_factory=lambda: np.empty((0, RANKS), dtype=np.int8))  #: of every label
+
+    @property
+    def trees(self) -> Trees:
+        """The trees as they are now."""
+        return Trees(self.parent, self.rank, self.morse)
 
     def make_room(self, n: int) -> None:
         """Make room for n more regions."""

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,7 @@ from numpy.typing import NDArray
 from fastmech.atlas.borders import Borders
 from fastmech.atlas.channels import Ground
 from fastmech.atlas.joining import branches, join_islands, separate
-from fastmech.atlas.regions import RANKS, Forest, Labels, label_points
+from fastmech.atlas.regions import RANKS, Edges, Forest, Labels, Place, Points, label_points
 from fastmech.equilibria.search import MOST
 from fastmech.scene import Scene
 
@@ -83,10 +84,9 @@ class SheetBuilder:
         borders = np.empty((n * len(lengths), 2), dtype=np.int64)
         partners = np.empty((n * len(lengths), MOST), dtype=np.int8)
         filled = np.zeros(1, dtype=np.int64)
-        forest.regions = label_points(
-            *arrays, ghosts, self._done - ghosts, strides, lengths, forest.regions,
-            forest.parent, forest.rank, forest.morse, label, borders, partners, filled,
-        )  # fmt: skip
+        own: Any = arrays
+        place, edges = Place(ghosts, self._done - ghosts, strides, lengths), Edges(borders, partners, filled)
+        forest.regions = label_points(Points(*own), place, forest.regions, forest.trees, label, edges)
         rows, axis = borders[: filled[0]].T
         self._borders.add(
             self._done - ghosts,

@@ -40,6 +40,7 @@ from fastmech.disturbance.size import confining_energy
 from fastmech.ensembles import checks
 from fastmech.ensembles.energy_bounds import breaks_energy_bounds
 from fastmech.ensembles.integrate import integrate
+from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import LABELS, Status, counts
 from fastmech.ensembles.threads import thread_count
@@ -188,7 +189,7 @@ def label_starts(
         warn_of_step([certificate.scene], dt, method)
     if settle_radius is not None:
         settle_radius = checks.number("settle_radius", settle_radius, "rad", above=0.0)
-    finite = np.asarray(np.isfinite(begin)).all(axis=1).reshape(-1)
+    finite = finite_rows(begin)
     coarse = coarse_steps(reduce(scene), begin) if dt is None else np.full(len(begin), dt)
     found = Paths.empty(len(begin))
     status = np.where(finite, Status.UNDECIDED, Status.START_NOT_FINITE).astype(np.int8)

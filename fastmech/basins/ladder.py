@@ -14,6 +14,7 @@ from fastmech.basins.runs import Paths
 from fastmech.capture.certificate import Certificate
 from fastmech.disturbance.size import size_at
 from fastmech.ensembles.integrate import integrate
+from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.status import Status
 from fastmech.errors import StepWarning
 from fastmech.mechanism.coefficients import Coefficients, reduce
@@ -71,7 +72,7 @@ def climb(
             status[torn[lingers(torn)]] = Status.AT_SADDLE
         bad = free[impossible(ends[free], last.state[free])]
         status[ends[bad]] = Status.STEP_TOO_LARGE
-        status[ends[free[~np.isfinite(last.state[free]).all(axis=1)]]] = Status.NOT_FINITE
+        status[ends[free[~finite_rows(last.state[free])]]] = Status.NOT_FINITE
         for kind in (Status.NOT_CONVERGED, Status.STEP_TOO_LARGE):
             status[ends[free[last.status[free] == kind]]] = kind
         # The finest step alone is within the limit: nothing bears it out.
@@ -94,7 +95,7 @@ def tell_the_same(
         longest: by how much the times at which they stop may differ [s].
         push: decaying force over m2 l that the bounding energies count with, 0 where there is none [1/s^2].
     """
-    finite = np.asarray(np.isfinite(coarse.state) & np.isfinite(fine.state)).all(axis=1)
+    finite = finite_rows(coarse.state) & finite_rows(fine.state)
     same = (coarse.code == fine.code) & (coarse.turns == fine.turns).all(axis=1) & finite
     same &= np.abs(coarse.stop - fine.stop) < longest
     apart = np.abs(np.where(finite.reshape(-1, 1), coarse.state - fine.state, np.inf))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fastmech.capture.certificate import Certificate
 from fastmech.capture.observe import CAPTURE_TIME, STOP_ENERGY, TURNS_PHI, TURNS_THETA
 from fastmech.ensembles.ends import STOP_CODE, STOP_TIME
+from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.run import run_ensemble
 from fastmech.ensembles.spans import MOST_STEPS
 from fastmech.errors import InputError
@@ -134,5 +135,5 @@ def follow(
         paths.put(running, reached)
         paths.steps += int(np.rint(end / interval - passed).sum()) * substeps
         passed += ahead
-        running = running[~stopped & np.isfinite(run.states[-1]).all(axis=1)]
+        running = running[~stopped & finite_rows(run.states[-1])]
     return paths

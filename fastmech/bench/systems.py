@@ -1,4 +1,4 @@
-"""Own systems: fixed steps and ``tol`` beside heyoka, at equal errors of everyone and of 99 %.
+"""Own systems and the mechanism: fixed steps and ``tol`` beside heyoka, at equal errors of all and of 99 %.
 
 Systems, starts and ends are those of :mod:`fastmech.bench.own_systems`. The truth is that of
 :mod:`fastmech.bench.extended`. heyoka has the rate of the setting with the error asked for, in hindsight.
@@ -17,7 +17,7 @@ import numpy as np
 from fastmech.bench import heyoka_series
 from fastmech.bench.entrant import Entrant, Floats, Prepare, Solve
 from fastmech.bench.entrants import missing
-from fastmech.bench.extended import ROUNDINGS, extended
+from fastmech.bench.extended import ROUNDINGS, extended, scene_rates
 from fastmech.bench.frontier import work_precision
 from fastmech.bench.measure import Row, measure
 from fastmech.bench.own_systems import STARTS, SYSTEMS, OwnSystem, spoken
@@ -29,6 +29,7 @@ from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.work_precision import order_statistic
 from fastmech.integrators.methods import find_method
+from fastmech.scene import Scene
 
 #: Errors at which rates are compared.
 TARGETS = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
@@ -47,6 +48,9 @@ FACTOR = 3.0
 
 LEVELS = {0.99: "99 %", 1.0: "largest"}
 
+#: The mechanism: Table 1 under its constant force for 10 s, with rates at the start up to so much [rad/s].
+SCENES = {"Table 1, from rest": 0.0, "Table 1, moving": 3.0}
+
 
 class Measured(NamedTuple):
     """What was measured on one system."""
@@ -64,6 +68,15 @@ def problem_of(name: str, own: OwnSystem, n: int) -> Problem:
     rhs, starts = spoken(own.rhs, sin=np.sin, cos=np.cos, inverse_cube=lambda s: s**-1.5), own.starts(n)
     truth = extended(lambda t, y: np.stack(rhs(t, *y)), starts, own.t_end, ROUNDINGS[1])
     return Problem(name, name, own.system(), starts, truth.astype(np.float64), own.t_end, 1.0)
+
+
+def mechanism(name: str, n: int) -> Problem:
+    """The mechanism with its first n starts and their truth."""
+    scene, t_end, low = Scene(alpha=0.0), 10.0, np.array([0.5, -1.0, -SCENES[name], -SCENES[name]])
+    high = np.array([2.5, 1.0, SCENES[name], SCENES[name]])
+    starts = np.ascontiguousarray(np.random.default_rng(1).uniform(low, high, (STARTS, 4))[:n])
+    truth = extended(scene_rates(scene), starts, t_end, ROUNDINGS[1])
+    return Problem(name, name, scene, starts, truth.astype(np.float64), t_end, 1.0)
 
 
 def candidates(problem: Problem, targets: Sequence[float]) -> Iterator[dict[str, Any]]:
@@ -224,21 +237,27 @@ def run_systems(
 ) -> list[Path]:
     """Measure and write ``systems.md`` into the folder ``out``; ``quick`` takes few starts of one system."""
     systems = dict(list(SYSTEMS.items())[1:2]) if quick else SYSTEMS
+    scenes = () if quick else tuple(SCENES)
     n, targets = (QUICK, TARGETS[:2]) if quick else (STARTS, TARGETS)
-    advance = stage("systems", 4 * len(systems))
-    found = []
-    for name, own in systems.items():
-        problem = problem_of(name, own, n)
-        advance(1)
-        found.append(measured(problem, targets, advance))
+    advance = stage("systems", 4 * (len(systems) + len(scenes)))
+
+    def measure_all(problems: Iterator[Problem]) -> list[Measured]:
+        found = []
+        for problem in problems:
+            advance(1)
+            found.append(measured(problem, targets, advance))
+        return found
+
+    own = measure_all(problem_of(name, system, n) for name, system in systems.items())
+    lines = report(own, targets, measure_all(mechanism(name, n) for name in scenes))
     out.mkdir(parents=True, exist_ok=True)
     path = out / "systems.md"
-    path.write_text("\n".join(report(found, targets)) + "\n", encoding="utf-8")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return [path]
 
 
-def report(found: list[Measured], targets: Sequence[float]) -> list[str]:
-    """The study as Markdown."""
+def report(found: list[Measured], targets: Sequence[float], scenes: Sequence[Measured] = ()) -> list[str]:
+    """The study of own systems, and of ``scenes`` of the mechanism, as Markdown."""
     n = max(found[0].fixed)
     lines = [
         "# Own systems beside heyoka",
@@ -253,5 +272,9 @@ def report(found: list[Measured], targets: Sequence[float]) -> list[str]:
         *summary(found, targets),
     ]
     for one in found:
+        lines += section(one, targets)
+    if scenes:
+        lines += ["# The mechanism beside heyoka", "", *summary(list(scenes), targets)]
+    for one in scenes:
         lines += section(one, targets)
     return lines

@@ -69,14 +69,15 @@ class Lanes:
         record: Floats,
         block_lanes: int,
         carried: int | Floats,
+        together: int = 1,
     ) -> None:
         """From states (n, dim) of the members, their parameters and their records.
 
         ``params`` are those of all (count,), or of each (n, count); ``record`` is the empty one (rows,) of
         all, or those of each (n, rows). ``carried`` is how many states their method carries of each, or what
-        it carries (n, carried * dim).
+        it carries (n, carried * dim). An observer looks at so many blocks ``together``.
         """
-        self.block_lanes = block_lanes
+        self.block_lanes, self._together = block_lanes, together
         self.members = members
         self.phase = np.zeros(PHASE)
         self._arrange(states, params, record)
@@ -93,20 +94,23 @@ class Lanes:
         self._width = -(-len(states) // (blocks * unit)) * unit
         self.Y, self._shared = self._blocked(states), params.ndim == 1
         self.params = self._filled(params, 1) if self._shared else self._blocked(params)
-        self.record = self._filled(record, len(self.Y)) if record.ndim == 1 else self._blocked(record)
+        together = min(self._together, len(self.Y))
+        seen = -(-len(self.Y) // together)
+        filled = self._filled(record, seen, together) if record.ndim == 1 else self._blocked(record, together)
+        self.record = filled
 
-    def _blocked(self, values: Floats) -> Floats:
-        """Values of each (n, rows) as blocks (blocks, rows, lanes)."""
-        n, rows = values.shape
-        blocks = -(-n // self._width)
-        lanes = np.minimum(np.arange(blocks * self._width), n - 1)
-        blocked = _on_lines((blocks, rows, self._width), values.dtype)
-        blocked[...] = rows_at(values, lanes).reshape(blocks, self._width, rows).transpose(0, 2, 1)
+    def _blocked(self, values: Floats, together: int = 1) -> Floats:
+        """Values of each (n, rows) as blocks (blocks, rows, lanes), so many ``together``."""
+        (n, rows), width = values.shape, self._width * together
+        blocks = -(-n // width)
+        lanes = np.minimum(np.arange(blocks * width), n - 1)
+        blocked = _on_lines((blocks, rows, width), values.dtype)
+        blocked[...] = rows_at(values, lanes).reshape(blocks, width, rows).transpose(0, 2, 1)
         return blocked
 
-    def _filled(self, values: Floats, blocks: int) -> Floats:
-        """Values of all (rows,) as blocks (blocks, rows, lanes)."""
-        filled = _on_lines((blocks, values.size, self._width), values.dtype)
+    def _filled(self, values: Floats, blocks: int, together: int = 1) -> Floats:
+        """Values of all (rows,) as blocks (blocks, rows, lanes), so many ``together``."""
+        filled = _on_lines((blocks, values.size, self._width * together), values.dtype)
         filled[...] = values[:, None]
         return filled
 

@@ -39,6 +39,10 @@ Progress = Callable[[int], None]
 CALL_STEPS, CALL_STEPS_WITH_STOPS = 2048, 64
 CALL_EVALUATIONS, STEP_EVALUATIONS, LANE_EVALUATIONS = 2**21, 4, 1024
 
+#: Blocks of an explicit method that an observer looks at together: what a look costs beside its lanes is
+#: shared, and the processor works on some while others wait for a result.
+SEEN_TOGETHER = 8
+
 
 @dataclass(frozen=True)
 class Observation:
@@ -163,6 +167,7 @@ def run_ensemble(
             observation.empty(states),
             block_lanes=block_lanes,
             carried=method.carried,
+            together=SEEN_TOGETHER if block_lanes == method.lanes else 1,
         )
         while piece < task.way.steps.size and lanes.members.size and not interrupted.is_set():
             check()
@@ -222,20 +227,21 @@ def _ended(lanes: Lanes, batch: Batch, given_up: Floats | None, observation: Obs
     healthy = (given_up is None or bool(np.isnan(given_up).all())) and bool(np.isfinite(batch.Y).all())
     if healthy and not observation.stops:
         return None
-    n, now = lanes.members.size, lanes.rows(batch.Y).copy()
+    n = lanes.members.size
     stopped = np.zeros(n, dtype=np.bool_)
     failed = np.full(n, np.nan) if given_up is None else given_up.reshape(-1)[:n].copy()
     if observation.stops:
-        record = lanes.rows(batch.record)
+        code, time = (batch.record[:, row].reshape(-1)[:n] for row in (STOP_CODE, STOP_TIME))
         # A lane that has been given up waits for the call's end: what is seen of it meanwhile is no stop.
-        waiting = record[:, STOP_TIME] > failed
+        waiting = time > failed
         block, lane = np.divmod(np.flatnonzero(waiting), batch.record.shape[2])
         batch.record[block, :, lane] = observation.record
-        stopped = np.asarray((record[:, STOP_CODE] != 0.0) & ~waiting)
+        stopped = np.asarray((code != 0.0) & ~waiting)
         if healthy and not stopped.any():
             return None
     failed[stopped] = np.nan
-    lost = np.flatnonzero(np.isnan(failed) & ~stopped & ~np.isfinite(now).all(axis=1))
+    now = lanes.rows(batch.Y).copy()
+    lost = np.flatnonzero(np.isnan(failed) & ~stopped & ~finite_rows(now))
     return _Ended(stopped, failed, lost, now)
 
 

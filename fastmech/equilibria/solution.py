@@ -1,31 +1,13 @@
-"""The arrays that the compiled solver fills, and the sentence that says what its proof came to."""
+"""The compiled solver for rows of scenes, and the sentence that says what its proof came to."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
 
 from fastmech.equilibria.outcome import Outcome
 from fastmech.equilibria.search import MOST, FloatArray
-from fastmech.equilibria.solve import solve
+from fastmech.equilibria.solve import Solution, solve
 from fastmech.jit import interpreted
-
-
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """What ``solve`` writes for n scenes; shapes (n,) and (n, 6), meanings there."""
-
-    phi: FloatArray
-    theta: FloatArray
-    energy: FloatArray
-    radius: FloatArray
-    index: NDArray[np.int8]
-    count: NDArray[np.int8]
-    expected: NDArray[np.int8]
-    outcome: NDArray[np.int8]
-    margin: FloatArray
 
 
 def solve_rows(coefficients: FloatArray, inherit: bool = False, compiled: bool = True) -> Solution:
@@ -47,7 +29,7 @@ def solve_rows(coefficients: FloatArray, inherit: bool = False, compiled: bool =
         margin=np.empty(n),
     )
     with np.errstate(all="ignore"):
-        (solve if compiled else interpreted(solve))(coefficients, inherit, *vars(result).values())
+        (solve if compiled else interpreted(solve))(coefficients, inherit, result)
     return result
 
 

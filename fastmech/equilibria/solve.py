@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
 from numba import boolean, types
 from numpy.typing import NDArray
@@ -10,7 +12,7 @@ from fastmech.equilibria.balance import EPS, Pulls, expected_count, normal_form,
 from fastmech.equilibria.certificate import AT_FOLD, COMPLETE, UNPROVED, apart, certify, unbalance
 from fastmech.equilibria.outcome import Outcome
 from fastmech.equilibria.search import LAPS, MOST, FloatArray, candidates, hessian, polish
-from fastmech.jit import MATRIX, STATUSES, VECTOR, inlined, kernel
+from fastmech.jit import MATRIX, STATUSES, VECTOR, inlined, kernel, named_tuple
 from fastmech.mechanism.reduced import potential
 
 DEGENERATE = int(Outcome.DEGENERATE)
@@ -28,6 +30,23 @@ MERGE = 16.0 * EPS ** (1.0 / 3.0)
 EVEN = 32.0 * EPS
 
 INDICES = types.Array(types.int8, 2, "C")
+
+
+class Solution(NamedTuple):
+    """What :func:`solve` writes for n scenes; slots without an equilibrium hold NaN."""
+
+    phi: FloatArray  #: (n, 6) [rad] in (-pi, pi]
+    theta: FloatArray  #: the same
+    energy: FloatArray  #: (n, 6) U over m2 l^2 less the springs' constant [1/s^2]
+    radius: FloatArray  #: (n, 6) distance [rad] within which the true equilibrium is; infinite: not proved
+    index: SmallIntegers  # type: ignore[assignment]  #: (n, 6) Morse index, ``SINGULAR`` or ``NO_EQUILIBRIUM``
+    count: SmallIntegers  # type: ignore[assignment]  #: (n,) number found
+    expected: SmallIntegers  #: (n,) number by the counting theorem, 0 where rounding hides it
+    outcome: SmallIntegers  #: (n,) ``Outcome``
+    margin: FloatArray  #: (n,) distance to the fold [rad], positive with six equilibria; NaN if undefined
+
+
+SOLUTION: Any = named_tuple([*[MATRIX] * 4, INDICES, *[STATUSES] * 3, VECTOR], Solution)
 
 
 @inlined
@@ -101,37 +120,18 @@ def sort_by_energy(
             radius[j], radius[j - 1] = radius[j - 1], radius[j]
 
 
-@kernel(
-    types.void(MATRIX, boolean, MATRIX, MATRIX, MATRIX, MATRIX, INDICES, STATUSES, STATUSES, STATUSES, VECTOR)
-)
-def solve(
-    coefficients: FloatArray,
-    inherit: bool,
-    phi: FloatArray,
-    theta: FloatArray,
-    energy: FloatArray,
-    radius: FloatArray,
-    index: SmallIntegers,
-    count: SmallIntegers,
-    expected: SmallIntegers,
-    outcome: SmallIntegers,
-    margin: FloatArray,
-) -> None:
+@kernel(types.void(MATRIX, boolean, SOLUTION))
+def solve(coefficients: FloatArray, inherit: bool, out: Solution) -> None:
     """Equilibria of every row of ``coefficients``, deepest first, with the outcome of the proof.
 
     Args:
         coefficients: (n, 8) rows of ``fastmech.mechanism.coefficients.Coefficients``, the force frozen.
         inherit: whether a row first tries Newton's method from the row before; what that gives counts only
             if its completeness is proved, else the row is searched afresh.
-        phi, theta: (n, 6) angles [rad] in (-pi, pi]; written, NaN where there is none.
-        energy: (n, 6) U over m2 l^2 less the springs' constant [1/s^2]; written.
-        radius: (n, 6) distance [rad] within which the true equilibrium is; infinite: not proved; written.
-        index: (n, 6) Morse index, ``SINGULAR`` or ``NO_EQUILIBRIUM``; written.
-        count: (n,) number found; written.
-        expected: (n,) number by the counting theorem, 0 where rounding hides it; written.
-        outcome: (n,) ``Outcome``; written.
-        margin: (n,) distance to the fold [rad], positive with six equilibria; NaN if undefined; written.
+        out: written.
     """
+    phi, theta, energy, radius, index = out.phi, out.theta, out.energy, out.radius, out.index
+    count, expected, outcome, margin = out.count, out.expected, out.outcome, out.margin
     at_phi, at_theta, at_radius = np.empty(LAPS), np.empty(LAPS), np.empty(LAPS)
     for row in range(coefficients.shape[0]):
         for i in range(MOST):

@@ -35,7 +35,9 @@ class Batch(NamedTuple):
     params: Floats  #: parameters of the lanes, shape (blocks, count, lanes); (1, count, lanes): of all blocks
     observer_params: Floats  #: parameters of the observer
     Y: Floats  #: states, advanced in place, shape (blocks, dim, lanes)
-    record: Floats  #: what the observer keeps, shape (blocks, rows, lanes)
+    #: What the observer keeps, shape (blocks, rows, lanes); explicit methods let it look at several blocks
+    #: together, whose lanes lie side by side here.
+    record: Floats
     out: Floats  #: states at the end of every piece, shape (blocks, pieces, dim, lanes)
     #: What the method carries of each lane, shape (blocks, carried * dim, lanes), zeros where it starts, and
     #: of all, shape (PHASE,); None: it starts.

@@ -64,7 +64,7 @@ class Weights(NamedTuple):
     nodes: Floats
     new: float  #: belongs to the predicted derivative in the corrector; 0: there is none
     rows: int  #: of the history; 0: a Runge-Kutta method
-    group: int  #: blocks that take whole steps together; 0: there are none
+    group: int  #: blocks that take whole steps together, unless an observer looks on; 0: there are none
 
 
 class Calls(NamedTuple):
@@ -223,17 +223,30 @@ def step_alone(rhs: BlockRHS, weights: Weights, block: Stepped, i: int, at: Mome
             block.history[row, d, i] = alone.history[row, d, 0]
 
 
+@called
+def see(Y: Floats, begin: int, seen: Floats) -> None:
+    """States of blocks from ``begin`` on side by side; where there are no more, the last one's."""
+    blocks, dim, width = Y.shape
+    for place in range(0, seen.shape[1], width):
+        b = min(begin + place // width, blocks - 1)
+        for d in range(dim):
+            for i in range(width):
+                seen[d, place + i] = Y[b, d, i]
+
+
 @kernel(driver_signature(types.float64))
 def drive(calls: Calls, weights: Weights, run: Batch) -> None:
     """Take blocks of lanes through all times, some blocks after the others.
 
-    The observer is called after every step. A step's time is computed from its index, so rounding does not
-    accumulate. An Adams method starts anew wherever the step's length changes; its ``phase`` is how many rows
-    of the history are known, the row before the oldest, and the step.
+    The observer is called after every step, for as many blocks together as the record has lanes. A step's
+    time is computed from its index, so rounding does not accumulate. An Adams method starts anew wherever the
+    step's length changes; its ``phase`` is how many rows of the history are known, the row before the oldest,
+    and the step.
     """
     (blocks, dim, width), rows = run.Y.shape, weights.rows
     carried, observed, whole = run.memory.shape[1] // dim, run.record.size > 0, weights.group > 0
-    group = max(weights.group, 1)
+    group = run.record.shape[2] // width if observed else max(weights.group, 1)
+    seen = np.empty((dim, group * width if observed else 0), run.Y.dtype)
     stages = np.empty((weights.nodes.shape[0] + 2, dim, width), run.Y.dtype)
     lost = np.zeros(group * width, dtype=np.bool_)
     flat = Lanes(
@@ -262,7 +275,7 @@ def drive(calls: Calls, weights: Weights, run: Batch) -> None:
                     done = calls.advance(flat, steps) if ready else calls.start(flat, steps)
                 number = abs(done)
                 at = Moment(now + (taken + number - 1) * h, h, (oldest + number - 1) % (rows + 1), ready)
-                for b in range(begin, end if fresh or observed or done < 0 or not whole else begin):
+                for b in range(begin, end if fresh or done < 0 or not whole else begin):
                     params = run.params[min(b, run.params.shape[0] - 1)]
                     block = Stepped(run.Y[b], params, run.memory[b].reshape((carried, dim, width)), stages)
                     if fresh:
@@ -276,9 +289,11 @@ def drive(calls: Calls, weights: Weights, run: Batch) -> None:
                         for i in range(width):
                             if lost[(b - begin) * width + i]:
                                 step_alone(calls.rhs, weights, block, i, at)
-                    if observed and not fresh:
-                        calls.observe(now + (taken + number) * h, block.Y, run.observer_params, run.record[b])
                 if not fresh:
+                    if observed:
+                        see(run.Y, begin, seen)
+                        t = now + (taken + number) * h
+                        calls.observe(t, seen, run.observer_params, run.record[begin // group])
                     oldest, taken = (oldest + number) % (rows + 1), taken + number
                     known = known if ready else known + number
             for b in range(begin, end):

@@ -20,7 +20,7 @@ from fastmech.integrators.methods import find_method
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.scene import Scene
 from fastmech.step_limits.warning import too_long, warn_of_step
-from fastmech.transients.tangent import advance_tangents
+from fastmech.transients.tangent import Disturbed, Flow, Stages, advance_tangents
 
 Floats = NDArray[np.float64]
 
@@ -109,22 +109,11 @@ def largest_lyapunov(
     times = np.linspace(0.0, t_end, PIECES + 1)
     exponents = np.empty((PIECES, len(starts)))
     analytic = problem.jacobian is not None
+    called = callee(problem.rhs), callee(problem.jacobian if analytic else problem.rhs)
+    flow, lanes = Flow(*called, analytic), Disturbed(Y, D, params, growth)
+    method = Stages(TABLEAU.matrix, np.array(TABLEAU.b), np.array(TABLEAU.c))
     for piece in range(PIECES):
-        advance_tangents(
-            callee(problem.rhs),
-            callee(problem.jacobian if analytic else problem.rhs),
-            int(analytic),
-            TABLEAU.matrix,
-            np.array(TABLEAU.b),
-            np.array(TABLEAU.c),
-            float(times[piece]),
-            h,
-            steps,
-            Y,
-            D,
-            params,
-            growth,
-        )
+        advance_tangents(flow, method, lanes, float(times[piece]), h, steps)
         exponents[piece] = growth / times[piece + 1]
     reached = np.where(finite_rows(Y.T) & np.isfinite(growth), Status.OK, Status.NOT_FINITE)
     status = np.where(finite_rows(starts), reached, Status.START_NOT_FINITE).astype(np.int8)

@@ -2,90 +2,94 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import types
 
 from fastmech.integrators.batch import BlockRHS, Floats
 from fastmech.integrators.implicit import difference_jacobian
-from fastmech.jit import JACOBIAN, MATRIX, RHS, VECTOR, kernel
+from fastmech.jit import JACOBIAN, MATRIX, RHS, VECTOR, kernel, named_tuple
 
 
-@kernel(
-    types.void(
-        RHS,
-        JACOBIAN,
-        types.int64,
-        MATRIX,
-        VECTOR,
-        VECTOR,
-        types.float64,
-        types.float64,
-        types.int64,
-        MATRIX,
-        MATRIX,
-        MATRIX,
-        VECTOR,
-    )
-)
+class Flow(NamedTuple):
+    """Derivatives of the states and of their disturbances."""
+
+    rhs: BlockRHS
+    jacobian: BlockRHS
+    analytic: bool  #: else the Jacobian is taken from differences of ``rhs``
+
+
+class Stages(NamedTuple):
+    """An explicit Runge-Kutta method."""
+
+    a: Floats
+    b: Floats
+    c: Floats
+
+
+class Disturbed(NamedTuple):
+    """Trajectories and a disturbance of each, advanced in place."""
+
+    Y: Floats  #: states (dim, lanes)
+    D: Floats  #: disturbances (dim, lanes)
+    params: Floats  #: (count, lanes)
+    growth: Floats  #: (lanes,) is added the logarithm of what a disturbance has grown by
+
+
+FLOW = named_tuple([RHS, JACOBIAN, types.boolean], Flow)
+STAGES = named_tuple([MATRIX, VECTOR, VECTOR], Stages)
+DISTURBED = named_tuple([MATRIX, MATRIX, MATRIX, VECTOR], Disturbed)
+
+
+@kernel(types.void(FLOW, STAGES, DISTURBED, types.float64, types.float64, types.int64))
 def advance_tangents(
-    rhs: BlockRHS,
-    jacobian: BlockRHS,
-    analytic: int,
-    a: Floats,
-    b: Floats,
-    c: Floats,
-    begin: float,
-    h: float,
-    steps: int,
-    Y: Floats,
-    D: Floats,
-    params: Floats,
-    growth: Floats,
+    flow: Flow, method: Stages, lanes: Disturbed, begin: float, h: float, steps: int
 ) -> None:
-    """Take states ``Y`` and disturbances ``D`` (dim, lanes) so many steps on from time ``begin`` [s].
+    """Take states and disturbances so many steps of ``h`` on from time ``begin`` [s].
 
     D' = J(y) D along the motion, by the same stages as y. After every step each disturbance is scaled to
-    length 1 and the logarithm of its length added to ``growth`` (lanes,). ``analytic`` = 0 takes the Jacobian
-    from differences of ``rhs``.
+    length 1.
     """
-    stages = b.shape[0]
-    dim, lanes = Y.shape
-    K, L = np.empty((stages, dim, lanes)), np.empty((stages, dim, lanes))
-    Z, W = np.empty((dim, lanes)), np.empty((dim, lanes))
-    J = np.empty((dim * dim, lanes))
+    Y, D, stages = lanes.Y, lanes.D, method.b.shape[0]
+    dim, count = Y.shape
+    K, L = np.empty((stages, dim, count)), np.empty((stages, dim, count))
+    Z, W = np.empty((dim, count)), np.empty((dim, count))
+    J = np.empty((dim * dim, count))
     for step in range(steps):
-        t = begin + step * h
         for s in range(stages):
-            Z[:] = Y
-            W[:] = D
+            t = begin + step * h + method.c[s] * h
+            for x in range(dim):
+                for i in range(count):
+                    Z[x, i], W[x, i] = Y[x, i], D[x, i]
             for m in range(s):
-                weight = h * a[s, m]
+                weight = h * method.a[s, m]
                 for x in range(dim):
-                    for i in range(lanes):
+                    for i in range(count):
                         Z[x, i] += weight * K[m, x, i]
                         W[x, i] += weight * L[m, x, i]
-            rhs(t + c[s] * h, Z, K[s], params)
-            if analytic:
-                jacobian(t + c[s] * h, Z, J, params)
+            flow.rhs(t, Z, K[s], lanes.params)
+            if flow.analytic:
+                flow.jacobian(t, Z, J, lanes.params)
             else:
-                difference_jacobian(rhs, t + c[s] * h, Z, J, params)
+                difference_jacobian(flow.rhs, t, Z, J, lanes.params)
             for x in range(dim):
-                for i in range(lanes):
+                for i in range(count):
                     total = 0.0
                     for y in range(dim):
                         total += J[x * dim + y, i] * W[y, i]
                     L[s, x, i] = total
         for s in range(stages):
-            weight = h * b[s]
+            weight = h * method.b[s]
             for x in range(dim):
-                for i in range(lanes):
+                for i in range(count):
                     Y[x, i] += weight * K[s, x, i]
                     D[x, i] += weight * L[s, x, i]
-        for i in range(lanes):
+        for i in range(count):
             square = 0.0
             for x in range(dim):
                 square += D[x, i] * D[x, i]
             length = np.sqrt(square)
-            growth[i] += np.log(length)
+            lanes.growth[i] += np.log(length)
             for x in range(dim):
                 D[x, i] /= length

@@ -12,7 +12,8 @@ from fastmech.atlas.coincidence import Coincidence
 from fastmech.atlas.folds import trace_folds
 from fastmech.atlas.map import map_equilibria
 from fastmech.equilibria.outcome import Outcome
-from fastmech.equilibria.solution import Solution, solve_rows
+from fastmech.equilibria.solution import solve_rows
+from fastmech.equilibria.solve import Solution
 from fastmech.scene import Scene
 
 Floats = np.typing.NDArray[np.float64]

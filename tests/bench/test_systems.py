@@ -10,7 +10,17 @@ from scipy.integrate import solve_ivp
 
 from fastmech.bench.measure import Row
 from fastmech.bench.own_systems import MU, SYSTEMS, spoken
-from fastmech.bench.systems import Measured, estimate_ratios, problem_of, ratios, report, run_systems
+from fastmech.bench.plain import scalar_rhs
+from fastmech.bench.systems import (
+    Measured,
+    estimate_ratios,
+    mechanism,
+    problem_of,
+    ratios,
+    report,
+    run_systems,
+)
+from fastmech.mechanism.coefficients import reduce
 
 NAMES = {name.split(",")[0]: name for name in SYSTEMS}
 
@@ -59,6 +69,14 @@ def test_the_truth_is_scipy_s(name):
         assert np.abs(run.y[:, -1] - end).max() < 1e-9
 
 
+def test_the_mechanism_s_truth_is_scipy_s():
+    problem = mechanism("Table 1, moving", 2)
+    p = np.array(reduce(problem.scene))
+    for start, end in zip(problem.starts, problem.truth, strict=True):
+        run = solve_ivp(scalar_rhs, (0, 10.0), start, "DOP853", args=(p,), rtol=1e-13, atol=1e-13)
+        assert np.abs(run.y[:, -1] - end).max() < 1e-9
+
+
 def row(family: str, rate: float, *errors: float) -> Row:
     return Row("x", family, "", 1, 1000, 1000 / rate, 1000 / rate, 0.1, np.array(errors))
 
@@ -93,6 +111,8 @@ def test_the_mean_is_geometric_and_the_worst_is_named():
     text = "\n".join(report([made(), slow], (1e-3, 1e-5)))
     assert "| fixed over heyoka | 2.00 (slow 1.00) | 2.00 (slow 1.00) |" in text
     assert "within a factor 3 of the truth in 8 of 8 runs (2 to 2 times it)" in text
+    assert "# The mechanism" not in text
+    assert "# The mechanism beside heyoka" in report([made()], (1e-3, 1e-5), [slow])
     assert "Not installed" in "\n".join(report([made()._replace(heyoka=[])], (1e-3, 1e-5)))
 
 

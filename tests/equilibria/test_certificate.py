@@ -15,7 +15,8 @@ from fastmech.equilibria.balance import expected_count, normal_form, pulls
 from fastmech.equilibria.certificate import certify
 from fastmech.equilibria.find import find_equilibria
 from fastmech.equilibria.outcome import Outcome
-from fastmech.equilibria.solution import Solution, solve_rows
+from fastmech.equilibria.solution import solve_rows
+from fastmech.equilibria.solve import Solution
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 
