@@ -25,8 +25,8 @@ from numba.core.registry import CPUDispatcher
 from numpy.typing import NDArray
 
 from fastmech.callee import CalleeType
-from fastmech.ensembles.fingerprint import enclosed
 from fastmech.jit import INLINED, VECTOR, inlined
+from fastmech.kernels.fingerprint import enclosed
 from fastmech.kernels.sincos import WITHIN
 
 Floats = NDArray[np.float64]

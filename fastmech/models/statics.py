@@ -19,5 +19,7 @@ class Statics(NamedTuple):
 
     coordinates: tuple[Coordinate, ...]
     parameters: tuple[Any, ...]  #: SymPy symbols, in the order in which values are given
-    forces: tuple[Any, ...]  #: SymPy expressions Q - dU/dq in coordinates and parameters, loads at their means
+    forces: tuple[
+        Any, ...
+    ]  #: SymPy expressions Q - dU/dq in coordinates and parameters, loads at their means
     conservative: bool  #: forces have a potential: their Jacobian is symmetric
