@@ -1,6 +1,6 @@
 """Loads: force laws F(t) [N, or N m of a torque] as data. To add one, write a class like these.
 
-A load tells its value over time as an expression, a bound, the work that it can still do, and its period.
+A load tells its value over time as an expression, its bound, mean and period, and what work it can still do.
 Numbers may be a mechanism's parameters, as SymPy symbols: ``load.at(values)`` puts their values in.
 """
 
@@ -9,57 +9,38 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fastmech.errors import InputError, shown
+
+inf = math.inf
+
+
+class Facts(NamedTuple):
+    """What is known of a load."""
+
+    mean: Any  #: what it is at rest: its mean over a period, or what it comes to in the end
+    bound: float  #: the greatest |F|
+    period: float | None = None  #: [s], if it has one
 
 
 @dataclass(frozen=True, eq=False)
 class Load:
-    """What all loads tell; numbers are asked for of loads without symbols, see :meth:`at`."""
-
-    def at(self, values: Mapping[str, float]) -> Self:
-        """The same load with parameters' values in the place of their symbols.
-
-        Raises:
-            InputError: a value is missing, or no finite number.
-        """
-        changes = {}
-        for field in fields(self):
-            given = getattr(self, field.name)
-            if hasattr(given, "free_symbols"):
-                named = {
-                    symbol: values[symbol.name] for symbol in given.free_symbols if symbol.name in values
-                }
-                try:
-                    changes[field.name] = float(given.subs(named))
-                except TypeError:
-                    raise InputError(
-                        f"{type(self).__name__}.{field.name} = {shown(given)}: needs values of its symbols"
-                    ) from None
-        return replace(self, **changes)
+    """What all loads tell. Of one with symbols only ``expression`` and ``facts().mean`` can be asked for."""
 
     def expression(self, t: Any) -> Any:
         """F at the symbol ``t`` [s] as a SymPy expression."""
         raise NotImplementedError
 
-    @property
-    def mean(self) -> Any:
-        """What the load is at rest: its mean over a period, or what it comes to in the end."""
+    def facts(self) -> Facts:
+        """What is known of it."""
         raise NotImplementedError
 
-    @property
-    def bound(self) -> float:
-        """The greatest |F|."""
+    def to_come(self, t: float) -> tuple[float, float]:
+        """|F(t) - F_end| and the total variation of F from ``t`` [s] on; infinite where it never fades."""
         raise NotImplementedError
-
-    @property
-    def period(self) -> float | None:
-        """Period [s]; ``None``: it has none."""
-        return None
 
     def work_left(self, t: float, reach: float = 1.0) -> float:
         """The most work [J] that F less its final value can do after ``t`` [s]; infinite if it never fades.
@@ -68,12 +49,26 @@ class Load:
         the work is [(F - F_end) x] less the integral of x dF, at most half the reach times what F lies off
         its end and all its changes together.
         """
-        off, changes = self._to_come(t)
-        return 0.5 * reach * (off + changes)
+        return 0.5 * reach * sum(self.to_come(t))
 
-    def _to_come(self, t: float) -> tuple[float, float]:
-        """|F(t) - F_end| and the total variation of F from t on."""
-        raise NotImplementedError
+    def at(self, values: Mapping[str, float]) -> Self:
+        """The same load with parameters' values in the place of their symbols.
+
+        Raises:
+            InputError: a value is missing, or out of its range.
+        """
+        given = {f.name: v for f in fields(self) if hasattr(v := getattr(self, f.name), "free_symbols")}
+        missing = {s.name for v in given.values() for s in v.free_symbols} - set(values)
+        if missing:
+            raise InputError(f"{type(self).__name__}: has no values of {', '.join(sorted(missing))}")
+        return replace(self, **{name: float(value.subs(dict(values))) for name, value in given.items()})
+
+    def _require(self, name: str, least: float = -inf, above: float = -inf) -> None:
+        """Refuse a number that is out of its range."""
+        value = getattr(self, name)
+        if isinstance(value, int | float) and not (value > above and value >= least):
+            told = f"> {above:g}" if above > -inf else f"at least {least:g}"
+            raise InputError(f"{type(self).__name__}.{name} = {shown(value)}: must be {told}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,18 +77,16 @@ class Constant(Load):
 
     value: Any
 
-    def expression(self, t: Any) -> Any:  # noqa: D102
+    def expression(self, t: Any) -> Any:
+        """The value."""
         return self.value
 
-    @property
-    def mean(self) -> Any:  # noqa: D102
-        return self.value
+    def facts(self) -> Facts:
+        """Bound and mean are the value."""
+        return Facts(self.value, abs(self.value))
 
-    @property
-    def bound(self) -> float:  # noqa: D102
-        return abs(self.value)
-
-    def _to_come(self, t: float) -> tuple[float, float]:
+    def to_come(self, t: float) -> tuple[float, float]:
+        """Nothing."""
         return 0.0, 0.0
 
 
@@ -105,22 +98,20 @@ class Decaying(Load):
     rate: Any
 
     def __post_init__(self) -> None:
-        _require("Decaying.rate", self.rate, least=0.0)
+        self._require("rate", least=0.0)
 
-    def expression(self, t: Any) -> Any:  # noqa: D102
+    def expression(self, t: Any) -> Any:
+        """An exponential."""
         import sympy
 
         return self.value * sympy.exp(-self.rate * t)
 
-    @property
-    def mean(self) -> Any:  # noqa: D102
-        return 0.0 if self.rate != 0 else self.value
+    def facts(self) -> Facts:
+        """At rest it is gone, unless its rate is zero."""
+        return Facts(0.0 if self.rate != 0 else self.value, abs(self.value))
 
-    @property
-    def bound(self) -> float:  # noqa: D102
-        return abs(self.value)
-
-    def _to_come(self, t: float) -> tuple[float, float]:
+    def to_come(self, t: float) -> tuple[float, float]:
+        """What is left, and to go."""
         left = abs(self.value) * math.exp(-self.rate * t) if self.rate else 0.0
         return left, left
 
@@ -134,21 +125,24 @@ class Harmonic(Load):
     mean: Any = 0.0
     phase: Any = 0.0
 
-    def expression(self, t: Any) -> Any:  # noqa: D102
+    def expression(self, t: Any) -> Any:
+        """A sine."""
         import sympy
 
         return self.mean + self.amplitude * sympy.sin(self.frequency * t + self.phase)
 
-    @property
-    def bound(self) -> float:  # noqa: D102
-        return abs(self.mean) + abs(self.amplitude)
+    def facts(self) -> Facts:
+        """Its mean, and a period."""
+        period = 2.0 * math.pi / abs(float(self.frequency)) if self._number and self.frequency else None
+        return Facts(self.mean, abs(self.mean) + abs(self.amplitude), period)
 
     @property
-    def period(self) -> float | None:  # noqa: D102
-        return 2.0 * math.pi / abs(self.frequency) if self.frequency else None
+    def _number(self) -> bool:
+        return not getattr(self.frequency, "free_symbols", None)
 
-    def _to_come(self, t: float) -> tuple[float, float]:
-        return (math.inf, math.inf) if self.amplitude and self.frequency else (0.0, 0.0)
+    def to_come(self, t: float) -> tuple[float, float]:
+        """It never fades."""
+        return (inf, inf) if self.amplitude and self.frequency else (0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,26 +154,22 @@ class Pulse(Load):
     duration: Any
 
     def __post_init__(self) -> None:
-        _require("Pulse.duration", self.duration, least=0.0)
+        self._require("duration", least=0.0)
 
-    def expression(self, t: Any) -> Any:  # noqa: D102
+    def expression(self, t: Any) -> Any:
+        """A piecewise constant."""
         import sympy
 
         return sympy.Piecewise((0, t < self.start), (self.value, t < self.start + self.duration), (0, True))
 
-    @property
-    def mean(self) -> Any:  # noqa: D102
-        return 0.0
+    def facts(self) -> Facts:
+        """At rest it is over."""
+        return Facts(0.0, abs(self.value))
 
-    @property
-    def bound(self) -> float:  # noqa: D102
-        return abs(self.value)
-
-    def _to_come(self, t: float) -> tuple[float, float]:
-        if t >= self.start + self.duration:
-            return 0.0, 0.0
-        value = abs(self.value)
-        return (0.0, 2.0 * value) if t < self.start else (value, value)
+    def to_come(self, t: float) -> tuple[float, float]:
+        """Up and down, or down."""
+        height = abs(self.value) if t < self.start + self.duration else 0.0
+        return (0.0, 2.0 * height) if t < self.start else (height, height)
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,26 +181,22 @@ class Ramp(Load):
     duration: Any
 
     def __post_init__(self) -> None:
-        _require("Ramp.duration", self.duration, above=0.0)
+        self._require("duration", above=0.0)
 
-    def expression(self, t: Any) -> Any:  # noqa: D102
+    def expression(self, t: Any) -> Any:
+        """A piecewise line."""
         import sympy
 
-        rising = self.value * (t - self.start) / self.duration
-        ends = self.start + self.duration
+        rising, ends = self.value * (t - self.start) / self.duration, self.start + self.duration
         return sympy.Piecewise((0, t < self.start), (rising, t < ends), (self.value, True))
 
-    @property
-    def mean(self) -> Any:  # noqa: D102
-        return self.value
+    def facts(self) -> Facts:
+        """At rest it has its value."""
+        return Facts(self.value, abs(self.value))
 
-    @property
-    def bound(self) -> float:  # noqa: D102
-        return abs(self.value)
-
-    def _to_come(self, t: float) -> tuple[float, float]:
-        done = min(max((t - self.start) / self.duration, 0.0), 1.0)
-        left = abs(self.value) * (1.0 - done)
+    def to_come(self, t: float) -> tuple[float, float]:
+        """What it has to rise."""
+        left = abs(self.value) * (1.0 - min(max((t - self.start) / self.duration, 0.0), 1.0))
         return left, left
 
 
@@ -218,11 +204,8 @@ class Ramp(Load):
 class Sampled(Load):
     """F through values at rising times [s], before the first and after the last as there.
 
-    Attributes:
-        times: [s], shape (n,), n at least 2.
-        values: shape (n,).
-        interpolation: "cubic", a spline with two continuous derivatives and no slope at its ends, of which
-            methods of integration keep their order as far as that; or "linear".
+    ``interpolation`` is "cubic", a spline with two continuous derivatives and no slope at its ends, or
+    "linear". ``times`` and ``values`` have shape (n,), n at least 2.
     """
 
     times: Any
@@ -231,19 +214,17 @@ class Sampled(Load):
 
     def __post_init__(self) -> None:
         try:
-            times, values = np.array(self.times, dtype=np.float64), np.array(self.values, dtype=np.float64)
+            times, values = (np.array(given, dtype=np.float64) for given in (self.times, self.values))
         except (TypeError, ValueError):
-            raise InputError(
-                f"Sampled.times = {shown(self.times)}: times and values must be numbers"
-            ) from None
+            times = values = np.zeros(0)
         if (
             times.ndim != 1
             or times.size < 2
             or values.shape != times.shape
-            or not (np.diff(times) > 0.0).all()
+            or not np.all(np.diff(times) > 0.0)
         ):
             raise InputError(
-                f"Sampled.times = {shown(self.times)}: must rise, two or more, with a value each"
+                f"Sampled.times = {shown(self.times)}: must be two or more rising numbers, with a value each"
             )
         if not (np.isfinite(times).all() and np.isfinite(values).all()):
             raise InputError("Sampled.values: times and values must be finite")
@@ -281,15 +262,12 @@ class Sampled(Load):
 
         return sampled
 
-    @property
-    def mean(self) -> Any:  # noqa: D102
-        return float(self.values[-1])
+    def facts(self) -> Facts:
+        """At rest it is the last value; between samples a spline may exceed them."""
+        return Facts(float(self.values[-1]), float(np.abs(self._extremes(-inf)).max()))
 
-    @property
-    def bound(self) -> float:  # noqa: D102
-        return float(np.abs(self._extremes(-math.inf)).max())
-
-    def _to_come(self, t: float) -> tuple[float, float]:
+    def to_come(self, t: float) -> tuple[float, float]:
+        """From extreme to extreme."""
         met = self._extremes(t)
         return abs(float(met[0] - met[-1])), float(np.abs(np.diff(met)).sum())
 
@@ -304,44 +282,21 @@ class Sampled(Load):
 
 @dataclass(frozen=True, eq=False)
 class Function(Load):
-    """F(t) = function(t), a plain Python function of one float that compiles.
+    """F(t) = function(t), a plain Python function of one float that compiles; what is not told is unknown."""
 
-    What is not told of it is not known: then its bound is infinite and it can do any work.
-
-    Attributes:
-        function: F of a time [s]; use :func:`fastmech.sin` and :func:`fastmech.cos`.
-        mean: what it is at rest.
-        bound: the greatest |F|.
-        period: [s], if it has one.
-    """
-
-    function: Callable[[float], float]
-    mean: Any = 0.0
-    bound: float = math.inf
+    function: Callable[[float], float]  #: use :func:`fastmech.sin` and :func:`fastmech.cos` in it
+    mean: float = 0.0
+    bound: float = inf
     period: float | None = None
 
     def __post_init__(self) -> None:
         if not callable(self.function):
             raise InputError(f"Function.function = {shown(self.function)}: must be a function of the time")
 
-    def _to_come(self, t: float) -> tuple[float, float]:
-        return math.inf, math.inf
+    def facts(self) -> Facts:
+        """What has been told."""
+        return Facts(self.mean, self.bound, self.period)
 
-
-def value_of(load: Load, t: ArrayLike) -> Any:
-    """F at times [s], shape of ``t``, of a load without symbols."""
-    times = np.asarray(t, dtype=np.float64)
-    if isinstance(load, Sampled | Function):
-        return np.vectorize(load.function, otypes=[np.float64])(times)
-    import sympy
-
-    symbol = sympy.Symbol("t", real=True)
-    found = sympy.lambdify(symbol, load.expression(symbol), "numpy")(times)
-    return np.broadcast_to(np.asarray(found, dtype=np.float64), times.shape)
-
-
-def _require(field: str, value: Any, *, above: float = -math.inf, least: float = -math.inf) -> None:
-    """Refuse a number that is out of its range; symbols are told by :meth:`Load.at`."""
-    if isinstance(value, int | float) and not (value > above and value >= least):
-        told = f"> {above:g}" if math.isfinite(above) else f"at least {least:g}"
-        raise InputError(f"{field} = {shown(value)}: must be {told}")
+    def to_come(self, t: float) -> tuple[float, float]:
+        """Unknown."""
+        return inf, inf

@@ -1,5 +1,7 @@
 """Shipped mechanisms. To add one, write a file with a function that gives a ``Mechanism``."""
 
+from __future__ import annotations
+
 from fastmech.mechanisms.cart_pendulum import cart_pendulum
 from fastmech.mechanisms.double_pendulum import double_pendulum
 from fastmech.mechanisms.pendulum_chain import pendulum_chain

@@ -55,6 +55,9 @@ def equations(parts: Parts, q: Sequence[Any], v: Sequence[Any]) -> Equations:
             if entry.free_symbols & {*v}:
                 entry = sympy.simplify(entry)
             metric[i, j] = metric[j, i] = parts.metric[i, j] + _by_terms(entry, q)
+    for i in range(n):
+        if metric[i, i] == 0:
+            raise InputError(f"kinetic: is not positive definite: {q[i]} moves no mass")
     linear = [parts.kinetic.subs(rest), *(sympy.diff(parts.kinetic, rate).subs(rest) for rate in v)]
     if metric.free_symbols & {*v} or any(sympy.simplify(term) != 0 for term in linear):
         raise InputError("kinetic: must be quadratic in the rates, with no other terms")
@@ -81,7 +84,7 @@ def statics(
     """Forces at rest, loads at their means."""
     q = [coordinate.symbol for coordinate in coordinates]
     still = {sympy.Symbol(f"{symbol}_dot", real=True): 0 for symbol in q}
-    still |= {symbol: load.mean for symbol, (load, _) in zip(found.loads, parts.loads, strict=True)}
+    still |= {symbol: load.facts().mean for symbol, (load, _) in zip(found.loads, parts.loads, strict=True)}
     forces = tuple(sympy.sympify(force).subs(still) for force in found.forces)
     n = len(q)
     conservative = all(
@@ -195,26 +198,24 @@ def derive(
         {f"_f{i}": f + g for i, (f, g) in enumerate(zip(forces, found.gain, strict=True))}
     )
     at_rest = dict.fromkeys(v, 0) | {
-        s: load.mean for s, (load, _) in zip(found.loads, parts.loads, strict=True)
+        s: load.facts().mean for s, (load, _) in zip(found.loads, parts.loads, strict=True)
     }
     slopes = {
         f"_{name}{i}_{j}": -sympy.diff(force, by[j]).subs(at_rest)
         for name, by in (("c", v), ("s", q)) for i, force in enumerate(found.forces) for j in range(n)
     }  # fmt: skip
-    work = (
-        f * sum(x * rate for x, rate in zip(moved, v, strict=True))
-        for f, (_, moved) in zip(values, parts.loads, strict=True)
-    )
-    lost = (
-        rate * (sympy.diff(parts.dissipation, rate) - force)
-        for rate, force in zip(v, parts.forces, strict=True)
-    )
+    arms = [sum(x * rate for x, rate in zip(moved, v, strict=True)) for _, moved in parts.loads]
+    powers = {
+        "_brought": sum(force * arm for force, arm in zip(values, arms, strict=True)),
+        "_damped": sum(rate * sympy.diff(parts.dissipation, rate) for rate in v),
+        "_taken": -sum(rate * force for rate, force in zip(v, parts.forces, strict=True)),
+    }
     plain = {
         "momenta": ([*q, *v], lifted(entries)),
         "energies": ([*q, *v], lifted(entries | {"_U": _by_terms(parts.potential, q)})),
         "metric": (q, lifted(entries)),
         "velocities": ([*q, *p], velocities),
-        "powers": ([t, *q, *v], lifted({"brought": sum(work), "lost": sum(lost)})),
+        "powers": ([t, *q, *v], lifted(powers)),
         "slopes": (q, lifted(slopes)),
     }
     kinetic = [

@@ -246,6 +246,9 @@ class Builder:
         return vector.dot(vector)
 
 
+_ELEMENTS = (Body, Spring, TorsionSpring, Damper, TorsionDamper, Force, Torque)
+
+
 def _masses(given: Any) -> list[Body]:
     """Mass points by point's name, and bodies."""
     if isinstance(given, Mapping):
@@ -258,7 +261,7 @@ def _masses(given: Any) -> list[Body]:
 
 def _all(field: str, given: Any, *kinds: type) -> list[Any]:
     """A list of elements of these kinds."""
-    if not isinstance(given, Sequence) or isinstance(given, (str, *kinds)):
+    if not isinstance(given, Sequence) or isinstance(given, (str, *_ELEMENTS)):
         raise InputError(f"{field} = {shown(given)}: must be a list")
     for number, element in enumerate(given):
         if not isinstance(element, kinds) or (type(element) is tuple and len(element) != 2):

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import json
 import keyword
 import math
+import re
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -15,9 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastmech.errors import InputError, shown
 from fastmech.generated import kept_text
-from fastmech.kernel_cache import PACKAGE, source_hash
 from fastmech.kernels.fingerprint import fingerprint
 from fastmech.loads import Function, Load, Sampled
+from fastmech.models.checks import check
 from fastmech.models.statics import Coordinate, Statics
 from fastmech.scene import nearest
 
@@ -31,12 +33,6 @@ MOST_COORDINATES = 4
 
 #: Names that the compiled text calls by.
 RESERVED = {"t", "np", "sin", "cos", "exp", "abs", "min", "max", "sincos", "turned", "rounded_to", "float32"}
-
-#: States at which what formulas cannot tell is tried when a mechanism is built.
-TRIED = 256
-
-#: Relative rounding of energies and forces that are compared there.
-ROUNDING = 1e-9
 
 
 class Energies(NamedTuple):
@@ -141,20 +137,18 @@ class Mechanism:
                 "generalized_forces": {} if generalized_forces is None else generalized_forces,
             }
         )  # fmt: skip
-        self._length = {q.name: q.unit == "m" for q in given}
-        self._check()
+        self.lengths = frozenset(q.name for q in given if q.unit == "m")
+        check(self)
 
     def replace(self, **parameters: float) -> Mechanism:
         """The same mechanism with other values of some parameters."""
-        import copy
-
         made = copy.copy(self)
         known = list(self.parameters)
         for name in parameters:
             if name not in known:
                 raise InputError(f"parameters.{name}: unknown name; {nearest(name, known)}")
         made.parameters, _ = _parameters(self.parameters | parameters)
-        made._check_values()
+        check(made)
         return made
 
     @property
@@ -162,7 +156,7 @@ class Mechanism:
         """Names of the states: coordinates, then rates."""
         return tuple(symbol.name for symbol in (*self._symbols, *self._rates))
 
-    @cached_property
+    @property
     def loads(self) -> tuple[Load, ...]:
         """Its loads with the parameters' values."""
         return tuple(load.at(self.parameters) for load, _ in self._parts.loads)
@@ -187,22 +181,14 @@ class Mechanism:
     @cached_property
     def prints(self) -> str:
         """Text that changes with its equations, not with the values of parameters."""
-        functions = [
-            fingerprint(load.function) for load, _ in self._parts.loads if isinstance(load, Function)
-        ]
-        tables = [
-            hashlib.sha256(
-                np.concatenate([load.times, load.values, load.pieces.ravel()]).tobytes()
-            ).hexdigest()
-            for load, _ in self._parts.loads
-            if isinstance(load, Sampled)
-        ]
-        loads = [
-            type(load).__name__ if isinstance(load, Sampled | Function) else repr(load)
-            for load, _ in self._parts.loads
-        ]
-        moved = [moved for _, moved in self._parts.loads]
-        told = [*self._parts[:5], loads, moved, self._symbols, self._constants, functions, tables]
+        loads = []
+        for load, moved in self._parts.loads:
+            if isinstance(load, Sampled):  # its function is the package's own: what differs are numbers
+                loads.append(fingerprint((load.times, load.values, load.pieces)))
+            else:
+                loads.append(fingerprint(load.function) if isinstance(load, Function) else repr(load))
+            loads.append(str(moved))
+        told = [*self._parts[:-1], loads, self._symbols, self._constants]
         return hashlib.sha256("\0".join(map(str, told)).encode()).hexdigest()[:16]
 
     @cached_property
@@ -214,8 +200,7 @@ class Mechanism:
             found = derive(self._parts, self.equations, self._symbols, self._rates, self._constants)
             return json.dumps(found)
 
-        sources = source_hash(sorted((PACKAGE / "models").glob("*.py")))
-        found = json.loads(kept_text("mechanism", f"{self.prints}_{sources}", text))
+        found = json.loads(kept_text("mechanism", self.prints, text))
         return Derived(tuple(found[0]), found[1])
 
     def functions_of_time(self) -> dict[str, Any]:
@@ -243,40 +228,32 @@ class Mechanism:
             found = self._numpy["coefficients"](*given)
         return dict(zip(self.derived.coefficients, map(np.float64, found), strict=True))
 
-    def _evaluated(
-        self, name: str, states: Any, parameters: Mapping[str, ArrayLike] | None
-    ) -> tuple[Any, ...]:
-        found = self.coefficients(parameters)
-        own = (found[k] for k in self.derived.functions[name][0])
+    def evaluate(self, name: str, states: Any, parameters: Mapping[str, ArrayLike] | None = None) -> Floats:
+        """One of its functions of numbers or arrays, one a state: all that it gives, stacked in front."""
+        known = self.coefficients(parameters)
+        own, text = self.derived.functions[name]
+        function = self._numpy[name]
+        if re.search(r" if |min\(|max\(", text):  # decisions are those of single numbers
+            function = np.vectorize(function, otypes=None)
         with np.errstate(all="ignore"):
-            return tuple(self._numpy[name](*states, *own))
-
-    def _split(self, y: ArrayLike, count: int) -> Floats:
-        states = np.asarray(y, dtype=np.float64)
-        if not states.ndim or states.shape[-1] != count:
-            raise InputError(f"y: has shape {states.shape}, must be (..., {count})")
-        return np.moveaxis(states, -1, 0)
+            found = function(*states, *(known[k] for k in own))
+        return np.stack(np.broadcast_arrays(*found, np.asarray(states[-1]))[:-1])
 
     def energies(self, y: ArrayLike, parameters: Mapping[str, ArrayLike] | None = None) -> Energies:
         """T and U [J] of states (..., 2 n); parameters' other values have shapes that fit."""
-        states = self._split(y, len(self.state))
-        return Energies(
-            *(np.broadcast_to(e, states[0].shape) for e in self._evaluated("energies", states, parameters))
-        )
+        return Energies(*self.evaluate("energies", self._split(y, 2), parameters))
 
     def powers(self, t: float, y: ArrayLike, parameters: Mapping[str, ArrayLike] | None = None) -> Powers:
         """Powers [W] at a time [s] in states (..., 2 n)."""
-        states = self._split(y, len(self.state))
-        found = self._evaluated("powers", [t, *states], parameters)
-        return Powers(*(np.broadcast_to(power, states[0].shape) for power in found))
+        brought, damped, taken = self.evaluate("powers", [t, *self._split(y, 2)], parameters)
+        return Powers(brought, damped + taken)
 
     def accelerations(
         self, t: float, y: ArrayLike, parameters: Mapping[str, ArrayLike] | None = None
     ) -> Floats:
         """q'' (..., n) at a time [s] in states (..., 2 n)."""
-        states = self._split(y, len(self.state))
-        found = self._evaluated("lagrange_rates", [t, *states], parameters)[len(self.coordinates) :]
-        return np.stack([np.broadcast_to(a, states[0].shape) for a in found], axis=-1)
+        rates = self.evaluate("lagrange_rates", [t, *self._split(y, 2)], parameters)
+        return np.moveaxis(rates[len(self.coordinates) :], 0, -1)
 
     def to_momenta(self, y: ArrayLike, parameters: Mapping[str, ArrayLike] | None = None) -> Floats:
         """Coordinates and momenta dT/dq' (..., 2 n) from coordinates and rates."""
@@ -287,104 +264,27 @@ class Mechanism:
         return self._second_half("velocities", y, parameters)
 
     def _second_half(self, name: str, y: ArrayLike, parameters: Mapping[str, ArrayLike] | None) -> Floats:
-        states = self._split(y, len(self.state))
-        found = self._evaluated(name, states, parameters)
-        return np.stack(np.broadcast_arrays(*states[: len(found)], *found), axis=-1)
+        states = self._split(y, 2)
+        found = self.evaluate(name, states, parameters)
+        return np.moveaxis(np.concatenate([np.broadcast_to(states[: len(found)], found.shape), found]), 0, -1)
 
     def metric(self, q: ArrayLike, parameters: Mapping[str, ArrayLike] | None = None) -> Floats:
         """The metric a (..., n, n) at positions (..., n)."""
-        place = self._split(q, len(self.coordinates))
-        return self._matrix(self._evaluated("metric", place, parameters), place)
+        return self._matrices("metric", q, parameters)[0]
 
     def linear(self, q: ArrayLike, parameters: Mapping[str, ArrayLike] | None = None) -> Linear:
         """Mass, damping and stiffness (..., n, n) about positions (..., n)."""
-        place = self._split(q, len(self.coordinates))
-        found, n = self._evaluated("slopes", place, parameters), len(place)
-        return Linear(
-            self.metric(q, parameters),
-            self._matrix(found[: n * n], place),
-            self._matrix(found[n * n :], place),
-        )
+        return Linear(self.metric(q, parameters), *self._matrices("slopes", q, parameters))
 
-    @staticmethod
-    def _matrix(entries: Sequence[Any], place: Floats) -> Floats:
-        n, shape = len(place), place[0].shape
-        full = np.stack([np.broadcast_to(entry, shape) for entry in entries], axis=-1)
-        return full.reshape(*shape, n, n)
+    def _matrices(self, name: str, q: ArrayLike, parameters: Mapping[str, ArrayLike] | None) -> Floats:
+        found, n = self.evaluate(name, self._split(q, 1), parameters), len(self.coordinates)
+        return np.moveaxis(found.reshape(-1, n, n, *found.shape[1:]), (1, 2), (-2, -1))
 
-    def _check(self) -> None:
-        """Refuse what is no mechanism; what formulas cannot tell is tried at some states."""
-        _ = self.derived
-        self._check_values()
-
-    def _check_values(self) -> None:
-        y = self._trial_states()
-        n = len(self.coordinates)
-        with np.errstate(all="ignore"):
-            a = self.metric(y[:, :n])
-            usable = np.isfinite(a).all(axis=(1, 2))
-            least = np.full(len(y), -np.inf)
-            least[usable] = np.linalg.eigvalsh(_scaled(a[usable])).min(axis=-1)
-            if not (least > 0.0).all():
-                where = dict(zip(map(str, self._symbols), y[np.argmin(least), :n].tolist(), strict=True))
-                told = ", ".join(f"{name} = {value:.3g}" for name, value in where.items())
-                raise InputError(
-                    f"kinetic: is not positive definite, as at {told}; every coordinate needs a mass"
-                )
-            lost = self._evaluated_dissipation(y)
-            if (lost < -ROUNDING * np.abs(lost).max()).any():
-                raise InputError("dissipation: feeds energy in; coefficients of dampers must not be negative")
-        self._check_periods(y)
-
-    def _evaluated_dissipation(self, y: Floats) -> Floats:
-        import sympy
-
-        power = sum(sympy.diff(self._parts.dissipation, v) * v for v in self._rates)
-        named = (*self._symbols, *self._rates, *self._constants)
-        found = sympy.lambdify(named, power, "numpy")(*y.T, *self.parameters.values())
-        return np.nan_to_num(np.broadcast_to(np.asarray(found, dtype=np.float64), len(y)))
-
-    def _check_periods(self, y: Floats) -> None:
-        n = len(self.coordinates)
-        for k, coordinate in enumerate(self.coordinates):
-            if not coordinate.periodic:
-                continue
-            turned = y.copy()
-            turned[:, k] += 2.0 * math.pi
-            for what, function in (
-                ("the potential", self._potential),
-                ("motion", self._accelerations_at_start),
-            ):
-                before, after = function(y), function(turned)
-                scale = np.nanmax(np.abs(before), initial=0.0, axis=0)
-                if (np.abs(after - before) > 1e-6 * (scale + 1e-300)).any():
-                    raise InputError(
-                        f"{coordinate.symbol}: {what} does not repeat after a full turn; "
-                        f"give the angle a range: fm.angles('{coordinate.symbol}', low, high)"
-                    )
-        _ = n
-
-    def _potential(self, y: Floats) -> Floats:
-        return self.energies(y).potential
-
-    def _accelerations_at_start(self, y: Floats) -> Floats:
-        return self.accelerations(0.0, y)
-
-    def _trial_states(self) -> Floats:
-        """States all over the ranges (TRIED, 2 n), of an endless one within some sizes."""
-        random, columns = np.random.default_rng(0), []
-        for coordinate in self.coordinates:
-            low, high = coordinate.low, coordinate.high
-            if math.isfinite(low) and math.isfinite(high):
-                columns.append(random.uniform(low, high, TRIED))
-            else:
-                size = 10.0 ** random.uniform(-2.0, 2.0, TRIED)
-                signed = size * random.choice([-1.0, 1.0], TRIED)
-                columns.append(
-                    low + size if math.isfinite(low) else high - size if math.isfinite(high) else signed
-                )
-        columns += [random.normal(size=TRIED) for _ in self.coordinates]
-        return np.stack(columns, axis=-1)
+    def _split(self, y: ArrayLike, halves: int) -> Floats:
+        states, count = np.asarray(y, dtype=np.float64), halves * len(self.coordinates)
+        if not states.ndim or states.shape[-1] != count:
+            raise InputError(f"y: has shape {states.shape}, must be (..., {count})")
+        return np.moveaxis(states, -1, 0)
 
     def __repr__(self) -> str:
         values = ", ".join(f"{name}={value:g}" for name, value in self.parameters.items())
@@ -400,25 +300,13 @@ def in_precision(text: str, precision: str) -> str:
     return text.replace("<<", left).replace(">>", right)
 
 
-def _scaled(a: Floats) -> Floats:
-    """Matrices (..., n, n) with ones, or what is not positive, on their diagonals."""
-    diagonal = np.abs(np.diagonal(a, axis1=-2, axis2=-1))
-    root = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-    return np.asarray(a / root[..., :, None] / root[..., None, :])
-
-
 def _identifier(field: str, name: Any) -> str:
-    if (
-        not isinstance(name, str)
-        or not name.isidentifier()
-        or keyword.iskeyword(name)
-        or name.startswith("_")
-    ):
+    usable = isinstance(name, str) and name.isidentifier() and not keyword.iskeyword(name)
+    if not usable or name.startswith("_") or name in RESERVED:
         raise InputError(
-            f"{field}: {shown(name)} must be a Python name that does not begin with an underscore"
+            f"{field}: {shown(name)} must be a Python name, with no underscore in front, and none of "
+            + ", ".join(sorted(RESERVED))
         )
-    if name in RESERVED:
-        raise InputError(f"{field}: {shown(name)} is taken; choose another name")
     return name
 
 

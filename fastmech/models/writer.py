@@ -14,6 +14,8 @@ from typing import Any
 import sympy
 from sympy.printing.pycode import PythonCodePrinter
 
+from fastmech.errors import InputError
+
 #: Multiples of a coordinate in a sine whose sine is written by those of the coordinate itself.
 HARMONICS = 4
 
@@ -57,6 +59,8 @@ class Printer(PythonCodePrinter):  # type: ignore[misc]
 
     def _print_Function(self, expr: Any) -> str:
         name = FUNCTIONS.get(expr.func.__name__, expr.func.__name__)
+        if name not in FUNCTIONS.values() and not name.startswith("function_"):
+            raise InputError(f"{expr.func.__name__}: is not known here; functions are {', '.join(FUNCTIONS)}")
         arguments = [self._print(argument) for argument in expr.args]
         if name in ("min", "max") and len(arguments) > 2:
             return f"{name}({arguments[0]}, {self._print_Function(expr.func(*expr.args[1:]))})"
@@ -88,7 +92,7 @@ class Coefficients:
     def lift(self, expression: Any) -> Any:
         """The expression with its coefficients' symbols."""
         own, rest = self._split(expression)
-        return self._name(own) * rest
+        return rest if own == 1 else self._name(own) * rest
 
     def _split(self, expression: Any) -> tuple[Any, Any]:
         """A coefficient before everything, in parameters still, and the rest, lifted."""
@@ -184,6 +188,8 @@ def expanded(expression: Any, q: Sequence[Any]) -> Any:
         return any(found) and all(c.is_Integer and abs(c) <= HARMONICS for c in found)
 
     expression = expression.replace(sympy.tan, lambda x: sympy.sin(x) / sympy.cos(x))
+    expression = expression.replace(sympy.Heaviside, lambda x, *_: sympy.Piecewise((0, x < 0), (1, True)))
+    expression = expression.replace(sympy.DiracDelta, lambda *_: sympy.S.Zero)
     return expression.replace(
         lambda x: isinstance(x, sympy.sin | sympy.cos) and not x.args[0].is_Symbol and small(x),
         lambda x: sympy.expand_trig(x),
