@@ -277,7 +277,7 @@ class Sampled(Load):
         for start, end, (a, b, c, _) in zip(self.times, self.times[1:], self.pieces.T, strict=False):
             roots = np.roots([3.0 * a, 2.0 * b, c])
             places += [start + x.real for x in roots if not x.imag and max(t, start) < start + x.real < end]
-        return np.array([self.function(float(x)) for x in sorted(places)])
+        return np.array(list(map(self.function, map(float, sorted(places)))))
 
 
 @dataclass(frozen=True, eq=False)
