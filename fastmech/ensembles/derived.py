@@ -43,7 +43,7 @@ class MechanismSystem(System):
         # The right-hand side as a user would have written it, for what looks into it.
         text = in_precision(self._texts["rates"], "float64")
         module = new_module("mechanism", text, [mechanism.prints])
-        vars(module).update(self._called(module.__name__, "float64"))
+        vars(module).update(self._called(module.__name__, "float64") | {"exp": np.exp})
         own = dict.fromkeys(texts["rates"][0], 0.0)
         super().__init__(run_module(module, text).rates, mechanism.state, own)
 

@@ -19,7 +19,7 @@ from fastmech.ensembles import checks
 from fastmech.ensembles.ends import STOP_CODE, STOP_STATE, STOP_TIME
 from fastmech.ensembles.refusals import explain, reason
 from fastmech.ensembles.run import NOTHING, Observation
-from fastmech.ensembles.switches import UnclearError, decides_nothing, watching
+from fastmech.ensembles.switches import UnclearError, require_noted, watching
 from fastmech.errors import InputError, shown
 from fastmech.generated import new_module, run_module
 from fastmech.jit import VECTOR, called, inlined
@@ -71,7 +71,8 @@ class System:
         rhs: ``rhs(t, *state, *parameters)`` gives the derivatives as a tuple, one for each state; plain
             arithmetic on floats. Use :func:`fastmech.sin` and :func:`fastmech.cos`, and values chosen by
             ``a if condition else b`` instead of branches: then the loop over trajectories becomes packed
-            instructions.
+            instructions. Write ``2.0 * x``, not ``2 * x``: in float32 a whole number makes the rest of the
+            arithmetic double, and so does the time.
             Of many states the function is ``rhs(t, y, p, rates)``: arrays of one trajectory's states and
             parameters, and one into which it writes the rates, in loops over indices.
         state: names of the states, or ``("x", 100)`` for x0, ..., x99 and arrays.
@@ -128,24 +129,22 @@ class System:
             UnclearError: it cannot be told where.
         """
         functions: dict[str, Any] = {}
-        time = next(iter(inspect.signature(self.rhs).parameters))
-        try:
-            functions["rhs"], places = watching(self.rhs, {time, "y"} if self.vector else {time, *self.state})
-        except UnclearError:
-            if decides_nothing(self.rhs):
-                return None
-            raise
-        if not places:
+        given = inspect.signature(self.rhs).parameters
+        depend = {next(iter(given)), *(["y"] if self.vector else self.state)}
+        arrays = [VECTOR if self.vector else float64] * (len(given) - 1)
+        if not require_noted(self.rhs, depend, [float64, *arrays]):
             return None
         if self.vector:
             raise UnclearError("decisions on arrays are not located")
+        functions["rhs"], _ = watching(self.rhs, depend)
         states = [f"y[{d}]" for d in range(len(self.state))]
         own = [f"p[{list(self.parameters).index(name)}]" for name in self.parameter_order]
         name, arguments = getattr(self.rhs, "__name__", "rhs"), ", ".join(["t", *states, *own])
         source = _SWITCHES.format(name=name, arguments=arguments)
         if self.stop is not None:
-            names = inspect.signature(self.stop).parameters
-            functions["stop"], _ = watching(self.stop, set(names))
+            names = set(inspect.signature(self.stop).parameters)
+            require_noted(self.stop, names, [float64] * len(names))
+            functions["stop"], _ = watching(self.stop, names)
             source += f"    stop(seen, {', '.join(['t', *states])})\n"
         prints = [fingerprint(function) for function in (self.rhs, self.stop) if function is not None]
         module = new_module("system", source, prints)

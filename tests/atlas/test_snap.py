@@ -108,7 +108,7 @@ def test_other_parameters_against_a_walk(parameter: str) -> None:
             goal = value if value is not None else min(max(end, 0.5 * snap.value), 2.0 * snap.value)
             beyond = [] if value is None else [value + 1e-4 * (value - snap.value)]
             at = np.array([start.phi, start.theta])
-            for here in [*(goal - (goal - snap.value) * np.linspace(1.0, 1e-3, 300) ** 2), *beyond]:
+            for here in [*(goal - (goal - snap.value) * np.linspace(1.0, 1e-3, 100) ** 2), *beyond]:
                 found = find_equilibria(BISTABLE.replace(**{parameter: float(here)}))
                 places = np.array([[e.phi, e.theta] for e in found if e.kind == "minimum"])
                 away = np.linalg.norm(2.0 * np.sin((places - at) / 2.0), axis=1)

@@ -53,8 +53,9 @@ def test_table_result_file_and_pictures(invoke, one_case):
         assert beside["same"].data.all()
 
 
-def test_a_case_that_fails_ends_with_code_1(invoke, one_case):
+def test_a_case_that_fails_ends_with_code_1(invoke, one_case, monkeypatch):
     one_case(1e-7)
+    monkeypatch.setattr(containment, "CONTAINED", {"rk4": 0.02})
     result = invoke("hardcases", "--quick", "--out", "hard")
     assert result.exit_code == 1
     assert result.stdout.splitlines()[-1] == "1 of 1 cases failed: easy"

@@ -147,6 +147,29 @@ def test_tolerances_and_work_precision_take_mechanisms() -> None:
     assert {p.method for p in table.points} == {"rk4", "dop853"}
 
 
+@pytest.mark.parametrize("case", [0, 1, 3])
+def test_tolerances_are_kept_where_loads_decide(case: int) -> None:
+    """Of smooth loads every error is told; steps end where a pulse begins and ends."""
+    load, force, kinks = FORCES[case]
+    x = fm.lengths("x")
+    mechanism = fm.Mechanism(
+        x, kinetic=x.dot**2 / 2, potential=2 * x**2 + x**4 / 4, points={"P": (x, 0)},
+        forces=[fm.Force("P", load, (1, 0))],
+    )  # fmt: skip
+    starts = np.random.default_rng(case).uniform(-1.0, 1.0, (30, 2))
+    found = fm.integrate(mechanism, starts, 3.0, tol=1e-6)
+    assert found.error is not None
+    assert np.isfinite(found.error).all()
+    for start, end in zip(starts, found.y[-1], strict=True):
+        y = start
+        for a, b in pairwise([0.0, *kinks, 3.0]):
+            y = solve_ivp(
+                lambda t, y: [y[1], force(t) - 4.0 * y[0] - y[0] ** 3], (a, np.nextafter(b, a)), y,
+                "DOP853", rtol=1e-12, atol=1e-13,
+            ).y[:, -1]  # fmt: skip
+        np.testing.assert_allclose(end, y, atol=1e-6)
+
+
 def test_the_largest_exponent_of_a_mechanism() -> None:
     """A damped pendulum at rest: the slower of the two rates of its linear motion."""
     q = fm.angles("q")

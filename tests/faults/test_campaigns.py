@@ -17,7 +17,7 @@ from fastmech.scan_types.request import read_request
 
 def test_runs_killed_at_random_moments() -> None:
     """In a process of its own, whose only thread may be forked."""
-    command = [sys.executable, "-m", "fastmech", "faults", "--kills", "6", "--disks", "2", "--workers", "0"]
+    command = [sys.executable, "-m", "fastmech", "faults", "--kills", "4", "--disks", "2", "--workers", "0"]
     done = subprocess.run([*command, "--mutations", "0"], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert "runs killed" in done.stdout
