@@ -165,7 +165,7 @@ def mechanism_problem(mechanism: Mechanism, n: int, own: Mapping[str, Floats], f
     """
     for extreme in (np.min, np.max) if n and own else ():
         mechanism.replace(**{name: float(extreme(column)) for name, column in own.items()})
-    return _of_mechanism(mechanism, own, formulation)
+    return _of_mechanism(mechanism.with_terms(own), own, formulation)
 
 
 def _of_mechanism(mechanism: Mechanism, own: Mapping[str, Floats], formulation: str) -> Problem:

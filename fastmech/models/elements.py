@@ -6,6 +6,7 @@ Points are expressions of the coordinates, by name or in place: two components [
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import sympy
@@ -81,6 +82,25 @@ class Parts(NamedTuple):
     dissipation: Any  #: Rayleigh's function, half the power that dampers take [W]
     forces: tuple[Any, ...]  #: generalized forces beside those, one a coordinate
     loads: tuple[tuple[Load, tuple[Any, ...]], ...]  #: with d(place along the load)/d(coordinate)
+
+    def put(self, values: Mapping[Any, Any]) -> Parts:
+        """The same with values of some symbols."""
+        loads = []
+        for load, moved in self.loads:
+            given = {k: v.xreplace(values) for k, v in vars(load).items() if isinstance(v, sympy.Expr)}
+            loads.append((replace(load, **given), tuple(x.xreplace(values) for x in moved)))
+        energies = (sympy.sympify(part).xreplace(values) for part in self[:4])
+        return Parts(*energies, tuple(x.xreplace(values) for x in self.forces), tuple(loads))
+
+    @property
+    def finite(self) -> bool:
+        """Whether no expression divides by zero."""
+        loads = (part for load, moved in self.loads for part in (*vars(load).values(), *moved))
+        return not any(
+            part.has(sympy.zoo, sympy.nan)
+            for part in (*self[:4], *self.forces, *loads)
+            if isinstance(part, sympy.Basic | sympy.MatrixBase)
+        )
 
 
 class Builder:

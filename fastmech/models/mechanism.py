@@ -8,7 +8,7 @@ import json
 import keyword
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -151,6 +151,23 @@ class Mechanism:
         check(made)
         return made
 
+    def with_terms(self, varied: Collection[str]) -> Mechanism:
+        """The same with no terms of parameters that are zero, but for those whose values are ``varied``."""
+        names = {name for name, value in self.parameters.items() if value == 0.0 and name not in varied}
+        if not names:
+            return self
+        key = self.prints, self.name, *sorted(names)
+        if key not in _with_terms:
+            made = copy.copy(self)
+            for name in ("equations", "_statics", "prints", "derived", "_numpy"):
+                made.__dict__.pop(name, None)
+            made._parts = self._parts.put({c: 0 for c in self._constants if c.name in names})
+            _with_terms[key] = made if made._parts.finite else copy.copy(self)
+            _ = _with_terms[key]._numpy  # what copies share
+        made = copy.copy(_with_terms[key])
+        made.parameters = self.parameters
+        return made
+
     @property
     def state(self) -> tuple[str, ...]:
         """Names of the states: coordinates, then rates."""
@@ -290,6 +307,9 @@ class Mechanism:
         values = ", ".join(f"{name}={value:g}" for name, value in self.parameters.items())
         return f"Mechanism({self.name}: {', '.join(map(str, self._symbols))}; {values})"
 
+
+#: Mechanisms without some of their terms, by what tells them apart.
+_with_terms: dict[tuple[str, ...], Mechanism] = {}
 
 _PLAIN = ("coefficients", "momenta", "energies", "metric", "velocities", "powers", "slopes")
 

@@ -13,6 +13,8 @@ import sympy
 from scipy.integrate import solve_ivp
 
 import fastmech as fm
+from fastmech.ensembles.derived import system_of
+from fastmech.ensembles.operations import operations_of
 
 STARTS = np.random.default_rng(2).uniform(-1.5, 1.5, (40, 4))
 
@@ -74,6 +76,21 @@ def test_parameters_may_differ_between_trajectories() -> None:
         fm.integrate(mechanism, STARTS, 1.0, parameters={"m2": -own["m2"]})
     with pytest.raises(fm.InputError, match=r"parameters\.m8: unknown name"):
         fm.integrate(mechanism, STARTS, 1.0, parameters={"m8": own["m2"]})
+
+
+def test_terms_that_are_not_there_cost_nothing() -> None:
+    """A parameter that is zero leaves the compiled code, unless its values differ between trajectories."""
+    mechanism = fm.mechanisms.slider_pendulum().replace(beta=0.0, alpha=0.0)
+    free, full = system_of(mechanism.with_terms(()), "lagrange"), system_of(mechanism, "lagrange")
+    assert len(free.parameters) < len(full.parameters)
+    assert operations_of(free.rhs, [0.5] * (5 + len(free.parameters))) + 10 < operations_of(
+        full.rhs, [0.5] * (5 + len(full.parameters))
+    )
+    own = {"beta": np.linspace(0.0, 100.0, len(STARTS))}
+    found = fm.integrate(mechanism, STARTS, 1.0, dt=0.01, parameters=own)
+    for beta, k in ((0.0, 0), (100.0, 39)):
+        alone = fm.integrate(mechanism.replace(beta=beta), STARTS[k : k + 1], 1.0, dt=0.01)
+        np.testing.assert_allclose(found.y[-1, k], alone.y[-1, 0], rtol=1e-11)
 
 
 def bumpy(t: float) -> float:
