@@ -89,8 +89,8 @@ class Parts(NamedTuple):
         for load, moved in self.loads:
             given = {k: v.xreplace(values) for k, v in vars(load).items() if isinstance(v, sympy.Expr)}
             loads.append((replace(load, **given), tuple(x.xreplace(values) for x in moved)))
-        energies = (sympy.sympify(part).xreplace(values) for part in self[:4])
-        return Parts(*energies, tuple(x.xreplace(values) for x in self.forces), tuple(loads))
+        a, T, U, D = (sympy.sympify(part).xreplace(values) for part in self[:4])
+        return Parts(a, T, U, D, tuple(x.xreplace(values) for x in self.forces), tuple(loads))
 
     @property
     def finite(self) -> bool:
