@@ -19,7 +19,7 @@ VALUES = {
 
 def cart_pendulum() -> Mechanism:
     """Place x of the cart, and the pendulum's angle from upright; a torsion spring keeps it from turning."""
-    x, angle = lengths("x"), angles("angle", -float(pi), float(pi))
+    x, angle = lengths("x", -5.0, 5.0), angles("angle", -float(pi), float(pi))
     M, m, l, g, k, kt, b = symbols(list(VALUES))
     return Mechanism(
         (x, angle),
