@@ -38,6 +38,10 @@ class Load:
         """What is known of it."""
         raise NotImplementedError
 
+    def mean_at(self, values: Mapping[str, float]) -> Any:
+        """The mean, of symbols still, in the form that it has for these values of them."""
+        return self.facts().mean
+
     def to_come(self, t: float) -> tuple[float, float]:
         """|F(t) - F_end| and the total variation of F from ``t`` [s] on; infinite where it never fades."""
         raise NotImplementedError
@@ -61,7 +65,10 @@ class Load:
         missing = {s.name for v in given.values() for s in v.free_symbols} - set(values)
         if missing:
             raise InputError(f"{type(self).__name__}: has no values of {', '.join(sorted(missing))}")
-        return replace(self, **{name: float(value.subs(dict(values))) for name, value in given.items()})
+        put = {
+            s: values[s.name] for v in given.values() for s in v.free_symbols
+        }  # whatever is assumed of them
+        return replace(self, **{name: float(value.subs(put)) for name, value in given.items()})
 
     def _require(self, name: str, least: float = -inf, above: float = -inf) -> None:
         """Refuse a number that is out of its range."""
@@ -109,6 +116,10 @@ class Decaying(Load):
     def facts(self) -> Facts:
         """At rest it is gone, unless its rate is zero."""
         return Facts(0.0 if self.rate != 0 else self.value, abs(self.value))
+
+    def mean_at(self, values: Mapping[str, float]) -> Any:
+        """Of a rate that is zero the value."""
+        return 0.0 if self.at(values).rate else self.value
 
     def to_come(self, t: float) -> tuple[float, float]:
         """What is left, and to go."""

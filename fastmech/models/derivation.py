@@ -39,9 +39,10 @@ class Equations(NamedTuple):
     inertia: list[Any]  #: (da_ij/dq_k - da_jk/dq_i / 2) q_j' q_k'
     gain: list[Any]  #: (da_jk/dq_i) q_j' q_k' / 2
     loads: list[Any]  #: symbols of the loads' values
+    means: dict[Any, Any]  #: their values at rest
 
 
-def equations(parts: Parts, q: Sequence[Any], v: Sequence[Any]) -> Equations:
+def equations(parts: Parts, q: Sequence[Any], v: Sequence[Any], means: Sequence[Any]) -> Equations:
     """From energies and forces.
 
     Raises:
@@ -70,7 +71,7 @@ def equations(parts: Parts, q: Sequence[Any], v: Sequence[Any]) -> Equations:
         pairs = [(j, k) for j in range(n) for k in range(n)]
         gain.append(sum(sympy.diff(metric[j, k], q[i]) * v[j] * v[k] for j, k in pairs) / 2)
         inertia.append(sum(sympy.diff(metric[i, j], q[k]) * v[j] * v[k] for j, k in pairs) - gain[i])
-    return Equations(metric, forces, inertia, gain, loads)
+    return Equations(metric, forces, inertia, gain, loads, dict(zip(loads, means, strict=True)))
 
 
 def _by_terms(expression: Any, q: Sequence[Any]) -> Any:
@@ -84,8 +85,7 @@ def statics(
     """Forces at rest, loads at their means."""
     q = [coordinate.symbol for coordinate in coordinates]
     still = {sympy.Symbol(f"{symbol}_dot", real=True): 0 for symbol in q}
-    still |= {symbol: load.facts().mean for symbol, (load, _) in zip(found.loads, parts.loads, strict=True)}
-    forces = tuple(sympy.sympify(force).subs(still) for force in found.forces)
+    forces = tuple(sympy.sympify(force).subs(still | found.means) for force in found.forces)
     n = len(q)
     conservative = all(
         simplest(sympy.diff(forces[i], q[j]) - sympy.diff(forces[j], q[i]), q).equals(0) is True
@@ -197,9 +197,7 @@ def derive(
     canonical = velocities | lifted(
         {f"_f{i}": f + g for i, (f, g) in enumerate(zip(forces, found.gain, strict=True))}
     )
-    at_rest = dict.fromkeys(v, 0) | {
-        s: load.facts().mean for s, (load, _) in zip(found.loads, parts.loads, strict=True)
-    }
+    at_rest = dict.fromkeys(v, 0) | found.means
     slopes = {
         f"_{name}{i}_{j}": -sympy.diff(force, by[j]).subs(at_rest)
         for name, by in (("c", v), ("s", q)) for i, force in enumerate(found.forces) for j in range(n)

@@ -148,8 +148,18 @@ class Mechanism:
             if name not in known:
                 raise InputError(f"parameters.{name}: unknown name; {nearest(name, known)}")
         made.parameters, _ = _parameters(self.parameters | parameters)
+        if list(map(str, made._means())) != list(map(str, self._means())):
+            made._forget()
         check(made)
         return made
+
+    def _means(self) -> list[Any]:
+        return [load.mean_at(self.parameters) for load, _ in self._parts.loads]
+
+    def _forget(self) -> None:
+        """What follows from the equations, which are others now."""
+        for name in ("equations", "_statics", "prints", "derived", "_numpy"):
+            self.__dict__.pop(name, None)
 
     def with_terms(self, varied: Collection[str]) -> Mechanism:
         """The same with no terms of parameters that are zero, but for those whose values are ``varied``."""
@@ -159,8 +169,7 @@ class Mechanism:
         key = self.prints, self.name, *sorted(names)
         if key not in _with_terms:
             made = copy.copy(self)
-            for name in ("equations", "_statics", "prints", "derived", "_numpy"):
-                made.__dict__.pop(name, None)
+            made._forget()
             made._parts = self._parts.put({c: 0 for c in self._constants if c.name in names})
             _with_terms[key] = made if made._parts.finite else copy.copy(self)
             _ = _with_terms[key]._numpy  # what copies share
@@ -183,7 +192,7 @@ class Mechanism:
         """Metric and forces as SymPy expressions."""
         from fastmech.models.derivation import equations
 
-        return equations(self._parts, self._symbols, self._rates)
+        return equations(self._parts, self._symbols, self._rates, self._means())
 
     @cached_property
     def _statics(self) -> Statics:
@@ -205,7 +214,7 @@ class Mechanism:
             else:
                 loads.append(fingerprint(load.function) if isinstance(load, Function) else repr(load))
             loads.append(str(moved))
-        told = [*self._parts[:-1], loads, self._symbols, self._constants]
+        told = [*self._parts[:-1], loads, self._means(), self._symbols, self._constants]
         return hashlib.sha256("\0".join(map(str, told)).encode()).hexdigest()[:16]
 
     @cached_property

@@ -9,7 +9,14 @@ from oracles import TABLE_1, oracle
 
 import fastmech as fm
 from fastmech.mechanism.hamilton import momenta
-from fastmech.mechanism.lagrange import angular_accelerations, kinetic_energy, potential_energy, unit
+from fastmech.mechanism.lagrange import (
+    angular_accelerations,
+    kinetic_energy,
+    potential_energy,
+    potential_gradient,
+    potential_hessian,
+    unit,
+)
 from fastmech.models.mechanism import Mechanism
 
 pytestmark = pytest.mark.nojit
@@ -171,6 +178,20 @@ def test_statics_are_the_forces_at_rest_with_loads_at_their_means() -> None:
     assert sympy.simplify(found.forces[0] - (5.0 - named["k"] * named["x"])) == 0
     assert sympy.simplify(found.forces[1] - (-named["F"] - named["k"] * named["y"])) == 0
     assert not fm.mechanisms.ziegler_column().statics().conservative
+
+
+@pytest.mark.parametrize(("alpha", "acting"), [(0.7, 0.0), (0.0, 100.0)])
+def test_a_force_that_decays_is_gone_at_rest_and_one_that_does_not_stays(alpha: float, acting: float) -> None:
+    mechanism, scene = fm.mechanisms.slider_pendulum().replace(alpha=alpha), fm.Scene()
+    q = np.array([0.4, -0.7])
+    found = mechanism.statics()
+    at = [c.symbol for c in found.coordinates] + list(found.parameters)
+    assert mechanism.loads[0].facts().mean == acting
+    assert mechanism.loads[0].facts().bound == 100.0
+    values = dict(zip(at, [*q, *mechanism.parameters.values()], strict=True))
+    forces = [float(force.subs(values)) for force in found.forces]
+    np.testing.assert_allclose(forces, -potential_gradient(scene, q, acting), rtol=1e-12)
+    np.testing.assert_allclose(mechanism.linear(q).stiffness, potential_hessian(scene, q, acting), rtol=1e-12)
 
 
 def test_a_mechanism_prints_itself_in_a_line_and_takes_other_values() -> None:
