@@ -30,6 +30,8 @@ COMPILED = (
     "callee.py",
     "jit.py",
     "generated.py",
+    "loads.py",
+    "models",
     "mechanism",
     "kernels",
     "intervals",

@@ -14,7 +14,7 @@ from typing import Any
 
 import numba
 
-from fastmech.ensembles.rebuilding import rebuilt
+from fastmech.kernels.rebuilding import rebuilt
 from fastmech.kernels.sincos import cos, sin
 
 #: Instructions of LLVM that decide.

@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 
 from fastmech.callee import CalleeType
 from fastmech.ensembles.decisions import decides
-from fastmech.ensembles.fingerprint import enclosed
 from fastmech.jit import INLINED, VECTOR, inlined
+from fastmech.kernels.fingerprint import enclosed
 from fastmech.kernels.sincos import WITHIN
 
 Floats = NDArray[np.float64]
@@ -117,7 +117,7 @@ _BLIND: dict[str, Any] = dict.fromkeys(
 _BLIND |= {"_fastmech_beside": _blind_beside, "_fastmech_whole": _blind_whole, "_fastmech_int": _blind_int}
 # type: ignore[no-untyped-call]
 #: Type of the first argument of such a copy.
-BLIND: Any = kinds.Tuple((kinds.Array(kinds.int64, 1, "C"), VECTOR))
+BLIND: Any = kinds.Tuple((kinds.Array(kinds.int64, 1, "C"), VECTOR))  # type: ignore[no-untyped-call]
 
 _COMPARED = {
     ast.Lt: ("_less", 1),

@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 
 from fastmech.ensembles import checks
 from fastmech.ensembles.ends import STOP_CODE, STOP_STATE, STOP_TIME
-from fastmech.ensembles.fingerprint import fingerprint
-from fastmech.ensembles.rebuilding import Swaps, compiled_callees, raises, reaches, rebuilt, returns
 from fastmech.ensembles.refusals import explain, reason
 from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.ensembles.switches import UnclearError, require_noted, watching
@@ -27,6 +25,8 @@ from fastmech.generated import new_module, run_module
 from fastmech.jit import VECTOR, called, inlined
 from fastmech.kernels.attempt import attempted
 from fastmech.kernels.blocks import Rates, block_kernel
+from fastmech.kernels.fingerprint import fingerprint
+from fastmech.kernels.rebuilding import Swaps, compiled_callees, raises, reaches, rebuilt, returns
 from fastmech.kernels.sincos import WITHIN
 
 #: States of a family at most: a block of an implicit method has the square of it.
@@ -177,9 +177,9 @@ class System:
     def kernel(self) -> Any:
         """The compiled block right-hand side, loaded from the disk cache where it is there."""
         self._refuse_raising("rhs", self.rhs)
-        numbers = 1 + len(self.state) + len(self.parameters)
+        count = 1 + len(self.state) + len(self.parameters)
         with self._explained(
-            "rhs", self.rhs, 3 if self.vector else numbers, [] if self.vector else list(self.state)
+            "rhs", self.rhs, 3 if self.vector else count, [] if self.vector else list(self.state)
         ):
             made = block_kernel(self.rates)
             if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
@@ -228,10 +228,10 @@ class System:
 
 def _array_functions(field: str, function: Any, module: str, precision: str) -> dict[str, Any]:
     """The same of one that takes arrays."""
-    return {field: called(rebuilt(function, module, _numbers(precision)))}
+    return {field: called(rebuilt(function, module, numbers(precision)))}
 
 
-def _numbers(precision: str) -> Swaps:
+def numbers(precision: str) -> Swaps:
     """What constants become: a float64 would turn a lane's arithmetic into its own."""
     single: Any = np.float32
     return {float: single} if precision == "float32" else {}
@@ -244,9 +244,9 @@ def _swaps() -> Swaps:
 
 def _functions(field: str, function: Any, module: str, precision: str) -> dict[str, Any]:
     """A user's function for a module of that name, and the same with trigonometry that raises."""
-    numbers = _numbers(precision)
-    whole = inlined(rebuilt(function, module, numbers))
-    return {field: whole, f"{field}_within": attempted(rebuilt(function, module, _swaps() | numbers))}
+    swaps = numbers(precision)
+    whole = inlined(rebuilt(function, module, swaps))
+    return {field: whole, f"{field}_within": attempted(rebuilt(function, module, _swaps() | swaps))}
 
 
 def stop_codes(records: NDArray[np.float64]) -> NDArray[np.int64]:
