@@ -115,7 +115,6 @@ _BLIND: dict[str, Any] = dict.fromkeys(
     ("_fastmech_less", "_fastmech_at_most", "_fastmech_equal"), _blind_bool
 )
 _BLIND |= {"_fastmech_beside": _blind_beside, "_fastmech_whole": _blind_whole, "_fastmech_int": _blind_int}
-# type: ignore[no-untyped-call]
 #: Type of the first argument of such a copy.
 BLIND: Any = kinds.Tuple((kinds.Array(kinds.int64, 1, "C"), VECTOR))  # type: ignore[no-untyped-call]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 import scipy.linalg
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fastmech.errors import InputError, shown
 from fastmech.intervals.arithmetic import Interval, add, div, mul, sub
 from fastmech.models.equilibria import Floats, RestingPlace
+from fastmech.models.mechanism import Linear
 from fastmech.scene import Scene
 from fastmech.stability import classify as of_scene
 from fastmech.stability.classify import Finding
@@ -20,15 +21,7 @@ from fastmech.stability.classify import Finding
 _ROUNDING = 32.0 * 2.0**-52
 
 
-class Linear(NamedTuple):
-    """M q'' + C q' + K q = 0 about an equilibrium; what a mechanism's ``linear`` gives."""
-
-    mass: Floats  #: M (n, n), symmetric and positive definite
-    damping: Floats  #: C (n, n)
-    stiffness: Floats  #: K (n, n), symmetric where the forces have a potential
-
-
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Stability:
     """What decides whether a mechanism stays at an equilibrium; SI units."""
 
@@ -42,6 +35,10 @@ class Stability:
     verdict: Literal["asymptotically stable", "stable", "unstable", "critical"]
     instability: Literal["flutter", "divergence"] | None  #: growing swings, or growth without; if unstable
     explanation: str
+
+    def __repr__(self) -> str:
+        swings = ", ".join(f"{value:.6g}" for value in self.eigenvalues)
+        return f"{self.verdict}: {self.explanation}\neigenvalues [1/s]: {swings}"
 
 
 def classify(system: Any, equilibrium: Any) -> of_scene.Classification | Stability:
@@ -59,7 +56,7 @@ def classify(system: Any, equilibrium: Any) -> of_scene.Classification | Stabili
         return of_scene.classify(system, equilibrium)
     if not isinstance(equilibrium, RestingPlace):
         raise InputError(f"equilibrium = {shown(equilibrium)}: must be one of fastmech.find_equilibria")
-    linear = Linear(*system.linear(equilibrium.position))
+    linear: Linear = system.linear(equilibrium.position)
     if linear.stiffness.shape != equilibrium.stiffness.shape or not np.allclose(
         linear.stiffness, equilibrium.stiffness, rtol=1e-9, atol=1e-9 * np.abs(linear.stiffness).max()
     ):

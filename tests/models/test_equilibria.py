@@ -31,7 +31,8 @@ import fastmech as fm
 from fastmech.equilibria.outcome import Outcome
 from fastmech.errors import InputError
 from fastmech.models.equilibria import prove_equilibria, search_rows
-from fastmech.models.stability import Linear, assess
+from fastmech.models.mechanism import Linear
+from fastmech.models.stability import assess
 from fastmech.models.statics import Coordinate, Statics
 
 

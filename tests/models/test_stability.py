@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from fastmech.models.stability import Linear, assess
+from fastmech.models.mechanism import Linear
+from fastmech.models.stability import assess
 
 CRITICAL_LOAD = 3.5 - math.sqrt(2.0)
 
