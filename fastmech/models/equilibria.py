@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, overload
 
@@ -16,6 +16,8 @@ from fastmech.equilibria import find
 from fastmech.equilibria.outcome import Outcome
 from fastmech.errors import InputError, shown
 from fastmech.intervals.search import AT_END, LIMIT, TWO_PI, UNCLEAR, UNDEFINED, Found, search, work
+from fastmech.loads import Constant
+from fastmech.models.mechanism import Mechanism
 from fastmech.models.statics import Statics
 
 Floats = NDArray[np.float64]
@@ -139,11 +141,15 @@ def find_equilibria(system: Any, at: float = math.inf) -> find.Equilibria | Rest
         InputError: ``at`` is not a number >= 0; a coordinate's range is not finite; a force has a function of
             which no bounds are known.
     """
-    if not callable(getattr(system, "statics", None)):
+    if not isinstance(system, Mechanism):
         return find.find_equilibria(system, at)
     if at != math.inf:
         raise InputError(f"at = {shown(at)}: is for a Scene; equilibria of a mechanism hold for mean loads")
-    return prove_equilibria(system.statics(), list(system.parameters.values()))
+    found = prove_equilibria(system.statics(), list(system.parameters.values()))
+    if all(isinstance(load, Constant) for load in system.loads):
+        return found
+    told = f"{found.certificate.sentence}; loads that change are at their means, or at what they come to"
+    return replace(found, certificate=replace(found.certificate, sentence=told))
 
 
 def prove_equilibria(

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from fastmech.errors import InputError, shown
 from fastmech.intervals.arithmetic import Interval, add, div, mul, sub
 from fastmech.models.equilibria import Floats, RestingPlace
-from fastmech.models.mechanism import Linear
-from fastmech.scene import Scene
+from fastmech.models.mechanism import Linear, Mechanism
 from fastmech.stability import classify as of_scene
 from fastmech.stability.classify import Finding
 
@@ -52,11 +51,11 @@ def classify(system: Any, equilibrium: Any) -> of_scene.Classification | Stabili
     Raises:
         InputError: an argument is wrong, or the equilibrium is another system's.
     """
-    if isinstance(system, Scene) or not callable(getattr(system, "statics", None)):
+    if not isinstance(system, Mechanism):
         return of_scene.classify(system, equilibrium)
     if not isinstance(equilibrium, RestingPlace):
         raise InputError(f"equilibrium = {shown(equilibrium)}: must be one of fastmech.find_equilibria")
-    linear: Linear = system.linear(equilibrium.position)
+    linear = system.linear(equilibrium.position)
     if linear.stiffness.shape != equilibrium.stiffness.shape or not np.allclose(
         linear.stiffness, equilibrium.stiffness, rtol=1e-9, atol=1e-9 * np.abs(linear.stiffness).max()
     ):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from types import SimpleNamespace
 from typing import Any
 
 import mpmath
@@ -321,19 +320,12 @@ def test_rows_do_not_depend_on_their_company() -> None:
 
 
 def test_public_names_take_a_mechanism() -> None:
-    statics = cart_pendulum()
-    mass = np.array([[2.0, 1.0], [1.0, 1.0]])
-    device = SimpleNamespace(
-        statics=lambda: statics,
-        parameters={"k": 50.0, "w": 100.0, "g": 9.81},
-        linear=lambda q: (mass, np.zeros((2, 2)), np.array([[150.0, 100.0], [100.0, 100.0 - 9.81]])),
-    )
+    device = fm.mechanisms.cart_pendulum()
     found = fm.find_equilibria(device)
-    upright = min(found, key=lambda item: float(np.abs(item.position).max()))
-    assert fm.classify(device, upright).verdict == "stable"
-    assert "theta" in repr(found)
+    assert fm.classify(device, found[0]).verdict == "stable"
+    assert "angle" in repr(found)
     with pytest.raises(InputError, match="another mechanism"):
-        fm.classify(device, found[-1])
+        fm.classify(device.replace(kt=11.0), found[0])
     with pytest.raises(InputError, match=r"must be one of fastmech\.find_equilibria"):
         fm.classify(device, (0.0, 0.0))
     with pytest.raises(InputError, match="at = 1: is for a Scene"):
