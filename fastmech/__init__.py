@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 from fastmech import kernel_cache as _kernel_cache  # noqa: F401  first: it notes what the sources are
 
 if TYPE_CHECKING:
+    from fastmech import loads as loads
+    from fastmech import mechanisms as mechanisms
     from fastmech.atlas.fold_points import find_folds
     from fastmech.atlas.folds import trace_folds
     from fastmech.atlas.map import map_equilibria
@@ -45,12 +47,23 @@ if TYPE_CHECKING:
     from fastmech.ensembles.integrate import integrate
     from fastmech.ensembles.status import Status
     from fastmech.ensembles.system import System
-    from fastmech.equilibria.find import find_equilibria
     from fastmech.errors import InputError
     from fastmech.kernels.sincos import cos, sin
     from fastmech.mechanism.reactions import reactions
+    from fastmech.models.coordinates import angles, lengths
+    from fastmech.models.elements import (
+        Body,
+        Damper,
+        Force,
+        Spring,
+        Torque,
+        TorsionDamper,
+        TorsionSpring,
+    )
+    from fastmech.models.equilibria import find_equilibria
+    from fastmech.models.mechanism import Mechanism
+    from fastmech.models.stability import classify
     from fastmech.scene import Scene
-    from fastmech.stability.classify import classify
     from fastmech.step_limits.predict import largest_stable_step
     from fastmech.step_limits.warning import step_warning
     from fastmech.store.read import open_results
@@ -64,18 +77,27 @@ except metadata.PackageNotFoundError:  # run from its sources, not installed
     __version__ = "unknown"
 
 _MODULES = {
+    "Body": "fastmech.models.elements",
+    "Damper": "fastmech.models.elements",
+    "Force": "fastmech.models.elements",
     "InputError": "fastmech.errors",
+    "Mechanism": "fastmech.models.mechanism",
     "Scene": "fastmech.scene",
+    "Spring": "fastmech.models.elements",
     "Status": "fastmech.ensembles.status",
     "StepWarning": "fastmech.errors",
     "System": "fastmech.ensembles.system",
+    "Torque": "fastmech.models.elements",
+    "TorsionDamper": "fastmech.models.elements",
+    "TorsionSpring": "fastmech.models.elements",
+    "angles": "fastmech.models.coordinates",
     "barrier_tree": "fastmech.capture.barriers",
     "basin_entropy": "fastmech.basins.measures.entropy",
     "basin_fractions": "fastmech.basins.measures.fractions",
     "basin_stability": "fastmech.basins.measures.fractions",
     "boundary_dimension": "fastmech.basins.measures.dimension",
     "brute_force_shock": "fastmech.basins.shock",
-    "classify": "fastmech.stability.classify",
+    "classify": "fastmech.models.stability",
     "copy_labels": "fastmech.basins.copies",
     "copy_of_label": "fastmech.basins.copies",
     "cos": "fastmech.kernels.sincos",
@@ -83,7 +105,7 @@ _MODULES = {
     "disturb": "fastmech.basins.disturbed",
     "disturbed_motion": "fastmech.disturbance.motion",
     "erosion": "fastmech.basins.erosion",
-    "find_equilibria": "fastmech.equilibria.find",
+    "find_equilibria": "fastmech.models.equilibria",
     "find_folds": "fastmech.atlas.fold_points",
     "find_snap": "fastmech.atlas.snap",
     "finite_time_basin_stability": "fastmech.basins.measures.fractions",
@@ -95,6 +117,7 @@ _MODULES = {
     "labels_of": "fastmech.basins.label",
     "largest_lyapunov": "fastmech.transients.lyapunov",
     "largest_stable_step": "fastmech.step_limits.predict",
+    "lengths": "fastmech.models.coordinates",
     "linear_range": "fastmech.disturbance.linear_range",
     "map_basins": "fastmech.basins.map",
     "map_equilibria": "fastmech.atlas.map",
@@ -120,11 +143,20 @@ _MODULES = {
 }
 
 __all__ = [
+    "Body",
+    "Damper",
+    "Force",
     "InputError",
+    "Mechanism",
     "Scene",
+    "Spring",
     "Status",
     "StepWarning",
     "System",
+    "Torque",
+    "TorsionDamper",
+    "TorsionSpring",
+    "angles",
     "barrier_tree",
     "basin_entropy",
     "basin_fractions",
@@ -151,6 +183,7 @@ __all__ = [
     "labels_of",
     "largest_lyapunov",
     "largest_stable_step",
+    "lengths",
     "linear_range",
     "map_basins",
     "map_equilibria",
@@ -177,6 +210,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    if name in ("loads", "mechanisms"):
+        return import_module(f"fastmech.{name}")
     if name not in _MODULES:
         raise AttributeError(f"module 'fastmech' has no attribute {name!r}")
     value = getattr(import_module(_MODULES[name]), name)

@@ -6,7 +6,7 @@ import hashlib
 import os
 import sys
 import threading
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import ModuleType
 
@@ -30,6 +30,20 @@ def new_module(kind: str, source: str, prints: Iterable[str] = ()) -> ModuleType
     module.__file__ = str(path)
     sys.modules[module.__name__] = module  # where numba looks when it loads a kernel from the disk
     return module
+
+
+def kept_text(kind: str, name: str, make: Callable[[], str]) -> str:
+    """A text that takes long to make, from the cache directory where it has been put there under its name.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    path = cache_directory() / f"{kind}s" / f"{kind}_{name}.txt"
+    if path.exists():
+        return path.read_text(encoding="utf-8")
+    text = make()
+    _write_once(path, text)
+    return text
 
 
 def run_module(module: ModuleType, source: str) -> ModuleType:

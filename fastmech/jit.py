@@ -74,6 +74,9 @@ KERNEL: Any = {"no_cfunc_wrapper": True, "pipeline_class": _WideCompiler, **FLAG
 #: Options of what is compiled into its caller; its loops become vectors before it gets there.
 INLINED: Any = {"forceinline": True, "no_cpython_wrapper": True, **KERNEL}
 
+#: Options of interval arithmetic besides: nothing is fused, so that an operation rounds once.
+EXACT: Any = {"fastmath": False}
+
 VECTOR = types.Array(types.float64, 1, "C")
 MATRIX = types.Array(types.float64, 2, "C")
 CUBE = types.Array(types.float64, 3, "C")
@@ -257,7 +260,16 @@ def inlined(function: F) -> F:
     The same source therefore serves compiled lanes and NumPy arrays. It is compiled once for its arguments'
     types: numba's ``register_jitable`` does so for kernels and for inlined functions apart.
     """
-    _parts.append(njit(**INLINED)(function))
+    return _inlined(function, INLINED)
+
+
+def inlined_exactly(function: F) -> F:
+    """The same for interval arithmetic: whatever function it is compiled into, nothing of it is fused."""
+    return _inlined(function, {**INLINED, **EXACT})
+
+
+def _inlined(function: F, options: Any) -> F:
+    _parts.append(njit(**options)(function))
     infer_global(function, types.Dispatcher(_parts[-1]))  # type: ignore[no-untyped-call]
     return function
 

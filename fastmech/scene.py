@@ -41,6 +41,9 @@ Number = Annotated[_Float, AfterValidator(_not_huge)]
 Positive = Annotated[Number, Field(gt=0), AfterValidator(_not_tiny)]
 NonNegative = Annotated[Number, Field(ge=0)]
 
+#: States of the mechanism by name.
+STATE = ("phi", "theta", "phi_dot", "theta_dot")
+
 _UNITS: dict[str, str] = {
     "m1": "kg",
     "m2": "kg",

@@ -25,10 +25,14 @@ LAYERS = (
     "scene",
     "mechanism",
     "kernels",
+    "intervals",
     "integrators",
     "equilibria",
     "stability",
     "step_limits",
+    "loads",
+    "models",
+    "mechanisms",
     "ensembles",
     "transients",
     "atlas",
@@ -165,7 +169,7 @@ def test_whatever_a_scan_computes_with_decides_its_identity() -> None:
 @EVERY_MODULE
 def test_cached_kernels_lie_in_compiled_places(path: Path) -> None:
     """What is decorated by ``kernel`` or ``inlined`` is kept on disk or reaches what is."""
-    if decorators(tree(path)) & {"kernel", "inlined"}:
+    if decorators(tree(path)) & {"kernel", "inlined", "inlined_exactly"}:
         assert is_compiled(path)
 
 
@@ -175,7 +179,9 @@ def test_compiled_places_exist_and_hold_kernels() -> None:
     sources = compiled_sources()
     assert sources == sorted(path for path in MODULES if is_compiled(path))
     assert PACKAGE / "jit.py" in sources
-    assert sum(bool(decorators(tree(path)) & {"kernel", "inlined"}) for path in sources) >= 10
+    assert (
+        sum(bool(decorators(tree(path)) & {"kernel", "inlined", "inlined_exactly"}) for path in sources) >= 10
+    )
 
 
 ENGINE = {"kernels", "integrators", "step_limits", "ensembles"}

@@ -75,3 +75,8 @@ def test_importing_the_library_changes_nothing_of_the_process():
         [sys.executable, "-c", STATE], capture_output=True, text=True, check=True, env=os.environ
     )
     assert json.loads(done.stdout) == [True, True, True]
+
+
+def test_sympy_is_imported_only_where_a_mechanism_is_built() -> None:
+    code = "import sys, fastmech as fm; fm.find_equilibria(fm.Scene()); assert 'sympy' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True)

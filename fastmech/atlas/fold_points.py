@@ -13,7 +13,7 @@ from fastmech.atlas.continuation import Curve, newton
 from fastmech.atlas.cover import apart, solutions
 from fastmech.atlas.enclosure import System
 from fastmech.atlas.folds import RESIDUAL, merging, sifted
-from fastmech.atlas.systems import Plane, families, fold, point_at, suited
+from fastmech.atlas.systems import Plane, families, point_at, rest, suited
 from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -105,7 +105,7 @@ def _together(places: Floats) -> list[Floats]:
 def _singular(plane: Plane, z: Floats) -> FoldPoint:
     """The merging where the equations of a fold are singular, by its normal form."""
     p = point_at(plane, z)
-    moved = fold(plane)(z)[1][:2, 2]
+    moved = rest(plane)(z)[1][:, 2]  # of the gradient
     h11, h12, h22 = p.hessian
     null = np.array([h12, -h11]) if abs(h11) > abs(h22) else np.array([h22, -h12])
     along = abs(moved @ null) / (np.linalg.norm(null) * np.linalg.norm(moved))

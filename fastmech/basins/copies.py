@@ -9,11 +9,11 @@ from numpy.typing import ArrayLike
 
 from fastmech.basins.label import How, Labels, label_starts, require_damper
 from fastmech.basins.measures.labels import Floats, Integers, LabelOf, check_point
-from fastmech.basins.measures.norm import STATE, kinetic_norm
+from fastmech.basins.measures.norm import kinetic_norm
 from fastmech.ensembles import checks
 from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError
-from fastmech.scene import Scene
+from fastmech.scene import STATE, Scene
 
 #: Bits for the well (a scene has at most six equilibria) and for each angle's turns.
 WELL_BITS, TURN_BITS = 3, 30

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from fastmech.basins.copies import copy_numbers
 from fastmech.basins.label import How, Labels, label_starts, told_ends
 from fastmech.basins.measures.labels import number_turns
-from fastmech.basins.measures.norm import STATE as STATE
 from fastmech.basins.measures.norm import check_angles
 from fastmech.basins.refine import LevelProgress, refine_grid
 from fastmech.basins.system import system_labels_of
@@ -22,7 +21,7 @@ from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import LABELS, Status, counts
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
-from fastmech.scene import Scene, nearest
+from fastmech.scene import STATE, Scene, nearest
 
 Floats = NDArray[np.float64]
 

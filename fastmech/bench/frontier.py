@@ -28,6 +28,7 @@ from fastmech.ensembles.work_precision import (
 from fastmech.errors import InputError, called_here, shown
 from fastmech.integrators.method import ImplicitRungeKutta, Method
 from fastmech.integrators.methods import METHODS, find_method
+from fastmech.models.mechanism import Mechanism
 from fastmech.plots.style import LINES, new_figure, style
 from fastmech.scene import Scene
 
@@ -116,7 +117,7 @@ class WorkPrecision:
 
 @called_here(t_span="t_end", tol="errors")
 def work_precision(
-    scene: Scene | System,
+    scene: Scene | Mechanism | System,
     y0: ArrayLike,
     t_end: float,
     *,

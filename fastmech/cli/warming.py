@@ -23,6 +23,7 @@ import numpy as np
 import fastmech as fm
 from fastmech import jit
 from fastmech.ensembles.threads import thread_count
+from fastmech.equilibria.find import find_equilibria
 
 _SCENES = {"constant": fm.Scene(alpha=0.0), "decaying": fm.Scene()}
 _STARTS = np.array([[1.0, 0.2, 0.0, 0.0], [0.9, -0.3, 0.5, 0.0]])
@@ -36,7 +37,7 @@ def _integrate(force: str, **how: object) -> None:
 
 def _disturb() -> None:
     scene = _SCENES["constant"]
-    fm.disturb(scene, fm.find_equilibria(scene)[0], 16, radius=0.1, t_end=0.5)
+    fm.disturb(scene, find_equilibria(scene)[0], 16, radius=0.1, t_end=0.5)
 
 
 #: What each purpose runs, the longest first.

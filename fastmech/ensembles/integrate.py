@@ -14,6 +14,7 @@ from fastmech.ensembles.problem import (
     Case,
     Problem,
     extreme_scenes,
+    mechanism_problem,
     own_values,
     scene_problem,
     system_problem,
@@ -28,7 +29,8 @@ from fastmech.errors import InputError, called_here, shown
 from fastmech.integrators.method import ImplicitRungeKutta, Method
 from fastmech.integrators.methods import find_method
 from fastmech.kernels.select import FORMULATIONS
-from fastmech.scene import Scene, nearest
+from fastmech.models.mechanism import Mechanism
+from fastmech.scene import STATE, Scene, nearest
 from fastmech.step_limits.warning import TURN, too_long, warn_of_step
 
 #: Longest step [s] where neither a step nor a tolerance is given.
@@ -68,6 +70,7 @@ class Trajectories:
     error: NDArray[np.float64] | None = None  #: estimate for each trajectory (n,), of runs to a tolerance
     error_estimate: float | None = None  #: estimate of the quantile asked for, of runs to a tolerance
     reason: str | None = None  #: why this method, one line, of runs to a tolerance
+    names: tuple[str, ...] = ()  #: of the states
 
     @property
     def failures(self) -> str:
@@ -84,7 +87,7 @@ class Trajectories:
 
 @called_here(rtol="tol", atol="tol", t_span="t_end", max_step="dt", h="dt", step="dt", args="parameters")
 def integrate(
-    scene: Scene | System,
+    scene: Scene | Mechanism | System,
     y0: ArrayLike,
     t_end: float | None = None,
     dt: float | None = None,
@@ -103,8 +106,9 @@ def integrate(
     """Integrate an ensemble with fixed steps.
 
     Args:
-        scene: the mechanism, or a system of your own.
-        y0: starts, shape (n, dim) or (dim,) at t = 0; a scene's: phi, theta [rad], phi', theta' [rad/s].
+        scene: the paper's mechanism, a :class:`fastmech.Mechanism`, or a system of your own.
+        y0: starts, shape (n, dim) or (dim,) at t = 0; a scene's: phi, theta [rad], phi', theta' [rad/s], a
+            mechanism's: coordinates, then rates.
             Angles are not wrapped.
         t_end: end of the run [s]; the last of ``t_eval`` by default.
         dt: longest step [s], 0.01 by default. Each interval between outputs is divided into equal steps not
@@ -125,8 +129,8 @@ def integrate(
             fast motion down. Scenes only.
         t_eval: output times [s], rising, not negative; only ``t_end`` by default.
         parameters: values of parameters, by name, that differ between trajectories, each of shape (n,).
-        formulation: of a scene: "lagrange", the default, integrates angles and rates (paper (13)), "hamilton"
-            angles and generalized momenta (paper (14)); both take and give angles and rates.
+        formulation: of a scene or a mechanism: "lagrange", the default, integrates angles and rates (paper
+            (13)), "hamilton" those and generalized momenta (paper (14)); both take and give angles and rates.
         dtype: precision of the lanes, "float64" or "float32": about twice as fast, for errors down to 1e-4.
         threads: threads to use, all processors by default. The result does not depend on it.
         progress: is told how many trajectories have finished since its last call.
@@ -218,13 +222,14 @@ def _trajectories(
         stop_time=time,
         failed=solution.failed,
         last=solution.y[-1] if solution.last is None else solution.last,
+        names=STATE if problem.system is None else tuple(problem.system.state),
     )
 
 
-def _fit_times(fit: bool | ArrayLike, scene: Scene | System, until: float) -> tuple[float, ...]:
+def _fit_times(fit: bool | ArrayLike, scene: Scene | Mechanism | System, until: float) -> tuple[float, ...]:
     if isinstance(fit, bool | np.bool_) and not fit:
         return ()
-    if isinstance(scene, System):
+    if not isinstance(scene, Scene):
         raise InputError("fit: only for a scene, whose energy bounds its speed")
     if isinstance(fit, bool | np.bool_):
         return (0.0,)
@@ -260,11 +265,14 @@ def _output_times(t_end: float | None, t_eval: ArrayLike | None) -> NDArray[np.f
 
 
 def problem_of(
-    scene: Scene | System, y0: ArrayLike, parameters: Mapping[str, ArrayLike], formulation: str | None
+    scene: Scene | Mechanism | System,
+    y0: ArrayLike,
+    parameters: Mapping[str, ArrayLike],
+    formulation: str | None,
 ) -> tuple[NDArray[np.float64], Problem, dict[str, NDArray[np.float64]]]:
     """Checked starts, what to integrate from them, and a scene's parameters that differ between them."""
     if isinstance(scene, System) and formulation is not None:
-        raise InputError(f"formulation = {shown(formulation)}: only for a scene")
+        raise InputError(f"formulation = {shown(formulation)}: only for a scene or a mechanism")
     formulation = "lagrange" if formulation is None else formulation
     if not isinstance(formulation, str) or formulation not in FORMULATIONS:
         raise InputError(
@@ -273,8 +281,12 @@ def problem_of(
     if isinstance(scene, System):
         starts = checks.states("y0", y0, len(scene.state))
         return starts, system_problem(scene, len(starts), parameters), {}
+    if isinstance(scene, Mechanism):
+        starts = checks.states("y0", y0, len(scene.state))
+        own = own_values(parameters, scene.parameters, len(starts))
+        return starts, mechanism_problem(scene, len(starts), own, formulation), own
     if not isinstance(scene, Scene):
-        raise InputError(f"scene = {shown(scene)}: must be a Scene or a System")
+        raise InputError(f"scene = {shown(scene)}: must be a Scene, a Mechanism or a System")
     starts = checks.states("y0", y0, 4)
     own = own_values(parameters, scene.model_dump(), len(starts))
     return starts, scene_problem(scene, len(starts), own, formulation), own

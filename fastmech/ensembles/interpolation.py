@@ -19,7 +19,6 @@ from fastmech.ensembles.fitting import EXPONENT_ONCE, fit_steps
 from fastmech.ensembles.problem import Case, Problem
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.solve import Settings, Solution, nothing, put_into, solve
-from fastmech.kernels.select import right_hand_side
 
 Floats = NDArray[np.float64]
 
@@ -98,11 +97,10 @@ def _weights(place: float, last: int, nodes: int) -> tuple[int, Floats, Floats]:
 
 def _rates(problem: Problem, times: Floats, y: Floats) -> Floats:
     """Derivatives of public states (times, n, dim)."""
-    c = problem.coefficients
-    rhs = right_hand_side(c, "lagrange") if problem.canonical and c is not None else problem.rhs
+    problem = problem.public
     rates, params = np.empty_like(y), problem.params.block(y.shape[1])
     into = np.empty((y.shape[2], y.shape[1]))
     for t, states, found in zip(times, y, rates, strict=True):
-        rhs(float(t), np.ascontiguousarray(states.T), into, params)
+        problem.rhs(float(t), np.ascontiguousarray(states.T), into, params)
         found[...] = into.T
     return rates

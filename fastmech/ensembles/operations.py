@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from fastmech.ensembles.rebuilding import rebuilt
 from fastmech.integrators.method import Adams, ImplicitRungeKutta, Method
+from fastmech.kernels.rebuilding import rebuilt
 from fastmech.kernels.sincos import cos, sin
 
 #: Operations of the mechanism's equations: additions and products, two divisions and two sine-cosine pairs,

@@ -189,8 +189,8 @@ def _meet(w: Any, h: float) -> float:
     """Where in a step of length ``h`` a decision may have turned over and back; 0: nowhere."""
     for k in range(1, 1 + 2 * _decisions(w, BEFORE), 2):
         first, last = w.notes[BEFORE, k], w.notes[AFTER, k]
-        if first * last > 0.0:
-            sign = 1.0 if first > 0.0 else -1.0
+        if first * last >= 0.0:  # a step may begin on the very edge
+            sign = 1.0 if first + last > 0.0 else -1.0
             down, up = sign * w.notes[SLOPES, k], sign * w.notes[AFTER_SLOPES, k]
             if down < 0.0 < up:
                 at = (sign * (first - last) + up * h) / (up - down)
@@ -287,7 +287,7 @@ def _follow(rhs: Any, switches: Any, observe: Any, course: Any, i: int) -> None:
                 break
             continue
         if not switched:
-            _slopes(switches, t + tried, SLOPE * tried, w, AFTER)
+            _slopes(switches, t + tried, max(SLOPE * tried, resolution), w, AFTER)
             turn = _meet(w, tried)
             if turn > 0.0:
                 if tried < FINEST * longest:

@@ -7,7 +7,7 @@ integrated ones and back.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.ensembles import checks
+from fastmech.ensembles.derived import system_of
 from fastmech.ensembles.fitting import damping_rate, vibration_frequency
 from fastmech.ensembles.parameters import Parameters
 from fastmech.ensembles.run import NOTHING, Observation
@@ -26,6 +27,7 @@ from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.mechanism.equations import momenta_from_rates, rates_from_momenta
 from fastmech.mechanism.reduced import metric_determinant, slider_ratio
+from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene, nearest
 
 Floats = NDArray[np.float64]
@@ -40,7 +42,11 @@ class Problem:
     observation: Observation = NOTHING
     coefficients: Coefficients | None = None  #: of a scene: numbers, or one a trajectory
     canonical: bool = False  #: momenta are integrated in place of rates
-    system: System | None = None  #: of the user's own
+    system: System | None = None  #: of the user's own, or of a mechanism
+    mechanism: Mechanism | None = None
+    values: Mapping[str, Floats] = field(
+        default_factory=dict
+    )  #: of a mechanism's parameters, one a trajectory
 
     @property
     def jacobian(self) -> Any:
@@ -55,11 +61,28 @@ class Problem:
 
     def inward(self, y: Floats) -> Floats:
         """Integrated states from public ones (..., n, dim)."""
-        return with_momenta(self.coefficients, y) if self.canonical and self.coefficients else y
+        if not self.canonical:
+            return y
+        if self.mechanism is not None:
+            return self.mechanism.to_momenta(y, self.values)
+        return with_momenta(self.coefficients, y) if self.coefficients else y
 
     def outward(self, y: Floats) -> Floats:
         """Public states from integrated ones (..., n, dim)."""
-        return with_rates(self.coefficients, y) if self.canonical and self.coefficients else y
+        if not self.canonical:
+            return y
+        if self.mechanism is not None:
+            return self.mechanism.to_rates(y, self.values)
+        return with_rates(self.coefficients, y) if self.coefficients else y
+
+    @property
+    def public(self) -> Problem:
+        """The same with public states."""
+        if self.canonical and self.mechanism is not None:
+            return _of_mechanism(self.mechanism, self.values, "lagrange")
+        if self.canonical and self.coefficients is not None:
+            return replace(self, rhs=right_hand_side(self.coefficients, "lagrange"), canonical=False)
+        return self
 
     def part(self, members: NDArray[np.int64]) -> Problem:
         """The same for some of the trajectories."""
@@ -69,7 +92,8 @@ class Problem:
         if own is not None:
             values: Any = (np.asarray(c)[members] for c in own)
             own = Coefficients(*values)
-        return replace(self, params=self.params.part(members), coefficients=own)
+        values = {name: column[members] for name, column in self.values.items()}
+        return replace(self, params=self.params.part(members), coefficients=own, values=values)
 
 
 class Case(NamedTuple):
@@ -131,6 +155,27 @@ def system_problem(system: System, n: int, parameters: Mapping[str, ArrayLike]) 
     own = own_values(parameters, system.parameters, n)
     columns = (np.asarray(own.get(k, v), dtype=np.float64) for k, v in system.parameters.items())
     return Problem(system.kernel, Parameters(tuple(columns)), system.observation, system=system)
+
+
+def mechanism_problem(mechanism: Mechanism, n: int, own: Mapping[str, Floats], formulation: str) -> Problem:
+    """A mechanism of which some parameters differ between the n trajectories: ``own``.
+
+    Raises:
+        InputError: values that no such mechanism may have.
+    """
+    for extreme in (np.min, np.max) if n and own else ():
+        mechanism.replace(**{name: float(extreme(column)) for name, column in own.items()})
+    return _of_mechanism(mechanism.with_terms(own), own, formulation)
+
+
+def _of_mechanism(mechanism: Mechanism, own: Mapping[str, Floats], formulation: str) -> Problem:
+    system, known = system_of(mechanism, formulation), mechanism.coefficients(own)
+    params = Parameters(tuple(np.asarray(known[name]) for name in system.parameters))
+    values = {name: np.asarray(column) for name, column in own.items()}
+    canonical = formulation == "hamilton"
+    return Problem(
+        system.kernel, params, canonical=canonical, system=system, mechanism=mechanism, values=values
+    )
 
 
 def own_values(parameters: Mapping[str, ArrayLike], known: Mapping[str, float], n: int) -> dict[str, Floats]:

@@ -205,7 +205,7 @@ class _Course:
 
 def _steps_taken(times: Floats, dt: Floats, n: int) -> tuple[NDArray[np.int64], Floats]:
     """Steps of n trajectories, none longer than ``dt`` [s] of all or of each; number and longest of each."""
-    lengths = np.unique(dt)
+    lengths = np.unique(dt) if dt.ndim else dt[None]
     numbers = [output_steps(times, float(length)) for length in lengths]
     total = np.array([number.sum() for number in numbers], dtype=np.int64)
     longest = np.array([np.max(np.diff(times) / np.maximum(number, 1)) for number in numbers])

@@ -134,7 +134,9 @@ def tasks_of(dt: Floats, usable: NDArray[np.bool_], times: Floats, workers: int,
     All workers share a step's trajectories where they are all there are. Of several steps' each is divided as
     far as its part of the work asks for: a task costs about as much beside its steps as a hundred of them.
     """
-    groups = [(way(times, float(step)), np.flatnonzero(usable & (dt == step))) for step in np.unique(dt)]
+    # To sort takes longer than a short run.
+    steps = dt[:1] if dt.size and dt.min() == dt.max() else np.unique(dt)
+    groups = [(way(times, float(step)), np.flatnonzero(usable & (dt == step))) for step in steps]
     groups = [(passed, members) for passed, members in groups if members.size]
     work = [members.size * max(int(passed.steps.sum()), 1) for passed, members in groups]
     equal = workers if len(groups) == 1 else SHARES * workers

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import ast
 import builtins
-import dis
 import linecache
 import math
 import types
@@ -25,8 +24,9 @@ from numba.core.registry import CPUDispatcher
 from numpy.typing import NDArray
 
 from fastmech.callee import CalleeType
-from fastmech.ensembles.fingerprint import enclosed
+from fastmech.ensembles.decisions import decides
 from fastmech.jit import INLINED, VECTOR, inlined
+from fastmech.kernels.fingerprint import enclosed
 from fastmech.kernels.sincos import WITHIN
 
 Floats = NDArray[np.float64]
@@ -82,8 +82,41 @@ def _whole(seen: Floats, x: float) -> float:
     return x
 
 
-#: What the copy calls in its own globals.
+Blind = tuple[NDArray[np.int64], Floats]
+
+
+@inlined
+def _blind_bool(seen: Blind, a: float, b: float) -> bool:
+    seen[1][0] = a - b  # what the sides hide is computed still
+    return seen[0][0] > 0
+
+
+@inlined
+def _blind_beside(seen: Blind, a: float, b: float) -> float:
+    seen[1][0] = a - b
+    return a
+
+
+@inlined
+def _blind_whole(seen: Blind, x: float) -> float:
+    seen[1][0] = x
+    return seen[0][0] + 0.0
+
+
+@inlined
+def _blind_int(seen: Blind, x: float) -> int:
+    seen[1][0] = x
+    return seen[0][0]
+
+
+#: What the copy calls in its own globals, and what one calls whose decisions nothing takes.
 _HELPERS = {f"_fastmech{f.__name__}": f for f in (_less, _at_most, _equal, _beside, _whole)}
+_BLIND: dict[str, Any] = dict.fromkeys(
+    ("_fastmech_less", "_fastmech_at_most", "_fastmech_equal"), _blind_bool
+)
+_BLIND |= {"_fastmech_beside": _blind_beside, "_fastmech_whole": _blind_whole, "_fastmech_int": _blind_int}
+#: Type of the first argument of such a copy.
+BLIND: Any = kinds.Tuple((kinds.Array(kinds.int64, 1, "C"), VECTOR))  # type: ignore[no-untyped-call]
 
 _COMPARED = {
     ast.Lt: ("_less", 1),
@@ -115,46 +148,53 @@ class UnclearError(Exception):
     """A function of which it cannot be told where it decides."""
 
 
-def watching(function: Any, depend: set[str]) -> tuple[types.FunctionType, int]:
+def watching(function: Any, depend: set[str], blind: bool = False) -> tuple[types.FunctionType, int]:
     """A copy that takes the array of its notes as first argument, and how many places of it note.
 
-    ``depend`` names the arguments that change on the way; what depends on others alone is no decision.
+    ``depend`` names the arguments that change on the way; what depends on others alone is no decision. In a
+    ``blind`` copy the decisions that would be noted are taken by nothing that it computes.
 
     Raises:
         UnclearError: the source is not at hand, or it calls what is not known to be smooth.
     """
     node = _definition(function)
     known = {**function.__globals__, **enclosed(function)}
-    watch = _Watch(known, _depending(node, depend))
+    watch = _Watch(known, _depending(node, depend), blind)
     body = [watch.visit(part) for part in node.body]
     copy = ast.FunctionDef(node.name, node.args, body, [], None, None)
     copy.args.args.insert(0, ast.arg("_fastmech_seen"))
     for argument in copy.args.args:
         argument.annotation = None
     module: Any = ast.fix_missing_locations(ast.Module([copy], []))
-    place = {**known, **_HELPERS, **watch.callees}
+    place = {**known, **(_BLIND if blind else _HELPERS), **watch.callees}
     exec(compile(module, function.__code__.co_filename, "exec"), place)
     made = place[node.name]
     made.__defaults__, made.__module__ = function.__defaults__, __name__
     return made, watch.places
 
 
-def decides_nothing(function: Any) -> bool:
-    """Whether a function whose source is not at hand has no decision in its instructions, and calls none."""
-    code = function.__code__
-    if any(
-        instruction.opname == "COMPARE_OP"
-        or "JUMP_IF" in instruction.opname
-        or instruction.argrepr in ("%", "//")
-        for instruction in dis.get_instructions(code)
-    ):
-        return False
-    known = {**vars(builtins), **function.__globals__, **enclosed(function)}
-    names = [*code.co_names, *code.co_freevars]
-    found = [known[name] for name in names if name in known]
-    called = [value for value in found if callable(value)]
-    attributes = [name for name in names if name not in known]
-    return all(_kind(value) == "smooth" for value in called) and set(attributes) <= _SMOOTH | {"pi", "e"}
+def require_noted(function: Any, depend: set[str], arguments: list[Any]) -> bool:
+    """Whether a function decides, having made sure that a copy notes where; ``arguments`` are numba's types.
+
+    Raises:
+        UnclearError: it decides, and it cannot be told where.
+    """
+    names = function.__code__.co_varnames[: len(arguments)]
+    steady = {name for name in names if name not in depend}
+    try:
+        blind, places = watching(function, depend, blind=True)
+        reason, given = "its compiled code decides where its source does not show it", [BLIND, *arguments]
+    except UnclearError as unclear:
+        blind, places, reason, given = function, 0, str(unclear), arguments
+    if numba.config.DISABLE_JIT and blind is not function:  # type: ignore[attr-defined]
+        return places > 0
+    try:
+        hidden = decides(blind, given, steady)
+    except Exception:  # whatever numba does not understand
+        hidden = True
+    if hidden:
+        raise UnclearError(reason)
+    return places > 0
 
 
 def _kind(value: Any) -> str:
@@ -251,12 +291,19 @@ def _depending(node: ast.FunctionDef, depend: set[str]) -> set[str]:
     return found
 
 
+def _sum(parts: list[ast.expr]) -> ast.expr:
+    total = parts[0]
+    for part in parts[1:]:
+        total = ast.BinOp(total, ast.Add(), part)
+    return total
+
+
 class _Watch(ast.NodeTransformer):
     """Puts notes into a function."""
 
-    def __init__(self, known: dict[str, Any], depending: set[str]) -> None:
+    def __init__(self, known: dict[str, Any], depending: set[str], blind: bool) -> None:
         """``known`` are its globals, ``depending`` its names that change on the way."""
-        self._known, self._depending = known, depending
+        self._known, self._depending, self._blind = known, depending, blind
         self.callees: dict[str, Any] = {}
         self.places = 0
 
@@ -293,6 +340,8 @@ class _Watch(ast.NodeTransformer):
 
     def _ratio(self, node: Any, place: str, a: ast.expr, b: ast.expr) -> Any:
         whole = self._noting("_whole", ast.BinOp(a, ast.Div(), b))
+        if self._blind:
+            return whole
         return ast.BinOp(node, ast.Add(), ast.BinOp(ast.Constant(0.0), ast.Mult(), whole))
 
     def visit_Call(self, node: ast.Call) -> ast.expr:
@@ -312,17 +361,26 @@ class _Watch(ast.NodeTransformer):
         args = node.args
         if kind in _SIGN and len(args) > _SIGN[kind]:
             args[_SIGN[kind]] = self._noting("_beside", args[_SIGN[kind]], ast.Constant(0.0))
+            if self._blind:
+                return _sum(args)
         elif kind in _INTEGER:
+            if self._blind:
+                home = getattr(value, "__module__", None) or "numpy"
+                whole = home in ("math", "builtins") and len(args) == 1
+                return self._noting("_int" if whole else "_whole", args[0])
             args[0] = self._noting("_whole", args[0])
         elif kind in _RATIO:
             return self._ratio(node, "args", *args)
         elif kind in _EXTREME and len(args) > 1:
             folded = args[0]
             for other in args[1:]:
-                folded = ast.Call(node.func, [folded, self._noting("_beside", other, folded)], [])
+                beside = [folded, self._noting("_beside", other, folded)]
+                folded = _sum(beside) if self._blind else ast.Call(node.func, beside, [])
             return folded
         elif kind == "clip" and len(args) == 3:
             args[0] = self._noting("_beside", self._noting("_beside", *args[:2]), args[2])
+            if self._blind:
+                return args[0]
         elif kind != "smooth":
             raise UnclearError(f"it calls {ast.unparse(node.func)} in a way that is not known")
         return node
@@ -343,7 +401,7 @@ class _Watch(ast.NodeTransformer):
         # An array made for the call may be written into by what is called.
         changes = [one or isinstance(part, ast.Call) for one, part in zip(depends, node.args, strict=True)]
         changing = {name for name, one in zip(names, changes, strict=False) if one}
-        copy, places = watching(function, changing)
+        copy, places = watching(function, changing, self._blind)
         self.places += places
         name = f"_fastmech_callee{len(self.callees)}"
         self.callees[name] = numba.njit(**INLINED)(copy)

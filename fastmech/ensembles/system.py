@@ -17,16 +17,16 @@ from numpy.typing import NDArray
 
 from fastmech.ensembles import checks
 from fastmech.ensembles.ends import STOP_CODE, STOP_STATE, STOP_TIME
-from fastmech.ensembles.fingerprint import fingerprint
-from fastmech.ensembles.rebuilding import Swaps, compiled_callees, raises, reaches, rebuilt, returns
 from fastmech.ensembles.refusals import explain, reason
 from fastmech.ensembles.run import NOTHING, Observation
-from fastmech.ensembles.switches import UnclearError, decides_nothing, watching
+from fastmech.ensembles.switches import UnclearError, require_noted, watching
 from fastmech.errors import InputError, shown
 from fastmech.generated import new_module, run_module
 from fastmech.jit import VECTOR, called, inlined
 from fastmech.kernels.attempt import attempted
 from fastmech.kernels.blocks import Rates, block_kernel
+from fastmech.kernels.fingerprint import fingerprint
+from fastmech.kernels.rebuilding import Swaps, compiled_callees, raises, reaches, rebuilt, returns
 from fastmech.kernels.sincos import WITHIN
 
 #: States of a family at most: a block of an implicit method has the square of it.
@@ -71,7 +71,8 @@ class System:
         rhs: ``rhs(t, *state, *parameters)`` gives the derivatives as a tuple, one for each state; plain
             arithmetic on floats. Use :func:`fastmech.sin` and :func:`fastmech.cos`, and values chosen by
             ``a if condition else b`` instead of branches: then the loop over trajectories becomes packed
-            instructions.
+            instructions. Write ``2.0 * x``, not ``2 * x``: in float32 a whole number makes the rest of the
+            arithmetic double, and so does the time.
             Of many states the function is ``rhs(t, y, p, rates)``: arrays of one trajectory's states and
             parameters, and one into which it writes the rates, in loops over indices.
         state: names of the states, or ``("x", 100)`` for x0, ..., x99 and arrays.
@@ -128,24 +129,22 @@ class System:
             UnclearError: it cannot be told where.
         """
         functions: dict[str, Any] = {}
-        time = next(iter(inspect.signature(self.rhs).parameters))
-        try:
-            functions["rhs"], places = watching(self.rhs, {time, "y"} if self.vector else {time, *self.state})
-        except UnclearError:
-            if decides_nothing(self.rhs):
-                return None
-            raise
-        if not places:
+        given = inspect.signature(self.rhs).parameters
+        depend = {next(iter(given)), *(["y"] if self.vector else self.state)}
+        arrays = [VECTOR if self.vector else float64] * (len(given) - 1)
+        if not require_noted(self.rhs, depend, [float64, *arrays]):
             return None
         if self.vector:
             raise UnclearError("decisions on arrays are not located")
+        functions["rhs"], _ = watching(self.rhs, depend)
         states = [f"y[{d}]" for d in range(len(self.state))]
         own = [f"p[{list(self.parameters).index(name)}]" for name in self.parameter_order]
         name, arguments = getattr(self.rhs, "__name__", "rhs"), ", ".join(["t", *states, *own])
         source = _SWITCHES.format(name=name, arguments=arguments)
         if self.stop is not None:
-            names = inspect.signature(self.stop).parameters
-            functions["stop"], _ = watching(self.stop, set(names))
+            names = set(inspect.signature(self.stop).parameters)
+            require_noted(self.stop, names, [float64] * len(names))
+            functions["stop"], _ = watching(self.stop, names)
             source += f"    stop(seen, {', '.join(['t', *states])})\n"
         prints = [fingerprint(function) for function in (self.rhs, self.stop) if function is not None]
         module = new_module("system", source, prints)
@@ -178,9 +177,9 @@ class System:
     def kernel(self) -> Any:
         """The compiled block right-hand side, loaded from the disk cache where it is there."""
         self._refuse_raising("rhs", self.rhs)
-        numbers = 1 + len(self.state) + len(self.parameters)
+        count = 1 + len(self.state) + len(self.parameters)
         with self._explained(
-            "rhs", self.rhs, 3 if self.vector else numbers, [] if self.vector else list(self.state)
+            "rhs", self.rhs, 3 if self.vector else count, [] if self.vector else list(self.state)
         ):
             made = block_kernel(self.rates)
             if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
@@ -229,10 +228,10 @@ class System:
 
 def _array_functions(field: str, function: Any, module: str, precision: str) -> dict[str, Any]:
     """The same of one that takes arrays."""
-    return {field: called(rebuilt(function, module, _numbers(precision)))}
+    return {field: called(rebuilt(function, module, numbers(precision)))}
 
 
-def _numbers(precision: str) -> Swaps:
+def numbers(precision: str) -> Swaps:
     """What constants become: a float64 would turn a lane's arithmetic into its own."""
     single: Any = np.float32
     return {float: single} if precision == "float32" else {}
@@ -245,9 +244,9 @@ def _swaps() -> Swaps:
 
 def _functions(field: str, function: Any, module: str, precision: str) -> dict[str, Any]:
     """A user's function for a module of that name, and the same with trigonometry that raises."""
-    numbers = _numbers(precision)
-    whole = inlined(rebuilt(function, module, numbers))
-    return {field: whole, f"{field}_within": attempted(rebuilt(function, module, _swaps() | numbers))}
+    swaps = numbers(precision)
+    whole = inlined(rebuilt(function, module, swaps))
+    return {field: whole, f"{field}_within": attempted(rebuilt(function, module, _swaps() | swaps))}
 
 
 def stop_codes(records: NDArray[np.float64]) -> NDArray[np.int64]:

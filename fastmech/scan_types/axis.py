@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from fastmech.basins.ladder import SUBSTEPS
-from fastmech.basins.measures.norm import STATE, check_angles
+from fastmech.basins.measures.norm import check_angles
 from fastmech.basins.runs import rounds_until
 from fastmech.basins.steps import fastest_followed, shortest_step
 from fastmech.ensembles import checks
 from fastmech.ensembles.spans import MOST_STEPS
 from fastmech.errors import InputError
 from fastmech.mechanism.coefficients import reduce
-from fastmech.scene import Number, Scene
+from fastmech.scene import STATE, Number, Scene
 
 #: Values of the longest axis.
 MOST_VALUES = 100_000

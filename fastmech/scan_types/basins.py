@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from fastmech.basins.label import require_damper
-from fastmech.basins.map import STATE, BasinMap, map_basins
+from fastmech.basins.map import BasinMap, map_basins
 from fastmech.basins.steps import method_for
 from fastmech.capture.certificate import certificate_of
 from fastmech.ensembles.status import FAILURES, LABELS, Status
@@ -25,7 +25,7 @@ from fastmech.results import NO_CODE, STATE_UNITS, Dataset, Variable, flags, num
 from fastmech.scan_types.axis import Axis, arrays, check_duration, check_rising, check_size, check_starts
 from fastmech.scan_types.request import TiledScan, UsualMethod, failures
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
-from fastmech.scene import Number, Scene, nearest
+from fastmech.scene import STATE, Number, Scene, nearest
 from fastmech.step_limits.warning import step_warning
 
 if TYPE_CHECKING:

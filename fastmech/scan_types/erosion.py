@@ -16,7 +16,6 @@ from pydantic import AfterValidator, Field
 from fastmech.basins.disturbed import MOST_RADIUS
 from fastmech.basins.erosion import FLAGS, MEASURES, Ends, survey_of, wells_along
 from fastmech.basins.label import How, label_starts, require_damper
-from fastmech.basins.measures.norm import STATE
 from fastmech.disturbance.motion import require_constant_force
 from fastmech.errors import InputError, shown
 from fastmech.results import Dataset, Variable
@@ -31,7 +30,7 @@ from fastmech.scan_types.axis import (
 )
 from fastmech.scan_types.request import Seed, TiledScan
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
-from fastmech.scene import Scene, nearest
+from fastmech.scene import STATE, Scene, nearest
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,13 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 from fastmech.callee import callee
 from fastmech.ensembles import checks
 from fastmech.ensembles.energy_bounds import breaks_energy_bounds
+from fastmech.ensembles.integrate import problem_of
 from fastmech.ensembles.lanes import finite_rows
-from fastmech.ensembles.problem import extreme_scenes, own_values, scene_problem, system_problem
+from fastmech.ensembles.problem import extreme_scenes
 from fastmech.ensembles.status import Status, failure_counts, failure_line
 from fastmech.ensembles.system import System
-from fastmech.errors import InputError, shown
+from fastmech.errors import InputError
 from fastmech.integrators.methods import find_method
 from fastmech.integrators.tableaus import TABLEAUS
+from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
 from fastmech.step_limits.warning import too_long, warn_of_step
 from fastmech.transients.tangent import Disturbed, Flow, Stages, advance_tangents
@@ -59,7 +61,7 @@ class LyapunovExponents:
 
 
 def largest_lyapunov(
-    scene: Scene | System,
+    scene: Scene | Mechanism | System,
     y0: ArrayLike,
     t_end: float,
     dt: float = 0.01,
@@ -86,16 +88,9 @@ def largest_lyapunov(
     t_end = checks.number("t_end", t_end, "s", above=0.0)
     dt = checks.number("dt", dt, "s", above=0.0)
     parameters = {} if parameters is None else parameters
-    if isinstance(scene, System):
-        starts = checks.states("y0", y0, len(scene.state))
-        problem = system_problem(scene, len(starts), parameters)
-    elif isinstance(scene, Scene):
-        starts = checks.states("y0", y0, 4)
-        own = own_values(parameters, scene.model_dump(), len(starts))
-        problem = scene_problem(scene, len(starts), own, "lagrange")
+    starts, problem, own = problem_of(scene, y0, parameters, None)
+    if isinstance(scene, Scene):
         warn_of_step(extreme_scenes(scene, own, problem), dt, METHOD, starts)
-    else:
-        raise InputError(f"scene = {shown(scene)}: must be a Scene or a System")
     Y = np.array(starts.T, order="C")
     params = problem.params.block(len(starts))
     # A fixed direction with no special zeros: it turns to the fastest growing one within a few periods.

@@ -212,6 +212,19 @@ def test_pitchforks_are_named() -> None:
     assert plane.complete
 
 
+@pytest.mark.parametrize("name", ["c1", "c2", "m1", "g", "l"])
+def test_what_merges_is_named_by_the_parameter_that_passes_it(name: str) -> None:
+    """Where both pulls are opposite, only c1 keeps the scene its own mirror image: the others pass a cusp."""
+    balanced = Scene(alpha=0.0, c1=294.9)
+    m, g, length = balanced.m1 + 2.0 * balanced.m2, balanced.g, balanced.l
+    scene = balanced.replace(c2=m * g / length, F0=19.568500727545274)
+    value = getattr(scene, name)
+    (found,) = [
+        f for f in find_folds(scene, name, [0.7 * value, 1.3 * value]) if abs(f.value / value - 1) < 1e-3
+    ]
+    assert found.kind == ("pitchfork" if name == "c1" else "cusp")
+
+
 def test_a_line_through_a_cusp_says_that_it_is_one() -> None:
     found = find_folds(PAPER.replace(c1=float(CUSPS["unforced_stiff"]["values"][1])), "F0", [-50.0, 50.0])
     assert [(fold.kind, round(fold.value, 6)) for fold in found] == [("cusp", 0.0)]

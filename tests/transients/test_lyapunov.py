@@ -79,7 +79,7 @@ def test_wrong_arguments() -> None:
         largest_lyapunov(CONSERVATIVE, [0, 0, 0, 0], 1.0, parameters=3)  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"^dt = 1e-300: .* more than 1e\+13 steps"):
         largest_lyapunov(CONSERVATIVE, [0, 0, 0, 0], 1e300, 1e-300)
-    with pytest.raises(InputError, match=r"^scene = 3: must be a Scene or a System"):
+    with pytest.raises(InputError, match=r"^scene = 3: must be a Scene, a Mechanism or a System"):
         largest_lyapunov(3, [0, 0, 0, 0], 1.0)  # type: ignore[arg-type]
 
 

@@ -17,12 +17,8 @@ from fastmech.disturbance.size import size_at
 from fastmech.ensembles import checks
 from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError, shown
-from fastmech.scene import Scene, nearest
+from fastmech.scene import STATE, Scene, nearest
 from fastmech.stability.arguments import require_rest
-
-#: States of the mechanism by the names of a map's axes.
-STATE = ("phi", "theta", "phi_dot", "theta_dot")
-
 
 #: Angles lie within so many turns of zero: what is beyond was meant in degrees.
 FEW_TURNS = 4

@@ -11,7 +11,7 @@ import numba
 import numpy as np
 from numba.core.registry import CPUDispatcher
 
-from fastmech.ensembles.fingerprint import FIXED, enclosed
+from fastmech.kernels.fingerprint import FIXED, enclosed
 
 #: Functions to be called in the place of others; that of ``float`` makes constants another type.
 Swaps = dict[Callable[[float], float], Callable[[float], float]]

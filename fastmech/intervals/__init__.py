@@ -1,0 +1,1 @@
+"""Interval arithmetic rounded outward, and what it proves about the zeros of forces."""

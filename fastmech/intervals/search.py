@@ -1,0 +1,349 @@
+"""Branch and prune: all zeros of forces in a box or on a torus, each proved to be there and to be alone.
+
+A box is dropped where a force, or the mean-value form of one, cannot be zero in it, and shrinks to what the
+Krawczyk operator K leaves of it (Neumaier: Interval methods for systems of equations, 1990, section 5.1).
+Where K maps a box that holds the one at hand into its own inside, that larger box has one zero: boxes in it
+are dropped, so that a zero on the face of two boxes is listed once. Other boxes are cut in two. Boxes are
+treated in the order of their making, all about equally small: a limit on their number leaves the small ones,
+at the places that need a closer look.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+
+from fastmech.callee import CalleeType
+from fastmech.intervals.arithmetic import add, magnitude, mul, sub
+from fastmech.intervals.matrices import invert, orientation, positive_eigenvalues
+from fastmech.jit import CUBE, EXACT, MATRIX, called, kernel, lanes, named_tuple
+
+FORCES_SIGNATURE = types.boolean(MATRIX, MATRIX, MATRIX, CUBE)
+FORCES = CalleeType(FORCES_SIGNATURE)
+
+TWO_PI = 2.0 * np.pi
+
+#: Why a box is left: numbers in ``Found.reason``.
+SMALL, LIMIT, UNDEFINED, AT_END, UNCLEAR = range(1, 6)
+
+#: A box of this part of the domain is left as it is: about a fold, forces of order one are rounding in it.
+SMALLEST = 2.0**-30
+
+#: Factor at most by which a box that is as small as any may be is widened for a proof: where derivatives are
+#: large beside each other, K of the box itself may be all rounding.
+MOST_WIDENED = 1e5
+
+#: Part of its width at which a box is cut: symmetric mechanisms have zeros in the middles.
+CUT = 0.487
+
+#: By how much boxes may be wrong that are compared modulo a turn [rad], which is rounded.
+MARGIN = 1e-14
+
+
+class Found(NamedTuple):
+    """What was found for each row of parameters; the first axis is the row."""
+
+    zeros: Any  #: enclosures (rows, most, n, 2); angles are not reduced to a turn
+    orientation: Any  #: (rows, most) int8: sign of the Jacobian's determinant; 0 not proved
+    positive: Any  #: (rows, most) int8: positive eigenvalues of a symmetric Jacobian; -1 not proved
+    left: Any  #: boxes that are not decided (rows, most_left, n, 2)
+    reason: Any  #: why (rows, most_left) int8
+    count: Any  #: (rows, 3) int64: zeros, boxes left (also what is beyond most_left), boxes treated
+
+
+class _Work(NamedTuple):
+    """Scratch arrays of a search."""
+
+    box: Any  #: the box at hand (n, 2)
+    before: Any  #: as it was before it shrank (n, 2)
+    rest: Any  #: what was left of it (n, 2)
+    middle: Any  #: its midpoint as a box (n, 2)
+    away: Any  #: the box from there (n, 2)
+    image: Any  #: K of the box (n, 2)
+    f: Any  #: forces over the box (n, 2)
+    g: Any  #: forces at the midpoint (n, 2)
+    J: Any  #: Jacobian over the box (n, n, 2)
+    D: Any  #: scratch (n, n, 2)
+    A: Any  #: scratch (n, n)
+    C: Any  #: inverse of the Jacobian's midpoint (n, n)
+    whole: Any  #: boxes with one zero each (most, n, 2)
+    inner: Any  #: where it lies in them (most, n, 2)
+
+
+def work(n: int, most: int) -> _Work:
+    """Scratch arrays for ``n`` coordinates and at most ``most`` zeros."""
+    shapes = [(n, 2)] * 8 + [(n, n, 2)] * 2 + [(n, n)] * 2 + [(most, n, 2)] * 2
+    return _Work(*map(np.empty, shapes))
+
+
+_WORK = named_tuple([MATRIX] * 8 + [CUBE] * 2 + [MATRIX] * 2 + [CUBE] * 2, _Work)
+_CUBES = lanes(types.float64, 4)
+_BYTES = types.Array(types.int8, 2, "C")
+_FOUND = named_tuple([_CUBES, _BYTES, _BYTES, _CUBES, _BYTES, types.Array(types.int64, 2, "C")], Found)
+
+#: What became of a box.
+_EMPTY, _ONE, _SHRUNK, _UNKNOWN = range(4)
+
+
+@called
+def _shrink(forces: Any, p: Any, w: Any) -> int:
+    """Shrink ``w.box`` to what K leaves of it; ``_ONE`` where K lies in its inside: it has one zero."""
+    n = len(w.box)
+    for i in range(n):
+        w.before[i, 0], w.before[i, 1] = w.box[i, 0], w.box[i, 1]
+    if not forces(w.box, p, w.f, w.J):
+        return _EMPTY
+    for i in range(n):
+        c = 0.5 * w.box[i, 0] + 0.5 * w.box[i, 1]
+        w.middle[i, 0], w.middle[i, 1] = c, c
+        w.away[i, 0], w.away[i, 1] = sub((w.box[i, 0], w.box[i, 1]), (c, c))
+    forces(w.middle, p, w.g, w.D)
+    known = True
+    for i in range(n):
+        value = (w.g[i, 0], w.g[i, 1])
+        for j in range(n):
+            value = add(value, mul((w.J[i, j, 0], w.J[i, j, 1]), (w.away[j, 0], w.away[j, 1])))
+        if value[0] > 0.0 or value[1] < 0.0:
+            return _EMPTY
+        known &= value[1] < np.inf
+    if not known or not invert(w.J, w.A, w.C):
+        return _UNKNOWN
+    inside = True
+    for i in range(n):
+        value = (w.middle[i, 0], w.middle[i, 0])
+        for k in range(n):
+            value = sub(value, mul((w.C[i, k], w.C[i, k]), (w.g[k, 0], w.g[k, 1])))
+        for j in range(n):
+            slope = (1.0, 1.0) if i == j else (0.0, 0.0)
+            for k in range(n):
+                slope = sub(slope, mul((w.C[i, k], w.C[i, k]), (w.J[k, j, 0], w.J[k, j, 1])))
+            value = add(value, mul(slope, (w.away[j, 0], w.away[j, 1])))
+        w.image[i, 0], w.image[i, 1] = value
+        inside &= value[0] > w.box[i, 0] and value[1] < w.box[i, 1]
+    for i in range(n):
+        low, high = max(w.box[i, 0], w.image[i, 0]), min(w.box[i, 1], w.image[i, 1])
+        if low > high:
+            return _EMPTY
+        w.box[i, 0], w.box[i, 1] = low, high
+    return _ONE if inside else _SHRUNK
+
+
+@called
+def _turned(a: Any, b: Any, turn: float) -> float:
+    """Whole turns that bring the middle of interval ``a`` nearest to that of ``b``; 0 where ``turn`` is."""
+    return turn * np.floor((b[0] + b[1] - a[0] - a[1]) / (2.0 * turn) + 0.5) if turn > 0.0 else 0.0
+
+
+@called
+def _lies_in(a: Any, b: Any, domain: Any) -> bool:
+    """Whether box ``a`` lies in box ``b``, modulo turns."""
+    for i in range(len(a)):
+        turn = _turned(a[i], b[i], domain[i, 2])
+        margin = MARGIN * (1.0 + abs(turn)) if turn != 0.0 else 0.0
+        if not (a[i, 0] + turn >= b[i, 0] + margin and a[i, 1] + turn <= b[i, 1] - margin):
+            return False
+    return True
+
+
+@called
+def _apart(a: Any, b: Any, domain: Any) -> bool:
+    """Whether two boxes much smaller than a turn have nothing in common, modulo turns."""
+    for i in range(len(a)):
+        turn = _turned(a[i], b[i], domain[i, 2])
+        margin = MARGIN * (1.0 + abs(turn)) if turn != 0.0 else 0.0
+        if a[i, 0] + turn > b[i, 1] + margin or a[i, 1] + turn < b[i, 0] - margin:
+            return True
+    return False
+
+
+@called
+def _known(w: Any, count: int, domain: Any) -> bool:
+    """Whether the box at hand lies in one whose only zero has been found."""
+    for k in range(count):  # noqa: SIM110
+        if _lies_in(w.box, w.whole[k], domain):
+            return True
+    return False
+
+
+@called
+def _note_left(box: Any, reason: int, found: Any, row: int) -> None:
+    k = found.count[row, 1]
+    found.count[row, 1] += 1
+    if k < found.left.shape[1]:
+        found.reason[row, k] = reason
+        for i in range(len(box)):
+            found.left[row, k, i, 0], found.left[row, k, i, 1] = box[i, 0], box[i, 1]
+
+
+@called
+def _note_zero(forces: Any, p: Any, domain: Any, w: Any, count: int, found: Any, row: int) -> int:
+    """Keep the one zero of ``w.whole[count]``, which lies in ``w.box``; how many such boxes there are now."""
+    n = len(w.box)
+    for _ in range(200):  # K converges quadratically in the end, down to the rounding of the forces
+        _shrink(forces, p, w)
+        again = False
+        for i in range(n):
+            width = w.box[i, 1] - w.box[i, 0]
+            again |= width < 0.95 * (w.before[i, 1] - w.before[i, 0])
+            again |= width > SMALLEST * (domain[i, 1] - domain[i, 0])
+        if not again:
+            break
+    for k in range(count):
+        if _lies_in(w.box, w.whole[k], domain) or _lies_in(w.inner[k], w.whole[count], domain):
+            return count
+        if not _apart(w.box, w.inner[k], domain):
+            _note_left(w.box, UNCLEAR, found, row)
+            return count
+    within, outside = True, False
+    for i in range(n):
+        w.inner[count, i, 0], w.inner[count, i, 1] = w.box[i, 0], w.box[i, 1]
+        if domain[i, 2] == 0.0:
+            within &= w.box[i, 0] >= domain[i, 0] and w.box[i, 1] <= domain[i, 1]
+            outside |= w.box[i, 1] < domain[i, 0] or w.box[i, 0] > domain[i, 1]
+    if outside:
+        return count + 1
+    k = found.count[row, 0]
+    if not within or k >= found.zeros.shape[1]:
+        _note_left(w.box, UNCLEAR if within else AT_END, found, row)
+        return count + 1
+    forces(w.box, p, w.f, w.J)
+    found.orientation[row, k] = orientation(w.J, w.D)
+    found.positive[row, k] = positive_eigenvalues(w.J, w.A, w.C)
+    for i in range(n):
+        found.zeros[row, k, i, 0], found.zeros[row, k, i, 1] = w.box[i, 0], w.box[i, 1]
+    found.count[row, 0] += 1
+    return count + 1
+
+
+@called
+def _narrower(w: Any) -> bool:
+    """Whether K was narrower than the box that it was of, along every coordinate."""
+    for i in range(len(w.box)):
+        if not (w.image[i, 1] - w.image[i, 0] < 0.9 * (w.before[i, 1] - w.before[i, 0])):
+            return False
+    return True
+
+
+@called
+def _widen(w: Any, domain: Any, factor: float) -> None:
+    """The rest of a box, wider by a factor and by no less than rounding."""
+    for i in range(len(w.box)):
+        c, width = 0.5 * w.rest[i, 0] + 0.5 * w.rest[i, 1], w.rest[i, 1] - w.rest[i, 0]
+        half = 0.5 * factor * (width + MARGIN * (abs(c) + domain[i, 1] - domain[i, 0]))
+        w.box[i, 0], w.box[i, 1] = c - half, c + half
+
+
+@called
+def _cut(w: Any, domain: Any) -> int:
+    """The coordinate along which forces change most over the box; -1 where it is as small as any may be."""
+    n = len(w.box)
+    widest, smeared, direction, known = 0.0, -1.0, 0, True
+    for j in range(n):
+        widest = max(widest, (w.box[j, 1] - w.box[j, 0]) / (domain[j, 1] - domain[j, 0]))
+    for j in range(n):
+        smear, width = 0.0, w.box[j, 1] - w.box[j, 0]
+        for i in range(n):
+            total = 0.0
+            for k in range(n):
+                total += magnitude((w.J[i, k, 0], w.J[i, k, 1])) * (w.box[k, 1] - w.box[k, 0])
+            known &= total < np.inf
+            smear += magnitude((w.J[i, j, 0], w.J[i, j, 1])) * width / total if total > 0.0 else 0.0
+        relative = width / (domain[j, 1] - domain[j, 0])
+        smear = (smear if known else relative) if 16.0 * relative >= widest else -1.0
+        if smear > smeared:
+            smeared, direction = smear, j
+    return direction if widest > SMALLEST else -1
+
+
+@called
+def _copy(source: Any, target: Any) -> None:
+    for i in range(len(source)):
+        target[i, 0], target[i, 1] = source[i, 0], source[i, 1]
+
+
+@called
+def _treat(forces: Any, p: Any, domain: Any, w: Any) -> tuple[int, int, float]:
+    """What became of ``w.box``, along which coordinate the rest is to be cut, and what part of it is left.
+
+    With ``_ONE`` the box ``w.before`` has one zero, which lies in ``w.box``.
+    """
+    became = _shrink(forces, p, w)
+    if became in (_EMPTY, _ONE):
+        return became, 0, 0.0
+    part = 1.0
+    for i in range(len(w.box)):
+        width = w.before[i, 1] - w.before[i, 0]
+        if width > SMALLEST * (domain[i, 1] - domain[i, 0]):  # a narrower one says nothing about the others
+            part *= (w.box[i, 1] - w.box[i, 0]) / width
+    direction = _cut(w, domain)
+    _copy(w.box, w.rest)
+    factor, last = 1.2, 1.2 if direction >= 0 else MOST_WIDENED
+    while became == _SHRUNK and factor <= last and (direction < 0 or _narrower(w)):
+        _widen(w, domain, factor)
+        again = _shrink(forces, p, w)
+        if again in (_EMPTY, _ONE):
+            return again, 0, 0.0
+        factor *= 8.0
+    _copy(w.rest, w.box)
+    return became, direction, part
+
+
+@called
+def _search(forces: Any, p: Any, domain: Any, boxes: Any, w: Any, found: Any, row: int) -> None:
+    """Treat the boxes of one row of parameters, the domain first."""
+    n, limit, most = len(domain), len(boxes) // 2 - 1, len(w.whole)
+    head, tail, count = 0, 1, 0
+    for i in range(n):
+        boxes[0, i, 0], boxes[0, i, 1] = domain[i, 0], domain[i, 1]
+    while head < min(tail, limit):
+        _copy(boxes[head], w.box)
+        head += 1
+        if _known(w, count, domain):
+            continue
+        became, direction, part = _treat(forces, p, domain, w)
+        if became == _ONE and count < most:
+            _copy(w.before, w.whole[count])
+            count = _note_zero(forces, p, domain, w, count, found, row)
+        elif became == _ONE:
+            _note_left(w.box, UNCLEAR, found, row)
+        elif became != _EMPTY and not _known(w, count, domain):
+            if direction < 0:
+                _note_left(w.box, SMALL if became == _SHRUNK else UNDEFINED, found, row)
+                continue
+            _copy(w.box, boxes[tail])
+            tail += 1
+            if part > 0.5:
+                low, high = w.box[direction, 0], w.box[direction, 1]
+                _copy(w.box, boxes[tail])
+                boxes[tail, direction, 0] = boxes[tail - 1, direction, 1] = low + CUT * (high - low)
+                tail += 1
+    for k in range(head, tail):
+        _note_left(boxes[k], LIMIT, found, row)
+    found.count[row, 2] = head
+    kept = 0
+    for k in range(min(found.count[row, 1], found.left.shape[1])):  # some lie in what was proved later
+        _copy(found.left[row, k], w.box)
+        if found.reason[row, k] >= AT_END or not _known(w, count, domain):
+            _copy(w.box, found.left[row, kept])
+            found.reason[row, kept] = found.reason[row, k]
+            kept += 1
+        else:
+            found.count[row, 1] -= 1
+
+
+@kernel(types.void(FORCES, MATRIX, CUBE, CUBE, _WORK, _FOUND), **EXACT)
+def search(forces: Any, domain: Any, parameters: Any, boxes: Any, w: Any, found: Any) -> None:
+    """All zeros of ``forces`` in a domain, for each row of ``parameters`` (rows, count, 2).
+
+    Args:
+        forces: kernel of :data:`FORCES_SIGNATURE`: enclosures of forces and Jacobian over a box.
+        domain: (n, 3): lowest and highest value of each coordinate and its period, 0 if it has none.
+        parameters: lowest and highest value of each parameter; what is found holds for all in between.
+        boxes: scratch (2 limit + 2, n, 2): ``limit`` boxes are treated at most for each row.
+        w: scratch of :func:`work`.
+        found: what was found; its counts are zero.
+    """
+    for row in range(len(parameters)):
+        _search(forces, parameters[row], domain, boxes, w, found, row)

@@ -1,0 +1,313 @@
+"""Loads: force laws F(t) [N, or N m of a torque] as data. To add one, write a class like these.
+
+A load tells its value over time as an expression, its bound, mean and period, and what work it can still do.
+Numbers may be a mechanism's parameters, as SymPy symbols: ``load.at(values)`` puts their values in.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+
+from fastmech.errors import InputError, shown
+
+inf = math.inf
+
+
+class Facts(NamedTuple):
+    """What is known of a load."""
+
+    mean: Any  #: what it is at rest: its mean over a period, or what it comes to in the end
+    bound: float  #: the greatest |F|
+    period: float | None = None  #: [s], if it has one
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """What all loads tell. Of one with symbols only ``expression`` and ``facts().mean`` can be asked for."""
+
+    def expression(self, t: Any) -> Any:
+        """F at the symbol ``t`` [s] as a SymPy expression."""
+        raise NotImplementedError
+
+    def facts(self) -> Facts:
+        """What is known of it."""
+        raise NotImplementedError
+
+    def mean_at(self, values: Mapping[str, float]) -> Any:
+        """The mean, of symbols still, in the form that it has for these values of them."""
+        return self.facts().mean
+
+    def to_come(self, t: float) -> tuple[float, float]:
+        """|F(t) - F_end| and the total variation of F from ``t`` [s] on; infinite where it never fades."""
+        raise NotImplementedError
+
+    def work_left(self, t: float, reach: float = 1.0) -> float:
+        """The most work [J] that F less its final value can do after ``t`` [s]; infinite if it never fades.
+
+        ``reach`` [m or rad] is the extent of the motion along the load. With x measured from the middle,
+        the work is [(F - F_end) x] less the integral of x dF, at most half the reach times what F lies off
+        its end and all its changes together.
+        """
+        return 0.5 * reach * sum(self.to_come(t))
+
+    def at(self, values: Mapping[str, float]) -> Self:
+        """The same load with parameters' values in the place of their symbols.
+
+        Raises:
+            InputError: a value is missing, or out of its range.
+        """
+        given = {f.name: v for f in fields(self) if hasattr(v := getattr(self, f.name), "free_symbols")}
+        missing = {s.name for v in given.values() for s in v.free_symbols} - set(values)
+        if missing:
+            raise InputError(f"{type(self).__name__}: has no values of {', '.join(sorted(missing))}")
+        put = {
+            s: values[s.name] for v in given.values() for s in v.free_symbols
+        }  # whatever is assumed of them
+        return replace(self, **{name: float(value.subs(put)) for name, value in given.items()})
+
+    def _require(self, name: str, least: float = -inf, above: float = -inf) -> None:
+        """Refuse a number that is out of its range."""
+        value = getattr(self, name)
+        if isinstance(value, int | float) and not (value > above and value >= least):
+            told = f"> {above:g}" if above > -inf else f"at least {least:g}"
+            raise InputError(f"{type(self).__name__}.{name} = {shown(value)}: must be {told}")
+
+
+@dataclass(frozen=True, eq=False)
+class Constant(Load):
+    """F(t) = value."""
+
+    value: Any
+
+    def expression(self, t: Any) -> Any:
+        """The value."""
+        return self.value
+
+    def facts(self) -> Facts:
+        """Bound and mean are the value."""
+        return Facts(self.value, abs(self.value))
+
+    def to_come(self, t: float) -> tuple[float, float]:
+        """Nothing."""
+        return 0.0, 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Decaying(Load):
+    """F(t) = value exp(-rate t), rate [1/s]; with a rate of zero it is constant."""
+
+    value: Any
+    rate: Any
+
+    def __post_init__(self) -> None:
+        self._require("rate", least=0.0)
+
+    def expression(self, t: Any) -> Any:
+        """An exponential."""
+        import sympy
+
+        return self.value * sympy.exp(-self.rate * t)
+
+    def facts(self) -> Facts:
+        """At rest it is gone, unless its rate is zero."""
+        return Facts(0.0 if self.rate != 0 else self.value, abs(self.value))
+
+    def mean_at(self, values: Mapping[str, float]) -> Any:
+        """Of a rate that is zero the value."""
+        return 0.0 if self.at(values).rate else self.value
+
+    def to_come(self, t: float) -> tuple[float, float]:
+        """What is left, and to go."""
+        left = abs(self.value) * math.exp(-self.rate * t) if self.rate else 0.0
+        return left, left
+
+
+@dataclass(frozen=True, eq=False)
+class Harmonic(Load):
+    """F(t) = mean + amplitude sin(frequency t + phase), frequency [rad/s], phase [rad]."""
+
+    amplitude: Any
+    frequency: Any
+    mean: Any = 0.0
+    phase: Any = 0.0
+
+    def expression(self, t: Any) -> Any:
+        """A sine."""
+        import sympy
+
+        return self.mean + self.amplitude * sympy.sin(self.frequency * t + self.phase)
+
+    def facts(self) -> Facts:
+        """Its mean, and a period."""
+        period = 2.0 * math.pi / abs(float(self.frequency)) if self._number and self.frequency else None
+        return Facts(self.mean, abs(self.mean) + abs(self.amplitude), period)
+
+    @property
+    def _number(self) -> bool:
+        return not getattr(self.frequency, "free_symbols", None)
+
+    def to_come(self, t: float) -> tuple[float, float]:
+        """It never fades."""
+        return (inf, inf) if self.amplitude and self.frequency else (0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Pulse(Load):
+    """F(t) = value from ``start`` on for ``duration`` [s], else zero."""
+
+    value: Any
+    start: Any
+    duration: Any
+
+    def __post_init__(self) -> None:
+        self._require("duration", least=0.0)
+
+    def expression(self, t: Any) -> Any:
+        """A piecewise constant."""
+        import sympy
+
+        return sympy.Piecewise((0, t < self.start), (self.value, t < self.start + self.duration), (0, True))
+
+    def facts(self) -> Facts:
+        """At rest it is over."""
+        return Facts(0.0, abs(self.value))
+
+    def to_come(self, t: float) -> tuple[float, float]:
+        """Up and down, or down."""
+        height = abs(self.value) if t < self.start + self.duration else 0.0
+        return (0.0, 2.0 * height) if t < self.start else (height, height)
+
+
+@dataclass(frozen=True, eq=False)
+class Ramp(Load):
+    """F(t) rises from zero at ``start`` to ``value`` in ``duration`` [s] and stays there."""
+
+    value: Any
+    start: Any
+    duration: Any
+
+    def __post_init__(self) -> None:
+        self._require("duration", above=0.0)
+
+    def expression(self, t: Any) -> Any:
+        """A piecewise line."""
+        import sympy
+
+        rising, ends = self.value * (t - self.start) / self.duration, self.start + self.duration
+        return sympy.Piecewise((0, t < self.start), (rising, t < ends), (self.value, True))
+
+    def facts(self) -> Facts:
+        """At rest it has its value."""
+        return Facts(self.value, abs(self.value))
+
+    def to_come(self, t: float) -> tuple[float, float]:
+        """What it has to rise."""
+        left = abs(self.value) * (1.0 - min(max((t - self.start) / self.duration, 0.0), 1.0))
+        return left, left
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled(Load):
+    """F through values at rising times [s], before the first and after the last as there.
+
+    ``interpolation`` is "cubic", a spline with two continuous derivatives and no slope at its ends, or
+    "linear". ``times`` and ``values`` have shape (n,), n at least 2.
+    """
+
+    times: Any
+    values: Any
+    interpolation: str = "cubic"
+
+    def __post_init__(self) -> None:
+        try:
+            times, values = (np.array(given, dtype=np.float64) for given in (self.times, self.values))
+        except (TypeError, ValueError):
+            times = values = np.zeros(0)
+        if (
+            times.ndim != 1
+            or times.size < 2
+            or values.shape != times.shape
+            or not np.all(np.diff(times) > 0.0)
+        ):
+            raise InputError(
+                f"Sampled.times = {shown(self.times)}: must be two or more rising numbers, with a value each"
+            )
+        if not (np.isfinite(times).all() and np.isfinite(values).all()):
+            raise InputError("Sampled.values: times and values must be finite")
+        if self.interpolation not in ("cubic", "linear"):
+            raise InputError(f"Sampled.interpolation = {shown(self.interpolation)}: must be cubic or linear")
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "values", values)
+
+    @property
+    def pieces(self) -> Any:
+        """Coefficients (4, n - 1) of (t - times[i])^3, ^2, ^1, ^0."""
+        if self.interpolation == "cubic":
+            from scipy.interpolate import CubicSpline
+
+            return CubicSpline(self.times, self.values, bc_type="clamped").c
+        slopes = np.diff(self.values) / np.diff(self.times)
+        return np.array([0.0 * slopes, 0.0 * slopes, slopes, self.values[:-1]])
+
+    @property
+    def function(self) -> Callable[[float], float]:
+        """F of a time, in compiled code too."""
+        times, (a, b, c, d), last = self.times, np.ascontiguousarray(self.pieces), float(self.values[-1])
+
+        def sampled(t):  # type: ignore[no-untyped-def]
+            low, high = 0, len(times) - 1
+            while high - low > 1:
+                middle = (low + high) // 2
+                if times[middle] <= t:
+                    low = middle
+                else:
+                    high = middle
+            x = max(t - times[low], 0.0)
+            inside = ((a[low] * x + b[low]) * x + c[low]) * x + d[low]
+            return inside if t < times[-1] else last
+
+        return sampled
+
+    def facts(self) -> Facts:
+        """At rest it is the last value; between samples a spline may exceed them."""
+        return Facts(float(self.values[-1]), float(np.abs(self._extremes(-inf)).max()))
+
+    def to_come(self, t: float) -> tuple[float, float]:
+        """From extreme to extreme."""
+        met = self._extremes(t)
+        return abs(float(met[0] - met[-1])), float(np.abs(np.diff(met)).sum())
+
+    def _extremes(self, t: float) -> Any:
+        """F at t, at every sample and extreme after it, in the order of time."""
+        places = [max(t, self.times[0]), *self.times[self.times > t]]
+        for start, end, (a, b, c, _) in zip(self.times, self.times[1:], self.pieces.T, strict=False):
+            roots = np.roots([3.0 * a, 2.0 * b, c])
+            places += [start + x.real for x in roots if not x.imag and max(t, start) < start + x.real < end]
+        return np.array(list(map(self.function, map(float, sorted(places)))))
+
+
+@dataclass(frozen=True, eq=False)
+class Function(Load):
+    """F(t) = function(t), a plain Python function of one float that compiles; what is not told is unknown."""
+
+    function: Callable[[float], float]  #: use :func:`fastmech.sin` and :func:`fastmech.cos` in it
+    mean: float = 0.0
+    bound: float = inf
+    period: float | None = None
+
+    def __post_init__(self) -> None:
+        if not callable(self.function):
+            raise InputError(f"Function.function = {shown(self.function)}: must be a function of the time")
+
+    def facts(self) -> Facts:
+        """What has been told."""
+        return Facts(self.mean, self.bound, self.period)
+
+    def to_come(self, t: float) -> tuple[float, float]:
+        """Unknown."""
+        return inf, inf

@@ -1,0 +1,153 @@
+"""Forces at rest and their Jacobian in intervals: one kernel a mechanism, written from its expressions."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from functools import reduce
+from math import inf, isfinite, nextafter
+from typing import Any
+
+import sympy
+from sympy.simplify.fu import TR8
+
+from fastmech.errors import InputError, shown
+from fastmech.generated import new_module, run_module
+from fastmech.models.statics import Statics
+
+_SOURCE = '''"""Made by fastmech: forces of a mechanism at rest and their Jacobian, in intervals."""
+
+from fastmech.intervals.arithmetic import add, atan, cos, div, exp, log, mul, neg, power, sin, sqrt, sub
+from fastmech.intervals.search import FORCES_SIGNATURE
+from fastmech.jit import EXACT, kernel
+
+
+@kernel(FORCES_SIGNATURE, **EXACT)
+def forces(q, p, f, J):
+{body}
+    return True
+'''
+
+_FUNCTIONS = {
+    sympy.sin: "sin",
+    sympy.cos: "cos",
+    sympy.exp: "exp",
+    sympy.log: "log",
+    sympy.atan: "atan",
+}
+
+
+def balance_kernel(statics: Statics) -> Any:
+    """``forces(q, p, f, J)`` writes enclosures of forces (n, 2) and Jacobian (n, n, 2) over a box (n, 2).
+
+    The box ``q`` and the parameters ``p`` (count, 2) are intervals. Where a force cannot be zero the kernel
+    returns False and does not write ``J``.
+
+    Raises:
+        InputError: an expression has a function or a symbol of which no enclosure is known.
+    """
+    text = source(statics)
+    return run_module(new_module("balance", text), text).forces
+
+
+def source(statics: Statics) -> str:
+    """The kernel's source: subexpressions are shared, and what only the Jacobian needs comes last."""
+    q = [coordinate.symbol for coordinate in statics.coordinates]
+    n = len(q)
+    forces = [
+        sympy.sympify(force).replace(sympy.tan, lambda x: sympy.sin(x) / sympy.cos(x))
+        for force in statics.forces
+    ]
+    forces = [min(force, _sums(force), key=sympy.count_ops) for force in forces]
+    jacobian = [force.diff(symbol) for force in forces for symbol in q]
+    names = {symbol: f"q{i}" for i, symbol in enumerate(q)}
+    names |= {symbol: f"p{i}" for i, symbol in enumerate(statics.parameters)}
+    shared, outputs = sympy.cse([*forces, *jacobian], symbols=sympy.numbered_symbols("x", real=True))
+    names |= {symbol: f"x{i}" for i, (symbol, _) in enumerate(shared)}
+    needed = set().union(*(output.free_symbols for output in outputs[:n]))
+    for symbol, expression in reversed(shared):
+        needed |= expression.free_symbols if symbol in needed else set()
+    lines = [
+        f"{names[s]} = {k}[{i}, 0], {k}[{i}, 1]"
+        for k, x in (("q", q), ("p", statics.parameters))
+        for i, s in enumerate(x)
+    ]
+    written = {symbol: f"{names[symbol]} = {_text(expression, names)}" for symbol, expression in shared}
+    lines += [written[symbol] for symbol, _ in shared if symbol in needed]
+    for i, force in enumerate(outputs[:n]):
+        lines.append(f"f[{i}, 0], f[{i}, 1] = {_text(force, names)}")
+    lines += [
+        "if " + " or ".join(f"f[{i}, 0] > 0.0 or f[{i}, 1] < 0.0" for i in range(n)) + ":",
+        "    return False",
+    ]
+    lines += [written[symbol] for symbol, _ in shared if symbol not in needed]
+    for k, slope in enumerate(outputs[n:]):
+        lines.append(f"J[{k // n}, {k % n}, 0], J[{k // n}, {k % n}, 1] = {_text(slope, names)}")
+    return _SOURCE.format(body="\n".join(f"    {line}" for line in lines))
+
+
+def _sums(force: Any) -> Any:
+    """Products of sines and cosines as sums: angles occur less often, so that bounds are closer.
+
+    Quotients and roots stay: expanded, they are bounded worse.
+    """
+    if any(not (power.exp.is_Integer and power.exp > 0) for power in force.atoms(sympy.Pow)):
+        return force
+    return sympy.expand(TR8(sympy.expand(force)))
+
+
+def _text(x: Any, names: dict[Any, str]) -> str:
+    """An expression as calls of interval operations."""
+    if x in names:
+        return names[x]
+    if x.is_Symbol:
+        raise InputError(f"forces: {shown(str(x))} is neither a coordinate nor a parameter")
+    if x.is_Number or x in (sympy.pi, sympy.E):
+        return _constant(x)
+    if x.is_Add:
+        first, *others = sorted(x.args, key=lambda term: term.could_extract_minus_sign())
+        text = _text(first, names)
+        for term in others:
+            minus = term.could_extract_minus_sign()
+            text = f"{'sub' if minus else 'add'}({text}, {_text(-term if minus else term, names)})"
+        return text
+    if x.is_Mul:
+        sign, factors = ("neg({})", (-x).as_ordered_factors()) if x.args[0] == -1 else ("{}", x.args)
+        above: list[str] = []
+        below: list[str] = []
+        for factor in factors:
+            falls = factor.is_Pow and factor.exp.is_Rational and factor.exp < 0
+            (below if falls else above).append(_text(1 / factor if falls else factor, names))
+        text = reduce("mul({}, {})".format, above or ["(1.0, 1.0)"])
+        return sign.format(f"div({text}, {reduce('mul({}, {})'.format, below)})" if below else text)
+    if x.is_Pow and x.exp.is_Rational and x.exp.q <= 2:
+        if x.exp < 0:
+            return f"div((1.0, 1.0), {_text(1 / x, names)})"
+        base = _text(x.base, names)
+        if x.exp.q == 2:
+            base = f"sqrt({base})"
+        return base if x.exp.p == 1 else f"power({base}, {x.exp.p})"
+    if x.func in _FUNCTIONS and len(x.args) == 1:
+        return f"{_FUNCTIONS[x.func]}({_text(x.args[0], names)})"
+    raise InputError(
+        f"forces: {shown(str(x))} has no proved bounds; known are sums, products, whole and half powers, "
+        "sin, cos, tan, exp, log and atan of coordinates and parameters"
+    )
+
+
+def _constant(x: Any) -> str:
+    """An exact number as the least interval of floating-point numbers."""
+    if x in (sympy.pi, sympy.E):
+        value = float(x)
+        return f"({nextafter(value, -inf)!r}, {nextafter(value, inf)!r})"
+    if x.is_Float or not x.is_finite:
+        value = float(x)
+        if not isfinite(value):
+            raise InputError(f"forces: {shown(str(x))} is not a finite number")
+        return f"({value!r}, {value!r})"
+    exact, value = Fraction(int(x.p), int(x.q)), float(x)
+    return repr(
+        (
+            value if value <= exact else nextafter(value, -inf),
+            value if value >= exact else nextafter(value, inf),
+        )
+    )

@@ -1,0 +1,247 @@
+"""Equations of motion of a mechanism, derived by SymPy and written as functions.
+
+With the metric a, T = a_ij q_i' q_j' / 2, Lagrange's equations are a_ij q_j'' = r_i with
+
+    r_i = Q_i - dU/dq_i - dD/dq_i' + sum of F dx/dq_i - (da_ij/dq_k - da_jk/dq_i / 2) q_j' q_k',
+
+and Hamilton's q' = a^-1 p, p_i' = (da_jk/dq_i) q_j' q_k' / 2 + the forces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import sympy
+
+from fastmech.errors import InputError
+from fastmech.loads import Function, Sampled
+from fastmech.models.elements import Parts
+from fastmech.models.statics import Coordinate, Statics
+from fastmech.models.writer import Body, Coefficients, Texts, expanded, simplest
+
+
+class Derived(NamedTuple):
+    """Texts of a mechanism's functions, with numbers for :func:`fastmech.models.mechanism.in_precision`.
+
+    Of states, coefficients and parameters each function takes one number each, in their order.
+    """
+
+    coefficients: tuple[str, ...]  #: their names
+    functions: dict[str, tuple[list[str], str]]  #: the coefficients that it takes, and text, by name
+
+
+class Equations(NamedTuple):
+    """The pieces of the equations of motion as expressions."""
+
+    metric: Any  #: matrix a
+    forces: list[Any]  #: generalized forces without those of inertia, loads as symbols
+    inertia: list[Any]  #: (da_ij/dq_k - da_jk/dq_i / 2) q_j' q_k'
+    gain: list[Any]  #: (da_jk/dq_i) q_j' q_k' / 2
+    loads: list[Any]  #: symbols of the loads' values
+    means: dict[Any, Any]  #: their values at rest
+
+
+def equations(parts: Parts, q: Sequence[Any], v: Sequence[Any], means: Sequence[Any]) -> Equations:
+    """From energies and forces.
+
+    Raises:
+        InputError: the kinetic energy is not quadratic in the rates.
+    """
+    n, rest = len(q), dict.fromkeys(v, 0)
+    metric = sympy.zeros(n)
+    for i in range(n):
+        for j in range(i + 1):
+            entry = sympy.diff(parts.kinetic, v[i], v[j])
+            if entry.free_symbols & {*v}:
+                entry = sympy.simplify(entry)
+            metric[i, j] = metric[j, i] = parts.metric[i, j] + _by_terms(entry, q)
+    for i in range(n):
+        if metric[i, i] == 0:
+            raise InputError(f"kinetic: is not positive definite: {q[i]} moves no mass")
+    linear = [parts.kinetic.subs(rest), *(sympy.diff(parts.kinetic, rate).subs(rest) for rate in v)]
+    if metric.free_symbols & {*v} or any(sympy.simplify(term) != 0 for term in linear):
+        raise InputError("kinetic: must be quadratic in the rates, with no other terms")
+    loads = [sympy.Symbol(f"load_{k}", real=True) for k in range(len(parts.loads))]
+    forces, inertia, gain = [], [], []
+    potential = _by_terms(parts.potential, q)
+    for i in range(n):
+        force = parts.forces[i] - sympy.diff(potential, q[i]) - sympy.diff(parts.dissipation, v[i])
+        forces.append(force + sum(f * moved[i] for f, (_, moved) in zip(loads, parts.loads, strict=True)))
+        pairs = [(j, k) for j in range(n) for k in range(n)]
+        gain.append(sum(sympy.diff(metric[j, k], q[i]) * v[j] * v[k] for j, k in pairs) / 2)
+        inertia.append(sum(sympy.diff(metric[i, j], q[k]) * v[j] * v[k] for j, k in pairs) - gain[i])
+    return Equations(metric, forces, inertia, gain, loads, dict(zip(loads, means, strict=True)))
+
+
+def _by_terms(expression: Any, q: Sequence[Any]) -> Any:
+    """Each term in the form that takes least to compute."""
+    return sympy.Add(*(simplest(term, q) for term in sympy.Add.make_args(expression)))
+
+
+def statics(
+    parts: Parts, found: Equations, coordinates: tuple[Coordinate, ...], parameters: tuple[Any, ...]
+) -> Statics:
+    """Forces at rest, loads at their means."""
+    q = [coordinate.symbol for coordinate in coordinates]
+    still = {sympy.Symbol(f"{symbol}_dot", real=True): 0 for symbol in q}
+    forces = tuple(sympy.sympify(force).subs(still | found.means) for force in found.forces)
+    n = len(q)
+    conservative = all(
+        simplest(sympy.diff(forces[i], q[j]) - sympy.diff(forces[j], q[i]), q).equals(0) is True
+        for i in range(n)
+        for j in range(i)
+    )
+    return Statics(coordinates, parameters, forces, conservative)
+
+
+class _Solver:
+    """Lines that solve a x = r by elimination.
+
+    Rows whose diagonal is constant come first: their multipliers need no division, and where one is left,
+    there is one division in all.
+    """
+
+    def __init__(self, metric: Any, q: Sequence[Any]) -> None:
+        self._metric, self._first = metric, list[int]()
+        for i in range(metric.rows):
+            if not metric[i, i].free_symbols & {*q} and not any(metric[i, j] != 0 for j in self._first):
+                self._first.append(i)
+        self._rest = [i for i in range(metric.rows) if i not in self._first]
+
+    def outputs(self, r: Sequence[Any]) -> dict[str, Any]:
+        """What the lines want by name, of a right side: rows of ``first`` come divided by their diagonal."""
+        a, found = self._metric, {}
+        for i in self._first:
+            found[f"_r{i}"] = _divided(r[i], a[i, i])
+            for j in self._rest:
+                if a[j, i] != 0:
+                    found[f"_a{j}_{i}"], found[f"_m{j}_{i}"] = a[j, i], _divided(a[j, i], a[i, i])
+        for j in self._rest:
+            found[f"_r{j}"] = r[j]
+            found |= {f"_a{j}_{k}": a[j, k] for k in self._rest if k <= j and a[j, k] != 0}
+        return found
+
+    def lines(self) -> list[str]:
+        """Lines that assign d0, d1, ..."""
+        left, lines = list(self._rest), []
+        known = {(j, k): f"_a{j}_{k}" for j in left for k in left if k <= j and self._metric[j, k] != 0}
+
+        def reduce(i: int, j: int, k: int, multiplier: str, entry: str) -> None:
+            before = f"{known[j, k]} - " if (j, k) in known else "-"
+            lines.append(f"_b{j}_{k}_{i} = {before}{entry} * {multiplier}")
+            known[j, k] = f"_b{j}_{k}_{i}"
+
+        back = []
+        for i in self._first:
+            coupled = [j for j in left if self._metric[j, i] != 0]
+            for j in coupled:
+                lines.append(f"_r{j} = _r{j} - _a{j}_{i} * _r{i}")
+                for k in coupled:
+                    if k <= j:
+                        reduce(i, j, k, f"_m{k}_{i}", f"_a{j}_{i}")
+            back.append((i, f"_r{i}", [(f"_m{j}_{i}", j) for j in coupled]))
+        while len(left) > 2 or (len(left) == 2 and (left[1], left[0]) not in known):
+            i = left.pop(0)
+            coupled = [j for j in left if (j, i) in known]
+            lines.append(f"_inverse{i} = <<1.0>> / {known[i, i]}")
+            for j in coupled:
+                lines += [f"_m{j}_{i} = {known[j, i]} * _inverse{i}", f"_r{j} = _r{j} - _m{j}_{i} * _r{i}"]
+                for k in coupled:
+                    if k <= j:
+                        reduce(i, j, k, f"_m{k}_{i}", known[j, i])
+            back.append((i, f"_r{i} * _inverse{i}", [(f"_m{j}_{i}", j) for j in coupled]))
+        if len(left) == 2:
+            i, j = left
+            a, b, c = known[i, i], known[j, i], known[j, j]
+            lines += [
+                f"_inverse{i} = <<1.0>> / ({a} * {c} - {b} * {b})",
+                f"_d{i} = ({c} * _r{i} - {b} * _r{j}) * _inverse{i}",
+                f"_d{j} = ({a} * _r{j} - {b} * _r{i}) * _inverse{i}",
+            ]
+        elif left:
+            lines.append(f"_d{left[0]} = _r{left[0]} / {known[left[0], left[0]]}")
+        for i, right, terms in reversed(back):
+            lines.append(f"_d{i} = " + " - ".join([right, *(f"{m} * _d{j}" for m, j in terms)]))
+        return lines
+
+
+def _divided(expression: Any, by: Any) -> Any:
+    """Each term over ``by``."""
+    return sympy.Add(*(term / by for term in sympy.Add.make_args(sympy.sympify(expression))))
+
+
+def derive(
+    parts: Parts, found: Equations, q: Sequence[Any], v: Sequence[Any], parameters: Sequence[Any]
+) -> Derived:
+    """Write all functions of a mechanism."""
+    n, t = len(q), sympy.Symbol("t", real=True)
+    p = [sympy.Symbol(f"p_{symbol}", real=True) for symbol in q]
+    coefficients = Coefficients([*q, *v, *p, t])
+
+    def lifted(outputs: dict[str, Any]) -> dict[str, Any]:
+        return {name: coefficients.lift(expanded(sympy.sympify(e), q)) for name, e in outputs.items()}
+
+    values = [
+        sympy.Function(f"function_{k}")(t) if isinstance(load, Sampled | Function) else load.expression(t)
+        for k, (load, _) in enumerate(parts.loads)
+    ]
+    acting = dict(zip(found.loads, values, strict=True))
+    forces = [sympy.sympify(force).xreplace(acting) for force in found.forces]
+    metric = found.metric.applyfunc(lambda entry: expanded(entry, q))
+    solver = _Solver(metric, q)
+    entries = {f"_a{i}_{j}": metric[i, j] for i in range(n) for j in range(i + 1)}
+    full = [[f"_a{max(i, j)}_{min(i, j)}" for j in range(n)] for i in range(n)]
+    lagrange = lifted(solver.outputs([f - h for f, h in zip(forces, found.inertia, strict=True)]))
+    velocities = lifted(solver.outputs(p))
+    canonical = velocities | lifted(
+        {f"_f{i}": f + g for i, (f, g) in enumerate(zip(forces, found.gain, strict=True))}
+    )
+    at_rest = dict.fromkeys(v, 0) | found.means
+    slopes = {
+        f"_{name}{i}_{j}": -sympy.diff(force, by[j]).subs(at_rest)
+        for name, by in (("c", v), ("s", q)) for i, force in enumerate(found.forces) for j in range(n)
+    }  # fmt: skip
+    arms = [sum(x * rate for x, rate in zip(moved, v, strict=True)) for _, moved in parts.loads]
+    powers = {
+        "_brought": sum(force * arm for force, arm in zip(values, arms, strict=True)),
+        "_damped": sum(rate * sympy.diff(parts.dissipation, rate) for rate in v),
+        "_taken": -sum(rate * force for rate, force in zip(v, parts.forces, strict=True)),
+    }
+    plain = {
+        "momenta": ([*q, *v], lifted(entries)),
+        "energies": ([*q, *v], lifted(entries | {"_U": _by_terms(parts.potential, q)})),
+        "metric": (q, lifted(entries)),
+        "velocities": ([*q, *p], velocities),
+        "powers": ([t, *q, *v], lifted(powers)),
+        "slopes": (q, lifted(slopes)),
+    }
+    kinetic = [
+        f"<<{0.5 if i == j else 1.0}>> * {full[i][j]} * {v[i]} * {v[j]}"
+        for i in range(n)
+        for j in range(i + 1)
+    ]
+    after = {
+        "momenta": [_tuple(" + ".join(f"{full[i][j]} * {v[j]}" for j in range(n)) for i in range(n))],
+        "energies": [_tuple([" + ".join(kinetic), "_U"])],
+        "metric": [_tuple(full[i][j] for i in range(n) for j in range(n))],
+        "velocities": [*solver.lines(), _tuple(f"_d{i}" for i in range(n))],
+    }
+    own = [symbol.name for symbol in coefficients.named.values()]
+    texts = Texts(own)
+    for name, (arguments, outputs) in plain.items():
+        texts.plain(name, list(map(str, arguments)), outputs, *after.get(name, []))
+    body, solved = Body(lagrange), [f"_d{i}" for i in range(n)]
+    lines = [*body.text()[0], *solver.lines()]
+    texts.motion("lagrange", list(map(str, [*q, *v])), body, lines, _tuple([*map(str, v), *solved]))
+    body = Body(canonical)
+    first, last = body.text([str(rate) for rate in v])
+    rates = [f"{rate} = _d{i}" for i, rate in enumerate(v)]
+    lines, result = [*first, *solver.lines(), *rates, *last], _tuple([*solved, *(f"_f{i}" for i in range(n))])
+    texts.motion("hamilton", list(map(str, [*q, *p])), body, lines, result)
+    texts.coefficients(list(map(str, parameters)), list(coefficients.named))
+    return Derived(tuple(own), texts.written)
+
+
+def _tuple(parts: Iterable[str]) -> str:
+    return f"({', '.join(parts)},)"

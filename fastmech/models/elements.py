@@ -1,0 +1,294 @@
+"""What a mechanism is built from, the engineer's way, and the energies and forces that follow.
+
+Points are expressions of the coordinates, by name or in place: two components [m] in a plane, or three.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import sympy
+
+from fastmech.errors import InputError, shown
+from fastmech.loads import Constant, Function, Load, Sampled
+from fastmech.models.writer import simplest
+
+
+class Body(NamedTuple):
+    """A rigid body in the plane."""
+
+    center: Any  #: its centre of mass, a point
+    mass: Any  #: [kg]
+    inertia: Any  #: moment of inertia about the centre of mass [kg m2]
+    angle: Any  #: its orientation [rad], an expression of the coordinates
+
+
+class Spring(NamedTuple):
+    """A linear spring between two points."""
+
+    a: Any
+    b: Any
+    stiffness: Any  #: [N/m]
+    free_length: Any = 0  #: [m]
+
+
+class TorsionSpring(NamedTuple):
+    """A linear spring on an angle, such as the difference of two rods' angles."""
+
+    angle: Any  #: [rad], an expression of the coordinates
+    stiffness: Any  #: [N m/rad]
+    free_angle: Any = 0  #: [rad]
+
+
+class Damper(NamedTuple):
+    """A viscous damper between two points along their line, or along a fixed direction."""
+
+    a: Any
+    b: Any
+    coefficient: Any  #: [N s/m]
+    along: Any = None  #: a unit vector; ``None``: the line through both points
+
+
+class TorsionDamper(NamedTuple):
+    """A viscous damper on an angle."""
+
+    angle: Any  #: [rad], an expression of the coordinates
+    coefficient: Any  #: [N m s/rad]
+
+
+class Force(NamedTuple):
+    """A load on a point in a direction; one made of coordinates follows a body."""
+
+    point: Any
+    load: Any  #: of :mod:`fastmech.loads` [N], or a number or parameter: constant
+    direction: Any  #: a unit vector of expressions
+
+
+class Torque(NamedTuple):
+    """A load on an angle."""
+
+    angle: Any  #: [rad], an expression of the coordinates
+    load: Any  #: of :mod:`fastmech.loads` [N m], or a number or parameter: constant
+
+
+class Parts(NamedTuple):
+    """All that a mechanism's motion follows from, as SymPy expressions."""
+
+    metric: Any  #: matrix of masses and bodies, T = a_ij q_i' q_j' / 2
+    kinetic: Any  #: T beside that [J]
+    potential: Any  #: U [J]
+    dissipation: Any  #: Rayleigh's function, half the power that dampers take [W]
+    forces: tuple[Any, ...]  #: generalized forces beside those, one a coordinate
+    loads: tuple[tuple[Load, tuple[Any, ...]], ...]  #: with d(place along the load)/d(coordinate)
+
+    def put(self, values: Mapping[Any, Any]) -> Parts:
+        """The same with values of some symbols."""
+        loads = []
+        for load, moved in self.loads:
+            given = {k: v.xreplace(values) for k, v in vars(load).items() if isinstance(v, sympy.Expr)}
+            loads.append((replace(load, **given), tuple(x.xreplace(values) for x in moved)))
+        a, T, U, D = (sympy.sympify(part).xreplace(values) for part in self[:4])
+        return Parts(a, T, U, D, tuple(x.xreplace(values) for x in self.forces), tuple(loads))
+
+    @property
+    def finite(self) -> bool:
+        """Whether no expression divides by zero."""
+        loads = (part for load, moved in self.loads for part in (*vars(load).values(), *moved))
+        return not any(
+            part.has(sympy.zoo, sympy.nan)
+            for part in (*self[:4], *self.forces, *loads)
+            if isinstance(part, sympy.Basic | sympy.MatrixBase)
+        )
+
+
+class Builder:
+    """Reads elements; every message names the argument and the number of the element in it."""
+
+    def __init__(self, q: Sequence[Any], rates: Sequence[Any], known: Mapping[str, Any]) -> None:
+        self._q, self._rates, self._known = q, rates, known
+        self._points: dict[str, Any] = {}
+
+    def expression(self, where: str, given: Any, rates: bool = False) -> Any:
+        """An expression in known symbols, of rates too where they may occur."""
+        try:
+            found = sympy.sympify(given, strict=not isinstance(given, str))
+        except (sympy.SympifyError, TypeError, AttributeError):
+            found = None
+        if isinstance(given, str) or not isinstance(found, sympy.Expr):
+            raise InputError(f"{where} = {shown(given)}: must be a number or a SymPy expression")
+        swaps, allowed = {}, {*self._known, *(str(rate) for rate in self._rates if rates)}
+        for symbol in found.free_symbols:
+            if symbol.name not in allowed:
+                raise InputError(
+                    f"{where}: has the symbol {shown(symbol)}, which is neither a coordinate"
+                    f"{', a rate' if rates else ''} nor a parameter"
+                )
+            swaps[symbol] = self._known.get(symbol.name, sympy.Symbol(symbol.name, real=True))
+        found = found.xreplace(swaps)
+        if found.has(sympy.I, sympy.nan, sympy.oo, sympy.zoo) or found.atoms(
+            sympy.core.function.AppliedUndef
+        ):
+            raise InputError(f"{where} = {shown(given)}: must be a finite real expression")
+        return found
+
+    def point(self, where: str, given: Any) -> Any:
+        """A point by name, or its two or three components."""
+        if isinstance(given, str):
+            if given not in self._points:
+                names = ", ".join(self._points) or "none"
+                raise InputError(f"{where} = {shown(given)}: no such point; points are {names}")
+            return self._points[given]
+        parts = list(given) if isinstance(given, Sequence | sympy.MatrixBase) else []
+        if len(parts) not in (2, 3):
+            raise InputError(f"{where} = {shown(given)}: must be a point's name or two or three expressions")
+        return sympy.Matrix([self.expression(where, part) for part in parts])
+
+    def points(self, given: Any) -> dict[str, Any]:
+        """Named points."""
+        if not isinstance(given, Mapping) or not all(isinstance(name, str) and name for name in given):
+            raise InputError(f"points = {shown(given)}: must map names to places")
+        for name, place in given.items():
+            self._points[name] = self.point(
+                f"points.{name}", tuple(place) if isinstance(place, list) else place
+            )
+        return self._points
+
+    def parts(self, given: Mapping[str, Any]) -> Parts:
+        """Energies and forces of everything together."""
+        potential = self.expression("potential", given["potential"])
+        kinetic = self.expression("kinetic", given["kinetic"], rates=True)
+        dissipation = self.expression("dissipation", given["dissipation"], rates=True)
+        gravity, metric = given["gravity"], sympy.zeros(len(self._q))
+        for number, mass in enumerate(_masses(given["masses"])):
+            where = f"masses[{number}]"
+            center = self.point(where, mass.center)
+            m, inertia = (self.expression(where, value) for value in (mass.mass, mass.inertia))
+            angle = sympy.Matrix([self.expression(where, mass.angle)])
+            metric += m * self._inertia(center) + inertia * self._inertia(angle)
+            if gravity is not None:
+                potential -= m * self._gravity(gravity, len(center)).dot(center)
+        for number, spring in enumerate(_all("springs", given["springs"], Spring, TorsionSpring)):
+            stretch_square = self._stretch_square(f"springs[{number}]", spring)
+            stiffness = self.expression(f"springs[{number}].stiffness", spring.stiffness)
+            potential += stiffness * stretch_square / 2
+        for number, damper in enumerate(_all("dampers", given["dampers"], Damper, TorsionDamper)):
+            rate_square = self._rate_square(f"dampers[{number}]", damper)
+            dissipation += (
+                self.expression(f"dampers[{number}].coefficient", damper.coefficient) * rate_square / 2
+            )
+        loads = tuple(
+            self._load(f"forces[{number}]", force)
+            for number, force in enumerate(_all("forces", given["forces"], Force, Torque))
+        )
+        return Parts(
+            metric, kinetic, potential, dissipation, self._generalized(given["generalized_forces"]), loads
+        )
+
+    def _inertia(self, place: Any) -> Any:
+        """Metric of a unit mass, or of a unit of inertia, at a place."""
+        moved = place.jacobian(sympy.Matrix(self._q))
+        return (moved.T * moved).applyfunc(lambda entry: simplest(entry, self._q))
+
+    def _generalized(self, given: Any) -> tuple[Any, ...]:
+        if not isinstance(given, Mapping):
+            raise InputError(f"generalized_forces = {shown(given)}: must map coordinates to expressions")
+        named = {str(name): value for name, value in given.items()}
+        for name in named.keys() - {str(q) for q in self._q}:
+            raise InputError(f"generalized_forces: {shown(name)} is no coordinate")
+        where = "generalized_forces"
+        return tuple(self.expression(f"{where}[{q}]", named.get(str(q), 0), rates=True) for q in self._q)
+
+    def _gravity(self, given: Any, components: int) -> Any:
+        """The vector of gravity: a number g pulls along -y in a plane, along -z in space."""
+        if isinstance(given, Sequence):
+            return self._fitting("gravity", self.point("gravity", given), components)
+        return sympy.Matrix([*[0] * (components - 1), -self.expression("gravity", given)])
+
+    def _fitting(self, where: str, vector: Any, components: int) -> Any:
+        if len(vector) != components:
+            raise InputError(f"{where}: has {len(vector)} components, must have the points' {components}")
+        return vector
+
+    def _between(self, where: str, a: Any, b: Any) -> Any:
+        first = self.point(f"{where}.a", a)
+        return self._fitting(f"{where}.b", self.point(f"{where}.b", b), len(first)) - first
+
+    def _stretch_square(self, where: str, spring: Any) -> Any:
+        if isinstance(spring, TorsionSpring):
+            return (self._expression_of(where, spring) - self.expression(where, spring.free_angle)) ** 2
+        square = simplest(self._square(self._between(where, spring.a, spring.b)), self._q)
+        free = self.expression(f"{where}.free_length", spring.free_length)
+        return square if free == 0 else (sympy.sqrt(square) - free) ** 2
+
+    def _rate_square(self, where: str, damper: Any) -> Any:
+        if isinstance(damper, TorsionDamper):
+            return self._rate(self._expression_of(where, damper)) ** 2
+        between = self._between(where, damper.a, damper.b)
+        if damper.along is not None:
+            direction = self._fitting(
+                f"{where}.along", self.point(f"{where}.along", damper.along), len(between)
+            )
+            return self._velocity(between).dot(direction) ** 2 / self._square(direction)
+        return between.dot(self._velocity(between)) ** 2 / simplest(self._square(between), self._q)
+
+    def _load(self, where: str, force: Any) -> tuple[Load, tuple[Any, ...]]:
+        load = force.load if isinstance(force.load, Load) else Constant(force.load)
+        if not isinstance(load, Sampled | Function):
+            changed = {}
+            for name, value in vars(load).items():
+                changed[name] = found = self.expression(f"{where}.load.{name}", value)
+                if found.free_symbols & {*self._q}:
+                    raise InputError(f"{where}.load.{name}: depends on a coordinate; a load depends on time")
+            load = type(load)(**changed)
+        if isinstance(force, Torque):
+            place = self._expression_of(where, force)
+            return load, tuple(sympy.diff(place, q) for q in self._q)
+        point = self.point(f"{where}.point", force.point)
+        direction = self.point(f"{where}.direction", force.direction)
+        direction = self._fitting(f"{where}.direction", direction, len(point))
+        if simplest(self._square(direction) - 1, self._q) != 0 and not _is_unit(self._square(direction)):
+            raise InputError(f"{where}.direction = {shown(force.direction)}: must be a unit vector")
+        return load, tuple(simplest(point.diff(q).dot(direction), self._q) for q in self._q)
+
+    def _expression_of(self, where: str, element: Any) -> Any:
+        return self.expression(f"{where}.angle", element.angle)
+
+    def _velocity(self, place: Any) -> Any:
+        return sum((place.diff(q) * rate for q, rate in zip(self._q, self._rates, strict=True)), 0 * place)
+
+    def _rate(self, angle: Any) -> Any:
+        return sum(sympy.diff(angle, q) * rate for q, rate in zip(self._q, self._rates, strict=True))
+
+    @staticmethod
+    def _square(vector: Any) -> Any:
+        return vector.dot(vector)
+
+
+_ELEMENTS = (Body, Spring, TorsionSpring, Damper, TorsionDamper, Force, Torque)
+
+
+def _masses(given: Any) -> list[Body]:
+    """Mass points by point's name, and bodies."""
+    if isinstance(given, Mapping):
+        given = list(given.items())
+    return [
+        one if isinstance(one, Body) else Body(one[0], one[1], 0, 0)
+        for one in _all("masses", given, Body, tuple)
+    ]
+
+
+def _all(field: str, given: Any, *kinds: type) -> list[Any]:
+    """A list of elements of these kinds."""
+    if not isinstance(given, Sequence) or isinstance(given, (str, *_ELEMENTS)):
+        raise InputError(f"{field} = {shown(given)}: must be a list")
+    for number, element in enumerate(given):
+        if not isinstance(element, kinds) or (type(element) is tuple and len(element) != 2):
+            told = " or ".join("(point, mass)" if kind is tuple else kind.__name__ for kind in kinds)
+            raise InputError(f"{field}[{number}] = {shown(element)}: must be a {told}")
+    return list(given)
+
+
+def _is_unit(square: Any) -> bool:
+    return not square.free_symbols and abs(float(square) - 1.0) < 1e-12

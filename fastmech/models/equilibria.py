@@ -1,0 +1,357 @@
+"""All equilibria of a mechanism, proved to be there, to be alone, and to be all."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.callee import callee
+from fastmech.equilibria import find
+from fastmech.equilibria.outcome import Outcome
+from fastmech.errors import InputError, shown
+from fastmech.intervals.search import AT_END, LIMIT, TWO_PI, UNCLEAR, UNDEFINED, Found, search, work
+from fastmech.models.statics import Statics
+
+Floats = NDArray[np.float64]
+
+#: Boxes that are treated at most, by the number of coordinates; a chain of four pendulums takes 9,600.
+LIMITS = {1: 10_000, 2: 50_000, 3: 300_000, 4: 1_000_000}
+
+MOST = 128  #: zeros at most
+TOGETHER = 2000  #: boxes not decided that are compared with one another; of more, neighbours are one before
+
+#: An angle's first box begins so far from -pi: symmetric mechanisms have equilibria there.
+SEAM = 0.3217
+
+#: Boxes not decided that touch are taken for one degenerate equilibrium if they span less of the domain.
+SMALL_PLACE = 1e-4
+
+#: For a curve of equilibria if they span more of their own widths.
+CURVE = 20.0
+
+#: Boxes that are tried to show the sign of a force on one end of a range.
+FACES = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class RestingPlace:
+    """One equilibrium of a mechanism; the forces Q - dU/dq vanish there."""
+
+    position: Floats  #: coordinates (n,) [rad or m], periodic angles in (-pi, pi]
+    radius: float  #: the one equilibrium here is proved to be within so many rad or m, by each coordinate
+    stiffness: Floats  #: minus the forces' derivatives (n, n); the Hessian of U if there is a potential
+    orientation: int  #: sign of the stiffness matrix' determinant, proved; 0 if it is not
+    morse_index: int | None  #: directions in which U falls, proved; -2 not proved; None without a potential
+
+    @property
+    def kind(self) -> str:
+        """``minimum``, ``saddle``, ``maximum``, ``degenerate``; without a potential by ``orientation``."""
+        if self.morse_index is None:
+            return {1: "positive", -1: "negative", 0: "degenerate"}[self.orientation]
+        extremes = {-2: "degenerate", 0: "minimum", len(self.position): "maximum"}
+        return extremes.get(self.morse_index, "saddle")
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A part of the domain of which it is not proved what equilibria it holds."""
+
+    low: Floats  #: (n,)
+    high: Floats  #: (n,)
+    boxes: int  #: how many boxes it consists of
+    reason: str
+
+
+@dataclass(frozen=True)
+class Proof:
+    """What is proved about a list of equilibria."""
+
+    outcome: Outcome
+    places: tuple[Place, ...]  #: not decided; outside of them the list is complete and correct
+    index_sum: int | None  #: sum of the orientations; None where one is not proved
+    expected_sum: (
+        int | None
+    )  #: what it must be; None where the forces on the ends of a range do not decide it
+    boxes: int  #: that were treated
+    sentence: str
+
+    @property
+    def complete(self) -> bool:
+        """Whether the list is proved to be correct and complete."""
+        return self.outcome is Outcome.COMPLETE
+
+
+@dataclass(frozen=True, eq=False)
+class RestingPlaces(Sequence[RestingPlace]):
+    """Equilibria of a mechanism: by Morse index or orientation, then by position."""
+
+    items: tuple[RestingPlace, ...]
+    names: tuple[str, ...]  #: of the coordinates
+    certificate: Proof
+
+    def __len__(self) -> int:
+        return len(self.items)
+
+    @overload
+    def __getitem__(self, index: int) -> RestingPlace: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[RestingPlace]: ...
+    def __getitem__(self, index: int | slice) -> RestingPlace | Sequence[RestingPlace]:
+        return self.items[index]
+
+    @property
+    def position(self) -> Floats:
+        """Coordinates (count, n)."""
+        return np.array([item.position for item in self.items]).reshape(-1, len(self.names))
+
+    @property
+    def kind(self) -> tuple[str, ...]:
+        """Kinds, one for each equilibrium."""
+        return tuple(item.kind for item in self.items)
+
+    def __repr__(self) -> str:
+        lines = [
+            ", ".join(f"{name} = {value:.6g}" for name, value in zip(self.names, item.position, strict=True))
+            + f": {item.kind}"
+            for item in self.items
+        ]
+        return "\n".join([*lines, self.certificate.sentence])
+
+
+def find_equilibria(system: Any, at: float = math.inf) -> find.Equilibria | RestingPlaces:
+    """All equilibria of a scene or a mechanism, with a proof that none is missing.
+
+    Args:
+        system: of a ``Scene`` the force is frozen at a time; of a ``Mechanism`` loads are at their means.
+        at: that time [s], for a scene. A constant force (alpha = 0) is F0 at every time. A decaying one is
+            zero at the default ``inf``, so Table 2 of the paper needs ``alpha = 0`` or ``at=0``.
+
+    Where rounding hides how many equilibria there are, near a fold, or where they are not isolated, the
+    certificate says so and where.
+
+    Raises:
+        InputError: ``at`` is not a number >= 0; a coordinate's range is not finite; a force has a function of
+            which no bounds are known.
+    """
+    if not callable(getattr(system, "statics", None)):
+        return find.find_equilibria(system, at)
+    if at != math.inf:
+        raise InputError(f"at = {shown(at)}: is for a Scene; equilibria of a mechanism hold for mean loads")
+    return prove_equilibria(system.statics(), list(system.parameters.values()))
+
+
+def prove_equilibria(
+    statics: Statics, values: Sequence[float] = (), limit: int | None = None
+) -> RestingPlaces:
+    """All equilibria for one set of parameters' values, in the order of ``statics.parameters``.
+
+    At most ``limit`` boxes are treated. Raises as :func:`find_equilibria`.
+    """
+    limit = limit or LIMITS[len(statics.coordinates)]
+    found = search_rows(statics, np.array([values], dtype=np.float64), limit, limit + 2)
+    n, count = len(statics.coordinates), int(found.count[0, 0])
+    p = np.repeat(np.array(values, dtype=np.float64)[:, None], 2, 1)
+    turning = np.array([coordinate.periodic for coordinate in statics.coordinates])
+    f, J, items = np.empty((n, 2)), np.empty((n, n, 2)), []
+    forces = _balance(statics)
+    for k in range(count):
+        zero = found.zeros[0, k]
+        forces(zero, p, f, J)
+        raw = zero.mean(1)
+        position = raw - TWO_PI * np.ceil((raw - math.pi) / TWO_PI) * turning
+        orientation = int(found.orientation[0, k]) * (-1) ** n
+        positive = int(found.positive[0, k])
+        index = (positive if positive >= 0 else -2) if statics.conservative else None
+        radius = float((zero[:, 1] - zero[:, 0]).max() + 1e-15 * (1.0 + np.abs(raw).max()))
+        items.append(RestingPlace(position, radius, -J.mean(2), orientation, index))
+    items.sort(key=lambda item: (item.morse_index or 0, -item.orientation, *item.position))
+    names = tuple(str(coordinate.symbol) for coordinate in statics.coordinates)
+    return RestingPlaces(tuple(items), names, _proof(statics, p, found, items))
+
+
+def search_rows(statics: Statics, rows: Floats, limit: int | None = None, most_left: int = 64) -> Found:
+    """What :func:`fastmech.intervals.search.search` finds for each row (rows, parameters) of values.
+
+    Raises:
+        InputError: as :func:`find_equilibria`, or rows have another number of parameters.
+    """
+    n, count = len(statics.coordinates), len(rows)
+    if rows.shape != (count, len(statics.parameters)):
+        raise InputError(f"parameters: {rows.shape[-1]} values, must be {len(statics.parameters)}")
+    found = Found(
+        np.empty((count, MOST, n, 2)),
+        np.zeros((count, MOST), dtype=np.int8),
+        np.zeros((count, MOST), dtype=np.int8),
+        np.empty((count, most_left, n, 2)),
+        np.zeros((count, most_left), dtype=np.int8),
+        np.zeros((count, 3), dtype=np.int64),
+    )
+    boxes = np.empty((2 * (limit or LIMITS[n]) + 2, n, 2))
+    forces = callee(_balance(statics))
+    search(forces, _domain(statics), np.repeat(rows[:, :, None], 2, 2), boxes, work(n, MOST), found)
+    return found
+
+
+@lru_cache(maxsize=64)
+def _balance(statics: Statics) -> Any:
+    from fastmech.models.balance import balance_kernel  # SymPy: only where a mechanism is there
+
+    return balance_kernel(statics)
+
+
+def _domain(statics: Statics) -> Floats:
+    """Lowest and highest values and periods (n, 3); a turn is taken a little larger than it is."""
+    rows = []
+    for symbol, low, high, periodic in statics.coordinates:
+        if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            raise InputError(
+                f"{symbol}: {low:g} .. {high:g} must be a finite range: what lies outside is not searched"
+            )
+        rows.append(
+            (SEAM - math.pi - 1e-14, SEAM + math.pi + 1e-14, TWO_PI) if periodic else (low, high, 0.0)
+        )
+    return np.array(rows)
+
+
+def _proof(statics: Statics, p: Floats, found: Found, items: list[RestingPlace]) -> Proof:
+    """The certificate of one row."""
+    domain = _domain(statics)
+    left = int(found.count[0, 1])
+    places = _places(found.left[0, :left], found.reason[0, :left], domain)
+    expected = expected_sum(statics, p)
+    signs = [item.orientation for item in items]
+    total = sum(signs) if all(signs) else None
+    boxes = int(found.count[0, 2])
+    listed = "1 equilibrium is" if len(items) == 1 else f"{len(items)} equilibria are"
+    if left:
+        spans = [float(((place.high - place.low) / (domain[:, 1] - domain[:, 0])).max()) for place in places]
+        kinds = {place.reason for place in places}
+        if kinds <= {_FOLD, _CURVE}:
+            outcome = Outcome.DEGENERATE if _CURVE in kinds else Outcome.AT_FOLD
+        else:
+            outcome = Outcome.UNPROVED
+        worst = places[int(np.argmax(spans))]
+        where = ", ".join(
+            f"{c.symbol} = {low:.6g}"
+            if high - low < 1e-5 * abs(low)
+            else f"{c.symbol} in [{low:.6g}, {high:.6g}]"
+            for c, low, high in zip(statics.coordinates, worst.low, worst.high, strict=True)
+        )
+        others = f" and {len(places) - 1} more" if len(places) > 1 else ""
+        sentence = f"{listed} proved; not decided at {where}{others}: {worst.reason}"
+    elif total is not None and expected is not None and total != expected:
+        outcome = Outcome.UNPROVED
+        sentence = f"{listed} found, whose indices sum to {total} and not to {expected}: please report this"
+    else:
+        outcome = Outcome.COMPLETE
+        sentence = f"{listed} proved to exist; there are no others ({boxes:,} boxes)"
+        if expected is not None and total is not None:
+            sentence += f"; their indices sum to {total}, as they must"
+    return Proof(outcome, places, total, expected, boxes, sentence)
+
+
+_FOLD = "equilibria merge here within rounding, or come as close"
+_CURVE = "equilibria may not be isolated here: a curve of them, or nearly"
+_REASONS = {
+    UNDEFINED: "forces or their derivatives are not defined, or not bounded, everywhere here",
+    LIMIT: "the limit on the number of boxes was reached",
+    AT_END: "an equilibrium lies on the end of a range within rounding",
+    UNCLEAR: "there are more equilibria than can be kept apart",
+}
+
+
+def _places(boxes: Floats, reasons: NDArray[np.int8], domain: Floats) -> tuple[Place, ...]:
+    """Boxes nearer to each other than they are wide, modulo turns, as one place."""
+    from scipy.sparse.csgraph import connected_components
+
+    size, turns = domain[:, 1] - domain[:, 0], domain[:, 2]
+    width = float((np.diff(boxes)[:, :, 0] / size).max()) if len(boxes) else 0.0
+    cells, counts = 1024.0, np.ones(len(boxes), dtype=np.int64)
+    while len(boxes) > TOGETHER:
+        cell = np.floor((boxes.mean(2) - domain[:, 0]) / size * cells)
+        _, group, number = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
+        boxes, reasons, counts = _merged(boxes, reasons, counts, group.reshape(-1), len(number))
+        cells /= 2.0
+    near = np.ones((len(boxes), len(boxes)), dtype=bool)
+    for k, period in enumerate(turns):
+        middle, extent = boxes[:, k].mean(1), np.diff(boxes[:, k])[:, 0]
+        away = middle[:, None] - middle
+        away -= period * np.round(away / period) if period else 0.0
+        near &= np.abs(away) <= 1.5 * (extent[:, None] + extent) + 1e-14 * size[k]
+    number, group = connected_components(near, directed=False)
+    first = boxes[np.unique(group, return_index=True)[1]][group]
+    turned = np.round((boxes.mean(2) - first.mean(2)) / TWO_PI) * turns
+    merged = _merged(boxes - turned[:, :, None], reasons, counts, group, number)
+    places = []
+    for (low, high), code, count in zip(merged[0].transpose(0, 2, 1), merged[1], merged[2], strict=True):
+        span = ((high - low) / size).max()
+        if code in _REASONS and code != LIMIT:
+            reason = _REASONS[code]
+        elif span < SMALL_PLACE:
+            reason = _FOLD
+        else:
+            reason = _CURVE if span > CURVE * width else _REASONS[LIMIT]
+        places.append(Place(low, high, int(count), reason))
+    return tuple(places)
+
+
+def _merged(
+    boxes: Floats, reasons: NDArray[np.int8], counts: NDArray[np.int64], group: Any, number: int
+) -> tuple[Floats, NDArray[np.int8], NDArray[np.int64]]:
+    """Hulls of groups of boxes, the gravest reason of each and how many boxes it has."""
+    hulls = np.empty((number, *boxes.shape[1:]))
+    hulls[:, :, 0], hulls[:, :, 1] = np.inf, -np.inf
+    np.minimum.at(hulls[:, :, 0], group, boxes[:, :, 0])
+    np.maximum.at(hulls[:, :, 1], group, boxes[:, :, 1])
+    gravest = np.zeros(number, dtype=np.int8)
+    np.maximum.at(gravest, group, reasons)
+    return hulls, gravest, np.bincount(group, counts, number).astype(np.int64)
+
+
+def expected_sum(statics: Statics, p: Floats) -> int | None:
+    """The sum over all equilibria of the signs of the stiffness' determinants: the degree of the forces.
+
+    Without ranges it is 0, the Euler characteristic of a torus. With ranges it is known where on each of
+    their ends the force along the coordinate keeps one sign, which is proved by boxes: then forces can be
+    deformed, without a zero on the boundary, into ones that depend on that coordinate alone, and are
+    constant along a periodic angle if there is one. Else None.
+    """
+    domain = _domain(statics)
+    degree = 0 if any(coordinate.periodic for coordinate in statics.coordinates) else 1
+    for k, coordinate in enumerate(statics.coordinates):
+        if not coordinate.periodic:
+            signs = [_sign_on_end(statics, p, domain, k, end) for end in (0, 1)]
+            if 0 in signs:
+                return None
+            degree *= (signs[0] - signs[1]) // 2
+    return degree
+
+
+def _sign_on_end(statics: Statics, p: Floats, domain: Floats, k: int, end: int) -> int:
+    """Sign of the force along coordinate ``k`` on one end of its range; 0 if it is not proved to have one."""
+    face = domain[:, :2].copy()
+    face[k] = domain[k, end]
+    n, todo, signs = len(face), [face], set[int]()
+    f, J, forces = np.empty((n, 2)), np.empty((n, n, 2)), _balance(statics)
+    for _ in range(FACES):
+        if not todo:
+            return signs.pop()
+        box = todo.pop()
+        forces(box, p, f, J)
+        if not f[k, 0] <= 0.0 <= f[k, 1]:
+            signs.add(1 if f[k, 0] > 0.0 else -1)
+        elif n > 1:
+            j = int(np.argmax(np.diff(box)[:, 0] / (domain[:, 1] - domain[:, 0])))
+            todo += [box.copy(), box.copy()]
+            todo[-1][j, 0] = todo[-2][j, 1] = box[j].mean()
+        elif not signs:
+            return 0
+        if len(signs) > 1:
+            return 0
+    return 0

@@ -1,0 +1,363 @@
+"""``fm.Mechanism``: any holonomic mechanism with one to four degrees of freedom, as data."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import json
+import keyword
+import math
+import re
+from collections.abc import Collection, Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastmech.errors import InputError, shown
+from fastmech.generated import kept_text
+from fastmech.kernels.fingerprint import fingerprint
+from fastmech.loads import Function, Load, Sampled
+from fastmech.models.checks import check
+from fastmech.models.statics import Coordinate, Statics
+from fastmech.scene import nearest
+
+if TYPE_CHECKING:
+    from fastmech.models.derivation import Derived, Equations
+
+Floats = NDArray[np.float64]
+
+#: Coordinates at most.
+MOST_COORDINATES = 4
+
+#: Names that the compiled text calls by.
+RESERVED = {"t", "np", "sin", "cos", "exp", "abs", "min", "max", "sincos", "turned", "rounded_to", "float32"}
+
+
+class Energies(NamedTuple):
+    """Energies [J] of states, each of their shape without the last axis."""
+
+    kinetic: Floats
+    potential: Floats
+
+
+class Powers(NamedTuple):
+    """Powers [W] of states: d(T + U)/dt = brought - lost."""
+
+    brought: Floats  #: by loads
+    lost: Floats  #: in dampers and to generalized forces
+
+
+class Linear(NamedTuple):
+    """M q'' + C q' + K q = 0 about a position, loads at their means."""
+
+    mass: Floats  #: metric (n, n)
+    damping: Floats  #: (n, n)
+    stiffness: Floats  #: (n, n), symmetric where forces have a potential
+
+
+class Mechanism:
+    """A holonomic mechanism.
+
+    Write it the engineer's way, by points that are expressions of the coordinates and what acts between them,
+    or the analyst's, by energies and forces; what is given both ways adds up.
+
+    Args:
+        coordinates: one to four symbols of :func:`fastmech.angles` and :func:`fastmech.lengths`; ``q.dot`` is
+            the rate of ``q``.
+        parameters: values by name, or by symbol; ``(value, unit)`` of any gives the units of all, which are
+            checked then.
+        points: places by name, two expressions [m] (three in space).
+        masses: mass [kg] by point, or a list of ``(point, mass)`` and :class:`~.elements.Body`.
+        springs: list of :class:`~.elements.Spring` and :class:`~.elements.TorsionSpring`.
+        dampers: list of :class:`~.elements.Damper` and :class:`~.elements.TorsionDamper`.
+        forces: list of :class:`~.elements.Force` and :class:`~.elements.Torque`, with loads of ``fm.loads``.
+        gravity: acceleration [m/s^2] along -y (-z in space), or its components.
+        kinetic: T [J], quadratic in the rates.
+        potential: U [J].
+        dissipation: Rayleigh's function D [W], half the power lost; the force is -dD/dq'.
+        generalized_forces: further forces by coordinate, of coordinates and rates [N or N m].
+        name: what it is called.
+
+    Raises:
+        InputError: names are wrong, twice there or unknown; the kinetic energy is not quadratic, or not
+            positive; dampers feed energy in; something does not repeat after a turn of an angle; units do not
+            fit.
+    """
+
+    def __init__(
+        self,
+        coordinates: Any,
+        parameters: Mapping[Any, Any] | None = None,
+        *,
+        points: Mapping[str, Any] | None = None,
+        masses: Any = (),
+        springs: Sequence[Any] = (),
+        dampers: Sequence[Any] = (),
+        forces: Sequence[Any] = (),
+        gravity: Any = None,
+        kinetic: Any = 0,
+        potential: Any = 0,
+        dissipation: Any = 0,
+        generalized_forces: Mapping[Any, Any] | None = None,
+        name: str = "mechanism",
+    ) -> None:
+        import sympy
+
+        from fastmech.models.coordinates import CoordinateSymbol
+        from fastmech.models.elements import Builder
+
+        given = list(coordinates) if isinstance(coordinates, Sequence) else [coordinates]
+        if not 1 <= len(given) <= MOST_COORDINATES or not all(isinstance(q, CoordinateSymbol) for q in given):
+            raise InputError(
+                f"coordinates = {shown(coordinates)}: must be one to four symbols of fm.angles and fm.lengths"
+            )
+        self.name = _identifier("name", name)
+        self._symbols = tuple(sympy.Symbol(q.name, real=True) for q in given)
+        self._rates = tuple(sympy.Symbol(f"{q.name}_dot", real=True) for q in given)
+        self.coordinates = tuple(
+            Coordinate(symbol, q.low, q.high, q.periodic)
+            for symbol, q in zip(self._symbols, given, strict=True)
+        )
+        self.parameters, self.units = _parameters({} if parameters is None else parameters)
+        self._constants = tuple(sympy.Symbol(name, real=True) for name in self.parameters)
+        names = [*map(str, self._symbols), *map(str, self._rates), *self.parameters]
+        for one in names:
+            _identifier("coordinates and parameters", one)
+            if names.count(one) > 1:
+                raise InputError(f"{one}: names a coordinate, a rate or a parameter twice")
+        known = {symbol.name: symbol for symbol in (*self._symbols, *self._constants)}
+        builder = Builder(self._symbols, self._rates, known)
+        self.points = builder.points({} if points is None else points)
+        self._parts = builder.parts(
+            {
+                "masses": masses, "springs": springs, "dampers": dampers, "forces": forces,
+                "gravity": gravity, "kinetic": kinetic, "potential": potential, "dissipation": dissipation,
+                "generalized_forces": {} if generalized_forces is None else generalized_forces,
+            }
+        )  # fmt: skip
+        self.lengths = frozenset(q.name for q in given if q.unit == "m")
+        check(self)
+
+    def replace(self, **parameters: float) -> Mechanism:
+        """The same mechanism with other values of some parameters."""
+        made = copy.copy(self)
+        known = list(self.parameters)
+        for name in parameters:
+            if name not in known:
+                raise InputError(f"parameters.{name}: unknown name; {nearest(name, known)}")
+        made.parameters, _ = _parameters(self.parameters | parameters)
+        if list(map(str, made._means())) != list(map(str, self._means())):
+            made._forget()
+        check(made)
+        return made
+
+    def _means(self) -> list[Any]:
+        return [load.mean_at(self.parameters) for load, _ in self._parts.loads]
+
+    def _forget(self) -> None:
+        """What follows from the equations, which are others now."""
+        for name in ("equations", "_statics", "prints", "derived", "_numpy"):
+            self.__dict__.pop(name, None)
+
+    def with_terms(self, varied: Collection[str]) -> Mechanism:
+        """The same with no terms of parameters that are zero, but for those whose values are ``varied``."""
+        names = {name for name, value in self.parameters.items() if value == 0.0 and name not in varied}
+        if not names:
+            return self
+        key = self.prints, self.name, *sorted(names)
+        if key not in _with_terms:
+            made = copy.copy(self)
+            made._forget()
+            made._parts = self._parts.put({c: 0 for c in self._constants if c.name in names})
+            _with_terms[key] = made if made._parts.finite else copy.copy(self)
+            _ = _with_terms[key]._numpy  # what copies share
+        made = copy.copy(_with_terms[key])
+        made.parameters = self.parameters
+        return made
+
+    @property
+    def state(self) -> tuple[str, ...]:
+        """Names of the states: coordinates, then rates."""
+        return tuple(symbol.name for symbol in (*self._symbols, *self._rates))
+
+    @property
+    def loads(self) -> tuple[Load, ...]:
+        """Its loads with the parameters' values."""
+        return tuple(load.at(self.parameters) for load, _ in self._parts.loads)
+
+    @cached_property
+    def equations(self) -> Equations:
+        """Metric and forces as SymPy expressions."""
+        from fastmech.models.derivation import equations
+
+        return equations(self._parts, self._symbols, self._rates, self._means())
+
+    @cached_property
+    def _statics(self) -> Statics:
+        from fastmech.models.derivation import statics
+
+        return statics(self._parts, self.equations, self.coordinates, self._constants)
+
+    def statics(self) -> Statics:
+        """Generalized forces at rest, loads at their means."""
+        return self._statics
+
+    @cached_property
+    def prints(self) -> str:
+        """Text that changes with its equations, not with the values of parameters."""
+        loads = []
+        for load, moved in self._parts.loads:
+            if isinstance(load, Sampled):  # its function is the package's own: what differs are numbers
+                loads.append(fingerprint((load.times, load.values, load.pieces)))
+            else:
+                loads.append(fingerprint(load.function) if isinstance(load, Function) else repr(load))
+            loads.append(str(moved))
+        told = [*self._parts[:-1], loads, self._means(), self._symbols, self._constants]
+        return hashlib.sha256("\0".join(map(str, told)).encode()).hexdigest()[:16]
+
+    @cached_property
+    def derived(self) -> Derived:
+        """Texts of its functions, kept on disk from the first time on."""
+        from fastmech.models.derivation import Derived, derive
+
+        def text() -> str:
+            found = derive(self._parts, self.equations, self._symbols, self._rates, self._constants)
+            return json.dumps(found)
+
+        found = json.loads(kept_text("mechanism", self.prints, text))
+        return Derived(tuple(found[0]), found[1])
+
+    def functions_of_time(self) -> dict[str, Any]:
+        """Loads that are functions, by the names under which the text calls them."""
+        return {
+            f"function_{k}": load.function
+            for k, (load, _) in enumerate(self._parts.loads)
+            if isinstance(load, Sampled | Function)
+        }
+
+    @cached_property
+    def _numpy(self) -> dict[str, Any]:
+        """Its functions over NumPy arrays."""
+        names = {"np": np, "sin": np.sin, "cos": np.cos, "exp": np.exp, "rounded_to": lambda x, value: value}
+        names |= self.functions_of_time()
+        for function in ("lagrange_rates", *_PLAIN):
+            exec(in_precision(self.derived.functions[function][1], "float64"), names)
+        return names
+
+    def coefficients(self, parameters: Mapping[str, ArrayLike] | None = None) -> dict[str, Any]:
+        """What its functions take of the parameters, of which some may have other values, by name."""
+        values = self.parameters | dict(parameters or {})
+        given = (np.asarray(values[name], dtype=np.float64)[()] for name in self.parameters)
+        with np.errstate(all="ignore"):
+            found = self._numpy["coefficients"](*given)
+        return dict(zip(self.derived.coefficients, map(np.float64, found), strict=True))
+
+    def evaluate(self, name: str, states: Any, parameters: Mapping[str, ArrayLike] | None = None) -> Floats:
+        """One of its functions of numbers or arrays, one a state: all that it gives, stacked in front."""
+        known = self.coefficients(parameters)
+        own, text = self.derived.functions[name]
+        function = self._numpy[name]
+        if re.search(r" if |min\(|max\(", text):  # decisions are those of single numbers
+            function = np.vectorize(function, otypes=None)
+        with np.errstate(all="ignore"):
+            found = function(*states, *(known[k] for k in own))
+        return np.stack(np.broadcast_arrays(*found, np.asarray(states[-1]))[:-1])
+
+    def energies(self, y: ArrayLike, parameters: Mapping[str, ArrayLike] | None = None) -> Energies:
+        """T and U [J] of states (..., 2 n); parameters' other values have shapes that fit."""
+        return Energies(*self.evaluate("energies", self._split(y, 2), parameters))
+
+    def powers(self, t: float, y: ArrayLike, parameters: Mapping[str, ArrayLike] | None = None) -> Powers:
+        """Powers [W] at a time [s] in states (..., 2 n)."""
+        brought, damped, taken = self.evaluate("powers", [t, *self._split(y, 2)], parameters)
+        return Powers(brought, damped + taken)
+
+    def accelerations(
+        self, t: float, y: ArrayLike, parameters: Mapping[str, ArrayLike] | None = None
+    ) -> Floats:
+        """q'' (..., n) at a time [s] in states (..., 2 n)."""
+        rates = self.evaluate("lagrange_rates", [t, *self._split(y, 2)], parameters)
+        return np.moveaxis(rates[len(self.coordinates) :], 0, -1)
+
+    def to_momenta(self, y: ArrayLike, parameters: Mapping[str, ArrayLike] | None = None) -> Floats:
+        """Coordinates and momenta dT/dq' (..., 2 n) from coordinates and rates."""
+        return self._second_half("momenta", y, parameters)
+
+    def to_rates(self, y: ArrayLike, parameters: Mapping[str, ArrayLike] | None = None) -> Floats:
+        """Coordinates and rates (..., 2 n) from coordinates and momenta."""
+        return self._second_half("velocities", y, parameters)
+
+    def _second_half(self, name: str, y: ArrayLike, parameters: Mapping[str, ArrayLike] | None) -> Floats:
+        states = self._split(y, 2)
+        found = self.evaluate(name, states, parameters)
+        return np.moveaxis(np.concatenate([np.broadcast_to(states[: len(found)], found.shape), found]), 0, -1)
+
+    def metric(self, q: ArrayLike, parameters: Mapping[str, ArrayLike] | None = None) -> Floats:
+        """The metric a (..., n, n) at positions (..., n)."""
+        return self._matrices("metric", q, parameters)[0]
+
+    def linear(self, q: ArrayLike, parameters: Mapping[str, ArrayLike] | None = None) -> Linear:
+        """Mass, damping and stiffness (..., n, n) about positions (..., n)."""
+        return Linear(self.metric(q, parameters), *self._matrices("slopes", q, parameters))
+
+    def _matrices(self, name: str, q: ArrayLike, parameters: Mapping[str, ArrayLike] | None) -> Floats:
+        found, n = self.evaluate(name, self._split(q, 1), parameters), len(self.coordinates)
+        return np.moveaxis(found.reshape(-1, n, n, *found.shape[1:]), (1, 2), (-2, -1))
+
+    def _split(self, y: ArrayLike, halves: int) -> Floats:
+        states, count = np.asarray(y, dtype=np.float64), halves * len(self.coordinates)
+        if not states.ndim or states.shape[-1] != count:
+            raise InputError(f"y: has shape {states.shape}, must be (..., {count})")
+        return np.moveaxis(states, -1, 0)
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{name}={value:g}" for name, value in self.parameters.items())
+        return f"Mechanism({self.name}: {', '.join(map(str, self._symbols))}; {values})"
+
+
+#: Mechanisms without some of their terms, by what tells them apart.
+_with_terms: dict[tuple[str, ...], Mechanism] = {}
+
+_PLAIN = ("coefficients", "momenta", "energies", "metric", "velocities", "powers", "slopes")
+
+
+def in_precision(text: str, precision: str) -> str:
+    """The text with its numbers in a precision: a float64 would turn a lane's arithmetic into its own."""
+    left, right = ("float32(", ")") if precision == "float32" else ("", "")
+    return text.replace("<<", left).replace(">>", right)
+
+
+def _identifier(field: str, name: Any) -> str:
+    usable = isinstance(name, str) and name.isidentifier() and not keyword.iskeyword(name)
+    if not usable or name.startswith("_") or name in RESERVED:
+        raise InputError(
+            f"{field}: {shown(name)} must be a Python name, with no underscore in front, and none of "
+            + ", ".join(sorted(RESERVED))
+        )
+    return name
+
+
+def _parameters(given: Any) -> tuple[dict[str, float], dict[str, str]]:
+    """Values and units by name."""
+    if not isinstance(given, Mapping):
+        raise InputError(f"parameters = {shown(given)}: must map names to values")
+    values: dict[str, float] = {}
+    units: dict[str, str] = {}
+    for symbol, told in given.items():
+        name, value = str(symbol), told
+        if isinstance(told, tuple):
+            if len(told) != 2 or not isinstance(told[1], str):
+                raise InputError(f"parameters.{name} = {shown(told)}: must be a number, or (number, unit)")
+            value, units[name] = told
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, int | float | np.number)
+            or not math.isfinite(value)
+        ):
+            raise InputError(f"parameters.{name} = {shown(value)}: must be a finite number")
+        if name in values:
+            raise InputError(f"parameters.{name}: is given twice")
+        values[name] = float(value)
+    return values, units

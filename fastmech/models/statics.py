@@ -1,0 +1,25 @@
+"""What the balance of a mechanism is made of: coordinates, parameters and forces at rest, as expressions."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+
+class Coordinate(NamedTuple):
+    """A generalized coordinate."""
+
+    symbol: Any  #: SymPy symbol, real
+    low: float  #: least value [rad or m]; of an angle -pi
+    high: float  #: greatest value; of an angle pi
+    periodic: bool  #: an angle: all repeats after 2 pi
+
+
+class Statics(NamedTuple):
+    """Generalized forces at rest; a mechanism is in balance where all are zero."""
+
+    coordinates: tuple[Coordinate, ...]
+    parameters: tuple[Any, ...]  #: SymPy symbols, in the order in which values are given
+    forces: tuple[
+        Any, ...
+    ]  #: SymPy expressions Q - dU/dq in coordinates and parameters, loads at their means
+    conservative: bool  #: forces have a potential: their Jacobian is symmetric

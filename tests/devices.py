@@ -1,0 +1,64 @@
+"""Mechanisms at rest, written down from their potentials and forces."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import sympy as sp
+
+from fastmech.models.statics import Coordinate, Statics
+
+phi, theta, x, y = sp.symbols("phi theta x y", real=True)
+
+
+def angle(symbol: Any) -> Coordinate:
+    return Coordinate(symbol, -math.pi, math.pi, True)
+
+
+def ranged(symbol: Any, low: float, high: float) -> Coordinate:
+    return Coordinate(symbol, low, high, False)
+
+
+def of_potential(coordinates: Any, parameters: Any, U: Any) -> Statics:
+    forces = tuple(-sp.diff(U, coordinate.symbol) for coordinate in coordinates)
+    return Statics(tuple(coordinates), tuple(parameters), forces, True)
+
+
+def slider_pendulum() -> Statics:
+    """The paper's mechanism; parameters in the order of ``SLIDER``."""
+    m1, m2, g, l, c1, c2, F = parameters = sp.symbols("m1 m2 g l c1 c2 F", real=True)
+    x2, y2 = l * (sp.cos(phi) - sp.sin(theta)), l * (sp.sin(phi) - sp.cos(theta))
+    x1, y1 = l * sp.cos(phi), l * sp.sin(phi)
+    U = m1 * g * y1 + m2 * g * y2 + c1 * (x2**2 + y2**2) / 2 + c2 * (x1**2 + (l - y1) ** 2) / 2 - F * x2
+    return of_potential([angle(phi), angle(theta)], parameters, sp.expand(U))
+
+
+def chain(n: int) -> Statics:
+    """Pendulums on one line, neighbours coupled."""
+    q = sp.symbols(f"q:{n}", real=True)
+    U = -sum((n - i) * (sp.Float(9.81) * sp.cos(q[i]) + 3 * sp.sin(q[i])) for i in range(n))
+    U -= 12 * sum(sp.cos(q[i] - q[i + 1]) for i in range(n - 1))
+    return of_potential([angle(s) for s in q], (), U)
+
+
+def truss(width: float = 0.7) -> Statics:
+    """Von Mises: bars of stiffness k and length L0 from (-1, 0) and (1, 0) to (x, y), load P downwards."""
+    k, L0, P = sp.symbols("k L0 P", real=True)
+    bars = [sp.sqrt((x - side) ** 2 + y**2) for side in (-1, 1)]
+    U = sum(k / 2 * (bar - L0) ** 2 for bar in bars) + P * y
+    return of_potential([ranged(x, -width, width), ranged(y, -1.5, 1.5)], (k, L0, P), U)
+
+
+def cart_pendulum() -> Statics:
+    """A pendulum of unit mass and length upside down on a cart: springs k to the wall, w from its tip."""
+    k, w, g = sp.symbols("k w g", real=True)
+    U = g * sp.cos(theta) + k / 2 * x**2 + w / 2 * (x + sp.sin(theta)) ** 2
+    return of_potential([ranged(x, -3.0, 3.0), angle(theta)], (k, w, g), U)
+
+
+def ziegler_column() -> Statics:
+    """Two rods of unit length on torsion springs k; the force P follows the second."""
+    k, P = sp.symbols("k P", real=True)
+    forces = (-k * phi + k * (theta - phi) + P * sp.sin(phi - theta), -k * (theta - phi))
+    return Statics((ranged(phi, -1.5, 1.5), ranged(theta, -1.5, 1.5)), (k, P), forces, False)

@@ -1,0 +1,375 @@
+"""All equilibria of mechanisms against closed forms, the paper's theory, and searches from many starts."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from types import SimpleNamespace
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+import scipy.optimize
+import sympy as sp
+from devices import (
+    angle,
+    cart_pendulum,
+    chain,
+    of_potential,
+    phi,
+    ranged,
+    slider_pendulum,
+    theta,
+    truss,
+    x,
+    y,
+    ziegler_column,
+)
+
+import fastmech as fm
+from fastmech.equilibria.outcome import Outcome
+from fastmech.errors import InputError
+from fastmech.models.equilibria import prove_equilibria, search_rows
+from fastmech.models.mechanism import Linear
+from fastmech.models.stability import assess
+from fastmech.models.statics import Coordinate, Statics
+
+
+def newton(statics: Statics, values: Any, starts: int, seed: int) -> np.ndarray[Any, Any]:
+    """Distinct zeros (count, n) by Newton's method from random starts, all at once."""
+    symbols = [c.symbol for c in statics.coordinates]
+    n = len(symbols)
+    given = dict(zip(statics.parameters, map(sp.Float, values), strict=True))
+    forces = [sp.sympify(f).subs(given) for f in statics.forces]
+    f = sp.lambdify(symbols, forces, "numpy")
+    slopes = sp.lambdify(symbols, [f.diff(s) for f in forces for s in symbols], "numpy")
+    low, high = (np.array([getattr(c, end) for c in statics.coordinates]) for end in ("low", "high"))
+    periodic = np.array([c.periodic for c in statics.coordinates])
+    rng = np.random.default_rng(seed)
+    q = rng.uniform(low, high, (starts, n))
+
+    def evaluated(q: Any) -> tuple[Any, Any]:
+        F = np.stack(np.broadcast_arrays(*f(*q.T), q[:, 0])[:-1], 1)
+        J = np.stack(np.broadcast_arrays(*slopes(*q.T), q[:, 0])[:-1], 1).reshape(-1, n, n)
+        return F, J
+
+    with np.errstate(all="ignore"):
+        for _ in range(60):
+            F, J = evaluated(q)
+            regular = np.isfinite(J).all((1, 2)) & np.isfinite(F).all(1)
+            step = np.zeros_like(q)
+            step[regular] = (np.linalg.pinv(J[regular]) @ F[regular, :, None])[..., 0]
+            q = q - np.clip(step, -0.5, 0.5)
+        F, J = evaluated(q)
+        scale = np.abs(J).max((1, 2)) + 1e-300
+        ends = np.abs(F).max(1) < 1e-12 * scale
+    ends &= np.where(periodic, True, (q >= low) & (q <= high)).all(1)
+    q = q[ends]
+    q = np.where(periodic, np.angle(np.exp(1j * q)), q)
+    distinct: list[Any] = []
+    for place in q:
+        away = [
+            np.where(periodic, np.angle(np.exp(1j * (place - other))), place - other) for other in distinct
+        ]
+        if not any(np.abs(a).max() < 1e-6 for a in away):
+            distinct.append(place)
+    return np.array(distinct).reshape(-1, n)
+
+
+def is_zero(statics: Statics, values: Any, place: Any) -> bool:
+    """Whether Newton's method in fifty digits ends nearby: beside a fold forces merely are small."""
+    symbols = [c.symbol for c in statics.coordinates]
+    given = dict(zip(statics.parameters, map(sp.Float, values), strict=True))
+    forces = [sp.sympify(f).subs(given) for f in statics.forces]
+    f = sp.lambdify(symbols, forces, "mpmath")
+    J = sp.lambdify(symbols, sp.Matrix(forces).jacobian(symbols), "mpmath")
+    with mpmath.workdps(50):
+        q = mpmath.matrix([mpmath.mpf(float(value)) for value in place])
+        for _ in range(80):
+            step = mpmath.lu_solve(J(*q), mpmath.matrix(f(*q)))
+            q -= step
+            if mpmath.norm(step) < 1e-40:
+                return bool(mpmath.norm(q - mpmath.matrix(place.tolist())) < 1e-3)
+    return False
+
+
+def unlisted(statics: Statics, values: Any, starts: int, seed: int = 0) -> list[Any]:
+    """Zeros that the search finds and the proof neither lists nor leaves open."""
+    found = prove_equilibria(statics, values)
+    periodic = np.array([c.periodic for c in statics.coordinates])
+
+    def away(a: Any, b: Any) -> Any:
+        return np.abs(np.where(periodic, np.angle(np.exp(1j * (a - b))), a - b))
+
+    missing = []
+    for place in newton(statics, values, starts, seed):
+        listed = any((away(place, item.position) < 1e-5).all() for item in found)
+        open_still = any(
+            (away(place, 0.5 * (p.low + p.high)) <= 0.5 * (p.high - p.low) + 1e-5).all()
+            for p in found.certificate.places
+        )
+        if not listed and not open_still and is_zero(statics, values, place):
+            missing.append(place)
+    return missing
+
+
+def slider_metric_and_damping(scene: fm.Scene, phi: float, theta: float) -> tuple[Any, Any]:
+    """The masses of three points, and a damper on the third, which slides."""
+    slide = math.sin(phi) * (1 + math.cos(phi) / math.sqrt(4 - math.sin(phi) ** 2))
+    a12 = scene.m2 * math.sin(phi + theta)
+    metric = np.array([[scene.m1 + scene.m2 + scene.m3 * slide**2, a12], [a12, scene.m2]])
+    return scene.l**2 * metric, scene.l**2 * np.diag([scene.beta * slide**2, 0.0])
+
+
+def test_the_paper_s_mechanism_has_the_equilibria_of_its_theory() -> None:
+    """Two hundred random scenes: positions, Morse indices, Hessians and verdicts."""
+    statics = slider_pendulum()
+    rng = np.random.default_rng(18)
+    counts = set()
+    for _ in range(200):
+        scene = fm.Scene(
+            m1=rng.uniform(1, 20), m2=rng.uniform(1, 20), l=rng.uniform(0.5, 2), c1=rng.uniform(0, 500),
+            c2=rng.uniform(0, 500), F0=rng.choice([0.0, 1.0]) * rng.uniform(-200, 200), alpha=0.0,
+        )  # fmt: skip
+        known = fm.find_equilibria(scene)
+        found = prove_equilibria(
+            statics, [getattr(scene, name) for name in ("m1", "m2", "g", "l", "c1", "c2", "F0")]
+        )
+        assert found.certificate.complete
+        assert known.certificate.complete
+        assert len(found) == len(known)
+        assert found.certificate.index_sum == found.certificate.expected_sum == 0
+        counts.add(len(found))
+        for item in known:
+            (mine,) = [
+                other
+                for other in found
+                if np.abs(np.angle(np.exp(1j * (other.position - [item.phi, item.theta])))).max() < 1e-9
+            ]
+            assert mine.morse_index == item.morse_index
+            assert mine.kind == item.kind
+            linear = Linear(*slider_metric_and_damping(scene, item.phi, item.theta), mine.stiffness)
+            assert assess(linear, mine.morse_index).verdict == fm.classify(scene, item).verdict
+            np.testing.assert_allclose(mine.stiffness, item.hessian, atol=1e-8 * np.abs(item.hessian).max())
+    assert counts == {4, 6}
+
+
+@pytest.mark.parametrize(("n", "indices"), [(2, [1, 3, 2]), (3, [1, 4, 5, 2]), (4, [1, 5, 10, 8, 2])])
+def test_chains_of_pendulums(n: int, indices: list[int]) -> None:
+    """Twelve and 26 equilibria, two of the latter beside a fold; counted by Newton from 200,000 starts."""
+    found = prove_equilibria(chain(n))
+    assert found.certificate.complete
+    assert np.bincount([item.morse_index for item in found]).tolist() == indices
+    if n == 4:
+        assert min(np.abs(np.linalg.eigvalsh(item.stiffness)).min() for item in found) == pytest.approx(
+            1.1e-3, rel=0.05
+        )
+
+
+def test_pendulums_that_do_not_know_each_other() -> None:
+    """Zeros at 0, where rounding knows no bound, beside ones at pi, where it does."""
+    m, g, k = sp.symbols("m g k", real=True)
+    U = -2 * m * g * sp.cos(phi) - m * g * sp.cos(theta) - k * sp.cos(phi - theta)
+    found = prove_equilibria(of_potential([angle(phi), angle(theta)], (m, g, k), U), [1.0, 9.81, 0.0])
+    assert found.certificate.complete
+    assert found.certificate.boxes < 200
+    assert found.kind == ("minimum", "saddle", "saddle", "maximum")
+    np.testing.assert_allclose(
+        np.cos(found.position), [[1, 1], [1, -1], [-1, 1], [-1, -1]], rtol=0, atol=1e-15
+    )
+
+
+def test_von_mises_truss() -> None:
+    """On the symmetric path it snaps at P = 2 k L0 (1 - cos^(2/3) a)^(3/2)."""
+    k, a = 100.0, 0.5
+    L0 = 1.0 / math.cos(a)
+    snap = 2.0 * k * L0 * (1.0 - math.cos(a) ** (2.0 / 3.0)) ** 1.5
+    below, above = (prove_equilibria(truss(), [k, L0, snap * part]) for part in (1 - 1e-9, 1 + 1e-9))
+    assert below.certificate.complete
+    assert above.certificate.complete
+    assert (len(below), len(above)) == (3, 1)
+    assert below.certificate.index_sum == above.certificate.index_sum == below.certificate.expected_sum == 1
+    at = prove_equilibria(truss(), [k, L0, snap])
+    assert at.certificate.outcome in (Outcome.AT_FOLD, Outcome.COMPLETE)
+    assert len(at) in (1, 3)
+    unloaded = prove_equilibria(truss(), [k, L0, 0.0])
+    np.testing.assert_allclose(sorted(unloaded.position[:, 1]), [-math.tan(a), 0.0, math.tan(a)], atol=1e-12)
+
+
+def test_where_a_bar_has_no_length_it_is_said_that_forces_are_not_defined() -> None:
+    found = prove_equilibria(truss(2.0), [100.0, 1.2, 5.0])
+    assert found.certificate.outcome is Outcome.UNPROVED
+    for place in found.certificate.places:
+        assert "not defined" in place.reason
+        np.testing.assert_allclose(np.abs(0.5 * (place.low + place.high)), [1.0, 0.0], atol=1e-7)
+    assert not unlisted(truss(2.0), [100.0, 1.2, 5.0], 5000)
+
+
+def test_inverted_pendulum_on_a_cart() -> None:
+    """Springs k and w in series hold it upright where k w / (k + w) > g."""
+    k, g = 50.0, 9.81
+    critical = g * k / (k - g)
+    for part, count in ((1 - 1e-9, 2), (1 - 1e-12, 2), (1 + 1e-12, 4), (1 + 1e-9, 4), (2.0, 4)):
+        found = prove_equilibria(cart_pendulum(), [k, critical * part, g])
+        assert found.certificate.complete
+        assert len(found) == count
+        assert found.certificate.index_sum == found.certificate.expected_sum == 0
+        upright = min(found, key=lambda item: float(np.abs(item.position).max()))
+        assert upright.kind == ("minimum" if part > 1 else "saddle")
+    at = prove_equilibria(cart_pendulum(), [k, critical, g]).certificate
+    assert at.outcome is Outcome.AT_FOLD
+    assert "merge" in at.sentence
+
+
+def test_the_column_under_a_following_force_stays_straight() -> None:
+    """No other equilibrium: k (theta - phi) = 0 leaves only the straight column, which flutters."""
+    found = prove_equilibria(ziegler_column(), [1.0, 2.2])
+    assert found.certificate.complete
+    assert len(found) == 1
+    assert found[0].morse_index is None
+    assert found[0].orientation == 1
+    np.testing.assert_allclose(found[0].stiffness, [[2.0 - 2.2, 2.2 - 1.0], [-1.0, 1.0]], atol=1e-12)
+    mass = np.array([[3.0, 1.0], [1.0, 1.0]])
+    stability = assess(Linear(mass, np.zeros((2, 2)), found[0].stiffness), None)
+    assert stability.instability == "flutter"
+
+
+def test_a_curve_of_equilibria_ends_and_says_so() -> None:
+    found = prove_equilibria(slider_pendulum(), [10.0, 12.0, 10.0, 1.0, 0.0, 220.0, 0.0])
+    assert found.certificate.outcome is Outcome.DEGENERATE
+    assert "curve" in found.certificate.sentence
+    assert not found.certificate.complete
+
+
+def test_the_end_of_a_range_and_the_limit_are_told() -> None:
+    spring = of_potential([ranged(x, 0.0, 1.0)], (), (x - 1) ** 2)
+    found = prove_equilibria(spring)
+    assert "end of a range" in found.certificate.sentence
+    inside = prove_equilibria(of_potential([ranged(x, 0.0, 1.0)], (), (x - sp.Rational(1, 3)) ** 2))
+    assert inside.position.tolist() == [[pytest.approx(1 / 3, abs=1e-15)]]
+    assert inside.certificate.index_sum == inside.certificate.expected_sum == 1
+    outside = prove_equilibria(of_potential([ranged(x, 0.0, 1.0)], (), (x - 2) ** 2))
+    assert (len(outside), outside.certificate.expected_sum) == (0, 0)
+    few = prove_equilibria(chain(3), limit=100)
+    assert few.certificate.outcome is Outcome.UNPROVED
+    assert "limit" in few.certificate.sentence
+
+
+def test_degree_is_not_claimed_where_a_force_changes_sign_on_an_end() -> None:
+    statics = of_potential([ranged(x, -1.0, 1.0), ranged(y, -1.0, 1.0)], (), x * y + x**3 / 9)
+    assert prove_equilibria(statics).certificate.expected_sum is None
+
+
+def random_mechanism(rng: np.random.Generator) -> tuple[Statics, list[float]]:
+    """Angles, lengths or both; harmonics, springs with ratios to 1e6, couplings."""
+    n = int(rng.integers(1, 4))
+    symbols = sp.symbols(f"u:{n}", real=True)
+    stiffness = 10.0 ** rng.uniform(-3, 3, 40)
+    take = iter(stiffness.tolist())
+    coordinates: list[Coordinate] = []
+    U: Any = 0
+    for s in symbols:
+        if rng.random() < 0.6:
+            coordinates.append(angle(s))
+            U += sum(
+                next(take) * rng.normal() * sp.cos(k * s - rng.uniform(0, 6))
+                for k in (1, int(rng.integers(1, 3)))
+            )
+        else:
+            coordinates.append(ranged(s, -2.0, 2.0))
+            U += next(take) * (s - rng.normal()) ** 2 / 2 - next(take) * sp.cos(rng.uniform(1, 4) * s)
+            if rng.random() < 0.3:  # a spring from a point beside the path, of free length 0 or 1
+                U += (
+                    next(take)
+                    * (sp.sqrt((s - rng.normal()) ** 2 + rng.uniform(0.01, 1)) - rng.integers(0, 2)) ** 2
+                )
+    for a, b in pairwise(coordinates):
+        if a.periodic and b.periodic:
+            U += next(take) * sp.cos(a.symbol - b.symbol)
+        else:
+            left, right = (sp.sin(c.symbol) if c.periodic else c.symbol for c in (a, b))
+            U += next(take) * (left + right) ** 2 / 2
+    return of_potential(coordinates, (), U), []
+
+
+def test_nothing_is_found_beside_the_list_in_random_mechanisms() -> None:
+    rng = np.random.default_rng(7)
+    outcomes = []
+    for seed in range(12):
+        statics, values = random_mechanism(rng)
+        assert unlisted(statics, values, 1000, seed) == []
+        certificate = prove_equilibria(statics, values).certificate
+        outcomes.append(certificate.outcome)
+        if certificate.complete and certificate.expected_sum is not None:
+            assert certificate.index_sum == certificate.expected_sum
+    assert outcomes.count(Outcome.COMPLETE) >= 10
+
+
+def test_rows_do_not_depend_on_their_company() -> None:
+    rng = np.random.default_rng(5)
+    rows = np.column_stack(
+        [rng.uniform(1, 20, (20, 2)), np.full((20, 2), [9.8, 1.0]), rng.uniform(0, 300, (20, 3))]
+    )
+    statics = slider_pendulum()
+    together = search_rows(statics, rows)
+    for k in (0, 7, 19):
+        alone = search_rows(statics, rows[k : k + 1])
+        assert (alone.count[0] == together.count[k]).all()
+        count = alone.count[0, 0]
+        assert (alone.zeros[0, :count] == together.zeros[k, :count]).all()
+
+
+def test_public_names_take_a_mechanism() -> None:
+    statics = cart_pendulum()
+    mass = np.array([[2.0, 1.0], [1.0, 1.0]])
+    device = SimpleNamespace(
+        statics=lambda: statics,
+        parameters={"k": 50.0, "w": 100.0, "g": 9.81},
+        linear=lambda q: (mass, np.zeros((2, 2)), np.array([[150.0, 100.0], [100.0, 100.0 - 9.81]])),
+    )
+    found = fm.find_equilibria(device)
+    upright = min(found, key=lambda item: float(np.abs(item.position).max()))
+    assert fm.classify(device, upright).verdict == "stable"
+    assert "theta" in repr(found)
+    with pytest.raises(InputError, match="another mechanism"):
+        fm.classify(device, found[-1])
+    with pytest.raises(InputError, match=r"must be one of fastmech\.find_equilibria"):
+        fm.classify(device, (0.0, 0.0))
+    with pytest.raises(InputError, match="at = 1: is for a Scene"):
+        fm.find_equilibria(device, at=1)
+
+
+@pytest.mark.parametrize(
+    ("force", "line"),
+    [(sp.Abs(x) - 1, "no proved bounds"), (x ** sp.Rational(1, 3), "no proved bounds"), (phi * x, "phi")],
+)
+def test_what_has_no_bounds_is_refused(force: Any, line: str) -> None:
+    with pytest.raises(InputError, match=line):
+        prove_equilibria(Statics((ranged(x, -1.0, 1.0),), (), (force,), False))
+
+
+def test_an_endless_range_is_refused() -> None:
+    with pytest.raises(InputError, match=r"x: -inf \.\. 1 must be a finite range"):
+        prove_equilibria(Statics((ranged(x, -math.inf, 1.0),), (), (x,), False))
+
+
+def test_functions_of_forces_hold_their_values() -> None:
+    """Every function that forces may have, against SciPy's root."""
+    third = sp.Rational(1, 3)
+    waves = [sp.tan(x / 2) - third, sp.atan(3 * x) - third, sp.sqrt(2) * x - sp.pi / 5]
+    powers = [(x + 3) ** sp.Rational(3, 2) - 6, 1 / (x + 3) ** 2 - third / 3, x**3 - 2]
+    for force in [*waves, *powers, sp.exp(x) - 2, sp.log(x + 3) - 1]:
+        found = prove_equilibria(Statics((ranged(x, -1.0, 2.0),), (), (force,), True))
+        expected = scipy.optimize.brentq(sp.lambdify(x, force, "math"), -1.0, 2.0, xtol=1e-15)
+        assert found.certificate.complete
+        assert found.position[:, 0] == pytest.approx([expected], abs=1e-13)
+
+
+def test_only_what_the_jacobian_needs_comes_after_the_forces() -> None:
+    from fastmech.models.balance import source
+
+    lines = source(of_potential([angle(theta)], (), sp.cos(theta))).splitlines()
+    split = next(i for i, line in enumerate(lines) if "return False" in line)
+    assert any("sin(" in line for line in lines[7:split])
+    assert not any("cos(" in line for line in lines[7:split])

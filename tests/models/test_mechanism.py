@@ -1,0 +1,204 @@
+"""Equations of motion of mechanisms against others' derivations of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy
+from oracles import TABLE_1, oracle
+
+import fastmech as fm
+from fastmech.mechanism.hamilton import momenta
+from fastmech.mechanism.lagrange import (
+    angular_accelerations,
+    kinetic_energy,
+    potential_energy,
+    potential_gradient,
+    potential_hessian,
+    unit,
+)
+from fastmech.models.mechanism import Mechanism
+
+pytestmark = pytest.mark.nojit
+
+
+@pytest.fixture(scope="module")
+def states() -> np.ndarray:
+    return np.random.default_rng(0).uniform(-4.0, 4.0, (500, 4))
+
+
+def distance(found: np.ndarray, wanted: np.ndarray) -> float:
+    """Greatest difference of vectors relative to their lengths."""
+    return float(np.max(np.linalg.norm(found - wanted, axis=-1) / np.linalg.norm(wanted, axis=-1)))
+
+
+@pytest.mark.parametrize("t", [0.0, 0.4])
+@pytest.mark.parametrize("changes", [{}, {"m2": 0.3, "c1": 12.0, "F0": -40.0, "alpha": 0.0, "l": 3.0}])
+def test_the_paper_s_mechanism_moves_as_the_scene(
+    states: np.ndarray, t: float, changes: dict[str, float]
+) -> None:
+    mechanism, scene = fm.mechanisms.slider_pendulum().replace(**changes), fm.Scene(**changes)
+    assert mechanism.parameters == scene.model_dump()
+    assert distance(mechanism.accelerations(t, states), angular_accelerations(scene, states, t)) < 1e-13
+
+
+def test_the_paper_s_mechanism_moves_as_40_digits_tell(states: np.ndarray) -> None:
+    mechanism = fm.mechanisms.slider_pendulum().replace(c2=TABLE_1["c2"])
+    found = mechanism.accelerations(0.3, states[:20])
+    for state, accelerations in zip(states[:20], found, strict=True):
+        wanted = np.array(oracle().accelerations(TABLE_1, state.tolist(), 0.3), dtype=float)
+        assert distance(accelerations, wanted) < 1e-13
+
+
+def test_energies_and_momenta_are_the_scene_s(states: np.ndarray) -> None:
+    mechanism, scene = fm.mechanisms.slider_pendulum(), fm.Scene()
+    energies = mechanism.energies(states)
+    np.testing.assert_allclose(energies.kinetic, kinetic_energy(scene, states), rtol=1e-13)
+    ours = energies.potential - energies.potential[0]
+    theirs = potential_energy(scene, states[:, :2])
+    np.testing.assert_allclose(ours, theirs - theirs[0], atol=1e-10 * unit(scene) * 100.0)
+    np.testing.assert_allclose(mechanism.to_momenta(states)[:, 2:], momenta(scene, states), rtol=1e-12)
+    np.testing.assert_allclose(mechanism.to_rates(mechanism.to_momenta(states)), states, rtol=1e-12)
+
+
+def lagrange(T, U, q, forces):  # type: ignore[no-untyped-def]
+    """Accelerations by Euler's and Lagrange's equations, differentiated and solved as they stand."""
+    t = sympy.Symbol("time")
+    moving = [sympy.Function(str(x))(t) for x in q]
+    names = dict(zip(q, moving, strict=True))
+    names |= {sympy.Symbol(f"{x}_dot", real=True): f.diff(t) for x, f in zip(q, moving, strict=True)}
+    L = (T - U).subs(names)
+    left = [L.diff(f.diff(t)).diff(t) - L.diff(f) for f in moving]
+    a = sympy.symbols(f"a:{len(q)}")
+    left = [e.subs({f.diff(t, 2): x for f, x in zip(moving, a, strict=True)}) for e in left]
+    back = {f.diff(t): sympy.Symbol(f"{x}_dot", real=True) for x, f in zip(q, moving, strict=True)}
+    left = [
+        e.subs(back).subs(dict(zip(moving, q, strict=True))) - f for e, f in zip(left, forces, strict=True)
+    ]
+    M, r = sympy.linear_eq_to_matrix(left, a)
+    rates = [sympy.Symbol(f"{x}_dot", real=True) for x in q]
+    return sympy.lambdify([*q, *rates], [M, r], "numpy")
+
+
+@pytest.mark.parametrize("constant", [0, 1, 2, 3])
+def test_metrics_of_every_shape_are_solved(constant: int) -> None:
+    """One to four coordinates, with none to all of the diagonal constant, full and sparse."""
+    q = [fm.lengths(name) for name in ("a", "b", "c", "d")]
+    rng = np.random.default_rng(constant)
+    for n in (1, 2, 3, 4):
+        some, v = q[:n], [x.dot for x in q[:n]]
+        B = [[int(rng.integers(-2, 3)) for _ in range(n)] for _ in range(n)]
+        each = [sum(b * x for b, x in zip(row, some, strict=True)) for row in B]
+        T = sum(
+            (2 + (sympy.sin(e) if i >= constant else 0)) * u**2
+            for i, (e, u) in enumerate(zip(each, v, strict=True))
+        )
+        T += sum(sympy.cos(e) * v[i] * v[i - 1] / 3 for i, e in enumerate(each) if i)
+        U = sum(sympy.exp(x / 3) + x**2 * some[0] / 5 for x in some)
+        mechanism = Mechanism(some, kinetic=T, potential=U, dissipation=v[0] ** 2)
+        plain = [sympy.Symbol(x.name, real=True) for x in some]
+        swapped = dict(zip(some, plain, strict=True))
+        solve = lagrange(T.subs(swapped), U.subs(swapped), plain, [-2 * v[0], *[0] * (n - 1)])
+        for y in rng.uniform(-2.0, 2.0, (20, 2 * n)):
+            M, r = solve(*y)
+            np.testing.assert_allclose(
+                mechanism.accelerations(0.0, y), np.linalg.solve(M, r).ravel(), rtol=1e-10, atol=1e-11
+            )
+
+
+def test_both_ways_of_writing_give_the_same() -> None:
+    x, angle = fm.lengths("x"), fm.angles("angle")
+    values = {"M": 2.0, "m": 0.7, "J": 0.3, "l": 1.3, "k": 5.0, "c": 0.4, "L0": 0.6, "g": 9.0}
+    M, m, J, l, k, c, L0, g = sympy.symbols(list(values))
+    tip = (x + l * sympy.sin(angle), -l * sympy.cos(angle))
+    built = Mechanism(
+        (x, angle), values, points={"cart": (x, 0), "tip": tip, "wall": (-3, 1)},
+        masses=[("cart", M), fm.Body("tip", m, J, 2 * angle)],
+        springs=[fm.Spring("wall", "tip", k, L0)], dampers=[fm.Damper("wall", "tip", c)], gravity=g,
+    )  # fmt: skip
+    away = sympy.sqrt((tip[0] + 3) ** 2 + (tip[1] - 1) ** 2)
+    speed = away.diff(x) * x.dot + away.diff(angle) * angle.dot
+    v = [p.diff(x) * x.dot + p.diff(angle) * angle.dot for p in tip]
+    written = Mechanism(
+        (x, angle), values,
+        kinetic=M * x.dot**2 / 2 + m * (v[0] ** 2 + v[1] ** 2) / 2 + J * (2 * angle.dot) ** 2 / 2,
+        potential=m * g * tip[1] + k * (away - L0) ** 2 / 2,
+        dissipation=c * speed**2 / 2,
+    )  # fmt: skip
+    y = np.random.default_rng(3).uniform(-2.0, 2.0, (200, 4))
+    assert distance(built.accelerations(0.0, y), written.accelerations(0.0, y)) < 1e-11
+    np.testing.assert_allclose(built.energies(y).kinetic, written.energies(y).kinetic, rtol=1e-12)
+    np.testing.assert_allclose(built.powers(0.0, y).lost, written.powers(0.0, y).lost, rtol=1e-10, atol=1e-12)
+
+
+def test_energy_changes_by_what_is_brought_and_lost() -> None:
+    """d(T + U)/dt along the motion, by differences, is the power of loads less that of dampers."""
+    mechanism = fm.mechanisms.slider_pendulum()
+    y = np.random.default_rng(5).uniform(-2.0, 2.0, (100, 4))
+    rates = np.concatenate([y[:, 2:], mechanism.accelerations(0.2, y)], axis=-1)
+    h = 1e-5
+    energy = [sum(mechanism.energies(y + s * h * rates)) for s in (-1.0, 1.0)]
+    power = mechanism.powers(0.2, y)
+    np.testing.assert_allclose((energy[1] - energy[0]) / (2.0 * h), power.brought - power.lost, atol=1e-4)
+
+
+def test_the_linear_motion_is_the_slope_of_the_forces() -> None:
+    mechanism = fm.mechanisms.ziegler_column().replace(b=0.3, P=1.7)
+    q, h = np.array([0.2, -0.4]), 1e-6
+    M, C, K = mechanism.linear(q)
+
+    def forces(position: np.ndarray, rates: np.ndarray) -> np.ndarray:
+        return mechanism.metric(position) @ mechanism.accelerations(0.0, np.concatenate([position, rates]))
+
+    still = np.zeros(2)
+    for k, step in enumerate(h * np.eye(2)):
+        slope = (forces(q + step, still) - forces(q - step, still)) / (2.0 * h)
+        np.testing.assert_allclose(slope, -K[:, k], atol=1e-8)
+        slope = (forces(q, step) - forces(q, -step)) / (2.0 * h)
+        np.testing.assert_allclose(slope, -C[:, k], atol=1e-8)
+    np.testing.assert_allclose(M, mechanism.metric(q))
+
+
+def test_statics_are_the_forces_at_rest_with_loads_at_their_means() -> None:
+    x, y = fm.lengths("x y")
+    k, F = sympy.symbols("k F")
+    mechanism = Mechanism(
+        (x, y), {"k": 2.0, "F": 3.0}, points={"M": (x, y)}, masses={"M": 1.0},
+        springs=[fm.Spring("M", (0, 0), k)],
+        forces=[
+            fm.Force("M", fm.loads.Harmonic(F, 4.0, mean=5.0), (1, 0)),
+            fm.Force("M", fm.loads.Decaying(F, 1.0), (1, 0)),
+            fm.Force("M", fm.loads.Ramp(F, 0.0, 1.0), (0, -1)),
+        ],
+    )  # fmt: skip
+    found = mechanism.statics()
+    assert [c.symbol.name for c in found.coordinates] == ["x", "y"]
+    assert found.conservative
+    named = {s.name: s for e in found.forces for s in e.free_symbols}
+    assert sympy.simplify(found.forces[0] - (5.0 - named["k"] * named["x"])) == 0
+    assert sympy.simplify(found.forces[1] - (-named["F"] - named["k"] * named["y"])) == 0
+    assert not fm.mechanisms.ziegler_column().statics().conservative
+
+
+@pytest.mark.parametrize(("alpha", "acting"), [(0.7, 0.0), (0.0, 100.0)])
+def test_a_force_that_decays_is_gone_at_rest_and_one_that_does_not_stays(alpha: float, acting: float) -> None:
+    mechanism, scene = fm.mechanisms.slider_pendulum().replace(alpha=alpha), fm.Scene()
+    q = np.array([0.4, -0.7])
+    found = mechanism.statics()
+    at = [c.symbol for c in found.coordinates] + list(found.parameters)
+    assert mechanism.loads[0].facts().mean == acting
+    assert mechanism.loads[0].facts().bound == 100.0
+    values = dict(zip(at, [*q, *mechanism.parameters.values()], strict=True))
+    forces = [float(force.subs(values)) for force in found.forces]
+    np.testing.assert_allclose(forces, -potential_gradient(scene, q, acting), rtol=1e-12)
+    np.testing.assert_allclose(mechanism.linear(q).stiffness, potential_hessian(scene, q, acting), rtol=1e-12)
+
+
+def test_a_mechanism_prints_itself_in_a_line_and_takes_other_values() -> None:
+    mechanism = fm.mechanisms.double_pendulum()
+    assert "upper, lower" in repr(mechanism)
+    assert mechanism.replace(m1=5.0).parameters["m1"] == 5.0
+    assert mechanism.parameters["m1"] == 1.0
+    assert mechanism.replace(m1=5.0).metric([0.0, 0.0])[0, 0] == 6.0
+    with pytest.raises(fm.InputError, match=r"parameters\.m9: unknown name"):
+        mechanism.replace(m9=1.0)

@@ -1,0 +1,115 @@
+"""Each mistake is told in one line that names what is wrong."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy
+
+import fastmech as fm
+
+pytestmark = pytest.mark.nojit
+
+PHI, X = fm.angles("phi"), fm.lengths("x", -2.0, 2.0)
+M, K, L = sympy.symbols("m k l")
+RIGHT: dict[str, Any] = {
+    "coordinates": (PHI, X),
+    "parameters": {"m": 2.0, "k": 3.0, "l": 1.5},
+    "points": {"P": (X + L * sympy.cos(PHI), L * sympy.sin(PHI)), "Q": (X, 0)},
+    "masses": {"P": M, "Q": M},
+    "springs": [fm.Spring((0, 0), "P", K)],
+}
+
+WRONG: list[tuple[dict[str, Any], str]] = [
+    ({"coordinates": ()}, "coordinates = "),
+    ({"coordinates": (sympy.Symbol("phi"),)}, "must be one to four symbols"),
+    ({"coordinates": fm.lengths("a b c d e")}, "one to four"),
+    ({"coordinates": (PHI, PHI)}, "phi: names a coordinate, a rate or a parameter twice"),
+    ({"coordinates": (PHI, fm.lengths("phi_dot"))}, "phi_dot: names"),
+    ({"parameters": {"m": 2.0, "phi": 3.0}}, "phi: names"),
+    ({"parameters": {"m": 2.0, "l": 1.0}}, r"springs\[0\].stiffness: has the symbol k"),
+    ({"parameters": {"m": math.nan, "k": 1.0}}, "parameters.m = nan: must be a finite number"),
+    ({"parameters": {"m": True, "k": 1.0}}, "parameters.m = True"),
+    ({"parameters": {"m": (1.0, "kg"), "k": (1.0, "lbf"), "l": (1.0, "m")}}, "unit = 'lbf'"),
+    ({"parameters": {"m": (1.0, "kg"), "k": (1.0, "kg"), "l": (1.0, "m")}}, "potential: has another unit"),
+    ({"parameters": {"m": (1.0, "m"), "k": (1.0, "N/m"), "l": (1.0, "m")}}, "kinetic: has another unit"),
+    ({"parameters": {"m": 1.0, "k": 1.0, "sin": 1.0}}, "'sin' must be a Python name"),
+    ({"parameters": {"m": 1.0, "k": 1.0, "_a": 1.0}}, "'_a' must be a Python name"),
+    ({"parameters": {"m": 1.0, M: 1.0, "k": 1.0}}, "parameters.m: is given twice"),
+    ({"points": {"P": (X,)}}, "points.P = "),
+    ({"points": {"P": (X, sympy.Symbol("u"))}}, "points.P: has the symbol u"),
+    ({"points": {"P": (X, PHI.dot), "Q": (X, 0)}}, "points.P: has the symbol phi_dot"),
+    ({"points": {"P": (X, "phi"), "Q": (X, 0)}}, "points.P = 'phi': must be a number or a SymPy expression"),
+    ({"masses": {"R": M}}, r"masses\[0\] = 'R': no such point; points are P, Q"),
+    ({"masses": 3.0}, "masses = 3.0: must be a list"),
+    ({"masses": {"Q": M}}, "kinetic: is not positive definite: phi moves no mass"),
+    ({"masses": {"P": -M, "Q": 3 * M}}, "kinetic: is not positive definite"),
+    ({"masses": {"P": M}}, "kinetic: is not positive definite, as at phi = -?1.57"),
+    ({"kinetic": PHI.dot**3}, "kinetic: must be quadratic in the rates"),
+    ({"kinetic": PHI.dot}, "kinetic: must be quadratic in the rates"),
+    ({"kinetic": M}, "kinetic: must be quadratic in the rates"),
+    ({"potential": K * PHI**2}, "phi: the mechanism is not the same after a full turn"),
+    ({"springs": [fm.TorsionSpring(PHI, K)]}, "phi: the mechanism is not the same after a full turn"),
+    ({"potential": PHI.dot}, "potential: has the symbol phi_dot"),
+    ({"potential": sympy.gamma(X)}, "gamma: is not known here"),
+    ({"potential": sympy.I * X}, "must be a finite real expression"),
+    ({"springs": [fm.Spring("P", (0, 0, 0), K)]}, r"springs\[0\].b: has 3 components"),
+    ({"springs": [("P", "Q", K)]}, r"springs\[0\] = .*must be a Spring or TorsionSpring"),
+    ({"springs": fm.Spring("P", "Q", K)}, "springs = .*: must be a list"),
+    ({"dampers": [fm.Damper((0, 0), "P", -K)]}, "dissipation: feeds energy in"),
+    ({"dissipation": -(PHI.dot**2)}, "dissipation: feeds energy in"),
+    ({"forces": [fm.Force("P", 3.0, (1, 1))]}, r"forces\[0\].direction = .*: must be a unit vector"),
+    ({"forces": [fm.Force("P", K * X, (1, 0))]}, r"forces\[0\].load.value: depends on a coordinate"),
+    ({"forces": [fm.Force("P", sympy.Symbol("z"), (1, 0))]}, r"forces\[0\].load.value: has the symbol z"),
+    ({"generalized_forces": {"z": 1.0}}, "generalized_forces: 'z' is no coordinate"),
+    ({"generalized_forces": 3.0}, "generalized_forces = 3.0"),
+    ({"gravity": (0, 0, -1)}, "gravity: has 3 components, must have the points' 2"),
+    ({"name": "two words"}, "name: 'two words' must be a Python name"),
+]  # fmt: skip
+
+
+def test_the_right_one_is_taken() -> None:
+    fm.Mechanism(**RIGHT)
+
+
+@pytest.mark.parametrize(("change", "told"), WRONG)
+def test_each_mistake_gets_a_line(change: dict[str, Any], told: str) -> None:
+    with pytest.raises(fm.InputError, match=told) as caught:
+        fm.Mechanism(**RIGHT | change)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("two-words",), "names = 'two-words': must be different Python names"),
+        (("a a",), "names = 'a a'"),
+        (("",), "names = ''"),
+        ((3,), "names = 3"),
+        (("a", 1.0, 1.0), r"low, high = \(1.0, 1.0\): low must be less"),
+        (("a", "b", 1.0), "low, high = .*must be numbers"),
+    ],
+)
+def test_wrong_coordinates(arguments: tuple[Any, ...], told: str) -> None:
+    for make in (fm.angles, fm.lengths):
+        with pytest.raises(fm.InputError, match=told):
+            make(*arguments)
+
+
+def test_an_angle_with_a_range_takes_a_torsion_spring() -> None:
+    bounded = fm.angles("phi", -2.0, 2.0)
+    found = fm.Mechanism(
+        bounded, {"k": 2.0}, kinetic=bounded.dot**2 / 2, springs=[fm.TorsionSpring(bounded, K)]
+    )
+    np.testing.assert_allclose(found.accelerations(0.0, [0.5, 0.0]), [-1.0])
+    assert found.coordinates[0].high == 2.0
+    assert not found.coordinates[0].periodic
+    assert fm.Mechanism(**RIGHT).coordinates[0].periodic
+
+
+def test_states_of_another_shape_are_refused() -> None:
+    with pytest.raises(fm.InputError, match=r"y: has shape \(3,\), must be \(\.\.\., 4\)"):
+        fm.Mechanism(**RIGHT).energies([1.0, 2.0, 3.0])
