@@ -16,7 +16,15 @@ from numpy.typing import NDArray
 from fastmech.basins.label import How, label_starts, require_damper
 from fastmech.basins.ladder import SUBSTEPS
 from fastmech.basins.measures.fractions import Shares, basin_stability
-from fastmech.basins.steps import MOST_OCTAVES, PHASE, TURNING, coarse_steps, highest_frequency, method_for
+from fastmech.basins.steps import (
+    MOST_OCTAVES,
+    PHASE,
+    TURNING,
+    coarse_steps,
+    highest_frequency,
+    method_for,
+    shortest_step,
+)
 from fastmech.disturbance.motion import damped_times, equilibria_to_disturb
 from fastmech.disturbance.observe import EXCURSION_PHI, EXCURSION_THETA, LAST_OUTSIDE, observe_departure
 from fastmech.disturbance.size import Size, confining_energy, excess_energy, size_at, uniform_ball
@@ -49,9 +57,6 @@ MOST_RADIUS = TURNING * 2.0**MOST_OCTAVES
 #: Share of a start's coarse step, at which labels begin, that measuring takes by default; an implicit method,
 #: whose error constant is larger, takes half of it.
 MEASURING = 0.6
-
-#: How often the step of a motion is halved at which Newton's iteration does not converge.
-HALVINGS = 6
 
 
 @dataclass(frozen=True, repr=False)
@@ -151,7 +156,8 @@ def disturb(
         seed: seed of the starts.
         t_end: end of the run [s].
         dt: longest step [s]; by default each start's own, from the scene's frequencies, its damping and the
-            start's energy, see :func:`measuring_steps`.
+            start's energy, see :func:`measuring_steps`. Motions that fail with it are followed again with a
+            16th of it, and so on, down to the shortest step of the fastest starts.
         method: name of the method; by default ``dop853``, or ``radau5`` (implicit) where the damper would
             set the explicit method's steps.
         return_radius: radius of the ball of return [rad].
@@ -193,9 +199,10 @@ def disturb(
     times = np.array([0.0, *at_first, t_end])
     departure = np.abs(starts - center)
     final, last, failed = np.empty_like(starts), np.empty_like(starts), np.empty(len(starts))
-    reached, records = np.empty(len(starts), dtype=np.int8), np.empty((3, len(starts)))
-    again, halvings = np.arange(len(starts)), 0
-    while again.size:  # with shorter steps where an implicit method finds none
+    status, records = np.empty(len(starts), dtype=np.int8), np.empty((3, len(starts)))
+    taken, again = np.empty(len(starts)), np.arange(len(starts))
+    shortest, first = np.inf if dt is not None else shortest_step(c), True
+    while again.size:
         run = run_ensemble(
             right_hand_side(c),
             c,
@@ -205,20 +212,20 @@ def disturb(
             with_jacobian(find_method(method), lagrange_jacobian, lagrange_inverse),
             _observation(center, size, return_radius),
             threads=threads,
-            progress=progress if halvings == 0 else None,
+            progress=progress if first else None,
         )
         final[again], last[again], failed[again] = run.states[-1], run.last, run.failed
-        reached[again], records[:, again] = run.status, run.records
-        again = again[(run.status == Status.NOT_CONVERGED) & (dt is None) & (halvings < HALVINGS)]
-        longest[again] *= 0.5
-        halvings += 1
-    steps, which = np.unique(longest, return_inverse=True)
-    number = np.array([output_steps(times[-2:], float(step))[0] for step in steps])
-    taken = ((t_end - times[-2]) / number)[which]
-    broken, status = breaks_energy_bounds(c, starts, final, threads), reached.copy()
-    status[broken & (reached == Status.OK)] = Status.STEP_TOO_LARGE
-    driven = np.array([drives_rest(scene, t_end / float(k), float(k), method) for k in number])[which]
-    status[driven & np.isin(status, (Status.OK, Status.NOT_FINITE))] = Status.STEP_TOO_LARGE
+        records[:, again] = run.records
+        steps, which = np.unique(longest[again], return_inverse=True)
+        number = np.array([output_steps(times[-2:], float(step))[0] for step in steps])
+        taken[again] = ((t_end - times[-2]) / number)[which]
+        reached, broken = run.status, breaks_energy_bounds(c, starts[again], run.states[-1], threads)
+        reached[broken & (reached == Status.OK)] = Status.STEP_TOO_LARGE
+        driven = np.array([drives_rest(scene, t_end / float(k), float(k), method) for k in number])[which]
+        reached[driven & np.isin(reached, (Status.OK, Status.NOT_FINITE))] = Status.STEP_TOO_LARGE
+        status[again] = reached
+        again, first = again[(reached != Status.OK) & (longest[again] > shortest)], False
+        longest[again] *= 0.0625
 
     outcome = np.where(ends.status == Status.CAPTURED, Status.ELSEWHERE, ends.status).astype(np.int8)
     outcome[(ends.well == index) & ~ends.turns.any(axis=1)] = Status.RETURNED

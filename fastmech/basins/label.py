@@ -31,6 +31,7 @@ from fastmech.basins.steps import (
     gone_at_once,
     highest_frequency,
     method_for,
+    shortest_step,
     step_of_fading,
 )
 from fastmech.capture.barriers import BarrierTree
@@ -42,7 +43,7 @@ from fastmech.ensembles.energy_bounds import breaks_energy_bounds
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.run import Progress
-from fastmech.ensembles.status import LABELS, Status, counts
+from fastmech.ensembles.status import FAILURES, LABELS, Status, counts
 from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError, StepWarning
 from fastmech.integrators.method import Method
@@ -138,7 +139,8 @@ def labels_of(
             more than four give a warning, if they may be degrees.
         t_end: end of the run [s]; what is not captured by then is undecided.
         dt: coarsest step [s]: each path is computed with it and with two thirds of it, and with less where
-            these differ. By default it follows from the scene's frequencies and the start's energy.
+            these differ. By default it follows from the scene's frequencies and the start's energy; paths
+            that fail with it are computed again with a 16th of it, and so on.
         method: name of the integration method; by default ``dop853``, or ``radau5`` (implicit) where the
             damper stops motion so quickly that explicit steps would have to be far shorter than the rest of
             the motion asks for.
@@ -194,14 +196,19 @@ def label_starts(
     found = Paths.empty(len(begin))
     status = np.where(finite, Status.UNDECIDED, Status.START_NOT_FINITE).astype(np.int8)
     settle = None if settle_radius is None else np.full(len(begin), np.nan)
+    shortest = np.inf if dt is not None else shortest_step(reduce(certificate.scene))
     for some in pieces_of(len(begin)):
-        for step in np.unique(coarse[some[finite[some]]]):
-            members = some[finite[some] & (coarse[some] == step)]
-            followed = Ladder(certificate, t_end, float(step), formula, threads, prelude, ladder)
-            followed.label(begin, members, found, status)
-            if settle is not None and settle_radius is not None:
-                settle[members] = followed.settle_times(begin, members, found, status, settle_radius)
-            found.steps += followed.steps
+        again = some[finite[some]]
+        while again.size:
+            for step in np.unique(coarse[again]):
+                members = again[coarse[again] == step]
+                followed = Ladder(certificate, t_end, float(step), formula, threads, prelude, ladder)
+                followed.label(begin, members, found, status)
+                if settle is not None and settle_radius is not None:
+                    settle[members] = followed.settle_times(begin, members, found, status, settle_radius)
+                found.steps += followed.steps
+            again = again[np.isin(status[again], FAILURES) & (coarse[again] > shortest)]
+            coarse[again] *= 0.0625
         if progress is not None:
             progress(some.size)
     captured = status == Status.CAPTURED

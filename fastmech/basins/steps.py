@@ -99,7 +99,11 @@ def fastest_followed(c: Coefficients) -> float:
 
 
 def shortest_step(c: Coefficients) -> float:
-    """Shortest of the coarse steps by default [s]."""
+    """Shortest of the coarse steps by default [s].
+
+    A motion that fails with a longer one is followed again with a 16th of its step, and so on: where the
+    metric is nearly singular (a light M1, crank and rod in line), some motions need it for an instant.
+    """
     return 0.5**MOST_OCTAVES * PHASE / highest_frequency(c)
 
 

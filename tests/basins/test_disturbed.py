@@ -211,6 +211,29 @@ def test_default_steps_are_the_scene_s() -> None:
     assert lost.share_returned_at_most >= failing.mean()
 
 
+def test_a_light_crank_pin_loses_no_motion() -> None:
+    """With crank and rod in line rates rise tenfold for an instant; by SciPy's DOP853 at 1e-10.
+
+    A step of the user's own stays as it is.
+    """
+    masses = {"m1": 0.01565, "m2": 4.247, "m3": 33.69, "l": 0.3433}
+    scene = Scene(**masses, c1=314.2, c2=10.69, beta=2.306, F0=26.6, alpha=0.0)
+    first = find_equilibria(scene)[0]
+    run = disturb(scene, first, 128, radius=1.2, t_end=1.0)
+    again = np.flatnonzero(run.dt < 0.5 * run.dt.max())
+    assert run.failures == ""
+    assert again.size > 4
+    for lane in again[:5]:
+        path = scipy_motion(scene, run.starts[lane], 1.0, 1e-10)
+        departures = path.sol(np.linspace(0.0, 1.0, 10_001))[:2].T - center(first)[:2]
+        np.testing.assert_allclose(run.excursion[lane], np.abs(departures).max(axis=0), rtol=0, atol=5e-3)
+    own = disturb(scene, first, 128, radius=1.2, t_end=1.0, dt=2e-3)
+    assert np.isin(own.outcome[again], FAILURES).sum() > 4
+    assert (own.dt == own.dt[0]).all()
+    ends = labels_of(scene, run.starts, 30.0)
+    assert ends.counts["step_too_large"] == ends.counts["not_finite"] == 0
+
+
 def test_a_step_of_a_start_is_no_matter_of_its_companions() -> None:
     scene = Scene(c1=2000.0, c2=8000.0, beta=20.0, alpha=0.0)
     first = find_equilibria(scene)[0]

@@ -243,6 +243,36 @@ def test_a_search_that_finds_nothing_tells_how_far_it_went() -> None:
     )
 
 
+def test_first_steps_too_long_for_a_damper_are_no_end_of_the_search() -> None:
+    """SciPy's Radau shows that a blow 1 % above the one found leaves, and one 1 % below does not."""
+    masses = {"m1": 12.672938325877112, "m2": 6.681754059270018}
+    springs = {"F0": -12.199235134378881, "c1": 99.95186532796019, "c2": 142.61250706229998}
+    scene = fm.Scene(**masses, **springs, beta=3613.0, alpha=0.0)
+    told = limit(scene, 0, "M2", 0.0)
+    assert told.found.impulse < 80.41  # the least of 800 blows between the bound and the largest
+    rest = struck(scene, 0, "M2", np.zeros(1), np.zeros(1))[0]
+    starts = struck(scene, 0, "M2", told.found.impulse * np.array([1.01, 0.99]), np.zeros(2))
+    rates = motion_rates(scene.model_dump())
+    turns = []
+    for start in starts:
+        run = solve_ivp(rates, (0.0, 20.0), start, method="Radau", rtol=1e-6, atol=1e-6)
+        turns.append(np.rint((run.y[:2, -1] - rest[:2]) / TURN).tolist())
+    assert turns == [[0.0, -1.0], [0.0, 0.0]]
+
+
+def test_where_no_blow_leaves_none_is_left_undecided_that_finer_steps_decide() -> None:
+    """A damper holds them all; SciPy's Radau agrees about three."""
+    springs = {"F0": 3.2666653399599, "c1": 320.96966646469696, "c2": 63.66752572559305}
+    scene = fm.Scene(m1=14.3, m2=16.17, **springs, beta=2876.6, alpha=0.0)
+    told = limit(scene, 0, "M3", 0.0)
+    assert np.isnan([told.found.impulse, told.undecided_from]).all()
+    rest = struck(scene, 0, "M3", np.zeros(1), np.zeros(1))[0]
+    rates = motion_rates(scene.model_dump())
+    for start in struck(scene, 0, "M3", told.tried_to * np.array([0.62, 0.8, 0.95]), np.zeros(3)):
+        run = solve_ivp(rates, (0.0, 20.0), start, method="Radau", rtol=1e-6, atol=1e-6)
+        np.testing.assert_array_equal(np.rint((run.y[:2, -1] - rest[:2]) / TURN), [0.0, 0.0])
+
+
 def test_a_direction_in_degrees_is_refused() -> None:
     with pytest.raises(fm.InputError, match=r"direction = 90\.0: must lie within"):
         fm.shock_limit(FREE, fm.find_equilibria(FREE)[0], "M2", 90.0)

@@ -115,8 +115,14 @@ def fractal_boundary_test(
 
     - False: boxes up to 4 steps see smooth boundaries (powers of 0.95 and 0.9 at least).
     - True: all powers are less than 0.95 by more than their errors and alike within a factor of 2.5,
-      entropies within one of 1.25, and at most half of the finest boxes hold a boundary.
+      entropies within one of 1.25, at most half of the finest boxes hold a boundary, and the dimension's
+      error bar leaves a smooth boundary out.
     - None: neither; a finer map, or one of a smaller window, can tell.
+
+    Stripes whose spacing shrinks geometrically, as beside a saddle, have the share e ln(1/e): their powers
+    rise towards 1 as boxes shrink, so slowly that small maps (below some 500 points an axis) may show the
+    same powers as a fractal. Stripes of sin(1/x) have the dimension 1.5 though each is smooth, and come out
+    True.
 
     The errors are found by leaving out each of 5 parts of the map along every axis in turn, so that balls
     that overlap do not feign certainty.
@@ -147,8 +153,6 @@ def fractal_boundary_test(
     entropy, error, number = (np.array(column) for column in zip(*found, strict=True))
     boxes = boundary_dimension(array)
     fractal, reason = _judge(boxes, entropy)
-    if fractal and boxes.thin:
-        fractal, reason = None, boxes.thin
     smooth_value = np.array([smooth_boundary_entropy(array.ndim, float(radius)) for radius in sizes])
     return FractalTest(fractal, reason, sizes, entropy, error, smooth_value, number, boxes)
 
@@ -195,7 +199,9 @@ def _judge(boxes: BoundaryDimension, entropy: Floats) -> tuple[bool | None, str]
     steady = power.min() >= 0.4 * power.max() and entropy.max() <= 1.25 * entropy.min()
     sizes = f"{powers}, the entropy over balls is {entropy.min():.2f} to {entropy.max():.2f}"
     if entropy.size > 1 and steady and (power + error < 0.95).all():
-        return True, f"the same at all scales: {sizes}"
+        if boxes.smooth is False:
+            return True, f"the same at all scales: {sizes}"
+        return None, boxes.thin or f"not settled at these scales, powers drift towards 1: {sizes}"
     return None, f"neither smooth at the finest scales nor the same at all, a finer map can tell: {sizes}"
 
 

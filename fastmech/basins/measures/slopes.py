@@ -21,6 +21,12 @@ from fastmech.basins.measures.labels import Floats, Integers
 #: Half width above which an error bar round 1 does not tell a smooth boundary from a fractal one.
 TELLING = 0.15
 
+#: Standard errors by which the coarser half of the scales must rise less steeply to be thought bent.
+BENT = 2.0
+
+#: Standard errors beyond the finest scales' exponent that the error bar reaches.
+BEYOND = 1.5
+
 
 @dataclass(frozen=True)
 class PowerLaw:
@@ -30,6 +36,7 @@ class PowerLaw:
     error: float  #: half width of the exponent's 95 % interval; inf: fewer than five scales
     local_slopes: Floats  #: between neighbouring scales (scales - 1,), NaN where f = 0
     local_errors: Floats  #: half widths of their 95 % intervals by counting alone (scales - 1,)
+    fitted: NDArray[np.bool_]  #: scales that take part (scales,)
 
 
 def is_smooth(exponent: float, error: float) -> bool | None:
@@ -50,6 +57,11 @@ def fit_counts(
     every scale's variance (DerSimonian and Laird, Control. Clin. Trials 7 (1986) 177), so that coarse scales,
     where most is counted, do not outweigh the others where the law is not exact. To that error comes the
     largest difference between exponents of parts that span half of the scales or more, less its own noise.
+
+    The exponent is a limit at fine scales. Where basins taper, the law bends towards it so slowly that coarse
+    scales hide it: the coarsest is left out as long as the coarser half rises less steeply than the finer
+    one by two standard errors (five scales stay); and the bar reaches to the finest part's exponent and one
+    and a half of its standard errors beyond.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         y = np.log(hits / trials)
@@ -60,14 +72,23 @@ def fit_counts(
         local_errors = norm.ppf(0.975) * np.sqrt(variance[1:] + variance[:-1]) / steps
     local[~np.isfinite(local)] = np.nan
     local_errors[~np.isfinite(local_errors)] = np.nan
-    known = (hits > 0) & fitted
-    if np.count_nonzero(known) < 2:
-        return PowerLaw(np.nan, np.nan, local, local_errors)
-    x, y, variance = np.log(scales[known]), y[known], variance[known]
+    fitted = fitted & (hits > 0)
+    used = np.flatnonzero(fitted)
+    while len(used) > 5:
+        half = (len(used) + 1) // 2
+        (fine, u), (coarse, v) = (
+            line(np.log(scales[part]), y[part], 1.0 / variance[part]) for part in (used[:half], used[-half:])
+        )
+        if fine - coarse <= BENT * np.sqrt(u + v):
+            break
+        fitted[used[-1]], used = False, used[:-1]
+    if len(used) < 2:
+        return PowerLaw(np.nan, np.nan, local, local_errors, fitted)
+    x, y, variance = np.log(scales[used]), y[used], variance[used]
     weight, free = 1.0 / variance, len(x) - 2
     exponent, of_counting = line(x, y, weight)
     if len(x) < 5:  # two parts of three can agree by chance
-        return PowerLaw(float(exponent), np.inf, local, local_errors)
+        return PowerLaw(float(exponent), np.inf, local, local_errors, fitted)
     design = np.stack([np.ones_like(x), x], axis=1)
     hat = np.linalg.inv(design.T @ (weight[:, None] * design)) @ (design.T @ (weight[:, None] ** 2 * design))
     rest = y - np.average(y, weights=weight) - exponent * (x - np.average(x, weights=weight))
@@ -78,8 +99,10 @@ def fit_counts(
     halves = [slice(i, j + 1) for i, j in ends if j > i + 1 and x[j] - x[i] >= 0.5 * (x[-1] - x[0]) - 1e-9]
     fits = [line(x[part], y[part], weight[part]) for part in halves]
     apart = [(a - b) ** 2 - (u + v - 2.0 * of_counting) for (a, u), (b, v) in combinations(fits, 2)]
-    error = np.sqrt(quantile**2 * spread + max(apart, default=0.0))
-    return PowerLaw(float(exponent), float(error), local, local_errors)
+    finest, of_finest = min(zip(halves, fits, strict=True), key=lambda each: (each[0].start, each[0].stop))[1]
+    bias = max(finest - exponent + BEYOND * np.sqrt(of_finest), 0.0)
+    error = np.sqrt(quantile**2 * spread + max([*apart, bias**2]))
+    return PowerLaw(float(exponent), float(error), local, local_errors, fitted)
 
 
 def line(x: Floats, y: Floats, weight: Floats) -> tuple[Floats, float]:

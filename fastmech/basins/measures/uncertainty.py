@@ -32,9 +32,13 @@ class UncertaintyExponent:
     uncertain: Integers  #: uncertain starts (scales,)
     starts: Integers  #: starts whose labels and whose neighbours' are all known (scales,)
     missing: Integers  #: starts with a label missing, not counted among ``starts`` (scales,)
-    fitted: NDArray[np.bool_]  #: distances that take part in the law (scales,)
     law: PowerLaw  #: exponent alpha, its error, local slopes
     dimension: float  #: D - alpha; its error is that of alpha
+
+    @property
+    def fitted(self) -> NDArray[np.bool_]:
+        """Distances that take part in the law (scales,)."""
+        return self.law.fitted
 
     @property
     def smooth(self) -> bool | None:
@@ -98,4 +102,4 @@ def uncertainty_exponent(
     fitted = hits <= DISORDER * trials * np.array(disordered)
     law = fit_counts(scales, hits, trials, fitted)
     dimension = float(np.count_nonzero(free) - law.exponent)
-    return UncertaintyExponent(scales, hits, trials, n - trials, fitted, law, dimension)
+    return UncertaintyExponent(scales, hits, trials, n - trials, law, dimension)

@@ -161,6 +161,21 @@ def test_fractal_boundaries_are_fractal(labels: np.ndarray) -> None:
     assert result.boxes.smooth is False
 
 
+def test_stripes_that_shrink_geometrically_are_not_settled() -> None:
+    """x = r^k, and xy = c beside a saddle: the share of boxes is e ln(1/e), its power 1 - 1/ln(1/e)."""
+    for angle in (0.3, 2.0):
+        x, y = (along(512, a) / 512.0 + 1e-9 for a in (angle, angle + np.pi / 2))
+        for levels in (
+            np.log(np.abs(x)) / np.log(0.5),
+            np.log(np.abs(x)) / np.log(0.7),
+            np.log(np.abs(x * y)) / 0.8,
+        ):
+            result = fractal_boundary_test(np.floor(levels).astype(int) % 2, balls=2000)
+            assert result.fractal is None, result.reason
+            assert "not settled" in result.reason
+            assert result.boxes.smooth is None
+
+
 def test_a_map_finer_than_its_points_is_undecided() -> None:
     for labels in (
         np.indices((200, 200)).sum(axis=0) % 2,

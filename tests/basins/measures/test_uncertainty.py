@@ -15,7 +15,7 @@ SCALES = np.geomspace(3e-3, 5e-2, 7)
 
 def test_a_smooth_boundary_has_exponent_one_within_its_error_bar() -> None:
     """Of 100 experiments at most 5 miss."""
-    runs = [uncertainty_exponent(disc, [-1, -1], [1, 1], SCALES, n=10_000, seed=seed) for seed in range(100)]
+    runs = [uncertainty_exponent(disc, [-1, -1], [1, 1], SCALES, n=20_000, seed=seed) for seed in range(100)]
     assert sum(run.smooth is False for run in runs) <= 5
     assert sum(run.smooth is True for run in runs) >= 70
     # An error bar that is merely wide would cover too: it must be that of the scatter, and of its parts.
@@ -70,6 +70,18 @@ def test_stripes_narrower_than_the_distances_are_not_called_fractal(width: float
             assert not run.fitted[scales > width / 2].any()
 
 
+@pytest.mark.parametrize("slope", [0.02, 0.1])
+@pytest.mark.parametrize("scales", [np.logspace(-4, -1, 10), np.logspace(-3.5, -0.5, 7)])
+def test_error_bars_cover_a_wedge(slope: float, scales: np.ndarray) -> None:
+    """Its boundaries are two straight lines; near the tip they are one at every distance."""
+
+    def wedge(y: np.ndarray) -> np.ndarray:
+        return (np.abs(y[:, 1] - 0.5) < slope * y[:, 0]).astype(int)
+
+    laws = [uncertainty_exponent(wedge, [0, 0], [1, 1], scales, seed=seed).law for seed in range(40)]
+    assert sum(abs(law.exponent - 1.0) <= law.error for law in laws) >= 36
+
+
 def test_four_distances_have_no_error_bar() -> None:
     run = uncertainty_exponent(disc, [-1, -1], [1, 1], [0.01, 0.02, 0.05, 0.1])
     assert np.isinf(run.law.error)
@@ -85,9 +97,9 @@ def test_starts_without_a_label_are_counted_and_left_out() -> None:
     def holed(y: np.ndarray) -> np.ndarray:
         return np.where(y[:, 0] > 0.5, -1, disc(y))
 
-    run = uncertainty_exponent(holed, [-1, -1], [1, 1], SCALES, n=4000)
-    assert (run.missing > 900).all()
-    assert (run.starts + run.missing == 4000).all()
+    run = uncertainty_exponent(holed, [-1, -1], [1, 1], SCALES, n=20_000)
+    assert (run.missing > 4500).all()
+    assert (run.starts + run.missing == 20_000).all()
     assert run.smooth
 
 
