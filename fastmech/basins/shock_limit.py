@@ -50,8 +50,8 @@ MOST_BLOWS, MOST_STEPS = 1 << 18, 200_000_000
 #: Blows that are followed together, in the order of their impulses.
 TOGETHER = 1 << 12
 
-#: Blows of a grid that are followed together with all substeps where the first ones do not tell their end, from
-#: the least upwards, until the search has taken so many steps.
+#: Blows of a grid that are followed together with all substeps where the first ones do not tell their end,
+#: from the least upwards, until the search has taken so many steps.
 UNCERTAIN, FURTHER = 32, 50_000_000
 
 #: Blows are tried up to so many times the sum of the potential's amplitudes: beyond, motions turn and turn.

@@ -217,7 +217,7 @@ def test_expected_count_in_plain_python() -> None:
 def test_the_radius_does_not_tell_where_the_search_began(
     coefficients: NDArray[np.float64], solution: Solution
 ) -> None:
-    """A place within rounding has the radius of its neighbours: on it the verdicts at rounding's edge rest."""
+    """Places within rounding of one another have one radius: verdicts at rounding's edge rest on it."""
     rng = np.random.default_rng(3)
     for row in range(0, SCENES, 10):
         p = pulls(*coefficients[row][[0, 2, 3, 4, 5]])

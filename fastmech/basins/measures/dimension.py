@@ -53,13 +53,13 @@ def boundary_dimension(labels: LabelsLike, edges: ArrayLike | None = None) -> Bo
 
     The exponent is a least-squares line through log p over log e. Its error bar joins the scatter between
     parts of the map (each of 5 parts along every axis left out in turn, the jackknife) and the largest
-    difference between local dimensions, continued at both ends by half of their last change, and that of boxes
-    judged by their corners: coarse boxes hold more than one smooth boundary, and fine ones miss structure of
-    a fractal between the points of the map, so that the true dimension may be at either end. Corners miss as
-    much at every size: a curve rougher than the map's points differs there, a smooth one does not. The
-    dimension is that of the scales at hand: of
-    stripes whose spacing shrinks geometrically, as beside a saddle, it falls towards that of one line as
-    boxes shrink, but slowly; stripes of sin(1/x) have 1.5 at all scales, though each is smooth.
+    difference between local dimensions, continued at both ends by half of their last change, and that of
+    boxes judged by their corners: coarse boxes hold more than one smooth boundary, and fine ones miss
+    structure of a fractal between the points of the map, so that the true dimension may be at either end.
+    Corners miss as much at every size: a curve rougher than the map's points differs there, a smooth one
+    does not. The dimension is that of the scales at hand: of stripes whose spacing shrinks geometrically, as
+    beside a saddle, it falls towards that of one line as boxes shrink, but slowly; stripes of sin(1/x) have
+    1.5 at all scales, though each is smooth.
 
     Args:
         labels: on a grid of any number of axes, with equal steps in one metric; negative: no label.
