@@ -78,7 +78,9 @@ class DisturbedEnsemble:
     end_index: NDArray[np.int8]  #: the stable equilibrium at which it is proved to end, -1: none; shape (n,)
     turns: NDArray[np.int64]  #: full turns of phi and theta on the way there, 0 where none; shape (n, 2)
     time_to_return: Floats  #: s, first step from which on it was in the ball; NaN: not by t_end; (n,)
-    excursion: Floats  #: largest departures of phi and theta [rad], NaN of those that failed; shape (n, 2)
+    excursion: Floats
+    """Largest departures of phi and theta [rad], NaN of those that failed or, by these steps, end elsewhere;
+    shape (n, 2)."""
 
     @property
     def failures(self) -> str:
@@ -158,7 +160,7 @@ def disturb(
         dt: longest step [s]; by default each start's own, from the scene's frequencies, its damping and the
             start's energy, see :func:`measuring_steps`. Motions that fail with it, or come to another well
             than is proved, are followed again with a 16th of it, and so on, down to the shortest step of the
-            fastest starts; with a ``dt`` of your own, or at the end, they are ``step_too_large``.
+            fastest starts, by default. What is measured of one that never comes to its proved well is NaN.
         method: name of the method; by default ``dop853``, or ``radau5`` (implicit) where the damper would
             set the explicit method's steps.
         return_radius: radius of the ball of return [rad].
@@ -203,6 +205,7 @@ def disturb(
     final, last, failed = np.empty_like(starts), np.empty_like(starts), np.empty(len(starts))
     status, records = np.empty(len(starts), dtype=np.int8), np.empty((3, len(starts)))
     taken, again = np.empty(len(starts)), np.arange(len(starts))
+    astray = np.zeros(len(starts), dtype=np.bool_)
     shortest, first = np.inf if dt is not None else shortest_step(c), True
     while again.size:
         run = run_ensemble(
@@ -231,9 +234,10 @@ def disturb(
         lost = (at_once.well != ends.well[again[kept]]) | (at_once.turns != ends.turns[again[kept]]).any(
             axis=1
         )
-        reached[kept[lost]] = Status.STEP_TOO_LARGE
+        astray[again] = False
+        astray[again[kept[lost]]] = True
         status[again] = reached
-        again, first = again[(reached != Status.OK) & (longest[again] > shortest)], False
+        again, first = again[((reached != Status.OK) | astray[again]) & (longest[again] > shortest)], False
         longest[again] *= 0.0625
 
     outcome = np.where(ends.status == Status.CAPTURED, Status.ELSEWHERE, ends.status).astype(np.int8)
@@ -246,6 +250,7 @@ def disturb(
     inside_since = np.where(left, np.minimum(after, last_outside + taken), 0.0)
     returned = outcome == Status.RETURNED
     back = np.zeros(len(starts), dtype=np.bool_)
+    returned &= ~astray
     back[returned] = (size(final[returned] - center) <= return_radius) & (
         excess_energy(scene, equilibrium, final[returned])
         <= confining_energy(scene, equilibrium, return_radius)
@@ -264,7 +269,7 @@ def disturb(
         end_index=np.where(failing, -1, ends.well).astype(np.int8),
         turns=np.where(failing[:, None], 0, ends.turns).astype(np.int64),
         time_to_return=np.where(back, inside_since, np.nan),
-        excursion=np.where(failing[:, None], np.nan, excursion),
+        excursion=np.where((failing | astray)[:, None], np.nan, excursion),
     )
 
 

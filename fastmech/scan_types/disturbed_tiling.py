@@ -66,7 +66,12 @@ _TRAJECTORY: dict[str, tuple[str, float, str | Mapping[str, str], str]] = {
         "s",
         "end of the first step from which on every step ended in the ball of return, NaN: none by t_end",
     ),
-    "excursion": ("f8", np.nan, ANGLE_UNITS, "largest departure of {} at the ends of steps, NaN: failed"),
+    "excursion": (
+        "f8",
+        np.nan,
+        ANGLE_UNITS,
+        "largest departure of {} at the ends of steps, NaN: not followed to its end",
+    ),
 }
 
 #: Names of what is known of every trajectory.

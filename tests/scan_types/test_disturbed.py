@@ -167,7 +167,14 @@ def test_starts_are_uniform_in_the_ball(run: Run) -> None:
 def test_finals_and_excursions_are_runge_kutta_s(run: Run) -> None:
     np.testing.assert_allclose(together(run.section, "final"), run.states[-1], rtol=0, atol=1e-6)
     departures = np.abs(run.states - run.centers[:, None])[..., :2].max(axis=0)
-    np.testing.assert_allclose(together(run.section, "excursion"), departures, rtol=0, atol=1e-6)
+    found = together(run.section, "excursion")
+    # These steps lead a few elsewhere than they are proved to go: nothing is said of how far they swing.
+    end, turns = run.section["end_equilibrium"].data, together(run.section, "turns")
+    away = np.linalg.norm(run.states[-1][..., :2] - run.angles[end] - 2 * np.pi * turns, axis=-1)
+    astray = np.isnan(found).any(axis=-1)
+    assert astray.mean() < 0.01
+    assert (away[astray] > np.pi / 2).all()
+    np.testing.assert_allclose(found[~astray], departures[~astray], rtol=0, atol=1e-6)
 
 
 def test_error_estimate(run: Run) -> None:
