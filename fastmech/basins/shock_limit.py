@@ -21,8 +21,8 @@ from fastmech.basins.copies import copy_numbers, copy_of_label
 from fastmech.basins.label import How, label_starts
 from fastmech.basins.ladder import SUBSTEPS
 from fastmech.basins.measures.labels import Floats, Integers
-from fastmech.basins.steps import coarse_steps
-from fastmech.capture.certificate import certificate_of
+from fastmech.capture.scene import scene_certificate
+from fastmech.capture.steps import coarse_steps
 from fastmech.disturbance.motion import require_constant_force
 from fastmech.ensembles import checks
 from fastmech.equilibria.find import Equilibria, Equilibrium
@@ -86,7 +86,7 @@ class ShockLimit:
     proved: Blow  #: no smaller one leaves, in whatever direction, or in the one given
     found: Blow  #: the least that was found to leave; NaN: none was found
     end: (
-        tuple[int, tuple[int, int]] | None
+        tuple[int, tuple[int, ...]] | None
     )  #: equilibrium and turns of phi and theta where the found one ends
     undecided_from: float  #: least impulse tried whose end is not known [N s]; NaN: none
     tried_to: float  #: largest impulse of the search [N s]: beyond it nothing is known; NaN: no search
@@ -134,7 +134,7 @@ def shock_limit(
     """
     place, moves, depth = _well(scene, equilibrium, on)
     angle = None if direction is None else _direction(direction)
-    certificate = certificate_of(scene)
+    certificate = scene_certificate(scene)
     if t_end is None:
         t_end = _long_enough(scene, certificate.tree.equilibria, place)
     easiest = math.remainder(moves.direction, 2.0 * math.pi) if angle is None else angle
@@ -297,7 +297,7 @@ def _well(scene: Scene, equilibrium: Equilibrium, on: str) -> tuple[Floats, Mobi
     require_rest(scene, equilibrium)
     require_constant_force(scene)
     _require_point(on)
-    certificate = certificate_of(scene)
+    certificate = scene_certificate(scene)
     equilibria, wells = certificate.tree.equilibria, certificate.tree.wells
     index = equilibria.index_of(equilibrium)
     e = equilibria[index]
