@@ -62,11 +62,18 @@ class Certificate(ABC):
     units: tuple[str, ...]  #: of the coordinates, rad or m
     periods: Floats  #: 2 pi of coordinates that turn fully, else 0 (coordinates,)
     decays: bool  #: whether a load still changes
+    joule: float  #: J of the unit that energies have here
+    amplitudes: float  #: how much U varies, in that unit: the scale of its rounding
 
     @property
     @abstractmethod
     def levels(self) -> Floats:
         """Energies below which each well captures (wells,)."""
+
+    @property
+    @abstractmethod
+    def energies(self) -> Floats:
+        """Of the equilibria (count,)."""
 
     @cached_property
     def packed(self) -> Floats:

@@ -87,6 +87,7 @@ class MechanismCertificate(Certificate):
 
     system: Mechanism
     tree: Wells
+    joule = 1.0
     work: Floats  #: at most what loads can still do [J] from each time on (TIMES,)
     fades: float  #: [s]: after it, the last of these
 
@@ -113,7 +114,7 @@ class MechanismCertificate(Certificate):
     @property
     def levels(self) -> Floats:
         """Barriers, less what rounding of energies may take."""
-        return self.tree.barrier - self._slack
+        return self.tree.barrier - ROUNDING * self.amplitudes
 
     @cached_property
     def _finite(self) -> Floats:
@@ -122,8 +123,14 @@ class MechanismCertificate(Certificate):
         return np.asarray(bounds[np.isfinite(bounds).all(axis=1)])
 
     @property
-    def _slack(self) -> float:
-        return ROUNDING * float(np.ptp(self._finite))
+    def amplitudes(self) -> float:  # type: ignore[override]
+        """From the least to the greatest U of the cells [J]."""
+        return float(np.ptp(self._finite))
+
+    @property
+    def energies(self) -> Floats:
+        """U."""
+        return self.tree.equilibria.energy
 
     @cached_property
     def _coefficients(self) -> list[float]:
@@ -253,7 +260,7 @@ class MechanismCertificate(Certificate):
         """Which have more energy than they began with and loads can have brought."""
         with np.errstate(all="ignore"):
             before, after = (self.system.evaluate("bounding", y.T)[0] for y in (starts, states))
-        scale = np.abs(before) + float(np.ptp(self._finite))
+        scale = np.abs(before) + self.amplitudes
         return np.asarray(~np.isfinite(after) | (after - before - self.work[0] > SLACK * scale))
 
     def change(self, states: Floats, apart: Floats, push: Floats | None = None) -> Floats:

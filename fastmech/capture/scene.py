@@ -73,7 +73,12 @@ class SceneCertificate(Certificate):
         return self.system.replace(F0=self.tree.equilibria.force, alpha=0.0)
 
     @property
-    def amplitudes(self) -> float:
+    def joule(self) -> float:  # type: ignore[override]
+        """m2 l^2."""
+        return unit(self.system)
+
+    @property
+    def amplitudes(self) -> float:  # type: ignore[override]
         """Sum of the potential's amplitudes over m2 l^2 [1/s^2]: the scale of its rounding."""
         c = reduce(self.system)
         return abs(c.lift) + c.spring + c.gravity + 2.0 * abs(c.force)
@@ -87,6 +92,11 @@ class SceneCertificate(Certificate):
         """Energies [J] as kernels count them [1/s^2]."""
         scene = self.system
         return np.asarray((energy - (scene.c1 + scene.c2) * scene.l**2) / unit(scene))
+
+    @property
+    def energies(self) -> Floats:
+        """Less the springs' constant."""
+        return self.reduced(self.tree.equilibria.energy)
 
     def params(self, levels: Floats) -> Floats:
         """The observers' vector (see ``locate.pack``) with proved cells."""
@@ -194,7 +204,7 @@ class SceneCertificate(Certificate):
     def confining(self, radius: float) -> Floats:
         """See the base class."""
         held, wells = self.held, [self.tree.equilibria[w] for w in self.tree.wells]
-        floor = self.reduced(np.array([e.energy for e in wells]))
+        floor = self.energies[list(self.tree.wells)]
         return np.asarray(floor + np.array([confining_energy(held, e, radius) for e in wells]) / unit(held))
 
     def measuring_steps(self, starts: Floats, method: str) -> Floats:

@@ -78,11 +78,11 @@ def disturbed_motion(
     method = method or default_method(scene, dt)
     passed = np.union1d(t, damped_times(scene, method, min(dt, float(t[-1]))))
     run = integrate(scene, center + start, dt=dt, method=method, t_eval=passed, threads=threads)
-    linearized = start @ propagators(_jacobian(scene, equilibrium), t).mT
+    linearized = start @ propagators(state_jacobian(scene, equilibrium), t).mT
     return DisturbedMotion(t, run.y[np.searchsorted(passed, t)] - center, linearized, run.status)
 
 
-def _jacobian(system: Scene | Mechanism, equilibrium: Equilibrium | RestingPlace) -> Floats:
+def state_jacobian(system: Scene | Mechanism, equilibrium: Equilibrium | RestingPlace) -> Floats:
     """Of the rates of states, by states, at an equilibrium (states, states)."""
     if isinstance(equilibrium, Equilibrium) and isinstance(system, Scene):
         return jacobian(system, equilibrium)

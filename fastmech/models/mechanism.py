@@ -218,6 +218,19 @@ class Mechanism:
         values = {sympy.Symbol(name, real=True): value for name, value in self.parameters.items()}
         return sympy.sympify(self._parts.dissipation).xreplace(values) != 0
 
+    def moved(self, point: str, q: ArrayLike) -> Floats:
+        """Derivatives (components, n) of a named point [m] by coordinates, at a position (n,).
+
+        Raises:
+            InputError: there is no such point.
+        """
+        if point not in self.points:
+            raise InputError(f"on = {shown(point)}: must be one of {', '.join(self.points) or 'no points'}")
+        given = dict(zip(self._symbols, np.asarray(q, dtype=np.float64).tolist(), strict=True))
+        given |= dict(zip(self._constants, self.parameters.values(), strict=True))
+        jacobian = self.points[point].jacobian(list(self._symbols)).xreplace(given)
+        return np.array(jacobian.evalf().tolist(), dtype=np.float64)
+
     def energy(self) -> Any:
         """T + U, loads at their means, as an expression of coordinates, rates and parameters.
 
