@@ -109,7 +109,7 @@ def follow(
             rhs,
             params,
             paths.state[running],
-            [passed * interval, (passed + ahead) * interval],
+            [certificate.origin + passed * interval, certificate.origin + (passed + ahead) * interval],
             interval / substeps,
             method,
             certificate.observation(observer, stop_rounds * interval, call_rounds * substeps),
@@ -118,7 +118,7 @@ def follow(
         )
         noted = certificate.noted(run.records)
         stopped = noted.code != 0
-        end = np.where(stopped, run.records[STOP_TIME], (passed + ahead) * interval)
+        end = np.where(stopped, run.records[STOP_TIME] - certificate.origin, (passed + ahead) * interval)
         reached = Paths(
             noted.code,
             noted.turns,

@@ -62,6 +62,7 @@ class Certificate(ABC):
     units: tuple[str, ...]  #: of the coordinates, rad or m
     periods: Floats  #: 2 pi of coordinates that turn fully, else 0 (coordinates,)
     decays: bool  #: whether a load still changes
+    origin: float = 0.0  #: time [s] from which on motions are followed
     joule: float  #: J of the unit that energies have here
     amplitudes: float  #: how much U varies, in that unit: the scale of its rounding
 

@@ -1,9 +1,9 @@
 """What observers of any mechanism share: positions to wells, capture, ranges, stops.
 
 ``params`` are the energy's coefficients, then from ``first`` on: time between stops [s], coordinates, wells,
-time [s] by which loads have faded, number of works; by coordinate the domain's low end, cells by unit, number
-of cells, period, high end; by well places, half widths of convex boxes (both wells x coordinates), levels;
-works [J]; cells.
+time [s] by which loads have faded, number of works, time of the run's begin [s]; by coordinate the domain's
+low end, cells by unit, number of cells, period, high end; by well places, half widths of convex boxes (both
+wells x coordinates), levels; works [J]; cells.
 """
 
 from __future__ import annotations
@@ -18,6 +18,9 @@ from fastmech.capture.observe import is_stop
 from fastmech.ensembles.ends import STOP_CODE, note_stop
 from fastmech.jit import called
 
+#: Numbers behind the coefficients, before those of coordinates.
+HEAD = 6
+
 #: Rows of numbers, one a coordinate, in front of the wells'.
 TABLE_ROWS = 5
 
@@ -31,7 +34,7 @@ def work_left(t: float, params: Any, first: int) -> float:
     """The most work that loads can still do at a time."""
     count = int(params[first + 4])
     k = int(t / params[first + 3] * (count - 1)) if t < params[first + 3] else count - 1
-    begin = first + 5 + TABLE_ROWS * int(params[first + 1])
+    begin = first + HEAD + TABLE_ROWS * int(params[first + 1])
     begin += int(params[first + 2]) * (2 * int(params[first + 1]) + 1)
     return float(params[begin + min(max(k, 0), count - 1)])
 
@@ -39,20 +42,19 @@ def work_left(t: float, params: Any, first: int) -> float:
 @called
 def finish(t: float, Y: Any, params: Any, record: Any, first: int, low: int) -> None:
     """Mark lanes that are captured or out of range, and at times of stopping stop those marked."""
-    n = int(params[first + 1])
+    n, row, at = int(params[first + 1]), first + HEAD, t - params[first + 5]
     level, energy, well = 2 + 2 * n, 3 + 2 * n, 4 + 2 * n
     if low:
         for i in range(Y.shape[1]):
             if record[energy, i] < record[level, i]:
-                _capture(t, Y, params, record, first, i)
-    row = first + 5
+                _capture(at, Y, params, record, first, i)
     for j in range(n):
         if params[row + 3 * n + j] == 0.0:
             for i in range(Y.shape[1]):
                 beyond = Y[j, i] < params[row + j] or Y[j, i] > params[row + 4 * n + j]
                 if beyond and record[well, i] == 0.0:
-                    record[well, i], record[well + 1, i], record[level, i] = OUT, t, -np.inf
-    if is_stop(t, params[first]):
+                    record[well, i], record[well + 1, i], record[level, i] = OUT, at, -np.inf
+    if is_stop(at, params[first]):
         for i in range(Y.shape[1]):
             if record[well, i] != 0.0 and record[STOP_CODE, i] == 0.0:
                 record[well + 2, i] = record[energy, i]
@@ -67,7 +69,7 @@ def _capture(t: float, Y: Any, params: Any, record: Any, first: int, i: int) -> 
     minima with w, and only wells of that component whose level is no higher can still take it.
     """
     n, wells = int(params[first + 1]), int(params[first + 2])
-    row, turns = first + 5, 2 + 2 * n + RECORD
+    row, turns = first + HEAD, 2 + 2 * n + RECORD
     places = row + TABLE_ROWS * n
     levels = places + 2 * wells * n
     table = levels + wells + int(params[first + 4])

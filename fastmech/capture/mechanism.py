@@ -8,7 +8,7 @@ convex: the way straight to the minimum does not rise.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from fastmech.callee import callee
 from fastmech.capture.cells import bound_states
-from fastmech.capture.certificate import Certificate, Noted
-from fastmech.capture.look import RECORD, TABLE_ROWS
+from fastmech.capture.certificate import Certificate, Early, Noted
+from fastmech.capture.look import HEAD, RECORD, TABLE_ROWS
 from fastmech.capture.steps import MEASURING, MOST_OCTAVES, PHASE, TURNING
 from fastmech.capture.wells import ROUNDING, Wells, prove_wells, values_of
 from fastmech.disturbance.size import Size, confining_energy, size_of
@@ -90,6 +90,7 @@ class MechanismCertificate(Certificate):
     joule = 1.0
     work: Floats  #: at most what loads can still do [J] from each time on (TIMES,)
     fades: float  #: [s]: after it, the last of these
+    origin: float = 0.0
 
     @property
     def names(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -157,7 +158,8 @@ class MechanismCertificate(Certificate):
         """Coefficients, then what :mod:`fastmech.capture.look` reads."""
         tree, n = self.tree, len(self.names)
         places = tree.equilibria.position[list(tree.wells)]
-        head = np.array([0.0, n, len(tree.wells), self.fades, len(self.work)])
+        head = np.array([0.0, n, len(tree.wells), self.fades, len(self.work), self.origin])
+        assert len(head) == HEAD
         domain = tree.cells.domain
         rows = [domain[:, 0], 1.0 / tree.cells.widths, tree.cells.counts, domain[:, 2], domain[:, 1]]
         assert len(rows) == TABLE_ROWS
@@ -172,7 +174,7 @@ class MechanismCertificate(Certificate):
         own, n = params.copy(), len(self.names)
         first, wells = len(self._coefficients), len(self.tree.wells)
         own[first] = interval
-        begin = first + 5 + TABLE_ROWS * n + 2 * wells * n
+        begin = first + HEAD + TABLE_ROWS * n + 2 * wells * n
         record = np.zeros(2 + 2 * n + RECORD + n)
         record[2 + 2 * n] = params[begin : begin + wells].max()
         return Observation(self._observe, own, record, stops=True, call_steps=call_steps)
@@ -255,6 +257,14 @@ class MechanismCertificate(Certificate):
     def damped_times(self, method: str, until: float, ratio: float = 2.0) -> Floats:
         """None: steps are short enough for the dampers."""
         return np.zeros(0)
+
+    def early(self, method: Method) -> Early | None:
+        """What happens until loads have no more kinks, which no step may cross."""
+        kinks = self.system.kinks(math.inf)
+        if not kinks.size:
+            return None
+        rest = replace(self, origin=float(kinks[-1]))
+        return Early(rest, rest.origin, self._paces[0])
 
     def impossible(self, starts: Floats, states: Floats, threads: int | None = 1) -> NDArray[np.bool_]:
         """Which have more energy than they began with and loads can have brought."""

@@ -23,7 +23,8 @@ def certificate_of(system: Scene | Mechanism) -> Certificate:
         InputError: its wells are not certain, or a mechanism's energy is not known to fall.
     """
     if isinstance(system, Mechanism):
-        return _of_mechanism(system.prints, system.name, tuple(system.parameters.items()), _Kept(system))
+        values = tuple(system.parameters.items()), tuple(c[1:] for c in system.coordinates)
+        return _of_mechanism(system.prints, system.name, values, _Kept(system))
     return scene_certificate(system)
 
 

@@ -188,6 +188,11 @@ class Mechanism:
         """Its loads with the parameters' values."""
         return tuple(load.at(self.parameters) for load, *_ in self._parts.loads)
 
+    def kinks(self, until: float) -> Floats:
+        """Times [s] within (0, until) that no step may cross: there a load's value or derivative jumps."""
+        times = np.array(sorted({t for load in self.loads for t in load.kinks()}))
+        return times[(times > 0.0) & (times < until)]
+
     @cached_property
     def equations(self) -> Equations:
         """Metric and forces as SymPy expressions."""
