@@ -17,6 +17,9 @@ from fastmech.errors import InputError, shown
 
 inf = math.inf
 
+#: Share of a time by which the last step before a jump ends before it: far above the rounding of times.
+BEFORE = 1e-14
+
 
 class Facts(NamedTuple):
     """What is known of a load."""
@@ -179,9 +182,7 @@ class Pulse(Load):
 
     def kinks(self) -> tuple[float, ...]:
         """Its begin and its end, and right before: the last step until then sees nothing of what comes."""
-        return tuple(
-            x for t in (self.start, self.start + self.duration) for x in (math.nextafter(t, -inf), t)
-        )
+        return tuple(x for t in (self.start, self.start + self.duration) for x in (t - BEFORE * abs(t), t))
 
     def facts(self) -> Facts:
         """At rest it is over."""
