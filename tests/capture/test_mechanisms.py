@@ -83,7 +83,7 @@ def test_barriers_in_closed_form() -> None:
 
 
 def test_a_spring_at_length_zero_bars_no_labels() -> None:
-    """A mass on a spring: one well, whose ring closes over its top; the first way out is the range's low end."""
+    """A mass on a spring: one well, whose ring closes over its top; the first way out is at y = -2."""
     x, y = fm.lengths("x y", -2.0, 2.0)
     swing = fm.Mechanism(
         (x, y),
