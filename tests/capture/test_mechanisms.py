@@ -265,3 +265,14 @@ def test_what_has_no_labels_says_why(mechanism: object, told: str) -> None:
     made = mechanism()  # type: ignore[operator]
     with pytest.raises(fm.InputError, match=told):
         fm.labels_of(made, np.zeros((1, len(made.state))))
+
+
+def test_the_papers_mechanism_under_a_pulse_ends_where_scipy_says() -> None:
+    mechanism = fm.mechanisms.slider_pendulum(fm.loads.Pulse(3000.0, 0.2, 0.3)).replace(c1=294.9, c2=92.85)
+    rng = np.random.default_rng(6)
+    starts = np.concatenate([rng.uniform(-3.0, 3.0, (40, 2)), np.zeros((40, 2))], axis=1)
+    found = fm.labels_of(mechanism, starts, 60.0)
+    assert (found.well >= 0).any()
+    for k in np.flatnonzero(found.well >= 0)[:4]:
+        expected = found.tree.equilibria[int(found.well[k])].position + TURN * found.turns[k]
+        np.testing.assert_allclose(end_of(mechanism, starts[k], 60.0)[:2], expected, atol=0.5)
