@@ -36,6 +36,11 @@ class Equilibrium:
     force: float  #: the frozen force F that it holds for [N]
 
     @property
+    def position(self) -> FloatArray:
+        """Both angles (2,) [rad]."""
+        return np.array([self.phi, self.theta])
+
+    @property
     def kind(self) -> str:
         """``minimum``, ``saddle``, ``maximum``; ``degenerate`` if the Hessian is singular within rounding."""
         return KINDS[self.morse_index]
@@ -97,6 +102,15 @@ class Equilibria(Sequence[Equilibrium]):
             f"equilibrium = ({equilibrium.phi:g}, {equilibrium.theta:g}) rad, F = {equilibrium.force:g} N: "
             f"must be one of this scene's equilibria (F = {self.force:g} N)"
         )
+
+    @property
+    def position(self) -> FloatArray:
+        """Angles phi, theta (n, 2) [rad]."""
+        return np.array([item.position for item in self.items]).reshape(-1, 2)
+
+    def place(self, k: int) -> str:
+        """Where an equilibrium is, in words."""
+        return f"phi = {self.items[k].phi:.4g}, theta = {self.items[k].theta:.4g} rad"
 
     @property
     def phi(self) -> FloatArray:

@@ -12,7 +12,7 @@ from disturbance.known import center, equilibria, known, oracle_size, scipy_moti
 from fastmech.basins.disturbed import DisturbedEnsemble, disturb
 from fastmech.basins.label import labels_of
 from fastmech.capture.barriers import barrier_tree
-from fastmech.capture.certificate import trapped
+from fastmech.capture.select import trapped
 from fastmech.ensembles.status import ENDS, FAILURES, Status
 from fastmech.equilibria.find import find_equilibria
 from fastmech.errors import InputError, StepWarning
