@@ -147,7 +147,8 @@ def disturb(
         dt: longest step [s]; by default each start's own, from the scene's frequencies, its damping and the
             start's energy, see ``Certificate.measuring_steps``. Motions that fail with it, or come to another
             well than is proved, are followed again with a 16th of it, and so on, down to the shortest step of
-            the fastest starts, by default. What is measured of one that never comes to its proved well is NaN.
+            the fastest starts, by default. Of one that never comes to its proved well, what is measured is
+            NaN.
         method: name of the method; by default ``dop853``, or ``radau5`` (implicit) where the damper would
             set the explicit method's steps.
         return_radius: radius of the ball of return [rad].
