@@ -195,7 +195,7 @@ def run_ensemble(
 
     _set_aside(ensemble, np.flatnonzero(~usable), np.asarray(starts, dtype=np.float64), clock[0])
     most = max(block_lanes, task_lanes(method, begin.shape[1]))
-    tasks = tasks_of(np.broadcast_to(dt, len(begin)), usable, clock, workers, most)
+    tasks = tasks_of(np.asarray(dt), usable, clock, workers, most)
     finishing = in_threads(run_task, tasks, min(workers, len(tasks)), interrupted)
     for finished in chain([int(np.count_nonzero(~usable))], finishing):
         if progress is not None:
@@ -205,10 +205,10 @@ def run_ensemble(
 
 def _set_aside(ensemble: Ensemble, members: NDArray[np.int64], begin: Floats, start: float) -> None:
     """Trajectories whose starts are not finite never enter a block."""
-    ensemble.states[:, members] = np.nan
-    ensemble.status[members] = Status.START_NOT_FINITE
-    ensemble.failed[members] = start
     if members.size:
+        ensemble.states[:, members] = np.nan
+        ensemble.status[members] = Status.START_NOT_FINITE
+        ensemble.failed[members] = start
         ensemble.lost.append((members, begin[members]))
 
 

@@ -181,13 +181,13 @@ class Trial:
     def work(self, method: Method, dt: float) -> float:
         """Operations of a trajectory with steps of dt [s]."""
         outputs, operations, dim = self.case.outputs, self.operations, self.case.starts.shape[1]
-        intervals = np.diff(outputs, prepend=0.0)
-        steps = np.maximum(output_steps(np.concatenate([[0.0], outputs]), dt), 1)
-        taken, starts_anew = float(steps[intervals > 0.0].sum()), 1.0
+        taken, starts_anew = math.ceil(self.until / dt * (1.0 - 1e-12)), 1.0
         if outputs.size * STEPS_BETWEEN * dt > self.until:
             taken = self.until / dt
         elif outputs.size > 1:
-            lengths = intervals / steps
+            intervals = np.diff(outputs, prepend=0.0)
+            steps = np.maximum(output_steps(np.concatenate([[0.0], outputs]), dt), 1)
+            taken, lengths = float(steps[intervals > 0.0].sum()), intervals / steps
             starts_anew += np.count_nonzero(~np.isclose(lengths[1:], lengths[:-1], rtol=1e-9))
         own = step_operations(method, operations, dim)
         return taken * self.fitted * own + starts_anew * start_operations(method, operations, dim)
