@@ -62,10 +62,9 @@ TYPICAL = 0.9
 #: Runs again at most, and by how much steps are shortened at most from one to the next.
 ROUNDS, LEAP = 6, 2.0
 
-#: Trajectories that run first where a quantile is asked for, a quarter of all from the sample's size to this;
-#: how often at most, by how much longer steps are worth another time, and how many times smaller the errors
-#: must be of the run that measures them.
-PILOT, QUARTER, PILOTS, WORTH, APART = 512, 4, 4, 1.2, 3.0
+#: Trajectories that run first where a quantile is asked for, how often at most, by how much longer steps are
+#: worth another time, and how many times smaller the errors must be of the run that measures them.
+PILOT, PILOTS, WORTH, APART = 512, 4, 1.2, 3.0
 
 #: Trajectories of which it does not pay to see whether float32 suffices.
 FEW = 4 * PILOT
@@ -219,10 +218,11 @@ def _once(
     ``known``: the reference does not come from runs with shorter steps, and only it tells errors.
     """
     (tol, quantile), settings, trial = wanted, found.settings, found.trial
+    solution = None
     if known:
         error = trial.errors(settings.method, float(settings.dt))
     else:
-        pilot = evenly(case, who, min(max(who.size // QUARTER, SAMPLE), PILOT))
+        pilot = evenly(case, who, PILOT)
         part = case.part(pilot)
         settings, run, error = _piloted(part, settings, wanted)
         if tol >= SINGLE and who.size > FEW and _in_single(settings, case):
@@ -230,7 +230,16 @@ def _once(
             rounded = error + distances(solve_at(part, single), run)
             if order_statistic(rounded, quantile) <= tol:
                 settings, error = single, rounded
-    solution = solve_at(case, settings, progress)
+        if (
+            case.problem.system is None
+            and pilot.size == len(case.starts)
+            and settings.precision is np.float64
+        ):
+            solution = run
+            if progress is not None:
+                progress(pilot.size)
+    if solution is None:
+        solution = solve_at(case, settings, progress)
     estimate = order_statistic(error, quantile)
     remark = "" if estimate <= tol else f"; the {quantile:.3g} quantile misses it"
     return Estimated(solution, settings, found.reason + remark, None, estimate)
@@ -255,10 +264,10 @@ def _piloted(
         if best is not None and estimate > (IN_VAIN * best[0] if best[0] > tol else tol):
             break
         best = estimate, dt, error
-        asked = (AIM * tol / max(estimate, 1e-300)) ** (1.0 / p) if estimate < np.inf else 1.0 / RATIO
+        asked = (AIM * tol / max(estimate, 1e-300)) ** (1.0 / p) if estimate < np.inf else 1.0 / LEAP
         if estimate <= tol and asked < WORTH:
             break
-        dt *= min(max(asked, 1.0 / RATIO), RATIO)
+        dt *= min(max(asked, 1.0 / LEAP), RATIO)
     assert best is not None
     return replace(settings, dt=best[1]), trial.run(settings.method, best[1]), best[2]
 
