@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from fastmech.basins.snapping import critical_forces, map_snapping
     from fastmech.bench.frontier import work_precision
     from fastmech.capture.barriers import barrier_tree
-    from fastmech.capture.certificate import trapped
+    from fastmech.capture.select import trapped
     from fastmech.disturbance.linear_range import linear_range
     from fastmech.disturbance.motion import disturbed_motion
     from fastmech.ensembles.integrate import integrate
@@ -135,7 +135,7 @@ _MODULES = {
     "trace_unreached": "fastmech.atlas.damping",
     "track_edge": "fastmech.basins.edge",
     "transient_growth": "fastmech.transients.growth",
-    "trapped": "fastmech.capture.certificate",
+    "trapped": "fastmech.capture.select",
     "uncertainty_exponent": "fastmech.basins.measures.uncertainty",
     "wada_merge_test": "fastmech.basins.measures.wada",
     "wilson": "fastmech.basins.measures.fractions",

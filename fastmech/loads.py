@@ -17,6 +17,9 @@ from fastmech.errors import InputError, shown
 
 inf = math.inf
 
+#: Share of a time by which the last step before a jump ends before it: far above the rounding of times.
+BEFORE = 1e-14
+
 
 class Facts(NamedTuple):
     """What is known of a load."""
@@ -45,6 +48,10 @@ class Load:
     def to_come(self, t: float) -> tuple[float, float]:
         """|F(t) - F_end| and the total variation of F from ``t`` [s] on; infinite where it never fades."""
         raise NotImplementedError
+
+    def kinks(self) -> tuple[float, ...]:
+        """Times [s] at which F or a derivative jumps: steps must not cross them."""
+        return ()
 
     def work_left(self, t: float, reach: float = 1.0) -> float:
         """The most work [J] that F less its final value can do after ``t`` [s]; infinite if it never fades.
@@ -173,6 +180,10 @@ class Pulse(Load):
 
         return sympy.Piecewise((0, t < self.start), (self.value, t < self.start + self.duration), (0, True))
 
+    def kinks(self) -> tuple[float, ...]:
+        """Its begin and its end, and right before: the last step until then sees nothing of what comes."""
+        return tuple(x for t in (self.start, self.start + self.duration) for x in (t - BEFORE * abs(t), t))
+
     def facts(self) -> Facts:
         """At rest it is over."""
         return Facts(0.0, abs(self.value))
@@ -200,6 +211,10 @@ class Ramp(Load):
 
         rising, ends = self.value * (t - self.start) / self.duration, self.start + self.duration
         return sympy.Piecewise((0, t < self.start), (rising, t < ends), (self.value, True))
+
+    def kinks(self) -> tuple[float, ...]:
+        """Its begin and its end."""
+        return self.start, self.start + self.duration
 
     def facts(self) -> Facts:
         """At rest it has its value."""
@@ -272,6 +287,10 @@ class Sampled(Load):
             return inside if t < times[-1] else last
 
         return sampled
+
+    def kinks(self) -> tuple[float, ...]:
+        """The samples."""
+        return tuple(self.times.tolist())
 
     def facts(self) -> Facts:
         """At rest it is the last value; between samples a spline may exceed them."""

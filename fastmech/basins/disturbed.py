@@ -9,39 +9,27 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.basins.label import How, label_starts, require_damper
-from fastmech.basins.ladder import SUBSTEPS
+from fastmech.basins.label import How, label_starts
 from fastmech.basins.measures.fractions import Shares, basin_stability
-from fastmech.basins.steps import (
-    MOST_OCTAVES,
-    PHASE,
-    TURNING,
-    coarse_steps,
-    highest_frequency,
-    method_for,
-    shortest_step,
-)
-from fastmech.disturbance.motion import damped_times, equilibria_to_disturb
-from fastmech.disturbance.observe import EXCURSION_PHI, EXCURSION_THETA, LAST_OUTSIDE, observe_departure
-from fastmech.disturbance.size import Size, confining_energy, excess_energy, size_at, uniform_ball
+from fastmech.capture.select import certificate_of, require_damper
+from fastmech.capture.steps import MOST_OCTAVES, TURNING
+from fastmech.disturbance.motion import equilibria_to_disturb
+from fastmech.disturbance.observe import EXCURSION, LAST_OUTSIDE, observe_departure
+from fastmech.disturbance.size import Size, confining_energy, excess_energy, size_of, uniform_ball
 from fastmech.ensembles import checks
-from fastmech.ensembles.energy_bounds import breaks_energy_bounds
 from fastmech.ensembles.run import Observation, Progress, run_ensemble
 from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.status import ENDS, FAILURES, Status, failure_counts, failure_line
-from fastmech.equilibria.find import Equilibria, Equilibrium
+from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError, StepWarning
-from fastmech.integrators.method import ImplicitRungeKutta, with_jacobian
-from fastmech.integrators.methods import find_method
-from fastmech.kernels.jacobians import lagrange_inverse, lagrange_jacobian
-from fastmech.kernels.select import right_hand_side
-from fastmech.mechanism.coefficients import reduce
+from fastmech.models.equilibria import RestingPlace
+from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
-from fastmech.step_limits.warning import drives_rest, step_limit, warn_of_step
 
 Floats = NDArray[np.float64]
 
@@ -54,10 +42,6 @@ MOST_TRAJECTORIES = 100_000_000
 #: Largest disturbance [rad]: times the frequency it is as fast as the shortest steps by default can follow.
 MOST_RADIUS = TURNING * 2.0**MOST_OCTAVES
 
-#: Share of a start's coarse step, at which labels begin, that measuring takes by default; an implicit method,
-#: whose error constant is larger, takes half of it.
-MEASURING = 0.6
-
 
 @dataclass(frozen=True, repr=False)
 class DisturbedEnsemble:
@@ -66,19 +50,20 @@ class DisturbedEnsemble:
     Printed, it says how many return, how soon, and how far they swing.
     """
 
-    equilibria: Equilibria  #: all equilibria of the scene
+    equilibria: Any  #: all equilibria of the scene
+    names: dict[str, str]  #: of the coordinates, with their units
     index: int  #: which of them was disturbed
     size: Size  #: the norm in which radius and ball are measured
     t_end: float  #: s
     dt: Floats  #: steps taken [s], shape (n,)
-    starts: Floats  #: states at t = 0, shape (n, 4)
-    final: Floats  #: states at t_end, of those that failed the last finite ones, shape (n, 4)
+    starts: Floats  #: states at t = 0, shape (n, states)
+    final: Floats  #: states at t_end, of those that failed the last finite ones, shape (n, states)
     failed: Floats  #: time of the last finite state of those that failed on the way [s], else NaN; shape (n,)
     outcome: NDArray[np.int8]  #: :class:`fastmech.ensembles.status.Status`, one of its ``ENDS``, shape (n,)
     end_index: NDArray[np.int8]  #: the stable equilibrium at which it is proved to end, -1: none; shape (n,)
-    turns: NDArray[np.int64]  #: full turns of phi and theta on the way there, 0 where none; shape (n, 2)
+    turns: NDArray[np.int64]  #: full turns of each coordinate on the way there, 0 where none; (n, coords)
     time_to_return: Floats  #: s, first step from which on it was in the ball; NaN: not by t_end; (n,)
-    excursion: Floats  #: largest departures of phi and theta [rad], NaN of those that failed; shape (n, 2)
+    excursion: Floats  #: largest departures of coordinates [rad or m], NaN of those that failed; (n, coords)
 
     @property
     def failures(self) -> str:
@@ -96,11 +81,11 @@ class DisturbedEnsemble:
         return basin_stability(np.where(known, self.outcome, -1), int(Status.RETURNED))
 
     def __repr__(self) -> str:
-        e, shares = self.equilibria[self.index], self.returned
+        kind, shares = self.equilibria[self.index].kind, self.returned
         ended = failure_counts(self.outcome, ENDS)
         lines = [
-            f"{self.outcome.size:,} disturbances of the {e.kind} at phi = {e.phi:.4g}, "
-            f"theta = {e.theta:.4g} rad, followed for {self.t_end:g} s",
+            f"{self.outcome.size:,} disturbances of the {kind} at {self.equilibria.place(self.index)}, "
+            f"followed for {self.t_end:g} s",
             "  ended: " + ", ".join(f"{count:,} {name}" for name, count in ended.items()),
             f"  returned: {shares.fraction:.2%}, at most {shares.at_most:.2%} "
             f"(95 % interval {shares.lower:.2%} to {shares.upper:.2%})",
@@ -109,8 +94,9 @@ class DisturbedEnsemble:
         if times.size:
             lines.append(f"  back after {np.median(times):.3g} s (median), {times.max():.3g} s at most")
         if np.isfinite(self.excursion).any():
-            phi, theta = np.nanmax(self.excursion, axis=0)
-            lines.append(f"  largest excursion: {phi:.3g} rad of phi, {theta:.3g} rad of theta")
+            most = zip(np.nanmax(self.excursion, axis=0), self.names.items(), strict=True)
+            each = ", ".join(f"{value:.3g} {unit} of {name}" for value, (name, unit) in most)
+            lines.append(f"  largest excursion: {each}")
         return "\n".join([*lines, *([f"  {self.failures}"] if self.failures else [])])
 
     @property
@@ -125,8 +111,8 @@ class DisturbedEnsemble:
 
 
 def disturb(
-    scene: Scene,
-    equilibrium: Equilibrium,
+    scene: Scene | Mechanism,
+    equilibrium: Equilibrium | RestingPlace,
     n: int = 4096,
     *,
     radius: float = 0.5,
@@ -149,15 +135,17 @@ def disturb(
     equilibrium's norm, without the energy to leave that ball.
 
     Args:
-        scene: a scene with a damper and a constant force (``alpha = 0`` or ``F0 = 0``).
+        scene: a scene with a damper and a constant force (``alpha = 0`` or ``F0 = 0``), or a mechanism with
+            dampers and constant loads.
         equilibrium: one of ``find_equilibria(scene)``.
         n: number of disturbances.
         radius: size of the largest disturbance [rad].
         seed: seed of the starts.
         t_end: end of the run [s].
         dt: longest step [s]; by default each start's own, from the scene's frequencies, its damping and the
-            start's energy, see :func:`measuring_steps`. Motions that fail with it are followed again with a
-            16th of it, and so on, down to the shortest step of the fastest starts.
+            start's energy, see ``Certificate.measuring_steps``. Motions that fail with it, or come to another
+            well than is proved, are followed again with a 16th of it, and so on, down to the shortest step of
+            the fastest starts; with a ``dt`` of your own, or at the end, they are ``step_too_large``.
         method: name of the method; by default ``dop853``, or ``radau5`` (implicit) where the damper would
             set the explicit method's steps.
         return_radius: radius of the ball of return [rad].
@@ -172,6 +160,7 @@ def disturb(
     checks.progress_function(progress, "trajectories")
     equilibria = equilibria_to_disturb(scene)
     require_damper(scene)
+    certificate = certificate_of(scene)
     n = checks.whole_number("n", n, least=1, most=MOST_TRAJECTORIES)
     seed = checks.whole_number("seed", seed, least=0)
     if (radius := checks.number("radius", radius, "rad", above=0.0)) > MOST_RADIUS:
@@ -180,36 +169,39 @@ def disturb(
         )
     return_radius = checks.number("return_radius", return_radius, "rad", above=0.0)
     t_end = checks.number("t_end", t_end, "s", above=0.0)
-    method = method_for(scene, method)
+    method = certificate.method(method)
     if dt is not None:
         dt = checks.number("dt", dt, "s", above=0.0)
-        warn_of_step([scene], dt, method)
+        certificate.warn_of_step(dt, method)
     index = equilibria.index_of(equilibrium)
-    c, center = reduce(scene), np.array([equilibrium.phi, equilibrium.theta, 0.0, 0.0])
-    size = size_at(scene, equilibrium.phi, equilibrium.theta)
+    coordinates = len(certificate.names)
+    center = np.concatenate([equilibrium.position, np.zeros(coordinates)])
+    size = size_of(scene, equilibrium)
     refuse_meeting_balls(scene, equilibria, return_radius, [index])
     chosen = range(*(part or slice(None)).indices(n))
-    starts = center + size.from_ball(radius * _starts_in_ball(seed, index, n, chosen))
+    starts = center + size.from_ball(radius * _starts_in_ball(seed, index, n, chosen, 2 * coordinates))
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StepWarning)  # it has been told
         ends = label_starts(scene, starts, t_end, How(dt, method, threads=threads))
-    longest = measuring_steps(scene, starts, method) if dt is None else np.full(len(starts), dt)
-    at_first = damped_times(scene, method, min(dt or PHASE / highest_frequency(c), t_end))
+    longest = certificate.measuring_steps(starts, method) if dt is None else np.full(len(starts), dt)
+    moment = certificate.slow_step
+    at_first = certificate.damped_times(method, min(dt or moment, t_end))
     times = np.array([0.0, *at_first, t_end])
     departure = np.abs(starts - center)
     final, last, failed = np.empty_like(starts), np.empty_like(starts), np.empty(len(starts))
-    status, records = np.empty(len(starts), dtype=np.int8), np.empty((3, len(starts)))
+    status, records = np.empty(len(starts), dtype=np.int8), np.empty((1 + coordinates, len(starts)))
     taken, again = np.empty(len(starts)), np.arange(len(starts))
-    shortest, first = np.inf if dt is not None else shortest_step(c), True
+    shortest, first = np.inf if dt is not None else certificate.shortest_step, True
+    rhs, params = certificate.motion
     while again.size:
         run = run_ensemble(
-            right_hand_side(c),
-            c,
+            rhs,
+            params,
             starts[again],
             times,
             longest[again],
-            with_jacobian(find_method(method), lagrange_jacobian, lagrange_inverse),
+            certificate.formula(method),
             _observation(center, size, return_radius),
             threads=threads,
             progress=progress if first else None,
@@ -219,10 +211,18 @@ def disturb(
         steps, which = np.unique(longest[again], return_inverse=True)
         number = np.array([output_steps(times[-2:], float(step))[0] for step in steps])
         taken[again] = ((t_end - times[-2]) / number)[which]
-        reached, broken = run.status, breaks_energy_bounds(c, starts[again], run.states[-1], threads)
+        reached, broken = run.status, certificate.impossible(starts[again], run.states[-1], threads)
         reached[broken & (reached == Status.OK)] = Status.STEP_TOO_LARGE
-        driven = np.array([drives_rest(scene, t_end / float(k), float(k), method) for k in number])[which]
-        reached[driven & np.isin(reached, (Status.OK, Status.NOT_FINITE))] = Status.STEP_TOO_LARGE
+        driven = [certificate.drives_rest(t_end / float(k), float(k), method) for k in number]
+        driving = np.array(driven)[which] & np.isin(reached, (Status.OK, Status.NOT_FINITE))
+        reached[driving] = Status.STEP_TOO_LARGE
+        # A motion that comes to another well than its proved one has not been followed, whatever it says.
+        kept = np.flatnonzero((reached == Status.OK) & (ends.status[again] == Status.CAPTURED))
+        at_once = label_starts(scene, run.states[-1, kept], moment, How(method=method, threads=threads))
+        lost = (at_once.well != ends.well[again[kept]]) | (at_once.turns != ends.turns[again[kept]]).any(
+            axis=1
+        )
+        reached[kept[lost]] = Status.STEP_TOO_LARGE
         status[again] = reached
         again, first = again[(reached != Status.OK) & (longest[again] > shortest)], False
         longest[again] *= 0.0625
@@ -241,9 +241,10 @@ def disturb(
         excess_energy(scene, equilibrium, final[returned])
         <= confining_energy(scene, equilibrium, return_radius)
     )
-    excursion = np.maximum(departure[:, :2], records[[EXCURSION_PHI, EXCURSION_THETA]].T)
+    excursion = np.maximum(departure[:, :coordinates], records[EXCURSION:].T)
     return DisturbedEnsemble(
         equilibria=equilibria,
+        names=dict(zip(certificate.names, certificate.units, strict=True)),
         index=index,
         size=size,
         t_end=t_end,
@@ -259,31 +260,21 @@ def disturb(
     )
 
 
-def measuring_steps(scene: Scene, starts: Floats, method: str) -> Floats:
-    """Longest steps [s] of starts (n, 4) by default, shape (n,).
-
-    Six tenths of the coarse step at which :func:`fastmech.basins.label.labels_of` begins, and no longer than
-    is stable for the scene, as far down as that function goes.
-    """
-    coarse = coarse_steps(reduce(scene), starts)
-    finest = coarse * SUBSTEPS[0] / SUBSTEPS[-1]
-    share = 0.5 * MEASURING if isinstance(find_method(method), ImplicitRungeKutta) else MEASURING
-    return np.asarray(np.clip(0.9 * step_limit(scene, method), finest, share * coarse))
-
-
 def refuse_meeting_balls(
-    scene: Scene, equilibria: Equilibria, radius: float, which: Sequence[int] | range
+    scene: Scene | Mechanism, equilibria: Any, radius: float, which: Sequence[int] | range
 ) -> None:
     """Refuse a ball of return about one of some equilibria that reaches half way to another.
 
     Raises:
         InputError: it does.
     """
-    angles = np.column_stack([equilibria.phi, equilibria.theta])
+    places = equilibria.position
+    turning = [c.periodic for c in scene.coordinates] if isinstance(scene, Mechanism) else [True, True]
     for index in which:
-        away = np.delete(angles, index, axis=0) - angles[index]
-        away -= 2.0 * np.pi * np.round(away / (2.0 * np.pi))
-        sizes = size_at(scene, *angles[index])(np.concatenate([away, np.zeros_like(away)], axis=1))
+        away = np.delete(places, index, axis=0) - places[index]
+        away[:, turning] -= 2.0 * np.pi * np.round(away[:, turning] / (2.0 * np.pi))
+        size = size_of(scene, equilibria[index])
+        sizes = size(np.concatenate([away, np.zeros_like(away)], axis=1))
         if radius > 0.5 * (nearest := float(sizes.min(initial=np.inf))):
             raise InputError(
                 f"return_radius = {radius:g} rad: must not exceed {0.5 * nearest:.3g} rad, "
@@ -291,11 +282,11 @@ def refuse_meeting_balls(
             )
 
 
-def _starts_in_ball(seed: int, index: int, n: int, chosen: range) -> Floats:
+def _starts_in_ball(seed: int, index: int, n: int, chosen: range, dim: int) -> Floats:
     """Points ``chosen`` of n in the unit ball, from streams that no other seed or equilibrium has."""
     first, last = chosen.start // STREAM, max(chosen.start, chosen.stop - 1) // STREAM
     streams = [
-        uniform_ball(np.random.default_rng([seed, index, 0, k]), min(STREAM, n - k * STREAM))
+        uniform_ball(np.random.default_rng([seed, index, 0, k]), min(STREAM, n - k * STREAM), dim)
         for k in range(first, last + 1)
     ]
     offset = first * STREAM
@@ -303,6 +294,6 @@ def _starts_in_ball(seed: int, index: int, n: int, chosen: range) -> Floats:
 
 
 def _observation(center: Floats, size: Size, return_radius: float) -> Observation:
-    a = size.metric
-    params = [center[0], center[1], a[0, 0], a[0, 1], a[1, 1], 1.0 / size.omega**2, return_radius**2]
-    return Observation(observe_departure, np.array(params), np.zeros(3))
+    n = len(center) // 2
+    params = [*center[:n], *size.metric.ravel(), 1.0 / size.omega**2, return_radius**2]
+    return Observation(observe_departure, np.array(params), np.zeros(1 + n))

@@ -15,16 +15,17 @@ from numpy.typing import ArrayLike
 
 from fastmech.basins.copies import copy_labels, label_name
 from fastmech.basins.measures.labels import Floats, LabelOf, ask, check_point
-from fastmech.basins.measures.norm import kinetic_norm, norm_on
-from fastmech.basins.steps import coarse_steps, method_for
-from fastmech.disturbance.motion import damped_times, require_constant_force
+from fastmech.basins.measures.norm import norm_on
+from fastmech.capture.select import certificate_of
+from fastmech.disturbance.motion import equilibria_to_disturb
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.system import System
-from fastmech.equilibria.find import Equilibrium, find_equilibria
+from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError
-from fastmech.mechanism.coefficients import reduce
-from fastmech.scene import Scene, require_scene
+from fastmech.models.equilibria import RestingPlace
+from fastmech.models.mechanism import Mechanism
+from fastmech.scene import Scene
 
 #: Points between two starts whose labels are asked for at once.
 SECTIONS = 15
@@ -54,7 +55,7 @@ class EdgeTrack:
 
 
 def track_edge(
-    scene: Scene | System,
+    scene: Scene | Mechanism | System,
     inside: ArrayLike,
     outside: ArrayLike,
     label_of: LabelOf | None = None,
@@ -91,18 +92,20 @@ def track_edge(
     Raises:
         InputError: an argument is wrong, the force decays, or the starts' labels are not two known ones.
     """
-    if isinstance(scene, Scene):
-        require_constant_force(scene)
+    certificate = None
+    if isinstance(scene, Scene | Mechanism):
+        equilibria_to_disturb(scene)
+        certificate = certificate_of(scene)
         label_of = label_of or copy_labels(scene)
-        norm = kinetic_norm(scene, find_equilibria(scene)[0]) if norm is None else norm
+        norm = certificate.size(certificate.tree.wells[0]).to_ball if norm is None else norm
     if label_of is None or norm is None:
-        raise InputError("label_of, norm: missing; only a scene has them by default")
+        raise InputError("label_of, norm: missing; only a scene or a mechanism has them by default")
     a = check_point("inside", inside)
     b = check_point("outside", outside, a.size)
     if dt is None:
-        if not isinstance(scene, Scene):
+        if certificate is None:
             raise InputError("dt: missing; a system needs its longest step in s")
-        dt = FINER * float(coarse_steps(reduce(scene), np.stack([a, b])).min())
+        dt = FINER * float(certificate.coarse_steps(np.stack([a, b])).min())
     matrix = norm_on(norm, a.size)
     t_end = checks.number("t_end", t_end, "s", above=0.0)
     near = checks.number("near", near, "", above=0.0)
@@ -121,9 +124,9 @@ def track_edge(
     times, states, gaps = [], [], []
     t, moved, lost = 0.0, np.inf, False
     looks, at_first = interval * np.arange(1, OUTPUTS + 1), np.zeros(0)
-    if isinstance(scene, Scene):
-        method = method_for(scene, method)
-        at_first = damped_times(scene, method, min(dt, interval))
+    if certificate is not None:
+        method = certificate.method(method)
+        at_first = certificate.damped_times(method, min(dt, interval))
     while True:
         a, b = _bisect(label_of, first, a, b, float(distance(a, b)), near)
         times.append(t)
@@ -149,28 +152,23 @@ def track_edge(
     )
 
 
-def saddle_at(scene: Scene, state: ArrayLike) -> tuple[Equilibrium, float]:
-    """The index-1 saddle of a scene nearest to a state (4,), and its distance [rad, rad/s as they are].
+def saddle_at(scene: Scene | Mechanism, state: ArrayLike) -> tuple[Equilibrium | RestingPlace, float]:
+    """The index-1 saddle nearest to a state (states,), and its distance in coordinates and rates as they are.
 
     Angles are compared up to full turns.
 
     Raises:
-        InputError: the force decays, or the state is not four finite numbers.
+        InputError: a load changes, or the state is not one of finite numbers.
     """
-    require_scene(scene)
-    require_constant_force(scene)
-    y = check_point("state", state, 4)
-    best: tuple[Equilibrium, float] | None = None
-    for e in find_equilibria(scene):
-        if e.morse_index == 1:
-            angles = y[:2] - np.array([e.phi, e.theta])
-            angles -= 2.0 * np.pi * np.round(angles / (2.0 * np.pi))
-            away = float(np.linalg.norm([*angles, *y[2:]]))
-            if best is None or away < best[1]:
-                best = e, away
-    if best is None:
+    equilibria, certificate = equilibria_to_disturb(scene), certificate_of(scene)
+    places = certificate.places
+    y = check_point("state", state, places.shape[1])
+    away = np.linalg.norm(certificate.away(places, y), axis=1)
+    away[np.asarray([e.morse_index != 1 for e in equilibria])] = np.inf
+    nearest = int(np.argmin(away))
+    if not np.isfinite(away[nearest]):
         raise InputError("scene: has no saddle with one falling direction")
-    return best
+    return equilibria[nearest], float(away[nearest])
 
 
 def _sides(label_of: LabelOf, a: Floats, b: Floats) -> tuple[int, Floats, Floats] | None:

@@ -16,12 +16,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.atlas.map import map_equilibria
-from fastmech.basins.label import label_starts, require_damper
+from fastmech.basins.label import label_starts
 from fastmech.basins.measures.fractions import basin_stability
 from fastmech.basins.measures.integrity import integrity
 from fastmech.basins.measures.labels import Floats, Integers, check_axes, check_point
 from fastmech.basins.measures.norm import check_angles, kinetic_norm, norm_on, state_index
 from fastmech.basins.shock import minimal_shock
+from fastmech.capture.select import require_damper
 from fastmech.disturbance.motion import require_constant_force
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress

@@ -12,7 +12,6 @@ damper stops part of a motion as quickly: steps are as short at first, and then 
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -21,37 +20,22 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.atlas.wells import ROUNDING
 from fastmech.basins.ladder import SUBSTEPS, climb, lingering, tell_the_same
 from fastmech.basins.measures.norm import FEW_TURNS, beyond_turns
 from fastmech.basins.runs import Paths, follow, rounds_until
-from fastmech.basins.steps import (
-    PHASE,
-    coarse_steps,
-    gone_at_once,
-    highest_frequency,
-    method_for,
-    shortest_step,
-    step_of_fading,
-)
-from fastmech.capture.barriers import BarrierTree
-from fastmech.capture.certificate import Certificate, certificate_of
-from fastmech.disturbance.motion import damped_times
-from fastmech.disturbance.size import confining_energy
+from fastmech.capture.certificate import Certificate
+from fastmech.capture.select import certificate_of, require_damper
 from fastmech.ensembles import checks
-from fastmech.ensembles.energy_bounds import breaks_energy_bounds
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import FAILURES, LABELS, Status, counts
 from fastmech.ensembles.threads import thread_count
-from fastmech.errors import InputError, StepWarning
+from fastmech.errors import StepWarning
 from fastmech.integrators.method import Method
 from fastmech.integrators.methods import find_method
-from fastmech.mechanism.coefficients import reduce
-from fastmech.mechanism.lagrange import unit
-from fastmech.scene import Scene, require_scene
-from fastmech.step_limits.warning import is_beyond, warn_of_step
+from fastmech.models.mechanism import Mechanism
+from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -83,9 +67,9 @@ START_NUMBERS = 20
 class Labels:
     """Where n starts end; printed, how many end where, and when."""
 
-    tree: BarrierTree | None  #: wells, barriers and equilibria; of a system of your own: None
+    tree: Any  #: wells, barriers and equilibria; of a system of your own: None
     well: NDArray[np.int8]  #: index of the well among the equilibria, -1: no label; shape (n,)
-    turns: NDArray[np.int32]  #: full turns of phi and theta of that well from its listed place, (n, 2)
+    turns: NDArray[np.int32]  #: full turns of each coordinate of that well from its listed place, (n, coords)
     time: Floats  #: of capture [s], NaN: not captured; the end of a step; (n,)
     settle_time: Floats | None  #: s, from then on within the settling ball; NaN: not by t_end; (n,)
     status: NDArray[np.int8]  #: :class:`Status`, (n,)
@@ -108,9 +92,8 @@ def told_ends(what: str, found: Any) -> str:
     statuses = ", ".join(f"{count:,} {name}" for name, count in found.counts.items() if count)
     lines = [f"{what}: {statuses}"]
     for k in order[:MOST_LINES]:
-        e = None if found.tree is None else found.tree.equilibria[int(known[k])]
-        place = "" if e is None else f" at phi = {e.phi:.4g}, theta = {e.theta:.4g} rad"
-        name = f"code {known[k]}" if e is None else f"well {known[k]}"
+        place = "" if found.tree is None else f" at {found.tree.equilibria.place(int(known[k]))}"
+        name = f"code {known[k]}" if found.tree is None else f"well {known[k]}"
         lines.append(f"  {name}{place}: {number[k]:,} ({number[k] / n:.1%})")
     if order.size > MOST_LINES:
         lines.append(f"  {order.size - MOST_LINES} more: {number[order[MOST_LINES:]].sum():,}")
@@ -121,7 +104,7 @@ def told_ends(what: str, found: Any) -> str:
 
 
 def labels_of(
-    scene: Scene,
+    scene: Scene | Mechanism,
     starts: ArrayLike,
     t_end: float = 60.0,
     *,
@@ -135,8 +118,8 @@ def labels_of(
 
     Args:
         scene: the mechanism, with a damper. A decaying force leads to the wells of springs and weights.
-        starts: phi, theta [rad], phi', theta' [rad/s], shape (n, 4) or (4,); angles count their turns, and
-            more than four give a warning, if they may be degrees.
+        starts: phi, theta [rad], phi', theta' [rad/s], shape (n, 4) or (4,), of a ``Mechanism`` coordinates,
+            then rates; angles count their turns, and more than four give a warning, if they may be degrees.
         t_end: end of the run [s]; what is not captured by then is undecided.
         dt: coarsest step [s]: each path is computed with it and with two thirds of it, and with less where
             these differ. By default it follows from the scene's frequencies and the start's energy; paths
@@ -152,8 +135,10 @@ def labels_of(
     Raises:
         InputError: an argument is wrong, the scene has no damper, or its wells are not certain.
     """
-    states = checks.states("starts", starts, 4)
-    angles = np.abs(states[:, :2])
+    require_damper(scene)
+    turning = [c.periodic for c in scene.coordinates] if isinstance(scene, Mechanism) else [True, True]
+    states = checks.states("starts", starts, 2 * len(turning))
+    angles = np.abs(states[:, : len(turning)][:, turning])
     largest = float(np.max(angles, initial=0.0, where=np.isfinite(angles)))
     if 2.0 * np.pi * FEW_TURNS < largest <= MOST_DEGREES:
         warnings.warn(f"starts: {beyond_turns(largest)}", stacklevel=2)
@@ -171,32 +156,37 @@ class How(NamedTuple):
 
 
 def label_starts(
-    scene: Scene, states: Floats, t_end: float, how: How | None = None, progress: Progress | None = None
+    scene: Scene | Mechanism,
+    states: Floats,
+    t_end: float,
+    how: How | None = None,
+    progress: Progress | None = None,
 ) -> Labels:
-    """As :func:`labels_of`, of states (n, 4)."""
+    """As :func:`labels_of`, of states (n, states)."""
     dt, method, settle_radius, threads, ladder = How() if how is None else how
     require_damper(scene)
     checks.progress_function(progress, "starts")
     checks.memory(len(states), START_NUMBERS, f"starts: labels of {len(states):.3g}", "fewer")
-    begin, turned = _unwound(states)
     thread_count(threads)
     t_end = checks.number("t_end", t_end, "s", above=0.0)
-    method = method_for(scene, method)
-    formula, certificate = find_method(method), certificate_of(scene)
-    prelude = Prelude.of(certificate, formula, threads, t_end)
+    first = certificate_of(scene)
+    begin, turned = _unwound(states, first.periods)
+    method = first.method(method)
+    formula, certificate = find_method(method), first
+    prelude = Prelude.of(first, formula, threads, t_end)
     if prelude is not None:
         certificate, t_end = prelude.rest, t_end - prelude.span
     if dt is not None:
         dt = checks.number("dt", dt, "s", above=0.0)
-        warn_of_step([certificate.scene], dt, method)
+        certificate.warn_of_step(dt, method)
     if settle_radius is not None:
         settle_radius = checks.number("settle_radius", settle_radius, "rad", above=0.0)
     finite = finite_rows(begin)
-    coarse = coarse_steps(reduce(scene), begin) if dt is None else np.full(len(begin), dt)
-    found = Paths.empty(len(begin))
+    coarse = first.coarse_steps(begin) if dt is None else np.full(len(begin), dt)
+    found = Paths.empty(len(begin), len(first.names))
     status = np.where(finite, Status.UNDECIDED, Status.START_NOT_FINITE).astype(np.int8)
     settle = None if settle_radius is None else np.full(len(begin), np.nan)
-    shortest = np.inf if dt is not None else shortest_step(reduce(certificate.scene))
+    shortest = np.inf if dt is not None else certificate.shortest_step
     for some in pieces_of(len(begin)):
         again = some[finite[some]]
         while again.size:
@@ -214,7 +204,7 @@ def label_starts(
     captured = status == Status.CAPTURED
     return Labels(
         certificate.tree,
-        np.where(captured, np.append(-1, certificate.tree.wells)[found.code], -1).astype(np.int8),
+        np.append(-1, certificate.tree.wells)[np.where(captured, found.code, 0)].astype(np.int8),
         np.where(captured[:, None], found.turns + turned, 0).astype(np.int32),
         np.where(captured, found.time, np.nan),
         settle,
@@ -223,18 +213,18 @@ def label_starts(
     )
 
 
-def _unwound(starts: Floats) -> tuple[Floats, Integers]:
-    """Starts (n, 4) with their angles in one turn, and the full turns taken away (n, 2).
+def _unwound(starts: Floats, periods: Floats) -> tuple[Floats, Integers]:
+    """Starts (n, states) with their angles in one turn, and the full turns taken away (n, coordinates).
 
     Too many turns to count make a start NaN.
     """
-    angles = starts[:, :2]
+    angles = starts[:, : len(periods)]
     with np.errstate(invalid="ignore"):
-        turns = np.where(np.abs(angles) > np.pi, np.rint(angles / (2.0 * np.pi)), 0.0)
+        turns = np.where((np.abs(angles) > np.pi) & (periods > 0.0), np.rint(angles / (2.0 * np.pi)), 0.0)
     turns = np.where(np.abs(turns) <= MOST_TURNS, turns, np.nan)
     begin = starts.copy()
     for part in TURN:  # their products with the number of turns are exact
-        begin[:, :2] -= turns * part
+        begin[:, : len(periods)] -= turns * part
     return begin, np.nan_to_num(turns).astype(np.int64)
 
 
@@ -242,7 +232,7 @@ def _unwound(starts: Floats) -> tuple[Floats, Integers]:
 class Prelude:
     """The motion until a force that dies out at once is gone, and what the damper stops at once rests."""
 
-    scene: Scene
+    first: Certificate
     rest: Certificate  #: of what follows
     span: float  #: s
     step: float  #: coarsest [s]
@@ -254,26 +244,23 @@ class Prelude:
         cls, certificate: Certificate, method: Method, threads: int | None, t_end: float
     ) -> Prelude | None:
         """None where nothing is over so quickly, or not before ``t_end`` [s]."""
-        scene, rest, c = certificate.scene, certificate, reduce(certificate.scene)
-        span, step = 0.0, math.inf
-        if certificate.decays and gone_at_once(c):  # once all work that it can still do is less than rounding
-            rest = Certificate(scene.replace(F0=0.0, alpha=0.0), certificate.tree)
-            span = float(np.log(40.0 * abs(c.force) / (ROUNDING * rest.amplitudes)) / c.decay)
-            step = step_of_fading(c)
-        stopped = PHASE / highest_frequency(reduce(rest.scene))
-        if damped_times(scene, method.name, stopped).size:
-            span = max(span, stopped)
-        return cls(scene, rest, span, step, method, threads) if 0.0 < span < t_end else None
+        early = certificate.early(method)
+        return cls(certificate, *early, method, threads) if early is not None and early.span < t_end else None
 
     def after(self, starts: Floats, step: float, substeps: int) -> tuple[Floats, NDArray[np.int8]]:
         """States (n, 4) and statuses (n,) at its end, with so many substeps and none above ``step`` [s]."""
         longest = min(step, self.step) * SUBSTEPS[0] / substeps
         ratio = 1.0 + max(2.0 / substeps, FINEST_GROWTH)
-        times = np.append(damped_times(self.scene, self.method.name, self.span, ratio), self.span)
+        times = np.append(self.first.damped_times(self.method.name, self.span, ratio), self.span)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", StepWarning)
             run = integrate(
-                self.scene, starts, dt=longest, method=self.method.name, t_eval=times, threads=self.threads
+                self.first.system,
+                starts,
+                dt=longest,
+                method=self.method.name,
+                t_eval=times,
+                threads=self.threads,
             )
         return run.y[-1], run.status
 
@@ -283,20 +270,6 @@ def pieces_of(n: int) -> Iterator[NDArray[np.intp]]:
     pieces = max(-(-n // BATCH), min(PIECES, n // LEAST), 1)
     for piece in range(pieces):
         yield np.arange(piece, n, pieces)
-
-
-def require_damper(scene: Scene) -> None:
-    """Refuse a scene in which nothing comes to rest.
-
-    Raises:
-        InputError: ``beta`` is zero, or it is no scene.
-    """
-    require_scene(scene)
-    if scene.beta == 0.0:
-        raise InputError(
-            "scene.beta = 0: must be greater than 0 N s/m: without damper nothing comes to rest and there "
-            "is no attractor; fastmech.trapped tells which states can never leave their well"
-        )
 
 
 @dataclass
@@ -319,12 +292,12 @@ class Ladder:
     def grows(self, substeps: int) -> bool:
         """Whether so many substeps let damped motion grow."""
         step = SUBSTEPS[0] * self.coarse / substeps
-        return is_beyond(self.certificate.scene, step, self.t_end / step, self.method.name)
+        return self.certificate.is_beyond(step, self.t_end / step, self.method.name)
 
     def follow(self, starts: Floats, substeps: int, observer: Floats) -> Paths:
         """One computation; none where its step lets damped motion grow."""
         if self.grows(substeps):
-            paths = Paths.empty(len(starts))
+            paths = Paths.empty(len(starts), len(self.certificate.names))
             paths.status[:] = Status.STEP_TOO_LARGE
             return paths
         begin, status = self.begin(starts, substeps)
@@ -346,14 +319,13 @@ class Ladder:
 
     def label(self, begin: Floats, members: NDArray[np.intp], found: Paths, status: NDArray[np.int8]) -> None:
         """Find labels and statuses of some starts."""
-        c = reduce(self.certificate.scene if self.prelude is None else self.prelude.scene)
-        push = c.force if self.certificate.decays else 0.0
+        first = self.certificate if self.prelude is None else self.prelude.first
         climb(
             self.certificate,
             members,
             lambda some, substeps: self.follow(begin[some], substeps, self.observer),
-            lambda _, coarse, fine: tell_the_same(self.certificate, coarse, fine, 0.5 * self.coarse, push),
-            lambda some, states: breaks_energy_bounds(c, begin[some], states),
+            lambda _, coarse, fine: tell_the_same(self.certificate, coarse, fine, 0.5 * self.coarse),
+            lambda some, states: first.impossible(begin[some], states),
             lambda some: self.lingers(begin[some]),
             found,
             status,
@@ -372,15 +344,10 @@ class Ladder:
         self, begin: Floats, members: NDArray[np.intp], found: Paths, status: NDArray[np.int8], radius: float
     ) -> Floats:
         """Times [s] from which on captured starts have no energy to leave the ball about their well."""
-        certificate, tree = self.certificate, self.certificate.tree
-        held = certificate.scene.replace(F0=tree.equilibria.force, alpha=0.0)
-        wells = [tree.equilibria[w] for w in tree.wells]
-        floor = certificate.reduced(np.array([e.energy for e in wells]))
-        energy = np.array([confining_energy(held, e, radius) for e in wells]) / unit(held)
-        levels = np.minimum(floor + energy, certificate.levels)
+        levels = np.minimum(self.certificate.confining(radius), self.certificate.levels)
         times = np.full(members.size, np.nan)
         captured = np.flatnonzero(status[members] == Status.CAPTURED)
-        paths = self.follow(begin[members[captured]], SUBSTEPS[1], certificate.params(levels))
+        paths = self.follow(begin[members[captured]], SUBSTEPS[1], self.certificate.params(levels))
         same = paths.code == found.code[members[captured]]
         times[captured[same]] = paths.time[same]
         return times

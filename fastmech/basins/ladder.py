@@ -11,14 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.basins.runs import Paths
-from fastmech.capture.certificate import Certificate
-from fastmech.disturbance.size import size_at
+from fastmech.capture.certificate import OUT, Certificate
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.status import Status
 from fastmech.errors import StepWarning
-from fastmech.mechanism.coefficients import Coefficients, reduce
-from fastmech.mechanism.reduced import metric_11, slider_ratio
 
 Floats = NDArray[np.float64]
 Indices: TypeAlias = NDArray[np.intp]
@@ -64,6 +61,7 @@ def climb(
         found.put(ends, last)
         captured = settled[done] & (last.code > 0)
         status[ends] = np.where(captured, Status.CAPTURED, Status.UNDECIDED)
+        status[ends[captured & (last.code == OUT)]] = Status.OUT_OF_RANGE
         free = np.flatnonzero(last.code == 0)
         status[ends[free[near_saddle(certificate, last.state[free])]]] = Status.AT_SADDLE
         # Steps that do not agree: a stable manifold between the paths leads them to its equilibrium first.
@@ -85,71 +83,41 @@ def climb(
 
 
 def tell_the_same(
-    certificate: Certificate, coarse: Paths, fine: Paths, longest: float, push: Floats | float
+    certificate: Certificate, coarse: Paths, fine: Paths, longest: float, push: Floats | None = None
 ) -> NDArray[np.bool_]:
     """Which paths are not captured either time, or captured both times beyond their difference.
 
     Args:
-        certificate: of the scene.
+        certificate: of the system.
         coarse, fine: the two computations.
         longest: by how much the times at which they stop may differ [s].
-        push: decaying force over m2 l that the bounding energies count with, 0 where there is none [1/s^2].
+        push: of a scene, the decaying force over m2 l that the bounding energies count with [1/s^2].
     """
     finite = finite_rows(coarse.state) & finite_rows(fine.state)
     same = (coarse.code == fine.code) & (coarse.turns == fine.turns).all(axis=1) & finite
     same &= np.abs(coarse.stop - fine.stop) < longest
     apart = np.abs(np.where(finite.reshape(-1, 1), coarse.state - fine.state, np.inf))
-    level = np.append(np.inf, certificate.levels)[fine.code]
+    held = (fine.code > 0) & (fine.code != OUT)
+    level = np.append(np.inf, certificate.levels)[np.where(held, fine.code, 0)]
     with np.errstate(invalid="ignore"):
-        room = energy_change(reduce(certificate.scene), np.abs(push), fine.state, apart)
-        proved = room < level - fine.energy
-    return np.asarray(same & (proved | (fine.code == 0)))
-
-
-def energy_change(c: Coefficients, push: Floats | float, states: Floats, apart: Floats) -> Floats:
-    """Bound on how much the bounding energy of states (n, 4) changes over the box of half-widths ``apart``.
-
-    Over m2 l^2 [1/s^2]. The change of U is at most its largest slope times the way; T is quadratic in the
-    rates with coefficients whose slopes are at most ``slider max|k k'|`` and 1.
-    """
-    dphi, dtheta, du, dv = apart.T
-    slope = (
-        np.hypot(c.lift, c.force) * dphi + np.hypot(c.gravity, c.force) * dtheta + c.spring * (dphi + dtheta)
-    )
-    slope = slope + push * (dphi + dtheta)
-    angles = np.linspace(-np.pi, np.pi, 721)
-    k, dk = slider_ratio(np.sin(angles), np.cos(angles))
-    a11 = metric_11(c.mass, c.slider, float(np.abs(k).max()))
-    u, v = np.abs(states[:, 2]) + du, np.abs(states[:, 3]) + dv
-    kinetic = (c.slider * float(np.abs(k * dk).max()) * u * u + u * v) * dphi + u * v * dtheta
-    return np.asarray(slope + kinetic + (a11 * u + v) * du + (u + v) * dv)
+        proved = certificate.change(fine.state, apart, push) < level - fine.energy
+    return np.asarray(same & (proved | ~held))
 
 
 def near_saddle(certificate: Certificate, states: Floats) -> NDArray[np.bool_]:
-    """Which states (n, 4) rest at an unstable equilibrium.
+    """Which states (n, dim) rest at an unstable equilibrium.
 
     Beside a fold, a motion that creeps between two equilibria is near both: near is a tenth of the way to
     the next one.
     """
-    scene, equilibria = certificate.scene, certificate.tree.equilibria
-    held = scene.replace(F0=equilibria.force, alpha=0.0)
-    near = np.zeros(len(states), dtype=np.bool_)
-    places = np.zeros((len(equilibria), 4))
-    places[:, 0], places[:, 1] = equilibria.phi, equilibria.theta
-    for place, e in zip(places, equilibria, strict=True):
-        if e.kind != "minimum":
-            size = size_at(held, e.phi, e.theta)
-            others = np.sort(size(_away(places, place)))[1:]
-            near |= size(_away(states, place)) < min(AT_SADDLE, 0.1 * float(others.min(initial=np.inf)))
+    near, places = np.zeros(len(states), dtype=np.bool_), certificate.places
+    for k, place in enumerate(places):
+        if k not in certificate.tree.wells:
+            size = certificate.size(k)
+            others = np.sort(size(certificate.away(places, place)))[1:]
+            most = min(AT_SADDLE, 0.1 * float(others.min(initial=np.inf)))
+            near |= size(certificate.away(states, place)) < most
     return near
-
-
-def _away(states: Floats, place: Floats) -> Floats:
-    """Departures (n, 4) from the copy of a place that is nearest."""
-    away = states - place
-    with np.errstate(invalid="ignore"):
-        away[:, :2] -= 2.0 * np.pi * np.round(away[:, :2] / (2.0 * np.pi))
-    return away
 
 
 def lingering(
@@ -164,8 +132,8 @@ def lingering(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", StepWarning)
             run = integrate(
-                certificate.scene, starts[some], dt=dt, method=method, t_eval=times, threads=threads
+                certificate.system, starts[some], dt=dt, method=method, t_eval=times, threads=threads
             )
-        near = near_saddle(certificate, run.y.reshape(-1, 4)).reshape(times.size, -1)
+        near = near_saddle(certificate, run.y.reshape(-1, starts.shape[1])).reshape(times.size, -1)
         found[some] = near.any(axis=0)
     return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,12 +16,12 @@ from fastmech.basins.measures.labels import number_turns
 from fastmech.basins.measures.norm import check_angles
 from fastmech.basins.refine import LevelProgress, refine_grid
 from fastmech.basins.system import system_labels_of
-from fastmech.capture.barriers import BarrierTree
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import LABELS, Status, counts
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
+from fastmech.models.mechanism import Mechanism
 from fastmech.scene import STATE, Scene, nearest
 
 Floats = NDArray[np.float64]
@@ -38,9 +39,9 @@ class BasinMap:
 
     axes: dict[str, Floats]  #: values along each axis [rad, rad/s]
     fixed: dict[str, float]  #: the other coordinates of the starts
-    tree: BarrierTree | None  #: wells, barriers and equilibria; of a system of your own: None
+    tree: Any  #: wells, barriers and equilibria; of a system of your own: None
     well: NDArray[np.int8]  #: index of the well among the equilibria (a system's stop code), -1: no label
-    turns: NDArray[np.int32]  #: full turns of phi and theta of that well from its listed place, (..., 2)
+    turns: NDArray[np.int32]  #: full turns of each coordinate of that well from its place, (..., coordinates)
     time: Floats  #: of capture [s]; NaN: not captured, or not computed (refinement)
     settle_time: Floats | None  #: s, from then on within the settling ball; NaN as in ``time``
     status: NDArray[np.int8]  #: :class:`fastmech.ensembles.status.Status`
@@ -55,9 +56,9 @@ class BasinMap:
 
     @property
     def labels(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """One integer for each (well, turns), -1 without label, and the table (labels, 3) they point into.
+        """One integer for each (well, turns), -1 without label, and the table they point into.
 
-        The table is sorted by well, then turns of phi, then of theta.
+        The table (labels, 1 + coordinates) is sorted by well, then by turns of each coordinate.
         """
         return number_turns(self.well, self.turns)
 
@@ -67,7 +68,7 @@ class BasinMap:
 
 
 def map_basins(
-    scene: Scene | System,
+    scene: Scene | Mechanism | System,
     axes: Mapping[str, ArrayLike],
     t_end: float = 60.0,
     *,
@@ -105,8 +106,8 @@ def map_basins(
     Raises:
         InputError: an argument is wrong, the scene has no damper, or its wells are not certain.
     """
-    if not isinstance(scene, Scene | System):
-        raise InputError(f"scene = {shown(scene)}: must be a Scene or a System")
+    if not isinstance(scene, Scene | Mechanism | System):
+        raise InputError(f"scene = {shown(scene)}: must be a Scene, a Mechanism or a System")
     names = STATE if isinstance(scene, Scene) else tuple(scene.state)
     values = _checked_axes(axes, names, least=2 if isinstance(scene, Scene) else 1)
     checks.progress_function(progress, "starts")
@@ -120,11 +121,11 @@ def map_basins(
         )
     checks.memory(size, POINT_NUMBERS, f"axes: {size:.3g} starts", "fewer")
     own = _checked_parameters(scene, parameters or {}, shape)
-    collected = _Collected(size)
+    collected = _Collected(size, len(names) // 2 if not isinstance(scene, System) else 2)
 
     def compute(points: NDArray[np.intp], tell: Progress | None) -> NDArray[np.int64]:
         starts = grid_starts(values, held, names, points)
-        if isinstance(scene, Scene):
+        if not isinstance(scene, System):
             part = label_starts(scene, starts, t_end, How(dt, method, settle_radius, threads), tell)
         else:
             part = system_labels_of(
@@ -163,7 +164,7 @@ def map_basins(
         fixed=held,
         tree=collected.tree,
         well=collected.well[source].reshape(shape),
-        turns=collected.turns[source].reshape(*shape, 2),
+        turns=collected.turns[source].reshape(*shape, -1),
         time=collected.time.reshape(shape),
         settle_time=None if settle is None else settle.reshape(shape),
         status=collected.status[source].reshape(shape),
@@ -187,12 +188,12 @@ def grid_starts(
 class _Collected:
     """Labels of all points of a grid, filled piece by piece."""
 
-    def __init__(self, size: int) -> None:
+    def __init__(self, size: int, coordinates: int) -> None:
         self.well = np.full(size, -1, dtype=np.int8)
-        self.turns = np.zeros((size, 2), dtype=np.int32)
+        self.turns = np.zeros((size, coordinates), dtype=np.int32)
         self.time, self.settle = np.full(size, np.nan), np.full(size, np.nan)
         self.status = np.full(size, Status.UNDECIDED, dtype=np.int8)
-        self.tree: BarrierTree | None = None
+        self.tree: Any = None
         self.steps = 0
 
     def put(self, points: NDArray[np.intp], part: Labels) -> NDArray[np.int64]:
@@ -235,7 +236,7 @@ def _checked_axes(axes: Mapping[str, ArrayLike], names: tuple[str, ...], least: 
 
 
 def _checked_parameters(
-    scene: Scene | System, parameters: Mapping[str, ArrayLike], shape: tuple[int, ...]
+    scene: Scene | Mechanism | System, parameters: Mapping[str, ArrayLike], shape: tuple[int, ...]
 ) -> dict[str, Floats]:
     """Values of parameters at every point of a map.
 
@@ -244,7 +245,7 @@ def _checked_parameters(
     """
     checked = {}
     for name, values in parameters.items():
-        if isinstance(scene, Scene):
+        if not isinstance(scene, System):
             raise InputError("parameters: only a system's may differ between starts; a map is of one scene")
         if name not in scene.parameters:
             raise InputError(f"parameters.{name}: unknown name; {nearest(name, list(scene.parameters))}")

@@ -8,15 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.capture.certificate import Certificate
-from fastmech.capture.observe import CAPTURE_TIME, STOP_ENERGY, TURNS_PHI, TURNS_THETA
-from fastmech.ensembles.ends import STOP_CODE, STOP_TIME
+from fastmech.ensembles.ends import STOP_TIME
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.run import run_ensemble
 from fastmech.ensembles.spans import MOST_STEPS
 from fastmech.errors import InputError
 from fastmech.integrators.method import Method
-from fastmech.kernels.select import right_hand_side
-from fastmech.mechanism.coefficients import reduce
 
 Floats = NDArray[np.float64]
 
@@ -37,25 +34,25 @@ ONE_THREAD = 128
 class Paths:
     """Where n lanes came to; those not captured have the code 0."""
 
-    code: NDArray[np.int8]  #: number of the well, from 1
-    turns: NDArray[np.int32]  #: (n, 2)
+    code: NDArray[np.int8]  #: number of the well, from 1; ``OUT`` of range
+    turns: NDArray[np.int32]  #: (n, coordinates)
     time: Floats  #: of capture [s]
     stop: Floats  #: end of the computation [s]
-    energy: Floats  #: bounding energy there, over m2 l^2
-    state: Floats  #: state there, (n, 4)
+    energy: Floats  #: bounding energy there, in the certificate's unit
+    state: Floats  #: state there, (n, states)
     status: NDArray[np.int8]  #: :class:`fastmech.ensembles.status.Status` of the run, (n,)
     steps: int = 0  #: of all lanes together
 
     @classmethod
-    def empty(cls, n: int) -> Paths:
+    def empty(cls, n: int, coordinates: int = 2) -> Paths:
         """Nothing known yet."""
         return cls(
             np.zeros(n, dtype=np.int8),
-            np.zeros((n, 2), dtype=np.int32),
+            np.zeros((n, coordinates), dtype=np.int32),
             np.full(n, np.nan),
             np.full(n, np.nan),
             np.full(n, np.nan),
-            np.full((n, 4), np.nan),
+            np.full((n, 2 * coordinates), np.nan),
             np.zeros(n, dtype=np.int8),
         )
 
@@ -95,13 +92,12 @@ def follow(
     method: Method,
     threads: int | None,
 ) -> Paths:
-    """Follow starts (n, 4) until ``t_end`` [s] with so many steps a round.
+    """Follow starts (n, states) until ``t_end`` [s] with so many steps a round.
 
     ``rounds`` is a number that ``rounds_until`` gives, ``observer`` the observers' vector.
     """
-    c = reduce(certificate.scene)
-    rhs, params = right_hand_side(c), np.array(c, dtype=np.float64)
-    paths = Paths.empty(len(starts))
+    rhs, params = certificate.motion
+    paths = Paths.empty(len(starts), len(certificate.names))
     paths.state[:] = starts
     running, passed = np.arange(len(starts)), 0
     interval = t_end / rounds
@@ -113,22 +109,22 @@ def follow(
             rhs,
             params,
             paths.state[running],
-            [passed * interval, (passed + ahead) * interval],
+            [certificate.origin + passed * interval, certificate.origin + (passed + ahead) * interval],
             interval / substeps,
             method,
             certificate.observation(observer, stop_rounds * interval, call_rounds * substeps),
             threads=1 if running.size <= ONE_THREAD else threads,
             block_lanes=LATE_BLOCK if until == rounds else BLOCK,
         )
-        code = run.records[STOP_CODE].astype(np.int8)
-        stopped = code != 0
-        end = np.where(stopped, run.records[STOP_TIME], (passed + ahead) * interval)
+        noted = certificate.noted(run.records)
+        stopped = noted.code != 0
+        end = np.where(stopped, run.records[STOP_TIME] - certificate.origin, (passed + ahead) * interval)
         reached = Paths(
-            code,
-            run.records[[TURNS_PHI, TURNS_THETA]].T.astype(np.int32),
-            run.records[CAPTURE_TIME],
+            noted.code,
+            noted.turns,
+            noted.time,
             end,
-            run.records[STOP_ENERGY],
+            noted.energy,
             run.states[-1],
             run.status,
         )

@@ -19,6 +19,8 @@ from fastmech.basins.measures.norm import norm_on
 from fastmech.ensembles import checks
 from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError
+from fastmech.models.equilibria import RestingPlace
+from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
 
 #: Radii at which a ray is looked at before its first way out is narrowed down: at first, and once turned.
@@ -49,8 +51,8 @@ class Shock:
 
 
 def minimal_shock(
-    label_of: LabelOf | Scene,
-    attractor: ArrayLike | Equilibrium,
+    label_of: LabelOf | Scene | Mechanism,
+    attractor: ArrayLike | Equilibrium | RestingPlace,
     norm: ArrayLike | None = None,
     *,
     most: float,
@@ -94,8 +96,8 @@ def minimal_shock(
 
 
 def brute_force_shock(
-    label_of: LabelOf | Scene,
-    attractor: ArrayLike | Equilibrium,
+    label_of: LabelOf | Scene | Mechanism,
+    attractor: ArrayLike | Equilibrium | RestingPlace,
     norm: ArrayLike | None = None,
     *,
     most: float,
@@ -118,8 +120,8 @@ def brute_force_shock(
 
 
 def _rays_in_a_norm(
-    label_of: LabelOf | Scene,
-    attractor: ArrayLike | Equilibrium,
+    label_of: LabelOf | Scene | Mechanism,
+    attractor: ArrayLike | Equilibrium | RestingPlace,
     norm: ArrayLike | None,
     coordinates: Sequence[int] | None,
     most: float,

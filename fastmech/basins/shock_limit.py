@@ -21,18 +21,19 @@ from fastmech.basins.copies import copy_numbers, copy_of_label
 from fastmech.basins.label import How, label_starts
 from fastmech.basins.ladder import SUBSTEPS
 from fastmech.basins.measures.labels import Floats, Integers
-from fastmech.basins.steps import coarse_steps
-from fastmech.capture.certificate import certificate_of
-from fastmech.disturbance.motion import require_constant_force
+from fastmech.capture.certificate import Certificate
+from fastmech.capture.select import certificate_of
+from fastmech.disturbance.motion import equilibria_to_disturb, require_constant_force, state_jacobian
 from fastmech.ensembles import checks
-from fastmech.equilibria.find import Equilibria, Equilibrium
+from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError, shown
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.impulse import POINTS, Mobility, impulse_for, mobility, rates_after
-from fastmech.mechanism.lagrange import unit
+from fastmech.models.equilibria import RestingPlace
+from fastmech.models.mechanism import Mechanism
+from fastmech.models.stability import require_own
 from fastmech.scene import Scene
 from fastmech.stability.arguments import require_rest
-from fastmech.stability.linearize import jacobian
 
 #: The first grid: directions all around, and by how much an impulse is larger than the one before, where
 #: directions are searched and where there is one alone. Each further grid is twice as fine, or four times.
@@ -50,8 +51,8 @@ MOST_BLOWS, MOST_STEPS = 1 << 18, 200_000_000
 #: Blows that are followed together, in the order of their impulses.
 TOGETHER = 1 << 12
 
-#: Blows of a grid that are followed with all substeps where the first ones do not tell their end. Where none
-#: has left, so are further ones until the search has taken so many steps.
+#: Blows of a grid that are followed together with all substeps where the first ones do not tell their end,
+#: from the least upwards, until the search has taken so many steps.
 UNCERTAIN, FURTHER = 32, 50_000_000
 
 #: Blows are tried up to so many times the sum of the potential's amplitudes: beyond, motions turn and turn.
@@ -60,6 +61,9 @@ ENERGY = 30.0
 #: A blow is followed for so many times the slowest decay about wells and saddles: until it is captured, slow
 #: modes may have to lose most of their energy. And for so many of the coarsest steps at most.
 LONG, STEPS = 5.0, 20_000.0
+
+#: Share of the greatest mobility below which the least one is rounding.
+NO_MOBILITY = 1e-12
 
 #: Relative, of the impulse found, where directions are searched and where there is one alone.
 TOLERANCE, ALONE_TOLERANCE = 1e-4, 1e-5
@@ -86,7 +90,7 @@ class ShockLimit:
     proved: Blow  #: no smaller one leaves, in whatever direction, or in the one given
     found: Blow  #: the least that was found to leave; NaN: none was found
     end: (
-        tuple[int, tuple[int, int]] | None
+        tuple[int, tuple[int, ...]] | None
     )  #: equilibrium and turns of phi and theta where the found one ends
     undecided_from: float  #: least impulse tried whose end is not known [N s]; NaN: none
     tried_to: float  #: largest impulse of the search [N s]: beyond it nothing is known; NaN: no search
@@ -96,8 +100,8 @@ class ShockLimit:
 
 
 def shock_limit(
-    scene: Scene,
-    equilibrium: Equilibrium,
+    scene: Scene | Mechanism,
+    equilibrium: Equilibrium | RestingPlace,
     on: str = "M2",
     direction: float | None = None,
     *,
@@ -122,7 +126,8 @@ def shock_limit(
     Args:
         scene: the mechanism with a constant force, or none.
         equilibrium: one of its minima.
-        on: the point that is struck, ``"M1"``, ``"M2"`` or ``"M3"``.
+        on: the point that is struck, ``"M1"``, ``"M2"`` or ``"M3"``; one of a ``Mechanism``'s points, in
+            a plane.
         direction: of the impulse, from +x [rad]; all directions by default.
         t_end: end of every run [s]; what is not captured by then is not taken to have left. By default it
             follows from the slowest decay about wells and saddles.
@@ -136,7 +141,7 @@ def shock_limit(
     angle = None if direction is None else _direction(direction)
     certificate = certificate_of(scene)
     if t_end is None:
-        t_end = _long_enough(scene, certificate.tree.equilibria, place)
+        t_end = _long_enough(certificate, place)
     easiest = math.remainder(moves.direction, 2.0 * math.pi) if angle is None else angle
 
     def blow(impulse: float, direction: float) -> Blow:
@@ -148,13 +153,14 @@ def shock_limit(
     alone = ShockLimit(on, proved, nothing, None, math.nan, math.nan, 0, math.nan, math.nan)
     if math.isnan(proved.impulse):
         return replace(alone, proved=nothing)
-    if scene.beta == 0.0:
+    if not (scene.damped if isinstance(scene, Mechanism) else scene.beta):
         return alone
-    amplitudes = certificate.amplitudes * unit(scene)
+    amplitudes = certificate.amplitudes * certificate.joule
     # Where rounding leaves nothing of the depth, the search begins where rounding ends.
     low, high = max(depth, ROUNDING * amplitudes), ENERGY * amplitudes
     everywhere = angle is None and bool(moves.least > 0.0)
-    search = _Search(scene, place, rates_after(scene, place[:2], on, np.eye(2)), t_end, threads, everywhere)
+    rates = _rates_after(scene, place[: place.size // 2], on)
+    search = _Search(scene, place, rates, t_end, threads, everywhere)
     if search.own < 0:
         return replace(alone, undecided_from=proved.impulse, trajectories=1)
     lines = [easiest] if angle is not None else [easiest, math.remainder(easiest + math.pi, 2.0 * math.pi)]
@@ -165,7 +171,7 @@ def shock_limit(
     found, end = nothing, None
     if np.isfinite(search.size):
         found = blow(search.size, search.angle if angle is None else angle)
-        end = copy_of_label(search.label)
+        end = copy_of_label(search.label, len(certificate.names))
     unknown = search.unknown if np.isfinite(search.unknown) else math.nan
     return ShockLimit(on, proved, found, end, unknown, most, search.blows, *search.apart)
 
@@ -184,9 +190,9 @@ def _direction(given: float) -> float:
 class _Search:
     """The least blow found to leave, and what was done to find it."""
 
-    scene: Scene
-    place: Floats  #: state of rest (4,)
-    rates: Floats  #: rates after 1 N s along x and along y, (2, 2)
+    scene: Scene | Mechanism
+    place: Floats  #: state of rest (states,)
+    rates: Floats  #: rates after 1 N s along x and along y, (2, coordinates)
     t_end: float
     threads: int | None
     everywhere: bool  #: whether directions are searched
@@ -204,7 +210,8 @@ class _Search:
     def ends(self, angles: Floats, sizes: Floats, ladder: tuple[int, ...]) -> Integers:
         """Labels (n,) after blows; the least one that leaves is kept."""
         starts = np.tile(self.place, (sizes.size, 1))
-        starts[:, 2:] = (sizes * np.stack([np.cos(angles), np.sin(angles)])).T @ self.rates
+        blows = sizes * np.stack([np.cos(angles), np.sin(angles)])
+        starts[:, self.place.size // 2 :] = blows.T @ self.rates
         found = label_starts(self.scene, starts, self.t_end, How(threads=self.threads, ladder=ladder))
         labels = copy_numbers(found)
         self.blows, self.steps = self.blows + sizes.size, self.steps + found.steps
@@ -256,10 +263,11 @@ class _Search:
         left = np.concatenate([*uncertain, order[:0]])
         left, first = left[sizes[left] < self.size], 0
         self.unknown = math.inf
-        while left.size and (first == 0 or (not np.isfinite(self.size) and self.steps < FURTHER)):
+        while left.size and (first == 0 or self.steps < FURTHER):
             some, left = left[:UNCERTAIN], left[UNCERTAIN:]
             labels, first = self.ends(angles[which[some]], sizes[some], SUBSTEPS), 1
             self.unknown = min(self.unknown, float(sizes[some[labels < 0]].min(initial=np.inf)))
+            left = left[sizes[left] < self.size]
         self.unknown = min(self.unknown, float(sizes[left].min(initial=np.inf)))
         return True
 
@@ -292,21 +300,44 @@ def proved_limits(scene: Scene, equilibrium: Equilibrium) -> dict[str, float]:
     return {on: float(impulse_for(depth, moves.greatest)) for on, (_, moves, depth) in wells.items()}
 
 
-def _well(scene: Scene, equilibrium: Equilibrium, on: str) -> tuple[Floats, Mobility, float]:
-    """State of rest (4,), mobility of the point there, and the well's depth less rounding [J]."""
-    require_rest(scene, equilibrium)
-    require_constant_force(scene)
-    _require_point(on)
+def _well(
+    scene: Scene | Mechanism, equilibrium: Equilibrium | RestingPlace, on: str
+) -> tuple[Floats, Mobility, float]:
+    """State of rest (states,), mobility of the point there, and the well's depth less rounding [J]."""
+    if isinstance(scene, Mechanism):
+        equilibria_to_disturb(scene)
+    else:
+        require_rest(scene, equilibrium)
+        require_constant_force(scene)
+        _require_point(on)
     certificate = certificate_of(scene)
     equilibria, wells = certificate.tree.equilibria, certificate.tree.wells
     index = equilibria.index_of(equilibrium)
-    e = equilibria[index]
     if index not in wells:
-        raise InputError(f"equilibrium: is a {e.kind}, must be a minimum")
-    c = reduce(scene)
-    room = certificate.levels[wells.index(index)] - float(certificate.reduced(np.array(e.energy)))
-    place = np.array([e.phi, e.theta, 0.0, 0.0])
-    return place, mobility(scene.m2, c.mass, c.slider, e.phi, e.theta, on), max(room, 0.0) * unit(scene)
+        raise InputError(f"equilibrium: is a {equilibria[index].kind}, must be a minimum")
+    place = certificate.places[index]
+    room = (certificate.levels[wells.index(index)] - certificate.energies[index]) * certificate.joule
+    return place, _mobility(scene, place[: place.size // 2], on), max(float(room), 0.0)
+
+
+def _mobility(scene: Scene | Mechanism, q: Floats, on: str) -> Mobility:
+    """Of a point at a position (coordinates,)."""
+    if isinstance(scene, Scene):
+        c = reduce(scene)
+        return mobility(scene.m2, c.mass, c.slider, q[0], q[1], on)
+    B = scene.moved(on, q)
+    if len(B) != 2:
+        raise InputError(f"on = {shown(on)}: must be a point in a plane")
+    values, vectors = np.linalg.eigh(B @ np.linalg.solve(scene.metric(q), B.T))
+    least = values[0] if values[0] > NO_MOBILITY * values[1] else 0.0
+    return Mobility(values[1], np.asarray(least), np.arctan2(vectors[1, 1], vectors[0, 1]))
+
+
+def _rates_after(scene: Scene | Mechanism, q: Floats, on: str) -> Floats:
+    """Rates after 1 N s along x and along y on a point of the resting mechanism, (2, coordinates)."""
+    if isinstance(scene, Scene):
+        return rates_after(scene, q, on, np.eye(2))
+    return np.asarray(np.linalg.solve(scene.metric(q), scene.moved(on, q).T).T)
 
 
 def _require_point(on: str) -> None:
@@ -314,18 +345,23 @@ def _require_point(on: str) -> None:
         raise InputError(f"on = {shown(on)}: must be one of {', '.join(POINTS)}")
 
 
-def _long_enough(scene: Scene, equilibria: Equilibria, place: Floats) -> float:
+def _long_enough(certificate: Certificate, place: Floats) -> float:
     """For how long a blow is followed [s]."""
-    states = [jacobian(scene, e) for e in equilibria if e.morse_index < 2]
+    equilibria = certificate.tree.equilibria
+    states = [state_jacobian(certificate.system, e) for e in equilibria if e.morse_index < 2]
     slowest = float(np.abs(np.linalg.eigvals(states).real).min())
-    longest = STEPS * float(coarse_steps(reduce(scene), place[None])[0])
+    longest = STEPS * float(certificate.coarse_steps(place[None])[0])
     return LONG / max(slowest, LONG / longest)
 
 
 def impulse_start(
-    scene: Scene, rest: Equilibrium, impulse: float, on: str = "M2", direction: float = 0.0
+    scene: Scene | Mechanism,
+    rest: Equilibrium | RestingPlace,
+    impulse: float,
+    on: str = "M2",
+    direction: float = 0.0,
 ) -> Floats:
-    """State (4,) after a blow at rest; on M2 along +x the limit of F0 exp(-alpha t) at impulse = F0/alpha.
+    """State (states,) after a blow at rest; on M2 along +x that of F0 exp(-alpha t), the faster it decays.
 
     The generalized momenta are B^T J, the rates a^-1 of them, paper (11).
 
@@ -333,16 +369,19 @@ def impulse_start(
         scene: the mechanism.
         rest: where it rests.
         impulse: N s.
-        on: the point that is struck, ``"M1"``, ``"M2"`` or ``"M3"``.
+        on: the point that is struck, ``"M1"``, ``"M2"`` or ``"M3"``; one of a ``Mechanism``'s points, in
+            a plane.
         direction: of the impulse, from +x [rad].
 
     Raises:
         InputError: an argument is wrong, or the scene does not rest there.
     """
-    require_rest(scene, rest)
-    _require_point(on)
+    if isinstance(scene, Mechanism):
+        require_own(scene, rest)
+    else:
+        require_rest(scene, rest)
+        _require_point(on)
     impulse = checks.number("impulse", impulse, "N s")
     direction = _direction(direction)
-    place = (rest.phi, rest.theta)
     along = np.array([np.cos(direction), np.sin(direction)])
-    return np.array([*place, *rates_after(scene, place, on, impulse * along)])
+    return np.concatenate([rest.position, impulse * along @ _rates_after(scene, rest.position, on)])

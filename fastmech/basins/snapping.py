@@ -19,11 +19,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.basins.label import require_damper
 from fastmech.basins.measures.labels import Floats, Integers, check_point
-from fastmech.basins.steps import method_for
 from fastmech.basins.switched import Switched
-from fastmech.capture.certificate import certificate_of
+from fastmech.capture.scene import scene_certificate
+from fastmech.capture.select import require_damper
+from fastmech.capture.steps import method_for
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import LABELS, Status, counts
@@ -144,7 +144,7 @@ def map_snapping(
         motions, MOTION_NUMBERS, f"F0, alpha: {motions:.3g} motions",
         'fewer, or in parts for files: fastmech run, kind = "snapping"',
     )  # fmt: skip
-    certificate = certificate_of(free)
+    certificate = scene_certificate(free)
     switched = Switched.of(
         certificate,
         np.array([rest.phi, rest.theta, 0.0, 0.0]),

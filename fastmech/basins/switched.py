@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from fastmech.basins.ladder import SUBSTEPS, Indices, climb, near_saddle, tell_the_same
 from fastmech.basins.runs import Paths
-from fastmech.basins.steps import coarse_steps
-from fastmech.capture.certificate import Certificate
+from fastmech.capture.scene import SceneCertificate
+from fastmech.capture.steps import coarse_steps
 from fastmech.ensembles.energy_bounds import breaks_energy_bounds, energies
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.run import Progress
@@ -37,7 +37,7 @@ class Switched:
     w's component and ``T + Pi + |F(t)| (2 l - sgn(F) x2(t))``, which no later T + Pi exceeds, is below B(w).
     """
 
-    certificate: Certificate
+    certificate: SceneCertificate
     start: Floats  #: (4,)
     F0: Floats  #: N
     alpha: Floats  #: 1/s
@@ -50,7 +50,7 @@ class Switched:
     @classmethod
     def of(
         cls,
-        certificate: Certificate,
+        certificate: SceneCertificate,
         start: Floats,
         F0: Floats,
         alpha: Floats,
@@ -61,8 +61,8 @@ class Switched:
         threads: int | None,
     ) -> Switched:
         """With the steps that follow from the forces, in octaves, where ``dt`` [s] does not say them."""
-        free = reduce(certificate.scene)
-        unit = certificate.scene.m2 * certificate.scene.l
+        free = reduce(certificate.system)
+        unit = certificate.system.m2 * certificate.system.l
         slowest = float(coarse_steps(free, start[None])[0])
         own = np.full(F0.size, dt if dt is not None else slowest)
         if dt is None:
@@ -98,7 +98,7 @@ class Switched:
 
     def push(self, members: Indices, t: Floats) -> Floats:
         """F(t)/(m2 l) [1/s^2]."""
-        scene = self.certificate.scene
+        scene = self.certificate.system
         return np.asarray(
             self.F0[members] * np.exp(-self.alpha[members] * t) / (scene.m2 * scene.l), dtype=np.float64
         )
@@ -134,7 +134,7 @@ class Switched:
         # A force that decays is at any time the start of one that is smaller by then.
         now = self.F0[lanes] * np.exp(-self.alpha[lanes] * clock[group])
         run = integrate(
-            self.certificate.scene,
+            self.certificate.system,
             paths.state[group],
             span,
             step,
@@ -152,7 +152,7 @@ class Switched:
         place = np.zeros(len(self.certificate.tree.equilibria) + 1, dtype=np.int8)
         place[list(self.certificate.tree.wells)] = np.arange(1, len(self.certificate.tree.wells) + 1)
         code = place[captured.well]
-        bound = energies(reduce(self.certificate.scene)._replace(force=0.0), state)[0]
+        bound = energies(reduce(self.certificate.system)._replace(force=0.0), state)[0]
         push = self.push(members[running], clock[running])
         bound = bound + 2.0 * np.abs(push) - push * (np.cos(state[:, 0]) - np.sin(state[:, 1]))
         held = (code > 0) & (bound < np.append(-np.inf, self.certificate.levels)[code])
@@ -168,7 +168,7 @@ class Switched:
 
     def impossible(self, members: Indices, states: Floats) -> NDArray[np.bool_]:
         """Which have energies that the force cannot have given."""
-        scene = self.certificate.scene
+        scene = self.certificate.system
         own = reduce(scene)._replace(
             force=self.F0[members] / (scene.m2 * scene.l),  # type: ignore[arg-type]
             decay=self.alpha[members],  # type: ignore[arg-type]

@@ -1,96 +1,91 @@
-"""The capture certificate of a scene: from which energy on, and where, a motion belongs to a well for good.
+"""The capture certificate: from which energy on, and where, a motion belongs to a well for good.
 
 A motion whose bounding energy is below B(w) and whose position lies in w's component of {U < B(w)} ends in
-w, since it can never have the energy to leave that component; B(w) is the well's barrier on the plane of
-unwrapped angles (``barriers``). The certificate is about the path as it was computed.
+w, since it can never have the energy to leave that component; B(w) is the well's barrier on unwrapped angles.
+The certificate is about the path as it was computed.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from fastmech.atlas.wells import ROUNDING
-from fastmech.capture.barriers import BarrierTree, barrier_tree, frozen_coefficients
-from fastmech.capture.locate import FIRST_WELL, INTERVAL, fill_cells, pack
-from fastmech.capture.observe import (
-    LEVEL,
-    ROWS,
-    TURNS_PHI,
-    TURNS_THETA,
-    observe_capture,
-    observe_capture_decaying,
-)
-from fastmech.ensembles import checks
-from fastmech.ensembles.ends import STOP_CODE
+from fastmech.disturbance.size import Size
 from fastmech.ensembles.run import CALL_STEPS_WITH_STOPS, Observation
-from fastmech.mechanism.coefficients import reduce
-from fastmech.mechanism.lagrange import unit
-from fastmech.scene import Scene, require_scene
+from fastmech.integrators.method import Method
 
 Floats = NDArray[np.float64]
+
+#: Code of a motion that has left the range of a coordinate, beside wells' numbers from 1.
+OUT = 127
 
 
 @dataclass(frozen=True)
 class Captured:
     """Wells that states belong to for good; arrays over n states."""
 
-    well: NDArray[np.int8]  #: index among the scene's equilibria, -1: not captured
-    turns: NDArray[np.int32]  #: full turns of phi and theta of that well from its listed place, (n, 2)
+    well: NDArray[np.int8]  #: index among the equilibria, -1: not captured
+    turns: NDArray[np.int32]  #: full turns of each coordinate of that well from its listed place, (n, coords)
 
 
-@dataclass(frozen=True)
-class Certificate:
-    """The barrier tree of a scene, ready for observers."""
+class Noted(NamedTuple):
+    """What observers have noted of n lanes."""
 
-    scene: Scene
-    tree: BarrierTree
+    code: NDArray[np.int8]  #: number of the well, from 1; ``OUT``; 0: none yet
+    turns: NDArray[np.int32]  #: (n, coordinates)
+    time: Floats  #: of capture [s]
+    energy: Floats  #: bounding energy at the stop
+
+
+class Early(NamedTuple):
+    """What is over long before motions come to rest, and asks for shorter steps until then."""
+
+    rest: Certificate  #: of what follows
+    span: float  #: s
+    step: float  #: coarsest [s]
+
+
+class Certificate(ABC):
+    """What is known of a system whose energy falls, for whoever follows its motions to rest.
+
+    Energies are in units of its own; states are coordinates, then rates.
+    """
+
+    system: Any  #: what :func:`fastmech.ensembles.integrate.integrate` takes
+    tree: Any  #: wells, barriers and equilibria
+    names: tuple[str, ...]  #: of the coordinates
+    units: tuple[str, ...]  #: of the coordinates, rad or m
+    periods: Floats  #: 2 pi of coordinates that turn fully, else 0 (coordinates,)
+    decays: bool  #: whether a load still changes
+    origin: float = 0.0  #: time [s] from which on motions are followed
+    joule: float  #: J of the unit that energies have here
+    amplitudes: float  #: how much U varies, in that unit: the scale of its rounding
 
     @property
-    def decays(self) -> bool:
-        """Whether the force decays."""
-        return self.scene.F0 != 0.0 and self.scene.alpha != 0.0
-
-    @property
-    def amplitudes(self) -> float:
-        """Sum of the potential's amplitudes over m2 l^2 [1/s^2]: the scale of its rounding."""
-        c = reduce(self.scene)
-        return abs(c.lift) + c.spring + c.gravity + 2.0 * abs(c.force)
-
-    @property
+    @abstractmethod
     def levels(self) -> Floats:
-        """Energy over m2 l^2, less the springs' constant, below which each well captures [1/s^2]."""
-        return self.reduced(self.tree.barrier) - ROUNDING * self.amplitudes
+        """Energies below which each well captures (wells,)."""
 
-    def reduced(self, energy: Floats) -> Floats:
-        """Energies [J] as kernels count them [1/s^2]."""
-        scene = self.scene
-        return np.asarray((energy - (scene.c1 + scene.c2) * scene.l**2) / unit(scene))
-
-    def params(self, levels: Floats) -> Floats:
-        """The observers' vector (see ``locate.pack``) with proved cells; its interval is still empty."""
-        wells, equilibria = list(self.tree.wells), self.tree.equilibria
-        amplitude, rate = (reduce(self.scene).force, self.scene.alpha) if self.decays else (0.0, 0.0)
-        params = pack(
-            frozen_coefficients(self.scene, equilibria),
-            amplitude,
-            rate,
-            equilibria.phi[wells],
-            equilibria.theta[wells],
-            self.tree.radius,
-            levels,
-        )
-        fill_cells(params)
-        return params
+    @property
+    @abstractmethod
+    def energies(self) -> Floats:
+        """Of the equilibria (count,)."""
 
     @cached_property
     def packed(self) -> Floats:
         """The observers' vector of the wells' own levels."""
         return self.params(self.levels)
 
+    @abstractmethod
+    def params(self, levels: Floats) -> Floats:
+        """The observers' vector; its interval is still empty."""
+
+    @abstractmethod
     def observation(
         self, params: Floats, interval: float, call_steps: int = CALL_STEPS_WITH_STOPS
     ) -> Observation:
@@ -98,49 +93,97 @@ class Certificate:
 
         They leave after at most ``call_steps`` steps. ``params`` is what the method of this name gives.
         """
-        own = params.copy()
-        own[INTERVAL] = interval
-        wells = len(self.tree.wells)
-        record = np.zeros(ROWS)
-        record[LEVEL] = params[FIRST_WELL + 3 * wells : FIRST_WELL + 4 * wells].max()
-        observe = observe_capture_decaying if self.decays else observe_capture
-        return Observation(observe, own, record, stops=True, call_steps=call_steps)
+
+    @abstractmethod
+    def noted(self, records: Floats) -> Noted:
+        """What is in an observer's record (rows, n)."""
+
+    @property
+    @abstractmethod
+    def motion(self) -> tuple[Any, Floats]:
+        """Right-hand side and parameters for :func:`fastmech.ensembles.run.run_ensemble`."""
+
+    @abstractmethod
+    def method(self, name: str | None) -> str:
+        """The method of this name, or the one by default."""
+
+    @abstractmethod
+    def warn_of_step(self, dt: float, method: str) -> None:
+        """Warn, in the caller's caller, if a step [s] cannot be right."""
+
+    @abstractmethod
+    def is_beyond(self, dt: float, steps: float, method: str) -> bool:
+        """Whether so many steps of dt [s] make motion grow that should die out."""
+
+    @abstractmethod
+    def coarse_steps(self, starts: Floats) -> Floats:
+        """Coarse step [s] of each start (n, states), shape (n,)."""
+
+    @property
+    @abstractmethod
+    def shortest_step(self) -> float:
+        """Shortest of the coarse steps by default [s]."""
+
+    @abstractmethod
+    def damped_times(self, method: str, until: float, ratio: float = 2.0) -> Floats:
+        """Times [s] before ``until`` at which an implicit method's first steps end."""
+
+    def early(self, method: Method) -> Early | None:
+        """What is over at once, if anything is."""
+        return None
+
+    @abstractmethod
+    def impossible(self, starts: Floats, states: Floats, threads: int | None = 1) -> NDArray[np.bool_]:
+        """Which motions from starts (n, states) have come to states that they cannot have (n,)."""
+
+    @abstractmethod
+    def change(self, states: Floats, apart: Floats, push: Floats | None = None) -> Floats:
+        """Bound on how much the bounding energy changes from states over boxes of these half-widths (n,)."""
+
+    @abstractmethod
+    def size(self, equilibrium: int) -> Size:
+        """The kinetic-energy norm at one of the equilibria."""
+
+    @property
+    @abstractmethod
+    def places(self) -> Floats:
+        """States of rest at the equilibria (count, states)."""
+
+    @abstractmethod
+    def confining(self, radius: float) -> Floats:
+        """Energies with which motions stay in the ball of a radius about each well, to second order."""
+
+    @abstractmethod
+    def measuring_steps(self, starts: Floats, method: str) -> Floats:
+        """Longest steps [s] of starts (n, states) for what is measured on the way, shape (n,)."""
+
+    @property
+    @abstractmethod
+    def slow_step(self) -> float:
+        """Coarse step of slow motions [s]."""
+
+    @abstractmethod
+    def formula(self, method: str) -> Method:
+        """A method that knows the Jacobian, if it needs one and there is one."""
+
+    def drives_rest(self, dt: float, steps: float, method: str) -> bool:
+        """Whether so many steps of dt [s] make motion grow, damped or not."""
+        return False
 
     def captured(self, states: Floats) -> Captured:
-        """Which states (n, 4) at t = 0 are captured already."""
+        """Which states (n, states) at t = 0 are captured already."""
         observation = self.observation(self.packed, 1.0)
         record = np.repeat(observation.record[:, None], len(states), axis=1)
         observation.observe(0.0, np.ascontiguousarray(states.T), observation.params, record)
-        return self.decode(record)
+        found = self.noted(record)
+        code = np.where(found.code == OUT, 0, found.code)
+        return Captured(np.append(-1, self.tree.wells)[code].astype(np.int8), found.turns)
 
-    def decode(self, record: Floats) -> Captured:
-        """Wells and turns from an observer's record (rows, n)."""
-        code = record[STOP_CODE].astype(np.int64)
-        well = np.append(-1, self.tree.wells)[code].astype(np.int8)
-        return Captured(well, record[[TURNS_PHI, TURNS_THETA]].T.astype(np.int32))
-
-
-@lru_cache(maxsize=16)
-def certificate_of(scene: Scene) -> Certificate:
-    """The capture certificate of a scene, kept for the next starts of the same scene.
-
-    Raises:
-        InputError: the scene's wells are not certain (see :func:`fastmech.capture.barriers.barrier_tree`).
-    """
-    return Certificate(scene, barrier_tree(scene))
-
-
-def trapped(scene: Scene, states: ArrayLike) -> Captured:
-    """Which states at t = 0 can never leave their well, whatever the damper does: the certificate at once.
-
-    With ``beta = 0`` nothing comes to rest, and this is all that can be said about wells.
-
-    Args:
-        scene: the mechanism. Where its force decays, the wells are those of springs and weights.
-        states: phi, theta [rad], phi', theta' [rad/s], shape (n, 4) or (4,).
-
-    Raises:
-        InputError: not states, or the scene's wells are not certain.
-    """
-    require_scene(scene)
-    return certificate_of(scene).captured(checks.states("states", states, 4))
+    def away(self, states: Floats, place: Floats) -> Floats:
+        """Departures (n, states) from the copy of a place that is nearest."""
+        away, n = states - place, len(self.periods)
+        turning = self.periods > 0.0
+        with np.errstate(invalid="ignore"):
+            turns = np.round(away[:, :n][:, turning] / (2.0 * np.pi))
+            away[:, np.flatnonzero(turning)] -= 2.0 * np.pi * turns
+        return away

@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.disturbance.motion import disturbed_motion, equilibria_to_disturb
-from fastmech.disturbance.size import Size, size_at, unit_directions
+from fastmech.disturbance.size import Size, size_of, unit_directions
 from fastmech.ensembles import checks
 from fastmech.equilibria.find import Equilibrium
+from fastmech.models.equilibria import RestingPlace
+from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -24,7 +26,7 @@ OUTPUTS = 200
 class LinearRange:
     """Largest sizes at which the linearized motion is within the tolerance, direction by direction."""
 
-    directions: Floats  #: disturbances of size 1 rad, shape (directions, 4)
+    directions: Floats  #: disturbances of size 1 rad, shape (directions, states)
     limit: Floats  #: rad, shape (directions,); 0: not even the smallest size tried, inf: every one
     size: Size  #: the norm
     horizon: float  #: s
@@ -32,8 +34,8 @@ class LinearRange:
 
 
 def linear_range(
-    scene: Scene,
-    equilibrium: Equilibrium,
+    scene: Scene | Mechanism,
+    equilibrium: Equilibrium | RestingPlace,
     *,
     horizon: float = 1.0,
     tolerance: float = 0.05,
@@ -61,14 +63,14 @@ def linear_range(
     count = checks.whole_number("directions", directions, least=1)
     seed = checks.whole_number("seed", seed, least=0)
     index = equilibria_to_disturb(scene).index_of(equilibrium)
-    size = size_at(scene, equilibrium.phi, equilibrium.theta)
+    size, dim = size_of(scene, equilibrium), 2 * len(equilibrium.position)
     rng = np.random.default_rng([seed, index, 1])
-    rays = size.from_ball(unit_directions(rng, count))[part or slice(None)]
+    rays = size.from_ball(unit_directions(rng, count, dim))[part or slice(None)]
     times = np.linspace(0.0, horizon, OUTPUTS + 1)
 
     def deviation(sizes: Floats) -> Floats:
         """Deviations at sizes (directions, k), one ray a row."""
-        starts = (sizes[..., None] * rays[:, None, :]).reshape(-1, 4)
+        starts = (sizes[..., None] * rays[:, None, :]).reshape(-1, dim)
         motion = disturbed_motion(scene, equilibrium, starts, times, dt=dt, threads=threads)
         apart = size(motion.nonlinear - motion.linearized).max(axis=0)
         with np.errstate(invalid="ignore"):

@@ -183,9 +183,12 @@ def integrate(
     step = checks.number("dt", DEFAULT_DT if dt is None else dt, "s", above=0.0)
     settings = Settings(formula, step, fitted_at, _precision(dtype, problem, formula))
     if not isinstance(scene, Scene):
-        return _trajectories(
-            problem, outputs, solve(Case(problem, starts, outputs, threads), settings, progress), settings
-        )
+        passed = outputs
+        if isinstance(scene, Mechanism):
+            passed = np.union1d(outputs, scene.kinks(float(outputs[-1])))
+        solution = solve(Case(problem, starts, passed, threads), settings, progress)
+        solution = replace(solution, y=solution.y[np.searchsorted(passed, outputs)])
+        return _trajectories(problem, outputs, solution, settings)
     warn_of_step(extreme_scenes(scene, own, problem), step, formula.name, starts)
     problem = watched(problem, starts, step, threads)
     solution = solve(Case(problem, starts, outputs, threads), settings, progress)

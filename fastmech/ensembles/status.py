@@ -24,6 +24,7 @@ class Status(IntEnum):
     AT_SADDLE = 7
     RETURNED = 8
     ELSEWHERE = 9
+    OUT_OF_RANGE = 10
 
     @property
     def advice(self) -> str:
@@ -44,12 +45,13 @@ _ADVICE = {
     Status.AT_SADDLE: "comes to an unstable equilibrium, and what follows is not decided",
     Status.RETURNED: "proved to end at its equilibrium without a full turn",
     Status.ELSEWHERE: "proved to end at another stable equilibrium, or at its own some turns further",
+    Status.OUT_OF_RANGE: "leaves the range of a coordinate, beyond which the mechanism is not described",
 }
 
 #: Statuses of motions that have failed; of labels; and of where disturbances end.
 FAILURES = (Status.NOT_FINITE, Status.STEP_TOO_LARGE, Status.NOT_CONVERGED, Status.START_NOT_FINITE)
-LABELS = (Status.CAPTURED, Status.UNDECIDED, Status.AT_SADDLE, *FAILURES)
-ENDS = (Status.RETURNED, Status.ELSEWHERE, Status.AT_SADDLE, Status.UNDECIDED, *FAILURES)
+LABELS = (Status.CAPTURED, Status.UNDECIDED, Status.AT_SADDLE, Status.OUT_OF_RANGE, *FAILURES)
+ENDS = (Status.RETURNED, Status.ELSEWHERE, Status.AT_SADDLE, Status.UNDECIDED, Status.OUT_OF_RANGE, *FAILURES)
 
 
 def counts(status: ArrayLike, kinds: Iterable[IntEnum]) -> dict[str, int]:

@@ -36,6 +36,11 @@ class Equilibrium:
     force: float  #: the frozen force F that it holds for [N]
 
     @property
+    def position(self) -> FloatArray:
+        """Both angles (2,) [rad]."""
+        return np.array([self.phi, self.theta])
+
+    @property
     def kind(self) -> str:
         """``minimum``, ``saddle``, ``maximum``; ``degenerate`` if the Hessian is singular within rounding."""
         return KINDS[self.morse_index]
@@ -85,17 +90,27 @@ class Equilibria(Sequence[Equilibrium]):
         if not isinstance(equilibrium, Equilibrium):
             raise InputError(f"equilibrium = {shown(equilibrium)}: must be one of fastmech.find_equilibria")
         # Where g = 0 the force alone may differ: the place is an equilibrium of both, its Hessian is not.
-        same = abs(equilibrium.force - self.force) <= 1e-9 * abs(self.force)
+        same = abs(equilibrium.force - self.force) <= 1e-12 * abs(self.force)
         for i, item in enumerate(self.items if same else ()):
-            away = np.hypot(
+            away = 2.0 * np.hypot(
                 np.sin((equilibrium.phi - item.phi) / 2), np.sin((equilibrium.theta - item.theta) / 2)
             )
-            if away <= 1e-9:
+            within = equilibrium.radius + item.radius  # both are near the same true one
+            if away <= (within if within < math.inf else 1e-9):
                 return i
         raise InputError(
             f"equilibrium = ({equilibrium.phi:g}, {equilibrium.theta:g}) rad, F = {equilibrium.force:g} N: "
             f"must be one of this scene's equilibria (F = {self.force:g} N)"
         )
+
+    @property
+    def position(self) -> FloatArray:
+        """Angles phi, theta (n, 2) [rad]."""
+        return np.array([item.position for item in self.items]).reshape(-1, 2)
+
+    def place(self, k: int) -> str:
+        """Where an equilibrium is, in words."""
+        return f"phi = {self.items[k].phi:.4g}, theta = {self.items[k].theta:.4g} rad"
 
     @property
     def phi(self) -> FloatArray:

@@ -21,6 +21,9 @@ from fastmech.jit import inlined_exactly
 
 Interval: TypeAlias = tuple[float, float]
 
+#: Names of what works on intervals.
+OPERATIONS = ("add", "sub", "neg", "mul", "div", "power", "sqrt", "sin", "cos", "exp", "log", "atan")
+
 #: Numbers beyond are not told from infinity: a few operations on others cannot overflow unseen.
 LARGEST = 1e300
 

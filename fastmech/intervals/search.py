@@ -18,10 +18,14 @@ from numba import types
 from fastmech.callee import CalleeType
 from fastmech.intervals.arithmetic import add, magnitude, mul, sub
 from fastmech.intervals.matrices import invert, orientation, positive_eigenvalues
-from fastmech.jit import CUBE, EXACT, MATRIX, called, kernel, lanes, named_tuple
+from fastmech.jit import CUBE, EXACT, MATRIX, VECTOR, called, kernel, lanes, named_tuple
 
 FORCES_SIGNATURE = types.boolean(MATRIX, MATRIX, MATRIX, CUBE)
 FORCES = CalleeType(FORCES_SIGNATURE)
+
+#: ``energy(q, v, p, found)``: the least and the greatest energy over a box of coordinates and rates.
+ENERGY_SIGNATURE = types.void(MATRIX, MATRIX, MATRIX, VECTOR)
+ENERGY = CalleeType(ENERGY_SIGNATURE)
 
 TWO_PI = 2.0 * np.pi
 

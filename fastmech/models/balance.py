@@ -1,18 +1,22 @@
-"""Forces at rest and their Jacobian in intervals: one kernel a mechanism, written from its expressions."""
+"""A mechanism's forces at rest, their Jacobian and its energy in intervals: kernels from expressions."""
 
 from __future__ import annotations
 
 from fractions import Fraction
-from functools import reduce
+from functools import lru_cache, reduce
 from math import inf, isfinite, nextafter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import sympy
 from sympy.simplify.fu import TR8
 
 from fastmech.errors import InputError, shown
 from fastmech.generated import new_module, run_module
+from fastmech.intervals import arithmetic
 from fastmech.models.statics import Statics
+
+if TYPE_CHECKING:
+    from fastmech.models.mechanism import Mechanism
 
 _SOURCE = '''"""Made by fastmech: forces of a mechanism at rest and their Jacobian, in intervals."""
 
@@ -25,6 +29,18 @@ from fastmech.jit import EXACT, kernel
 def forces(q, p, f, J):
 {body}
     return True
+'''
+
+_ENERGY = '''"""Made by fastmech: energy of a mechanism, loads at their means, in intervals."""
+
+from fastmech.intervals.arithmetic import add, atan, cos, div, exp, log, mul, neg, power, sin, sqrt, sub
+from fastmech.intervals.search import ENERGY_SIGNATURE
+from fastmech.jit import EXACT, kernel
+
+
+@kernel(ENERGY_SIGNATURE, **EXACT)
+def energy(q, v, p, found):
+{body}
 '''
 
 _FUNCTIONS = {
@@ -45,8 +61,67 @@ def balance_kernel(statics: Statics) -> Any:
     Raises:
         InputError: an expression has a function or a symbol of which no enclosure is known.
     """
-    text = source(statics)
-    return run_module(new_module("balance", text), text).forces
+    return _made("balance", source(statics)).forces
+
+
+def energy_kernel(mechanism: Mechanism) -> Any:
+    """``energy(q, v, p, found)`` writes the least and the greatest T + U, loads at their means, over a box.
+
+    Coordinates ``q`` and rates ``v`` (n, 2) and parameters ``p`` (count, 2) are intervals.
+
+    Raises:
+        InputError: as :func:`balance_kernel`.
+    """
+    statics = mechanism.statics()
+    names = _names(statics)
+    rates = [sympy.Symbol(f"{coordinate.symbol}_dot", real=True) for coordinate in statics.coordinates]
+    names |= {symbol: f"v{i}" for i, symbol in enumerate(rates)}
+    whole = mechanism.energy()
+    still = whole.xreplace(dict.fromkeys(rates, 0))
+    potential = min(still, _sums(still), key=sympy.count_ops)
+    shared, (kinetic, potential) = sympy.cse(
+        [whole - still, potential], symbols=sympy.numbered_symbols("x", real=True)
+    )
+    names |= {symbol: f"x{i}" for i, (symbol, _) in enumerate(shared)}
+    lines = [
+        *_unpacked(statics),
+        *(f"v{i} = v[{i}, 0], v[{i}, 1]" for i in range(len(rates))),
+        *(f"{names[symbol]} = {_text(expression, names)}" for symbol, expression in shared),
+        f"found[0], found[1] = add({_text(kinetic, names)}, {_text(potential, names)})",
+    ]
+    text = _ENERGY.format(body="\n".join(f"    {line}" for line in lines))
+    return _made("energy", text).energy
+
+
+def range_of(mechanism: Mechanism, expression: Any, domain: Any) -> tuple[float, float]:
+    """Bounds of an expression of coordinates and parameters over a box (n, 2 or more)."""
+    statics = mechanism.statics()
+    place: dict[str, Any] = {f"q{i}": (float(low), float(high)) for i, (low, high, *_) in enumerate(domain)}
+    place |= {f"p{i}": (value, value) for i, value in enumerate(mechanism.parameters.values())}
+    known = {name: getattr(arithmetic, name) for name in arithmetic.OPERATIONS}
+    found: tuple[float, float] = eval(_text(sympy.sympify(expression), _names(statics)), known | place)
+    return found
+
+
+@lru_cache(maxsize=256)
+def _made(kind: str, text: str) -> Any:
+    """The module of a text, run once."""
+    return run_module(new_module(kind, text), text)
+
+
+def _names(statics: Statics) -> dict[Any, str]:
+    """Coordinates and parameters by what the texts call them."""
+    names = {coordinate.symbol: f"q{i}" for i, coordinate in enumerate(statics.coordinates)}
+    return names | {symbol: f"p{i}" for i, symbol in enumerate(statics.parameters)}
+
+
+def _unpacked(statics: Statics) -> list[str]:
+    """Lines that make pairs of arrays' rows."""
+    return [
+        f"{k}{i} = {k}[{i}, 0], {k}[{i}, 1]"
+        for k, x in (("q", statics.coordinates), ("p", statics.parameters))
+        for i in range(len(x))
+    ]
 
 
 def source(statics: Statics) -> str:
@@ -59,18 +134,13 @@ def source(statics: Statics) -> str:
     ]
     forces = [min(force, _sums(force), key=sympy.count_ops) for force in forces]
     jacobian = [force.diff(symbol) for force in forces for symbol in q]
-    names = {symbol: f"q{i}" for i, symbol in enumerate(q)}
-    names |= {symbol: f"p{i}" for i, symbol in enumerate(statics.parameters)}
+    names = _names(statics)
     shared, outputs = sympy.cse([*forces, *jacobian], symbols=sympy.numbered_symbols("x", real=True))
     names |= {symbol: f"x{i}" for i, (symbol, _) in enumerate(shared)}
     needed = set().union(*(output.free_symbols for output in outputs[:n]))
     for symbol, expression in reversed(shared):
         needed |= expression.free_symbols if symbol in needed else set()
-    lines = [
-        f"{names[s]} = {k}[{i}, 0], {k}[{i}, 1]"
-        for k, x in (("q", q), ("p", statics.parameters))
-        for i, s in enumerate(x)
-    ]
+    lines = _unpacked(statics)
     written = {symbol: f"{names[symbol]} = {_text(expression, names)}" for symbol, expression in shared}
     lines += [written[symbol] for symbol, _ in shared if symbol in needed]
     for i, force in enumerate(outputs[:n]):

@@ -67,11 +67,31 @@ def equations(parts: Parts, q: Sequence[Any], v: Sequence[Any], means: Sequence[
     potential = _by_terms(parts.potential, q)
     for i in range(n):
         force = parts.forces[i] - sympy.diff(potential, q[i]) - sympy.diff(parts.dissipation, v[i])
-        forces.append(force + sum(f * moved[i] for f, (_, moved) in zip(loads, parts.loads, strict=True)))
+        forces.append(force + sum(f * moved[i] for f, (_, moved, _) in zip(loads, parts.loads, strict=True)))
         pairs = [(j, k) for j in range(n) for k in range(n)]
         gain.append(sum(sympy.diff(metric[j, k], q[i]) * v[j] * v[k] for j, k in pairs) / 2)
         inertia.append(sum(sympy.diff(metric[i, j], q[k]) * v[j] * v[k] for j, k in pairs) - gain[i])
     return Equations(metric, forces, inertia, gain, loads, dict(zip(loads, means, strict=True)))
+
+
+def total_potential(parts: Parts, found: Equations) -> Any:
+    """U of springs, weights and loads at their means; None where forces are not known to have one."""
+    means = [found.means[symbol] for symbol in found.loads]
+    follows = any(acting.place is None and mean != 0 for acting, mean in zip(parts.loads, means, strict=True))
+    if follows or any(force != 0 for force in parts.forces):
+        return None
+    total = parts.potential
+    for (_, _, place), mean in zip(parts.loads, means, strict=True):
+        total -= 0 if mean == 0 else mean * place
+    return total
+
+
+def bounding_energy(parts: Parts, found: Equations, q: Sequence[Any], v: Sequence[Any]) -> Any:
+    """T + U with that potential, or None."""
+    total, n = total_potential(parts, found), len(q)
+    if total is None:
+        return None
+    return sum(found.metric[i, j] * v[i] * v[j] for i in range(n) for j in range(n)) / 2 + total
 
 
 def _by_terms(expression: Any, q: Sequence[Any]) -> Any:
@@ -184,7 +204,7 @@ def derive(
 
     values = [
         sympy.Function(f"function_{k}")(t) if isinstance(load, Sampled | Function) else load.expression(t)
-        for k, (load, _) in enumerate(parts.loads)
+        for k, (load, *_) in enumerate(parts.loads)
     ]
     acting = dict(zip(found.loads, values, strict=True))
     forces = [sympy.sympify(force).xreplace(acting) for force in found.forces]
@@ -202,7 +222,7 @@ def derive(
         f"_{name}{i}_{j}": -sympy.diff(force, by[j]).subs(at_rest)
         for name, by in (("c", v), ("s", q)) for i, force in enumerate(found.forces) for j in range(n)
     }  # fmt: skip
-    arms = [sum(x * rate for x, rate in zip(moved, v, strict=True)) for _, moved in parts.loads]
+    arms = [sum(x * rate for x, rate in zip(moved, v, strict=True)) for _, moved, _ in parts.loads]
     powers = {
         "_brought": sum(force * arm for force, arm in zip(values, arms, strict=True)),
         "_damped": sum(rate * sympy.diff(parts.dissipation, rate) for rate in v),
@@ -231,6 +251,9 @@ def derive(
     texts = Texts(own)
     for name, (arguments, outputs) in plain.items():
         texts.plain(name, list(map(str, arguments)), outputs, *after.get(name, []))
+    if (total := total_potential(parts, found)) is not None:
+        outputs, result = lifted(entries | {"_U": _by_terms(total, q)}), " + ".join([*kinetic, "_U"])
+        texts.packed("bounding", list(map(str, [*q, *v])), outputs, f"({result},)")
     body, solved = Body(lagrange), [f"_d{i}" for i in range(n)]
     lines = [*body.text()[0], *solver.lines()]
     texts.motion("lagrange", list(map(str, [*q, *v])), body, lines, _tuple([*map(str, v), *solved]))

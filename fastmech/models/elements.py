@@ -73,6 +73,14 @@ class Torque(NamedTuple):
     load: Any  #: of :mod:`fastmech.loads` [N m], or a number or parameter: constant
 
 
+class Acting(NamedTuple):
+    """A load and what it acts on."""
+
+    load: Load
+    moved: tuple[Any, ...]  #: d(place along the load)/d(coordinate), one a coordinate
+    place: Any  #: where it acts, along its direction [m], or the angle [rad]; None: it follows a body
+
+
 class Parts(NamedTuple):
     """All that a mechanism's motion follows from, as SymPy expressions."""
 
@@ -81,21 +89,22 @@ class Parts(NamedTuple):
     potential: Any  #: U [J]
     dissipation: Any  #: Rayleigh's function, half the power that dampers take [W]
     forces: tuple[Any, ...]  #: generalized forces beside those, one a coordinate
-    loads: tuple[tuple[Load, tuple[Any, ...]], ...]  #: with d(place along the load)/d(coordinate)
+    loads: tuple[Acting, ...]
 
     def put(self, values: Mapping[Any, Any]) -> Parts:
         """The same with values of some symbols."""
         loads = []
-        for load, moved in self.loads:
+        for load, moved, place in self.loads:
             given = {k: v.xreplace(values) for k, v in vars(load).items() if isinstance(v, sympy.Expr)}
-            loads.append((replace(load, **given), tuple(x.xreplace(values) for x in moved)))
+            put = None if place is None else place.xreplace(values)
+            loads.append(Acting(replace(load, **given), tuple(x.xreplace(values) for x in moved), put))
         a, T, U, D = (sympy.sympify(part).xreplace(values) for part in self[:4])
         return Parts(a, T, U, D, tuple(x.xreplace(values) for x in self.forces), tuple(loads))
 
     @property
     def finite(self) -> bool:
         """Whether no expression divides by zero."""
-        loads = (part for load, moved in self.loads for part in (*vars(load).values(), *moved))
+        loads = (part for acting in self.loads for part in (*vars(acting.load).values(), *acting.moved))
         return not any(
             part.has(sympy.zoo, sympy.nan)
             for part in (*self[:4], *self.forces, *loads)
@@ -233,7 +242,7 @@ class Builder:
             return self._velocity(between).dot(direction) ** 2 / self._square(direction)
         return between.dot(self._velocity(between)) ** 2 / simplest(self._square(between), self._q)
 
-    def _load(self, where: str, force: Any) -> tuple[Load, tuple[Any, ...]]:
+    def _load(self, where: str, force: Any) -> Acting:
         load = force.load if isinstance(force.load, Load) else Constant(force.load)
         if not isinstance(load, Sampled | Function):
             changed = {}
@@ -244,13 +253,15 @@ class Builder:
             load = type(load)(**changed)
         if isinstance(force, Torque):
             place = self._expression_of(where, force)
-            return load, tuple(sympy.diff(place, q) for q in self._q)
+            return Acting(load, tuple(sympy.diff(place, q) for q in self._q), place)
         point = self.point(f"{where}.point", force.point)
         direction = self.point(f"{where}.direction", force.direction)
         direction = self._fitting(f"{where}.direction", direction, len(point))
         if simplest(self._square(direction) - 1, self._q) != 0 and not _is_unit(self._square(direction)):
             raise InputError(f"{where}.direction = {shown(force.direction)}: must be a unit vector")
-        return load, tuple(simplest(point.diff(q).dot(direction), self._q) for q in self._q)
+        moved = tuple(simplest(point.diff(q).dot(direction), self._q) for q in self._q)
+        fixed = not direction.free_symbols & {*self._q}
+        return Acting(load, moved, point.dot(direction) if fixed else None)
 
     def _expression_of(self, where: str, element: Any) -> Any:
         return self.expression(f"{where}.angle", element.angle)

@@ -50,6 +50,7 @@ class RestingPlace:
     stiffness: Floats  #: minus the forces' derivatives (n, n); the Hessian of U if there is a potential
     orientation: int  #: sign of the stiffness matrix' determinant, proved; 0 if it is not
     morse_index: int | None  #: directions in which U falls, proved; -2 not proved; None without a potential
+    energy: float = math.nan  #: U [J], loads at their means; NaN where forces are not known to have one
 
     @property
     def kind(self) -> str:
@@ -91,7 +92,7 @@ class Proof:
 
 @dataclass(frozen=True, eq=False)
 class RestingPlaces(Sequence[RestingPlace]):
-    """Equilibria of a mechanism: by Morse index or orientation, then by position."""
+    """Equilibria of a mechanism: the deepest first, or without a potential by orientation and position."""
 
     items: tuple[RestingPlace, ...]
     names: tuple[str, ...]  #: of the coordinates
@@ -117,12 +118,35 @@ class RestingPlaces(Sequence[RestingPlace]):
         """Kinds, one for each equilibrium."""
         return tuple(item.kind for item in self.items)
 
+    @property
+    def energy(self) -> Floats:
+        """U [J] (count,), loads at their means; NaN where forces are not known to have one."""
+        return np.array([item.energy for item in self.items])
+
+    def index_of(self, equilibrium: RestingPlace) -> int:
+        """Which of these an equilibrium is.
+
+        Raises:
+            InputError: it is none of them, for example one of another mechanism.
+        """
+        if not isinstance(equilibrium, RestingPlace):
+            raise InputError(f"equilibrium = {shown(equilibrium)}: must be one of fastmech.find_equilibria")
+        for k, item in enumerate(self.items):
+            if item.position.shape == equilibrium.position.shape:
+                away = np.abs(item.position - equilibrium.position)
+                stiffness = np.abs(item.stiffness - equilibrium.stiffness)
+                if (away <= 1e-9).all() and (stiffness <= 1e-9 * np.abs(item.stiffness).max()).all():
+                    return k
+        told = shown(equilibrium.position.tolist())
+        raise InputError(f"equilibrium = {told}: must be one of this mechanism's equilibria")
+
+    def place(self, k: int) -> str:
+        """Where an equilibrium is, in words."""
+        named = zip(self.names, self.items[k].position, strict=True)
+        return ", ".join(f"{name} = {value:.6g}" for name, value in named)
+
     def __repr__(self) -> str:
-        lines = [
-            ", ".join(f"{name} = {value:.6g}" for name, value in zip(self.names, item.position, strict=True))
-            + f": {item.kind}"
-            for item in self.items
-        ]
+        lines = [f"{self.place(k)}: {item.kind}" for k, item in enumerate(self.items)]
         return "\n".join([*lines, self.certificate.sentence])
 
 
@@ -146,6 +170,13 @@ def find_equilibria(system: Any, at: float = math.inf) -> find.Equilibria | Rest
     if at != math.inf:
         raise InputError(f"at = {shown(at)}: is for a Scene; equilibria of a mechanism hold for mean loads")
     found = prove_equilibria(system.statics(), list(system.parameters.values()))
+    if "bounding" in system.derived.functions and len(found):
+        still = np.zeros((2 * len(found.names), len(found)))
+        still[: len(found.names)] = found.position.T
+        energies = system.evaluate("bounding", still)[0]
+        items = [replace(item, energy=float(u)) for item, u in zip(found, energies, strict=True)]
+        items.sort(key=lambda item: item.energy)  # the deepest first; equal ones stay in the order of places
+        found = replace(found, items=tuple(items))
     if all(isinstance(load, Constant) for load in system.loads):
         return found
     told = f"{found.certificate.sentence}; loads that change are at their means, or at what they come to"
@@ -200,7 +231,7 @@ def search_rows(statics: Statics, rows: Floats, limit: int | None = None, most_l
     )
     boxes = np.empty((2 * (limit or LIMITS[n]) + 2, n, 2))
     forces = callee(_balance(statics))
-    search(forces, _domain(statics), np.repeat(rows[:, :, None], 2, 2), boxes, work(n, MOST), found)
+    search(forces, domain_of(statics), np.repeat(rows[:, :, None], 2, 2), boxes, work(n, MOST), found)
     return found
 
 
@@ -211,7 +242,7 @@ def _balance(statics: Statics) -> Any:
     return balance_kernel(statics)
 
 
-def _domain(statics: Statics) -> Floats:
+def domain_of(statics: Statics) -> Floats:
     """Lowest and highest values and periods (n, 3); a turn is taken a little larger than it is."""
     rows = []
     for symbol, low, high, periodic in statics.coordinates:
@@ -227,7 +258,7 @@ def _domain(statics: Statics) -> Floats:
 
 def _proof(statics: Statics, p: Floats, found: Found, items: list[RestingPlace]) -> Proof:
     """The certificate of one row."""
-    domain = _domain(statics)
+    domain = domain_of(statics)
     left = int(found.count[0, 1])
     places = _places(found.left[0, :left], found.reason[0, :left], domain)
     expected = expected_sum(statics, p)
@@ -328,7 +359,7 @@ def expected_sum(statics: Statics, p: Floats) -> int | None:
     deformed, without a zero on the boundary, into ones that depend on that coordinate alone, and are
     constant along a periodic angle if there is one. Else None.
     """
-    domain = _domain(statics)
+    domain = domain_of(statics)
     degree = 0 if any(coordinate.periodic for coordinate in statics.coordinates) else 1
     for k, coordinate in enumerate(statics.coordinates):
         if not coordinate.periodic:

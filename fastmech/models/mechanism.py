@@ -25,6 +25,7 @@ from fastmech.scene import nearest
 
 if TYPE_CHECKING:
     from fastmech.models.derivation import Derived, Equations
+    from fastmech.models.elements import Acting
 
 Floats = NDArray[np.float64]
 
@@ -154,7 +155,7 @@ class Mechanism:
         return made
 
     def _means(self) -> list[Any]:
-        return [load.mean_at(self.parameters) for load, _ in self._parts.loads]
+        return [load.mean_at(self.parameters) for load, *_ in self._parts.loads]
 
     def _forget(self) -> None:
         """What follows from the equations, which are others now."""
@@ -185,7 +186,12 @@ class Mechanism:
     @property
     def loads(self) -> tuple[Load, ...]:
         """Its loads with the parameters' values."""
-        return tuple(load.at(self.parameters) for load, _ in self._parts.loads)
+        return tuple(load.at(self.parameters) for load, *_ in self._parts.loads)
+
+    def kinks(self, until: float) -> Floats:
+        """Times [s] within (0, until) that no step may cross: there a load's value or derivative jumps."""
+        times = np.array(sorted({t for load in self.loads for t in load.kinks()}))
+        return times[(times > 0.0) & (times < until)]
 
     @cached_property
     def equations(self) -> Equations:
@@ -204,16 +210,51 @@ class Mechanism:
         """Generalized forces at rest, loads at their means."""
         return self._statics
 
+    @property
+    def acting(self) -> tuple[Acting, ...]:
+        """Its loads and what they act on, as expressions."""
+        return self._parts.loads
+
+    @property
+    def damped(self) -> bool:
+        """Whether dampers take energy with the parameters' values."""
+        import sympy
+
+        values = {sympy.Symbol(name, real=True): value for name, value in self.parameters.items()}
+        return sympy.sympify(self._parts.dissipation).xreplace(values) != 0
+
+    def moved(self, point: str, q: ArrayLike) -> Floats:
+        """Derivatives (components, n) of a named point [m] by coordinates, at a position (n,).
+
+        Raises:
+            InputError: there is no such point.
+        """
+        if point not in self.points:
+            raise InputError(f"on = {shown(point)}: must be one of {', '.join(self.points) or 'no points'}")
+        given = dict(zip(self._symbols, np.asarray(q, dtype=np.float64).tolist(), strict=True))
+        given |= dict(zip(self._constants, self.parameters.values(), strict=True))
+        jacobian = self.points[point].jacobian(list(self._symbols)).xreplace(given)
+        return np.array(jacobian.evalf().tolist(), dtype=np.float64)
+
+    def energy(self) -> Any:
+        """T + U, loads at their means, as an expression of coordinates, rates and parameters.
+
+        None where the forces at rest are not known to come from a potential.
+        """
+        from fastmech.models.derivation import bounding_energy
+
+        return bounding_energy(self._parts, self.equations, self._symbols, self._rates)
+
     @cached_property
     def prints(self) -> str:
         """Text that changes with its equations, not with the values of parameters."""
         loads = []
-        for load, moved in self._parts.loads:
+        for load, *acted in self._parts.loads:
             if isinstance(load, Sampled):  # its function is the package's own: what differs are numbers
                 loads.append(fingerprint((load.times, load.values, load.pieces)))
             else:
                 loads.append(fingerprint(load.function) if isinstance(load, Function) else repr(load))
-            loads.append(str(moved))
+            loads.append(str(acted))
         told = [*self._parts[:-1], loads, self._means(), self._symbols, self._constants]
         return hashlib.sha256("\0".join(map(str, told)).encode()).hexdigest()[:16]
 
@@ -233,7 +274,7 @@ class Mechanism:
         """Loads that are functions, by the names under which the text calls them."""
         return {
             f"function_{k}": load.function
-            for k, (load, _) in enumerate(self._parts.loads)
+            for k, (load, *_) in enumerate(self._parts.loads)
             if isinstance(load, Sampled | Function)
         }
 
@@ -242,7 +283,7 @@ class Mechanism:
         """Its functions over NumPy arrays."""
         names = {"np": np, "sin": np.sin, "cos": np.cos, "exp": np.exp, "rounded_to": lambda x, value: value}
         names |= self.functions_of_time()
-        for function in ("lagrange_rates", *_PLAIN):
+        for function in self.derived.functions.keys() & {"lagrange_rates", *_PLAIN}:
             exec(in_precision(self.derived.functions[function][1], "float64"), names)
         return names
 
@@ -320,7 +361,7 @@ class Mechanism:
 #: Mechanisms without some of their terms, by what tells them apart.
 _with_terms: dict[tuple[str, ...], Mechanism] = {}
 
-_PLAIN = ("coefficients", "momenta", "energies", "metric", "velocities", "powers", "slopes")
+_PLAIN = ("bounding", "coefficients", "momenta", "energies", "metric", "velocities", "powers", "slopes")
 
 
 def in_precision(text: str, precision: str) -> str:

@@ -53,6 +53,15 @@ def classify(system: Any, equilibrium: Any) -> of_scene.Classification | Stabili
     """
     if not isinstance(system, Mechanism):
         return of_scene.classify(system, equilibrium)
+    return assess(require_own(system, equilibrium), equilibrium.morse_index)
+
+
+def require_own(system: Mechanism, equilibrium: Any) -> Linear:
+    """The linearization of a mechanism at one of its equilibria.
+
+    Raises:
+        InputError: it is none, or another mechanism's.
+    """
     if not isinstance(equilibrium, RestingPlace):
         raise InputError(f"equilibrium = {shown(equilibrium)}: must be one of fastmech.find_equilibria")
     linear = system.linear(equilibrium.position)
@@ -60,7 +69,7 @@ def classify(system: Any, equilibrium: Any) -> of_scene.Classification | Stabili
         linear.stiffness, equilibrium.stiffness, rtol=1e-9, atol=1e-9 * np.abs(linear.stiffness).max()
     ):
         raise InputError(f"equilibrium = {shown(equilibrium.position.tolist())}: is another mechanism's")
-    return assess(linear, equilibrium.morse_index)
+    return linear
 
 
 def assess(linear: Linear, morse_index: int | None) -> Stability:

@@ -291,6 +291,14 @@ class Texts:
         lines = [*body.trigonometry("any"), *body.text()[0], *more, f"return {result}"]
         self._function(name, arguments, self._used(lines), lines)
 
+    def packed(self, name: str, arguments: Sequence[str], outputs: dict[str, Any], result: str) -> None:
+        """A plain function, and one for packed loops, which tells first whether the sines do not reach."""
+        self.plain(name, arguments, outputs, result)
+        body = Body(outputs)
+        variant, beyond = ("within", "_beyond") if body.angles else ("any", "False")
+        lines = [*body.trigonometry(variant), *body.text()[0], f"return {beyond}, {result}[0]"]
+        self._function(f"{name}_within", arguments, self._used(lines), lines)
+
     def motion(self, name: str, states: Sequence[str], body: Body, lines: list[str], result: str) -> None:
         """What :class:`fastmech.kernels.blocks.Rates` wants."""
         own = self._used([*lines, *body.trigonometry("any")])

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from fastmech.basins.ladder import SUBSTEPS
 from fastmech.basins.measures.norm import check_angles
 from fastmech.basins.runs import rounds_until
-from fastmech.basins.steps import fastest_followed, shortest_step
+from fastmech.capture.steps import fastest_followed, shortest_step
 from fastmech.ensembles import checks
 from fastmech.ensembles.spans import MOST_STEPS
 from fastmech.errors import InputError

@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
-from fastmech.basins.label import require_damper
 from fastmech.basins.map import BasinMap, map_basins
-from fastmech.basins.steps import method_for
-from fastmech.capture.certificate import certificate_of
+from fastmech.capture.select import certificate_of, require_damper
+from fastmech.capture.steps import method_for
 from fastmech.ensembles.status import FAILURES, LABELS, Status
 from fastmech.errors import InputError, shown
 from fastmech.results import NO_CODE, STATE_UNITS, Dataset, Variable, flags, numbers

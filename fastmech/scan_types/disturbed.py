@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from pydantic import AfterValidator, Field
 
 from fastmech.basins.disturbed import MOST_RADIUS, DisturbedEnsemble, disturb
-from fastmech.basins.label import require_damper
-from fastmech.basins.steps import method_for, shortest_step
+from fastmech.capture.select import require_damper
+from fastmech.capture.steps import method_for, shortest_step
 from fastmech.disturbance.motion import require_constant_force, require_isolated
 from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError, shown

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from fastmech.basins.disturbed import MOST_RADIUS
-from fastmech.basins.steps import highest_frequency
+from fastmech.capture.steps import highest_frequency
 from fastmech.disturbance.motion import (
     PHASE,
     default_method,

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from fastmech.basins.disturbed import (
     STREAM,
     DisturbedEnsemble,
-    measuring_steps,
     refuse_meeting_balls,
 )
-from fastmech.basins.steps import method_for
+from fastmech.capture.select import certificate_of
+from fastmech.capture.steps import method_for
 from fastmech.disturbance.linear_range import linear_range
 from fastmech.disturbance.motion import damped_times, equilibria_to_disturb
 from fastmech.disturbance.size import size_at
@@ -185,7 +185,7 @@ class DisturbedTiling(Tiling):
         rest = np.column_stack(
             [self.equilibria.phi, self.equilibria.theta, *np.zeros((2, len(self.equilibria)))]
         )
-        step = request.dt or float(measuring_steps(scene, rest, self.method).min())
+        step = request.dt or float(certificate_of(scene).measuring_steps(rest, self.method).min())
         self.parts = _blocks(request.trajectories, self._tile_length(step))
         self.count = len(self.equilibria) * (len(self.rays) + len(self.parts))
 

@@ -15,7 +15,8 @@ from pydantic import AfterValidator, Field
 
 from fastmech.basins.disturbed import MOST_RADIUS
 from fastmech.basins.erosion import FLAGS, MEASURES, Ends, survey_of, wells_along
-from fastmech.basins.label import How, label_starts, require_damper
+from fastmech.basins.label import How, label_starts
+from fastmech.capture.select import require_damper
 from fastmech.disturbance.motion import require_constant_force
 from fastmech.errors import InputError, shown
 from fastmech.results import Dataset, Variable

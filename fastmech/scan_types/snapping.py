@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from fastmech.basins.label import require_damper
 from fastmech.basins.shock_limit import shock_limit
 from fastmech.basins.snapping import SnappingMap, critical_forces, default_end, force_free, map_snapping
-from fastmech.basins.steps import method_for
+from fastmech.capture.select import require_damper
+from fastmech.capture.steps import method_for
 from fastmech.ensembles.status import FAILURES, LABELS, Status
 from fastmech.errors import InputError
 from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers

@@ -12,7 +12,7 @@ from disturbance.known import center, equilibria, known, oracle_size, scipy_moti
 from fastmech.basins.disturbed import DisturbedEnsemble, disturb
 from fastmech.basins.label import labels_of
 from fastmech.capture.barriers import barrier_tree
-from fastmech.capture.certificate import trapped
+from fastmech.capture.select import trapped
 from fastmech.ensembles.status import ENDS, FAILURES, Status
 from fastmech.equilibria.find import find_equilibria
 from fastmech.errors import InputError, StepWarning
@@ -336,3 +336,14 @@ def test_printed_it_says_what_became_of_them() -> None:
     assert lines[2].startswith("  returned: 100.00%, at most 100.00% (95 % interval 98.7")  # 1/(1 + z^2/n)
     assert f"{np.median(run.time_to_return):.3g} s (median)" in lines[3]
     assert f"{run.excursion[:, 0].max():.3g} rad of phi" in lines[4]
+
+
+def test_what_is_measured_is_the_motion_whose_end_is_proved() -> None:
+    """A light M1 and long ways: the first steps lead one motion in ten elsewhere than it is proved to go."""
+    scene = Scene(m1=0.3, m2=5.0, F0=60.0, c1=294.9, c2=92.85, beta=20.0, alpha=0.0)
+    stable = next(e for e in find_equilibria(scene) if e.kind == "minimum")
+    run = disturb(scene, stable, 512, radius=4.0, t_end=200.0)
+    rests, place = resting_place(run)
+    assert rests.mean() > 0.9
+    assert np.linalg.norm(run.final[:, :2] - place, axis=1)[rests].max() < 0.5
+    assert (run.excursion >= np.abs(place - center(stable)[:2]) - 0.5)[rests].all()

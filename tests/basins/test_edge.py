@@ -84,7 +84,9 @@ def test_the_default_labels_and_norm_lead_to_the_same_saddle() -> None:
     told = r"lead to well 0, \+1 turn of theta and well 0, \+1 turn of theta, must lead to two different"
     with pytest.raises(fm.InputError, match=told):
         track_edge(scene, turned, turned + 0.01, t_end=1.0)
-    with pytest.raises(fm.InputError, match=r"^label_of, norm: missing; only a scene has them"):
+    with pytest.raises(
+        fm.InputError, match=r"^label_of, norm: missing; only a scene or a mechanism has them"
+    ):
         track_edge(fm.System(two_wells, ["x", "y"], {}), [-1.0, 0.0], [1.0, 0.0], t_end=1.0)
 
 

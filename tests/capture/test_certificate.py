@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from fastmech.capture.certificate import trapped
+from fastmech.capture.select import trapped
 from fastmech.mechanism.lagrange import kinetic_energy, potential_energy
 from fastmech.scene import Scene
 

@@ -202,3 +202,24 @@ def test_a_mechanism_prints_itself_in_a_line_and_takes_other_values() -> None:
     assert mechanism.replace(m1=5.0).metric([0.0, 0.0])[0, 0] == 6.0
     with pytest.raises(fm.InputError, match=r"parameters\.m9: unknown name"):
         mechanism.replace(m9=1.0)
+
+
+@pytest.mark.parametrize("load", [fm.loads.Pulse(2.0, 0.313, 1.07), fm.loads.Ramp(2.0, 0.313, 1.07)])
+def test_steps_end_where_a_load_has_a_kink(load: fm.loads.Load) -> None:
+    """rk4 keeps its order: x'' = -x + F(t) in closed form, piece by piece, by superposed steps and ramps."""
+    x = fm.lengths("x")
+    points = {"O": (0, 0), "M": (x, 0)}
+    force = [fm.Force("M", load, (1, 0))]
+    mechanism = fm.Mechanism(
+        x, points=points, masses={"M": 1}, springs=[fm.Spring("O", "M", 1)], forces=force
+    )
+    t, start, end = 3.0, 0.313, 1.383
+    if isinstance(load, fm.loads.Pulse):
+        expected = 2.0 * (np.cos(t - end) - np.cos(t - start))
+    else:
+        expected = 2.0 / 1.07 * ((t - start - np.sin(t - start)) - (t - end - np.sin(t - end)))
+    for method, order in (("rk4", 4), ("tsit5", 5), ("radau5", 5)):
+        steps = (0.1, 0.05, 0.025, 0.0125)
+        runs = [fm.integrate(mechanism, [0.0, 0.0], t, dt=dt, method=method) for dt in steps]
+        errors = np.array([abs(run.y[-1, 0, 0] - expected) for run in runs])
+        assert (errors < 1e-4 * (np.array(steps) / 0.1) ** (order - 1)).all()

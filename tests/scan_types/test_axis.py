@@ -10,7 +10,7 @@ import pytest
 from pydantic import ValidationError
 
 import fastmech as fm
-from fastmech.basins.steps import coarse_steps, fastest_followed, shortest_step
+from fastmech.capture.steps import coarse_steps, fastest_followed, shortest_step
 from fastmech.ensembles import checks
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scan_types import scan_kinds

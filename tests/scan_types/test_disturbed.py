@@ -207,9 +207,10 @@ def test_outcomes(run: Run) -> None:
         np.testing.assert_array_equal(labels.turns.reshape(turns.shape), turns)
     attrs = run.section["outcome"].attrs
     meanings = (
-        "returned elsewhere at_saddle undecided not_finite step_too_large not_converged start_not_finite"
+        "returned elsewhere at_saddle undecided out_of_range not_finite step_too_large not_converged "
+        "start_not_finite"
     )
-    assert (attrs["flag_values"].tolist(), attrs["flag_meanings"]) == ([8, 9, 7, 6, 1, 2, 4, 3], meanings)
+    assert (attrs["flag_values"].tolist(), attrs["flag_meanings"]) == ([8, 9, 7, 6, 10, 1, 2, 4, 3], meanings)
     assert run.section.attrs["failed"] == 0
 
 

@@ -13,10 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fastmech.basins.measures.labels import Floats
-from fastmech.disturbance.size import size_at
+from fastmech.disturbance.size import size_of
 from fastmech.ensembles import checks
 from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError, shown
+from fastmech.models.equilibria import RestingPlace
+from fastmech.models.mechanism import Mechanism
+from fastmech.models.stability import require_own
 from fastmech.scene import STATE, Scene, nearest
 from fastmech.stability.arguments import require_rest
 
@@ -51,8 +54,8 @@ def state_index(name: str) -> int:
     return STATE.index(name)
 
 
-def kinetic_norm(scene: Scene, equilibrium: Equilibrium) -> Floats:
-    """Matrix N (4, 4) of the kinetic-energy norm at an equilibrium: ``|departure @ N|`` is a size [rad].
+def kinetic_norm(scene: Scene | Mechanism, equilibrium: Equilibrium | RestingPlace) -> Floats:
+    """Matrix N (states, states) of the kinetic-energy norm: ``|departure @ N|`` is a size [rad].
 
     ``size^2 = (xi' a xi + eta' a eta / omega^2) / (m2 l^2)`` for departures xi [rad] and eta [rad/s], with
     the metric ``a`` at the equilibrium, paper (11), and the highest natural frequency omega [rad/s]. The
@@ -61,9 +64,12 @@ def kinetic_norm(scene: Scene, equilibrium: Equilibrium) -> Floats:
     Raises:
         InputError: an argument is wrong, or the scene does not rest there.
     """
+    if isinstance(scene, Mechanism):
+        require_own(scene, equilibrium)
+        return size_of(scene, equilibrium).to_ball
     require_rest(scene, equilibrium)
-    frozen = scene.replace(F0=equilibrium.force, alpha=0.0)
-    return size_at(frozen, equilibrium.phi, equilibrium.theta).to_ball
+    assert isinstance(equilibrium, Equilibrium)
+    return size_of(scene.replace(F0=equilibrium.force, alpha=0.0), equilibrium).to_ball
 
 
 def norm_on(norm: ArrayLike, dim: int, coordinates: Sequence[int] | None = None) -> Floats:

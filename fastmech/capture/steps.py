@@ -23,6 +23,10 @@ PHASE, TURNING = 1.0, 2.5
 #: faster still comes out as what that step makes of it.
 MOST_OCTAVES = 7.0
 
+#: Share of a start's coarse step, at which labels begin, that measuring takes by default (an implicit method,
+#: whose error constant is larger, takes half of it), and the least share: that of the finest labels.
+MEASURING, FINEST = 0.6, 0.05
+
 #: A force whose decay rate is so many times the scene's highest frequency is gone at once: while it acts, it
 #: falls by ``exp(-FALL)`` in the coarsest step.
 AT_ONCE, FALL = 4.0, 0.5

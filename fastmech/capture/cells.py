@@ -1,0 +1,242 @@
+"""Cells of the domain of coordinates: bounds of the potential over each, and floods through them.
+
+A set {U < E} is open: a path in it can be moved off the corners and edges of cells, so that it passes from
+cell to cell through faces. Where it can go at most is told by the least U of cells, where it can surely go by
+the greatest.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import types
+
+from fastmech.intervals.arithmetic import mul, sub
+from fastmech.intervals.matrices import positive_eigenvalues
+from fastmech.intervals.search import ENERGY, FORCES
+from fastmech.jit import CUBE, EXACT, INTEGERS, MATRIX, VECTOR, called, kernel
+
+#: Turns of a coordinate, either way, that a cell's number can hold, and numbers of wells before them.
+MOST_TURNS, WELL_DIGITS = 4, 128
+
+#: Cells are taken this much larger than they are: positions are assigned to them with rounding.
+ENLARGED = 1e-9
+
+#: Halvings of a box about a minimum at most, and the share of the proved one that is used.
+HALVINGS, WITHIN = 40, 0.999
+
+_FLAGS = types.Array(types.int8, 1, "C")
+_TURNS = types.Array(types.int8, 2, "C")
+
+
+@kernel(types.void(ENERGY, FORCES, MATRIX, MATRIX, INTEGERS, MATRIX), **EXACT)
+def bound_cells(energy: Any, forces: Any, domain: Any, p: Any, counts: Any, bounds: Any) -> None:
+    """Write the least and the greatest U of every cell into ``bounds`` (cells, 2).
+
+    Both by the enclosure over the cell and by the mean-value form, which is the closer one in small cells.
+
+    Args:
+        energy: see :data:`fastmech.intervals.search.ENERGY_SIGNATURE`; rates are zero here.
+        forces: enclosures of -dU/dq.
+        domain: lowest and highest value of each coordinate (n, 2 or more).
+        p: parameters (count, 2).
+        counts: cells along each coordinate (n,).
+        bounds: what is written, cells in C order.
+    """
+    n = len(counts)
+    box, still, middle = np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, 2))
+    f, J, found = np.zeros((n, 2)), np.zeros((n, n, 2)), np.zeros(2)
+    for cell in range(len(bounds)):
+        rest = cell
+        for i in range(n - 1, -1, -1):
+            k = rest % counts[i]
+            rest //= counts[i]
+            width = (domain[i, 1] - domain[i, 0]) / counts[i]
+            box[i, 0] = domain[i, 0] + (k - ENLARGED) * width
+            box[i, 1] = domain[i, 0] + (k + 1.0 + ENLARGED) * width
+            middle[i, 0] = middle[i, 1] = 0.5 * box[i, 0] + 0.5 * box[i, 1]
+        energy(box, still, p, found)
+        low, high = found[0], found[1]
+        energy(middle, still, p, found)
+        value = (found[0], found[1])
+        forces(box, p, f, J)
+        for i in range(n):
+            away = sub((box[i, 0], box[i, 1]), (middle[i, 0], middle[i, 0]))
+            value = sub(value, mul((f[i, 0], f[i, 1]), away))
+        bounds[cell, 0], bounds[cell, 1] = max(low, value[0]), min(high, value[1])
+
+
+@called
+def _sift(heap: Any, keys: Any, count: int) -> None:
+    """Move the last of ``count`` cells up to its place in a heap ordered by keys."""
+    k = count - 1
+    while k > 0 and keys[heap[k]] < keys[heap[(k - 1) // 2]]:
+        heap[k], heap[(k - 1) // 2] = heap[(k - 1) // 2], heap[k]
+        k = (k - 1) // 2
+
+
+@called
+def _pop(heap: Any, keys: Any, count: int) -> int:
+    """Take the least of ``count`` cells off a heap."""
+    least = heap[0]
+    heap[0] = heap[count - 1]
+    k, last = 0, count - 1
+    while 2 * k + 1 < last:
+        child = 2 * k + 1
+        if child + 1 < last and keys[heap[child + 1]] < keys[heap[child]]:
+            child += 1
+        if keys[heap[k]] <= keys[heap[child]]:
+            break
+        heap[k], heap[child] = heap[child], heap[k]
+        k = child
+    return int(least)
+
+
+@kernel(types.void(VECTOR, INTEGERS, _FLAGS, _FLAGS, types.int64, VECTOR), **EXACT)
+def first_exits(low: Any, counts: Any, periodic: Any, marks: Any, start: int, found: Any) -> None:
+    """Bounds below the energies at which a well's component can first meet another well, or a range's end.
+
+    Cells are flooded in the order of the least energy that reaches them. ``found`` (2,): when the flood comes
+    to another minimum's cell, or to a cell that it holds with other turns; and when to an end of a range.
+
+    Args:
+        low: the least U of every cell.
+        counts: cells along each coordinate.
+        periodic: 1 of coordinates that turn fully.
+        marks: of every cell 0, or the number of the minimum in it, from 1 (127: of several).
+        start: the minimum's cell.
+        found: what is written.
+    """
+    n, cells = len(counts), len(low)
+    keys, state, turns = np.empty(cells), np.zeros(cells, np.int8), np.zeros((cells, n), np.int8)
+    heap = np.empty(cells, np.int64)
+    found[0], found[1] = np.inf, np.inf
+    heap[0], keys[start], state[start], waiting = start, low[start], 1, 1
+    ranged = False
+    for i in range(n):
+        ranged |= periodic[i] == 0
+    while waiting > 0:
+        cell = _pop(heap, keys, waiting)
+        waiting -= 1
+        state[cell], key = 2, keys[cell]
+        if marks[cell] != 0 and (marks[cell] != marks[start] or marks[cell] == 127):
+            found[0] = min(found[0], key)
+        rest, stride = cell, 1
+        for i in range(n - 1, -1, -1):
+            k = rest % counts[i]
+            rest //= counts[i]
+            for side in (-1, 1):
+                turned = 0
+                near = k + side
+                if near < 0 or near >= counts[i]:
+                    if periodic[i] == 0:
+                        found[1] = min(found[1], key)
+                        continue
+                    turned = side
+                    near -= side * counts[i]
+                other = cell + (near - k) * stride
+                if state[other] == 0:
+                    for j in range(n):
+                        turns[other, j] = turns[cell, j]
+                    turns[other, i] += turned
+                    if abs(turns[other, i]) > MOST_TURNS:
+                        found[0] = min(found[0], key)
+                    keys[other], state[other] = max(key, low[other]), 1
+                    heap[waiting] = other
+                    waiting += 1
+                    _sift(heap, keys, waiting)
+                elif state[other] == 2:
+                    for j in range(n):
+                        if turns[other, j] != turns[cell, j] + (turned if j == i else 0):
+                            found[0] = min(found[0], key)
+            stride *= counts[i]
+        if found[0] < np.inf and (found[1] < np.inf or not ranged):
+            break
+
+
+@kernel(
+    types.void(VECTOR, INTEGERS, _FLAGS, types.int64, INTEGERS, types.float64, types.int64, VECTOR), **EXACT
+)
+def fill_component(
+    high: Any, counts: Any, periodic: Any, start: int, first: Any, level: float, well: int, table: Any
+) -> None:
+    """Write a well's number, and its turns, into the cells from which a path below ``level`` leads to it.
+
+    ``table`` holds 0 where nothing is proved, else 1 + well + 128 (turns + 4, to the base of 9, the last
+    coordinate's last): those of the well from its listed place for a position in the domain. ``first`` are
+    the turns that bring the listed place into the domain, with the other sign.
+    """
+    n, cells = len(counts), len(high)
+    if not high[start] < level:
+        return
+    queue, turns = np.empty(cells, np.int64), np.zeros((cells, n), np.int8)
+    queue[0], begin, end = start, 0, 1
+    code = 0
+    for j in range(n):
+        turns[start, j] = first[j]
+        code = code * (2 * MOST_TURNS + 1) + MOST_TURNS - first[j]
+    table[start] = 1.0 + well + WELL_DIGITS * code
+    while begin < end:
+        cell = queue[begin]
+        begin += 1
+        rest, stride = cell, 1
+        for i in range(n - 1, -1, -1):
+            k = rest % counts[i]
+            rest //= counts[i]
+            for side in (-1, 1):
+                turned = 0
+                near = k + side
+                if near < 0 or near >= counts[i]:
+                    if periodic[i] == 0:
+                        continue
+                    turned = side
+                    near -= side * counts[i]
+                other = cell + (near - k) * stride
+                if table[other] != 0.0 or not high[other] < level:
+                    continue
+                if abs(turns[cell, i] + turned) > MOST_TURNS:
+                    continue
+                code = 0
+                for j in range(n):
+                    turns[other, j] = turns[cell, j] + (turned if j == i else 0)
+                    code = code * (2 * MOST_TURNS + 1) + MOST_TURNS - turns[other, j]
+                table[other] = 1.0 + well + WELL_DIGITS * code
+                queue[end] = other
+                end += 1
+            stride *= counts[i]
+
+
+@kernel(types.void(FORCES, MATRIX, MATRIX, VECTOR, VECTOR), **EXACT)
+def convex_box(forces: Any, domain: Any, p: Any, q: Any, half: Any) -> None:
+    """Halve a box about a minimum ``q`` (n,) until U is proved convex in it; zero where that fails.
+
+    ``half`` (n,) are its half widths; ``forces``, ``domain`` and ``p`` as in :func:`bound_cells`.
+    """
+    n = len(q)
+    box, f, J = np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, n, 2))
+    H, A, V = np.zeros((n, n, 2)), np.zeros((n, n)), np.zeros((n, n))
+    for _ in range(HALVINGS):
+        inside = True
+        for i in range(n):
+            box[i, 0], box[i, 1] = q[i] - half[i], q[i] + half[i]
+            inside &= domain[i, 2] > 0.0 or (box[i, 0] >= domain[i, 0] and box[i, 1] <= domain[i, 1])
+        if inside and forces(box, p, f, J):
+            for i in range(n):
+                for j in range(n):
+                    H[i, j, 0], H[i, j, 1] = -J[i, j, 1], -J[i, j, 0]
+            if positive_eigenvalues(H, A, V) == n:
+                for i in range(n):
+                    half[i] *= WITHIN
+                return
+        for i in range(n):
+            half[i] *= 0.5
+    for i in range(n):
+        half[i] = 0.0
+
+
+@kernel(types.void(ENERGY, MATRIX, CUBE, CUBE, MATRIX), **EXACT)
+def bound_states(energy: Any, p: Any, q: Any, v: Any, bounds: Any) -> None:
+    """The least and the greatest T + U (m, 2) over boxes of coordinates and rates (m, n, 2)."""
+    for k in range(len(bounds)):
+        energy(q[k], v[k], p, bounds[k])

@@ -1,0 +1,371 @@
+"""The capture certificate of any mechanism whose energy falls and whose loads fade.
+
+The bounding energy is T + U with loads at what they come to, and all work that they can still do. A position
+belongs to a well by the cells of :mod:`fastmech.capture.wells`, or by a box about the well in which U is
+convex: the way straight to the minimum does not rise.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.callee import callee
+from fastmech.capture.cells import bound_states
+from fastmech.capture.certificate import Certificate, Early, Noted
+from fastmech.capture.look import HEAD, RECORD, TABLE_ROWS
+from fastmech.capture.steps import MEASURING, MOST_OCTAVES, PHASE, TURNING
+from fastmech.capture.wells import ROUNDING, Wells, prove_wells, values_of
+from fastmech.disturbance.size import Size, confining_energy, size_of
+from fastmech.ensembles.derived import system_of
+from fastmech.ensembles.ends import STOP_CODE
+from fastmech.ensembles.run import CALL_STEPS_WITH_STOPS, Observation
+from fastmech.errors import InputError
+from fastmech.generated import new_module, run_module
+from fastmech.integrators.method import Method
+from fastmech.integrators.methods import find_method
+from fastmech.models.balance import energy_kernel, range_of
+from fastmech.models.mechanism import Mechanism, in_precision
+
+Floats = NDArray[np.float64]
+
+#: Places along each coordinate at which frequencies are looked up, by the number of coordinates.
+LOOKED_AT = {1: 512, 2: 48, 3: 12, 4: 7}
+
+#: Times at which the work that loads can still do is tabulated.
+TIMES = 2048
+
+#: A load has faded when all that it can still do is less than this share of the range of U.
+FADED = 1e-13
+
+#: Seconds by which a load that fades has to have done so.
+LONGEST = 1e6
+
+#: Longest step times the fastest damping rate: the default method's region of stability ends at -6.1.
+DAMPED = 4.0
+
+#: Share of energies by which a motion may miss a bound: far above errors of steps that resolve it.
+SLACK = 1e-2
+
+#: Share of a load's time scale that a coarse step may take.
+OF_LOAD = 0.25
+
+_OBSERVER = '''"""Made by fastmech: looks at the bounding energy of lanes."""
+
+import numpy as np
+
+from fastmech.capture.look import finish, work_left
+from fastmech.jit import OBSERVER_SIGNATURE, inlined, kernel, rounded_to
+from fastmech.kernels.exponential import exp
+from fastmech.kernels.sincos import cos, reduction_limit, sin, sincos
+
+
+@inlined
+{function}
+
+@kernel(OBSERVER_SIGNATURE)
+def observe(t, Y, params, record):
+    energy, level = record[{energy}], record[{level}]
+    left, low = work_left(t, params, {count}), 0
+    for i in range(Y.shape[1]):
+        beyond, value = bounding_within({arguments})
+        value = np.inf if beyond else value + left
+        energy[i] = value
+        low |= value < level[i]
+    finish(t, Y, params, record, {count}, low)
+'''
+
+
+@dataclass(frozen=True, eq=False)
+class MechanismCertificate(Certificate):
+    """Wells of a mechanism, ready for observers; energies in J."""
+
+    system: Mechanism
+    tree: Wells
+    joule = 1.0
+    work: Floats  #: at most what loads can still do [J] from each time on (TIMES,)
+    fades: float  #: [s]: after it, the last of these
+    origin: float = 0.0
+
+    @property
+    def names(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Of the coordinates."""
+        return self.system.state[: len(self.system.coordinates)]
+
+    @property
+    def units(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Of the coordinates."""
+        return tuple("m" if name in self.system.lengths else "rad" for name in self.names)
+
+    @property
+    def periods(self) -> Floats:  # type: ignore[override]
+        """See the base class."""
+        return self.tree.cells.domain[:, 2]
+
+    @property
+    def decays(self) -> bool:  # type: ignore[override]
+        """Whether a load still changes."""
+        return bool(self.work[0] > 0.0)
+
+    @property
+    def levels(self) -> Floats:
+        """Barriers, less what rounding of energies may take."""
+        return self.tree.barrier - ROUNDING * self.amplitudes
+
+    @cached_property
+    def _finite(self) -> Floats:
+        """Bounds of U over the cells where it is finite."""
+        bounds = self.tree.cells.bounds
+        return np.asarray(bounds[np.isfinite(bounds).all(axis=1)])
+
+    @property
+    def amplitudes(self) -> float:  # type: ignore[override]
+        """From the least to the greatest U of the cells [J]."""
+        return float(np.ptp(self._finite))
+
+    @property
+    def energies(self) -> Floats:
+        """U."""
+        return self.tree.equilibria.energy
+
+    @cached_property
+    def _coefficients(self) -> list[float]:
+        own, _ = self.system.derived.functions["bounding_within"]
+        known = self.system.coefficients()
+        return [float(known[name]) for name in own]
+
+    @cached_property
+    def _observe(self) -> Any:
+        own, text = self.system.derived.functions["bounding_within"]
+        states = [f"Y[{k}, i]" for k in range(len(self.system.state))]
+        numbers = [f"params[{k}]" for k in range(len(own))]
+        begin = 2 + len(states)
+        source = _OBSERVER.format(
+            function=in_precision(text, "float64"),
+            arguments=", ".join([*states, *numbers]),
+            count=len(own),
+            level=begin,
+            energy=begin + 1,
+        )
+        return run_module(new_module("observer", source), source).observe
+
+    def params(self, levels: Floats) -> Floats:
+        """Coefficients, then what :mod:`fastmech.capture.look` reads."""
+        tree, n = self.tree, len(self.names)
+        places = tree.equilibria.position[list(tree.wells)]
+        head = np.array([0.0, n, len(tree.wells), self.fades, len(self.work), self.origin])
+        assert len(head) == HEAD
+        domain = tree.cells.domain
+        rows = [domain[:, 0], 1.0 / tree.cells.widths, tree.cells.counts, domain[:, 2], domain[:, 1]]
+        assert len(rows) == TABLE_ROWS
+        cells = tree.table(self.levels)
+        parts = [self._coefficients, head, *rows, places, tree.radius, levels, self.work, cells]
+        return np.concatenate([np.ravel(np.asarray(part, dtype=np.float64)) for part in parts])
+
+    def observation(
+        self, params: Floats, interval: float, call_steps: int = CALL_STEPS_WITH_STOPS
+    ) -> Observation:
+        """See the base class."""
+        own, n = params.copy(), len(self.names)
+        first, wells = len(self._coefficients), len(self.tree.wells)
+        own[first] = interval
+        begin = first + HEAD + TABLE_ROWS * n + 2 * wells * n
+        record = np.zeros(2 + 2 * n + RECORD + n)
+        record[2 + 2 * n] = params[begin : begin + wells].max()
+        return Observation(self._observe, own, record, stops=True, call_steps=call_steps)
+
+    def noted(self, records: Floats) -> Noted:
+        """See the base class."""
+        begin = 2 + len(self.system.state)
+        turns = records[begin + RECORD : begin + RECORD + len(self.names)]
+        return Noted(
+            records[STOP_CODE].astype(np.int8),
+            turns.T.astype(np.int32),
+            records[begin + 3],
+            records[begin + 4],
+        )
+
+    @cached_property
+    def motion(self) -> tuple[Any, Floats]:
+        """Lagrange's equations."""
+        mechanism = self.system.with_terms(())
+        system, known = system_of(mechanism, "lagrange"), mechanism.coefficients()
+        return system.kernel, np.array([known[name] for name in system.parameters], dtype=np.float64)
+
+    def method(self, name: str | None) -> str:
+        """By default ``dop853``."""
+        return find_method(name or "dop853").name
+
+    def warn_of_step(self, dt: float, method: str) -> None:
+        """Nothing is known before the run; energies tell after it."""
+
+    def is_beyond(self, dt: float, steps: float, method: str) -> bool:
+        """Energies tell."""
+        return False
+
+    @cached_property
+    def _paces(self) -> tuple[float, Floats]:
+        """Coarse step of slow motions [s], and the squared rates that an energy allows, by phase [1/J s2].
+
+        A length's phase is a turn over its range.
+        """
+        domain, n = self.tree.cells.domain, len(self.names)
+        steps = (np.arange(LOOKED_AT[n]) + 0.5) / LOOKED_AT[n]
+        grid = np.stack(np.meshgrid(*[steps] * n, indexing="ij"), axis=-1).reshape(-1, n)
+        q = domain[:, 0] + grid * (domain[:, 1] - domain[:, 0])
+        linear = self.system.linear(q)
+        known = np.isfinite(np.concatenate([part.reshape(len(q), -1) for part in linear], axis=1)).all(axis=1)
+        mass, damping, stiffness = (part[known] for part in linear)
+        inverse = np.linalg.inv(mass)
+        frequency = math.sqrt(float(np.abs(np.linalg.eigvals(inverse @ stiffness)).max(initial=1e-300)))
+        rate = float(np.abs(np.linalg.eigvals(inverse @ damping)).max(initial=1e-300))
+        waves = 2.0 * np.pi / (domain[:, 1] - domain[:, 0])
+        allowed = 2.0 * np.abs(np.diagonal(inverse, axis1=1, axis2=2)).max(axis=0) * waves**2
+        return min(PHASE / frequency, DAMPED / rate, *self._load_steps()), allowed
+
+    def _load_steps(self) -> list[float]:
+        """Steps that loads allow [s], while they act."""
+        found = [math.inf]
+        for load in self.system.loads:
+            times = np.asarray(getattr(load, "times", ()))
+            rate, duration = getattr(load, "rate", 0.0), getattr(load, "duration", 0.0)
+            found += [OF_LOAD / rate] if rate else []
+            found += [OF_LOAD * duration] if duration else []
+            found += [OF_LOAD * float(np.diff(times).min())] if times.size else []
+        return found
+
+    def coarse_steps(self, starts: Floats) -> Floats:
+        """In octaves below that of slow motions, by the energy of each start."""
+        slow, allowed = self._paces
+        lowest = float(self._finite.min())
+        with np.errstate(all="ignore"):
+            energy = self.system.evaluate("bounding", starts.T)[0] + self.work[0]
+            fastest = np.sqrt(np.maximum(energy - lowest, 0.0) * allowed.max())
+            octaves = np.ceil(np.log2(fastest * slow / TURNING) - 1e-9)
+        return np.asarray(slow * 0.5 ** np.clip(np.nan_to_num(octaves), 0.0, MOST_OCTAVES))
+
+    @property
+    def shortest_step(self) -> float:
+        """See the base class."""
+        return float(0.5**MOST_OCTAVES * self._paces[0])
+
+    def damped_times(self, method: str, until: float, ratio: float = 2.0) -> Floats:
+        """None: steps are short enough for the dampers."""
+        return np.zeros(0)
+
+    def early(self, method: Method) -> Early | None:
+        """What happens until loads have no more kinks, which no step may cross."""
+        kinks = self.system.kinks(math.inf)
+        if not kinks.size:
+            return None
+        rest = replace(self, origin=float(kinks[-1]))
+        return Early(rest, rest.origin, self._paces[0])
+
+    def impossible(self, starts: Floats, states: Floats, threads: int | None = 1) -> NDArray[np.bool_]:
+        """Which have more energy than they began with and loads can have brought."""
+        with np.errstate(all="ignore"):
+            before, after = (self.system.evaluate("bounding", y.T)[0] for y in (starts, states))
+        scale = np.abs(before) + self.amplitudes
+        return np.asarray(~np.isfinite(after) | (after - before - self.work[0] > SLACK * scale))
+
+    def change(self, states: Floats, apart: Floats, push: Floats | None = None) -> Floats:
+        """By the interval enclosure of the energy over the box."""
+        n = len(self.names)
+        known = np.isfinite(states).all(axis=1) & np.isfinite(apart).all(axis=1)
+        found = np.full(len(states), np.inf)
+        low, high = states[known] - apart[known], states[known] + apart[known]
+        boxes = np.stack([np.nextafter(low, -np.inf), np.nextafter(high, np.inf)], axis=-1)
+        points = np.repeat(states[known][:, :, None], 2, axis=2)
+        kernel, p = callee(energy_kernel(self.system)), values_of(self.system)
+        over, at = np.empty((len(boxes), 2)), np.empty((len(boxes), 2))
+        for whole, bounds in ((boxes, over), (points, at)):
+            q, v = (np.ascontiguousarray(part) for part in (whole[:, :n], whole[:, n:]))
+            bound_states(kernel, p, q, v, bounds)
+        found[known] = over[:, 1] - at[:, 0]
+        return found
+
+    def size(self, equilibrium: int) -> Size:
+        """The norm in units of the last coordinate."""
+        return size_of(self.system, self.tree.equilibria[equilibrium])
+
+    @property
+    def places(self) -> Floats:
+        """See the base class."""
+        found = np.zeros((len(self.tree.equilibria), 2 * len(self.names)))
+        found[:, : len(self.names)] = self.tree.equilibria.position
+        return found
+
+    def confining(self, radius: float) -> Floats:
+        """See the base class."""
+        wells = [self.tree.equilibria[well] for well in self.tree.wells]
+        return np.array([e.energy + confining_energy(self.system, e, radius) for e in wells])
+
+    def measuring_steps(self, starts: Floats, method: str) -> Floats:
+        """A share of the coarse step."""
+        return MEASURING * self.coarse_steps(starts)
+
+    @property
+    def slow_step(self) -> float:
+        """See the base class."""
+        return self._paces[0]
+
+    def formula(self, method: str) -> Method:
+        """It takes differences."""
+        return find_method(method)
+
+
+def mechanism_certificate(mechanism: Mechanism) -> MechanismCertificate:
+    """The capture certificate of a mechanism.
+
+    Raises:
+        InputError: its wells are not certain, or a load never fades, or what it can do has no bound.
+    """
+    tree = prove_wells(mechanism)
+    finite = tree.cells.bounds[np.isfinite(tree.cells.bounds).all(axis=1)]
+    work, fades = _work_left(mechanism, tree, FADED * float(np.ptp(finite)))
+    return MechanismCertificate(mechanism, tree, work, fades)
+
+
+def _work_left(mechanism: Mechanism, tree: Wells, least: float) -> tuple[Floats, float]:
+    """What loads can still do at most [J] at times evenly spaced until they have faded, and that time [s]."""
+    domain, changing = tree.cells.domain, []
+    for load, acting in zip(mechanism.loads, mechanism.acting, strict=True):
+        if load.to_come(0.0) == (0.0, 0.0):
+            continue
+        name = f"{mechanism.name}: the load {load!r}"
+        if not math.isfinite(load.work_left(0.0)):
+            raise InputError(f"{name} never fades; motion under it does not come to rest: no label is proved")
+        turned = {c.symbol: c.symbol + 2 * _pi() for c in mechanism.coordinates if c.periodic}
+        if (
+            acting.place is None
+            or acting.place.subs(turned, simultaneous=True).expand() != acting.place.expand()
+        ):
+            raise InputError(f"{name} can do any work along a motion that turns: no label is proved")
+        low, high = range_of(mechanism, acting.place, domain)
+        if not math.isfinite(high - low):
+            raise InputError(f"{name}: how far its point can move is not bounded")
+        changing.append((load, high - low))
+
+    def left(t: float) -> float:
+        return sum(load.work_left(t, reach) for load, reach in changing)
+
+    fades = 1e-3
+    while left(fades) > least:
+        fades *= 2.0
+        if fades > LONGEST:
+            raise InputError(f"{mechanism.name}: its loads have not faded after {LONGEST:g} s")
+    if not changing:
+        return np.zeros(1), 1.0
+    times = np.linspace(0.0, fades, TIMES, endpoint=False)
+    return np.array([*map(left, times), left(fades)]) * (1.0 + 1e-12), fades
+
+
+def _pi() -> Any:
+    import sympy
+
+    return sympy.pi

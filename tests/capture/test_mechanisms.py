@@ -1,0 +1,278 @@
+"""Wells, labels and disturbances of any mechanism, against closed forms, floods, SciPy and ``Scene``."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import sympy
+from scipy import ndimage
+from scipy.integrate import solve_ivp
+
+import fastmech as fm
+from fastmech.basins.shock_limit import impulse_start, shock_limit
+from fastmech.capture.wells import prove_wells
+
+TURN = 2.0 * np.pi
+
+#: Scenes with one and two wells, a strong and a weak damper, and forces that fade.
+SCENES = (
+    {"F0": 85.3, "c1": 294.9, "c2": 92.85, "alpha": 0.0},
+    {"F0": -150.0, "c1": 260.0, "c2": 60.0, "alpha": 0.0},
+    {"F0": 85.3, "c1": 294.9, "c2": 92.85, "alpha": 0.0, "beta": 20.0},
+    {"F0": 100.0, "c1": 294.9, "c2": 92.85, "alpha": 0.7},
+)
+
+
+def double_well(load: object = None, *, b: float = 0.2, reach: float = 3.0) -> fm.Mechanism:
+    """x'' = x - x^3 - b x' + F(t): minima at +-1, a saddle at 0, barriers of 1/4 J."""
+    x = fm.lengths("x", -reach, reach)
+    m, c = sympy.symbols("m c")
+    return fm.Mechanism(
+        x,
+        {"m": 1.0, "c": b},
+        points={"O": (0, 0), "M": (x, 0)},
+        masses={"M": m},
+        potential=x**4 / 4 - x**2 / 2,
+        dampers=[fm.Damper("O", "M", c, along=(1, 0))],
+        forces=[] if load is None else [fm.Force("M", load, (1, 0))],
+        name="double_well",
+    )
+
+
+def damped_chain(n: int) -> fm.Mechanism:
+    """Pendulums of unit lengths and masses in a row, each with a damper in its joint."""
+    q = [fm.angles(f"q{k + 1}") for k in range(n)]
+    points, x, y = {}, 0, 0
+    for k, angle in enumerate(q):
+        x, y = x + sympy.sin(angle), y - sympy.cos(angle)
+        points[f"M{k + 1}"] = x, y
+    joints = [fm.TorsionDamper(q[0], 1), *(fm.TorsionDamper(b - a, 1) for a, b in pairwise(q))]
+    masses = dict.fromkeys(points, 1)
+    return fm.Mechanism(q, points=points, masses=masses, dampers=joints, gravity=9.81, name=f"damped_{n}")
+
+
+@pytest.mark.parametrize("values", SCENES)
+def test_the_papers_mechanism_has_the_scenes_wells_barriers_and_labels(values: dict[str, float]) -> None:
+    scene = fm.Scene(**values)
+    mechanism = fm.mechanisms.slider_pendulum().replace(**values)
+    rng = np.random.default_rng(5)
+    angles, rates = rng.uniform(-np.pi, np.pi, (1500, 2)), rng.normal(0.0, 4.0, (1500, 2))
+    starts = np.concatenate([angles, rates], axis=1)
+    expected, found = fm.labels_of(scene, starts), fm.labels_of(mechanism, starts)
+    np.testing.assert_allclose(found.tree.barrier, expected.tree.barrier, rtol=1e-10)
+    np.testing.assert_allclose(found.tree.equilibria.energy, expected.tree.equilibria.energy, rtol=1e-10)
+    both = (expected.well >= 0) & (found.well >= 0)
+    assert both.sum() > 0.9 * (expected.well >= 0).sum()
+    assert both.sum() > 60
+    places, others = expected.tree.equilibria.position, found.tree.equilibria.position
+    same = [np.abs(np.sin((others - place) / 2.0)).sum(axis=1).argmin() for place in places]
+    assert (np.array(same)[expected.well] == found.well)[both].all()
+    assert (expected.turns == found.turns)[both].all()
+
+
+def test_barriers_in_closed_form() -> None:
+    wells = prove_wells(double_well())
+    np.testing.assert_allclose(wells.barrier - wells.equilibria.energy[list(wells.wells)], 0.25, rtol=1e-10)
+    chain = prove_wells(fm.mechanisms.pendulum_chain(1))
+    depth = chain.barrier[0] - chain.equilibria[0].energy
+    assert depth == pytest.approx(2.0 * math.hypot(9.81, 3.0), rel=1e-10)
+    assert chain.passes == (1,)
+
+
+def test_a_spring_at_length_zero_bars_no_labels() -> None:
+    """A mass on a spring: one well, whose ring closes over its top; the first way out is at y = -2."""
+    x, y = fm.lengths("x y", -2.0, 2.0)
+    swing = fm.Mechanism(
+        (x, y),
+        points={"O": (0, 0), "M": (x, y)},
+        masses={"M": 1},
+        springs=[fm.Spring("O", "M", 100, 1)],
+        dampers=[fm.Damper("O", "M", 3, along=(1, 0)), fm.Damper("O", "M", 3, along=(0, 1))],
+        gravity=9.81,
+        name="swing",
+    )
+    assert not fm.find_equilibria(swing).certificate.complete
+    wells = prove_wells(swing)
+    assert len(wells.wells) == 1
+    end, bottom = 50.0 - 9.81 * 2.0, -9.81 - 9.81**2 / 200.0  # U at (0, -2), and at the minimum
+    assert wells.equilibria[wells.wells[0]].energy == pytest.approx(bottom, rel=1e-10)
+    assert end - 2.0 < wells.barrier[0] <= end
+    assert wells.passes == (None,)
+    rng = np.random.default_rng(4)
+    found = fm.labels_of(swing, np.concatenate([rng.uniform(-1.0, 1.0, (200, 4))], axis=1))
+    assert found.counts["captured"] == 200
+
+
+@pytest.mark.parametrize("reach", [1.2, 3.0])
+def test_a_ranges_end_may_be_the_lowest_way_out(reach: float) -> None:
+    """U(1.2) = -0.2016 lies below the saddle at 0."""
+    wells = prove_wells(double_well(reach=reach))
+    end = min(0.0, reach**4 / 4 - reach**2 / 2)
+    assert (wells.barrier <= end + 1e-12).all()
+    np.testing.assert_allclose(wells.barrier, end, atol=1e-3)
+
+
+def test_barriers_against_a_flood() -> None:
+    """Of the truss: the energy at which the upper state's sublevel set first reaches the lower one."""
+    truss = fm.mechanisms.von_mises_truss().replace(P=20.0)
+    wells = prove_wells(truss)
+    x, y = np.linspace(-0.9, 0.9, 721), np.linspace(-2.0, 2.0, 1601)
+    free, k = math.hypot(1.0, 0.5), 1000.0
+    grid = np.meshgrid(x, y, indexing="ij")
+    stretch = [np.hypot(grid[0] + side, grid[1]) - free for side in (-1.0, 1.0)]
+    u = 0.5 * k * (stretch[0] ** 2 + stretch[1] ** 2) + 20.0 * grid[1]
+    cells = [
+        (np.abs(x - place[0]).argmin(), np.abs(y - place[1]).argmin())
+        for place in wells.equilibria.position[list(wells.wells)]
+    ]
+    low, high = u[cells[0]], 40.0
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        number, _ = ndimage.label(u < middle)
+        joined = number[cells[0]] == number[cells[1]] != 0
+        low, high = (low, middle) if joined else (middle, high)
+    np.testing.assert_allclose(wells.barrier, high, atol=2e-2)  # a step of the grid
+
+
+def end_of(mechanism: fm.Mechanism, start: np.ndarray, t_end: float) -> np.ndarray:
+    """Where SciPy comes to."""
+
+    def rates(t: float, y: np.ndarray) -> np.ndarray:
+        return np.concatenate([y[len(y) // 2 :], mechanism.accelerations(t, y)])
+
+    return np.asarray(solve_ivp(rates, (0.0, t_end), start, method="DOP853", rtol=1e-10, atol=1e-12).y[:, -1])
+
+
+@pytest.mark.parametrize(
+    "load",
+    [
+        fm.loads.Pulse(2.0, 1.0, 1.5),
+        fm.loads.Decaying(3.0, 0.8),
+        fm.loads.Ramp(0.2, 1.0, 4.0),
+        fm.loads.Sampled([0.0, 1.0, 2.0, 5.0], [0.0, 2.0, -2.0, 0.0]),
+    ],
+    ids=lambda load: type(load).__name__,
+)
+def test_labels_under_loads_that_fade(load: object) -> None:
+    mechanism = double_well(load)
+    rng = np.random.default_rng(2)
+    starts = rng.uniform([-2.0, -2.0], [2.0, 2.0], (300, 2))
+    found = fm.labels_of(mechanism, starts)
+    assert (found.well >= 0).mean() > 0.9
+    places = found.tree.equilibria.position[:, 0]
+    for start, well in zip(starts[:12], found.well[:12], strict=True):
+        if well >= 0:
+            assert abs(end_of(mechanism, start, 120.0)[0] - places[well]) < 1e-3
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_labels_of_chains_count_turns(n: int) -> None:
+    chain = damped_chain(n)
+    rng = np.random.default_rng(3)
+    starts = np.concatenate([rng.uniform(-3.0, 3.0, (200, n)), rng.normal(0.0, 6.0, (200, n))], axis=1)
+    found = fm.labels_of(chain, starts, 120.0)
+    assert (found.well >= 0).mean() > 0.95
+    assert np.abs(found.turns).max() > 0
+    for start, well, turns in zip(starts[:8], found.well[:8], found.turns[:8], strict=True):
+        if well >= 0:
+            expected = found.tree.equilibria[int(well)].position + TURN * turns
+            np.testing.assert_allclose(end_of(chain, start, 60.0)[:n], expected, atol=0.5)
+
+
+def test_a_motion_that_leaves_its_range_says_so() -> None:
+    found = fm.labels_of(double_well(reach=1.5), [[1.0, 3.0], [1.0, 0.1], [-1.0, -3.0]])
+    assert [fm.Status(s).name for s in found.status] == ["OUT_OF_RANGE", "CAPTURED", "OUT_OF_RANGE"]
+    assert found.well.tolist() == [-1, found.well[1], -1]
+    assert found.counts["out_of_range"] == 2
+
+
+def test_disturbances_maps_and_shocks_of_a_mechanism() -> None:
+    mechanism = double_well()
+    equilibria = fm.find_equilibria(mechanism)
+    right = next(e for e in equilibria if e.position[0] > 0.5)
+    own = equilibria.index_of(right)
+    ensemble = fm.disturb(mechanism, right, 500, radius=0.6, t_end=120.0)
+    assert ensemble.returned.fraction + 1e-12 >= (ensemble.end_index == own).mean()
+    grid = {"x": np.linspace(-2.0, 2.0, 41), "x_dot": np.linspace(-2.0, 2.0, 41)}
+    basins = fm.map_basins(mechanism, grid, 120.0)
+    assert basins.turns.shape == (41, 41, 1)
+    mirrored = basins.well[::-1, ::-1]  # x to -x, v to -v
+    known = (basins.well >= 0) & (mirrored >= 0)
+    assert known.mean() > 0.95
+    assert (basins.well != mirrored)[known].all()
+    # A kick of the resting mass needs at least the barrier's energy, and with this damper hardly more.
+    shock = fm.minimal_shock(mechanism, right, most=2.0, coordinates=(1,), directions=2)
+    omega = fm.kinetic_norm(mechanism, right)[1, 1] ** -1
+    speed = shock.size * omega
+    assert speed > math.sqrt(0.5)
+
+    def comes_back(v: float) -> bool:
+        return bool(end_of(mechanism, np.array([1.0, -v]), 120.0)[0] > 0.0)
+
+    assert comes_back(0.999 * speed)
+    assert not comes_back(1.001 * speed)
+    edge = fm.track_edge(mechanism, [1.0, 0.0], [-1.0, 0.0], t_end=40.0)
+    assert edge.settled
+    saddle, away = fm.saddle_at(mechanism, edge.state)
+    assert abs(saddle.position[0]) < 1e-9
+    assert away < 1e-2
+
+
+def test_a_blow_on_the_papers_mechanism_is_that_on_the_scene() -> None:
+    values = {"F0": 100.0, "alpha": 0.0, "beta": 60.0}
+    scene, mechanism = fm.Scene(**values), fm.mechanisms.slider_pendulum().replace(**values)
+    one, other = fm.find_equilibria(scene)[0], fm.find_equilibria(mechanism)[0]
+    for on in ("M1", "M2", "M3"):
+        np.testing.assert_allclose(
+            impulse_start(mechanism, other, 12.0, on, 0.4),
+            impulse_start(scene, one, 12.0, on, 0.4),
+            rtol=1e-9,
+        )
+    proved, found = (shock_limit(x, e, "M2", 1.0, t_end=1.0) for x, e in ((scene, one), (mechanism, other)))
+    assert found.proved.impulse == pytest.approx(proved.proved.impulse, rel=1e-9)
+    assert found.proved.energy == pytest.approx(proved.proved.energy, rel=1e-9)
+    assert found.found.impulse == pytest.approx(proved.found.impulse, rel=1e-4, nan_ok=True)
+
+
+def test_small_disturbances_move_as_the_linearization_says() -> None:
+    chain = damped_chain(2)
+    hanging = fm.find_equilibria(chain)[0]
+    motion = fm.disturbed_motion(chain, hanging, [1e-4, 0.0, 0.0, 0.0], np.linspace(0.0, 2.0, 21))
+    apart = np.abs(motion.nonlinear - motion.linearized).max()
+    assert apart < 1e-9
+    limits = fm.linear_range(chain, hanging, directions=8).limit
+    assert ((limits > 1e-2) & (limits < np.pi)).all()
+
+
+def test_trapped_needs_no_damper() -> None:
+    found = fm.trapped(double_well(b=0.0), [[1.0, 0.0], [1.0, 0.6], [1.0, 0.8], [-0.2, 0.0]])
+    assert (found.well >= 0).tolist() == [True, True, False, True]
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "told"),
+    [
+        (lambda: double_well(fm.loads.Harmonic(0.3, 1.2)), "never fades"),
+        (lambda: double_well(b=0.0), "has no dampers"),
+        (lambda: fm.mechanisms.ziegler_column().replace(b=1.0), "not known to come from a potential"),
+    ],
+    ids=["harmonic", "undamped", "follower"],
+)
+def test_what_has_no_labels_says_why(mechanism: object, told: str) -> None:
+    made = mechanism()  # type: ignore[operator]
+    with pytest.raises(fm.InputError, match=told):
+        fm.labels_of(made, np.zeros((1, len(made.state))))
+
+
+def test_the_papers_mechanism_under_a_pulse_ends_where_scipy_says() -> None:
+    mechanism = fm.mechanisms.slider_pendulum(fm.loads.Pulse(3000.0, 0.2, 0.3)).replace(c1=294.9, c2=92.85)
+    rng = np.random.default_rng(6)
+    starts = np.concatenate([rng.uniform(-3.0, 3.0, (40, 2)), np.zeros((40, 2))], axis=1)
+    found = fm.labels_of(mechanism, starts, 60.0)
+    assert (found.well >= 0).any()
+    for k in np.flatnonzero(found.well >= 0)[:4]:
+        expected = found.tree.equilibria[int(found.well[k])].position + TURN * found.turns[k]
+        np.testing.assert_allclose(end_of(mechanism, starts[k], 60.0)[:2], expected, atol=0.5)
