@@ -1,7 +1,8 @@
 """A tolerance in place of a step.
 
 A sample chooses method and step (:mod:`fastmech.ensembles.work_precision`). For a quantile of the errors
-everyone then runs once; a larger sample, the pilot, runs twice and tells the error. For the largest error
+everyone then runs once; a larger sample, the pilot, runs before, and again with shorter steps, which
+tells the error. For the largest error
 everyone runs twice, the second time with steps shorter by sqrt(2). That run is kept. Its error is told by the
 distance of the two (Hairer, Norsett, Wanner, *Solving ODEs I*, section II.4), whose ratio to the error is
 known from the method's order and from the sample. Where the two lie further apart than the tolerance, a third

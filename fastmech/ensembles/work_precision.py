@@ -208,7 +208,7 @@ class Trial:
     def work(self, method: Method, dt: float) -> float:
         """Operations of a trajectory with steps of dt [s]."""
         outputs, operations, dim = self.case.outputs, self.operations, self.case.starts.shape[1]
-        taken, starts_anew = math.ceil(self.until / dt * (1.0 - 1e-12)), 1.0
+        taken, starts_anew = float(math.ceil(self.until / dt * (1.0 - 1e-12))), 1.0
         if outputs.size * STEPS_BETWEEN * dt > self.until:
             taken = self.until / dt
         elif outputs.size > 1:
