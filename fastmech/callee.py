@@ -59,3 +59,17 @@ def callee(kernel: Any) -> Any:
     if known is None:
         known = kernel.callee = Callee(kernel)
     return known
+
+
+def entry(kernel: Any) -> Any:
+    """The compiled function of a kernel of one signature, which is called without a look at types.
+
+    That look takes longer at tuples of arrays than a small run of a few steps. Arguments must be of the
+    kernel's types, arrays in C order: only the size of their numbers is checked.
+    """
+    settings: Any = numba_config
+    if settings.DISABLE_JIT:
+        return kernel
+    kernel.make()
+    (compiled,) = kernel.overloads.values()
+    return compiled.entry_point

@@ -7,7 +7,7 @@ import pytest
 from numba import types
 from numba.core import config
 
-from fastmech.callee import Callee, CalleeType, callee
+from fastmech.callee import Callee, CalleeType, callee, entry
 from fastmech.jit import kernel
 
 SIGNATURE = types.float64(types.float64, types.float64)
@@ -50,6 +50,26 @@ def test_each_is_called_with_its_own_arguments():
 def test_a_number_that_is_none_comes_back():
     assert np.isnan(inner(callee(difference), np.nan))
     assert inner(callee(quotient), np.inf) == np.inf
+
+
+@kernel(types.void(types.Array(types.float64, 1, "C")))
+def double_all(x):
+    for i in range(x.size):
+        x[i] *= 2.0
+
+
+def test_an_entry_does_what_its_kernel_does():
+    assert entry(difference)(7.0, 2.0) == 5.0
+    assert entry(inner)(callee(quotient), 6.0) == 4.0
+
+
+@compiled_only
+def test_an_entry_refuses_numbers_of_another_size():
+    x = np.arange(4.0)
+    entry(double_all)(x)
+    assert x.tolist() == [0.0, 2.0, 4.0, 6.0]
+    with pytest.raises(TypeError):
+        entry(double_all)(x.astype(np.float32))
 
 
 @compiled_only

@@ -44,11 +44,9 @@ def lie_together(which: NDArray[np.int64]) -> bool:
 
 def _on_lines(shape: tuple[int, ...], precision: Any, allocate: Any = np.empty) -> Floats:
     """An array in C order whose rows begin on lines of the cache: no vector lies on two."""
-    size = math.prod(shape) * np.dtype(precision).itemsize
-    memory = allocate(size + CACHE_LINE, dtype=np.uint8)
-    first = -memory.__array_interface__["data"][0] % CACHE_LINE
-    lines: Floats = memory[first : first + size].view(precision).reshape(shape)
-    return lines
+    kind = np.dtype(precision)
+    memory = allocate(math.prod(shape) * kind.itemsize + CACHE_LINE, dtype=np.uint8)
+    return np.ndarray(shape, kind, memory, -memory.ctypes.data % CACHE_LINE)
 
 
 class Lanes:
@@ -103,9 +101,10 @@ class Lanes:
         """Values of each (n, rows) as blocks (blocks, rows, lanes), so many ``together``."""
         (n, rows), width = values.shape, self._width * together
         blocks = -(-n // width)
-        lanes = np.minimum(np.arange(blocks * width), n - 1)
+        if blocks * width > n:
+            values = rows_at(values, np.minimum(np.arange(blocks * width), n - 1))
         blocked = _on_lines((blocks, rows, width), values.dtype)
-        blocked[...] = rows_at(values, lanes).reshape(blocks, width, rows).transpose(0, 2, 1)
+        blocked[...] = values.reshape(blocks, width, rows).transpose(0, 2, 1)
         return blocked
 
     def _filled(self, values: Floats, blocks: int, together: int = 1) -> Floats:

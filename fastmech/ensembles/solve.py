@@ -84,7 +84,8 @@ def distances(a: Solution, b: Solution) -> Floats:
     Infinite where one is not finite, or has stopped otherwise than the other.
     """
     with np.errstate(invalid="ignore", over="ignore"):
-        apart = np.nan_to_num(np.abs(a.y - b.y).max(axis=(0, 2)), nan=np.inf, posinf=np.inf)
+        apart = np.abs(a.y - b.y).max(axis=(0, 2))
+    apart[np.isnan(apart)] = np.inf
     if a.records.size and b.records.size:
         apart[a.records[STOP_CODE] != b.records[STOP_CODE]] = np.inf
     return np.asarray(apart)

@@ -52,6 +52,8 @@ class Span:
     def span(self, first: int, most: int) -> Span:
         """What a call passes from piece ``first`` on: one piece, or more while steps are at most ``most``."""
         before = self._steps_before
+        if not first and before[-1] <= most:
+            return self
         end = max(first + 1, int(np.searchsorted(before, before[first] + most, side="right")) - 1)
         return self.part(first, end)
 
@@ -77,6 +79,8 @@ def output_steps(times: Floats, dt: float) -> NDArray[np.int64]:
 def way(times: Floats, dt: float) -> Span:
     """The way through all output times; an interval of many steps is cut into pieces."""
     totals = output_steps(times, dt)
+    if totals.max(initial=0) <= PIECE_STEPS:
+        return Span(times, totals, np.arange(totals.size), totals.size)
     lengths = np.minimum(np.maximum(-(-totals // PIECES), PIECE_STEPS), MOST_PIECE_STEPS)
     pieces = np.maximum(1, -(-totals // lengths))
     output = np.repeat(np.arange(totals.size), pieces)
@@ -134,9 +138,10 @@ def tasks_of(dt: Floats, usable: NDArray[np.bool_], times: Floats, workers: int,
     All workers share a step's trajectories where they are all there are. Of several steps' each is divided as
     far as its part of the work asks for: a task costs about as much beside its steps as a hundred of them.
     """
-    # To sort takes longer than a short run.
-    steps = dt[:1] if dt.size and dt.min() == dt.max() else np.unique(dt)
-    groups = [(way(times, float(step)), np.flatnonzero(usable & (dt == step))) for step in steps]
+    if dt.ndim:
+        groups = [(way(times, float(step)), np.flatnonzero(usable & (dt == step))) for step in np.unique(dt)]
+    else:
+        groups = [(way(times, float(dt)), np.flatnonzero(usable))]
     groups = [(passed, members) for passed, members in groups if members.size]
     work = [members.size * max(int(passed.steps.sum()), 1) for passed, members in groups]
     equal = workers if len(groups) == 1 else SHARES * workers

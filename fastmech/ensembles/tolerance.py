@@ -1,7 +1,8 @@
 """A tolerance in place of a step.
 
 A sample chooses method and step (:mod:`fastmech.ensembles.work_precision`). For a quantile of the errors
-everyone then runs once; a larger sample, the pilot, runs twice and tells the error. For the largest error
+everyone then runs once; a larger sample, the pilot, runs before, and again with shorter steps, which
+tells the error. For the largest error
 everyone runs twice, the second time with steps shorter by sqrt(2). That run is kept. Its error is told by the
 distance of the two (Hairer, Norsett, Wanner, *Solving ODEs I*, section II.4), whose ratio to the error is
 known from the method's order and from the sample. Where the two lie further apart than the tolerance, a third
@@ -28,7 +29,6 @@ from fastmech.ensembles.solve import (
     Settings,
     Solution,
     distances,
-    nothing,
     part_of,
     put_into,
     solve,
@@ -41,6 +41,7 @@ from fastmech.ensembles.work_precision import (
     RATIO,
     REFERENCE,
     Chosen,
+    Trial,
     choose,
     error_of_finer,
     order_statistic,
@@ -62,9 +63,12 @@ TYPICAL = 0.9
 #: Runs again at most, and by how much steps are shortened at most from one to the next.
 ROUNDS, LEAP = 6, 2.0
 
-#: Trajectories that run first where a quantile is asked for, how often at most, how many of the worst are
-#: measured (in the share that may miss the tolerance), and by how much longer steps are worth another time.
-PILOT, PILOTS, TAIL, WORTH = 512, 4, 4.0, 1.2
+#: Trajectories that run first where a quantile is asked for, how often at most, by how much longer steps are
+#: worth another time, and how many times smaller the errors must be of the run that measures them.
+PILOT, PILOTS, WORTH, APART = 512, 4, 1.2, 3.0
+
+#: Trajectories of which it does not pay to see whether float32 suffices.
+FEW = 4 * PILOT
 
 #: An error of more than this share of that with longer steps is taken for one that these do not set.
 IN_VAIN = 0.7
@@ -190,9 +194,10 @@ def _estimated(
     sample, truth = case.part(members), None
     if switches is not None and quantile < 1.0:
         truth, _, _ = follow_to_tolerance(sample, switches, tol, None)
-    found = choose(sample, tol, TYPICAL if quantile == 1.0 else quantile, method, truth)
+    level = TYPICAL if quantile == 1.0 else quantile
+    found = choose(sample, tol, level, method, truth, pilot=quantile < 1.0)
     if quantile < 1.0:
-        return _once(case, who, (members, found), (tol, quantile), progress, known=truth is not None)
+        return _once(case, who, found, (tol, quantile), progress, known=truth is not None)
     runs = Runs(case, who, found.settings, tol)
     runs.twice(progress)
     runs.calibrate(members, found)
@@ -204,7 +209,7 @@ def _estimated(
 def _once(
     case: Case,
     who: Members,
-    chosen: tuple[Members, Chosen],
+    found: Chosen,
     wanted: tuple[float, float],
     progress: Progress | None,
     known: bool,
@@ -213,60 +218,59 @@ def _once(
 
     ``known``: the reference does not come from runs with shorter steps, and only it tells errors.
     """
-    (tol, quantile), (members, found) = wanted, chosen
-    settings = found.settings
-    pilot, p = evenly(case, who, PILOT), settings.method.order
-    part, n = case.part(pilot), pilot.size
-    best: tuple[float, Runs] | None = None
-    for _ in range(1 if known else PILOTS):
-        runs = Runs(part, np.arange(n), settings, tol)
-        runs.twice(None)
-        if np.array_equal(members, pilot):
-            runs.calibrate(np.arange(n), found)
-        far = np.argsort(-runs.error, kind="stable")[: math.ceil(TAIL * (1.0 - quantile) * n)]
-        if far.size <= n // 4:
-            runs.measure(np.sort(far))
-        estimate = order_statistic(runs.error, quantile)
-        if best is not None and estimate > (IN_VAIN * best[0] if best[0] > tol else tol):
-            break
-        best = estimate, runs
-        asked = (AIM * tol / max(estimate, 1e-300)) ** (1.0 / p) if estimate < np.inf else 1.0 / RATIO
-        if estimate <= tol and (asked < WORTH or n == who.size):
-            break
-        settings = replace(settings, dt=float(settings.dt) * min(max(asked, 1.0 / RATIO), RATIO))
-    assert best is not None
-    estimate, runs = best
-    settings = runs.settings
+    (tol, quantile), settings, trial = wanted, found.settings, found.trial
+    solution = None
     if known:
-        assert found.trial.truth is not None
-        right = solve_at(found.trial.case, settings)
-        estimate = order_statistic(distances(right, found.trial.truth), quantile)
-    if tol >= SINGLE and _in_single(settings, case):
-        single = replace(settings, precision=np.float32)
-        run = solve_at(part, single)
-        rounded = order_statistic(runs.error + distances(run, runs.kept), quantile)
-        if rounded <= tol:
-            settings, estimate = single, rounded
-    if settings.precision is np.float32:
-        solution = solve_at(case, settings, progress)
+        error = trial.errors(settings.method, float(settings.dt))
     else:
-        solution = _with_others(case, pilot, runs.kept, settings, progress)
+        pilot = evenly(case, who, PILOT)
+        part = case.part(pilot)
+        settings, run, error = _piloted(part, settings, wanted)
+        if tol >= SINGLE and who.size > FEW and _in_single(settings, case):
+            single = replace(settings, precision=np.float32)
+            rounded = error + distances(solve_at(part, single), run)
+            if order_statistic(rounded, quantile) <= tol:
+                settings, error = single, rounded
+        if (
+            case.problem.system is None
+            and pilot.size == len(case.starts)
+            and settings.precision is np.float64
+        ):
+            solution = run
+            if progress is not None:
+                progress(pilot.size)
+    if solution is None:
+        solution = solve_at(case, settings, progress)
+    estimate = order_statistic(error, quantile)
     remark = "" if estimate <= tol else f"; the {quantile:.3g} quantile misses it"
     return Estimated(solution, settings, found.reason + remark, None, estimate)
 
 
-def _with_others(
-    case: Case, who: Members, done: Solution, settings: Settings, progress: Progress | None
-) -> Solution:
-    """All trajectories, of which some are done."""
-    if progress is not None:
-        progress(who.size)
-    others = np.setdiff1d(np.arange(len(case.starts)), who)
-    solution = nothing(case.problem, case.outputs.size, *case.starts.shape)
-    rest = solve_at(case.part(others), settings, progress)
-    for members, run in ((who, done), (others, rest)):
-        put_into(solution, members, run)
-    return solution
+def _piloted(
+    part: Case, settings: Settings, wanted: tuple[float, float]
+) -> tuple[Settings, Solution, Floats]:
+    """Steps with which the quantile of a pilot's errors is within the tolerance; their run and its errors.
+
+    These are measured by a run with shorter steps.
+    """
+    (tol, quantile), p, dt = wanted, settings.method.order, float(settings.dt)
+    trial, reference = Trial(part, tol, quantile, settings.fit), math.inf
+    best: tuple[float, float, Floats] | None = None
+    for _ in range(PILOTS):
+        if not (dt / reference) ** p >= APART:
+            reference = dt / RATIO
+        runs = (trial.run(settings.method, step) for step in (reference, dt))
+        error = distances(*runs) / (1.0 - (reference / dt) ** p)
+        estimate = order_statistic(error, quantile)
+        if best is not None and estimate > (IN_VAIN * best[0] if best[0] > tol else tol):
+            break
+        best = estimate, dt, error
+        asked = (AIM * tol / max(estimate, 1e-300)) ** (1.0 / p) if estimate < np.inf else 1.0 / LEAP
+        if estimate <= tol and asked < WORTH:
+            break
+        dt *= min(max(asked, 1.0 / LEAP), RATIO)
+    assert best is not None
+    return replace(settings, dt=best[1]), trial.run(settings.method, best[1]), best[2]
 
 
 def _in_single(settings: Settings, case: Case) -> bool:

@@ -10,7 +10,7 @@ trajectories choose the method, the whole sample its steps.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -33,9 +33,10 @@ from fastmech.ensembles.operations import (
     step_operations,
 )
 from fastmech.ensembles.problem import Case
-from fastmech.ensembles.solve import Settings, Solution, distances
+from fastmech.ensembles.run import Sample
+from fastmech.ensembles.solve import Settings, Solution, distances, nothing
 from fastmech.ensembles.spans import output_steps
-from fastmech.integrators.method import ImplicitRungeKutta, Method
+from fastmech.integrators.method import Explicit, ImplicitRungeKutta, Method
 from fastmech.integrators.methods import find_method
 
 Floats = NDArray[np.float64]
@@ -43,7 +44,7 @@ Floats = NDArray[np.float64]
 #: What gives the reference, and where stability and not accuracy would set its steps.
 REFERENCE, IMPLICIT = "abm10", "radau5"
 
-#: The explicit method with the longest stable steps of high order.
+#: The explicit method with the longest stable steps of high order: a user's system has its reference from it.
 SINGLE_STEP = "dop853"
 
 #: Methods that are tried beside the reference's, by the tolerance below which they are: high orders pay where
@@ -54,6 +55,13 @@ TRIED = (
     (3e-4, ("ab6", "dop853")),
     (math.inf, ("ab6", "tsit5")),
 )
+#: The same of systems: where a right-hand side costs little, Adams methods' histories cost more than stages.
+TRIED_ON_SYSTEMS = (
+    (1e-8, ("verner7", "abm12")),
+    (1e-5, ("verner7", "abm10")),
+    (3e-4, ("verner7", "ab6")),
+    (math.inf, ("tsit5", "ab6")),
+)
 
 #: Lengths of the steps of two runs that tell an error.
 RATIO = math.sqrt(2.0)
@@ -61,8 +69,8 @@ RATIO = math.sqrt(2.0)
 #: Shares of the tolerance: what steps aim at, what is near enough, and the reference's error.
 AIM, NEAR, REFERRED = 0.5, 0.25, 1.0 / 16.0
 
-#: By how much steps change at most from run to run.
-LEAP = 4.0
+#: By how much steps change at most from run to run, and to what is believed without a run.
+LEAP, BELIEVED = 4.0, 1.5
 
 #: Steps of a run at least.
 FEWEST = 8.0
@@ -88,7 +96,7 @@ OVERSHOT, STIFF = 1e-3, 4.0
 GUESS, GUESSED = 0.14, 1e-6
 
 #: Steps of the first guess for a user's system, at least and at most.
-FEW_STEPS, MANY_STEPS = 64.0, 2.0**14
+FEW_STEPS, MANY_STEPS = 32.0, 2.0**14
 
 #: Where fast motion slows down, steps are fitted again at these shares of the run.
 AGAIN = (0.0, 0.125, 0.5)
@@ -136,6 +144,15 @@ class Trial:
     fitted: float = 1.0  #: steps of a trajectory, on average, in those of slow motion
     _runs: dict[tuple[str, float], Solution] = field(default_factory=dict)
 
+    @cached_property
+    def _sample(self) -> Sample | None:
+        """For small runs of a system without arrays, all with the same steps."""
+        problem, starts, outputs, _ = self.case
+        system = problem.system
+        if system is None or system.vector or problem.observation.record.size or not outputs[0] > 0.0:
+            return None
+        return Sample(problem.rhs, problem.params, problem.inward(starts))
+
     @property
     def until(self) -> float:
         """End of the run [s]."""
@@ -172,22 +189,32 @@ class Trial:
     def run(self, method: Method, dt: float) -> Solution:
         """The sample's run."""
         if (method.name, dt) not in self._runs:
-            run = solve_at(self.case, self.settings(method, dt))
+            run = self._small_run(method, dt) or solve_at(self.case, self.settings(method, dt))
             self._runs[method.name, dt] = run
             if self.fit and self.until and len(self.case.starts):
                 self.fitted = max(float(run.steps.mean()) * dt / self.until, 1.0)
         return self._runs[method.name, dt]
 
+    def _small_run(self, method: Method, dt: float) -> Solution | None:
+        """The same of few steps, whose bookkeeping would take longer than they do."""
+        (problem, starts, outputs, _), sample = self.case, self._sample
+        if sample is None or outputs.size * STEPS_BETWEEN * dt > self.until:
+            return None
+        y = sample.run(method, np.concatenate([[0.0], outputs]), dt) if isinstance(method, Explicit) else None
+        if y is None:
+            return None
+        return replace(nothing(problem, 0, *starts.shape), y=problem.outward(y))
+
     def work(self, method: Method, dt: float) -> float:
         """Operations of a trajectory with steps of dt [s]."""
         outputs, operations, dim = self.case.outputs, self.operations, self.case.starts.shape[1]
-        intervals = np.diff(outputs, prepend=0.0)
-        steps = np.maximum(output_steps(np.concatenate([[0.0], outputs]), dt), 1)
-        taken, starts_anew = float(steps[intervals > 0.0].sum()), 1.0
+        taken, starts_anew = float(math.ceil(self.until / dt * (1.0 - 1e-12))), 1.0
         if outputs.size * STEPS_BETWEEN * dt > self.until:
             taken = self.until / dt
         elif outputs.size > 1:
-            lengths = intervals / steps
+            intervals = np.diff(outputs, prepend=0.0)
+            steps = np.maximum(output_steps(np.concatenate([[0.0], outputs]), dt), 1)
+            taken, lengths = float(steps[intervals > 0.0].sum()), intervals / steps
             starts_anew += np.count_nonzero(~np.isclose(lengths[1:], lengths[:-1], rtol=1e-9))
         own = step_operations(method, operations, dim)
         return taken * self.fitted * own + starts_anew * start_operations(method, operations, dim)
@@ -236,11 +263,16 @@ class Trial:
                 break
             before, last, ratio = apart, finer, LEAP
             if np.isfinite(found):
-                ratio = RATIO if vain else min(max((found / goal) ** (1.0 / p) * 1.05, RATIO), LEAP)
+                # More than 2 cannot show what it brings.
+                ratio = RATIO if vain else min(max((found / goal) ** (1.0 / p) * 1.05, RATIO), 2.0)
         return False
 
-    def tune(self, method: Method, dt: float, near: float) -> Point:
-        """The step with which a method's error is between ``near`` times the tolerance and it."""
+    def tune(self, method: Method, dt: float, least: float = math.inf) -> Point:
+        """The step with which a method's error is between :data:`NEAR` times the tolerance and it.
+
+        On the trajectories that choose a method, ``least`` is the work of the best one so far: an error near
+        enough tells the step by the method's order, and a method that needs more work is given up.
+        """
         good: tuple[float, float] | None = None
         bad, best, dt = math.inf, (math.inf, dt), min(dt, self.longest)
         before, vain = math.inf, 0
@@ -250,10 +282,15 @@ class Trial:
             wanted = 1.0 / LEAP
             if found < math.inf:
                 wanted = (AIM * self.tol / max(found, 1e-300)) ** (1.0 / method.order)
+                believed = self.refers is not None and 1.0 / BELIEVED <= wanted <= BELIEVED
                 wanted = min(max(wanted, 1.0 / LEAP), LEAP)
+                asked = min(dt * wanted, self.longest)
+                if believed or (found > self.tol and self.work(method, asked) > least):
+                    work = self.work(method, asked)
+                    return Point(method, asked, AIM * self.tol, work, work <= least)
             if found <= self.tol:
                 good = (dt, found) if good is None or dt > good[0] else good
-                if found >= near * self.tol or dt >= self.longest or bad <= 1.2 * dt:
+                if found >= NEAR * self.tol or dt >= self.longest or bad <= 1.2 * dt:
                     break
                 dt = min(dt * wanted, self.longest, math.sqrt(dt * bad))
             else:
@@ -269,7 +306,7 @@ class Trial:
         return Point(method, dt, error, self.work(method, dt), good is not None, limited)
 
     def nearest(self) -> float:
-        """Step [s] of the reference's method that the error of one of its runs asks for."""
+        """Step [s] of the reference's method with the error that is nearest to what is aimed at."""
         assert self.refers is not None
         method, dt = self.refers
         steps = [step for name, step in self._runs if name == method.name and step > dt]
@@ -277,18 +314,7 @@ class Trial:
         known = {step: error for step, error in errors.items() if 0.0 < error < math.inf}
         if not known:
             return dt * (AIM / REFERRED) ** (1.0 / method.order)
-        step = min(known, key=lambda step: abs(math.log(known[step] / (AIM * self.tol))))
-        if NEAR * self.tol <= known[step] <= self.tol:
-            return step
-        return step * min(max((AIM * self.tol / known[step]) ** (1.0 / method.order), 1.0 / LEAP), LEAP)
-
-    def predicted(self, point: Point) -> Point:
-        """With the step that the point's error asks for, if that is near."""
-        if point.limited or not 0.0 < point.error < math.inf:
-            return point
-        factor = (AIM * self.tol / point.error) ** (1.0 / point.method.order)
-        dt = min(point.dt * min(max(factor, 0.5), 1.5), self.longest)
-        return Point(point.method, dt, point.error, self.work(point.method, dt), point.good)
+        return min(known, key=lambda step: abs(math.log(known[step] / (AIM * self.tol))))
 
 
 class Chosen(NamedTuple):
@@ -299,10 +325,13 @@ class Chosen(NamedTuple):
     trial: Trial  #: the whole sample's runs
 
 
-def choose(case: Case, tol: float, level: float, method: str | None, truth: Solution | None) -> Chosen:
+def choose(
+    case: Case, tol: float, level: float, method: str | None, truth: Solution | None, pilot: bool
+) -> Chosen:
     """The method and the step with which the quantile ``level`` of a sample's errors is within ``tol``.
 
-    ``method`` is kept if given; ``truth`` is the sample's, if it is known from elsewhere.
+    ``method`` is kept if given; ``truth`` is the sample's, if it is known from elsewhere. With a
+    ``pilot``, whose runs follow, the few that choose a method suffice.
     """
     fit = times_to_fit(case)
     few = np.unique(np.linspace(0, len(case.starts) - 1, PROBE).astype(np.int64))
@@ -310,7 +339,9 @@ def choose(case: Case, tol: float, level: float, method: str | None, truth: Solu
     probe = Trial(case if small else case.part(few), tol, level, fit)
     points = _points(probe, None if method is None else find_method(method))
     best = min(points, key=lambda point: (not point.good, point.work if point.good else point.error))
-    whole = probe
+    reason, whole = "as asked for" if method is not None else _reason(best, points, tol), probe
+    if pilot and truth is None:
+        return Chosen(probe.settings(best.method, best.dt), reason, probe)
     if not small:
         whole = Trial(case, tol, level, fit)
         finer = min((REFERRED / AIM) ** (1.0 / best.method.order), 1.0 / RATIO)
@@ -318,8 +349,7 @@ def choose(case: Case, tol: float, level: float, method: str | None, truth: Solu
     if truth is not None:
         whole.truth, whole.doubt = truth, np.zeros(len(case.starts))
     if best.error < math.inf and not best.limited and not (small and NEAR * tol <= best.error <= tol):
-        best = whole.tune(best.method, probe.predicted(best).dt, NEAR)
-    reason = "as asked for" if method is not None else _reason(best, points, tol)
+        best = whole.tune(best.method, best.dt)
     return Chosen(whole.settings(best.method, best.dt), reason, whole)
 
 
@@ -327,6 +357,9 @@ def _points(probe: Trial, asked: Method | None) -> list[Point]:
     """Methods and their steps on the trajectories that choose."""
     explicit, implicit = find_method(REFERENCE), find_method(IMPLICIT)
     c, dt, limit = probe.case.problem.coefficients, first_guess(probe.case, probe.tol), math.inf
+    tried, single_step = TRIED, find_method(SINGLE_STEP)
+    if c is None:
+        explicit, tried = single_step, TRIED_ON_SYSTEMS
     if c is not None and len(probe.case.starts):
         limit = explicit_limit(explicit, c) / RATIO
     if isinstance(asked, ImplicitRungeKutta):
@@ -342,22 +375,21 @@ def _points(probe: Trial, asked: Method | None) -> list[Point]:
     base, step = probe.refers[0], probe.nearest()
     if asked is not None:
         equal = 1.0 if base is asked else probe.work(asked, step) / max(probe.work(base, step), 1.0)
-        return [probe.tune(asked, step * equal, 0.5 * NEAR)]
-    points = [probe.tune(base, step, 0.5 * NEAR)]
-    best = probe.predicted(points[0])
-    single_step = find_method(SINGLE_STEP)
+        return [probe.tune(asked, step * equal)]
+    best = probe.tune(base, step)
+    points = [best]
     if base is implicit:
         limit = math.inf if c is None else explicit_limit(single_step, c) / RATIO
         cheap = limit < math.inf and probe.work(single_step, limit) < best.work
-        return [*points, probe.tune(single_step, limit, 0.5 * NEAR)] if cheap else points
-    if points[0].limited:
-        dt = LEAP * points[0].dt
-        return [*points, *(probe.tune(method, dt, 0.5 * NEAR) for method in (single_step, implicit))]
-    for name in next(names for above, names in TRIED if probe.tol < above) if best.good else ():
+        return [*points, probe.tune(single_step, limit)] if cheap else points
+    if best.limited:
+        others = (implicit,) if base is single_step else (single_step, implicit)
+        return [best, *(probe.tune(method, LEAP * best.dt) for method in others)]
+    for name in next(names for above, names in tried if probe.tol < above) if best.good else ():
         method = find_method(name)
         # With as much work as the reference's method, to begin with.
         equal = probe.work(method, best.dt) / max(best.work, 1.0)
-        points.append(probe.predicted(probe.tune(method, best.dt * equal, 0.5 * NEAR)))
+        points.append(probe.tune(method, best.dt * equal, min(p.work for p in points)))
     return points
 
 
@@ -401,7 +433,7 @@ def first_guess(case: Case, tol: float) -> float:
     """
     problem, starts, outputs, _ = case
     c, t_end = problem.coefficients, float(outputs[-1])
-    order = find_method(REFERENCE).order
+    order = find_method(REFERENCE if c is not None else SINGLE_STEP).order
     if c is not None:
         return GUESS * (tol / GUESSED) ** (1.0 / order) / float(np.max(vibration_frequency(c)))
     Y = starts.T.copy()
@@ -411,4 +443,5 @@ def first_guess(case: Case, tol: float) -> float:
         times = np.abs(Y).max(axis=0) / np.abs(rates).max(axis=0)
     times = times[np.isfinite(times) & (times > 0.0)]
     longest, shortest = t_end / FEW_STEPS, t_end / MANY_STEPS
-    return float(np.clip(np.median(times), shortest, longest)) if times.size else longest
+    guess = float(np.clip(np.median(times), shortest, longest)) if times.size else longest
+    return guess * (tol / GUESSED) ** (1.0 / order)

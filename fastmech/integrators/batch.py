@@ -46,8 +46,10 @@ class Batch(NamedTuple):
 
     def ready(self, carried: int) -> Batch:
         """With memory for a method that carries so many states."""
-        blocks, dim, width = self.Y.shape
         memory, phase = self.memory, self.phase
+        if memory is not None and phase is not None:
+            return self
+        blocks, dim, width = self.Y.shape
         return self._replace(
             memory=np.zeros((blocks, carried * dim, width), self.Y.dtype) if memory is None else memory,
             phase=np.zeros(PHASE) if phase is None else phase,

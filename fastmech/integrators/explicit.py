@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from fastmech.callee import CalleeType, callee
+from fastmech.callee import CalleeType, callee, entry
 from fastmech.integrators.batch import ROUNDED_TIME, Batch, BlockRHS, Floats, Integers, Observer, batch_type
 from fastmech.integrators.tableau import Tableau
 from fastmech.jit import (
@@ -353,13 +353,28 @@ def formula_of(tableau: Tableau, rows: int = 0) -> Formula:
 
 def take_steps(method: Any, rhs: Any, observe: Any, batch: Batch) -> None:
     """Take a batch through its times with an explicit method's ``weights`` and ``formulas``."""
-    precision, rates, group = batch.Y.dtype.name, getattr(rhs, "rates", None), 0
+    known, (_, dim, width) = vars(rhs).setdefault("bound", {}), batch.Y.shape
+    key = id(method), id(observe), batch.Y.dtype, dim, width
+    if key not in known:  # who is named by its id is kept alive
+        known[key] = *_bound(method, (rhs, observe), (batch.Y.dtype, dim, width)), method, observe
+    drive, calls, weights, *_ = known[key]
+    drive(calls, weights, batch.ready(method.carried))
+
+
+def _bound(
+    method: Any, functions: tuple[Any, Any], lanes: tuple[Any, int, int]
+) -> tuple[Any, Calls, Weights]:
+    """The driver, what it calls and its weights, for blocks of so many states and lanes of a precision."""
+    (rhs, observe), (dtype, dim, width), group = functions, lanes, 0
+    precision, rates = dtype.name, getattr(rhs, "rates", None)
     advance = (no_steps_in(precision),) * 2
-    if rates is not None and batch.Y.shape[2] == VECTOR_LANES:
+    if rates is not None and width == VECTOR_LANES:
         made = tuple(whole_steps(rates, formula, precision) for formula in method.formulas)
         if None not in made:
-            advance, numbers = made, batch.Y.shape[1] * (method.carried + 2) * VECTOR_LANES
-            group = max(1, min(GROUP, GROUP_BYTES // (batch.Y.itemsize * numbers)))
-    functions = rhs if precision == "float64" else in_single(rhs), observe, *advance
-    calls = Calls(*map(callee, functions))
-    drive_in(precision)(calls, method.weights._replace(group=group), batch.ready(method.carried))
+            advance = made
+            group = max(
+                1, min(GROUP, GROUP_BYTES // (dtype.itemsize * dim * (method.carried + 2) * VECTOR_LANES))
+            )
+    own = rhs if precision == "float64" else in_single(rhs)
+    calls = Calls(*map(callee, (own, observe, *advance)))
+    return entry(drive_in(precision)), calls, method.weights._replace(group=group)

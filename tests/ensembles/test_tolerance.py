@@ -15,6 +15,10 @@ from ensembles.references import Floats, errors, motions, motions_of, rest_start
 from ensembles.starts import random_starts
 
 import fastmech as fm
+from fastmech.bench.own_systems import SYSTEMS
+from fastmech.ensembles.problem import system_problem
+from fastmech.ensembles.run import Sample, run_ensemble
+from fastmech.ensembles.tolerance import FEW
 from fastmech.ensembles.work_precision import ROUNDING
 from fastmech.errors import InputError
 from fastmech.integrators.methods import METHODS
@@ -140,7 +144,8 @@ def test_what_was_chosen_is_reported() -> None:
     assert run.own_dt.shape == (1, N)
     assert run.own_steps.shape == (N,)
     assert run.dt == run.own_dt.max()
-    rough = fm.integrate(scene, starts, 4.0, tol=1e-2, quantile=0.5)
+    many = np.tile(starts, (FEW // N + 1, 1))
+    rough = fm.integrate(scene, many, 4.0, tol=1e-2, quantile=0.5)
     assert rough.precision == "float32"
 
 
@@ -314,3 +319,37 @@ def test_wrong_arguments_are_refused_in_one_line(arguments: dict[str, Any], mess
     with pytest.raises(InputError, match=f"^{re.escape(message)}") as error:
         fm.integrate(Scene(), rest_starts(2), 1.0, **arguments)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("tol", [1e-3, 1e-5, 1e-7, 1e-9])
+def test_a_choice_takes_few_small_runs_and_everyone_runs_once(
+    tol: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = SYSTEMS["Lorenz, 3 states"]
+    whole, small = [], []
+
+    def counted(*given: Any, **named: Any) -> Any:
+        whole.append(len(given[2]))
+        return run_ensemble(*given, **named)
+
+    def counted_small(self: Sample, method: Any, times: Floats, dt: float) -> Any:
+        small.append((method.name, dt))
+        return run_sample(self, method, times, dt)
+
+    run_sample = Sample.run
+    monkeypatch.setattr("fastmech.ensembles.solve.run_ensemble", counted)
+    monkeypatch.setattr(Sample, "run", counted_small)
+    fm.integrate(own.system(), own.starts(1024), own.t_end, tol=tol, quantile=0.99)
+    assert whole == [1024]
+    assert len(small) <= 14
+
+
+def test_a_sample_has_the_bits_of_an_ensemble() -> None:
+    own = SYSTEMS["Henon-Heiles, 4 states"]
+    problem, starts = system_problem(own.system(), 21, {}), own.starts(21)
+    for name in ("tsit5", "abm10"):
+        method, times = METHODS[name], np.array([0.0, 0.7, 3.0, 30.0])
+        run = run_ensemble(problem.rhs, problem.params, starts, times, 0.1, method, threads=1)
+        found = Sample(problem.rhs, problem.params, starts).run(method, times, 0.1)
+        assert np.array_equal(found, run.states)
+    assert Sample(problem.rhs, problem.params, starts).run(method, times, 1e-3) is None
