@@ -8,6 +8,7 @@ from pathlib import Path
 
 from fastmech.ensembles.run import Progress
 from fastmech.errors import InputError, StepWarning, shown
+from fastmech.models.mechanism import Mechanism
 from fastmech.plots.style import save
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import RunContext, read_request
@@ -27,6 +28,7 @@ def run_request(
     hire: Hiring | None = None,
     tell: Callable[[str], None] = lambda line: None,
     text: str | None = None,
+    mechanism: Mechanism | None = None,
 ) -> RunReport:
     """Run every scan of a request file and write one result file; an interrupted run goes on.
 
@@ -43,13 +45,14 @@ def run_request(
         hire: who computes, threads of this process by default; see :mod:`fastmech.tiles.cluster`.
         tell: is given lines for the user.
         text: of the request, by default that of the file; ``path`` then is its name.
+        mechanism: one of your own that the request is about.
 
     Raises:
         InputError: the request is wrong, the result cannot be written, or it exists and ``fresh`` is False.
         CrashedTilesError: some tiles could not be computed; the others are kept.
         Stopped: by Ctrl-C or SIGTERM; finished tiles are kept.
     """
-    request = read_request(path, scan_kinds(), text)
+    request = read_request(path, scan_kinds(), text, mechanism)
     target = Path(out) if out is not None else default_output(path)
     run = ScanRun(request, Path(path), target, context or RunContext(), hire or ThreadHiring(), tell)
     for line in request.step_warnings:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import runpy
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,6 +13,7 @@ import click
 from fastmech.cli.reporting import Account, account, reporting_options
 
 if TYPE_CHECKING:
+    from fastmech.models.mechanism import Mechanism
     from fastmech.scan_types.request import RunContext
     from fastmech.tiles.report import RunReport
     from fastmech.tiles.work import Hiring
@@ -36,6 +38,11 @@ if TYPE_CHECKING:
 @click.option("--threads", metavar="N", type=click.IntRange(min=1), help="Threads to use [default: all].")
 @click.option("--workers", metavar="N", type=click.IntRange(min=1), help="Compute in N processes (Dask).")
 @click.option("--scheduler", metavar="ADDRESS", help="Compute on a Dask cluster: tcp://HOST:8786.")
+@click.option(
+    "--mechanism",
+    metavar="FILE.py:NAME",
+    help="What the request is about: a mechanism, or a function that gives one.",
+)
 @click.option("--tile", metavar="SECTION:INDEX", help="Compute one tile alone.")
 @click.option(
     "--keep", metavar="FILE.h5", type=click.Path(dir_okay=False, path_type=Path), help="Keep that tile here."
@@ -49,6 +56,7 @@ def command(
     threads: int | None,
     workers: int | None,
     scheduler: str | None,
+    mechanism: str | None,
     tile: str | None,
     keep: Path | None,
     quiet: bool,
@@ -74,19 +82,49 @@ def command(
             from fastmech.runner import run_request
             from fastmech.scan_types.request import RunContext
             from fastmech.tiles.run import default_output
+
+            own = None if mechanism is None else _mechanism_named(mechanism)
         context = RunContext(threads, told.bars.stage)
         target = out or default_output(request_file)
         if tile is not None:
-            _run_tile(told, request_file, text, tile, target, keep, context)
+            _run_tile(told, request_file, text, tile, target, keep, context, own)
             return
         with _hiring(workers, scheduler) as hire:
             settings: dict[str, Any] = {"fresh": fresh, "context": context, "hire": hire}
-            report = run_request(request_file, target, **settings, tell=told.bars.tell, text=text)
+            settings |= {"tell": told.bars.tell, "text": text, "mechanism": own}
+            report = run_request(request_file, target, **settings)
         told.done = str(target)
         told.facts |= report.summary()
         _show(told, report)
         if before is not None:
             _compare(told, before, report.path)
+
+
+def _mechanism_named(where: str) -> Mechanism:
+    """A mechanism by file and name.
+
+    Raises:
+        InputError: there is none.
+    """
+    from fastmech.errors import InputError, one_line, shown, shown_name
+    from fastmech.models.mechanism import Mechanism
+
+    file, _, name = where.rpartition(":")
+    if not file.endswith(".py") or not name.isidentifier():
+        raise InputError(f"--mechanism {shown(where)}: must be FILE.py:NAME")
+    if not Path(file).is_file():
+        raise InputError(f"{shown_name(file)}: no such file")
+    try:
+        found = runpy.run_path(file).get(name)
+        found = found() if callable(found) else found
+    except InputError:
+        raise
+    except Exception as error:
+        told = one_line(f"{type(error).__name__}: {error}")
+        raise InputError(f"{shown_name(file)}: cannot be run: {told}") from None
+    if not isinstance(found, Mechanism):
+        raise InputError(f"{shown_name(file)}: {shown_name(name)} is no fastmech.Mechanism, nor gives one")
+    return found
 
 
 def _asked_in(source: Path) -> tuple[Path, str, str | None]:
@@ -129,13 +167,14 @@ def _run_tile(
     target: Path,
     keep: Path | None,
     context: RunContext,
+    mechanism: Mechanism | None,
 ) -> None:
     from fastmech.store.write import check_writable
     from fastmech.tiles.alone import compute_alone
 
     if keep is not None:
         check_writable(keep)
-    alone = compute_alone(request_file, tile, context, target, text)
+    alone = compute_alone(request_file, tile, context, target, text, mechanism)
     told.facts |= {"tile": tile, "content": alone.content, "same": alone.same}
     told.say(f"{alone.seconds:9.2f} s  {tile}: {alone.items:,} {alone.what}")
     told.say(f"Content: {alone.content}")

@@ -159,7 +159,7 @@ class Mechanism:
 
     def _forget(self) -> None:
         """What follows from the equations, which are others now."""
-        for name in ("equations", "_statics", "prints", "derived", "_numpy"):
+        for name in _MADE:
             self.__dict__.pop(name, None)
 
     def with_terms(self, varied: Collection[str]) -> Mechanism:
@@ -187,6 +187,15 @@ class Mechanism:
     def loads(self) -> tuple[Load, ...]:
         """Its loads with the parameters' values."""
         return tuple(load.at(self.parameters) for load, *_ in self._parts.loads)
+
+    def described(self) -> dict[str, tuple[float, str, str]]:
+        """Value, unit and description of every parameter."""
+        about = f"parameter of {self.name}"
+        return {name: (value, self.units.get(name, "1"), about) for name, value in self.parameters.items()}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what is made again from the rest."""
+        return {k: v for k, v in self.__dict__.items() if k not in _MADE}
 
     def kinks(self, until: float) -> Floats:
         """Times [s] within (0, until) that no step may cross: there a load's value or derivative jumps."""
@@ -357,6 +366,9 @@ class Mechanism:
         values = ", ".join(f"{name}={value:g}" for name, value in self.parameters.items())
         return f"Mechanism({self.name}: {', '.join(map(str, self._symbols))}; {values})"
 
+
+#: Names of what follows from the equations.
+_MADE = ("equations", "_statics", "prints", "derived", "_numpy")
 
 #: Mechanisms without some of their terms, by what tells them apart.
 _with_terms: dict[tuple[str, ...], Mechanism] = {}

@@ -6,11 +6,15 @@ from itertools import product
 
 import numpy as np
 
+from fastmech.plots.basin_marks import coordinates_of, symbol
 from fastmech.plots.style import PALETTE
 from fastmech.results import Dataset
 
 #: Wells and turns of each angle, either way, whose basins have a colour of their own.
 WELLS, TURNS = 2, 2
+
+#: Colours of further wells, from the end of the list.
+OTHERS = 8
 
 #: Colours by how usual a label is. After Okabe and Ito's each next one was chosen as far as possible from all
 #: before it in OKLab (Ottosson 2020), and from white, black and the greys of :mod:`fastmech.plots.basins`, as
@@ -45,14 +49,19 @@ def well_number(dataset: Dataset, well: int) -> int:
     return int(np.flatnonzero(wells == well)[0])
 
 
-def basin_color(dataset: Dataset, well: int, turns: tuple[int, int]) -> str:
+def basin_color(dataset: Dataset, well: int, turns: tuple[int, ...]) -> str:
     """Colour of a copy of a well; ``well`` is an index among the dataset's equilibria."""
-    return _COLOR_OF.get((well_number(dataset, well), *turns), FURTHER)
+    number = well_number(dataset, well)
+    if number >= WELLS and not any(turns):
+        return COLORS[-1 - (number - WELLS) % OTHERS]
+    first, second = (*turns, 0)[:2]
+    return FURTHER if any(turns[2:]) else _COLOR_OF.get((number, first, second), FURTHER)
 
 
-def basin_name(dataset: Dataset, well: int, turns: tuple[int, int]) -> str:
+def basin_name(dataset: Dataset, well: int, turns: tuple[int, ...]) -> str:
     """Name of a copy of a well; ``well`` is an index among the dataset's equilibria."""
     wells = int(np.count_nonzero(dataset["equilibrium_morse_index"].data == 0))
     text = f"well {well_number(dataset, well) + 1}" if wells > 1 else "the well"
-    made = [f"{t:+d} {symbol}" for t, symbol in zip(turns, ("φ", "θ"), strict=True) if t]
+    names = map(symbol, coordinates_of(dataset))
+    made = [f"{t:+d} {name}" for t, name in zip(turns, names, strict=True) if t]
     return f"{text}, {', '.join(made)} turn{'s' * (len(made) > 1 or abs(sum(turns)) > 1)}" if made else text

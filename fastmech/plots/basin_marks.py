@@ -28,11 +28,28 @@ SYMBOLS = {"phi": "φ", "theta": "θ", "phi_dot": "φ'", "theta_dot": "θ'"}
 DASHES = ["-", "--", ":"]
 
 
+#: The paper's coordinates, of which both turn fully.
+ANGLES = ("phi", "theta")
+
+
+def symbol(name: str) -> str:
+    """How pictures write a coordinate or a rate."""
+    return SYMBOLS.get(name, f"{name.removesuffix('_dot')}'" if name.endswith("_dot") else name)
+
+
+def coordinates_of(dataset: Dataset) -> tuple[str, ...]:
+    """Names of the coordinates of a basin map."""
+    return tuple(dataset.attrs.get("coordinate_names", ANGLES))
+
+
 class Slice:
     """The first two axes that vary; further ones are held at their middle value."""
 
-    def __init__(self, dataset: Dataset, scene: Scene) -> None:
+    def __init__(self, dataset: Dataset, scene: Scene | None) -> None:
         self.dataset, self.scene = dataset, scene
+        self.coordinates = coordinates_of(dataset)
+        self.turning = ANGLES if scene is not None else tuple(dataset.attrs.get("turning_names", ()))
+        self.states = (*self.coordinates, *(f"{name}_dot" for name in self.coordinates))
         names = tuple(dataset.attrs["axes"])
         self.axes = (*[n for n in names if dataset.sizes[n] > 1], *names)[:2]
         if self.axes[0] == self.axes[1]:
@@ -41,7 +58,7 @@ class Slice:
         self.swapped = names.index(self.axes[0]) > names.index(self.axes[1])
         self.held = {
             name: float(dataset.attrs[f"fixed_{name}"])
-            for name in SYMBOLS
+            for name in self.states
             if f"fixed_{name}" in dataset.attrs
         }
         self.held |= {
@@ -57,16 +74,15 @@ class Slice:
         """Values along one of the two axes."""
         return np.asarray(self.dataset[self.axes[number]].data, dtype=np.float64)
 
-    @property
-    def energy(self) -> tuple[Floats, Floats, Floats]:
+    def energy(self, scene: Scene) -> tuple[Floats, Floats, Floats]:
         """Values along both axes and T + U over them [J], U with the force that the wells hold for."""
         x, y = (np.linspace(self.axis(k)[0], self.axis(k)[-1], GRID) for k in (0, 1))
         grids = dict(zip(self.axes, np.meshgrid(x, y, indexing="ij"), strict=True))
         states = np.stack(
-            [grids[n] if n in grids else np.full((GRID, GRID), self.held[n]) for n in SYMBOLS], axis=-1
+            [grids[n] if n in grids else np.full((GRID, GRID), self.held[n]) for n in self.states], axis=-1
         )
         force = float(self.dataset["force"].data)
-        return x, y, kinetic_energy(self.scene, states) + potential_energy(self.scene, states[..., :2], force)
+        return x, y, kinetic_energy(scene, states) + potential_energy(scene, states[..., :2], force)
 
 
 def mark(marker: str, text: str, face: str = "white") -> Artist:
@@ -82,10 +98,11 @@ def decisive(axes: Axes, view: Slice) -> list[Artist]:
 
     handles: list[Artist] = []
     data = view.dataset
-    x, y, energy = view.energy
     wells = np.flatnonzero(data["equilibrium_morse_index"].data == 0)
     barriers = data["barrier"].data[wells]
-    for number, level in enumerate(np.unique(barriers)):
+    levels = np.unique(barriers[: None if view.scene is not None else 0])
+    x, y, energy = view.energy(view.scene) if view.scene is not None else (np.zeros(0),) * 3
+    for number, level in enumerate(levels):
         if energy.min() < level < energy.max():
             look = DASHES[number % len(DASHES)]
             axes.contour(x, y, energy.T, levels=[level], colors="black", linewidths=1.6, linestyles=look)
@@ -118,15 +135,17 @@ def _places(view: Slice, index: int, inside: bool, only: int | None = None) -> F
     lie at the origin.
     """
     data, found = view.dataset, []
-    if not inside and not {"phi", "theta"} & set(view.axes):
+    if not inside and not set(view.coordinates) & set(view.axes):
         return np.zeros((0, 2))
     reach = [(view.axis(k)[0], view.axis(k)[-1]) for k in (0, 1)]
     for i in np.flatnonzero(data["equilibrium_morse_index"].data == index):
         if only is not None and i != only:
             continue
-        place = {"phi": data["equilibrium_phi"].data[i], "theta": data["equilibrium_theta"].data[i]}
+        place = {name: data[f"equilibrium_{name}"].data[i] for name in view.coordinates}
         away = [
-            (held - place.get(n, 0.0) + np.pi) % (2.0 * np.pi) - np.pi if n in place else held
+            (held - place[n] + np.pi) % (2.0 * np.pi) - np.pi
+            if n in view.turning
+            else held - place.get(n, 0.0)
             for n, held in view.held.items()
         ]
         if bool(np.abs(away).max(initial=0.0) <= IN_SLICE) != inside:
@@ -138,7 +157,9 @@ def _places(view: Slice, index: int, inside: bool, only: int | None = None) -> F
                 np.ceil((low - at) / (2.0 * np.pi)), np.floor((high - at) / (2.0 * np.pi)) + 1.0
             )
             copies.append(
-                at + 2.0 * np.pi * turns if name in place else np.array([at] if low <= at <= high else [])
+                at + 2.0 * np.pi * turns
+                if name in view.turning
+                else np.array([at] if low <= at <= high else [])
             )
         found += [(a, b) for a in copies[0] for b in copies[1]]
     return np.array(found).reshape(-1, 2)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.plots.basin_colors import FURTHER, basin_color, basin_name
-from fastmech.plots.basin_marks import SYMBOLS, Slice, decisive, mark
+from fastmech.plots.basin_marks import Slice, decisive, mark, symbol
 from fastmech.plots.labels import Codes, flag_codes
 from fastmech.plots.style import FIELD, new_figure, style
 from fastmech.results import Dataset
@@ -27,6 +27,7 @@ NAMED = 10
 UNLABELLED = {
     "undecided": ("#ffffff", "x", "undecided at the end of the run"),
     "at_saddle": ("#000000", "s", "on a saddle's stable manifold"),
+    "out_of_range": ("#d0b8a0", "v", "leaves its range"),
     "not_finite": ("#4d4d4d", "+", "not finite"),
     "step_too_large": ("#4d4d4d", "1", "step too large"),
     "not_converged": ("#4d4d4d", "3", "Newton's iteration failed"),
@@ -39,6 +40,9 @@ WITHOUT_TIME = {"capture_time": "not captured", "settle_time": "not settled"}
 #: Colour of starts of a refined map that have not been computed.
 SKIPPED = "#d9d9d9"
 
+#: Parameters of a mechanism that a title tells.
+MOST_TOLD = 6
+
 #: Starts without label up to which each is marked.
 FEW = 400
 
@@ -46,7 +50,7 @@ FEW = 400
 def draw_basins(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
     """Pictures of a dataset of the scan type ``basins`` about the scene with these parameters."""
     with style():
-        slice_ = Slice(dataset, Scene(**scene))
+        slice_ = Slice(dataset, None if "mechanism" in dataset.attrs else Scene(**scene))
         figures = {"labels": _labels(slice_)}
         for name, title in (
             ("capture_time", "Time until capture is proved"),
@@ -54,6 +58,8 @@ def draw_basins(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figur
         ):
             if name in dataset and np.isfinite(slice_.data(name)).any():
                 figures[name] = _times(slice_, name, title)
+        for figure in figures.values():
+            _describe(figure.axes[0], slice_, scene)
         return figures
 
 
@@ -115,7 +121,7 @@ def _labels(view: Slice) -> Figure:
     )
     handles += decisive(axes, view)
     figure.legend(handles=handles, loc="outside lower center", ncols=2)
-    _describe(axes, view, "Where starts come to rest")
+    axes.set_title("Where starts come to rest")
     return figure
 
 
@@ -125,11 +131,11 @@ def unlabelled(codes: Codes) -> dict[str, tuple[str, str, str]]:
     return {**UNLABELLED, **{name: ("#b3a2c7", "P", name.replace("_", " ")) for name in others}}
 
 
-def _copy(view: Slice, basin: int) -> tuple[int, tuple[int, int]]:
+def _copy(view: Slice, basin: int) -> tuple[int, tuple[int, ...]]:
     """A basin's well and turns."""
     data = view.dataset
-    phi, theta = (int(data[f"basin_turns_{angle}"].data[basin]) for angle in ("phi", "theta"))
-    return int(data["basin_well"].data[basin]), (phi, theta)
+    turns = tuple(int(data[f"basin_turns_{name}"].data[basin]) for name in view.coordinates)
+    return int(data["basin_well"].data[basin]), turns
 
 
 def _share(where: NDArray[np.bool_]) -> str:
@@ -184,27 +190,29 @@ def _times(view: Slice, name: str, title: str) -> Figure:
     figure.legend(handles=handles, loc="outside lower center", ncols=2)
     if view.data("computed").all():  # else those near boundaries are over-represented
         title += f" (median {np.median(known):.3g} s, 99 % within {np.quantile(known, 0.99):.3g} s)"
-    _describe(axes, view, title)
+    axes.set_title(title)
     return figure
 
 
-def _describe(axes: Axes, view: Slice, title: str) -> None:
-    """Labels with units, the scene's decisive parameters, and what is held."""
-    scene = view.scene
-    force = f"F0 = {scene.F0:g} N" + (f" exp(-{scene.alpha:g} t)" if scene.F0 and scene.alpha else "")
-    at_rest = (
-        all(value == 0.0 for value in view.held.values())
-        and "phi" not in view.held
-        and "theta" not in view.held
-    )
-    held = "starts at rest" if at_rest and set(view.axes) == {"phi", "theta"} else _held(view)
-    axes.set_title(f"{title}\n{force}, c1 = {scene.c1:g} N/m, c2 = {scene.c2:g} N/m; {held}")
+def _describe(axes: Axes, view: Slice, parameters: Mapping[str, float]) -> None:
+    """Labels with units, the decisive parameters, and what is held."""
+    if view.scene is not None:
+        scene = view.scene
+        force = f"F0 = {scene.F0:g} N" + (f" exp(-{scene.alpha:g} t)" if scene.F0 and scene.alpha else "")
+        told = f"{force}, c1 = {scene.c1:g} N/m, c2 = {scene.c2:g} N/m"
+    else:
+        each = ", ".join(f"{name} = {value:g}" for name, value in list(parameters.items())[:MOST_TOLD])
+        told = f"{view.dataset.attrs['mechanism']}: {each}{', ...' * (len(parameters) > MOST_TOLD)}"
+    at_rest = all(value == 0.0 for value in view.held.values()) and not set(view.coordinates) & set(view.held)
+    held = "starts at rest" if at_rest and set(view.axes) == set(view.coordinates) else _held(view)
+    axes.set_title(f"{axes.get_title()}\n{told}; {held}" if held else f"{axes.get_title()}\n{told}")
     for axis, name in (("x", view.axes[0]), ("y", view.axes[1])):
         unit = view.dataset[name].units
-        kind = "angle" if unit == "rad" else "rate"
-        getattr(axes, f"set_{axis}label")(f"{kind} {SYMBOLS[name]} at the start [{unit}]")
+        kind = {"rad": "angle", "m": "position"}.get(unit, "rate")
+        getattr(axes, f"set_{axis}label")(f"{kind} {symbol(name)} at the start [{unit}]")
     axes.grid(visible=False)
 
 
 def _held(view: Slice) -> str:
-    return "starts with " + ", ".join(f"{SYMBOLS[n]} = {v:.4g}" for n, v in view.held.items())
+    each = ", ".join(f"{symbol(name)} = {value:.4g}" for name, value in view.held.items())
+    return f"starts with {each}" if each else ""

@@ -16,11 +16,13 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from fastmech.basins.map import BasinMap, map_basins
+from fastmech.capture.barriers import BarrierTree
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.capture.steps import method_for
 from fastmech.ensembles.status import FAILURES, LABELS, Status
 from fastmech.errors import InputError, shown
-from fastmech.results import NO_CODE, STATE_UNITS, Dataset, Variable, flags, numbers
+from fastmech.models.mechanism import Mechanism
+from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers
 from fastmech.scan_types.axis import Axis, arrays, check_duration, check_rising, check_size, check_starts
 from fastmech.scan_types.request import TiledScan, UsualMethod, failures
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
@@ -41,13 +43,6 @@ USUAL_END = 60.0
 _ARRAYS = ("well", "turns", "time", "settle_time", "status", "computed")
 
 
-def _known_coordinates(entries: dict[str, Axis] | dict[str, float]) -> dict[str, Axis] | dict[str, float]:
-    for name in entries:
-        if name not in STATE:
-            raise ValueError(f"unknown coordinate {shown(name)}; {nearest(name, list(STATE))}")
-    return entries
-
-
 def _power_of_two(value: int | None) -> int | None:
     if value is not None and value & (value - 1):
         raise ValueError("must be a power of two")
@@ -58,9 +53,10 @@ class Basins(TiledScan):
     """A basin map of a slice of state space, labels proved by capture."""
 
     kind: ClassVar[str] = "basins"
+    of_mechanisms = True
 
-    axes: Annotated[dict[str, Axis], Field(min_length=2, max_length=4), AfterValidator(_known_coordinates)]
-    fixed: Annotated[dict[str, float], AfterValidator(_known_coordinates)] = Field(
+    axes: Annotated[dict[str, Axis], Field(min_length=2, max_length=4)]
+    fixed: dict[str, float] = Field(
         default={}, description="the other coordinates of the starts [rad, rad/s], 0 by default"
     )
     t_end: Annotated[float, Field(gt=0)] = 60.0
@@ -73,23 +69,33 @@ class Basins(TiledScan):
     dt: Annotated[float | None, Field(gt=0)] = Field(None, description="coarsest step [s]")
     method: UsualMethod = None
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Scene | Mechanism) -> None:
         """Without a damper there are no basins; and a map has its limits."""
         require_damper(scene)
+        names = _states(scene)
+        for where, entries in (("axes", self.axes), ("fixed", self.fixed)):
+            for name in entries:
+                if name not in names:
+                    told = nearest(name, list(names))
+                    raise InputError(f"{where}.{name}: unknown coordinate {shown(name)}; {told}")
         check_size("axes", self.axes, "starts", MOST_POINTS, POINT_NUMBERS)
         for name, axis in self.axes.items():
             if name in self.fixed:
                 raise InputError(f"fixed.{name}: is an axis of the map; give one or the other")
             check_rising(f"axes.{name}", axis)
+        if isinstance(scene, Mechanism):
+            return
         starts = {f"axes.{name}": axis.array for name, axis in self.axes.items()}
         check_starts(scene, starts | {f"fixed.{name}": np.array(value) for name, value in self.fixed.items()})
         check_duration(scene, self.t_end, self.dt)
 
-    def step_warning(self, scene: Scene) -> str | None:
+    def step_warning(self, scene: Scene | Mechanism) -> str | None:
         """By the scene's limit and the decaying force; without ``dt`` each start's step is chosen."""
-        return None if self.dt is None else step_warning(scene, self.dt, method_for(scene, self.method))
+        if self.dt is None or isinstance(scene, Mechanism):
+            return None
+        return step_warning(scene, self.dt, method_for(scene, self.method))
 
-    def tiling(self, scene: Scene) -> Tiling:
+    def tiling(self, scene: Scene | Mechanism) -> Tiling:
         """Planes of the first axis; a refined map is one tile, because it follows boundaries anywhere."""
         return BasinTiling(self, scene, arrays(self.axes))
 
@@ -112,8 +118,10 @@ class BasinTiling(Tiling):
 
     what = "starts of the basin map"
 
-    def __init__(self, request: Basins, scene: Scene, axes: dict[str, NDArray[np.float64]]) -> None:
-        self.request, self.scene, self.axes = request, scene, axes
+    def __init__(
+        self, request: Basins, scene: Scene | Mechanism, axes: dict[str, NDArray[np.float64]]
+    ) -> None:
+        self.request, self.scene, self.axes, self.names = request, scene, axes, _states(scene)
         self.first, *others = axes
         self.others = tuple(len(axes[other]) for other in others)
         length = len(axes[self.first])
@@ -153,10 +161,11 @@ class BasinTiling(Tiling):
     def assemble(self, tile: Tiles) -> Dataset:
         """Join the planes and number the basins."""
         tiles = [tile(index) for index in range(self.count)]
+        certificate = certificate_of(self.scene)
         found = BasinMap(
             axes=self.axes,
-            fixed={name: self.request.fixed.get(name, 0.0) for name in STATE if name not in self.axes},
-            tree=certificate_of(self.scene).tree,
+            fixed={name: self.request.fixed.get(name, 0.0) for name in self.names if name not in self.axes},
+            tree=certificate.tree,
             t_end=self.request.t_end,
             steps=sum(int(part.attrs["steps"]) for part in tiles),
             **{name: self._joined(tiles, name) for name in _ARRAYS},
@@ -164,12 +173,22 @@ class BasinTiling(Tiling):
         attrs: dict[str, Any] = {
             "axes": tuple(self.axes),
             "t_end": found.t_end,
-            "method": method_for(self.scene, self.request.method),
+            "method": certificate.method(self.request.method),
         }
+        if isinstance(self.scene, Mechanism):
+            turning = [n for n, period in zip(certificate.names, certificate.periods, strict=True) if period]
+            attrs |= {"mechanism": self.scene.name, "coordinate_names": certificate.names}
+            attrs |= {"turning_names": tuple(turning)} if turning else {}
         attrs |= {"steps": found.steps, "refine": self.request.refine or 0}
         attrs |= {f"fixed_{name}": value for name, value in found.fixed.items()}
-        groups = {"basins": Dataset(_basins(found)), "equilibria": Dataset(_wells(found))}
-        return Dataset(_variables(found), attrs | found.counts | failures(found.status, FAILURES), groups)
+        coordinates = dict(zip(certificate.names, certificate.units, strict=True))
+        groups = {
+            "basins": Dataset(_basins(found, coordinates)),
+            "equilibria": Dataset(_wells(found, coordinates)),
+        }
+        return Dataset(
+            _variables(found, coordinates), attrs | found.counts | failures(found.status, FAILURES), groups
+        )
 
     def missing(self, index: int) -> Dataset:
         """Starts that have not been computed."""
@@ -177,7 +196,7 @@ class BasinTiling(Tiling):
         nothing = np.full(grid, np.nan)
         arrays: dict[str, NDArray[Any] | None] = {
             "well": np.full(grid, -1, dtype=np.int8),
-            "turns": np.zeros((*grid, 2), dtype=np.int32),
+            "turns": np.zeros((*grid, len(self.names) // 2), dtype=np.int32),
             "time": nothing,
             "status": np.full(grid, Status.UNDECIDED, dtype=np.int8),
             "computed": np.zeros(grid, dtype=np.bool_),
@@ -208,24 +227,32 @@ class BasinTiling(Tiling):
         )
 
 
-def _variables(found: BasinMap) -> dict[str, Variable]:
-    """What is known of every start."""
-    described = {
-        "phi": "angle phi",
-        "theta": "angle theta",
-        "phi_dot": "rate of phi",
-        "theta_dot": "rate of theta",
-    }
+def _states(scene: Scene | Mechanism) -> tuple[str, ...]:
+    """Names of coordinates, then of rates."""
+    return STATE if isinstance(scene, Scene) else scene.state
+
+
+def _kind(unit: str) -> str:
+    return "angle" if unit == "rad" else "length"
+
+
+def _variables(found: BasinMap, coordinates: Mapping[str, str]) -> dict[str, Variable]:
+    """What is known of every start; ``coordinates`` are names with their units."""
+    units, described = dict(coordinates), {name: f"{_kind(u)} {name}" for name, u in coordinates.items()}
+    for name, unit in coordinates.items():
+        units[f"{name}_dot"], described[f"{name}_dot"] = f"{unit}/s", f"rate of {name}"
     names = tuple(found.axes)
     variables = {
-        name: Variable((name,), values, STATE_UNITS[name], f"{described[name]} at the start")
+        name: Variable((name,), values, units[name], f"{described[name]} at the start")
         for name, values in found.axes.items()
     }
     variables |= {
         "label": Variable(names, found.labels[0].astype(np.int32), "1", "basin of the start", NO_CODE),
         "well": Variable(names, found.well, "1", "equilibrium that captures the start", NO_CODE),
-        "turns_phi": Variable(names, found.turns[..., 0], "1", "full turns of phi of that well"),
-        "turns_theta": Variable(names, found.turns[..., 1], "1", "full turns of theta of that well"),
+        **{
+            f"turns_{name}": Variable(names, found.turns[..., k], "1", f"full turns of {name} of that well")
+            for k, name in enumerate(coordinates)
+        },
         "capture_time": Variable(
             names, found.time, "s", "time of capture, NaN: not captured or not computed"
         ),
@@ -233,8 +260,9 @@ def _variables(found: BasinMap) -> dict[str, Variable]:
         "computed": Variable(names, found.computed, "1", "computed, not filled in between equal labels"),
     }
     assert found.tree is not None  # a scene's map has one
-    force = np.array(found.tree.equilibria.force)
-    variables["force"] = Variable((), force, "N", "constant force that the wells hold for")
+    if isinstance(found.tree, BarrierTree):
+        force = np.array(found.tree.equilibria.force)
+        variables["force"] = Variable((), force, "N", "constant force that the wells hold for")
     if found.settle_time is not None:
         variables["settle_time"] = Variable(
             names,
@@ -245,7 +273,7 @@ def _variables(found: BasinMap) -> dict[str, Variable]:
     return variables
 
 
-def _basins(found: BasinMap) -> dict[str, Variable]:
+def _basins(found: BasinMap, coordinates: Mapping[str, str]) -> dict[str, Variable]:
     """Every well and turns that occur."""
     label, table = found.labels
     share = np.array([np.mean(label == i) for i in range(len(table))])
@@ -253,10 +281,12 @@ def _basins(found: BasinMap) -> dict[str, Variable]:
     return {
         **numbers("basin", len(table), "number of the basin"),
         "basin_well": Variable(("basin",), table[:, 0].astype(np.int8), "1", "equilibrium of the basin"),
-        "basin_turns_phi": Variable(("basin",), table[:, 1].astype(np.int32), "1", "its full turns of phi"),
-        "basin_turns_theta": Variable(
-            ("basin",), table[:, 2].astype(np.int32), "1", "its full turns of theta"
-        ),
+        **{
+            f"basin_turns_{name}": Variable(
+                ("basin",), table[:, 1 + k].astype(np.int32), "1", f"its full turns of {name}"
+            )
+            for k, name in enumerate(coordinates)
+        },
         "basin_share": Variable(("basin",), share, "1", "share of the starts"),
         "basin_share_at_most": Variable(
             ("basin",), share + unknown, "1", "share of the starts if all without a label ended there"
@@ -264,19 +294,27 @@ def _basins(found: BasinMap) -> dict[str, Variable]:
     }
 
 
-def _wells(found: BasinMap) -> dict[str, Variable]:
+def _wells(found: BasinMap, coordinates: Mapping[str, str]) -> dict[str, Variable]:
     """The scene's equilibria."""
     assert found.tree is not None
     equilibria, each = found.tree.equilibria, ("equilibrium",)
+    index = np.array([e.morse_index for e in equilibria], dtype=np.int8)
     barrier = np.full(len(equilibria), np.nan)
     barrier[list(found.tree.wells)] = found.tree.barrier
     return {
         **numbers("equilibrium", len(equilibria), "number of the equilibrium"),
-        "equilibrium_phi": Variable(each, equilibria.phi, "rad", "angle phi of the equilibrium"),
-        "equilibrium_theta": Variable(each, equilibria.theta, "rad", "angle theta of the equilibrium"),
+        **{
+            f"equilibrium_{name}": Variable(
+                each, equilibria.position[:, k], unit, f"{_kind(unit)} {name} of the equilibrium"
+            )
+            for k, (name, unit) in enumerate(coordinates.items())
+        },
         "equilibrium_energy": Variable(each, equilibria.energy, "J", "potential energy of the equilibrium"),
         "equilibrium_morse_index": Variable(
-            each, equilibria.morse_index, "1", "unstable directions, 0: a well"
+            each,
+            index,
+            "1",
+            "unstable directions, 0: a well",
         ),
         "barrier": Variable(each, barrier, "J", "energy at which the well first meets another, NaN: no well"),
     }

@@ -16,6 +16,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from fastmech.ensembles.status import failure_counts, failure_line
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.integrators.methods import find_method
+from fastmech.models.mechanism import MOST_COORDINATES, Mechanism
 from fastmech.results import Dataset, Variable, check_name
 from fastmech.scan_types.tiling import RunContext as RunContext
 from fastmech.scan_types.tiling import Tiles, Tiling
@@ -59,6 +60,8 @@ class Scan(BaseModel, ABC):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     kind: ClassVar[str]
+
+    of_mechanisms: ClassVar[bool] = False  #: whether it works for any mechanism, not for the paper's alone
 
     scene: dict[str, Any] = Field(default={}, description="parameters that differ from the file's scene")
 
@@ -153,7 +156,7 @@ class Request:
     """A request file: title, scene and scans by name, with the text it was read from."""
 
     title: str
-    scene: Scene
+    scene: Any  #: a ``Scene``, or a ``Mechanism`` for scans that are ``of_mechanisms``
     scans: Mapping[str, Scan]
     text: str
 
@@ -165,7 +168,7 @@ class Request:
             for name, (value, unit, about) in self.scene.described().items()
         }
 
-    def scene_of(self, name: str) -> Scene:
+    def scene_of(self, name: str) -> Any:
         """The scene of one scan: the file's with the scan's own changes."""
         return self.scene.replace(**self.scans[name].scene)
 
@@ -176,30 +179,39 @@ class Request:
         return [f"scan.{name}: {line}" for name, line in told.items() if line is not None]
 
 
-def read_request(path: str | Path, kinds: Mapping[str, type[Scan]], text: str | None = None) -> Request:
+def read_request(
+    path: str | Path,
+    kinds: Mapping[str, type[Scan]],
+    text: str | None = None,
+    mechanism: Mechanism | None = None,
+) -> Request:
     """Read and validate a request file, or the text that is given as its own.
+
+    ``mechanism`` is one of the user's own, which the file does not name: nothing in a file is executed.
 
     Raises:
         InputError: the file cannot be read, or anything in it is unknown, of a wrong type or out of range.
     """
-    return request_of_text(read_text(path) if text is None else text, path, kinds)
+    return request_of_text(read_text(path) if text is None else text, path, kinds, mechanism)
 
 
-def request_of_text(text: str, path: str | Path, kinds: Mapping[str, type[Scan]]) -> Request:
+def request_of_text(
+    text: str, path: str | Path, kinds: Mapping[str, type[Scan]], mechanism: Mechanism | None = None
+) -> Request:
     """Validate the text of a request file; ``path`` is for messages and the default title.
 
     Raises:
         InputError: it is no TOML, or anything in it is unknown, of a wrong type or out of range.
     """
     table = parse_toml(text, path)
-    allowed = ["title", "scene", "scan"]
+    allowed = ["title", "mechanism", "scene", "scan"]
     for name in table:
         if name not in allowed:
             raise InputError(f"{shown_name(name)}: unknown name; {nearest(name, allowed)}")
     title = table.get("title", Path(path).stem)
     if not isinstance(title, str) or "\0" in title:
         raise InputError(f"title = {shown(title)}: must be a text without null characters")
-    scene = Scene(**_table(table.get("scene", {}), "scene"))
+    scene = _scene(table, mechanism)
     scans = _table(table.get("scan", {}), "scan")
     if not scans:
         raise InputError(
@@ -207,11 +219,43 @@ def request_of_text(text: str, path: str | Path, kinds: Mapping[str, type[Scan]]
         )
     request = Request(title, scene, {name: _scan(name, scans[name], kinds) for name in scans}, text)
     for name, scan in request.scans.items():
+        if isinstance(scene, Mechanism):
+            if not scan.of_mechanisms:
+                usable = ", ".join(kind for kind, made in kinds.items() if made.of_mechanisms)
+                raise InputError(
+                    f"scan.{name}.kind = {scan.kind}: is for the paper's mechanism; of others: {usable}"
+                )
+            if name in scene.parameters:
+                raise InputError(f"scan.{name}: is the name of a parameter of the mechanism; choose another")
         try:
             scan.check(request.scene_of(name))
         except InputError as error:
             raise InputError(f"scan.{name}.{error}") from None
     return request
+
+
+def _scene(table: Mapping[str, Any], mechanism: Mechanism | None) -> Any:
+    """The scene, or the mechanism with the file's parameters."""
+    values, name = _table(table.get("scene", {}), "scene"), table.get("mechanism")
+    if name is None and mechanism is None:
+        return Scene(**values)
+    if name is not None:
+        from fastmech import mechanisms  # with SymPy, which other requests do without
+
+        shipped = [one for one in mechanisms.__all__ if one != "pendulum_chain"]
+        shipped += [f"pendulum_chain_{n}" for n in range(1, MOST_COORDINATES + 1)]
+        if mechanism is not None:
+            raise InputError(f"mechanism = {shown(name)}: another one is given on the command line")
+        if name not in shipped:
+            hint = nearest(name if isinstance(name, str) else "", shipped)
+            raise InputError(f"mechanism = {shown(name)}: unknown; {hint}")
+        made, _, number = name.rpartition("_") if name.startswith("pendulum_chain") else (name, "", "")
+        mechanism = getattr(mechanisms, made)(*([int(number)] if number else []))
+    for key, value in values.items():
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise InputError(f"scene.{key} = {shown(value)}: must be a number")
+    assert mechanism is not None
+    return mechanism.replace(**values)
 
 
 def _table(value: Any, where: str) -> dict[str, Any]:

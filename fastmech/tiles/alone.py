@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fastmech.errors import InputError, shown, shown_name
+from fastmech.models.mechanism import Mechanism
 from fastmech.results import Dataset
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import Request, RunContext, read_request
@@ -65,7 +66,12 @@ class LoneTile:
 
 
 def compute_alone(
-    path: Path, tile: str, context: RunContext, target: Path, text: str | None = None
+    path: Path,
+    tile: str,
+    context: RunContext,
+    target: Path,
+    text: str | None = None,
+    mechanism: Mechanism | None = None,
 ) -> LoneTile:
     """Compute one tile.
 
@@ -75,11 +81,12 @@ def compute_alone(
         context: threads to use.
         target: the request's result file, whose finished tiles it is compared with.
         text: of the request, by default that of the file.
+        mechanism: one of the user's own that the request is about.
 
     Raises:
         InputError: the request is wrong or has no such tile.
     """
-    request = read_request(path, scan_kinds(), text)
+    request = read_request(path, scan_kinds(), text, mechanism)
     sections = {s.name: s for s in sections_of(request, identity_of(asked_for(request)))}
     name, _, number = tile.partition(":")
     where = f"--tile {shown_name(tile)}"

@@ -12,7 +12,9 @@ from typing import Any
 
 from fastmech.errors import shown_name
 from fastmech.kernel_cache import COMPILED, PACKAGE, source_hash
+from fastmech.models.mechanism import Mechanism
 from fastmech.scan_types.request import Request
+from fastmech.scene import Scene
 from fastmech.store.read import open_results
 
 #: Raised when finished tiles of an older version can no longer be assembled.
@@ -21,7 +23,7 @@ TILE_SCHEMA = 1
 #: Sources besides the compiled ones that decide a section's values.
 _SOURCES = (*COMPILED, "basins", "scene.py", "results.py", "scan_types")
 
-_LIBRARIES = ("numba", "llvmlite", "numpy", "scipy")
+_LIBRARIES = ("numba", "llvmlite", "numpy", "scipy", "sympy")
 
 _MOST_TOLD = 3
 
@@ -45,10 +47,18 @@ def asked_for(request: Request) -> str:
     content = {
         "tile schema": TILE_SCHEMA,
         "code": code_in_use(),
-        "scene": request.scene.model_dump(mode="json"),
+        "scene": _told(request.scene),
         "scan": scans,
     }
     return json.dumps(content, sort_keys=True)
+
+
+def _told(scene: Scene | Mechanism) -> dict[str, Any]:
+    """What tells a scene or a mechanism apart."""
+    if isinstance(scene, Scene):
+        return scene.model_dump(mode="json")
+    ranges = {str(c.symbol): [c.low, c.high, c.periodic] for c in scene.coordinates}
+    return {"mechanism": scene.name, "equations": scene.prints, "ranges": ranges, **scene.parameters}
 
 
 def identity_of(asked: str) -> str:
