@@ -143,9 +143,9 @@ def disturb(
         seed: seed of the starts.
         t_end: end of the run [s].
         dt: longest step [s]; by default each start's own, from the scene's frequencies, its damping and the
-            start's energy, see
-            ``Certificate.measuring_steps``. Motions that fail with it are followed again with a
-            16th of it, and so on, down to the shortest step of the fastest starts.
+            start's energy, see ``Certificate.measuring_steps``. Motions that fail with it, or come to another
+            well than is proved, are followed again with a 16th of it, and so on, down to the shortest step of
+            the fastest starts; with a ``dt`` of your own, or at the end, they are ``step_too_large``.
         method: name of the method; by default ``dop853``, or ``radau5`` (implicit) where the damper would
             set the explicit method's steps.
         return_radius: radius of the ball of return [rad].
@@ -185,7 +185,8 @@ def disturb(
         warnings.simplefilter("ignore", StepWarning)  # it has been told
         ends = label_starts(scene, starts, t_end, How(dt, method, threads=threads))
     longest = certificate.measuring_steps(starts, method) if dt is None else np.full(len(starts), dt)
-    at_first = certificate.damped_times(method, min(dt or certificate.slow_step, t_end))
+    moment = certificate.slow_step
+    at_first = certificate.damped_times(method, min(dt or moment, t_end))
     times = np.array([0.0, *at_first, t_end])
     departure = np.abs(starts - center)
     final, last, failed = np.empty_like(starts), np.empty_like(starts), np.empty(len(starts))
@@ -215,6 +216,13 @@ def disturb(
         driven = [certificate.drives_rest(t_end / float(k), float(k), method) for k in number]
         driving = np.array(driven)[which] & np.isin(reached, (Status.OK, Status.NOT_FINITE))
         reached[driving] = Status.STEP_TOO_LARGE
+        # A motion that comes to another well than its proved one has not been followed, whatever it says.
+        kept = np.flatnonzero((reached == Status.OK) & (ends.status[again] == Status.CAPTURED))
+        at_once = label_starts(scene, run.states[-1, kept], moment, How(method=method, threads=threads))
+        lost = (at_once.well != ends.well[again[kept]]) | (at_once.turns != ends.turns[again[kept]]).any(
+            axis=1
+        )
+        reached[kept[lost]] = Status.STEP_TOO_LARGE
         status[again] = reached
         again, first = again[(reached != Status.OK) & (longest[again] > shortest)], False
         longest[again] *= 0.0625

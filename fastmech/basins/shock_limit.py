@@ -51,8 +51,8 @@ MOST_BLOWS, MOST_STEPS = 1 << 18, 200_000_000
 #: Blows that are followed together, in the order of their impulses.
 TOGETHER = 1 << 12
 
-#: Blows of a grid that are followed with all substeps where the first ones do not tell their end. Where none
-#: has left, so are further ones until the search has taken so many steps.
+#: Blows of a grid that are followed together with all substeps where the first ones do not tell their end,
+#: from the least upwards, until the search has taken so many steps.
 UNCERTAIN, FURTHER = 32, 50_000_000
 
 #: Blows are tried up to so many times the sum of the potential's amplitudes: beyond, motions turn and turn.
@@ -263,10 +263,11 @@ class _Search:
         left = np.concatenate([*uncertain, order[:0]])
         left, first = left[sizes[left] < self.size], 0
         self.unknown = math.inf
-        while left.size and (first == 0 or (not np.isfinite(self.size) and self.steps < FURTHER)):
+        while left.size and (first == 0 or self.steps < FURTHER):
             some, left = left[:UNCERTAIN], left[UNCERTAIN:]
             labels, first = self.ends(angles[which[some]], sizes[some], SUBSTEPS), 1
             self.unknown = min(self.unknown, float(sizes[some[labels < 0]].min(initial=np.inf)))
+            left = left[sizes[left] < self.size]
         self.unknown = min(self.unknown, float(sizes[left].min(initial=np.inf)))
         return True
 

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.callee import callee
-from fastmech.capture.cells import bound_cells, convex_box, fill_component, first_exits
+from fastmech.capture.cells import bound_cells, bound_states, convex_box, fill_component, first_exits
 from fastmech.errors import InputError, shown
 from fastmech.models.balance import balance_kernel, energy_kernel
-from fastmech.models.equilibria import RestingPlaces, domain_of, find_equilibria
+from fastmech.models.equilibria import Place, RestingPlaces, domain_of, find_equilibria
 from fastmech.models.mechanism import Mechanism
 
 Floats = NDArray[np.float64]
@@ -30,6 +30,9 @@ SIDES = {1: 8191, 2: 255, 3: 61, 4: 23}
 
 #: Share of the range of U by which barriers are lowered: rounding of energies in compiled loops is far less.
 ROUNDING = 1e-11
+
+#: The mark of a cell with several minima, or with what is not decided.
+SEVERAL = 127
 
 #: A minimum is in a cell if it is so near to it, in widths.
 NEAR = 1e-6
@@ -69,14 +72,16 @@ class Wells:
     equilibria: RestingPlaces
     wells: tuple[int, ...]  #: which equilibria are minima, the deepest first
     barrier: Floats  #: energy [J] below which each well's component is proved to hold no other; (wells,)
-    passes: tuple[int | None, ...]  #: the saddle at that energy; None: an end of a range, or no exit
+    passes: tuple[
+        int | None, ...
+    ]  #: the saddle there; None: an end of a range, an undecided place, or no exit
     cells: Cells
 
     def __repr__(self) -> str:
         lines = []
         for well, barrier, saddle in zip(self.wells, self.barrier, self.passes, strict=True):
             depth = barrier - self.equilibria[well].energy
-            over = f"over equilibrium {saddle}" if saddle is not None else "to an end of a range"
+            over = f"over equilibrium {saddle}" if saddle is not None else "to an end or an undecided place"
             over = over if np.isfinite(depth) else "anywhere"
             lines.append(f"well {well} at {self.equilibria.place(well)}: {depth:.6g} J {over}")
         return "\n".join(lines)
@@ -113,7 +118,8 @@ def prove_wells(mechanism: Mechanism) -> Wells:
 
     Raises:
         InputError: its forces are not known to have a potential, U changes with a full turn, a range is not
-            finite, or its equilibria are not proved to be complete.
+            finite, or no well is proved. Places of which it is not decided what equilibria they hold, such as
+            a spring at length zero, count as further wells and as passes at the least U there.
     """
     if mechanism.energy() is None:
         raise InputError(
@@ -122,42 +128,59 @@ def prove_wells(mechanism: Mechanism) -> Wells:
         )
     equilibria = find_equilibria(mechanism)
     assert isinstance(equilibria, RestingPlaces)
-    if not equilibria.certificate.complete:
+    left = equilibria.certificate.places
+    if not (equilibria.certificate.complete or left):
         raise InputError(f"{mechanism.name}: its wells are not certain: {equilibria.certificate.sentence}")
-    domain = domain_of(mechanism.statics())
+    domain, p = domain_of(mechanism.statics()), values_of(mechanism)
     n = len(domain)
     cells = Cells(domain, np.full(n, SIDES[n]), np.empty((SIDES[n] ** n, 2)))
-    bound_cells(
-        callee(energy_kernel(mechanism)),
-        callee(balance_kernel(mechanism.statics())),
-        domain,
-        values_of(mechanism),
-        cells.counts,
-        cells.bounds,
-    )
+    energies, forces = callee(energy_kernel(mechanism)), callee(balance_kernel(mechanism.statics()))
+    bound_cells(energies, forces, domain, p, cells.counts, cells.bounds)
     _require_periodic(mechanism, domain)
     energy = np.array([place.energy for place in equilibria])
     index = np.array([place.morse_index for place in equilibria])
     wells = np.flatnonzero(index == 0)
+    if not wells.size:
+        raise InputError(f"{mechanism.name}: has no well that is proved: {equilibria.certificate.sentence}")
     wells = wells[np.argsort(energy[wells], kind="stable")]
     marks = np.zeros(len(cells.bounds), dtype=np.int8)
     for number, well in enumerate(wells, 1):
         for cell in _cells_near(cells, equilibria[int(well)].position):
-            marks[cell] = number if marks[cell] in (0, number) else 127
+            marks[cell] = number if marks[cell] in (0, number) else SEVERAL
+    for well in np.flatnonzero(index < 0):
+        marks[list(_cells_near(cells, equilibria[int(well)].position))] = SEVERAL
+    for place in left:
+        _mark(cells, marks, place)
+    # What is not decided may hold wells and passes, none lower than U there.
+    boxes = np.array([[place.low, place.high] for place in left]).reshape(-1, 2, n).transpose(0, 2, 1).copy()
+    over = np.empty((len(boxes), 2))
+    bound_states(energies, p, boxes, np.zeros_like(boxes), over)
+    passing = np.flatnonzero((index == 1) | (index < 0))
+    levels = np.concatenate([energy[passing], over[:, 0]])
     low = np.ascontiguousarray(cells.bounds[:, 0])
     finite = cells.bounds[np.isfinite(cells.bounds).all(axis=1)]
     slack = ROUNDING * float(np.ptp(finite)) if len(finite) else 0.0
-    saddles = np.flatnonzero(index == 1)
-    saddles = saddles[np.argsort(energy[saddles], kind="stable")]
     barrier, passes, exits = np.empty(len(wells)), list[int | None](), np.empty(2)
     for row, well in enumerate(wells):
         start, _ = cells.place(equilibria[int(well)].position)
         first_exits(low, cells.counts, cells.periodic, marks, start, exits)
-        above = saddles[energy[saddles] >= exits[0] - slack]
-        over = energy[above[0]] if above.size and exits[0] < np.inf else np.inf
-        barrier[row] = min(over, exits[1])
-        passes.append(int(above[0]) if over < exits[1] else None)
+        above = np.where((levels >= exits[0] - slack) & (exits[0] < np.inf), levels, np.inf)
+        lowest = int(np.argmin(above)) if above.size else 0
+        out = float(above[lowest]) if above.size else np.inf
+        barrier[row] = min(out, exits[1])
+        passes.append(int(passing[lowest]) if out < exits[1] and lowest < len(passing) else None)
     return Wells(mechanism, equilibria, tuple(wells.tolist()), barrier, tuple(passes), cells)
+
+
+def _mark(cells: Cells, marks: NDArray[np.int8], place: Place) -> None:
+    """Mark the cells of a place of which it is not decided what it holds."""
+    first = np.floor((place.low - cells.domain[:, 0]) / cells.widths - NEAR).astype(np.int64)
+    last = np.floor((place.high - cells.domain[:, 0]) / cells.widths + NEAR).astype(np.int64)
+    rows = []
+    for begin, end, count, period in zip(first, last, cells.counts, cells.domain[:, 2], strict=True):
+        row = np.arange(begin, min(end, begin + count - 1) + 1)
+        rows.append(row % count if period else np.clip(row, 0, count - 1))
+    marks.reshape(tuple(cells.counts))[np.ix_(*rows)] = SEVERAL
 
 
 def values_of(mechanism: Mechanism) -> Floats:

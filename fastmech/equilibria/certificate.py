@@ -24,6 +24,9 @@ EVALUATION = 8.0 * EPS
 #: A residual is "at rounding level" below this many evaluation bounds: the last Newton step's own rounding.
 RESIDUAL = 16.0
 
+#: Residuals are this part of the evaluation's bounds, at most, as a rule.
+LEFT = 0.5
+
 #: Beyond a fold that is within rounding a lap's end balances up to the margin's error, in each of the pulls.
 BEYOND = 4.0
 
@@ -70,10 +73,16 @@ def existence_radius(p: Pulls, phi: float, theta: float) -> tuple[float, int, bo
     n1 = (np.hypot(k2 + k3, k3) + d2 + 2.0 * d3) / least
     n2 = (np.hypot(k1 + k3, k3) + d1 + 2.0 * d3) / least
     n3 = (np.hypot(k1, k2) + d1 + d2) / least
-    step = abs(g1) * n1 + abs(g2) * n2 + d1 * n1 + d2 * n2 + d3 * n3
+    errors = d1 * n1 + d2 * n2 + d3 * n3
+    step = abs(g1) * n1 + abs(g2) * n2 + errors
     w = p.amplitude_phi * n1 + p.amplitude_theta * n2 + 2.0 * p.amplitude_psi * n3
     if not 2.0 * w * step <= 1.0:
         return np.inf, 0, small
+    # What Newton's last step leaves is chance: residuals within rounding have one radius, so that verdicts
+    # at the edge of rounding do not depend on where the search began.
+    usual = max(abs(g1), LEFT * (d1 + d3)) * n1 + max(abs(g2), LEFT * (d2 + d3)) * n2 + errors
+    if 2.0 * w * usual <= 1.0:
+        step = usual
     return 2.0 * step / (1.0 + np.sqrt(1.0 - 2.0 * w * step)), 1 if determinant > 0.0 else -1, small
 
 

@@ -90,12 +90,13 @@ class Equilibria(Sequence[Equilibrium]):
         if not isinstance(equilibrium, Equilibrium):
             raise InputError(f"equilibrium = {shown(equilibrium)}: must be one of fastmech.find_equilibria")
         # Where g = 0 the force alone may differ: the place is an equilibrium of both, its Hessian is not.
-        same = abs(equilibrium.force - self.force) <= 1e-9 * abs(self.force)
+        same = abs(equilibrium.force - self.force) <= 1e-12 * abs(self.force)
         for i, item in enumerate(self.items if same else ()):
-            away = np.hypot(
+            away = 2.0 * np.hypot(
                 np.sin((equilibrium.phi - item.phi) / 2), np.sin((equilibrium.theta - item.theta) / 2)
             )
-            if away <= 1e-9:
+            within = equilibrium.radius + item.radius  # both are near the same true one
+            if away <= (within if within < math.inf else 1e-9):
                 return i
         raise InputError(
             f"equilibrium = ({equilibrium.phi:g}, {equilibrium.theta:g}) rad, F = {equilibrium.force:g} N: "

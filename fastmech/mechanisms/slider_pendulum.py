@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sympy import cos, sin, sqrt, symbols
 
-from fastmech.loads import Decaying
+from fastmech.loads import Decaying, Load
 from fastmech.models.coordinates import angles
 from fastmech.models.elements import Damper, Force, Spring
 from fastmech.models.mechanism import Mechanism
@@ -17,8 +17,11 @@ TABLE_1 = {
 }  # fmt: skip
 
 
-def slider_pendulum() -> Mechanism:
-    """The mechanism of :class:`fastmech.Scene`, through the general way."""
+def slider_pendulum(load: Load | None = None) -> Mechanism:
+    """The mechanism of :class:`fastmech.Scene`, through the general way.
+
+    ``load`` acts on M2 along +x in place of F0 exp(-alpha t), any of :mod:`fastmech.loads` [N].
+    """
     phi, theta = angles("phi theta")
     m1, m2, m3, l, c1, c2, beta, g, F0, alpha = symbols(list(TABLE_1))
     x1, y1 = l * cos(phi), l * sin(phi)
@@ -35,7 +38,7 @@ def slider_pendulum() -> Mechanism:
         masses={"M1": m1, "M2": m2, "M3": m3},
         springs=[Spring("O", "M2", c1), Spring("A", "M1", c2)],
         dampers=[Damper("O", "M3", beta, along=(1, 0))],
-        forces=[Force("M2", Decaying(F0, alpha), (1, 0))],
+        forces=[Force("M2", Decaying(F0, alpha) if load is None else load, (1, 0))],
         gravity=g,
         name="slider_pendulum",
     )

@@ -14,8 +14,9 @@ from fastmech.scene import require_scene as require_scene
 #: What an equilibrium has: its place, its proof and its force.
 ENTRIES = ("phi", "theta", "morse_index", "radius", "force")
 
-#: Share of the loads that may be left unbalanced: far above rounding, far below any other scene's loads.
-NOT_AT_REST = 1e-7
+#: Share of the loads that may be left unbalanced: above rounding, below what another scene's loads leave; and
+#: of a place that is not proved to be one of rest, as beside a fold.
+NOT_AT_REST, NOT_PROVED = 1e-12, 1e-7
 
 
 def require_rest(scene: Any, equilibrium: Any) -> None:
@@ -42,7 +43,8 @@ def require_rest(scene: Any, equilibrium: Any) -> None:
     loads = abs(c.lift) + (c.mass + 2.0) * c.gravity + 2.0 * c.spring + 2.0 * abs(c.force)
     left = abs(potential_gradient(scene, (equilibrium.phi, equilibrium.theta), force)).max() / unit(scene)
     beside = abs(equilibrium.force - force) / (scene.m2 * scene.l)
-    if not max(left, beside) <= NOT_AT_REST * loads:
+    share = NOT_AT_REST if equilibrium.radius < math.inf else NOT_PROVED
+    if not max(left, beside) <= share * loads:
         raise InputError(
             f"equilibrium = ({equilibrium.phi:g}, {equilibrium.theta:g}) rad, F = {equilibrium.force:g} N: "
             f"this scene (F0 = {scene.F0:g} N, alpha = {scene.alpha:g} 1/s) does not rest there; "

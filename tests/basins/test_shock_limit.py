@@ -273,6 +273,21 @@ def test_where_no_blow_leaves_none_is_left_undecided_that_finer_steps_decide() -
         np.testing.assert_array_equal(np.rint((run.y[:2, -1] - rest[:2]) / TURN), [0.0, 0.0])
 
 
+def test_blows_that_few_steps_do_not_decide_are_decided_below_one_that_leaves() -> None:
+    """A slow mode leaves many blows open at first, a whole window of leaving ones among them."""
+    masses = {"m1": 0.26960322012359694, "m2": 2.390972870305129, "m3": 26.40382911789746}
+    springs = {"F0": 1.2881306963016803, "c1": 65.03040404003984, "c2": 3.4791283954754517}
+    scene = fm.Scene(**masses, **springs, l=0.3769942645975386, beta=84.66179041445628, alpha=0.0)
+    told = limit(scene, 1, "M1")
+    starts = struck(scene, 1, "M1", np.array([35.41, 35.43, 38.2]), np.full(3, told.proved.direction))
+    rates = motion_rates(scene.model_dump())
+    runs = [solve_ivp(rates, (0.0, 300.0), y, method="DOP853", rtol=1e-11, atol=1e-11) for y in starts]
+    other, own = (fm.find_equilibria(scene)[k].phi for k in (0, 1))
+    leaves = [abs(run.y[0, -1] - other) < abs(run.y[0, -1] - own) for run in runs]
+    assert leaves == [False, True, True]
+    assert 35.41 < told.found.impulse < 35.43
+
+
 def test_a_direction_in_degrees_is_refused() -> None:
     with pytest.raises(fm.InputError, match=r"direction = 90\.0: must lie within"):
         fm.shock_limit(FREE, fm.find_equilibria(FREE)[0], "M2", 90.0)

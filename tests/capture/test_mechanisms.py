@@ -82,6 +82,30 @@ def test_barriers_in_closed_form() -> None:
     assert chain.passes == (1,)
 
 
+def test_a_spring_at_length_zero_bars_no_labels() -> None:
+    """A mass on a spring: one well, whose ring closes over its top; the first way out is at y = -2."""
+    x, y = fm.lengths("x y", -2.0, 2.0)
+    swing = fm.Mechanism(
+        (x, y),
+        points={"O": (0, 0), "M": (x, y)},
+        masses={"M": 1},
+        springs=[fm.Spring("O", "M", 100, 1)],
+        dampers=[fm.Damper("O", "M", 3, along=(1, 0)), fm.Damper("O", "M", 3, along=(0, 1))],
+        gravity=9.81,
+        name="swing",
+    )
+    assert not fm.find_equilibria(swing).certificate.complete
+    wells = prove_wells(swing)
+    assert len(wells.wells) == 1
+    end, bottom = 50.0 - 9.81 * 2.0, -9.81 - 9.81**2 / 200.0  # U at (0, -2), and at the minimum
+    assert wells.equilibria[wells.wells[0]].energy == pytest.approx(bottom, rel=1e-10)
+    assert end - 2.0 < wells.barrier[0] <= end
+    assert wells.passes == (None,)
+    rng = np.random.default_rng(4)
+    found = fm.labels_of(swing, np.concatenate([rng.uniform(-1.0, 1.0, (200, 4))], axis=1))
+    assert found.counts["captured"] == 200
+
+
 @pytest.mark.parametrize("reach", [1.2, 3.0])
 def test_a_ranges_end_may_be_the_lowest_way_out(reach: float) -> None:
     """U(1.2) = -0.2016 lies below the saddle at 0."""
@@ -241,3 +265,14 @@ def test_what_has_no_labels_says_why(mechanism: object, told: str) -> None:
     made = mechanism()  # type: ignore[operator]
     with pytest.raises(fm.InputError, match=told):
         fm.labels_of(made, np.zeros((1, len(made.state))))
+
+
+def test_the_papers_mechanism_under_a_pulse_ends_where_scipy_says() -> None:
+    mechanism = fm.mechanisms.slider_pendulum(fm.loads.Pulse(3000.0, 0.2, 0.3)).replace(c1=294.9, c2=92.85)
+    rng = np.random.default_rng(6)
+    starts = np.concatenate([rng.uniform(-3.0, 3.0, (40, 2)), np.zeros((40, 2))], axis=1)
+    found = fm.labels_of(mechanism, starts, 60.0)
+    assert (found.well >= 0).any()
+    for k in np.flatnonzero(found.well >= 0)[:4]:
+        expected = found.tree.equilibria[int(found.well[k])].position + TURN * found.turns[k]
+        np.testing.assert_allclose(end_of(mechanism, starts[k], 60.0)[:2], expected, atol=0.5)

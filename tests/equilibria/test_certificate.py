@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fastmech.equilibria.balance import expected_count, normal_form, pulls
-from fastmech.equilibria.certificate import certify
+from fastmech.equilibria.balance import EPS, expected_count, normal_form, pulls
+from fastmech.equilibria.certificate import certify, existence_radius
 from fastmech.equilibria.find import find_equilibria
 from fastmech.equilibria.outcome import Outcome
 from fastmech.equilibria.solution import solve_rows
@@ -212,3 +212,18 @@ def test_all_laps_meet_in_one_point(c1: float) -> None:
 def test_expected_count_in_plain_python() -> None:
     c = reduce(PAPER)
     assert expected_count(normal_form(pulls(c.mass, c.lift, c.spring, c.gravity, c.force))) == 4
+
+
+def test_the_radius_does_not_tell_where_the_search_began(
+    coefficients: NDArray[np.float64], solution: Solution
+) -> None:
+    """Places within rounding of one another have one radius: verdicts at rounding's edge rest on it."""
+    rng = np.random.default_rng(3)
+    for row in range(0, SCENES, 10):
+        p = pulls(*coefficients[row][[0, 2, 3, 4, 5]])
+        for phi, theta in zip(solution.phi[row], solution.theta[row], strict=True):
+            if math.isnan(phi):
+                continue
+            aside = EPS * rng.uniform(-1.0, 1.0, (8, 2))
+            told = [existence_radius(p, phi + one, theta + other)[0] for one, other in aside]
+            assert max(told) <= min(told) * (1.0 + 1e-6)

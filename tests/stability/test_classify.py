@@ -263,6 +263,16 @@ def test_an_equilibrium_of_another_scene_is_refused(name: str, change: dict[str,
         TAKERS[name](scene, 3)
 
 
+@pytest.mark.parametrize("name", TAKERS)
+@pytest.mark.parametrize("change", [{"F0": 1e-6}, {"c1": 1e-6}, {"m1": 1e-7}, {"l": 1e-8}])
+def test_one_of_almost_the_same_scene_is_refused_too(name: str, change: dict[str, float]) -> None:
+    scene = Scene(F0=40.0, c1=294.9, c2=92.85, alpha=0.0)
+    ((field, by),) = change.items()
+    foreign = find_equilibria(scene.replace(**{field: getattr(scene, field) + by}))[0]
+    with pytest.raises(InputError, match=r"^equilibrium = \(.*\) rad, F = 40 N: [^\n]*$"):
+        TAKERS[name](scene, foreign)
+
+
 def test_only_the_force_of_a_weightless_scene_differs() -> None:
     """With phi = 0, theta = pi/2 and no weights the force pulls along both rods: any force has rest there."""
     scene = Scene(g=0.0, c1=100.0, c2=0.0, F0=50.0, alpha=0.0)

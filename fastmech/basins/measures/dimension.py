@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from fastmech.basins.measures.labels import Floats, Integers, LabelsLike, check_map, too_thin
@@ -53,11 +53,13 @@ def boundary_dimension(labels: LabelsLike, edges: ArrayLike | None = None) -> Bo
 
     The exponent is a least-squares line through log p over log e. Its error bar joins the scatter between
     parts of the map (each of 5 parts along every axis left out in turn, the jackknife) and the largest
-    difference between local dimensions, continued at both ends by half of their last change: coarse boxes
-    hold more than one smooth boundary, and fine ones miss structure of a fractal between the points of the
-    map, so that the true dimension may be at either end. The dimension is that of the scales at hand: of
-    stripes whose spacing shrinks geometrically, as beside a saddle, it falls towards that of one line as
-    boxes shrink, but slowly; stripes of sin(1/x) have 1.5 at all scales, though each is smooth.
+    difference between local dimensions, continued at both ends by half of their last change, and that of
+    boxes judged by their corners: coarse boxes hold more than one smooth boundary, and fine ones miss
+    structure of a fractal between the points of the map, so that the true dimension may be at either end.
+    Corners miss as much at every size: a curve rougher than the map's points differs there, a smooth one
+    does not. The dimension is that of the scales at hand: of stripes whose spacing shrinks geometrically, as
+    beside a saddle, it falls towards that of one line as boxes shrink, but slowly; stripes of sin(1/x) have
+    1.5 at all scales, though each is smooth.
 
     Args:
         labels: on a grid of any number of axes, with equal steps in one metric; negative: no label.
@@ -84,7 +86,8 @@ def boundary_dimension(labels: LabelsLike, edges: ArrayLike | None = None) -> Bo
     weight = np.ones_like(x)
     slope, local = line(x, _log(share), weight)[0], np.diff(_log(share)) / np.diff(x)
     beyond = 1.5 * local[[0, -1]] - 0.5 * local[[1, -2]]
-    error = np.hypot(half_width(line(x, without, weight)[0]), np.ptp([*local, *beyond]))
+    corners = line(x, _log(np.array([_mixed_corners(array, int(edge)) for edge in given])), weight)[0]
+    error = np.hypot(half_width(line(x, without, weight)[0]), np.ptp([*local, *beyond, corners]))
     return BoundaryDimension(
         edge=given.astype(np.int64),
         mixed=share,
@@ -99,13 +102,25 @@ def boundary_dimension(labels: LabelsLike, edges: ArrayLike | None = None) -> Bo
 
 def _count(labels: Integers, edge: int) -> Floats:
     """Places of a box with two labels, and with any, by part of the map; shape (2, parts)."""
-    highest = maximum_filter(np.maximum(labels, -1), size=edge + 1, mode="mirror")
-    filled = np.where(labels < 0, labels.max() + 1, labels)
-    lowest = minimum_filter(filled, size=edge + 1, mode="mirror")
     part = part_of(np.indices(labels.shape, sparse=True), labels.shape)
-    known = highest >= 0
-    kinds = (known & (lowest < highest), known)
+    kinds = _mixed(labels, np.ones((edge + 1,) * labels.ndim, dtype=bool))
     return np.array([np.bincount(part[kind], minlength=PARTS**labels.ndim) for kind in kinds], np.float64)
+
+
+def _mixed_corners(labels: Integers, edge: int) -> float:
+    """Share of the boxes whose corners have two labels."""
+    corners = np.zeros((edge + 1,) * labels.ndim, dtype=bool)
+    corners[(slice(None, None, edge),) * labels.ndim] = True
+    mixed, known = _mixed(labels, corners)
+    return float(mixed.sum() / known.sum())
+
+
+def _mixed(labels: Integers, box: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Whether the points of a box round each point of the map have two labels, and whether any."""
+    highest = maximum_filter(np.maximum(labels, -1), footprint=box, mode="mirror")
+    lowest = minimum_filter(np.where(labels < 0, labels.max() + 1, labels), footprint=box, mode="mirror")
+    known = highest >= 0
+    return known & (lowest < highest), known
 
 
 def _log(share: Floats) -> Floats:

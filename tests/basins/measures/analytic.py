@@ -91,6 +91,14 @@ def koch(n: int, angle: float, scale: float = 0.8, depth: int = 14) -> Integers:
     return inside.reshape(n, n).astype(np.int64)
 
 
+def rough(n: int, angle: float, power: float, seed: int) -> Integers:
+    """Sides of Weierstrass' curve sum b^(-power k) cos(b^k u + phase), b = 1.9, of dimension 2 - power."""
+    phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, 32)
+    u, v = along(n, angle) / n, along(n, angle + np.pi / 2) / n
+    terms = (1.9 ** (-power * k) * np.cos(2.0 * np.pi * 1.9**k * u + p) for k, p in enumerate(phases))
+    return (3.0 * v < sum(terms)).astype(np.int64)
+
+
 def newton(n: int, angle: float = 0.0, span: float = 1.5, middle: complex = 0.0) -> Integers:
     """Roots of z^3 = 1 that Newton's method finds from n x n starts in a square; -1: none."""
     x = np.linspace(-span, span, n)

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from analytic import ANGLES, along, cantor, gaps, koch, newton, round_spots, smooth_map, stripes
+from analytic import ANGLES, along, cantor, gaps, koch, newton, rough, round_spots, smooth_map, stripes
 
 from fastmech.basins.measures.dimension import boundary_dimension
 from fastmech.errors import InputError
@@ -61,6 +61,10 @@ def known_dimensions() -> list[tuple[str, float, np.ndarray]]:
     rng = np.random.default_rng(2)
     maps = [("three colours", 1.0, smooth_map(int(rng.integers(100, 500)), 3, k)) for k in range(40)]
     for angle in ANGLES:
+        for power in (0.3, 0.5, 0.7):
+            for seed in range(3):
+                labels = rough(int(rng.integers(128, 400)), angle, power, seed)
+                maps.append((f"Weierstrass {power}", 2.0 - power, labels))
         n = int(rng.integers(200, 500))
         maps += [
             ("straight", 1.0, (along(n, angle, 3.3) > 0.0).astype(int)),
