@@ -26,6 +26,8 @@ from fastmech.errors import InputError, shown
 if TYPE_CHECKING:
     import xarray
 
+    from fastmech.scene import Scene
+
 Attribute: TypeAlias = "str | int | float | tuple[str, ...] | npt.NDArray[Any]"
 
 _INTEGERS = {f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)}
@@ -236,6 +238,12 @@ def parts(
         f"{name}_{entry}": Variable(dims, data[..., k], unit, about.format(entry))
         for k, (entry, unit) in enumerate(units.items())
     }
+
+
+def scene_parameters(scene: Scene) -> dict[str, Variable]:
+    """A scene's parameters as a result file holds them."""
+    described = scene.described().items()
+    return {name: Variable((), np.array(value), unit, about) for name, (value, unit, about) in described}
 
 
 def numbers(dim: str, count: int, about: str) -> dict[str, Variable]:

@@ -8,20 +8,19 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
-from importlib.util import find_spec
-from pathlib import Path
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from fastmech.basins.label import Labels, labels_of
+from fastmech.basins.label import labels_of
+from fastmech.bench.measure import Stage, in_turns
 from fastmech.bench.plain import scalar_rhs
+from fastmech.bench.tables import table
 from fastmech.disturbance.size import confining_energy, excess_energy
-from fastmech.ensembles.run import Progress
 from fastmech.ensembles.threads import thread_count
 from fastmech.equilibria.find import find_equilibria
 from fastmech.jit import FLAGS
@@ -35,12 +34,8 @@ Floats = NDArray[np.float64]
 SCENE = Scene(alpha=0.0)
 REST, T_END, REPEATS = 1e-3, 300.0, 3
 
-#: Step that pynamicalsys is given [s].
-PEER_STEP = 0.02
 
-
-@dataclass(frozen=True)
-class BasinRow:
+class BasinRow(NamedTuple):
     """What one way of labelling did."""
 
     name: str
@@ -51,30 +46,20 @@ class BasinRow:
     wrong: int  #: labels that differ from the certificate's
 
 
-def run_basins(
-    out: Path,
-    *,
-    quick: bool = False,
-    stage: Callable[[str, int], Progress] = lambda name, total: lambda done: None,
-) -> list[Path]:
-    """Measure and write ``basins.md`` into the folder ``out``; ``quick`` is for trying the command."""
+def basins_study(quick: bool, stage: Stage) -> list[str]:
+    """``basins.md``; ``quick`` is for trying the command."""
     many, some, few = (20_000, 1000, 4) if quick else (1_000_000, 10_000, 40)
-    starts = random_starts(many)
-    advance = stage("basin labels", 4 if thread_count(None) > 1 else 3)
+    starts, threads = random_starts(many), sorted({1, thread_count(None)})
+    advance = stage("basin labels", 2 + len(threads))
     rows = []
-    for threads in sorted({1, thread_count(None)}):
-        rows.append(certified(starts, threads))
+    for n in threads:
+        rows.append(certified(starts, n))
         advance(1)
     rows.append(settled(starts[:some]))
     advance(1)
     rows.append(lsoda(starts[:few]))
     advance(1)
-    if find_spec("pynamicalsys") is not None:
-        rows.append(pynamicalsys(starts[:few]))
-    out.mkdir(parents=True, exist_ok=True)
-    table = out / "basins.md"
-    table.write_text(markdown(rows), encoding="utf-8")
-    return [table]
+    return markdown(rows)
 
 
 def random_starts(n: int) -> Floats:
@@ -86,27 +71,28 @@ def random_starts(n: int) -> Floats:
 
 def certified(starts: Floats, threads: int) -> BasinRow:
     """The package's labels."""
-    labels_of(SCENE, starts[:1000], T_END, threads=threads)
-    seconds = []
-    for _ in range(REPEATS):
-        began = time.perf_counter()
-        found = labels_of(SCENE, starts, T_END, threads=threads)
-        seconds.append(time.perf_counter() - began)
+    steps: list[int] = []
+
+    def labelled() -> None:
+        steps.append(labels_of(SCENE, starts, T_END, threads=threads).steps)
+
+    (seconds,) = in_turns({"": labelled}, REPEATS, clock=time.perf_counter).values()
     rate = len(starts) / statistics.median(seconds)
-    return BasinRow("capture certificate", threads, len(starts), rate, found.steps / len(starts), 0)
+    return BasinRow("capture certificate", threads, len(starts), rate, steps[0] / len(starts), 0)
 
 
 def settled(starts: Floats) -> BasinRow:
     """The same engine, each start followed once, with the certificate's finer step, until it rests."""
-    plain = labels_of(SCENE, starts, T_END, threads=1)
-    began = time.perf_counter()
-    found = labels_of(SCENE, starts, T_END, settle_radius=REST, threads=1)
-    seconds = time.perf_counter() - began
-    began = time.perf_counter()
-    labels_of(SCENE, starts, T_END, threads=1)
-    seconds -= time.perf_counter() - began
-    steps = (found.steps - plain.steps) / len(starts)
-    return BasinRow(f"until within {REST:g} of rest", 1, len(starts), len(starts) / seconds, steps, 0)
+    steps: dict[float | None, int] = {}
+
+    def labelled(radius: float | None) -> None:
+        steps[radius] = labels_of(SCENE, starts, T_END, settle_radius=radius, threads=1).steps
+
+    works = {radius: partial(labelled, radius) for radius in (None, REST)}
+    seconds = {k: v[0] for k, v in in_turns(works, 1, clock=time.perf_counter).items()}
+    rate = len(starts) / (seconds[REST] - seconds[None])
+    each = (steps[REST] - steps[None]) / len(starts)
+    return BasinRow(f"until within {REST:g} of rest", 1, len(starts), rate, each, 0)
 
 
 def _energy_above(y: Floats, p: Floats, bottom: float) -> float:
@@ -146,71 +132,27 @@ def lsoda(starts: Floats) -> BasinRow:
         steps += run.t.size - 1
     seconds = time.perf_counter() - began
     turns = np.round((np.array(ends) - [well.phi, well.theta]) / (2.0 * np.pi))
-    wrong = _differ(labels, turns)
-    return BasinRow(
-        "SciPy LSODA to rest, rtol 1e-6", 1, len(starts), len(starts) / seconds, steps / len(starts), wrong
-    )
+    wrong = int(np.count_nonzero((labels.turns != turns).any(axis=1)))
+    rate = len(starts) / seconds
+    return BasinRow("SciPy LSODA to rest, rtol 1e-6", 1, len(starts), rate, steps / len(starts), wrong)
 
 
-def pynamicalsys(starts: Floats) -> BasinRow:
-    """pynamicalsys' RK4 with a step of 0.02 s, one start after the other, for as long as the slowest takes.
-
-    It cannot stop when a start has come to rest.
-    """
-    from pynamicalsys import ContinuousDynamicalSystem
-
-    labels = labels_of(SCENE, starts, T_END, settle_radius=REST)
-    assert labels.settle_time is not None
-    t_end, p = float(np.nanmax(labels.settle_time)), np.array(reduce(SCENE))
-    system = ContinuousDynamicalSystem(
-        equations_of_motion=scalar_rhs, system_dimension=4, parameters=p, number_of_parameters=p.size
-    )
-    system.integrator("rk4", time_step=PEER_STEP)
-    system.evolve_system(starts[0], PEER_STEP)
-    began = time.perf_counter()
-    ends = np.array([system.evolve_system(start, t_end) for start in starts])
-    seconds = time.perf_counter() - began
-    well = find_equilibria(SCENE)[0]
-    turns = np.round((ends[:, :2] - [well.phi, well.theta]) / (2.0 * np.pi))
-    return BasinRow(
-        f"pynamicalsys RK4 to {t_end:.0f} s, dt = {PEER_STEP:g} s",
-        1,
-        len(starts),
-        len(starts) / seconds,
-        t_end / PEER_STEP,
-        _differ(labels, turns),
-    )
-
-
-def _differ(labels: Labels, turns: Floats) -> int:
-    return int(np.count_nonzero((labels.turns != turns).any(axis=1)))
-
-
-def markdown(rows: list[BasinRow]) -> str:
+def markdown(rows: list[BasinRow]) -> list[str]:
     """The table and the two ratios."""
-    lines = [
+    first, (rest, peer) = rows[0], rows[-2:]
+    return [
         "# Basin labels",
         "",
         "Table 1, constant force, random starts at rest; medians of warm calls.",
         "",
-        "| labelled by | threads | starts | starts/s | steps a start | labels that differ |",
-        "|---|---:|---:|---:|---:|---:|",
-    ]
-    for row in rows:
-        lines.append(
-            f"| {row.name} | {row.threads} | {row.starts:,} | {row.rate:,.4g} | {row.steps:,.4g} "
-            f"| {row.wrong} |"
-        )
-    first = rows[0]
-    others = [row for row in rows if row.name.startswith("pynamicalsys")]
-    also = "".join(f" and {first.rate / row.rate:,.0f} times as many as pynamicalsys" for row in others)
-    rest = next(row for row in rows if row.name.startswith("until"))
-    peer = next(row for row in rows if row.name.startswith("SciPy"))
-    lines += [
-        "",
+        *table(
+            ["labelled by", "threads", "starts", "starts/s", "steps a start", "labels that differ"],
+            (
+                [r.name, str(r.threads), f"{r.starts:,}", f"{r.rate:,.4g}", f"{r.steps:,.4g}", str(r.wrong)]
+                for r in rows
+            ),
+        ),
         f"The certificate takes 1/{rest.steps / first.steps:.0f} of the steps to rest, both of its "
         f"computations counted, and labels {first.rate / peer.rate:,.0f} times as many starts a second "
-        f"on one core as SciPy{also}.",
-        "",
+        f"on one core as SciPy.",
     ]
-    return "\n".join(lines)

@@ -7,21 +7,19 @@ package's own trigonometry and accelerations, so what is left to compare is the 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
 from numba import njit
 
-from fastmech.bench.entrant import Entrant, Prepare, Solve
+from fastmech.bench.entrant import Floats, Series, Solve
 from fastmech.bench.package import STEPS
 from fastmech.bench.problem import Problem
 from fastmech.integrators.tableau import Tableau
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import FLAGS
 from fastmech.kernels.sincos import sincos
-from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.equations import lagrange_accelerations
 
 METHODS = ("rk4", "dop853")
@@ -73,26 +71,21 @@ def compiled(method: str) -> Any:
     return njit(nogil=True, **FLAGS)(names["integrate"])
 
 
-def entrants(problem: Problem) -> Iterator[Entrant]:
-    """RK4 and order 8 at the package's steps."""
-    for method in METHODS:
-        for dt in STEPS[method]:
-            h = dt * problem.pace
-            yield Entrant(f"hand-fused {method}", f"dt = {h:g} s", prepared(method, h))
-
-
-def prepared(method: str, h: float) -> Prepare:
+def prepared(method: str, problem: Problem, threads: int, h: float) -> Solve:
     """A method at a fixed step, in blocks of lanes."""
+    kernel, p = compiled(method), problem.coefficients
+    steps = int(np.ceil(problem.t_end / h - 1e-9))
 
-    def prepare(problem: Problem, threads: int) -> Solve:
-        kernel, p = compiled(method), reduce(problem.scene)
-        steps = int(np.ceil(problem.t_end / h - 1e-9))
+    def solve(starts: Floats) -> Floats:
+        final = np.empty_like(starts)
+        kernel(starts, final, LANES, problem.t_end / steps, steps, *p[:7])
+        return final
 
-        def solve(starts: Any) -> Any:
-            final = np.empty_like(starts)
-            kernel(starts, final, LANES, problem.t_end / steps, steps, *p[:7])
-            return final
+    return solve
 
-        return solve
 
-    return prepare
+#: RK4 and order 8 at the package's steps.
+SERIES = tuple(
+    Series(f"hand-fused {method}", "dt = {:g} s", STEPS[method], partial(prepared, method))
+    for method in METHODS
+)

@@ -9,14 +9,16 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.bench.entrant import Entrant, Floats, Solve
 from fastmech.bench.problem import Problem
+from fastmech.ensembles.run import Progress
 
 #: Processor seconds of timed calls that one entrant is given, and its calls at most.
 BUDGET = 0.8
@@ -24,6 +26,33 @@ MOST_REPEATS = 7
 
 #: Calls shorter than this [s] are given copies of the starts, up to the entrant's most.
 SHORT_CALL = 0.1
+
+
+#: Measured turns of :func:`in_turns` after one that warms up.
+TURNS = 7
+
+Name = TypeVar("Name")
+
+#: Makes a bar from what is done and how many pieces that are; it is told of each.
+Stage = Callable[[str, int], Progress]
+
+
+def in_turns(
+    works: Mapping[Name, Callable[[], object]],
+    turns: int = TURNS,
+    advance: Progress = lambda done: None,
+    clock: Callable[[], float] = time.process_time,
+) -> dict[Name, list[float]]:
+    """Seconds of each turn's call, after a turn that is not counted; ``advance`` is told 1 for each call."""
+    seconds: dict[Name, list[float]] = {name: [] for name in works}
+    for turn in range(turns + 1):
+        for name, work in works.items():
+            began = clock()
+            work()
+            if turn:
+                seconds[name].append(clock() - began)
+            advance(1)
+    return seconds
 
 
 @dataclass(frozen=True)
@@ -79,7 +108,7 @@ class _Runner:
 def measure(
     problem: Problem,
     everyone: Sequence[tuple[Entrant, int]],
-    advance: Callable[[int], None] = lambda done: None,
+    advance: Progress = lambda done: None,
     failed: Callable[[Entrant, Exception], None] | None = None,
     budget: float = BUDGET,
 ) -> list[Row]:

@@ -2,44 +2,35 @@
 
 from __future__ import annotations
 
-import re
 import statistics
-import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from fastmech.bench.measure import TURNS, Stage, in_turns
 from fastmech.bench.problem import Problem
 from fastmech.ensembles.integrate import integrate
 from fastmech.integrators.methods import find_method
 from fastmech.jit import FLAGS
 from fastmech.kernels.select import right_hand_side
-from fastmech.mechanism.coefficients import reduce
 
 Floats = NDArray[np.float64]
 
 #: Independent chains of multiply-adds in a lane, and their length: enough to hide each one's latency.
 CHAINS, LENGTH = 8, 32
 
-TURNS = 7
-
 #: Lanes of the block that the right-hand side alone is given.
 LANES = 256
 
-#: Packed fused multiply-adds of doubles in x86 (AVX2, AVX-512) and Arm code.
-PACKED = re.compile(r"vfn?madd\d+pd|\bfmla\s+v")
 
-
-@dataclass(frozen=True)
-class Throughput:
+class Throughput(NamedTuple):
     """Evaluations of right-hand sides per second of one core."""
 
-    name: str
+    place: str
     rhs: float  #: right-hand sides of one trajectory, per second
     share: float  #: of the kernel alone
     slots: float  #: multiply-adds that the core could have done in the time of one
@@ -62,12 +53,6 @@ def multiply_adds() -> Any:
     return njit(["void(float64[::1], int64, float64)"], nogil=True, **FLAGS)(scope["loop"])
 
 
-def packed_multiply_adds() -> int:
-    """How many packed fused multiply-adds the machine code of that loop holds."""
-    (code,) = multiply_adds().inspect_asm().values()
-    return len(PACKED.findall(code))
-
-
 @cache
 def evaluations() -> Any:
     """A loop that calls a block right-hand side over and over."""
@@ -79,11 +64,11 @@ def evaluations() -> Any:
     return njit(nogil=True, **FLAGS)(loop)
 
 
-def throughputs(problem: Problem, advance: Callable[[int], None]) -> tuple[float, list[Throughput]]:
+def throughputs(problem: Problem, stage: Stage) -> tuple[float, list[Throughput]]:
     """The measured peak [multiply-adds/s], and right-hand sides alone and inside of methods."""
     x, turns = np.ones(LANES), 2000
     Y = np.ascontiguousarray(np.resize(problem.starts, (LANES, 4)).T)
-    coefficients = reduce(problem.scene)
+    coefficients = problem.coefficients
     p = np.repeat(np.array(coefficients)[:, None], LANES, axis=1)
     rhs, dY = right_hand_side(coefficients), np.empty_like(Y)
     many = np.tile(problem.starts, (max(1, 4096 // len(problem.starts)), 1))
@@ -98,15 +83,8 @@ def throughputs(problem: Problem, advance: Callable[[int], None]) -> tuple[float
             return integrate(problem.scene, many, problem.t_end, dt, method, threads=1)
 
         works[f"inside {method}"] = (run, len(many) * find_method(method).evaluations(steps))
-    for work, _ in works.values():
-        work()
-    seconds: dict[str, list[float]] = {name: [] for name in works}
-    for _ in range(TURNS):
-        for name, (work, _) in works.items():
-            began = time.process_time()
-            work()
-            seconds[name].append(time.process_time() - began)
-        advance(1)
+    calls = {name: work for name, (work, _) in works.items()}
+    seconds = in_turns(calls, advance=stage("right-hand sides", len(works) * (TURNS + 1)))
     rates = {name: count / statistics.median(seconds[name]) for name, (_, count) in works.items()}
     peak = rates.pop("peak")
     alone = rates["kernel alone"]

@@ -5,19 +5,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from fastmech.bench.entrant import Entrant, Prepare, Solve
+from fastmech.bench.entrant import Floats, Series, Solve
 from fastmech.bench.problem import Problem
 from fastmech.jit import FLAGS
-from fastmech.mechanism.coefficients import reduce
-
-Floats = NDArray[np.float64]
 
 #: Steps [s], those of the package's RK4 among them.
 STEPS = (0.05, 0.02, 0.01, 0.005)
@@ -82,19 +78,14 @@ def in_scalars(starts: Floats, p: Floats, h: float, steps: int) -> Floats:
     return final
 
 
-def entrants(problem: Problem) -> Iterator[Entrant]:
-    """RK4 at the package's steps."""
-    for kernel, how in ((one_at_a_time, "small arrays"), (in_scalars, "local numbers")):
-        for dt in STEPS:
-            h = dt * problem.pace
-            yield Entrant(f"Numba RK4, one at a time, {how}", f"dt = {h:g} s", prepared(kernel, h), most=1024)
-
-
-def prepared(kernel: Any, h: float) -> Prepare:
+def prepared(kernel: Any, problem: Problem, threads: int, h: float) -> Solve:
     """A kernel above at a fixed step."""
+    p, steps = np.array(problem.coefficients), round(problem.t_end / h)
+    return lambda starts: kernel(starts, p, problem.t_end / steps, steps)
 
-    def prepare(problem: Problem, threads: int) -> Solve:
-        p, steps = np.array(reduce(problem.scene)), round(problem.t_end / h)
-        return lambda starts: kernel(starts, p, problem.t_end / steps, steps)
 
-    return prepare
+#: RK4 at the package's steps.
+SERIES = tuple(
+    Series(f"Numba RK4, one at a time, {how}", "dt = {:g} s", STEPS, partial(prepared, kernel), most=1024)
+    for how, kernel in (("small arrays", one_at_a_time), ("local numbers", in_scalars))
+)

@@ -8,11 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import files
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.ensembles.system import System
+from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -27,11 +28,17 @@ class Problem:
 
     name: str
     description: str
-    scene: Any  #: Scene, or a System
+    scene: Scene | System
     starts: Floats  #: shape (n, dim)
     truth: Floats  #: final states, shape (n, dim)
     t_end: float  #: s
     pace: float  #: steps of fixed-step methods relative to those of the rest starts
+
+    @property
+    def coefficients(self) -> Coefficients:
+        """The scene's reduced coefficients; a system has none."""
+        assert isinstance(self.scene, Scene)
+        return reduce(self.scene)
 
 
 def _problem(name: str, description: str, rate: float, pace: float, n: int) -> Problem:

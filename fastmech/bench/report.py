@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -13,27 +12,25 @@ from typing import Any
 import numpy as np
 
 from fastmech.bench import tables
-from fastmech.bench.atlas import run_atlas
-from fastmech.bench.basins import run_basins
+from fastmech.bench.atlas import atlas_study
+from fastmech.bench.basins import basins_study
 from fastmech.bench.entrant import Entrant
-from fastmech.bench.entrants import entrants, missing
 from fastmech.bench.fused import METHODS
-from fastmech.bench.measure import BUDGET, Row, measure
-from fastmech.bench.memory import TRAJECTORIES, footprints
-from fastmech.bench.peak import TURNS as PEAK_TURNS
-from fastmech.bench.peak import Throughput, throughputs
+from fastmech.bench.measure import BUDGET, Row, Stage, measure
+from fastmech.bench.peak import throughputs
+from fastmech.bench.peers import entrants, missing
 from fastmech.bench.picture import draw_bench
 from fastmech.bench.problem import PROBLEMS, Problem
-from fastmech.bench.startup import STARTED, Start, started
-from fastmech.bench.stiff import run_stiff
-from fastmech.bench.systems import run_systems
-from fastmech.bench.terms import TURNS, Cost, costs
-from fastmech.bench.threads import run_threads
-from fastmech.bench.tolerances import run_tolerances
-from fastmech.bench.vectors import run_vectors
+from fastmech.bench.processes import footprints, started, vectors_study
+from fastmech.bench.stiff import stiff_study
+from fastmech.bench.systems import systems_study
+from fastmech.bench.terms import costs
+from fastmech.bench.threads import threads_study
+from fastmech.bench.tolerances import tolerances_study
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.threads import thread_count
-from fastmech.results import Dataset, Variable
+from fastmech.results import Dataset, Variable, scene_parameters
+from fastmech.scene import Scene
 from fastmech.store.provenance import processor_name, provenance
 from fastmech.store.write import check_writable, write_results
 
@@ -50,23 +47,39 @@ QUICK_LEAST = 8192
 LIBRARIES = ("numba", "scipy", "heyoka", "torch", "jax", "diffrax", "numbalsoda", "CyRK", "pynamicalsys")
 
 
-#: Studies with a file of their own, by name.
-STUDIES: dict[str, Callable[..., list[Path]]] = {
-    "atlas": run_atlas,
-    "basins": run_basins,
-    "stiff": run_stiff,
-    "systems": run_systems,
-    "threads": run_threads,
-    "tolerances": run_tolerances,
-    "vectors": run_vectors,
+#: Studies with a file of their own, by name: from `quick` and a stage to the lines of Markdown.
+STUDIES: dict[str, Callable[..., list[str]]] = {
+    "atlas": atlas_study,
+    "basins": basins_study,
+    "stiff": stiff_study,
+    "systems": systems_study,
+    "threads": threads_study,
+    "tolerances": tolerances_study,
+    "vectors": vectors_study,
 }
+
+
+def run_study(
+    name: str,
+    out: Path,
+    *,
+    quick: bool = False,
+    stage: Stage = lambda name, total: lambda done: None,
+    **chosen: int,
+) -> Path:
+    """Measure and write a study's ``NAME.md`` into the folder ``out``; ``chosen`` are its own settings."""
+    lines = STUDIES[name](quick, stage, **chosen)
+    out.mkdir(parents=True, exist_ok=True)
+    path = out / f"{name}.md"
+    path.write_text("\n".join(lines).rstrip("\n") + "\n", encoding="utf-8")
+    return path
 
 
 def run_bench(
     out: Path,
     *,
     quick: bool = False,
-    stage: Callable[[str, int], Progress] = lambda name, total: lambda done: None,
+    stage: Stage = lambda name, total: lambda done: None,
 ) -> list[Path]:
     """Measure and write ``bench.md``, ``bench.png`` and ``bench.h5`` into the folder ``out``.
 
@@ -89,10 +102,10 @@ def run_bench(
             advance(1)
 
         rows += measure(problem, everyone, advance, failed, QUICK_BUDGET if quick else BUDGET)
-    peak, rhs = throughputs(problems[0], stage("right-hand sides", PEAK_TURNS))
-    prices = costs(problems[0], stage("terms", TURNS))
-    starts = [] if quick else list(started(stage("cold starts", len(STARTED))))
-    memory = [] if quick else footprints(stage("memory", len(TRAJECTORIES)))
+    peak, rhs = throughputs(problems[0], stage)
+    prices = costs(problems[0], stage)
+    starts = [] if quick else list(started(stage))
+    memory = [] if quick else footprints(stage)
     table, picture = out / "bench.md", out / "bench.png"
     lines = _preamble(quick, failures)
     for problem in problems:
@@ -100,31 +113,32 @@ def run_bench(
     lines += tables.machine_sections(peak, rhs, prices, starts, memory)
     table.write_text("\n".join(lines) + "\n", encoding="utf-8")
     draw_bench(rows, picture)
+    peaks = {
+        "peak": Variable((), np.array(peak), "1/s", "fused multiply-adds of doubles of one core, measured")
+    }
+    sections = {
+        "speed": speed_dataset(rows, problems),
+        "rhs": Dataset(peaks | _columns("place", rhs, _PLACES)),
+        "terms": Dataset(_columns("kind", prices, _KINDS)),
+    }
+    if starts:
+        sections["starts"] = Dataset(_columns("entrant", starts, _STARTS))
     write_results(
         data,
-        scene_parameters={
-            name: Variable((), np.array(value), unit, about)
-            for name, (value, unit, about) in problems[0].scene.described().items()
-        },
-        sections={
-            "speed": speed_dataset(rows, problems),
-            "rhs": throughput_dataset(peak, rhs),
-            "terms": cost_dataset(prices),
-        }
-        | ({"starts": start_dataset(starts)} if starts else {}),
+        scene_parameters=scene_parameters(Scene(alpha=0.0)),
+        sections=sections,
         attrs={"title": "Speed against error", "wall_time_s": time.perf_counter() - began}
         | provenance(thread_count(None)),
         replace=True,
     )
-    others = (study(out, quick=quick, stage=stage) for study in STUDIES.values())
-    return [table, picture, data, *(path for paths in others for path in paths)]
+    return [table, picture, data, *(run_study(name, out, quick=quick, stage=stage) for name in STUDIES)]
 
 
 def enlarged(entrant: Entrant) -> Entrant:
     """An entrant of ``--quick``, with enough trajectories where its loop is compared with another's."""
     engine = {f"{tables.OWN} {method}" for method in METHODS}
     compared = entrant.family in engine or entrant.family.startswith(tables.FUSED)
-    return replace(entrant, least=max(entrant.least, QUICK_LEAST)) if compared else entrant
+    return entrant._replace(least=max(entrant.least, QUICK_LEAST)) if compared else entrant
 
 
 def _threads(entrant: Entrant) -> list[int]:
@@ -160,8 +174,15 @@ def _preamble(quick: bool, failures: list[str]) -> list[str]:
     return lines
 
 
-def _strings(values: list[str]) -> np.ndarray[Any, Any]:
-    return np.array(values, dtype=object)
+def _columns(dim: str, rows: Sequence[Any], about: Mapping[str, tuple[str, str]]) -> dict[str, Variable]:
+    """Attributes of rows by name, with unit and description."""
+
+    def column(name: str, unit: str, told: str) -> Variable:
+        values = [value() if callable(value := getattr(row, name)) else value for row in rows]
+        data = np.array(values, dtype=object if values and isinstance(values[0], str) else None)
+        return Variable((dim,), data, unit, told)
+
+    return {name: column(name, *told) for name, told in about.items()}
 
 
 def speed_dataset(rows: list[Row], problems: list[Problem]) -> Dataset:
@@ -170,56 +191,31 @@ def speed_dataset(rows: list[Row], problems: list[Problem]) -> Dataset:
     for line, row in zip(errors, rows, strict=True):
         line[: row.errors.size] = row.errors
     worst = "of the worst component of a final state in rad and rad/s"
-    columns = {
-        "problem": (_strings([r.problem for r in rows]), "1", "problem"),
-        "family": (_strings([r.family for r in rows]), "1", "integrator"),
-        "setting": (_strings([r.setting for r in rows]), "1", "step or tolerance"),
-        "threads": (np.array([r.threads for r in rows]), "1", "threads"),
-        "trajectories": (np.array([r.trajectories for r in rows]), "1", "trajectories in a timed call"),
-        "wall": (np.array([r.wall for r in rows]), "s", "wall time of a call, median"),
-        "processor": (np.array([r.processor for r in rows]), "s", "processor time of a call, median"),
-        "first_call": (np.array([r.first_call for r in rows]), "s", "preparing and the first call"),
-        "max_error": (np.array([r.max_error() for r in rows]), "1", f"largest error, {worst}"),
-        "median_error": (np.array([r.median_error for r in rows]), "1", f"median error, {worst}"),
-    }
-    variables = {name: Variable(("row",), *column) for name, column in columns.items()}
-    return Dataset(variables | {"error": Variable(("row", "trajectory"), errors, "1", f"error, {worst}")})
-
-
-def throughput_dataset(peak: float, found: list[Throughput]) -> Dataset:
-    """Right-hand sides per second, and the peak."""
-    return Dataset(
+    columns = _columns(
+        "row",
+        rows,
         {
-            "peak": Variable(
-                (), np.array(peak), "1/s", "fused multiply-adds of doubles of one core, measured"
-            ),
-            "place": Variable(("place",), _strings([t.name for t in found]), "1", "where they are evaluated"),
-            "rhs": Variable(("place",), np.array([t.rhs for t in found]), "1/s", "right-hand sides"),
-        }
+            "problem": ("1", "problem"),
+            "family": ("1", "integrator"),
+            "setting": ("1", "step or tolerance"),
+            "threads": ("1", "threads"),
+            "trajectories": ("1", "trajectories in a timed call"),
+            "wall": ("s", "wall time of a call, median"),
+            "processor": ("s", "processor time of a call, median"),
+            "first_call": ("s", "preparing and the first call"),
+            "max_error": ("1", f"largest error, {worst}"),
+            "median_error": ("1", f"median error, {worst}"),
+        },
     )
+    return Dataset(columns | {"error": Variable(("row", "trajectory"), errors, "1", f"error, {worst}")})
 
 
-def cost_dataset(found: list[Cost]) -> Dataset:
-    """Rates by kind of scene."""
-    return Dataset(
-        {
-            "kind": Variable(("kind",), _strings([c.name for c in found]), "1", "terms of the scene"),
-            "rate": Variable(("kind",), np.array([c.rate for c in found]), "1/s", "trajectories"),
-        }
-    )
-
-
-def start_dataset(found: list[Start]) -> Dataset:
-    """Cold starts."""
-    return Dataset(
-        {
-            "entrant": Variable(("entrant",), _strings([s.name for s in found]), "1", "integrator"),
-            "first": Variable(
-                ("entrant",), np.array([s.first_process for s in found]), "s", "to the first result"
-            ),
-            "second": Variable(
-                ("entrant",), np.array([s.second_process for s in found]), "s", "the same in a second process"
-            ),
-            "steady": Variable(("entrant",), np.array([s.steady for s in found]), "s", "a later call"),
-        }
-    )
+#: Sections of the machine: what is read from each row.
+_PLACES = {"place": ("1", "where they are evaluated"), "rhs": ("1/s", "right-hand sides")}
+_KINDS = {"kind": ("1", "terms of the scene"), "rate": ("1/s", "trajectories")}
+_STARTS = {
+    "entrant": ("1", "integrator"),
+    "first": ("s", "to the first result"),
+    "second": ("s", "the same in a second process"),
+    "steady": ("s", "a later call"),
+}

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable
-from pathlib import Path
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from fastmech.bench.measure import Stage, in_turns
 from fastmech.bench.plain import scalar_rhs
 from fastmech.bench.problem import rest_starts
+from fastmech.bench.tables import table
 from fastmech.ensembles.integrate import integrate
-from fastmech.ensembles.run import Progress
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 
@@ -32,13 +33,8 @@ REPEATS = 3
 EQUAL = 1.5
 
 
-def run_stiff(
-    out: Path,
-    *,
-    quick: bool = False,
-    stage: Callable[[str, int], Progress] = lambda name, total: lambda done: None,
-) -> list[Path]:
-    """Measure and write ``stiff.md`` into the folder ``out``: one thread, medians of warm calls.
+def stiff_study(quick: bool, stage: Stage) -> list[str]:
+    """``stiff.md``: one thread, medians of warm calls.
 
     The reference is ``gauss6`` at a hundredth of the step, which shares no coefficient with the entrants;
     the gallery of hard cases compares the same methods with extended precision.
@@ -46,60 +42,37 @@ def run_stiff(
     n, few = (128, 4) if quick else (2048, 16)
     starts = rest_starts(n).starts
     lines = ["# Heavy damping", "", f"Rest starts, t = {T_END:g} s, one thread.", ""]
-    advance = stage("stiff", len(BETAS))
+    ours = {f"fastmech {m}, dt = 1/{k} s": (m, k) for m, ks in STEPS.items() for k in ks}
+    theirs = {f"SciPy {m}, rtol = {tol:g}": (m, tol) for m, tols in TOLERANCES.items() for tol in tols}
     for beta in BETAS:
         scene = Scene(alpha=0.0, beta=beta)
         truth = integrate(scene, starts[:few], T_END, 1 / 6400, "gauss6", threads=1).y[-1]
-        ours = [
-            (f"fastmech {m}, dt = 1/{k} s", *_timed(_package(scene, m, 1 / k), starts, truth))
-            for m, ks in STEPS.items()
-            for k in ks
-        ]
-        theirs = [
-            (f"SciPy {m}, rtol = {tol:g}", *_timed(_scipy(scene, m, tol), starts[:few], truth))
-            for m, tols in TOLERANCES.items()
-            for tol in tols
-        ]
+        final: dict[str, Floats] = {}
+
+        def own(name: str, method: str, k: int, scene: Scene = scene, final: Any = final) -> None:
+            final[name] = integrate(scene, starts, T_END, 1 / k, method, threads=1).y[-1]
+
+        def peer(name: str, method: str, tol: float, scene: Scene = scene, final: Any = final) -> None:
+            options = {"method": method, "args": (np.array(reduce(scene)),), "rtol": tol, "atol": tol * 1e-2}
+            ends = [solve_ivp(scalar_rhs, (0.0, T_END), y0, **options).y[:, -1] for y0 in starts[:few]]
+            final[name] = np.array(ends)
+
+        works = {name: partial(own, name, *how) for name, how in ours.items()}
+        works |= {name: partial(peer, name, *how) for name, how in theirs.items()}
+        advance = stage(f"stiff, beta = {beta:g}", len(works) * (REPEATS + 1))
+        seconds = in_turns(works, REPEATS, advance, time.perf_counter)
+        rates = {name: len(final[name]) / statistics.median(each) for name, each in seconds.items()}
+        errors = {name: float(np.abs(end[:few] - truth).max()) for name, end in final.items()}
+        rows = ([name, f"{rates[name]:,.0f}", f"{errors[name]:.0e}"] for name in works)
         lines += [
             f"## beta = {beta:g} N s/m",
             "",
-            "| integrator | trajectories/s | max error |",
-            "|---|---:|---:|",
+            *table(["integrator", "trajectories/s", "max error"], rows),
         ]
-        lines += [f"| {name} | {rate:,.0f} | {error:.0e} |" for name, rate, error in ours + theirs]
-        lines.append("")
-        for name, rate, error in theirs:
-            equal = [(r, other) for other, r, e in ours if e <= EQUAL * error]
+        for name in theirs:
+            equal = [(rates[other], other) for other in ours if errors[other] <= EQUAL * errors[name]]
             if equal:
                 best, other = max(equal)
-                lines.append(f"- {other}: {best / rate:,.0f} times {name}")
+                lines.append(f"- {other}: {best / rates[name]:,.0f} times {name}")
         lines.append("")
-        advance(1)
-    out.mkdir(parents=True, exist_ok=True)
-    table = out / "stiff.md"
-    table.write_text("\n".join(lines), encoding="utf-8")
-    return [table]
-
-
-def _timed(run: Callable[[Floats], Floats], starts: Floats, truth: Floats) -> tuple[float, float]:
-    run(starts[:2])
-    seconds = []
-    for _ in range(REPEATS):
-        began = time.perf_counter()
-        final = run(starts)
-        seconds.append(time.perf_counter() - began)
-    return len(starts) / statistics.median(seconds), float(np.abs(final[: len(truth)] - truth).max())
-
-
-def _package(scene: Scene, method: str, dt: float) -> Callable[[Floats], Floats]:
-    return lambda starts: integrate(scene, starts, T_END, dt, method, threads=1).y[-1]
-
-
-def _scipy(scene: Scene, method: str, tolerance: float) -> Callable[[Floats], Floats]:
-    p = np.array(reduce(scene))
-
-    def run(starts: Floats) -> Floats:
-        options = {"method": method, "args": (p,), "rtol": tolerance, "atol": tolerance * 1e-2}
-        return np.array([solve_ivp(scalar_rhs, (0.0, T_END), y0, **options).y[:, -1] for y0 in starts])
-
-    return run
+    return lines

@@ -9,24 +9,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from fastmech.bench import heyoka_series
 from fastmech.bench.entrant import Entrant, Floats, Prepare, Solve
-from fastmech.bench.entrants import missing
 from fastmech.bench.extended import ROUNDINGS, extended, scene_rates
 from fastmech.bench.frontier import work_precision
-from fastmech.bench.measure import Row, measure
+from fastmech.bench.measure import Row, Stage, measure
 from fastmech.bench.own_systems import STARTS, SYSTEMS, OwnSystem, spoken
 from fastmech.bench.package import prepared
+from fastmech.bench.peers import heyoka, missing
 from fastmech.bench.precision import rate_at
 from fastmech.bench.problem import Problem
 from fastmech.bench.tables import table
 from fastmech.ensembles.integrate import integrate
-from fastmech.ensembles.run import Progress
 from fastmech.ensembles.work_precision import order_statistic
 from fastmech.integrators.methods import find_method
 from fastmech.scene import Scene
@@ -97,56 +94,54 @@ def candidates(problem: Problem, targets: Sequence[float]) -> Iterator[dict[str,
                     yield keywords | {"dt": best[method] * float(np.clip(factor, 0.4, 2.5))}
 
 
+def to_tolerance(tol: float, quantile: float, estimates: dict[tuple[int, float, float], float]) -> Prepare:
+    """A run to a tolerance, which leaves its estimate by number of starts, quantile and tolerance."""
+
+    def prepare(problem: Problem, threads: int) -> Solve:
+        def solve(starts: Floats) -> Floats:
+            run = integrate(problem.scene, starts, problem.t_end, tol=tol, quantile=quantile, threads=threads)
+            estimates[len(starts), quantile, tol] = float(run.error_estimate or 0.0)
+            return np.asarray(run.y[-1])
+
+        return solve
+
+    return prepare
+
+
+def by_heyoka(tolerance: float, most: int) -> Entrant:
+    """heyoka at a tolerance."""
+    return Entrant(
+        "heyoka", f"{tolerance:g}", lambda problem, threads: heyoka(problem, threads, tolerance), most
+    )
+
+
 def measured(
     problem: Problem, targets: Sequence[float], advance: Callable[[int], None] = lambda done: None
 ) -> Measured:
     """Everyone on one system, timed in turns."""
-    n, estimates = len(problem.starts), dict[tuple[int, float, float], float]()
-    sizes = {size: cut(problem, size) for size in (min(SMALL, n), n)}
-
-    def to_tolerance(tol: float, quantile: float) -> Prepare:
-        def prepare(problem: Problem, threads: int) -> Solve:
-            def solve(starts: Floats) -> Floats:
-                run = integrate(
-                    problem.scene, starts, problem.t_end, tol=tol, quantile=quantile, threads=threads
-                )
-                estimates[len(starts), quantile, tol] = float(run.error_estimate or 0.0)
-                return np.asarray(run.y[-1])
-
-            return solve
-
-        return prepare
-
+    n, found = len(problem.starts), Measured(problem.name, {}, {}, {}, [], 0.0)
     settings = list(candidates(problem, targets))
+    asked = [(quantile, target) for quantile in LEVELS for target in targets]
+    peers = [t for t in HEYOKA if t >= 1e-3 * min(targets) and "heyoka" not in missing()]
     advance(1)
-    fixed: dict[int, list[Row]] = {}
-    tol: dict[tuple[int, float, float], Row] = {}
-    heyoka: list[Row] = []
-    for size, part in sizes.items():
+    for size in dict.fromkeys((min(SMALL, n), n)):
         everyone = [
-            Entrant(f"fastmech {k['method']}", f"{k['dt']:.4g} s, {k['dtype']}", prepared(k), most=size)
+            Entrant(f"fastmech {k['method']}", f"{k['dt']:.4g} s, {k['dtype']}", prepared(k), size)
             for k in settings
         ]
-        asked = [(quantile, target) for quantile in LEVELS for target in targets]
-        everyone += [Entrant("tol", f"{t:g}, {q:g}", to_tolerance(t, q), most=size) for q, t in asked]
-        if size == n and heyoka_series.NEEDS not in missing():
-            everyone += [
-                Entrant("heyoka", f"{t:g}", heyoka_series.prepared(t), most=size)
-                for t in HEYOKA
-                if t >= 1e-3 * min(targets)
-            ]
-        rows = measure(part, [(entrant, 1) for entrant in everyone])
-        fixed[size] = [row for row in rows if row.family.startswith("fastmech")]
-        told = [row for row in rows if row.family == "tol"]
-        tol |= {(size, *key): row for key, row in zip(asked, told, strict=True)}
-        heyoka += [row for row in rows if row.family == "heyoka"]
+        everyone += [Entrant("tol", "", to_tolerance(t, q, found.estimates), size) for q, t in asked]
+        everyone += [by_heyoka(t, n) for t in peers if size == n]
+        rows = measure(cut(problem, size), [(entrant, 1) for entrant in everyone])
+        told, theirs = len(settings), len(settings) + len(asked)
+        found.fixed[size] = rows[:told]
+        found.tol.update({(size, *key): row for key, row in zip(asked, rows[told:theirs], strict=True)})
+        found.heyoka.extend(rows[theirs:])
         advance(1)
-    call = 0.0
-    if heyoka:
-        still = replace(problem, truth=problem.starts, t_end=0.0)
-        (idle,) = measure(still, [(Entrant("heyoka", "", heyoka_series.prepared(1e-5), most=n), 1)])
-        call = 1.0 / idle.rate
-    return Measured(problem.name, fixed, tol, estimates, heyoka, call)
+    if not peers:
+        return found
+    still = replace(problem, truth=problem.starts, t_end=0.0)
+    (idle,) = measure(still, [(by_heyoka(1e-5, n), 1)])
+    return found._replace(call=1.0 / idle.rate)
 
 
 def cut(problem: Problem, n: int) -> Problem:
@@ -229,13 +224,8 @@ def section(found: Measured, targets: Sequence[float]) -> list[str]:
     return [f"## {found.name}", "", *table([*head, *ratios(found, targets[0])], lines)]
 
 
-def run_systems(
-    out: Path,
-    *,
-    quick: bool = False,
-    stage: Callable[[str, int], Progress] = lambda name, total: lambda done: None,
-) -> list[Path]:
-    """Measure and write ``systems.md`` into the folder ``out``; ``quick`` takes few starts of one system."""
+def systems_study(quick: bool, stage: Stage) -> list[str]:
+    """``systems.md``; ``quick`` takes few starts of one system."""
     systems = dict(list(SYSTEMS.items())[1:2]) if quick else SYSTEMS
     scenes = () if quick else tuple(SCENES)
     n, targets = (QUICK, TARGETS[:2]) if quick else (STARTS, TARGETS)
@@ -249,11 +239,7 @@ def run_systems(
         return found
 
     own = measure_all(problem_of(name, system, n) for name, system in systems.items())
-    lines = report(own, targets, measure_all(mechanism(name, n) for name in scenes))
-    out.mkdir(parents=True, exist_ok=True)
-    path = out / "systems.md"
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return [path]
+    return report(own, targets, measure_all(mechanism(name, n) for name in scenes))
 
 
 def report(found: list[Measured], targets: Sequence[float], scenes: Sequence[Measured] = ()) -> list[str]:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 from fastmech.bench.measure import Row
-from fastmech.bench.memory import Footprint
 from fastmech.bench.peak import Throughput
 from fastmech.bench.precision import TARGETS, fastest_at, rate_at
 from fastmech.bench.problem import Problem
-from fastmech.bench.startup import Start
 from fastmech.bench.terms import Cost
 
 OWN = "fastmech"
@@ -19,6 +18,22 @@ FUSED = "hand-fused"
 
 #: Seconds that a call takes at least for the loop's own speed to show, not what stands around it.
 WORTH_COMPARING = 0.01
+
+
+class Start(NamedTuple):
+    """Seconds from the first import to the first result of 1,024 trajectories."""
+
+    entrant: str
+    first: float  #: nothing compiled before
+    second: float  #: with what the first has left on the disk
+    steady: float  #: a later call in the same process
+
+
+class Footprint(NamedTuple):
+    """The largest memory of a process that integrates so many trajectories."""
+
+    trajectories: int
+    memory: int  #: bytes, starts and final states included
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
@@ -75,28 +90,22 @@ def same_step(rows: list[Row]) -> list[str]:
     found = {(row.family, row.setting): row for row in rows if row.threads == 1}
     lines, left_out = [], 0
     for (family, setting), row in found.items():
-        if family.startswith(FUSED):
-            method = family.removeprefix(FUSED).strip()
-            engine = found.get((f"{OWN} {method}", setting))
-            if engine is not None and min(row.processor, engine.processor) < WORTH_COMPARING:
-                left_out += 1
-            elif engine is not None:
-                lines.append([f"{family}, {setting}", f"{row.rate:,.0f}", f"{engine.rate:,.0f}",
-                              f"{engine.rate / row.rate:.2f}"])  # fmt: skip
-        elif family.startswith("Numba RK4") and (f"{OWN} rk4", setting) in found:
-            engine = found[f"{OWN} rk4", setting]
-            lines.append([f"{family}, {setting}", f"{row.rate:,.0f}", f"{engine.rate:,.0f}",
-                          f"{engine.rate / row.rate:.2f}"])  # fmt: skip
+        method = "rk4" if family.startswith("Numba RK4") else family.removeprefix(FUSED).strip()
+        engine = found.get((f"{OWN} {method}", setting))
+        if engine is None:
+            continue
+        if family.startswith(FUSED) and min(row.processor, engine.processor) < WORTH_COMPARING:
+            left_out += 1
+            continue
+        ratio = engine.rate / row.rate
+        lines.append([f"{family}, {setting}", f"{row.rate:,.0f}", f"{engine.rate:,.0f}", f"{ratio:.2f}"])
+    told = f"Left out: {left_out} whose calls are shorter than {WORTH_COMPARING:g} s."
     return [
         "The same method and step, one thread, trajectories per core second. The hand-fused loop is the "
         "engine's yardstick: this mechanism and this method alone, in the same blocks.",
         "",
         *table(["against", "its rate", "fastmech", "ratio"], lines),
-        *(
-            [f"Left out: {left_out} whose calls are shorter than {WORTH_COMPARING:g} s.", ""]
-            if left_out
-            else []
-        ),
+        *([told, ""] if left_out else []),
     ]
 
 
@@ -161,13 +170,13 @@ def machine_sections(
         "",
         *table(
             ["where", "million right-hand sides/s", "of the kernel alone", "multiply-adds in that time"],
-            ([t.name, f"{t.rhs / 1e6:.1f}", f"{t.share:.2f}", f"{t.slots:.0f}"] for t in throughputs),
+            ([t.place, f"{t.rhs / 1e6:.1f}", f"{t.share:.2f}", f"{t.slots:.0f}"] for t in throughputs),
         ),
         "## Terms of a scene (RK4, dt = 0.01 s)",
         "",
         *table(
             ["scene", "trajectories per core second", "relative"],
-            ([c.name, f"{c.rate:,.0f}", f"{c.relative:.3f}"] for c in costs),
+            ([c.kind, f"{c.rate:,.0f}", f"{c.relative:.3f}"] for c in costs),
         ),
     ]
     if starts:
@@ -179,7 +188,7 @@ def machine_sections(
             "",
             *table(
                 ["integrator", "first process", "second process", "later call"],
-                ([s.name, f"{s.first_process:.2f}", f"{s.second_process:.2f}", f"{s.steady:.4f}"]
+                ([s.entrant, f"{s.first:.2f}", f"{s.second:.2f}", f"{s.steady:.4f}"]
                  for s in starts),
             ),
         ]  # fmt: skip

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import statistics
-import time
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from fastmech.bench.measure import TURNS, Stage, in_turns
 from fastmech.bench.problem import Problem
 from fastmech.ensembles.integrate import integrate
+from fastmech.scene import Scene
 
 METHOD, DT = "rk4", 0.01
-TURNS = 9
 
 #: Scenes by the terms that they have, as changes of Table 1.
 SCENES: dict[str, dict[str, float]] = {
@@ -28,40 +27,30 @@ SCENES: dict[str, dict[str, float]] = {
 OWN_PARAMETERS = "damper, constant force, every trajectory its own ten parameters"
 
 
-@dataclass(frozen=True)
-class Cost:
+class Cost(NamedTuple):
     """Trajectories per second of a kind of scene."""
 
-    name: str
+    kind: str
     rate: float  #: per second of one core
     relative: float  #: to the damper with constant force
 
 
-def costs(problem: Problem, advance: Callable[[int], None]) -> list[Cost]:
+def costs(problem: Problem, stage: Stage) -> list[Cost]:
     """Every kind of scene with the same method, step and starts, in turns."""
     starts = np.tile(problem.starts, (max(1, 4096 // len(problem.starts)), 1))
     rng = np.random.default_rng(3)
     own = {
         name: value * rng.uniform(0.99, 1.01, len(starts))
-        for name, value in problem.scene.model_dump().items()
+        for name, value in Scene(alpha=0.0).model_dump().items()
         if value
     }
 
-    def work(changes: dict[str, float], parameters: dict[str, Any]) -> Callable[[], Any]:
-        scene = problem.scene.replace(**changes)
+    def work(changes: dict[str, float], parameters: dict[str, Any]) -> Callable[[], object]:
+        scene = Scene(alpha=0.0).replace(**changes)
         return lambda: integrate(scene, starts, problem.t_end, DT, METHOD, threads=1, parameters=parameters)
 
-    works = {name: work(changes, {}) for name, changes in SCENES.items()}
-    works[OWN_PARAMETERS] = work({}, own)
-    for run in works.values():
-        run()
-    seconds: dict[str, list[float]] = {name: [] for name in works}
-    for _ in range(TURNS):
-        for name, run in works.items():
-            began = time.process_time()
-            run()
-            seconds[name].append(time.process_time() - began)
-        advance(1)
+    works = {name: work(changes, {}) for name, changes in SCENES.items()} | {OWN_PARAMETERS: work({}, own)}
+    seconds = in_turns(works, advance=stage("terms", len(works) * (TURNS + 1)))
     rates = {name: len(starts) / statistics.median(times) for name, times in seconds.items()}
     base = rates["damper, constant force"]
     return [Cost(name, rate, rate / base) for name, rate in rates.items()]

@@ -10,24 +10,19 @@ import statistics
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from functools import partial
 
 import numpy as np
 
+from fastmech.bench.measure import TURNS, Stage, in_turns
 from fastmech.bench.package import AGAIN, prepared
 from fastmech.bench.peak import LANES, multiply_adds
 from fastmech.bench.problem import Problem, fast_starts, rest_starts
 from fastmech.bench.tables import table
-from fastmech.ensembles.run import Progress
 from fastmech.ensembles.threads import thread_count
 
 #: Trajectories of a call: tenths of a second to seconds of work.
 TRAJECTORIES = 32_768
-
-#: Measured turns after one that warms up.
-TURNS = 7
 
 #: Turns of the yardstick's loop: about a third of a second.
 YARDSTICK = 500_000
@@ -44,32 +39,21 @@ REST = (
 FAST = (("abm8", 0.028), ("abm10", 0.018))
 
 
-@dataclass(frozen=True)
-class Case:
-    """A run that is timed, and on how many threads it can."""
-
-    name: str
-    run: Callable[[int], Any]  #: on so many threads
+#: A run on so many threads.
+Run = Callable[[int], object]
 
 
-def run_threads(
-    out: Path,
-    *,
-    quick: bool = False,
-    stage: Callable[[str, int], Progress] = lambda name, total: lambda done: None,
-) -> list[Path]:
-    """Measure and write ``threads.md`` into the folder ``out``; ``quick``: a turn of few trajectories."""
+def threads_study(quick: bool, stage: Stage) -> list[str]:
+    """``threads.md``; ``quick``: a turn of few trajectories."""
     many, turns, n = thread_count(None), 1 if quick else TURNS, 1024 if quick else TRAJECTORIES
     found = cases(n, YARDSTICK // 20 if quick else YARDSTICK)
-    advance = stage("threads", len(found) * (turns + 1))
-    ratios: dict[str, list[float]] = {case.name: [] for case in found}
-    for turn in range(turns + 1):
-        for case in found:
-            ratio = _seconds(case, 1) / _seconds(case, many)
-            if turn:
-                ratios[case.name].append(ratio)
-            advance(1)
-    lines = [
+    works = {(name, k): partial(run, k) for name, run in found.items() for k in sorted({1, many})}
+    seconds = in_turns(works, turns, stage("threads", len(works) * (turns + 1)), time.perf_counter)
+    ratios = {
+        name: [one / all_ for one, all_ in zip(seconds[name, 1], seconds[name, many], strict=True)]
+        for name in found
+    }
+    return [
         "# Threads",
         "",
         f"{n:,} trajectories to t = 10 s on {many} threads over one, by wall time: {turns} "
@@ -84,45 +68,35 @@ def run_threads(
             ),
         ),
     ]
-    out.mkdir(parents=True, exist_ok=True)
-    path = out / "threads.md"
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return [path]
 
 
-def cases(n: int, turns: int) -> list[Case]:
+def cases(n: int, turns: int) -> dict[str, Run]:
     """The yardstick and the engine's runs of ``n`` trajectories."""
-    found = [Case("multiply-adds, one loop a thread", _arithmetic(turns))]
     rest, fast = rest_starts(), fast_starts()
+    again = [share * fast.t_end for share in AGAIN]
+    found = {"multiply-adds, one loop a thread": _arithmetic(turns)}
     for method, dt, fit in REST:
         name = f"{method}, dt = {dt:g} s{', `fit=True`' * fit}, from rest"
-        found.append(Case(name, _ensemble(rest, n, {"method": method, "dt": dt, "fit": fit})))
-    again = [share * fast.t_end for share in AGAIN]
+        found[name] = _ensemble(rest, n, {"method": method, "dt": dt, "fit": fit})
     for method, dt in FAST:
         name = f"{method}, dt = {dt:g} s, fitted again, fast starts"
-        found.append(Case(name, _ensemble(fast, n, {"method": method, "dt": dt, "fit": again})))
+        found[name] = _ensemble(fast, n, {"method": method, "dt": dt, "fit": again})
     return found
 
 
-def _ensemble(problem: Problem, n: int, keywords: dict[str, object]) -> Callable[[int], Any]:
+def _ensemble(problem: Problem, n: int, keywords: dict[str, object]) -> Run:
     starts = np.resize(problem.starts, (n, problem.starts.shape[1]))
     prepare = prepared(keywords)
     return lambda threads: prepare(problem, threads)(starts)
 
 
-def _arithmetic(turns: int) -> Callable[[int], Any]:
+def _arithmetic(turns: int) -> Run:
     """So many turns of the loop in all, shared among the threads."""
     loop = multiply_adds()
 
-    def run(threads: int) -> Any:
+    def run(threads: int) -> object:
         lanes = [np.ones(LANES) for _ in range(threads)]
         with ThreadPoolExecutor(threads) as pool:
             return list(pool.map(lambda x: loop(x, turns // threads, 0.5), lanes))
 
     return run
-
-
-def _seconds(case: Case, threads: int) -> float:
-    began = time.perf_counter()
-    case.run(threads)
-    return time.perf_counter() - began

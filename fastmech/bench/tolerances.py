@@ -1,9 +1,8 @@
 """``tol`` on random scenes: is its error estimate the truth?
 
-The truth comes from an extrapolation method of its own with equations typed separately, see
-:mod:`fastmech.bench.extrapolation`. Where it is doubtful, because a motion magnifies rounding, it is found
-again in extended precision (:mod:`fastmech.bench.extended`). Where it stays doubtful, the estimate is not
-judged.
+The truth comes from an extrapolation method of its own in extended precision, with equations typed
+separately (:mod:`fastmech.bench.extended`). Where it is doubtful, because a motion magnifies rounding, the
+estimate is not judged.
 """
 
 from __future__ import annotations
@@ -11,16 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.bench.extended import extended_truth, scene_rates
-from fastmech.bench.extrapolation import truth
+from fastmech.bench.measure import Stage
 from fastmech.bench.tables import table
 from fastmech.ensembles.integrate import integrate
-from fastmech.ensembles.run import Progress
 from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -33,9 +30,8 @@ QUANTILES = (0.5, 0.99, 1.0)
 #: An estimate is right within this factor, both ways.
 FACTOR = 3.0
 
-#: The truth is known where its uncertainty is at most this share of it, and a trajectory's is good enough
-#: below a tenth of that. An uncertainty may itself be too small so many times.
-KNOWN, LUCK = 0.1, 30.0
+#: The truth is known where its uncertainty is at most this share of it.
+KNOWN = 0.1
 
 
 @dataclass(frozen=True)
@@ -118,32 +114,21 @@ def estimates(scenes: int, n: int, advance: Callable[[int], None], seed: int = 7
     rng, found = np.random.default_rng(seed), []
     for number in range(scenes):
         scene, starts, t_end, tol = random_case(rng, n)
-        runs = [integrate(scene, starts, t_end, tol=tol, quantile=q, threads=1) for q in QUANTILES]
-        for quantile, run, (true, doubt) in zip(
-            QUANTILES, runs, _true(scene, starts, t_end, [run.y[-1] for run in runs]), strict=True
-        ):
+        right, doubts = extended_truth(scene_rates(scene), starts, t_end)
+        for quantile in QUANTILES:
+            run = integrate(scene, starts, t_end, tol=tol, quantile=quantile, threads=1)
             estimate = float(run.error_estimate or 0.0)
+            true, doubt = _true(right, doubts, quantile, run.y[-1])
             found.append(Estimate(number, quantile, tol, run.method, estimate, true, doubt))
         advance(1)
     return found
 
 
-def _true(scene: Scene, starts: Floats, t_end: float, ends: list[Floats]) -> list[tuple[float, float]]:
-    """Each quantile's true error and its uncertainty, of runs that end so (n, 4)."""
-    right, doubts = truth(scene, starts, t_end)
-    extended = np.zeros(len(starts), dtype=np.bool_)
-    while True:
-        found, matters = [], np.zeros(len(starts), dtype=np.bool_)
-        for quantile, end in zip(QUANTILES, ends, strict=True):
-            rank, errors = math.ceil(quantile * len(starts)) - 1, np.abs(end - right).max(axis=1)
-            least, true, most = (float(np.sort(e)[rank]) for e in (errors - doubts, errors, errors + doubts))
-            found.append((true, max(most - true, true - least)))
-            matters |= (doubts > 0.1 * KNOWN * true) & (np.abs(errors - true) <= LUCK * doubts)
-        who = np.flatnonzero(matters & ~extended)
-        if not who.size:
-            return found
-        right[who], doubts[who] = extended_truth(scene_rates(scene), starts[who], t_end)
-        extended[who] = True
+def _true(right: Floats, doubts: Floats, quantile: float, end: Floats) -> tuple[float, float]:
+    """A quantile's true error and its uncertainty, of a run that ends so (n, 4)."""
+    rank, errors = math.ceil(quantile * len(end)) - 1, np.abs(end - right).max(axis=1)
+    least, true, most = (float(np.sort(e)[rank]) for e in (errors - doubts, errors, errors + doubts))
+    return true, max(most - true, true - least)
 
 
 def report(found: list[Estimate], n: int) -> list[str]:
@@ -153,8 +138,8 @@ def report(found: list[Estimate], n: int) -> list[str]:
         "# `tol` on random scenes",
         "",
         f"{len(found) // len(QUANTILES)} random scenes of {n} trajectories each, tolerances from 1e-8 to "
-        "1e-3; estimate of the error against the truth (extrapolation of order 14, each trajectory with its "
-        "own steps, equations typed separately; in extended precision where rounding is magnified). Truth is "
+        "1e-3; estimate of the error against the truth (extrapolation of order 18 in extended precision, "
+        "each trajectory with its own steps, equations typed separately). Truth is "
         f"known where its uncertainty is at most {KNOWN:.0%} of it; {unknown or 'none'} of {len(found)} "
         f"{'is' if unknown == 1 else 'are'} not known, and not judged.",
         "",
@@ -208,18 +193,7 @@ def report(found: list[Estimate], n: int) -> list[str]:
     return lines
 
 
-def run_tolerances(
-    out: Path,
-    *,
-    quick: bool = False,
-    stage: Callable[[str, int], Progress] = lambda name, total: lambda done: None,
-    scenes: int = SCENES,
-    starts: int = STARTS,
-) -> list[Path]:
-    """Measure and write ``tolerances.md`` into the folder ``out``."""
+def tolerances_study(quick: bool, stage: Stage, scenes: int = SCENES, starts: int = STARTS) -> list[str]:
+    """``tolerances.md``."""
     scenes, n = (2, 16) if quick else (scenes, starts)
-    found = estimates(scenes, n, stage("tolerances", scenes))
-    out.mkdir(parents=True, exist_ok=True)
-    path = out / "tolerances.md"
-    path.write_text("\n".join(report(found, n)) + "\n", encoding="utf-8")
-    return [path]
+    return report(estimates(scenes, n, stage("tolerances", scenes)), n)

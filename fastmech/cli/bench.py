@@ -55,13 +55,13 @@ def command(
     with account("bench", quiet, as_json) as told:
         with told.bars.preparing():
             from fastmech.bench.own_problem import run_problem
-            from fastmech.bench.report import STUDIES, run_bench
+            from fastmech.bench.report import run_bench, run_study
         if problem is not None:
             lines, written = run_problem(problem, out, told.bars.stage)
             told.say("\n".join([*lines, ""]))
         elif only is None:
             written = run_bench(out, quick=quick, stage=told.bars.stage)
         else:
-            written = STUDIES[only](out, quick=quick, stage=told.bars.stage, **chosen)
+            written = [run_study(only, out, quick=quick, stage=told.bars.stage, **chosen)]
         for path in written:
             told.wrote(path)

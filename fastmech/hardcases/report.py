@@ -29,7 +29,7 @@ from fastmech.integrators.methods import METHODS
 from fastmech.plots.energy_drift import draw_energy_drift
 from fastmech.plots.stability_region import draw_stability_regions
 from fastmech.plots.style import save
-from fastmech.results import Dataset, Variable
+from fastmech.results import Dataset, Variable, scene_parameters
 from fastmech.scene import Scene
 from fastmech.step_limits.axes import imaginary_limit, real_limit
 from fastmech.step_limits.measure import measured_stable_step
@@ -91,10 +91,6 @@ def _write(out: Path, quick: bool, stage: Stage, started: float) -> Report:
     if not contained(shares):
         told, passed = f"{told}; failing trajectories are not contained", False
     table.write_text(gallery_markdown(results, tables), encoding="utf-8")
-    parameters = {
-        name: Variable((), np.array(value), unit, about)
-        for name, (value, unit, about) in scene.described().items()
-    }
     attrs = {
         **provenance(thread_count(None)),
         "title": "Hard cases",
@@ -103,7 +99,7 @@ def _write(out: Path, quick: bool, stage: Stage, started: float) -> Report:
     }
     write_results(
         store,
-        scene_parameters=parameters,
+        scene_parameters=scene_parameters(scene),
         sections={"gallery": gallery_dataset(results), "step_limits": limits, "containment": shares},
         attrs=attrs,
         replace=True,

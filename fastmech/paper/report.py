@@ -7,8 +7,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError
 from fastmech.paper.checks import Check, all_checks, parameters_used
@@ -23,7 +21,7 @@ from fastmech.paper.rows import all_rows
 from fastmech.paper.scene import PAPER_SCENE
 from fastmech.paper.text import TITLE, report_text
 from fastmech.plots.style import png
-from fastmech.results import Variable
+from fastmech.results import scene_parameters
 from fastmech.store.provenance import provenance
 from fastmech.store.write import check_writable, write_results
 
@@ -100,10 +98,7 @@ def write_paper(out: Path, *, threads: int | None = None, progress: Progress | N
         raise InputError(f"{out}: cannot be written: {error.strerror}") from None
     write_results(
         out / DATA,
-        scene_parameters={
-            name: Variable((), np.array(value), unit, about)
-            for name, (value, unit, about) in PAPER_SCENE.described().items()
-        },
+        scene_parameters=scene_parameters(PAPER_SCENE),
         sections=datasets,
         attrs={
             **provenance(thread_count(threads)),

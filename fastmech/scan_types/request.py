@@ -17,7 +17,7 @@ from fastmech.ensembles.status import failure_counts, failure_line
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.integrators.methods import find_method
 from fastmech.models.mechanism import MOST_COORDINATES, Mechanism
-from fastmech.results import Dataset, Variable, check_name
+from fastmech.results import Dataset, Variable, check_name, scene_parameters
 from fastmech.scan_types.tiling import RunContext as RunContext
 from fastmech.scan_types.tiling import Tiles, Tiling
 from fastmech.scene import Scene, explain, nearest, parse_toml, read_text
@@ -163,10 +163,7 @@ class Request:
     @property
     def parameters(self) -> dict[str, Variable]:
         """The scene's parameters as a result file holds them."""
-        return {
-            name: Variable((), np.array(value), unit, about)
-            for name, (value, unit, about) in self.scene.described().items()
-        }
+        return scene_parameters(self.scene)
 
     def scene_of(self, name: str) -> Any:
         """The scene of one scan: the file's with the scan's own changes."""

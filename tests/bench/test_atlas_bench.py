@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from fastmech.bench.atlas import markdown, side_by_side
-from fastmech.bench.multistart import SCENE, TOLD, multistart
+from fastmech.bench.atlas import SCENE, TOLD, markdown, multistart, row_of, side_by_side
 
 
 def test_what_one_start_cannot_find_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     """The bistable scene has six equilibria, and a start finds one at most."""
-    monkeypatch.setattr("fastmech.bench.multistart.STARTS", 2)
-    monkeypatch.setattr("fastmech.bench.multistart.TOLD", (1, 2))
+    monkeypatch.setattr("fastmech.bench.atlas.STARTS", 2)
+    monkeypatch.setattr("fastmech.bench.atlas.TOLD", (1, 2))
     finished: list[int] = []
-    row = multistart("here", [SCENE] * 3, finished.append)
+    row = row_of("here", multistart([SCENE] * 3, finished.append))
     assert sum(finished) == row.points == row.incomplete == 3
     after_one, after_two = row.missed
     assert 15 <= after_one <= 18
@@ -28,6 +27,6 @@ def test_turns_and_table() -> None:
     assert [row.points for row in rows] == [36] * len(ratios) + [3]
     assert all(low <= middle <= high for low, middle, high in ratios.values())
     assert rows[-1].missed[-1] <= rows[-1].missed[0]
-    text = markdown(rows, ratios, [])
+    text = "\n".join(markdown(rows, ratios))
     assert all(f"after {', '.join(map(str, TOLD))} starts" in text for _ in ratios)
     assert text.count("times as many points a second as multistart") == len(ratios)

@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from fastmech.bench import fused, heyoka_series, package, plain, scipy_solvers
-from fastmech.bench.entrants import entrants, installed
+from fastmech.bench import fused, package, peers
+from fastmech.bench.peers import entrants, entrants_of, installed
 from fastmech.bench.problem import STARTS, fast_starts, rest_starts
 from fastmech.integrators.methods import METHODS
 
@@ -44,27 +44,27 @@ def solved(entrant, problem):
 
 
 @pytest.mark.parametrize(
-    ("module", "family", "setting", "most"),
+    ("family", "setting", "most"),
     [
-        (package, "fastmech rk4", "dt = 0.01 s", 1e-5),
-        (package, "fastmech dop853", "dt = 0.05 s", 1e-7),
-        (fused, "hand-fused rk4", "dt = 0.01 s", 1e-5),
-        (plain, "Numba RK4, one at a time, small arrays", "dt = 0.01 s", 1e-5),
-        (plain, "Numba RK4, one at a time, local numbers", "dt = 0.01 s", 1e-5),
-        (scipy_solvers, "SciPy LSODA", "rtol = 1e-08", 1e-6),
+        ("fastmech rk4", "dt = 0.01 s", 1e-5),
+        ("fastmech dop853", "dt = 0.05 s", 1e-7),
+        ("hand-fused rk4", "dt = 0.01 s", 1e-5),
+        ("Numba RK4, one at a time, small arrays", "dt = 0.01 s", 1e-5),
+        ("Numba RK4, one at a time, local numbers", "dt = 0.01 s", 1e-5),
+        ("SciPy LSODA", "rtol = 1e-08", 1e-6),
     ],
 )
-def test_errors_are_what_order_and_tolerance_promise(module, family, setting, most):
+def test_errors_are_what_order_and_tolerance_promise(family, setting, most):
     problem = rest_starts(FEW)
-    (entrant,) = (e for e in module.entrants(problem) if (e.family, e.setting) == (family, setting))
+    (entrant,) = (e for e in entrants_of("fastmech", problem) if (e.family, e.setting) == (family, setting))
     errors = solved(entrant, problem)
     assert 0.0 < np.median(errors) <= errors.max() < most
 
 
 def test_the_hand_fused_loop_solves_the_hard_problem_in_blocks_that_are_not_full():
     problem = fast_starts(300)
-    (entrant, *_) = (e for e in fused.entrants(problem) if e.family == "hand-fused rk4")
-    finer = fused.prepared("rk4", 0.0005)(problem, 1)(problem.starts)
+    entrant = next(fused.SERIES[0].entrants(problem))
+    finer = fused.prepared("rk4", problem, 1, 0.0005)(problem.starts)
     assert np.median(np.abs(finer - problem.truth).max(axis=1)) < 1e-9
     assert entrant.prepare(problem, 1)(problem.starts).shape == (300, 4)
 
@@ -75,15 +75,15 @@ def test_heyoka(threads):
     problem = dataclasses.replace(
         rest_starts(32), starts=rest_starts(32).starts[16:], truth=rest_starts(32).truth[16:]
     )
-    final = heyoka_series.prepared(1e-12)(problem, threads)(problem.starts)
+    final = peers.heyoka(problem, threads, 1e-12)(problem.starts)
     assert np.abs(final - problem.truth).max() < 1e-11
 
 
-@pytest.mark.parametrize("module", [m for m in installed() if m.NEEDS != "heyoka"], ids=lambda m: m.NEEDS)
-def test_other_libraries(module):
+@pytest.mark.parametrize("library", [name for name in installed() if name != "heyoka"])
+def test_other_libraries(library):
     """The last setting of each is an accurate one."""
     problem = rest_starts(FEW)
-    *_, entrant = module.entrants(problem)
+    *_, entrant = entrants_of(library, problem)
     starts = np.tile(problem.starts, (max(1, -(-entrant.least // FEW)), 1))
     final = entrant.prepare(problem, 1)(starts)
     assert np.abs(final[:FEW] - problem.truth).max() < 1e-5

@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from fastmech.bench.measure import Row
 from fastmech.bench.own_systems import MU, SYSTEMS, spoken
 from fastmech.bench.plain import scalar_rhs
+from fastmech.bench.report import run_study
 from fastmech.bench.systems import (
     Measured,
     estimate_ratios,
@@ -18,9 +19,7 @@ from fastmech.bench.systems import (
     problem_of,
     ratios,
     report,
-    run_systems,
 )
-from fastmech.mechanism.coefficients import reduce
 
 NAMES = {name.split(",")[0]: name for name in SYSTEMS}
 
@@ -71,7 +70,7 @@ def test_the_truth_is_scipy_s(name):
 
 def test_the_mechanism_s_truth_is_scipy_s():
     problem = mechanism("Table 1, moving", 2)
-    p = np.array(reduce(problem.scene))
+    p = np.array(problem.coefficients)
     for start, end in zip(problem.starts, problem.truth, strict=True):
         run = solve_ivp(scalar_rhs, (0, 10.0), start, "DOP853", args=(p,), rtol=1e-13, atol=1e-13)
         assert np.abs(run.y[:, -1] - end).max() < 1e-9
@@ -117,7 +116,6 @@ def test_the_mean_is_geometric_and_the_worst_is_named():
 
 
 def test_a_quick_study(tmp_path: Path):
-    (written,) = run_systems(tmp_path, quick=True)
-    text = written.read_text()
+    text = run_study("systems", tmp_path, quick=True).read_text()
     assert "## Lorenz, 3 states" in text
     assert "time of `tol` over fixed, 99 %, 256" in text

@@ -7,18 +7,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from fastmech.bench.extended import extended_truth, scene_rates
-from fastmech.bench.extrapolation import truth
-from fastmech.bench.problem import fast_starts, rest_starts
+from fastmech.bench.problem import fast_starts
 from fastmech.bench.tolerances import Estimate, estimates, random_case, report
 from fastmech.mechanism.lagrange import angular_accelerations
 from fastmech.scene import Scene
-
-
-def test_the_truth_is_that_of_the_bench() -> None:
-    problem = rest_starts(8)
-    found, uncertainty = truth(problem.scene, problem.starts, problem.t_end)
-    assert np.abs(found - problem.truth).max() < 1e-11
-    assert uncertainty.max() < 1e-11
 
 
 @pytest.mark.skipif(np.finfo(np.longdouble).eps > 1e-18, reason="longdouble is no more than double here")
@@ -39,16 +31,6 @@ def test_extended_precision_knows_the_decay() -> None:
 
     right = solve_ivp(rates, (0.0, 0.5), start, "DOP853", rtol=1e-12, atol=1e-12).y[:, -1]
     assert np.abs(extended_truth(scene_rates(scene), start[None], 0.5)[0][0] - right).max() < 1e-9
-
-
-def test_the_truth_knows_the_decay() -> None:
-    scene, start = Scene(alpha=0.7), np.array([1.0, 0.5, 0.2, -0.1])
-
-    def rates(t, y):
-        return np.concatenate([y[2:], angular_accelerations(scene, y[None], t)[0]])
-
-    right = solve_ivp(rates, (0.0, 2.0), start, "Radau", rtol=1e-9, atol=1e-10).y[:, -1]
-    assert np.abs(truth(scene, start[None], 2.0)[0][0] - right).max() < 1e-6
 
 
 @pytest.mark.nojit
