@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Any, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -17,8 +17,9 @@ from fastmech.errors import InputError, shown
 
 inf = math.inf
 
-#: Share of a time by which the last step before a jump ends before it: far above the rounding of times.
-BEFORE = 1e-14
+#: Share of a time by which the last step before a jump ends before it, so that it sees nothing of what comes:
+#: far above the rounding of times, in either precision.
+BEFORE = {"float64": 1e-14, "float32": 4e-7}
 
 
 class Facts(NamedTuple):
@@ -32,6 +33,8 @@ class Facts(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Load:
     """What all loads tell. Of one with symbols only ``expression`` and ``facts().mean`` can be asked for."""
+
+    jumps: ClassVar[bool] = False  #: whether F itself jumps at its kinks
 
     def expression(self, t: Any) -> Any:
         """F at the symbol ``t`` [s] as a SymPy expression."""
@@ -170,6 +173,7 @@ class Pulse(Load):
     value: Any
     start: Any
     duration: Any
+    jumps = True
 
     def __post_init__(self) -> None:
         self._require("duration", least=0.0)
@@ -181,8 +185,8 @@ class Pulse(Load):
         return sympy.Piecewise((0, t < self.start), (self.value, t < self.start + self.duration), (0, True))
 
     def kinks(self) -> tuple[float, ...]:
-        """Its begin and its end, and right before: the last step until then sees nothing of what comes."""
-        return tuple(x for t in (self.start, self.start + self.duration) for x in (t - BEFORE * abs(t), t))
+        """Its begin and its end."""
+        return self.start, self.start + self.duration
 
     def facts(self) -> Facts:
         """At rest it is over."""

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,13 +14,16 @@ from numpy.typing import ArrayLike, NDArray
 from fastmech.atlas.assess import Assessed, assess
 from fastmech.atlas.axes import Floats, check_axes, grid_coefficients
 from fastmech.atlas.coincidence import coincidences
+from fastmech.atlas.resting_map import map_resting_places
 from fastmech.atlas.sheets import SheetBuilder
 from fastmech.atlas.wells import barriers, least_impulses
 from fastmech.ensembles import checks
 from fastmech.ensembles.threads import thread_count
 from fastmech.equilibria.search import MOST
 from fastmech.equilibria.solve import Solution, solve
+from fastmech.errors import InputError
 from fastmech.mechanism.impulse import POINTS
+from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
 
 #: Points that one task solves; each but the first of them starts from the one before.
@@ -100,14 +104,17 @@ Progress = Callable[[int], None]
 
 
 def map_equilibria(
-    scene: Scene,
+    scene: Scene | Mechanism,
     axes: Mapping[str, ArrayLike],
     *,
     wells: bool = False,
     threads: int | None = None,
     progress: Progress | None = None,
-) -> EquilibriumMap:
+) -> Any:
     """All equilibria of ``scene`` at every point of a grid over one to three of its parameters.
+
+    Of a ``Mechanism`` over any number of its parameters: see
+    :func:`fastmech.atlas.resting_map.map_resting_places`, which gives a ``RestingMap``.
 
     The force is F0 where alpha = 0 and its limit 0 where alpha > 0, as in ``find_equilibria``. The result
     has the same bits for any number of threads.
@@ -123,6 +130,10 @@ def map_equilibria(
         InputError: wrong number of axes, an unknown name, values that neither rise nor fall throughout or
             that the scene refuses, or more points than memory holds.
     """
+    if isinstance(scene, Mechanism):
+        if wells:
+            raise InputError("wells = True: is for a Scene; fastmech.trapped and labels tell a mechanism's")
+        return map_resting_places(scene, axes, threads=threads, progress=progress)
     checks.progress_function(progress, "points")
     checked = check_axes(scene, axes)
     grid = tuple(len(values) for values in checked.values())

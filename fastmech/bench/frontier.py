@@ -171,7 +171,7 @@ def work_precision(
         dt = guess * method.evaluations(1000) / base.evaluations(1000)
         for error in wanted:
             trial.tol = error
-            found = trial.tune(method, dt, 0.5)
+            found = trial.tune(method, dt, near=0.5)
             if found.good and not (points and (points[-1].method, points[-1].dt) == (method.name, found.dt)):
                 dt = found.dt
                 points.append(_timed(case, trial, method, dt))

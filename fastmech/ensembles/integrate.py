@@ -185,7 +185,7 @@ def integrate(
     if not isinstance(scene, Scene):
         passed = outputs
         if isinstance(scene, Mechanism):
-            passed = np.union1d(outputs, scene.kinks(float(outputs[-1])))
+            passed = np.union1d(outputs, scene.kinks(float(outputs[-1]), dtype))
         solution = solve(Case(problem, starts, passed, threads), settings, progress)
         solution = replace(solution, y=solution.y[np.searchsorted(passed, outputs)])
         return _trajectories(problem, outputs, solution, settings)

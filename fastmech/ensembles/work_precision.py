@@ -267,11 +267,12 @@ class Trial:
                 ratio = RATIO if vain else min(max((found / goal) ** (1.0 / p) * 1.05, RATIO), 2.0)
         return False
 
-    def tune(self, method: Method, dt: float, least: float = math.inf) -> Point:
-        """The step with which a method's error is between :data:`NEAR` times the tolerance and it.
+    def tune(self, method: Method, dt: float, least: float = math.inf, near: float = NEAR) -> Point:
+        """The step with which a method's error is between ``near`` times the tolerance and it.
 
         On the trajectories that choose a method, ``least`` is the work of the best one so far: an error near
-        enough tells the step by the method's order, and a method that needs more work is given up.
+        enough tells the step by the method's order, and a method that needs more work is given up. With
+        another ``near`` than by default every step is run.
         """
         good: tuple[float, float] | None = None
         bad, best, dt = math.inf, (math.inf, dt), min(dt, self.longest)
@@ -282,7 +283,7 @@ class Trial:
             wanted = 1.0 / LEAP
             if found < math.inf:
                 wanted = (AIM * self.tol / max(found, 1e-300)) ** (1.0 / method.order)
-                believed = self.refers is not None and 1.0 / BELIEVED <= wanted <= BELIEVED
+                believed = near == NEAR and self.refers is not None and 1.0 / BELIEVED <= wanted <= BELIEVED
                 wanted = min(max(wanted, 1.0 / LEAP), LEAP)
                 asked = min(dt * wanted, self.longest)
                 if believed or (found > self.tol and self.work(method, asked) > least):
@@ -290,7 +291,7 @@ class Trial:
                     return Point(method, asked, AIM * self.tol, work, work <= least)
             if found <= self.tol:
                 good = (dt, found) if good is None or dt > good[0] else good
-                if found >= NEAR * self.tol or dt >= self.longest or bad <= 1.2 * dt:
+                if found >= near * self.tol or dt >= self.longest or bad <= 1.2 * dt:
                     break
                 dt = min(dt * wanted, self.longest, math.sqrt(dt * bad))
             else:

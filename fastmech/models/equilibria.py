@@ -194,14 +194,13 @@ def prove_equilibria(
     found = search_rows(statics, np.array([values], dtype=np.float64), limit, limit + 2)
     n, count = len(statics.coordinates), int(found.count[0, 0])
     p = np.repeat(np.array(values, dtype=np.float64)[:, None], 2, 1)
-    turning = np.array([coordinate.periodic for coordinate in statics.coordinates])
     f, J, items = np.empty((n, 2)), np.empty((n, n, 2)), []
     forces = _balance(statics)
     for k in range(count):
         zero = found.zeros[0, k]
         forces(zero, p, f, J)
         raw = zero.mean(1)
-        position = raw - TWO_PI * np.ceil((raw - math.pi) / TWO_PI) * turning
+        position = wrapped(raw, statics)
         orientation = int(found.orientation[0, k]) * (-1) ** n
         positive = int(found.positive[0, k])
         index = (positive if positive >= 0 else -2) if statics.conservative else None
@@ -210,6 +209,31 @@ def prove_equilibria(
     items.sort(key=lambda item: (item.morse_index or 0, -item.orientation, *item.position))
     names = tuple(str(coordinate.symbol) for coordinate in statics.coordinates)
     return RestingPlaces(tuple(items), names, _proof(statics, p, found, items))
+
+
+def wrapped(positions: Floats, statics: Statics) -> Floats:
+    """Positions (..., n) with their periodic angles in (-pi, pi]."""
+    turning = np.array([coordinate.periodic for coordinate in statics.coordinates])
+    return np.asarray(positions - TWO_PI * np.ceil((positions - math.pi) / TWO_PI) * turning)
+
+
+def outcome_of_row(statics: Statics, values: Floats, found: Found, row: int) -> Outcome:
+    """What is proved about the list of one row of parameters' values."""
+    left, count = int(found.count[row, 1]), int(found.count[row, 0])
+    if left:
+        kept = min(left, found.left.shape[1])
+        places = _places(found.left[row, :kept], found.reason[row, :kept], domain_of(statics))
+        return _outcome({place.reason for place in places}) if kept == left else Outcome.UNPROVED
+    signs = found.orientation[row, :count].astype(int) * (-1) ** len(statics.coordinates)
+    turning = all(coordinate.periodic for coordinate in statics.coordinates)
+    return Outcome.UNPROVED if turning and signs.all() and signs.sum() != 0 else Outcome.COMPLETE
+
+
+def _outcome(reasons: set[str]) -> Outcome:
+    """Of a list that leaves places for these reasons."""
+    if reasons <= {_FOLD, _CURVE}:
+        return Outcome.DEGENERATE if _CURVE in reasons else Outcome.AT_FOLD
+    return Outcome.UNPROVED
 
 
 def search_rows(statics: Statics, rows: Floats, limit: int | None = None, most_left: int = 64) -> Found:
@@ -268,11 +292,7 @@ def _proof(statics: Statics, p: Floats, found: Found, items: list[RestingPlace])
     listed = "1 equilibrium is" if len(items) == 1 else f"{len(items)} equilibria are"
     if left:
         spans = [float(((place.high - place.low) / (domain[:, 1] - domain[:, 0])).max()) for place in places]
-        kinds = {place.reason for place in places}
-        if kinds <= {_FOLD, _CURVE}:
-            outcome = Outcome.DEGENERATE if _CURVE in kinds else Outcome.AT_FOLD
-        else:
-            outcome = Outcome.UNPROVED
+        outcome = _outcome({place.reason for place in places})
         worst = places[int(np.argmax(spans))]
         where = ", ".join(
             f"{c.symbol} = {low:.6g}"

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastmech.errors import InputError, shown
 from fastmech.generated import kept_text
 from fastmech.kernels.fingerprint import fingerprint
-from fastmech.loads import Function, Load, Sampled
+from fastmech.loads import BEFORE, Function, Load, Sampled
 from fastmech.models.checks import check
 from fastmech.models.statics import Coordinate, Statics
 from fastmech.scene import nearest
@@ -197,9 +197,11 @@ class Mechanism:
         """Without what is made again from the rest."""
         return {k: v for k, v in self.__dict__.items() if k not in _MADE}
 
-    def kinks(self, until: float) -> Floats:
+    def kinks(self, until: float, precision: str = "float64") -> Floats:
         """Times [s] within (0, until) that no step may cross: there a load's value or derivative jumps."""
-        times = np.array(sorted({t for load in self.loads for t in load.kinks()}))
+        each = {t for load in self.loads for t in load.kinks()}
+        each |= {t - BEFORE[precision] * abs(t) for load in self.loads if load.jumps for t in load.kinks()}
+        times = np.array(sorted(each))
         return times[(times > 0.0) & (times < until)]
 
     @cached_property

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
 
 from fastmech.errors import InputError, shown
@@ -18,6 +18,13 @@ from fastmech.stability.classify import Finding
 
 #: Matrices are taken to be wrong by so many units of rounding of their largest entry.
 _ROUNDING = 32.0 * 2.0**-52
+
+#: Verdicts, by their numbers.
+VERDICTS = ("asymptotically stable", "stable", "unstable", "critical")
+ASYMPTOTIC, STABLE, UNSTABLE, CRITICAL = range(4)
+
+#: In place of a Morse index where there is no potential.
+_NONE = -1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -77,32 +84,14 @@ def assess(linear: Linear, morse_index: int | None) -> Stability:
 
     ``morse_index`` is None without a potential and -2 where the Hessian is not proved to be regular.
     """
-    mass, damping, stiffness = (np.asarray(matrix, dtype=np.float64) for matrix in linear)
-    n = len(mass)
-    factor = np.linalg.cholesky(mass)
-    by_mass = [
-        scipy.linalg.solve_triangular(
-            factor, scipy.linalg.solve_triangular(factor, matrix, lower=True).T, lower=True
-        ).T
-        for matrix in (damping, stiffness)
-    ]
-    rate = float(max(np.sqrt(np.abs(by_mass[1]).max()), np.abs(by_mass[0]).max())) or 1.0
-    c, k = by_mass[0] / rate, by_mass[1] / rate**2
-    undamped = not damping.any()
-    roots: NDArray[np.complex128]
-    if undamped:
-        squares, square_errors = _eigenvalues(-k)
-        half = np.sqrt(squares)
-        size = np.maximum(np.abs(half), np.sqrt(square_errors))
-        roots = np.concatenate([half, -half])
-        errors = np.tile(square_errors / np.maximum(size, 1e-300), 2)
-    else:
-        roots, errors = _eigenvalues(np.block([[np.zeros((n, n)), np.eye(n)], [-k, -c]]))
-    order = np.lexsort((-roots.imag, -roots.real))
-    roots, errors = roots[order], errors[order]
+    whole = Linear(*(np.asarray(matrix, dtype=np.float64)[None] for matrix in linear))
+    own, c, k = spectra(whole)
+    n = whole.mass.shape[1]
+    roots, errors, rate = own.roots[0], own.errors[0], float(own.rate[0])
     spectrum, instability = _by_spectrum(roots, errors)
-    polynomial, minors, hurwitz = _by_hurwitz(c, k)
-    potential, verdict, explanation = _jointly(morse_index, damping, spectrum, instability, undamped)
+    polynomial, minors, hurwitz = _by_hurwitz(c[0], k[0])
+    verdict: Any = VERDICTS[int(verdicts(own, np.array([_NONE if morse_index is None else morse_index]))[0])]
+    potential, explanation = _why(morse_index, own, spectrum, instability, n)
     if verdict != "unstable":
         instability = None
     elif instability is None:
@@ -122,15 +111,74 @@ def assess(linear: Linear, morse_index: int | None) -> Stability:
     )
 
 
-def _eigenvalues(matrix: Floats) -> tuple[NDArray[np.complex128], Floats]:
-    """Eigenvalues, and how far rounding of the matrix may move each (Wilkinson's condition numbers)."""
-    values, left, right = scipy.linalg.eig(matrix, left=True)
-    overlap = np.abs(np.einsum("ik,ik->k", left.conj(), right))
-    conditions = np.linalg.norm(left, axis=0) * np.linalg.norm(right, axis=0) / np.maximum(overlap, 1e-300)
-    size = _ROUNDING * len(matrix) * np.linalg.norm(matrix)
-    return values.astype(np.complex128), np.minimum(
-        size * conditions, np.linalg.norm(matrix) * (size ** (1.0 / len(matrix)))
-    )
+class Spectra(NamedTuple):
+    """Eigenvalues of many linearizations, and what verdicts need besides; arrays over m of them."""
+
+    roots: NDArray[np.complex128]  #: over ``rate`` (m, 2 n), largest real part first
+    errors: Floats  #: bounds on their errors (m, 2 n)
+    rate: Floats  #: by which times are measured (m,) [1/s]
+    undamped: NDArray[np.bool_]  #: no damping at all (m,)
+    loses: NDArray[np.bool_]  #: damping takes energy, whatever the motion (m,)
+    gyroscopic: NDArray[np.bool_]  #: it has a part that turns motions (m,)
+
+
+def spectra(linear: Linear) -> tuple[Spectra, Floats, Floats]:
+    """Eigenvalues of linearizations (m, n, n), and their damping and stiffness by mass, over the rate."""
+    mass, damping, stiffness = linear
+    m, n = mass.shape[:2]
+    inverse = np.linalg.inv(np.linalg.cholesky(mass))
+    by_mass = [inverse @ matrix @ inverse.mT for matrix in (damping, stiffness)]
+    rate = np.maximum(np.sqrt(np.abs(by_mass[1]).max((1, 2))), np.abs(by_mass[0]).max((1, 2)))
+    rate[rate == 0.0] = 1.0
+    c, k = by_mass[0] / rate[:, None, None], by_mass[1] / rate[:, None, None] ** 2
+    undamped: Any = ~damping.any((1, 2))
+    roots, errors = np.empty((m, 2 * n), dtype=np.complex128), np.empty((m, 2 * n))
+    if undamped.any():
+        squares, wrong = _eigenvalues(-k[undamped])
+        half = np.sqrt(squares)
+        size = np.maximum(np.abs(half), np.sqrt(wrong))
+        roots[undamped] = np.concatenate([half, -half], axis=1)
+        errors[undamped] = np.tile(wrong / np.maximum(size, 1e-300), 2)
+    if not undamped.all():
+        some = ~undamped
+        matrices = np.zeros((int(some.sum()), 2 * n, 2 * n))
+        matrices[:, :n, n:] = np.eye(n)
+        matrices[:, n:, :n], matrices[:, n:, n:] = -k[some], -c[some]
+        roots[some], errors[some] = _eigenvalues(matrices)
+    order = np.lexsort((-roots.imag, -roots.real))
+    roots, errors = (np.take_along_axis(values, order, axis=1) for values in (roots, errors))
+    size = np.abs(damping).max((1, 2))
+    loses: Any = np.linalg.eigvalsh(0.5 * (damping + damping.mT))[:, 0] >= -_ROUNDING * size
+    gyroscopic: Any = np.abs(damping - damping.mT).max((1, 2)) > _ROUNDING * size
+    return Spectra(roots, errors, rate, undamped, loses, gyroscopic), c, k
+
+
+def verdicts(own: Spectra, morse_index: NDArray[np.integer[Any]]) -> NDArray[np.int8]:
+    """Numbers of :data:`VERDICTS` (m,) from eigenvalues and proved Morse indices (-1: no potential)."""
+    growing = (own.roots.real > own.errors).any(axis=1)
+    falling = (own.roots.real < -own.errors).all(axis=1)
+    spectrum = np.where(growing, UNSTABLE, np.where(falling, ASYMPTOTIC, CRITICAL))
+    found = np.where(~own.loses | (spectrum == ASYMPTOTIC), spectrum, STABLE)
+    found = np.where(morse_index > 0, np.where(own.loses & ~own.gyroscopic, UNSTABLE, spectrum), found)
+    found = np.where(morse_index == -2, CRITICAL, found)
+    return np.where(morse_index == _NONE, spectrum, found).astype(np.int8)
+
+
+def _eigenvalues(matrices: Floats) -> tuple[NDArray[np.complex128], Floats]:
+    """Eigenvalues (m, s), and how far rounding of a matrix may move each (Wilkinson's condition numbers)."""
+    values, right = np.linalg.eig(matrices)
+    s = matrices.shape[1]
+    conditions = np.full(values.shape, np.inf)
+    try:
+        conditions = np.linalg.norm(np.linalg.inv(right), axis=2) * np.linalg.norm(right, axis=1)
+    except np.linalg.LinAlgError:  # one of them has too few eigenvectors: the others one by one
+        for k, vectors in enumerate(right):
+            with contextlib.suppress(np.linalg.LinAlgError):
+                left = np.linalg.inv(vectors)
+                conditions[k] = np.linalg.norm(left, axis=1) * np.linalg.norm(vectors, axis=0)
+    norm = np.linalg.norm(matrices, axis=(1, 2))[:, None]
+    size = _ROUNDING * s * norm
+    return values.astype(np.complex128), np.minimum(size * conditions, norm * size ** (1.0 / s))
 
 
 def _by_spectrum(
@@ -210,39 +258,30 @@ def _characteristic(matrix: list[list[Interval]]) -> list[Interval]:
     return found
 
 
-def _jointly(
-    index: int | None,
-    damping: Floats,
-    spectrum: Finding,
-    instability: str | None,
-    undamped: bool,
-) -> tuple[Finding | None, Any, str]:
-    """The potential's finding, the verdict and why."""
-    symmetric = 0.5 * (damping + damping.T)
-    size = float(np.abs(damping).max())
-    loses = bool(np.linalg.eigvalsh(symmetric).min() >= -_ROUNDING * size)
-    gyroscopic = bool(np.abs(damping - damping.T).max() > _ROUNDING * size)
+def _why(
+    index: int | None, own: Spectra, spectrum: Finding, instability: str | None, n: int
+) -> tuple[Finding | None, str]:
+    """The potential's finding, and why the verdict is what it is."""
+    loses, gyroscopic, undamped = bool(own.loses[0]), bool(own.gyroscopic[0]), bool(own.undamped[0])
     if index is None:
-        word = spectrum.verdict
-        if word == "unstable":
-            return None, word, f"{instability}: {spectrum.reason}"
-        if word == "critical" and undamped:
-            return None, word, "nothing damps and all swings keep their size; second order does not decide"
-        return None, word, spectrum.reason
+        if spectrum.verdict == "unstable":
+            return None, f"{instability}: {spectrum.reason}"
+        if spectrum.verdict == "critical" and undamped:
+            return None, "nothing damps and all swings keep their size; second order does not decide"
+        return None, spectrum.reason
     if index == -2:
         reason = "the Hessian of U is singular within rounding"
-        return Finding("critical", reason), "critical", f"{reason}; second order does not decide"
+        return Finding("critical", reason), f"{reason}; second order does not decide"
     if index > 0:
-        reason = f"U falls in {index} of {len(damping)} directions"
-        if loses and not gyroscopic:
-            return Finding("unstable", reason), "unstable", f"{reason}, which no damping makes stable"
-        return Finding("unstable", reason), spectrum.verdict, spectrum.reason
+        reason = f"U falls in {index} of {n} directions"
+        told = f"{reason}, which no damping makes stable" if loses and not gyroscopic else spectrum.reason
+        return Finding("unstable", reason), told
     reason = "the Hessian of U is proved positive definite: U has a minimum"
     finding = Finding("stable", reason)
     if not loses:
-        return finding, spectrum.verdict, f"U has a minimum but velocities feed energy in: {spectrum.reason}"
+        return finding, f"U has a minimum but velocities feed energy in: {spectrum.reason}"
     if spectrum.verdict == "asymptotically stable":
-        return finding, spectrum.verdict, f"{reason}, and damping reaches every mode"
+        return finding, f"{reason}, and damping reaches every mode"
     if undamped:
-        return finding, "stable", f"{reason}; nothing damps: disturbances stay small but do not die out"
-    return finding, "stable", f"{reason}; damping misses a mode to first order, or reaches it within rounding"
+        return finding, f"{reason}; nothing damps: disturbances stay small but do not die out"
+    return finding, f"{reason}; damping misses a mode to first order, or reaches it within rounding"

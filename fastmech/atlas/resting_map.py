@@ -1,0 +1,191 @@
+"""Equilibria of any mechanism over a grid of parameters, each point proved, with their stability."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastmech.ensembles import checks
+from fastmech.ensembles.threads import in_parts
+from fastmech.equilibria.outcome import Outcome
+from fastmech.errors import InputError, shown, shown_name
+from fastmech.intervals.search import Found
+from fastmech.models.equilibria import outcome_of_row, search_rows, wrapped
+from fastmech.models.mechanism import Mechanism
+from fastmech.models.stability import VERDICTS, spectra, verdicts
+from fastmech.scene import nearest
+
+Floats = NDArray[np.float64]
+Codes = NDArray[np.int8]
+
+#: Points that a thread proves at a time, and the numbers of 8 bytes that each takes meanwhile.
+BLOCK, POINT_NUMBERS = 64, 1200
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RestingMap:
+    """Equilibria over a grid of parameters; arrays have the grid's shape first, then a slot an equilibrium.
+
+    Equilibria come the deepest first. Numbers are NaN in slots without one, codes -1.
+    """
+
+    axes: dict[str, Floats]
+    names: tuple[str, ...]  #: of the coordinates
+    count: NDArray[np.int16]  #: equilibria, proved each
+    outcome: Codes  #: :class:`fastmech.equilibria.outcome.Outcome`: COMPLETE where there are no others
+    position: Floats  #: [rad or m], (..., slots, n); angles in (-pi, pi]
+    radius: Floats  #: each is proved to be within so many rad or m
+    energy: Floats  #: U [J], loads at their means; NaN where forces are not known to have a potential
+    orientation: Codes  #: sign of the stiffness' determinant, 0: not proved
+    morse_index: Codes  #: directions in which U falls, -2 not proved, -1 also without a potential
+    verdict: Codes  #: stability, a number of :data:`fastmech.models.stability.VERDICTS`
+    eigenvalues: NDArray[np.complex128]  #: [1/s], (..., slots, 2 n), largest real part first
+
+    def __repr__(self) -> str:
+        grid = " x ".join(f"{name} ({values.size:,})" for name, values in self.axes.items())
+        kinds, number = np.unique(self.count, return_counts=True)
+        complete = np.count_nonzero(self.outcome == Outcome.COMPLETE)
+        there = self.verdict[self.verdict >= 0]
+        each = ", ".join(
+            f"{np.count_nonzero(there == k):,} {name}"
+            for k, name in enumerate(VERDICTS)
+            if (there == k).any()
+        )
+        lines = [
+            f"equilibria of {', '.join(self.names)} over {grid}",
+            f"  proved complete at {complete:,} of {self.count.size:,} points",
+            "  equilibria: " + ", ".join(f"{k} at {n:,}" for k, n in zip(kinds, number, strict=True)),
+            f"  {each}",
+        ]
+        return "\n".join(lines)
+
+
+def map_resting_places(
+    mechanism: Mechanism,
+    axes: Mapping[str, ArrayLike],
+    *,
+    threads: int | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> RestingMap:
+    """All equilibria of a mechanism at every point of a grid over one or more of its parameters.
+
+    Each point is proved as :func:`fastmech.find_equilibria` proves one, loads at their means. The result has
+    the same bits for any number of threads.
+
+    Args:
+        mechanism: gives every parameter that is no axis.
+        axes: parameters' names with their values, in the order of the result's dimensions.
+        threads: threads to use, all processors by default.
+        progress: is told how many points are done since its last call.
+
+    Raises:
+        InputError: an unknown name, values that the mechanism refuses, a load that they turn into another at
+            rest, too many points, or as :func:`fastmech.find_equilibria`.
+    """
+    checks.progress_function(progress, "points")
+    checked = _checked(mechanism, axes)
+    grid = tuple(values.size for values in checked.values())
+    total = math.prod(grid)
+    checks.memory(total, POINT_NUMBERS, f"axes: {total:.3g} points", "fewer")
+    rows = np.tile(np.array(list(mechanism.parameters.values())), (total, 1))
+    order = list(mechanism.parameters)
+    for name, column in zip(checked, np.meshgrid(*checked.values(), indexing="ij"), strict=True):
+        rows[:, order.index(name)] = column.ravel()
+    statics, blocks = mechanism.statics(), [_Block()] * (-(-total // BLOCK))
+
+    def solve(part: slice) -> None:
+        found = search_rows(statics, rows[part])
+        blocks[part.start // BLOCK] = _assessed(mechanism, rows[part], found)
+        if progress is not None:
+            progress(part.stop - part.start)
+
+    in_parts(solve, total, threads, BLOCK)
+    return _joined(mechanism, checked, blocks)
+
+
+@dataclass(frozen=True)
+class _Block:
+    """Points one after the other; ``point`` says which one an equilibrium is of."""
+
+    count: Any = None
+    outcome: Any = None
+    point: Any = None
+    each: Any = None  #: arrays of all equilibria by name
+
+
+def _checked(mechanism: Mechanism, axes: Mapping[str, ArrayLike]) -> dict[str, Floats]:
+    if not isinstance(axes, Mapping) or not axes:
+        raise InputError(f"axes = {shown(axes)}: must map at least one parameter to its values")
+    checked, known = {}, list(mechanism.parameters)
+    for name, values in axes.items():
+        if name not in known:
+            hint = nearest(name, known) if isinstance(name, str) else f"allowed: {', '.join(known)}"
+            raise InputError(f"axes.{shown_name(name)}: unknown parameter; {hint}")
+        vector = checks.reals(f"axes.{name}", values, "real numbers")
+        if vector.ndim != 1 or not vector.size:
+            raise InputError(f"axes.{name}: shape {vector.shape}: must be one-dimensional and not empty")
+        checks.one_way(f"axes.{name}", values, vector)
+        for value in (vector.min(), vector.max()):
+            try:
+                made = mechanism.replace(**{name: float(value)})
+            except InputError as error:
+                raise InputError(f"axes.{name} = {value:g}: {error}") from None
+            if made.prints != mechanism.prints:
+                raise InputError(f"axes.{name} = {value:g}: turns a load into another at rest; map it apart")
+        checked[name] = vector
+    return checked
+
+
+def _assessed(mechanism: Mechanism, rows: Floats, found: Found) -> _Block:
+    """Positions, energies and stability of all equilibria of some points."""
+    statics, n = mechanism.statics(), len(mechanism.coordinates)
+    number = found.count[:, 0]
+    point = np.repeat(np.arange(len(rows)), number)
+    slot = np.concatenate([np.arange(k) for k in number]) if len(number) else number
+    zeros = found.zeros[point, slot]
+    position = wrapped(zeros.mean(2), statics)
+    size = np.abs(zeros).max((1, 2), initial=0.0)
+    radius = (zeros[:, :, 1] - zeros[:, :, 0]).max(axis=1, initial=0.0) + 1e-15 * (1.0 + size)
+    orientation = found.orientation[point, slot] * (-1) ** n
+    positive = found.positive[point, slot]
+    index = np.where(positive >= 0, positive, -2) if statics.conservative else np.full(len(point), -1)
+    values = dict(zip(mechanism.parameters, rows[point].T, strict=True))
+    own, _, _ = spectra(mechanism.linear(position, values))
+    energy = np.full(len(point), np.nan)
+    if "bounding" in mechanism.derived.functions:
+        still = np.concatenate([position, np.zeros_like(position)], axis=1)
+        energy = mechanism.evaluate("bounding", still.T, values)[0]
+    each = {
+        "position": position, "radius": radius, "energy": energy, "orientation": orientation.astype(np.int8),
+        "morse_index": index.astype(np.int8), "verdict": verdicts(own, index),
+        "eigenvalues": own.roots * own.rate[:, None],
+    }  # fmt: skip
+    keys = (*position.T[::-1], np.nan_to_num(energy), point)
+    order = np.lexsort(keys)
+    each = {name: values[order] for name, values in each.items()}
+    outcome = np.array([outcome_of_row(statics, row, found, k) for k, row in enumerate(rows)], dtype=np.int8)
+    return _Block(number.astype(np.int16), outcome, point[order], each)
+
+
+def _joined(mechanism: Mechanism, axes: dict[str, Floats], blocks: list[_Block]) -> RestingMap:
+    """All points, each equilibrium in its slot."""
+    count = np.concatenate([block.count for block in blocks])
+    first = np.concatenate([[0], np.cumsum(count)])[:-1]
+    point = np.repeat(np.arange(count.size), count)
+    slot = np.arange(point.size) - first[point]
+    slots, grid = int(count.max(initial=0)), tuple(values.size for values in axes.values())
+    arrays: dict[str, Any] = {}
+    for name in blocks[0].each:
+        values = np.concatenate([block.each[name] for block in blocks])
+        nothing = -1 if values.dtype == np.int8 else np.nan
+        whole = np.full((count.size, slots, *values.shape[1:]), nothing, dtype=values.dtype)
+        whole[point, slot] = values
+        arrays[name] = whole.reshape(*grid, slots, *values.shape[1:])
+    outcome = np.concatenate([block.outcome for block in blocks])
+    names = mechanism.state[: len(mechanism.coordinates)]
+    return RestingMap(axes, names, count.reshape(grid), outcome.reshape(grid), **arrays)
