@@ -62,4 +62,5 @@ def test_a_well_s_number_counts_not_its_place_among_the_equilibria() -> None:
 
 def test_rare_labels_share_grey() -> None:
     wells = equilibria([0, 0, 0])
-    assert basin_color(wells, 0, (3, 0)) == basin_color(wells, 2, (0, 0)) == FURTHER
+    assert basin_color(wells, 0, (3, 0)) == basin_color(wells, 2, (1, 0)) == FURTHER
+    assert len({basin_color(wells, well, (0, 0)) for well in range(3)} | {FURTHER}) == 4
