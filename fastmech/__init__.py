@@ -13,6 +13,7 @@ from fastmech import kernel_cache as _kernel_cache  # noqa: F401  first: it note
 if TYPE_CHECKING:
     from fastmech import loads as loads
     from fastmech import mechanisms as mechanisms
+    from fastmech.atlas.critical import critical_values
     from fastmech.atlas.fold_points import find_folds
     from fastmech.atlas.folds import trace_folds
     from fastmech.atlas.map import map_equilibria
@@ -102,6 +103,7 @@ _MODULES = {
     "copy_of_label": "fastmech.basins.copies",
     "cos": "fastmech.kernels.sincos",
     "critical_forces": "fastmech.basins.snapping",
+    "critical_values": "fastmech.atlas.critical",
     "disturb": "fastmech.basins.disturbed",
     "disturbed_motion": "fastmech.disturbance.motion",
     "erosion": "fastmech.basins.erosion",
@@ -168,6 +170,7 @@ __all__ = [
     "copy_of_label",
     "cos",
     "critical_forces",
+    "critical_values",
     "disturb",
     "disturbed_motion",
     "erosion",

@@ -1,0 +1,61 @@
+"""Critical values of mechanisms against closed forms and the scene's folds."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import fastmech as fm
+
+
+def test_ziegler_s_column() -> None:
+    """P l / k = 7/2 - sqrt 2 where nothing damps; 41/28 + b^2 / (2 k m l^2) with equal dashpots."""
+    column, loads = fm.mechanisms.ziegler_column(), np.linspace(0.1, 2.5, 13)
+    (found,) = fm.critical_values(column, "P", loads)
+    assert found.kind == "coalescence"
+    assert found.value == pytest.approx(3.5 - math.sqrt(2.0), rel=1e-10)
+    for b in (0.1, 0.4):
+        (found,) = fm.critical_values(column.replace(b=b), "P", loads)
+        assert found.kind == "Hopf"
+        assert found.value == pytest.approx(41.0 / 28.0 + b * b / 2.0, rel=1e-10)
+        assert found.width < 1e-9
+
+
+def test_the_truss_snaps() -> None:
+    truss = fm.mechanisms.von_mises_truss()
+    k, span, rise = (truss.parameters[name] for name in ("k", "span", "rise"))
+    length = math.hypot(span / 2, rise)
+    expected = 2.0 * k * length * (1.0 - (span / 2 / length) ** (2.0 / 3.0)) ** 1.5
+    found = fm.critical_values(truss, "P", np.linspace(1.0, 100.0, 12))
+    assert [one.kind for one in found] == ["fold"]
+    assert found[0].value == pytest.approx(expected, rel=1e-10)
+
+
+def test_the_pendulum_on_a_cart() -> None:
+    """Upright is stable from kt = m g l on: two leaning positions end there."""
+    (found,) = fm.critical_values(fm.mechanisms.cart_pendulum(), "kt", np.linspace(1.0, 30.0, 9))
+    assert found.kind == "pitchfork"
+    assert found.value == pytest.approx(9.81, rel=1e-10)
+    assert str(found).startswith("9.81: pitchfork at (0, ")
+
+
+@pytest.mark.parametrize("parameter", ["c1", "F0"])
+def test_folds_of_the_papers_mechanism_are_the_scenes(parameter: str) -> None:
+    values = {"c1": np.linspace(40.0, 400.0, 25), "F0": np.linspace(20.0, 900.0, 45)}[parameter]
+    scene = fm.Scene(alpha=0.0, c2=92.85, F0=85.3, c1=294.9)
+    mechanism = fm.mechanisms.slider_pendulum().replace(alpha=0.0, c2=92.85, F0=85.3, c1=294.9)
+    expected = sorted(fold.value for fold in fm.find_folds(scene, parameter, values))
+    found = [one.value for one in fm.critical_values(mechanism, parameter, values) if one.kind == "fold"]
+    np.testing.assert_allclose(found, expected, rtol=1e-10)
+
+
+def test_what_is_wrong_gets_a_line() -> None:
+    chain = fm.mechanisms.pendulum_chain(1)
+    with pytest.raises(fm.InputError, match="two or more rising values"):
+        fm.critical_values(chain, "F", [1.0])
+    with pytest.raises(fm.InputError, match="must be a Mechanism"):
+        fm.critical_values(fm.Scene(), "F0", [1.0, 2.0])  # type: ignore[arg-type]
+    with pytest.raises(fm.InputError, match="unknown parameter"):
+        fm.critical_values(chain, "nothing", [1.0, 2.0])
