@@ -118,15 +118,9 @@ class MechanismCertificate(Certificate):
         return self.tree.barrier - ROUNDING * self.amplitudes
 
     @cached_property
-    def _finite(self) -> Floats:
-        """Bounds of U over the cells where it is finite."""
-        bounds = self.tree.cells.bounds
-        return np.asarray(bounds[np.isfinite(bounds).all(axis=1)])
-
-    @property
     def amplitudes(self) -> float:  # type: ignore[override]
-        """From the least to the greatest U of the cells [J]."""
-        return float(np.ptp(self._finite))
+        """The scale of U [J]."""
+        return self.tree.cells.scale
 
     @property
     def energies(self) -> Floats:
@@ -242,7 +236,8 @@ class MechanismCertificate(Certificate):
     def coarse_steps(self, starts: Floats) -> Floats:
         """In octaves below that of slow motions, by the energy of each start."""
         slow, allowed = self._paces
-        lowest = float(self._finite.min())
+        low = self.tree.cells.bounds[:, 0]
+        lowest = float(low[np.isfinite(low)].min())
         with np.errstate(all="ignore"):
             energy = self.system.evaluate("bounding", starts.T)[0] + self.work[0]
             fastest = np.sqrt(np.maximum(energy - lowest, 0.0) * allowed.max())
@@ -326,8 +321,7 @@ def mechanism_certificate(mechanism: Mechanism) -> MechanismCertificate:
         InputError: its wells are not certain, or a load never fades, or what it can do has no bound.
     """
     tree = prove_wells(mechanism)
-    finite = tree.cells.bounds[np.isfinite(tree.cells.bounds).all(axis=1)]
-    work, fades = _work_left(mechanism, tree, FADED * float(np.ptp(finite)))
+    work, fades = _work_left(mechanism, tree, FADED * tree.cells.scale)
     return MechanismCertificate(mechanism, tree, work, fades)
 
 

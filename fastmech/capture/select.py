@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any
 
 from numpy.typing import ArrayLike
 
 from fastmech.capture.certificate import Captured, Certificate
-from fastmech.capture.mechanism import MechanismCertificate, mechanism_certificate
+from fastmech.capture.mechanism import mechanism_certificate
 from fastmech.capture.scene import scene_certificate
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene, require_scene
+
+#: Certificates of mechanisms that are kept, the oldest first, by what tells mechanisms apart.
+_kept: dict[tuple[Any, ...], Certificate] = {}
+MOST_KEPT = 16
 
 
 def certificate_of(system: Scene | Mechanism) -> Certificate:
@@ -22,28 +25,15 @@ def certificate_of(system: Scene | Mechanism) -> Certificate:
     Raises:
         InputError: its wells are not certain, or a mechanism's energy is not known to fall.
     """
-    if isinstance(system, Mechanism):
-        values = tuple(system.parameters.items()), tuple(c[1:] for c in system.coordinates)
-        return _of_mechanism(system.prints, system.name, values, _Kept(system))
-    return scene_certificate(system)
-
-
-class _Kept:
-    """A mechanism beside what tells it apart."""
-
-    def __init__(self, mechanism: Mechanism) -> None:
-        self.mechanism = mechanism
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Kept)
-
-    def __hash__(self) -> int:
-        return 0
-
-
-@lru_cache(maxsize=16)
-def _of_mechanism(prints: str, name: str, values: Any, kept: _Kept) -> MechanismCertificate:
-    return mechanism_certificate(kept.mechanism)
+    if not isinstance(system, Mechanism):
+        return scene_certificate(system)
+    ranges = tuple(coordinate[1:] for coordinate in system.coordinates)
+    key = system.prints, system.name, tuple(system.parameters.items()), ranges
+    if key not in _kept:
+        while len(_kept) >= MOST_KEPT:
+            del _kept[next(iter(_kept))]
+        _kept[key] = mechanism_certificate(system)
+    return _kept[key]
 
 
 def require_damper(system: Any) -> None:

@@ -55,6 +55,12 @@ class Cells(NamedTuple):
         """Of cells, by coordinate."""
         return np.asarray((self.domain[:, 1] - self.domain[:, 0]) / self.counts)
 
+    @property
+    def scale(self) -> float:
+        """How much U varies [J], or a tenth of its size where an offset is larger: the scale of rounding."""
+        finite = self.bounds[np.isfinite(self.bounds).all(axis=1)]
+        return float(max(np.ptp(finite), 0.1 * np.abs(finite).max())) if len(finite) else 0.0
+
     def place(self, q: Floats) -> tuple[int, Integers]:
         """The cell of a position (n,), and the turns by which the position lies off the domain."""
         period = self.domain[:, 2]
@@ -158,8 +164,7 @@ def prove_wells(mechanism: Mechanism) -> Wells:
     passing = np.flatnonzero((index == 1) | (index < 0))
     levels = np.concatenate([energy[passing], over[:, 0]])
     low = np.ascontiguousarray(cells.bounds[:, 0])
-    finite = cells.bounds[np.isfinite(cells.bounds).all(axis=1)]
-    slack = ROUNDING * float(np.ptp(finite)) if len(finite) else 0.0
+    slack = ROUNDING * cells.scale
     barrier, passes, exits = np.empty(len(wells)), list[int | None](), np.empty(2)
     for row, well in enumerate(wells):
         start, _ = cells.place(equilibria[int(well)].position)

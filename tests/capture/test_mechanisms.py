@@ -276,3 +276,17 @@ def test_the_papers_mechanism_under_a_pulse_ends_where_scipy_says() -> None:
     for k in np.flatnonzero(found.well >= 0)[:4]:
         expected = found.tree.equilibria[int(found.well[k])].position + TURN * found.turns[k]
         np.testing.assert_allclose(end_of(mechanism, starts[k], 60.0)[:2], expected, atol=0.5)
+
+
+def test_an_offset_of_the_potential_costs_margin_and_no_label() -> None:
+    """1e6 J beneath barriers of 1/4 J: what rounding may hide is taken off, labels stay."""
+    x = fm.lengths("x", -3.0, 3.0)
+    well = fm.Mechanism(
+        x, points={"O": (0, 0), "M": (x, 0)}, masses={"M": 1}, potential=x**4 / 4 - x**2 / 2 + 1e6,
+        dampers=[fm.Damper("O", "M", 0.2, along=(1, 0))], name="raised",
+    )  # fmt: skip
+    starts = np.random.default_rng(2).uniform([-2.0, -2.0], [2.0, 2.0], (100, 2))
+    found, plain = fm.labels_of(well, starts, 120.0), fm.labels_of(double_well(), starts, 120.0)
+    assert (found.well >= 0).mean() > 0.95
+    both = (found.well >= 0) & (plain.well >= 0)
+    assert (found.well == plain.well)[both].all()
