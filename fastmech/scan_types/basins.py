@@ -39,6 +39,10 @@ MOST_POINTS, POINT_NUMBERS = 20_000_000, 20
 TILE_POINTS = 1 << 14
 USUAL_END = 60.0
 
+#: The dimension of turns in a tile, and names that coordinates cannot have beside the result's own.
+TURNED = "turned_coordinate"
+RESERVED = {TURNED, "label", "well", "turns", "time", "capture_time", "settle_time", "status", "computed"}
+
 #: What a tile knows of every start, by the names in `fastmech.basins.map.BasinMap`.
 _ARRAYS = ("well", "turns", "time", "settle_time", "status", "computed")
 
@@ -73,6 +77,8 @@ class Basins(TiledScan):
         """Without a damper there are no basins; and a map has its limits."""
         require_damper(scene)
         names = _states(scene)
+        for name in RESERVED & set(names):
+            raise InputError(f"mechanism: {name} is the name of a coordinate and of a variable of the result")
         for where, entries in (("axes", self.axes), ("fixed", self.fixed)):
             for name in entries:
                 if name not in names:
@@ -220,7 +226,7 @@ class BasinTiling(Tiling):
         return array
 
     def _tile(self, arrays: dict[str, NDArray[Any] | None], steps: int) -> Dataset:
-        dims = (*self.axes, "angle")
+        dims = (*self.axes, TURNED)
         there = {name: array for name, array in arrays.items() if array is not None}
         return Dataset(
             {name: Variable(dims[: array.ndim], array) for name, array in there.items()}, {"steps": steps}

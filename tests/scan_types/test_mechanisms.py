@@ -63,9 +63,10 @@ def test_a_shipped_mechanism_by_name_gives_what_python_gives(tmp_path: Path) -> 
     assert {p.name for p in pictures} == {"map_labels.png", "map_capture_time.png"}
 
 
-def test_the_shipped_request_is_valid() -> None:
-    request = read_request(Path("scans/mechanisms/von_mises_truss.toml"), scan_kinds())
-    assert request.scene.parameters["P"] == 20.0
+@pytest.mark.parametrize("path", sorted(Path("scans/mechanisms").glob("*.toml")), ids=lambda path: path.stem)
+def test_shipped_requests_are_valid(path: Path) -> None:
+    request = read_request(path, scan_kinds())
+    assert request.scene.name == path.stem
 
 
 def test_ones_own_is_given_on_the_command_line(tmp_path: Path) -> None:
@@ -84,6 +85,19 @@ def test_ones_own_is_given_on_the_command_line(tmp_path: Path) -> None:
         wrong = CliRunner().invoke(main, [*run, "--mechanism", f"{device}:{name}"])
         assert wrong.exit_code == 2
         assert told in wrong.output
+
+
+def test_a_coordinate_with_the_name_of_a_variable_is_refused(tmp_path: Path) -> None:
+    request = tmp_path / "scan.toml"
+    axis = "= { start = -1, stop = 1, num = 3 }"
+    axes = f"[scan.map.axes]\nwell {axis}\nwell_dot {axis}\n"
+    request.write_text(f'[scan.map]\nkind = "basins"\n{axes}')
+    well = fm.lengths("well", -2.0, 2.0)
+    damper = fm.Damper("O", "M", 1, along=(1, 0))
+    points = {"O": (0, 0), "M": (well, 0)}
+    made = fm.Mechanism(well, points=points, masses={"M": 1}, potential=well**2, dampers=[damper])
+    with pytest.raises(fm.InputError, match="mechanism: well is the name of a coordinate and of a variable"):
+        read_request(request, scan_kinds(), mechanism=made)
 
 
 def test_a_mechanism_goes_to_other_processes() -> None:
