@@ -209,7 +209,8 @@ def _describe(axes: Axes, view: Slice, parameters: Mapping[str, float]) -> None:
     for axis, name in (("x", view.axes[0]), ("y", view.axes[1])):
         unit = view.dataset[name].units
         kind = {"rad": "angle", "m": "position"}.get(unit, "rate")
-        getattr(axes, f"set_{axis}label")(f"{kind} {symbol(name)} at the start [{unit}]")
+        what = symbol(name) if symbol(name) == kind else f"{kind} {symbol(name)}"
+        getattr(axes, f"set_{axis}label")(f"{what} at the start [{unit}]")
     axes.grid(visible=False)
 
 
