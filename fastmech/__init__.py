@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from fastmech import loads as loads
     from fastmech import mechanisms as mechanisms
     from fastmech.atlas.critical import critical_values
+    from fastmech.atlas.critical_curves import critical_curves
     from fastmech.atlas.fold_points import find_folds
     from fastmech.atlas.folds import trace_folds
     from fastmech.atlas.map import map_equilibria
@@ -102,6 +103,7 @@ _MODULES = {
     "copy_labels": "fastmech.basins.copies",
     "copy_of_label": "fastmech.basins.copies",
     "cos": "fastmech.kernels.sincos",
+    "critical_curves": "fastmech.atlas.critical_curves",
     "critical_forces": "fastmech.basins.snapping",
     "critical_values": "fastmech.atlas.critical",
     "disturb": "fastmech.basins.disturbed",
@@ -169,6 +171,7 @@ __all__ = [
     "copy_labels",
     "copy_of_label",
     "cos",
+    "critical_curves",
     "critical_forces",
     "critical_values",
     "disturb",

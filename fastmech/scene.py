@@ -123,14 +123,14 @@ class Scene(BaseModel):
         }
 
 
-def require_scene(scene: Any) -> None:
-    """Refuse what is no scene.
+def require_scene(scene: Any, hint: str = "") -> None:
+    """Refuse what is no scene; the hint ends the message.
 
     Raises:
         InputError: it is something else.
     """
     if not isinstance(scene, Scene):
-        raise InputError(f"scene = {shown(scene)}: must be a Scene")
+        raise InputError(f"scene = {shown(scene)}: must be a Scene{hint}")
 
 
 #: How HDF5 files begin.

@@ -56,7 +56,7 @@ def check_axis(scene: Scene, name: str, values: ArrayLike) -> Floats:
     Raises:
         InputError: as ``check_axes``, the parameter is alpha, which moves no fold, or there is one value.
     """
-    require_scene(scene)
+    require_scene(scene, "; fm.critical_values and fm.critical_curves are for a Mechanism")
     vector = _check_values(scene, name, values)
     if name == "alpha":
         raise InputError("axes.alpha: equilibria do not depend on how fast a force decays; choose another")

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.atlas.enclosure import System
-
 Floats = NDArray[np.float64]
+
+#: Gives values F(z) and Jacobian.
+Equations = Callable[[Floats], tuple[Floats, Floats]]
 
 #: Longest and shortest step along a curve, in radians and in parts of the parameters' ranges.
 LONGEST, SHORTEST = 0.02, 1e-8
@@ -44,13 +45,13 @@ class Curve:
     finished: bool = True  #: False: cut short at ``MOST_STEPS``, or where the curve could not be followed
 
 
-def regular(system: System, z: Floats) -> bool:
+def regular(system: Equations, z: Floats) -> bool:
     """Whether the solutions near z are one curve: the Jacobian has full rank beyond rounding."""
     sizes = np.linalg.svd(system(z)[1], compute_uv=False)
     return bool(sizes[-1] > RANK * sizes[0])
 
 
-def newton(system: System, z: Floats, reach: float, normal: Floats | None = None) -> Floats | None:
+def newton(system: Equations, z: Floats, reach: float, normal: Floats | None = None) -> Floats | None:
     """Solution near z: the nearest one, or the one in the plane through z with this normal.
 
     A system of as many equations as unknowns is solved as it is.
@@ -80,14 +81,14 @@ def newton(system: System, z: Floats, reach: float, normal: Floats | None = None
     return z if size < 1e-11 else None
 
 
-def tangent_at(system: System, z: Floats) -> Floats:
+def tangent_at(system: Equations, z: Floats) -> Floats:
     """Unit tangent of the curve, of either direction."""
     tangent: Floats = np.linalg.svd(system(z)[1])[2][-1]
     return tangent
 
 
 def trace(
-    system: System,
+    system: Equations,
     start: Floats,
     inside: Callable[[Floats], bool],
     finish: Callable[[Floats, Floats], Floats],
@@ -116,7 +117,7 @@ def trace(
 
 
 def _march(
-    system: System,
+    system: Equations,
     start: Floats,
     tangent: Floats,
     inside: Callable[[Floats], bool],

@@ -7,7 +7,7 @@ rounding ends it. What changes twice between neighbours that do not differ is no
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Literal
@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.atlas.resting_map import RestingMap, map_resting_places
+from fastmech.atlas.resting_map import RestingMap, map_resting_places, resting_places_at
 from fastmech.equilibria.outcome import Outcome
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
@@ -35,8 +35,8 @@ BETWEEN = (0.5, 0.38, 0.62, 0.46, 0.54)
 #: A pitchfork's pair lies so evenly about the equilibrium that it comes from, in its own distance.
 EVENLY = 0.1
 
-#: A damping rate below this share of the frequencies is none: two frequencies coalesce.
-NO_DAMPING = 1e-6
+#: A swing slower than this part of the fastest one is none: the eigenvalue passes zero.
+STEADY = 1e-6
 
 
 @dataclass(frozen=True)
@@ -80,53 +80,36 @@ def critical_values(
     if not isinstance(mechanism, Mechanism):
         raise InputError(f"mechanism = {shown(mechanism)}: must be a Mechanism; fm.find_folds is for a Scene")
 
-    def lists(at: ArrayLike) -> RestingMap:
-        return map_resting_places(mechanism, {parameter: at}, threads=threads)
-
     first = map_resting_places(mechanism, {parameter: values}, threads=threads, progress=progress)
     grid = first.axes[parameter]
     if grid.size < 2 or grid[-1] < grid[0]:
         raise InputError(f"values = {shown(values)}: must be two or more rising values")
-    known = [_Known(float(x), first, k) for k, x in enumerate(grid) if first.outcome[k] == Outcome.COMPLETE]
-    todo = [(a, b) for a, b in pairwise(known) if a.holds != b.holds]
-    located = []
-    for _ in range(HALVINGS):
-        if not todo:
-            break
-        middles = [a.value + share * (b.value - a.value) for a, b in todo for share in BETWEEN]
-        order = np.argsort(middles)
-        rising, place = np.unique(np.array(middles)[order], return_inverse=True)
-        found, where = lists(rising), np.empty(len(middles), dtype=np.int64)
-        where[order] = place
-        following = []
-        for k, (a, b) in enumerate(todo):
-            own = where[k * len(BETWEEN) : (k + 1) * len(BETWEEN)]
-            between = [_Known(float(rising[i]), found, i) for i in own]
-            usable = [one for one in between if one.complete and a.value < one.value < b.value]
-            if not usable or b.value - a.value <= WIDTH * max(abs(a.value), abs(b.value)):
-                located.append((a, b))
-                continue
-            chain = sorted([a, *usable, b], key=lambda one: one.value)
-            following += [(c, d) for c, d in pairwise(chain) if c.holds != d.holds]
-        todo = following
-    merged: list[tuple[_Known, _Known]] = []
-    for a, b in sorted(located + todo, key=lambda pair: pair[0].value):
+    known = [Known(grid[[k]], first, k) for k in range(grid.size) if first.outcome[k] == Outcome.COMPLETE]
+    located = narrowed(mechanism, first.axes, changes(known), HALVINGS, threads=threads)
+    merged: list[tuple[Known, Known]] = []
+    for a, b in sorted(located, key=lambda pair: float(pair[0].at[0])):
         # Within rounding of one value lists may change more than once.
-        if merged and a.value - merged[-1][1].value <= SAME * max(abs(a.value), abs(b.value)):
+        if merged and a.at[0] - merged[-1][1].at[0] <= SAME * max(abs(a.at[0]), abs(b.at[0])):
             a = merged.pop()[0]
         merged.append((a, b))
-    return [_named(mechanism, a, b) for a, b in merged if a.holds != b.holds]
+    found = []
+    for a, b in merged:
+        if a.holds != b.holds:
+            kind, position, _ = named(mechanism, [parameter], a, b)
+            value, width = 0.5 * a.at[0] + 0.5 * b.at[0], b.at[0] - a.at[0]
+            found.append(CriticalValue(float(value), float(width), kind, tuple(map(float, position))))
+    return found
 
 
-class _Known:
-    """The list at one value."""
+class Known:
+    """A proved list of equilibria and the values of parameters that it is for."""
 
-    def __init__(self, value: float, found: RestingMap, k: int) -> None:
-        self.value, self.complete = value, found.outcome[k] == Outcome.COMPLETE
+    def __init__(self, at: Floats, found: RestingMap, k: Any) -> None:
+        self.at = at
         n = int(found.count[k])
-        self.position, self.eigenvalues = found.position[k, :n], found.eigenvalues[k, :n]
-        self.index, self.verdict = found.morse_index[k, :n], found.verdict[k, :n]
-        self.orientation = found.orientation[k, :n]
+        self.position, self.eigenvalues = found.position[k][:n], found.eigenvalues[k][:n]
+        self.index, self.verdict = found.morse_index[k][:n], found.verdict[k][:n]
+        self.orientation = found.orientation[k][:n]
 
     @property
     def holds(self) -> tuple[Any, ...]:
@@ -136,8 +119,47 @@ class _Known:
         )
 
 
-def _named(mechanism: Mechanism, a: _Known, b: _Known) -> CriticalValue:
-    """What changes between two lists that are next to each other."""
+Pairs = list[tuple[Known, Known]]
+
+
+def changes(known: list[Known]) -> Pairs:
+    """Neighbours whose lists differ."""
+    return [(a, b) for a, b in pairwise(known) if a.holds != b.holds]
+
+
+def narrowed(
+    mechanism: Mechanism, axes: dict[str, Floats], todo: Pairs, halvings: int, *, threads: int | None = None
+) -> Pairs:
+    """Pairs whose lists differ, nearer to each other by so many halvings, or within rounding."""
+    located: Pairs = []
+    for _ in range(halvings):
+        between: list[Known | None] = [None] * len(todo)
+        for share in BETWEEN:
+            open_ones = [k for k, middle in enumerate(between) if middle is None]
+            if not open_ones:
+                break
+            at = np.array([todo[k][0].at + share * (todo[k][1].at - todo[k][0].at) for k in open_ones])
+            found = resting_places_at(mechanism, axes, list(at.T), threads=threads)
+            for row, k in enumerate(open_ones):
+                a, b = todo[k]
+                inside = (at[row] != a.at).any() and (at[row] != b.at).any()
+                if inside and found.outcome[row] == Outcome.COMPLETE:
+                    between[k] = Known(at[row], found, row)
+        following: Pairs = []
+        for (a, b), middle in zip(todo, between, strict=True):
+            size = np.maximum(np.abs(a.at), np.abs(b.at))
+            if middle is None or (np.abs(b.at - a.at) <= WIDTH * size).all():
+                located.append((a, b))
+            else:
+                following += changes([a, middle, b])
+        todo = following
+        if not todo:
+            break
+    return located + todo
+
+
+def named(mechanism: Mechanism, names: Iterable[str], a: Known, b: Known) -> tuple[Any, Floats, float]:
+    """What changes between two lists that are next to each other, where, and the frequency [rad/s] there."""
     less, more = (a, b) if len(a.position) <= len(b.position) else (b, a)
     turning = np.array([c.periodic for c in mechanism.coordinates])
 
@@ -146,10 +168,6 @@ def _named(mechanism: Mechanism, a: _Known, b: _Known) -> CriticalValue:
         return np.asarray(
             np.abs(np.where(turning, np.remainder(away + np.pi, 2 * np.pi) - np.pi, away)).max(2)
         )
-
-    def told(kind: Any, position: Floats) -> CriticalValue:
-        value = 0.5 * a.value + 0.5 * b.value
-        return CriticalValue(value, b.value - a.value, kind, tuple(map(float, position)))
 
     unknown = np.full(len(mechanism.coordinates), np.nan)
     left = list(range(len(more.position)))
@@ -167,21 +185,21 @@ def _named(mechanism: Mechanism, a: _Known, b: _Known) -> CriticalValue:
         )
         beside = apart(middle[None], less.position).min(initial=np.inf)
         changed = [(i, j) for i, j in pairs if less.index[i] != more.index[j]]
-        return told("pitchfork" if beside < EVENLY * size and changed else "fold", middle)
+        return "pitchfork" if beside < EVENLY * size and changed else "fold", middle, 0.0
     if left:
-        return told("several", unknown)
+        return "several", unknown, 0.0
     indices = [
         (i, j)
         for i, j in pairs
         if less.orientation[i] != more.orientation[j] or less.index[i] != more.index[j]
     ]
     if indices:
-        return told("exchange" if len(indices) == 2 else "several", more.position[indices[0][1]])
+        return "exchange" if len(indices) == 2 else "several", more.position[indices[0][1]], 0.0
     verdicts = [(i, j) for i, j in pairs if less.verdict[i] != more.verdict[j]]
     i, j = verdicts[0]
     roots = more.eigenvalues[j] if VERDICTS[more.verdict[j]] == "unstable" else less.eigenvalues[i]
     fast = float(np.abs(roots).max()) or 1.0
-    steady = np.abs(roots[0].imag) < NO_DAMPING * fast
-    undamped = np.abs(roots.real).max() < 1e3 * NO_DAMPING * fast
-    kind = "divergence" if steady else ("coalescence" if undamped else "Hopf")
-    return told(kind if len(verdicts) == 1 else "several", more.position[j])
+    damping = mechanism.linear(more.position[j], dict(zip(names, more.at, strict=True))).damping
+    swings = "Hopf" if damping.any() else "coalescence"
+    kind = "divergence" if abs(roots[0].imag) < STEADY * fast else swings
+    return kind if len(verdicts) == 1 else "several", more.position[j], abs(float(roots[0].imag))

@@ -214,8 +214,10 @@ def inside(z: Floats) -> bool:
     return bool(((z[-2:] >= 0.0) & (z[-2:] <= 1.0)).all())
 
 
-def finish_on_edge(equations: System) -> Callable[[Floats, Floats], Floats]:
-    """How a curve ends: on the side of the rectangle that it crosses."""
+def finish_on_edge(
+    equations: Callable[[Floats], tuple[Floats, Floats]], inside: Callable[[Floats], bool] = inside
+) -> Callable[[Floats, Floats], Floats]:
+    """How a curve ends: on the side of the rectangle that it crosses, or where else it is not inside."""
 
     def finish(last: Floats, beyond: Floats) -> Floats:
         for k in (-2, -1):

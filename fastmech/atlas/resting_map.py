@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -92,9 +92,23 @@ def map_resting_places(
     grid = tuple(values.size for values in checked.values())
     total = math.prod(grid)
     checks.memory(total, POINT_NUMBERS, f"axes: {total:.3g} points", "fewer")
+    columns = np.meshgrid(*checked.values(), indexing="ij")
+    return resting_places_at(mechanism, checked, columns, threads=threads, progress=progress)
+
+
+def resting_places_at(
+    mechanism: Mechanism,
+    axes: dict[str, Floats],
+    columns: Sequence[Floats],
+    *,
+    threads: int | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> RestingMap:
+    """The map at any points: ``columns`` are the values of the parameters ``axes``, arrays of one shape."""
+    grid, total = columns[0].shape, columns[0].size
     rows = np.tile(np.array(list(mechanism.parameters.values())), (total, 1))
     order = list(mechanism.parameters)
-    for name, column in zip(checked, np.meshgrid(*checked.values(), indexing="ij"), strict=True):
+    for name, column in zip(axes, columns, strict=True):
         rows[:, order.index(name)] = column.ravel()
     statics, blocks = mechanism.statics(), [_Block()] * (-(-total // BLOCK))
 
@@ -105,7 +119,7 @@ def map_resting_places(
             progress(part.stop - part.start)
 
     in_parts(solve, total, threads, BLOCK)
-    return _joined(mechanism, checked, blocks)
+    return _joined(mechanism, axes, grid, blocks)
 
 
 @dataclass(frozen=True)
@@ -172,13 +186,15 @@ def _assessed(mechanism: Mechanism, rows: Floats, found: Found) -> _Block:
     return _Block(number.astype(np.int16), outcome, point[order], each)
 
 
-def _joined(mechanism: Mechanism, axes: dict[str, Floats], blocks: list[_Block]) -> RestingMap:
+def _joined(
+    mechanism: Mechanism, axes: dict[str, Floats], grid: tuple[int, ...], blocks: list[_Block]
+) -> RestingMap:
     """All points, each equilibrium in its slot."""
     count = np.concatenate([block.count for block in blocks])
     first = np.concatenate([[0], np.cumsum(count)])[:-1]
     point = np.repeat(np.arange(count.size), count)
     slot = np.arange(point.size) - first[point]
-    slots, grid = int(count.max(initial=0)), tuple(values.size for values in axes.values())
+    slots = int(count.max(initial=0))
     arrays: dict[str, Any] = {}
     for name in blocks[0].each:
         values = np.concatenate([block.each[name] for block in blocks])

@@ -1,0 +1,250 @@
+"""``fm.critical_curves``: folds, pitchforks, Hopf points and coalescing frequencies over two parameters.
+
+Proved lists on a grid of both parameters tell between which neighbours something changes. From there Newton's
+method on the critical point's defining system gives a point of a curve, and continuation the curve. A curve
+that passes between all points of the grid is not seen, nor where two equilibria only exchange their stability:
+lists hold the same then.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
+
+from fastmech.atlas.continuation import LONGEST, Curve, Equations, distance, newton, trace
+from fastmech.atlas.critical import Known, Pairs, changes, named, narrowed
+from fastmech.atlas.defining import Balance
+from fastmech.atlas.folds import finish_on_edge
+from fastmech.atlas.resting_map import map_resting_places
+from fastmech.equilibria.outcome import Outcome
+from fastmech.errors import InputError, shown
+from fastmech.models.mechanism import Mechanism
+
+Floats = NDArray[np.float64]
+
+#: Halvings of an edge of the grid before Newton's method is tried.
+HALVINGS = 10
+
+#: How far Newton's method may go from there, and how near to a curve is on it [rad, parts of the ranges].
+REACH, ON = 0.1, 2.0 * LONGEST
+
+#: Curves of one kind after which none is begun.
+MOST_CURVES = 100
+
+#: A fold at which the forces change by the parameters along the null vector by less is none: a pitchfork.
+SYMMETRIC = 1e-6
+
+#: A branch point at which the forces' second derivative along the null vector is larger is no pitchfork.
+EVEN = 1e-5
+
+Kind = Literal["fold", "pitchfork", "Hopf", "coalescence"]
+
+
+@dataclass(frozen=True, eq=False)
+class CriticalCurve:
+    """A curve of critical points; arrays over its points, in order."""
+
+    kind: Kind
+    x: Floats  #: values of the first parameter
+    y: Floats  #: values of the second one
+    position: Floats  #: of the equilibrium (points, n) [rad or m]
+    frequency: Floats  #: of the swing that grows [rad/s]; 0 at folds and pitchforks
+    closed: bool  #: the last point is the first one
+    finished: bool  #: it ends where it leaves the ranges, closes, or meets another curve
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CriticalCurves:
+    """The critical curves that a grid shows."""
+
+    names: tuple[str, str]  #: of the parameters
+    coordinates: tuple[str, ...]
+    curves: tuple[CriticalCurve, ...]
+    cusps: Floats  #: (cusps, 2 + n): values of both parameters, position
+    changes: int  #: edges of the grid between whose ends the equilibria change
+    unexplained: Floats  #: (k, 2): changes on no curve
+
+    def __repr__(self) -> str:
+        kinds = [curve.kind for curve in self.curves]
+        told = ", ".join(f"{kinds.count(kind)} of {kind}s" for kind in dict.fromkeys(kinds)) or "none"
+        lines = [
+            f"critical curves over {self.names[0]} and {self.names[1]}: {told}",
+            f"  {len(self.cusps)} cusps; of {self.changes:,} changes on the grid "
+            f"{len(self.unexplained):,} lie on no curve",
+        ]
+        return "\n".join(lines)
+
+
+def critical_curves(
+    mechanism: Mechanism,
+    x: tuple[str, ArrayLike],
+    y: tuple[str, ArrayLike],
+    *,
+    threads: int | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> CriticalCurves:
+    """Curves over two parameters on which equilibria appear, vanish or change their stability.
+
+    Args:
+        mechanism: gives the other parameters; loads are at their means.
+        x, y: name and rising values of a parameter; what passes between all points of the grid is missed.
+        threads: threads to use; the result does not depend on it.
+        progress: is told how many points of the grid are done since its last call.
+
+    Raises:
+        InputError: an argument is wrong, or as :func:`fastmech.find_equilibria`.
+    """
+    if not isinstance(mechanism, Mechanism):
+        raise InputError(
+            f"mechanism = {shown(mechanism)}: must be a Mechanism; fm.trace_folds is for a Scene"
+        )
+    for name, given in (("x", x), ("y", y)):
+        if not isinstance(given, tuple | list) or len(given) != 2 or not isinstance(given[0], str):
+            raise InputError(f"{name} = {shown(given)}: must be a parameter's name and its values")
+    if x[0] == y[0]:
+        raise InputError(f"axes: {x[0]} is given twice; two different parameters are needed")
+    found = map_resting_places(mechanism, dict((x, y)), threads=threads, progress=progress)
+    for name, values in found.axes.items():
+        if values.size < 2 or values[-1] < values[0]:
+            raise InputError(f"{name}: must have two or more rising values")
+    pairs = _changes(found)
+    balance = Balance(
+        mechanism,
+        {name: float(values[0]) for name, values in found.axes.items()},
+        {name: float(values[-1]) for name, values in found.axes.items()},
+    )
+    search = _Search(balance)
+    for a, b in narrowed(mechanism, found.axes, pairs, HALVINGS, threads=threads):
+        search.begin(*named(mechanism, found.axes, a, b), 0.5 * (a.at + b.at))
+    lost = [at for at in search.lost if not search.explains(at)]
+    names: Any = tuple(found.axes)
+    cusps = [search.cusps(curve) for kind, curve in search.curves if kind == "fold"]
+    return CriticalCurves(
+        names,
+        found.names,
+        tuple(search.told(kind, curve) for kind, curve in search.curves),
+        np.concatenate([np.empty((0, 2 + balance.n)), *cusps]),
+        len(pairs),
+        np.array(lost).reshape(-1, 2),
+    )
+
+
+def _changes(found: Any) -> Pairs:
+    """Neighbours on the grid whose lists differ; lists that are not complete are passed over."""
+    first, second = found.axes.values()
+    pairs: Pairs = []
+    for turned in (False, True):
+        outer, inner = (second, first) if turned else (first, second)
+        for i in range(outer.size):
+            line = []
+            for j in range(inner.size):
+                k = (j, i) if turned else (i, j)
+                if found.outcome[k] == Outcome.COMPLETE:
+                    line.append(Known(np.array([first[k[0]], second[k[1]]]), found, k))
+            pairs += changes(line)
+    return pairs
+
+
+class _Search:
+    """The curves that are known so far."""
+
+    def __init__(self, balance: Balance) -> None:
+        self._balance, self.curves, self.lost = balance, list[tuple[Kind, Curve]](), list[Floats]()
+
+    def begin(self, kind: Any, position: Floats, frequency: float, at: Floats) -> None:
+        """Trace the curve through a critical point that is about here, unless it is known."""
+        balance, n = self._balance, self._balance.n
+        if not np.isfinite(position).all():
+            self.lost.append(at)
+            return
+        place = balance.point(position, at)
+        if len(self.curves) >= MOST_CURVES or any(self._near(curve, place) for _, curve in self.curves):
+            return
+        balance.rescale(place)
+        ways = {
+            "Hopf": [("Hopf", balance.hopf)],
+            "coalescence": [("coalescence", balance.coalescence)],
+            "fold": [("fold", balance.singular), ("pitchfork", balance.unfolded)],
+        }
+        even: list[tuple[Any, Equations]] = [("pitchfork", balance.unfolded), ("fold", balance.singular)]
+        for name, equations in ways.get(kind, even):
+            more = {"Hopf": [frequency / balance.rate], "pitchfork": [0.0], "fold": []}.get(
+                name, [(frequency / balance.rate) ** 2]
+            )
+            z = newton(equations, np.insert(place, n, more), REACH)
+            if z is None or not self._inside(z):
+                continue
+            own = self._kind(z, name)
+            if own is None:
+                continue
+            if not any(one == own and self._near(curve, z) for one, curve in self.curves):
+                finish = finish_on_edge(equations, self._inside)
+                self.curves.append((own, trace(equations, z, self._inside, finish, balance.apart)))
+            return
+        self.lost.append(at)
+
+    def _kind(self, z: Floats, name: Any) -> Kind | None:
+        """What a critical point is; None if other equations than its name's are its own."""
+        if name in ("Hopf", "coalescence"):
+            return cast(Kind, name)
+        flat = np.delete(z, self._balance.n) if name == "pitchfork" else z
+        bent, moved, _ = self._balance.bend(flat)
+        if name == "fold":
+            return "fold" if moved > SYMMETRIC else None
+        even = max(abs(z[self._balance.n]), moved) < SYMMETRIC and abs(bent) < EVEN
+        return "pitchfork" if even else None
+
+    def _inside(self, z: Floats) -> bool:
+        swings = len(z) == self._balance.n + 2 or z[self._balance.n] >= -SYMMETRIC
+        return bool(swings and self._balance.in_range(z))
+
+    def _near(self, curve: Curve, z: Floats) -> bool:
+        points = self._flat(curve.points)
+        return distance(points, self._flat(z), self._balance.apart)[0] < ON
+
+    def _flat(self, z: Floats) -> Floats:
+        """Without the further unknown."""
+        n = self._balance.n
+        return np.concatenate([z[..., :n], z[..., -2:]], axis=-1)
+
+    def explains(self, at: Floats) -> bool:
+        """Whether a curve passes these values of the parameters."""
+        here = (at - self._balance.low) / self._balance.span
+        return any(
+            distance(curve.points[:, -2:], here, lambda a, b: a - b)[0] < ON for _, curve in self.curves
+        )
+
+    def cusps(self, curve: Curve) -> Floats:
+        """Values and position of the cusps of a fold curve (k, 2 + n)."""
+        balance, places = self._balance, []
+        _, _, left = balance.bend(curve.points[0])
+
+        def bent(share: float, a: Floats, b: Floats, left: Floats) -> float:
+            z = newton(balance.singular, a + share * balance.apart(b, a), REACH, balance.apart(b, a))
+            value, _, own = balance.bend(a if z is None else z)
+            return value * float(np.sign(own @ left))
+
+        for a, b in zip(curve.points[:-1], curve.points[1:], strict=True):
+            if bent(0.0, a, b, left) * bent(1.0, a, b, left) < 0.0:
+                share = brentq(bent, 0.0, 1.0, (a, b, left), xtol=1e-14)
+                z = newton(balance.singular, a + share * balance.apart(b, a), REACH, balance.apart(b, a))
+                if z is not None:
+                    places.append(np.concatenate([balance.values(z), balance.position(z)]))
+            _, _, own = balance.bend(b)
+            left = own * np.sign(own @ left)
+        return np.array(places).reshape(-1, 2 + balance.n)
+
+    def told(self, kind: Kind, curve: Curve) -> CriticalCurve:
+        """In the parameters' and coordinates' units."""
+        balance, z = self._balance, curve.points
+        x, y = balance.values(z).T
+        swings = {"Hopf": 1.0, "coalescence": 0.5}
+        fast = np.abs(z[:, balance.n]) ** swings[kind] if kind in swings else np.zeros(len(z))
+        return CriticalCurve(
+            kind, x, y, balance.position(z), balance.rate * fast, curve.closed, curve.finished
+        )

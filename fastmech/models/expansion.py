@@ -1,0 +1,41 @@
+"""Derivatives of a mechanism's forces at rest, of its metric and of its damping, as functions of numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import sympy
+
+if TYPE_CHECKING:
+    from fastmech.models.mechanism import Mechanism
+
+
+class Expansion(NamedTuple):
+    """Functions of coordinates and then of some parameters, together z; each gives one flat list."""
+
+    forces: Callable[..., list[float]]  #: forces at rest (n,), their derivatives by z (n, z) and (n, z, z)
+    motion: Callable[..., list[float]]  #: metric and damping (2, n, n), their derivatives by z (2, n, n, z)
+
+
+def expansion(mechanism: Mechanism, names: Sequence[str]) -> Expansion:
+    """Of the parameters ``names``; the others have their values, loads are at their means."""
+    values = {
+        sympy.Symbol(name, real=True): sympy.Float(value)
+        for name, value in mechanism.parameters.items()
+        if name not in names
+    }
+    q = [coordinate.symbol for coordinate in mechanism.coordinates]
+    v = [sympy.Symbol(f"{symbol}_dot", real=True) for symbol in q]
+    z = [*q, *(sympy.Symbol(name, real=True) for name in names)]
+    found = mechanism.equations
+    still = dict.fromkeys(v, 0) | found.means
+    forces = [sympy.sympify(force).xreplace(values) for force in mechanism.statics().forces]
+    first = [force.diff(x) for force in forces for x in z]
+    second = [slope.diff(x) for slope in first for x in z]
+    damping = [-sympy.diff(force, rate).subs(still) for force in found.forces for rate in v]
+    inertia = [sympy.sympify(entry).xreplace(values) for entry in [*found.metric, *damping]]
+    return Expansion(
+        sympy.lambdify(z, [*forces, *first, *second], modules="math", cse=True),
+        sympy.lambdify(z, [*inertia, *(entry.diff(x) for entry in inertia for x in z)], "math", cse=True),
+    )
