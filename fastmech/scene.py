@@ -8,7 +8,7 @@ import sys
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Self, cast
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
@@ -64,6 +64,9 @@ class Scene(BaseModel):
     Frozen; a wrong name, type or value raises :class:`fastmech.errors.InputError` with one line that names
     the field, the value and what is allowed. The standard gravity 9.80665 m/s^2 is what the paper computed
     with. Masses m1 and m2 must be positive: without either the metric is singular.
+
+    ``Scene(load=...)`` gives the same device under another load on M2 along +x, one of :mod:`fastmech.loads`,
+    in place of F0 exp(-alpha t): a :class:`fastmech.Mechanism`, :func:`fastmech.mechanisms.slider_pendulum`.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
@@ -78,6 +81,17 @@ class Scene(BaseModel):
     g: NonNegative = Field(9.80665, description="acceleration of gravity")
     F0: Number = Field(100.0, description="force on M2 along +x at t = 0")
     alpha: NonNegative = Field(0.7, description="decay rate of the force F0 exp(-alpha t)")
+
+    def __new__(cls, *, load: Any = None, **parameters: Any) -> Self:
+        """The scene; under a load of ``fm.loads`` the mechanism that it stands for."""
+        if load is None:
+            return super().__new__(cls)
+        from fastmech.mechanisms.slider_pendulum import slider_pendulum  # what is general knows the scene
+
+        for name in {"F0", "alpha"} & set(parameters):
+            raise InputError(f"scene.{name}: the load acts in place of F0 exp(-alpha t); give one of them")
+        made: Any = slider_pendulum(load).replace(**cls(**parameters).model_dump(exclude={"F0", "alpha"}))
+        return cast(Self, made)
 
     def __init__(self, **parameters: Any) -> None:
         try:

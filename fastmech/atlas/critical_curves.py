@@ -2,8 +2,8 @@
 
 Proved lists on a grid of both parameters tell between which neighbours something changes. From there Newton's
 method on the critical point's defining system gives a point of a curve, and continuation the curve. A curve
-that passes between all points of the grid is not seen, nor where two equilibria only exchange their stability:
-lists hold the same then.
+that passes between all points of the grid is not seen, nor where two equilibria only exchange their
+stability: lists hold the same then.
 """
 
 from __future__ import annotations

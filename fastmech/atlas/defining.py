@@ -15,9 +15,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.models.mechanism import Mechanism
+from fastmech.atlas.continuation import newton
+from fastmech.models.mechanism import Linear, Mechanism
+from fastmech.models.stability import spectra
 
 Floats = NDArray[np.float64]
+
+
+#: How far Newton's method may go to where flutter begins.
+NEAR = 0.01
 
 
 class Border(NamedTuple):
@@ -117,6 +123,30 @@ class Balance:
         scaled = np.array([unit * self.rate**2, unit * self.rate])
         value, first = np.split(found, [2 * n * n])
         return value.reshape(2, n, n) * scaled, first.reshape(2, n, n, k) * scaled[..., None] * self._by
+
+    def determinant(self, z: Floats) -> float:
+        """Of the forces' Jacobian by coordinates."""
+        return float(np.linalg.det(self.forces(z)[1][:, : self.n]))
+
+    def linear(self, z: Floats) -> Linear:
+        """Mass, damping and stiffness at points (..., unknowns)."""
+        return self.mechanism.linear(
+            self.position(z), dict(zip(self.names, np.moveaxis(self.values(z), -1, 0), strict=True))
+        )
+
+    def flutters(self, z: Floats) -> bool:
+        """Whether an equilibrium swings more and more."""
+        roots = spectra(self.linear(z[None]))[0]
+        return bool(((roots.roots.real > roots.errors) & (np.abs(roots.roots.imag) > roots.errors)).any())
+
+    def flutter(self, z: Floats) -> Floats:
+        """The equilibrium very near one that begins to flutter; itself if Newton's method finds none."""
+        linear = self.linear(z[None])
+        own = spectra(linear)[0]
+        fast = abs(float(own.roots[0, 0].imag * own.rate[0])) / self.rate
+        equations, more = (self.hopf, fast) if linear.damping.any() else (self.coalescence, fast * fast)
+        found = newton(equations, np.insert(z, self.n, more), NEAR)
+        return z if found is None else np.delete(found, self.n)
 
     def _arguments(self, z: Floats) -> list[float]:
         return [*(z[: self.n] * self.size).tolist(), *self.values(z).tolist()]

@@ -1,19 +1,24 @@
-"""The load, or any other parameter's value, at which the present resting position ends."""
+"""``fm.find_snap``: the load, or any other parameter's value, at which a resting position ends."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.atlas.continuation import newton, tangent_at
-from fastmech.atlas.enclosure import System
+from fastmech.atlas.continuation import Equations, newton, tangent_at
+from fastmech.atlas.defining import Balance
 from fastmech.atlas.systems import Plane, fold, point_at, rest
 from fastmech.equilibria.find import Equilibria, Equilibrium, find_equilibria
 from fastmech.errors import InputError, shown
+from fastmech.models.equilibria import RestingPlace, RestingPlaces
+from fastmech.models.equilibria import find_equilibria as resting_places
+from fastmech.models.mechanism import Mechanism
+from fastmech.models.stability import assess
 from fastmech.scene import Scene, nearest, require_scene
 
 Floats = NDArray[np.float64]
@@ -37,18 +42,21 @@ FAR = 100.0
 CROSSING = 1e-3
 
 
+#: What a position does at an end of its branch.
+How = Literal["disappears", "turns unstable", "begins to flutter", "leaves its range"]
+
+
 @dataclass(frozen=True)
 class Snap:
-    """Values of a parameter at which a resting position ends; angles in rad."""
+    """Values of a parameter at which a resting position ends."""
 
     parameter: str
     unit: str  #: of the parameter
-    phi: float  #: the position at the present value
-    theta: float
+    position: tuple[float, ...]  #: at the present value [rad or m]
     value: float  #: the present value
     below: float | None  #: value at which it ends when the parameter is lowered; None: at no value
     above: float | None  #: value at which it ends when the parameter is raised; None: at no value
-    unstable: tuple[bool, bool]  #: whether it turns unstable there, below and above, and does not disappear
+    how: tuple[How, How]  #: what it does there, below and above
     searched: tuple[float, float]  #: values that were searched
     exhaustive: bool  #: beyond the range there is no fold, so None means never
 
@@ -56,8 +64,8 @@ class Snap:
     def answer(self) -> str:
         """Where it ends, in words."""
         ends = [
-            f"{'turns unstable' if unstable else 'disappears'} at {value:.6g} {self.unit}"
-            for value, unstable in zip((self.below, self.above), self.unstable, strict=True)
+            f"{how} at {value:.6g} {self.unit}"
+            for value, how in zip((self.below, self.above), self.how, strict=True)
             if value is not None
         ]
         nowhere = "no load whatever" if self.parameter == "F0" else f"no {self.parameter} whatever"
@@ -80,36 +88,41 @@ class Snap:
             if self.parameter == "F0"
             else f"{self.parameter} = {self.value:g} {self.unit}"
         )
-        return f"the position ({self.phi:z.4f}, {self.theta:z.4f}) rad at {at} {self.answer}"
+        place = ", ".join(f"{x:z.4f}" for x in self.position)
+        return f"the position ({place}) at {at} {self.answer}"
 
 
 def find_snap(
-    scene: Scene,
-    equilibrium: Equilibrium | Sequence[float] | None = None,
+    system: Scene | Mechanism,
+    equilibrium: Any = None,
     searched: tuple[float, float] | None = None,
     *,
-    parameter: str = "F0",
+    parameter: str | None = None,
 ) -> Snap:
     """The values of a parameter, below and above the present one, at which a stable position ends.
 
     The position is followed as the parameter changes, until it merges with a saddle and disappears, or passes
-    through other equilibria and is unstable from there on (as symmetric ones do). The present load is F0
-    where alpha = 0 and 0 where alpha > 0, as in ``find_equilibria``; the loads searched are constant ones.
-    (A map or a search for folds over F0 asks for alpha = 0, since there F0 would be no load at all.)
+    through other equilibria and is unstable from there on (as symmetric ones do), or begins to flutter. A
+    mechanism's loads are at their means. The present load of a scene is F0 where alpha = 0 and 0 where
+    alpha > 0, as in ``find_equilibria``; the loads searched are constant ones. (A map or a search for folds
+    over F0 asks for alpha = 0, since there F0 would be no load at all.)
 
     Args:
-        scene: the mechanism at its present load.
-        equilibrium: a stable one of the scene, or about where it is, (phi, theta) [rad]; by default the
-            deepest.
-        searched: values to search; by default all at which a fold is possible, see ``fold_free``, but not
-            more than 100 times the present ones.
-        parameter: one of F0, c1, c2, m1, m2, l, g; SI units.
+        system: the mechanism at its present load.
+        equilibrium: a stable one of it, or about where it is: coordinates [rad or m], of a scene
+            (phi, theta). By default the deepest, of a mechanism the first stable one.
+        searched: values to search. A mechanism needs them. By default all at which a scene may have a fold,
+            see ``fold_free``, but not more than 100 times the present ones.
+        parameter: its name; of a scene one of F0, c1, c2, m1, m2, l, g, and F0 by default.
 
     Raises:
-        InputError: the equilibrium is not stable or not one of the scene, there is no stable one, the
+        InputError: the equilibrium is not stable or not one of the system, there is no stable one, the
             parameter moves no equilibrium, or the range does not hold its present value.
     """
-    require_scene(scene)
+    if isinstance(system, Mechanism):
+        return _of_mechanism(system, equilibrium, searched, parameter)
+    require_scene(system)
+    parameter = "F0" if parameter is None else parameter
     if parameter not in MOVING:
         hint = (
             nearest(parameter, list(MOVING))
@@ -117,8 +130,8 @@ def find_snap(
             else f"allowed: {', '.join(MOVING)}"
         )
         raise InputError(f"parameter = {shown(parameter)}: must be one that moves equilibria; {hint}")
-    found = find_equilibria(scene)
-    held = scene.replace(F0=found.force, alpha=0.0)
+    found = find_equilibria(system)
+    held = system.replace(F0=found.force, alpha=0.0)
     chosen = stable_at(found, equilibrium)
     present, unit, _ = held.described()[parameter]
     below, above = fold_free(held, parameter)
@@ -127,22 +140,87 @@ def find_snap(
         high = min(1.01 * max(above, abs(present)) + (parameter == "F0"), max(far, 1.01 * abs(present)))
         low = -high if parameter == "F0" else 1e-6 * present if below > 0.0 else 0.0
     else:
-        low, high = _range(held, searched, parameter, f"{present:g} {unit}")
+        low, high = _range(held, searched, parameter, present, unit)
     plane = Plane(held, (parameter,), (low,), (high,))
     start = np.array([chosen.phi, chosen.theta, *plane.parts([present])])
-    ends = [_ending(plane, start, direction) for direction in (-1.0, 1.0)]
-    return Snap(
-        parameter,
-        unit,
-        chosen.phi,
-        chosen.theta,
-        present,
-        ends[0][0],
-        ends[1][0],
-        (ends[0][1], ends[1][1]),
-        (low, high),
-        low <= below and high >= above,
+    branch = _Branch(
+        rest(plane),
+        fold(plane),
+        lambda z: float(point_at(plane, z[:, None]).determinant[0]),
+        lambda z: float(plane.values(z[2:])[parameter]),
     )
+    exhaustive = low <= below and high >= above
+    return _snap(branch, start, parameter, unit, (chosen.phi, chosen.theta), present, (low, high), exhaustive)
+
+
+def _of_mechanism(
+    mechanism: Mechanism, equilibrium: Any, searched: tuple[float, float] | None, parameter: str | None
+) -> Snap:
+    known = mechanism.described()
+    if parameter is None or parameter not in known:
+        raise InputError(f"parameter = {shown(parameter)}: must be one of {', '.join(known)}")
+    present, unit, _ = known[parameter]
+    low, high = _range(mechanism, searched, parameter, present, unit)
+    balance = Balance(mechanism, {parameter: low}, {parameter: high})
+    chosen = _stable_place(balance, equilibrium, present)
+    start = balance.point(chosen.position, np.array([present]))
+    balance.rescale(start)
+    side = np.sign(balance.determinant(start))
+    follows = not mechanism.statics().conservative
+    branch = _Branch(
+        balance.rest,
+        balance.singular,
+        lambda z: float(side * balance.determinant(z)),
+        lambda z: float(balance.values(z)[0]),
+        lambda z: follows and balance.flutters(z),
+        balance.flutter,
+        balance.in_range,
+    )
+    position = tuple(map(float, chosen.position))
+    return _snap(branch, start, parameter, unit, position, present, (low, high), False)
+
+
+def _stable_place(balance: Balance, wanted: Any, present: float) -> RestingPlace:
+    """The stable resting place wanted, one of the list or about where it is; by default the first."""
+    mechanism = balance.mechanism
+    found = cast(RestingPlaces, resting_places(mechanism))
+    stable = [  # where nothing damps and forces follow, swings that keep their size have to do
+        k
+        for k, place in enumerate(found)
+        if place.orientation != 0
+        and assess(mechanism.linear(place.position), place.morse_index).verdict != "unstable"
+    ]
+    if not stable:
+        raise InputError("equilibrium: the mechanism has no stable one")
+    if wanted is None:
+        return found[stable[0]]
+    if isinstance(wanted, RestingPlace):
+        if (k := found.index_of(wanted)) in stable:
+            return found[k]
+        raise InputError(f"equilibrium = {shown(wanted.position.tolist())}: must be a stable one")
+    try:
+        near = np.asarray(wanted, dtype=np.float64)
+    except (TypeError, ValueError):
+        near = np.empty(0)
+    if near.shape != (balance.n,):
+        raise InputError(
+            f"equilibrium = {shown(wanted)}: must be one of fastmech.find_equilibria, or its coordinates"
+        )
+    points = np.array([balance.point(found[k].position, np.array([present])) for k in stable])
+    away = np.abs(balance.apart(points, balance.point(near, np.array([present])))).max(axis=1)
+    if away.min() <= NEAR:
+        return found[stable[int(np.argmin(away))]]
+    places = "; ".join(", ".join(f"{x:.4f}" for x in found[k].position) for k in stable)
+    raise InputError(f"equilibrium = {shown(near.tolist())}: is near no stable one; they are at {places}")
+
+
+def _snap(
+    branch: _Branch, start: Floats, parameter: str, unit: str, position: tuple[float, ...],
+    present: float, searched: tuple[float, float], exhaustive: bool,
+) -> Snap:  # fmt: skip
+    below, above = (_ending(branch, start, direction) for direction in (-1.0, 1.0))
+    how = below[1], above[1]
+    return Snap(parameter, unit, position, present, below[0], above[0], how, searched, exhaustive)
 
 
 def fold_free(scene: Scene, parameter: str) -> tuple[float, float]:
@@ -187,18 +265,21 @@ def _natural(scene: Scene, parameter: str) -> float:
     )
 
 
-def _range(scene: Scene, searched: object, parameter: str, present: str) -> tuple[float, float]:
+def _range(
+    system: Scene | Mechanism, searched: object, parameter: str, present: float, unit: str
+) -> tuple[float, float]:
     try:
         ends = np.asarray(searched)
     except ValueError:
         ends = np.array(None)
     if ends.dtype.kind in "iuf" and ends.shape == (2,) and np.isfinite(ends).all():
         low, high = (float(end) for end in ends)
-        if low < high and low <= getattr(scene, parameter) <= high:
+        if low < high and low <= present <= high:
             for end in (low, high):
-                scene.replace(**{parameter: end})
+                system.replace(**{parameter: end})
             return low, high
-    raise InputError(f"searched = {shown(searched)}: must be a range of {parameter} that holds {present}")
+    told = f"{present:g} {unit}"
+    raise InputError(f"searched = {shown(searched)}: must be a range of {parameter} that holds {told}")
 
 
 def stable_at(found: Equilibria, wanted: Equilibrium | Sequence[float] | None) -> Equilibrium:
@@ -233,72 +314,89 @@ def stable_at(found: Equilibria, wanted: Equilibrium | Sequence[float] | None) -
     raise InputError(f"equilibrium = ({phi:g}, {theta:g}) rad: is near no stable one; they are at {places}")
 
 
-def _ending(plane: Plane, start: Floats, direction: float) -> tuple[float | None, bool]:
-    """Value at which the branch from ``start`` ceases to be stable, and whether it goes on unstable.
+class _Branch(NamedTuple):
+    """What is known of the equilibria over one parameter; points are (coordinates, part of its range)."""
 
-    None if it leaves the range before. A minimum can always be followed a little further. Where no step
-    succeeds, the branch has come as near to its end as a step is short, and what Newton's method cannot
-    polish there is that end. Where a symmetric position takes over from two tilted ones, their branch turns
+    rest: Equations
+    fold: Equations
+    determinant: Callable[[Floats], float]  #: of the stiffness, positive where the position is stable
+    value: Callable[[Floats], float]  #: of the parameter
+    flutters: Callable[[Floats], bool] = lambda z: False
+    flutter: Callable[[Floats], Floats] = lambda z: z  #: where it begins, from very near
+    in_range: Callable[[Floats], bool] = lambda z: bool(0.0 <= z[-1] <= 1.0)
+
+
+def _ending(branch: _Branch, start: Floats, direction: float) -> tuple[float | None, How]:
+    """Value at which the branch from ``start`` ceases to be stable, and what it does there.
+
+    None if it leaves the parameter's range before. A minimum can always be followed a little further. Where
+    no step succeeds, the branch has come as near to its end as a step is short, and what Newton's method
+    cannot polish there is that end. Where a symmetric position takes over from two tilted ones, their branch turns
     back and is stable on both sides: the symmetric one is followed on.
     """
-    equations, folds = rest(plane), fold(plane)
-    along = np.array([0.0, 0.0, direction])
-    z, step = start, 0.25 * STEP
-    tangent = tangent_at(equations, z)
+    along = np.zeros(start.size)
+    along[-1] = direction
+    z, step, flutters, outside = start, 0.25 * STEP, False, False
+    tangent = tangent_at(branch.rest, z)
     tangent = tangent * math.copysign(1.0, tangent @ along)
     while step > SHORTEST:
-        there = newton(equations, z + step * tangent, 0.3 * step, tangent)
-        ahead = None if there is None else tangent_at(equations, there)
-        if there is None or ahead is None or abs(ahead @ tangent) < 0.985 or not 0.0 <= there[2] <= 1.0:
+        there = newton(branch.rest, z + step * tangent, 0.3 * step, tangent)
+        ahead = None if there is None else tangent_at(branch.rest, there)
+        inside = there is not None and branch.in_range(there)
+        if there is None or ahead is None or abs(ahead @ tangent) < 0.985 or not inside:
+            outside = there is not None and not inside
             step *= 0.5
             continue
+        if branch.flutters(there):
+            flutters, step = True, 0.5 * step
+            continue
         ahead = ahead * math.copysign(1.0, ahead @ tangent)
-        unstable = _determinant(plane, there) <= 0.0
+        unstable = branch.determinant(there) <= 0.0
         if unstable or ahead @ along < 0.0:
-            turn = newton(folds, 0.5 * (z + there), 4.0 * step) if unstable else z
+            turn = newton(branch.fold, 0.5 * (z + there), 4.0 * step) if unstable else z
             if turn is None or (not unstable and step > PAST):
                 step *= 0.5
                 continue
             z = turn
-            beyond = _successor(plane, equations, z, direction) if _crosses(folds, z) else None
+            beyond = _successor(branch, z, direction) if _crosses(branch.fold, z) else None
             if beyond is None:
                 break
-            there, ahead = beyond, tangent_at(equations, beyond)
+            there, ahead = beyond, tangent_at(branch.rest, beyond)
             ahead = ahead * math.copysign(1.0, ahead @ along)
-        z, tangent, step = there, ahead, min(STEP, 1.5 * step)
-    if min(z[2], 1.0 - z[2]) < 10.0 * SHORTEST:
-        return None, False
-    crosses = _crosses(folds, z)
+        z, tangent, step, flutters = there, ahead, min(STEP, 1.5 * step), False
+    if min(z[-1], 1.0 - z[-1]) < 10.0 * SHORTEST:
+        return None, "disappears"
+    if flutters:
+        return branch.value(branch.flutter(z)), "begins to flutter"
+    if outside:
+        return branch.value(z), "leaves its range"
+    crosses = _crosses(branch.fold, z)
     if crosses:
         # Newton's method stops short of where branches meet; the determinant passes through zero there.
-        after, before = _determinant(plane, z + PAST * tangent), _determinant(plane, z - PAST * tangent)
-        rest_of_it = 2.0 * PAST * _determinant(plane, z) / (before - after) if before != after else math.inf
+        after, before = branch.determinant(z + PAST * tangent), branch.determinant(z - PAST * tangent)
+        rest_of_it = 2.0 * PAST * branch.determinant(z) / (before - after) if before != after else math.inf
         z = z + rest_of_it * tangent if abs(rest_of_it) < 0.01 * PAST else z
-    return float(plane.values(z[2:])[plane.names[0]]), crosses
+    return branch.value(z), "turns unstable" if crosses else "disappears"
 
 
-def _successor(plane: Plane, equations: System, z: Floats, direction: float) -> Floats | None:
+def _successor(branch: _Branch, z: Floats, direction: float) -> Floats | None:
     """The stable position a little past z that Newton's method finds from there, if it does.
 
     So near to where equilibria meet, rounding in the gradient moves them by far more than rounding.
     """
     z, far = z.copy(), math.inf
-    z[2] = min(max(z[2] + PAST * direction, 0.0), 1.0)
+    z[-1] = min(max(z[-1] + PAST * direction, 0.0), 1.0)
     for _ in range(30):
-        value, jacobian = equations(z)
+        value, jacobian = branch.rest(z)
         if not np.isfinite(value).all():
             return None
-        step = np.linalg.lstsq(jacobian[:, :2], value)[0]
-        z[:2] -= step
+        step = np.linalg.lstsq(jacobian[:, :-1], value)[0]
+        z[:-1] -= step
         far = float(np.linalg.norm(step))
-    return z if far < 1e-8 and _determinant(plane, z) > 0.0 else None
+    return z if far < 1e-8 and branch.determinant(z) > 0.0 else None
 
 
-def _crosses(folds: System, z: Floats) -> bool:
+def _crosses(folds: Equations, z: Floats) -> bool:
     """Whether other equilibria pass through an end, so that there is more than one branch."""
     sizes = np.linalg.svd(folds(z)[1], compute_uv=False)
     return bool(sizes[-1] < CROSSING * sizes[0])
-
-
-def _determinant(plane: Plane, z: Floats) -> float:
-    return float(point_at(plane, z[:, None]).determinant[0])

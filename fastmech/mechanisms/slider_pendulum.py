@@ -23,11 +23,12 @@ def slider_pendulum(load: Load | None = None) -> Mechanism:
     ``load`` acts on M2 along +x in place of F0 exp(-alpha t), any of :mod:`fastmech.loads` [N].
     """
     phi, theta = angles("phi theta")
+    values = {name: TABLE_1[name] for name in TABLE_1 if load is None or name not in ("F0", "alpha")}
     m1, m2, m3, l, c1, c2, beta, g, F0, alpha = symbols(list(TABLE_1))
     x1, y1 = l * cos(phi), l * sin(phi)
     return Mechanism(
         (phi, theta),
-        TABLE_1,
+        values,
         points={
             "O": (0, 0),
             "A": (0, l),

@@ -75,9 +75,10 @@ class SnapScan(TiledScan):
         limits = (self.searched[0], self.searched[1]) if self.searched is not None else None
         found = find_snap(scene, position, limits, parameter=self.parameter)
         ends = [np.nan if value is None else value for value in (found.below, found.above)]
-        row = np.array([found.phi, found.theta, *ends, *found.searched], dtype=np.float64)
+        row = np.array([*found.position, *ends, *found.searched], dtype=np.float64)
+        unstable = np.array([how == "turns unstable" for how in found.how])
         return Dataset(
-            {"row": Variable(("entry",), row), "unstable": Variable(("end",), np.array(found.unstable))},
+            {"row": Variable(("entry",), row), "unstable": Variable(("end",), unstable)},
             {"sentence": found.sentence, "unit": found.unit},
         )
 

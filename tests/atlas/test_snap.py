@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import sympy
 
+import fastmech as fm
 from fastmech.atlas.fold_points import find_folds
 from fastmech.atlas.snap import find_snap, fold_free
 from fastmech.equilibria.find import find_equilibria
@@ -24,7 +28,7 @@ def test_table_1_never_snaps() -> None:
     snap = find_snap(Scene(alpha=0.0))
     assert (snap.below, snap.above) == (None, None)
     assert snap.exhaustive
-    assert (snap.phi, snap.theta) == pytest.approx((1.4506, -0.2326), abs=1e-3)
+    assert snap.position == pytest.approx((1.4506, -0.2326), abs=1e-3)
     assert "no load whatever" in snap.sentence
 
 
@@ -89,7 +93,7 @@ def test_how_soft_c1_may_get() -> None:
     assert pitchfork == pytest.approx(43.1747, abs=1e-4)
     for place in (None, (-1.57, 0.0), (3 * np.pi / 2, 0.01)):
         snap = find_snap(scene, place, parameter="c1")
-        assert (snap.below, snap.unstable) == (None, (False, True))
+        assert (snap.below, snap.how[1]) == (None, "turns unstable")
         assert snap.above == pytest.approx(pitchfork, rel=1e-9)
         assert "c1 = 20 N/m turns unstable at 43.1747 N/m" in snap.sentence
     tilted = scene.replace(c1=60.0)
@@ -157,3 +161,75 @@ def test_searched_range_is_kept_to() -> None:
     snap = find_snap(BISTABLE, searched=(-600.0, 600.0))
     assert (snap.below, snap.above, snap.exhaustive) == (None, None, False)
     assert "no load in that range" in snap.sentence
+
+
+def test_any_mechanism_snaps() -> None:
+    """The truss at its closed-form load; the cart's pendulum at kt = m g l; Ziegler's column flutters."""
+    truss = fm.mechanisms.von_mises_truss()
+    k, span, rise = (truss.parameters[name] for name in ("k", "span", "rise"))
+    length = math.hypot(span / 2, rise)
+    load = 2.0 * k * length * (1.0 - (span / 2 / length) ** (2.0 / 3.0)) ** 1.5
+    up = fm.find_snap(truss, (0.0, rise), (-200.0, 200.0), parameter="P")
+    assert up.above == pytest.approx(load, rel=1e-12)
+    assert (up.below, up.how[1]) == (None, "disappears")
+    down = fm.find_snap(truss, (0.0, -rise), (-200.0, 200.0), parameter="P")
+    assert (down.above, down.below) == (None, pytest.approx(-load, rel=1e-12))
+    assert "disappears at" in down.sentence
+
+    cart = fm.mechanisms.cart_pendulum()
+    upright = fm.find_snap(cart, (0.0, 0.0), (1.0, 30.0), parameter="kt")
+    assert (upright.below, upright.how[0]) == (pytest.approx(9.81, rel=1e-10), "turns unstable")
+    assert upright.above is None
+
+    column = fm.mechanisms.ziegler_column()
+    flutter = fm.find_snap(column, None, (0.0, 3.0), parameter="P")
+    assert (flutter.above, flutter.how[1]) == (
+        pytest.approx(3.5 - math.sqrt(2.0), rel=1e-12),
+        "begins to flutter",
+    )
+    damped = fm.find_snap(column.replace(b=0.2), (0.0, 0.0), (0.0, 3.0), parameter="P")
+    assert damped.above == pytest.approx(41.0 / 28.0 + 0.02, rel=1e-12)
+
+
+@pytest.mark.parametrize("parameter", ["F0", "c1", "m2"])
+def test_the_papers_mechanism_snaps_as_its_scene(parameter: str) -> None:
+    mechanism = fm.mechanisms.slider_pendulum().replace(alpha=0.0, F0=85.3, c1=294.9, c2=92.85)
+    searched = {"F0": (-900.0, 900.0), "c1": (1.0, 900.0), "m2": (1.0, 60.0)}[parameter]
+    number = 0
+    for place in find_equilibria(BISTABLE):
+        if place.kind == "minimum":
+            number += 1
+            expected = find_snap(BISTABLE, place, searched, parameter=parameter)
+            found = fm.find_snap(mechanism, (place.phi, place.theta), searched, parameter=parameter)
+            assert (found.below is None, found.above is None) == (
+                expected.below is None,
+                expected.above is None,
+            )
+            for one, other in ((found.below, expected.below), (found.above, expected.above)):
+                assert one is None or one == pytest.approx(other, rel=1e-10)
+            assert found.how == expected.how
+    assert number == 2
+
+
+def test_a_position_may_leave_its_range() -> None:
+    x = fm.lengths("x", -1.0, 1.0)
+    k, F = sympy.symbols("k F")
+    hung = fm.Mechanism(x, {"k": 10.0, "F": 1.0}, kinetic=x.dot**2 / 2, potential=k * x**2 / 2 - F * x)
+    found = fm.find_snap(hung, None, (-5.0, 50.0), parameter="F")
+    assert (found.below, found.above, found.how[1]) == (None, pytest.approx(10.0), "leaves its range")
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"parameter": "nothing"}, "must be one of"),
+        ({"parameter": None}, "must be one of"),
+        ({"searched": None}, "must be a range of P that holds 0 N"),
+        ({"equilibrium": (0.0, 0.0)}, "is near no stable one"),
+        ({"equilibrium": (0.0,)}, "or its coordinates"),
+    ],
+)
+def test_what_is_wrong_about_a_mechanism_s_snap_gets_a_line(changes: dict[str, Any], expected: str) -> None:
+    given = {"equilibrium": None, "searched": (-1.0, 1.0), "parameter": "P"} | changes
+    with pytest.raises(InputError, match=expected):
+        find_snap(fm.mechanisms.von_mises_truss(), **given)

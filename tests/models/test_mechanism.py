@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import numpy as np
 import pytest
 import sympy
@@ -223,3 +226,19 @@ def test_steps_end_where_a_load_has_a_kink(load: fm.loads.Load) -> None:
         runs = [fm.integrate(mechanism, [0.0, 0.0], t, dt=dt, method=method) for dt in steps]
         errors = np.array([abs(run.y[-1, 0, 0] - expected) for run in runs])
         assert (errors < 1e-4 * (np.array(steps) / 0.1) ** (order - 1)).all()
+
+
+def test_a_scene_under_another_load_is_a_mechanism(states: np.ndarray) -> None:
+    driven: Any = fm.Scene(c1=200.0, load=fm.loads.Harmonic(80.0, 4.0, mean=5.0))
+    assert "F0" not in driven.parameters
+    t, values = 0.3, {**TABLE_1, "c1": 200.0, "c2": 366.67, "alpha": 0.0}
+    values["F0"] = 5.0 + 80.0 * math.sin(4.0 * t)
+    for y in states[:5]:
+        expected = np.array(oracle().accelerations(values, y, t), dtype=float)
+        np.testing.assert_allclose(driven.accelerations(t, y), expected, rtol=1e-12)
+    with pytest.raises(fm.InputError, match="the load acts in place of F0"):
+        fm.Scene(F0=1.0, load=fm.loads.Constant(1.0))
+    with pytest.raises(fm.InputError, match=r"c1 = -1\.0"):
+        fm.Scene(c1=-1.0, load=fm.loads.Constant(1.0))
+    with pytest.raises(fm.InputError, match="must be a number or a SymPy expression"):
+        fm.Scene(load="strong")
