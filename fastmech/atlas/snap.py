@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, cast
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from fastmech.atlas.defining import Balance
 from fastmech.atlas.systems import Plane, fold, point_at, rest
 from fastmech.equilibria.find import Equilibria, Equilibrium, find_equilibria
 from fastmech.errors import InputError, shown
-from fastmech.models.equilibria import RestingPlace, RestingPlaces
+from fastmech.models.equilibria import RestingPlace
 from fastmech.models.equilibria import find_equilibria as resting_places
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import assess
@@ -183,7 +183,7 @@ def _of_mechanism(
 def _stable_place(balance: Balance, wanted: Any, present: float) -> RestingPlace:
     """The stable resting place wanted, one of the list or about where it is; by default the first."""
     mechanism = balance.mechanism
-    found = cast(RestingPlaces, resting_places(mechanism))
+    found = resting_places(mechanism)
     stable = [  # where nothing damps and forces follow, swings that keep their size have to do
         k
         for k, place in enumerate(found)
@@ -331,8 +331,8 @@ def _ending(branch: _Branch, start: Floats, direction: float) -> tuple[float | N
 
     None if it leaves the parameter's range before. A minimum can always be followed a little further. Where
     no step succeeds, the branch has come as near to its end as a step is short, and what Newton's method
-    cannot polish there is that end. Where a symmetric position takes over from two tilted ones, their branch turns
-    back and is stable on both sides: the symmetric one is followed on.
+    cannot polish there is that end. Where a symmetric position takes over from two tilted ones, their branch
+    turns back and is stable on both sides: the symmetric one is followed on.
     """
     along = np.zeros(start.size)
     along[-1] = direction

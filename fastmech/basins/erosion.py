@@ -15,20 +15,29 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.atlas.following import follow_wells
 from fastmech.atlas.map import map_equilibria
 from fastmech.basins.label import label_starts
 from fastmech.basins.measures.fractions import basin_stability
 from fastmech.basins.measures.integrity import integrity
 from fastmech.basins.measures.labels import Floats, Integers, check_axes, check_point
-from fastmech.basins.measures.norm import check_angles, kinetic_norm, norm_on, state_index
+from fastmech.basins.measures.norm import (
+    angles_of,
+    check_angles,
+    kinetic_norm,
+    norm_on,
+    state_index,
+    states_of,
+)
 from fastmech.basins.shock import minimal_shock
 from fastmech.capture.select import require_damper
 from fastmech.disturbance.motion import require_constant_force
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
-from fastmech.equilibria.find import Equilibria, find_equilibria
 from fastmech.errors import InputError, shown
-from fastmech.scene import Scene, require_scene
+from fastmech.models.equilibria import find_equilibria
+from fastmech.models.mechanism import Mechanism
+from fastmech.scene import Scene
 
 #: Relative tolerance of shocks: what a profile shows.
 TOLERANCE = 1e-3
@@ -43,11 +52,11 @@ class Ends(Protocol):
 
     @property
     def turns(self) -> NDArray[np.integer[Any]]:
-        """Full turns of phi and theta of that well from its listed place, shape (n, 2)."""
+        """Full turns of the coordinates of that well from its listed place, shape (n, coordinates)."""
 
 
-#: Where starts (n, 4) of a scene end.
-LabelsOf = Callable[[Scene, Floats], Ends]
+#: Where starts (n, states) of a scene or a mechanism end.
+LabelsOf = Callable[[Any, Floats], Ends]
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +70,7 @@ class ErosionProfile:
     parameter: str
     values: Floats  #: (values,)
     sheet: Integers  #: identity of every well in the atlas of these values (wells,)
-    phi: Floats  #: where the well is [rad]
-    theta: Floats  #: rad
+    position: dict[str, Floats]  #: where the well is [rad or m], by coordinate
     stability: Floats  #: basin stability: share of random starts in the window that end in the well
     stability_at_most: Floats  #: the same if all random starts without a label ended in the well
     lower: Floats  #: lower end of the 95 % Wilson interval, with none of these
@@ -83,7 +91,7 @@ class ErosionProfile:
 
 
 #: Names of an :class:`ErosionProfile`'s arrays over values and wells.
-MEASURES = tuple(field.name for field in fields(ErosionProfile)[3:])
+MEASURES = tuple(field.name for field in fields(ErosionProfile)[4:])
 
 #: Those that are yes or no.
 FLAGS = ("lim_at_window", "factor_at_window")
@@ -101,24 +109,26 @@ class Survey:
     directions: int
     seed: int
 
-    def of_wells(self, scene: Scene, places: Floats) -> dict[str, NDArray[Any]]:
-        """Every measure of wells at ``places`` (wells, 2) [rad], arrays (wells,); NaN where that is NaN."""
+    def of_wells(self, scene: Scene | Mechanism, places: Floats) -> dict[str, NDArray[Any]]:
+        """Every measure of wells at ``places`` (wells, n) [rad or m], arrays (wells,); NaN where that is NaN.
+
+        Coordinates, by their names, are among the measures.
+        """
         measured: dict[str, NDArray[Any]] = {
             name: np.zeros(len(places), dtype=bool) if name in FLAGS else np.full(len(places), np.nan)
-            for name in MEASURES
+            for name in (*states_of(scene)[: places.shape[1]], *MEASURES)
         }
         equilibria = find_equilibria(scene)
         for w in np.flatnonzero(np.isfinite(places[:, 0])):
-            apart = np.hypot(
-                np.sin((equilibria.phi - places[w, 0]) / 2.0), np.sin((equilibria.theta - places[w, 1]) / 2.0)
-            )
+            apart = np.linalg.norm(_less_turns(equilibria.position - places[w], scene), axis=1)
             for name, number in self._of_well(scene, equilibria, int(apart.argmin())).items():
                 measured[name][w] = number
         return measured
 
-    def _of_well(self, scene: Scene, equilibria: Equilibria, own: int) -> dict[str, float]:
+    def _of_well(self, scene: Scene | Mechanism, equilibria: Any, own: int) -> dict[str, float]:
         e = equilibria[own]
-        place = np.array([e.phi, e.theta, 0.0, 0.0])
+        n = e.position.size
+        place = np.concatenate([e.position, np.zeros(n)])
 
         def copy_of(y: Floats) -> Integers:
             """0: this copy of the well, 1: elsewhere, -1: not known."""
@@ -138,13 +148,12 @@ class Survey:
             tolerance=TOLERANCE,
             seed=self.seed,
         )
-        kick = search(coordinates=(2, 3))
+        kick = search(coordinates=tuple(range(n, 2 * n)))
         # A kick of the rates is a shock too, and so is a push onto a saddle.
-        guess = np.concatenate([kick.shock[None], _saddles_from(equilibria, place)])
+        guess = np.concatenate([kick.shock[None], _saddles_from(scene, equilibria, place)])
         shock = search(guess=guess[np.isfinite(guess).all(axis=1)])
         return {
-            "phi": e.phi,
-            "theta": e.theta,
+            **dict(zip(states_of(scene)[:n], e.position.tolist(), strict=True)),
             "stability": float(share.fraction),
             "stability_at_most": float(share.at_most),
             "lower": float(share.lower),
@@ -167,7 +176,7 @@ class Survey:
         within = bool(((own >= window[:, 0]) & (own <= window[:, 1])).all())
         # Outside the window there is no largest ball round the well; the other measures need no centre.
         centre = own if within else window.mean(axis=1)
-        result = integrity(labels, self.lines, 0, centre, norm_on(norm, 4, self.states))
+        result = integrity(labels, self.lines, 0, centre, norm_on(norm, place.size, self.states))
         return {
             "gim": result.gim,
             "gim_at_most": result.gim_at_most,
@@ -180,14 +189,14 @@ class Survey:
         }
 
     def _starts(self, points: Floats, place: Floats) -> Floats:
-        """States (n, 4) at points (n, axes), the other ones those of ``place`` (4,)."""
+        """States (n, states) at points (n, axes), the other ones those of ``place`` (states,)."""
         full = np.tile(place, (len(points), 1))
         full[:, list(self.states)] = points
         return full
 
 
 def erosion(
-    scene: Scene,
+    scene: Scene | Mechanism,
     parameter: str,
     values: ArrayLike,
     axes: Mapping[str, ArrayLike],
@@ -203,11 +212,11 @@ def erosion(
     """Erosion profiles of all wells along one parameter, in the kinetic-energy norm at each well.
 
     Args:
-        scene: with a constant force; gives every other parameter.
+        scene: with constant loads; gives every other parameter.
         parameter: name of a parameter, such as "F0", "c1" or "c2".
         values: of it, rising.
-        axes: the map and its window: names among phi, theta [rad], phi_dot, theta_dot [rad/s] with their
-            coordinates, rising in equal steps. States that are no axis are the well's own.
+        axes: the map and its window: names of states (of a scene phi, theta [rad], phi_dot, theta_dot
+            [rad/s]) with their values, rising in equal steps. States that are no axis are the well's own.
         most_shock: largest shock to look for [rad].
         t_end: end of the runs [s]; what is not captured by then has no label.
         labels_of: where starts of a scene end, if not :func:`fastmech.basins.label.labels_of` shall tell.
@@ -218,15 +227,21 @@ def erosion(
         progress: is told how many values are done since its last call.
 
     Raises:
-        InputError: an argument is wrong, the force decays, there is no damper, or wells are not certain.
+        InputError: an argument is wrong, a load changes, there is no damper, or wells are not certain.
     """
-    require_scene(scene)
     require_constant_force(scene)
     checks.progress_function(progress, "values")
     along = check_point("values", values)
     checks.one_way("values", values, along)
     survey = survey_of(
-        axes, most_shock=most_shock, t_end=t_end, labels_of=labels_of, n=n, directions=directions, seed=seed
+        axes,
+        scene,
+        most_shock=most_shock,
+        t_end=t_end,
+        labels_of=labels_of,
+        n=n,
+        directions=directions,
+        seed=seed,
     )
     sheets, places = wells_along(scene, parameter, along)
     rows = []
@@ -234,12 +249,14 @@ def erosion(
         rows.append(survey.of_wells(scene.replace(**{parameter: float(value)}), place))
         if progress is not None:
             progress(1)
-    profile: Any = {name: np.stack([row[name] for row in rows]) for name in MEASURES}
-    return ErosionProfile(parameter, along, sheets, **profile)
+    profile: Any = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
+    position = {name: profile.pop(name) for name in states_of(scene)[: places.shape[2]]}
+    return ErosionProfile(parameter, along, sheets, position, **profile)
 
 
 def survey_of(
     axes: Mapping[str, ArrayLike],
+    scene: Scene | Mechanism,
     *,
     most_shock: float,
     t_end: float,
@@ -251,10 +268,10 @@ def survey_of(
     """What to measure, checked; arguments and errors as for :func:`erosion`."""
     if not isinstance(axes, Mapping) or not axes:
         raise InputError(f"axes = {shown(axes)}: must map at least one state to its values")
-    states = tuple(state_index(name) for name in axes)
+    states = tuple(state_index(name, states_of(scene)) for name in axes)
     lines = check_axes(axes, tuple(np.size(line) for line in axes.values()))
     for name, line in zip(axes, lines, strict=True):
-        check_angles(f"axes.{name}", name, line)
+        check_angles(f"axes.{name}", name, line, angles_of(scene))
     rng = np.random.default_rng(checks.whole_number("seed", seed, least=0))
     low, high = np.array([[line.min(), line.max()] for line in lines]).T
     n = checks.whole_number("n", n, least=1)
@@ -270,13 +287,16 @@ def survey_of(
     )
 
 
-def wells_along(scene: Scene, parameter: str, values: Floats) -> tuple[Integers, Floats]:
-    """Sheets of all wells along a parameter (wells,), and where they are [rad] (values, wells, 2), or NaN.
+def wells_along(scene: Scene | Mechanism, parameter: str, values: Floats) -> tuple[Integers, Floats]:
+    """Sheets of all wells along a parameter (wells,), and where they are (values, wells, n), or NaN.
 
     Raises:
         InputError: the parameter or a value of it is none, or the scene has no damper.
     """
     require_damper(scene)
+    if isinstance(scene, Mechanism):
+        places = follow_wells(scene, parameter, values)
+        return np.arange(places.shape[1]), places
     atlas = map_equilibria(scene, {parameter: values})
     wells = np.flatnonzero(atlas.sheet_morse_index == 0)
     places = np.full((values.size, wells.size, 2), np.nan)
@@ -286,9 +306,14 @@ def wells_along(scene: Scene, parameter: str, values: Floats) -> tuple[Integers,
     return wells.astype(np.int64), places
 
 
-def _saddles_from(equilibria: Equilibria, place: Floats) -> Floats:
-    """Disturbances (n, 4) that lead from a state onto the nearest copies of the saddles."""
-    saddles = equilibria.morse_index == 1
-    angles = np.column_stack([equilibria.phi, equilibria.theta])[saddles] - place[:2]
-    angles -= 2.0 * np.pi * np.round(angles / (2.0 * np.pi))
-    return np.concatenate([angles, np.zeros_like(angles)], axis=1)
+def _saddles_from(scene: Scene | Mechanism, equilibria: Any, place: Floats) -> Floats:
+    """Disturbances (k, states) that lead from a state onto the nearest copies of the saddles."""
+    index = np.array([e.morse_index for e in equilibria])
+    away = _less_turns(equilibria.position[index == 1] - place[: place.size // 2], scene)
+    return np.concatenate([away, np.zeros_like(away)], axis=1)
+
+
+def _less_turns(away: Floats, scene: Scene | Mechanism) -> Floats:
+    """Differences of positions (k, n) with angles the short way."""
+    turning = [name in angles_of(scene) for name in states_of(scene)[: away.shape[1]]]
+    return np.where(turning, away - 2.0 * np.pi * np.round(away / (2.0 * np.pi)), away)

@@ -121,12 +121,17 @@ def damped_times(scene: Scene | Mechanism, method: str, until: float, ratio: flo
     return np.asarray(first * (ratio ** np.arange(1, number) - 1.0) / (ratio - 1.0), dtype=np.float64)
 
 
-def require_constant_force(scene: Scene) -> None:
-    """Refuse a scene whose force changes: nothing rests while it decays.
+def require_constant_force(scene: Scene | Mechanism) -> None:
+    """Refuse what is under a load that changes: nothing rests while it does.
 
     Raises:
-        InputError: the force decays.
+        InputError: it is.
     """
+    if isinstance(scene, Mechanism):
+        for load in scene.loads:
+            if load.to_come(0.0) != (0.0, 0.0):
+                raise InputError(f"{scene.name}: {load!r} changes; nothing rests while it does")
+        return
     require_scene(scene)
     if scene.F0 != 0 and scene.alpha != 0:
         raise InputError(
@@ -142,9 +147,7 @@ def equilibria_to_disturb(scene: Scene | Mechanism) -> Any:
         InputError: a load changes, or no equilibrium is isolated.
     """
     if isinstance(scene, Mechanism):
-        for load in scene.loads:
-            if load.to_come(0.0) != (0.0, 0.0):
-                raise InputError(f"{scene.name}: {load!r} changes; nothing rests while it does")
+        require_constant_force(scene)
     else:
         require_isolated(scene)
     equilibria = find_equilibria(scene)

@@ -19,6 +19,7 @@ from fastmech.intervals.search import AT_END, LIMIT, TWO_PI, UNCLEAR, UNDEFINED,
 from fastmech.loads import Constant
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.statics import Statics
+from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
 
@@ -150,6 +151,12 @@ class RestingPlaces(Sequence[RestingPlace]):
         return "\n".join([*lines, self.certificate.sentence])
 
 
+@overload
+def find_equilibria(system: Scene, at: float = ...) -> find.Equilibria: ...
+@overload
+def find_equilibria(system: Mechanism) -> RestingPlaces: ...
+@overload
+def find_equilibria(system: Scene | Mechanism, at: float = ...) -> find.Equilibria | RestingPlaces: ...
 def find_equilibria(system: Any, at: float = math.inf) -> find.Equilibria | RestingPlaces:
     """All equilibria of a scene or a mechanism, with a proof that none is missing.
 

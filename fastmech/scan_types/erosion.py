@@ -156,6 +156,7 @@ class ErosionTiling(Tiling):
 
         survey = survey_of(
             self.window,
+            self.scene,
             most_shock=self.request.most_shock,
             t_end=self.request.t_end,
             labels_of=ends,
@@ -178,7 +179,7 @@ class ErosionTiling(Tiling):
                 ("well",), self.sheets.astype(np.int32), "1", "identity of the well in the atlas"
             ),
         }
-        for key in MEASURES:
+        for key in (*STATE[:2], *MEASURES):
             array = np.array([part[key].data for part in tiles]).reshape(self.values.size, -1)
             variables[f"well_{key}"] = Variable(
                 (name, "well"), array.astype(np.bool_) if key in FLAGS else array, *_ABOUT[key]
@@ -191,4 +192,5 @@ class ErosionTiling(Tiling):
 
     def missing(self, index: int) -> Dataset:
         """A well that has not been measured."""
-        return Dataset({key: Variable((), np.array(False if key in FLAGS else np.nan)) for key in MEASURES})
+        keys = (*STATE[:2], *MEASURES)
+        return Dataset({key: Variable((), np.array(False if key in FLAGS else np.nan)) for key in keys})

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.integrators.method import ImplicitRungeKutta, Method
 from fastmech.integrators.methods import find_method
+from fastmech.models.equilibria import RestingPlace
+from fastmech.models.mechanism import Mechanism
+from fastmech.models.stability import require_own, spectra
 from fastmech.scene import Scene
 from fastmech.stability.linearize import Rest, jacobian
 from fastmech.step_limits.amplification import DIVISIONS, amplifies, first_crossing
@@ -66,13 +71,13 @@ def _decaying(eigenvalues: ArrayLike) -> tuple[NDArray[np.complex128], NDArray[n
     return values, np.maximum(values.real + GROWTH_PER_RADIAN * np.abs(values), 0.0)
 
 
-def largest_stable_step(scene: Scene, equilibrium: Rest, method: str) -> float:
+def largest_stable_step(scene: Scene | Mechanism, equilibrium: Rest | RestingPlace, method: str) -> float:
     """Largest step [s] at which small motions about a stable equilibrium die out as they should.
 
     Args:
-        scene: the mechanism; the force is the equilibrium's, frozen.
-        equilibrium: one of :func:`fastmech.equilibria.find.find_equilibria`. Where it is unstable, the modes
-            that decay set the limit.
+        scene: the mechanism; a scene's force is the equilibrium's, frozen, other loads are at their means.
+        equilibrium: one of :func:`fastmech.find_equilibria`. Where it is unstable, the modes that decay set
+            the limit.
         method: a name from :data:`fastmech.integrators.methods.METHODS`.
 
     Returns:
@@ -81,8 +86,18 @@ def largest_stable_step(scene: Scene, equilibrium: Rest, method: str) -> float:
     Raises:
         InputError: an argument is wrong.
     """
-    values = np.linalg.eigvals(jacobian(scene, equilibrium))
+    if isinstance(scene, Mechanism):
+        require_own(scene, equilibrium)
+        assert isinstance(equilibrium, RestingPlace)
+        return stable_step(find_method(method), small_eigenvalues(scene, equilibrium))
+    values = np.linalg.eigvals(jacobian(scene, cast(Rest, equilibrium)))
     return stable_step(find_method(method), values)
+
+
+def small_eigenvalues(mechanism: Mechanism, place: RestingPlace) -> NDArray[np.complex128]:
+    """Eigenvalues [1/s] of the small motion about a resting place (2 n,)."""
+    own, _, _ = spectra(mechanism.linear(place.position[None]))
+    return np.asarray(own.roots[0] * own.rate[0])
 
 
 def limiting_eigenvalues(scene: Scene, equilibrium: Rest) -> NDArray[np.complex128]:

@@ -25,11 +25,20 @@ from fastmech.integrators.method import Adams, ImplicitRungeKutta, Method, Runge
 from fastmech.integrators.methods import METHODS, find_method
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.mechanism.lagrange import potential_energy, potential_gradient, potential_hessian
+from fastmech.models.equilibria import find_equilibria
+from fastmech.models.mechanism import Mechanism
+from fastmech.models.stability import assess
 from fastmech.scene import Scene
 from fastmech.stability.arguments import require_scene
 from fastmech.stability.linearize import fill_state_matrix, small_motion
 from fastmech.step_limits.amplification import amplifies, first_crossing
-from fastmech.step_limits.predict import GROWTH_PER_RADIAN, UNDAMPED, is_stable, stable_step
+from fastmech.step_limits.predict import (
+    GROWTH_PER_RADIAN,
+    UNDAMPED,
+    is_stable,
+    small_eigenvalues,
+    stable_step,
+)
 
 Floats = NDArray[np.float64]
 
@@ -145,26 +154,50 @@ def beyond_stability(scene: Scene, dt: float, method: str) -> bool:
     return not (is_stable(formula, resting, dt) and is_stable(formula, passing, dt, PASSING))
 
 
-def step_warning(scene: Scene, dt: float, method: str, starts: ArrayLike | None = None) -> str | None:
-    """One line if a step cannot be right for a scene, else ``None``.
+def step_warning(
+    scene: Scene | Mechanism, dt: float, method: str, starts: ArrayLike | None = None
+) -> str | None:
+    """One line if a step cannot be right for a scene or a mechanism, else ``None``.
 
     It is too long where a motion that dies out grows instead, where the decaying force's impulse comes out
-    wrong, or where a body turns by more than 1 rad in it.
+    wrong, or where a body turns by more than 1 rad in it. Of a mechanism only the small motions about its
+    resting places are looked at, and the rates of its angles.
 
     Args:
         scene: the mechanism.
         dt: step [s].
         method: a name from :data:`fastmech.integrators.methods.METHODS`.
-        starts: states phi, theta [rad], phi', theta' [rad/s], shape (n, 4); their rates count if given.
+        starts: states phi, theta [rad], phi', theta' [rad/s], shape (n, 4), of a ``Mechanism`` coordinates,
+            then rates; the rates count if given.
 
     Raises:
         InputError: an argument is wrong.
     """
-    require_scene(scene)
-    fastest = 0.0 if starts is None else _fastest(starts)
+    turning = [True, True]
+    if isinstance(scene, Mechanism):
+        turning = [str(c.symbol) not in scene.lengths for c in scene.coordinates]
+    else:
+        require_scene(scene)
+    fastest = 0.0 if starts is None else _fastest(starts, turning)
     if not isinstance(dt, Real) or isinstance(dt, bool) or not 0.0 < dt <= float(np.finfo(np.float64).max):
         raise InputError(f"dt = {shown(dt)}: must be a finite number of s greater than 0")
-    return _told(_first_limit(scene, dt, method, fastest), dt, method)
+    limit = _limit_of_mechanism if isinstance(scene, Mechanism) else _first_limit
+    return _told(limit(scene, dt, method, fastest), dt, method)
+
+
+def _limit_of_mechanism(mechanism: Mechanism, dt: float, method: str, fastest: float) -> Limit:
+    formula, limits = find_method(method), [Limit(np.inf, "")]
+    for place in find_equilibria(mechanism):
+        if assess(mechanism.linear(place.position), place.morse_index).verdict != "unstable":
+            reason = GROWS if mechanism.damped else UNDAMPED_GROWS
+            limits.append(Limit(stable_step(formula, small_eigenvalues(mechanism, place)), reason))
+    return min([*limits, *_turning(dt, fastest)])
+
+
+def _turning(dt: float, fastest: float) -> list[Limit]:
+    """The limit that an angle of this rate [rad/s] sets."""
+    reason = f"at {fastest:.3g} rad/s it would turn {dt * fastest:.3g} rad a step"
+    return [Limit(TURN / fastest, reason)] if fastest > 0.0 else []
 
 
 def _told(limit: Limit, dt: float, method: str) -> str | None:
@@ -194,15 +227,16 @@ class Limit(NamedTuple):
     reason: str
 
 
-def _fastest(starts: ArrayLike) -> float:
-    """The greatest finite rate [rad/s] of states (n, 4) or (4,)."""
+def _fastest(starts: ArrayLike, turning: Sequence[bool] = (True, True)) -> float:
+    """The greatest finite rate [rad/s] of states (n, states) or (states,); which coordinates are angles."""
+    count = 2 * len(turning)
     try:
         states = np.asarray(starts, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
-        raise InputError("starts: must be numbers of shape (n, 4)") from None
-    if states.ndim not in (1, 2) or states.shape[-1] != 4:
-        raise InputError(f"starts: has shape {states.shape}, must be (n, 4)")
-    rates = np.abs(states[..., 2:])
+        raise InputError(f"starts: must be numbers of shape (n, {count})") from None
+    if states.ndim not in (1, 2) or states.shape[-1] != count:
+        raise InputError(f"starts: has shape {states.shape}, must be (n, {count})")
+    rates = np.abs(states[..., len(turning) :][..., np.asarray(turning)])
     fastest = float(np.max(rates, initial=0.0))
     if not np.isfinite(fastest):  # what is not has a status of its own
         fastest = float(np.max(rates[np.isfinite(rates)], initial=0.0))
@@ -219,11 +253,7 @@ def _first_limit(scene: Scene, dt: float, method: str, fastest: float) -> Limit:
         reason = f"the decaying force would give {ratio:.3g} times its impulse"
         decay = impulse_limit(formula) / scene.alpha
         limits.append(Limit(decay, reason))
-    if fastest > 0.0:
-        turn = TURN / fastest
-        reason = f"at {fastest:.3g} rad/s it would turn {dt * fastest:.3g} rad a step"
-        limits.append(Limit(turn, reason))
-    return min(limits)
+    return min([*limits, *_turning(dt, fastest)])
 
 
 def _below(limit: float) -> float:

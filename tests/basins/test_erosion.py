@@ -51,7 +51,7 @@ def test_measures_of_known_basins() -> None:
     np.testing.assert_allclose(profile.kick, RADIUS, rtol=1e-3)
     assert profile.stability.sum() == pytest.approx(1.0)  # turns do not count there
     for w in range(len(wells)):
-        e = wells[int(np.argmin([abs(e.phi - profile.phi[0, w]) for e in wells]))]
+        e = wells[int(np.argmin([abs(e.phi - profile.position["phi"][0, w]) for e in wells]))]
         part = norm_on(kinetic_norm(scene, e), 4, (0, 1))
         step = np.linalg.norm(np.array([0.16, 0.16]) @ part)
         assert RADIUS - 1e-9 <= profile.lim[0, w] < RADIUS + step
@@ -72,12 +72,16 @@ def test_wells_keep_their_identity_where_their_order_changes() -> None:
     deepest = [fm.find_equilibria(BISTABLE.replace(F0=float(v)))[0].phi for v in values]
     assert deepest[0] > 2.0
     assert deepest[-1] < 1.0
-    assert profile.phi.shape == (5, 2)
-    assert (np.abs(np.sin(np.diff(profile.phi, axis=0))) < 0.4).all()
-    assert (np.abs(np.diff(profile.theta, axis=0)) < 0.4).all()
+    assert profile.position["phi"].shape == (5, 2)
+    assert (np.abs(np.sin(np.diff(profile.position["phi"], axis=0))) < 0.4).all()
+    assert (np.abs(np.diff(profile.position["theta"], axis=0)) < 0.4).all()
     # Mirrored: phi to pi - phi, theta to -theta, F0 to -F0.
-    np.testing.assert_allclose(np.cos(profile.phi[::-1, 1]), -np.cos(profile.phi[:, 0]), atol=1e-9)
-    np.testing.assert_allclose(profile.theta[::-1, 1], -profile.theta[:, 0], atol=1e-9)
+    np.testing.assert_allclose(
+        np.cos(profile.position["phi"][::-1, 1]), -np.cos(profile.position["phi"][:, 0]), atol=1e-9
+    )
+    np.testing.assert_allclose(
+        profile.position["theta"][::-1, 1], -profile.position["theta"][:, 0], atol=1e-9
+    )
 
 
 def test_starts_without_a_label_leave_room_above_the_measures() -> None:
@@ -116,9 +120,9 @@ def test_a_well_erodes_towards_its_fold() -> None:
     scene, values = BISTABLE.replace(F0=85.3), [95.0, 98.0, 100.0]
     axes = {"phi": np.linspace(-3.1, -2.2, 7), "theta": np.linspace(-2.1, -1.3, 7)}
     profile = erosion(scene, "c2", values, axes, most_shock=0.3, t_end=10.0, n=100, directions=4)
-    shallow = int(np.flatnonzero(np.isnan(profile.phi[-1]))[0])
+    shallow = int(np.flatnonzero(np.isnan(profile.position["phi"][-1]))[0])
     deep = 1 - shallow
-    assert not np.isnan(profile.phi[:, deep]).any()
+    assert not np.isnan(profile.position["phi"][:, deep]).any()
     for measure in (profile.shock, profile.kick, profile.stability, profile.gim):
         assert measure[0, shallow] > measure[1, shallow] > 0.0
         assert np.isnan(measure[2, shallow])
@@ -156,3 +160,45 @@ def test_wrong_arguments_are_refused(changes: dict[str, Any], message: str) -> N
     with pytest.raises(fm.InputError) as refusal:
         erosion(**(arguments | changes))
     assert str(refusal.value).startswith(message)
+
+
+def test_the_papers_mechanism_erodes_as_its_scene() -> None:
+    mechanism = fm.mechanisms.slider_pendulum().replace(F0=0.0, c1=294.9, c2=92.85, alpha=0.0)
+    axes = {"phi": np.linspace(-3.1, 3.1, 7), "theta": np.linspace(-3.1, 3.1, 7)}
+    one, other = (
+        erosion(system, "F0", [85.3], axes, most_shock=0.6, t_end=30.0, n=100, directions=32)
+        for system in (BISTABLE, mechanism)
+    )
+    for name in ("phi", "theta"):
+        np.testing.assert_allclose(other.position[name], one.position[name], atol=1e-9)
+    for name in ("stability", "gim", "lim", "factor", "shock", "kick"):
+        np.testing.assert_allclose(getattr(other, name), getattr(one, name), rtol=2e-3, err_msg=name)
+
+
+def test_a_truss_s_well_lasts_until_it_snaps() -> None:
+    """The upper well ends at 2 k L (1 - cos^(2/3) a)^(3/2); the lower one stays."""
+    truss = fm.mechanisms.von_mises_truss().replace(b=4.0, P=0.0)
+    k, span, rise = (truss.parameters[name] for name in ("k", "span", "rise"))
+    length = np.hypot(span / 2, rise)
+    load = 2.0 * k * length * (1.0 - (span / 2 / length) ** (2.0 / 3.0)) ** 1.5
+    values = np.array([0.5, 0.99, 0.9999, 1.0001]) * load
+
+    def upwards(system: fm.Mechanism, y: np.ndarray) -> Ends:
+        """A made-up rule: up ends up."""
+        places = fm.find_equilibria(system).position
+        minima = [i for i, e in enumerate(fm.find_equilibria(system)) if e.kind == "minimum"]
+        height = places[minima, 1]
+        up, down = minima[int(height.argmax())], minima[int(height.argmin())]
+        return Ends(np.where(y[:, 1] > 0.0, up, down), np.zeros((len(y), 2), dtype=int))
+
+    axes = {"x": np.linspace(-0.5, 0.5, 5), "y": np.linspace(-1.0, 1.0, 9)}
+    profile = erosion(truss, "P", values, axes, labels_of=upwards, most_shock=3.0, n=400, directions=4)
+    heights = profile.position["y"]
+    assert heights.shape == (4, 2)
+    upper = int(np.argmax(heights[0]))
+    assert np.isfinite(heights[:3]).all()
+    assert np.isnan(heights[3, upper])
+    assert (np.diff(heights[:3], axis=0) < 0.0).all()
+    np.testing.assert_allclose(profile.stability[:3, upper], 0.5, atol=0.1)
+    with pytest.raises(fm.InputError, match=r"axes\.z: unknown name; allowed: x, y, x_dot, y_dot"):
+        erosion(truss, "P", values, {"z": [0.0, 1.0]}, most_shock=1.0)

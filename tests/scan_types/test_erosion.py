@@ -45,7 +45,9 @@ def test_a_file_holds_what_the_function_gives(section: Dataset) -> None:
     units |= dict.fromkeys(("lim_at_window", "factor_at_window"), "1")
     check_labels(section, {f"well_{k}": u for k, u in units.items()} | {"c2": "N/m", "sheet": "1"})
     for name in units:
-        np.testing.assert_array_equal(section[f"well_{name}"].data, getattr(own, name), err_msg=name)
+        np.testing.assert_array_equal(
+            section[f"well_{name}"].data, (own.position | vars(own))[name], err_msg=name
+        )
     np.testing.assert_array_equal(section["sheet"].data, own.sheet)
     most, share = own.stability_at_most, own.stability
     there = np.isfinite(share)
@@ -53,7 +55,7 @@ def test_a_file_holds_what_the_function_gives(section: Dataset) -> None:
     assert (own.undecided[there] > 0.1).any(), "10 s do not decide all here"
     assert (own.lower[there] <= share[there] + 1e-15).all()
     assert (own.upper[there] >= most[there] - 1e-15).all()
-    shallow = int(np.flatnonzero(np.isnan(own.phi[-1]))[0])
+    shallow = int(np.flatnonzero(np.isnan(own.position["phi"][-1]))[0])
     assert own.shock[1, shallow] > 0.0
 
 

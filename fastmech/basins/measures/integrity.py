@@ -24,10 +24,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import KDTree
 
 from fastmech.basins.measures.labels import Floats, LabelsLike, check_axes, check_map, check_point
-from fastmech.basins.measures.norm import kinetic_norm, norm_on, state_index
+from fastmech.basins.measures.norm import kinetic_norm, norm_on, state_index, states_of
 from fastmech.ensembles import checks
 from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError
+from fastmech.models.equilibria import RestingPlace
+from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
 
 
@@ -53,10 +55,10 @@ def integrity(
     labels: LabelsLike,
     axes: Sequence[ArrayLike] | Mapping[str, ArrayLike],
     label: int,
-    attractor: ArrayLike | Equilibrium,
+    attractor: ArrayLike | Equilibrium | RestingPlace,
     norm: ArrayLike | None = None,
     *,
-    scene: Scene | None = None,
+    scene: Scene | Mechanism | None = None,
 ) -> Integrity:
     """GIM, LIM and IF of the basin ``label`` on a map, and how large points without a label leave them.
 
@@ -68,24 +70,26 @@ def integrity(
     Args:
         labels: on the grid, any number of axes; negative: no label, in the basin only for what
             ends in ``_at_most``.
-        axes: coordinates along every axis, rising in equal steps; of a scene by the names of its states, as
-            :class:`fastmech.basins.map.BasinMap` has them.
+        axes: coordinates along every axis, rising in equal steps; of a scene or a mechanism by the names
+            of its states, as :class:`fastmech.basins.map.BasinMap` has them.
         label: of the basin.
-        attractor: its coordinates on the map's axes (axes,), within the window; of a scene an equilibrium.
+        attractor: its coordinates on the map's axes (axes,), within the window; or an equilibrium
+            of ``scene``.
         norm: matrix N (axes, axes): ``|d @ N|`` is the length of a departure d along the axes. By default,
             for an equilibrium of ``scene``, the kinetic-energy norm there, on the axes.
-        scene: the mechanism, for the default norm.
+        scene: the scene or the mechanism, for the default norm.
 
     Raises:
         InputError: an argument is wrong, or the attractor lies outside the window.
     """
     array = check_map(labels)
     names = list(axes) if isinstance(axes, Mapping) else []
-    if isinstance(attractor, Equilibrium):
-        chosen = [state_index(name) for name in names]
+    if isinstance(attractor, Equilibrium | RestingPlace):
+        states = states_of(scene)
+        chosen = [state_index(name, states) for name in names]
         if norm is None and scene is not None:
-            norm = norm_on(kinetic_norm(scene, attractor), 4, chosen)
-        attractor = np.array([attractor.phi, attractor.theta, 0.0, 0.0])[chosen]
+            norm = norm_on(kinetic_norm(scene, attractor), len(states), chosen)
+        attractor = np.concatenate([attractor.position, np.zeros_like(attractor.position)])[chosen]
     if norm is None:
         raise InputError("norm: missing; by default it is that of an equilibrium and a scene")
     lines = check_axes(axes, array.shape)

@@ -16,7 +16,7 @@ from fastmech.basins.measures.labels import Floats
 from fastmech.disturbance.size import size_of
 from fastmech.ensembles import checks
 from fastmech.equilibria.find import Equilibrium
-from fastmech.errors import InputError, shown
+from fastmech.errors import InputError, shown, shown_name
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import require_own
@@ -27,14 +27,14 @@ from fastmech.stability.arguments import require_rest
 FEW_TURNS = 4
 
 
-def check_angles(field: str, name: str, values: ArrayLike) -> None:
-    """Refuse angles that must be degrees; ``name`` is that of a state, of which rates are no angles.
+def check_angles(field: str, name: str, values: ArrayLike, angles: Sequence[str] = STATE[:2]) -> None:
+    """Refuse angles that must be degrees; ``name`` is that of a state, which ``angles`` lists if it is one.
 
     Raises:
         InputError: one is beyond ``FEW_TURNS`` turns.
     """
     largest = float(np.abs(values).max())
-    if name in STATE[:2] and largest > 2.0 * np.pi * FEW_TURNS:
+    if name in angles and largest > 2.0 * np.pi * FEW_TURNS:
         raise InputError(f"{field}: {beyond_turns(largest)}")
 
 
@@ -43,15 +43,27 @@ def beyond_turns(largest: float) -> str:
     return f"reaches {largest:g}, beyond {FEW_TURNS} turns; angles are in radians (numpy.deg2rad)"
 
 
-def state_index(name: str) -> int:
-    """Which state of the mechanism an axis of this name is.
+def states_of(system: Scene | Mechanism | None) -> tuple[str, ...]:
+    """Names of the states, a scene's by default: coordinates, then rates."""
+    return system.state if isinstance(system, Mechanism) else STATE
+
+
+def angles_of(system: Scene | Mechanism | None) -> tuple[str, ...]:
+    """Names of the coordinates that turn fully."""
+    if not isinstance(system, Mechanism):
+        return STATE[:2]
+    return tuple(str(c.symbol) for c in system.coordinates if c.periodic)
+
+
+def state_index(name: str, names: Sequence[str] = STATE) -> int:
+    """Which of the states an axis of this name is.
 
     Raises:
         InputError: it is none.
     """
-    if name not in STATE:
-        raise InputError(f"axes.{name}: unknown name; {nearest(name, list(STATE))}")
-    return STATE.index(name)
+    if name not in names:
+        raise InputError(f"axes.{shown_name(name)}: unknown name; {nearest(name, list(names))}")
+    return names.index(name)
 
 
 def kinetic_norm(scene: Scene | Mechanism, equilibrium: Equilibrium | RestingPlace) -> Floats:
