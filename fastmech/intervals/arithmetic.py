@@ -22,7 +22,9 @@ from fastmech.jit import inlined_exactly
 Interval: TypeAlias = tuple[float, float]
 
 #: Names of what works on intervals.
-OPERATIONS = ("add", "sub", "neg", "mul", "div", "power", "sqrt", "sin", "cos", "exp", "log", "atan")
+OPERATIONS = (
+    "absolute", "add", "atan", "cos", "div", "exp", "log", "mul", "neg", "power", "sign", "sin", "sqrt", "sub",
+)  # fmt: skip
 
 #: Numbers beyond are not told from infinity: a few operations on others cannot overflow unseen.
 LARGEST = 1e300
@@ -73,6 +75,22 @@ def sub(a: Interval, b: Interval) -> Interval:
 def neg(a: Interval) -> Interval:
     """Negative; exact."""
     return -a[1], -a[0]
+
+
+@inlined_exactly
+def absolute(a: Interval) -> Interval:
+    """Absolute value; exact."""
+    if a[0] >= 0.0 or not a[1] <= LARGEST:
+        return a
+    return (-a[1], -a[0]) if a[1] <= 0.0 else (0.0, max(-a[0], a[1]))
+
+
+@inlined_exactly
+def sign(a: Interval) -> Interval:
+    """1, -1, or where it is not known, as at zero, all between."""
+    if a[0] > 0.0:
+        return 1.0, 1.0
+    return (-1.0, -1.0) if a[1] < 0.0 else (-1.0, 1.0)
 
 
 @inlined_exactly

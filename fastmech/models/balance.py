@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _SOURCE = '''"""Made by fastmech: forces of a mechanism at rest and their Jacobian, in intervals."""
 
-from fastmech.intervals.arithmetic import add, atan, cos, div, exp, log, mul, neg, power, sin, sqrt, sub
+from fastmech.intervals.arithmetic import {operations}
 from fastmech.intervals.search import FORCES_SIGNATURE
 from fastmech.jit import EXACT, kernel
 
@@ -33,7 +33,7 @@ def forces(q, p, f, J):
 
 _ENERGY = '''"""Made by fastmech: energy of a mechanism, loads at their means, in intervals."""
 
-from fastmech.intervals.arithmetic import add, atan, cos, div, exp, log, mul, neg, power, sin, sqrt, sub
+from fastmech.intervals.arithmetic import {operations}
 from fastmech.intervals.search import ENERGY_SIGNATURE
 from fastmech.jit import EXACT, kernel
 
@@ -44,6 +44,8 @@ def energy(q, v, p, found):
 '''
 
 _FUNCTIONS = {
+    sympy.Abs: "absolute",
+    sympy.sign: "sign",
     sympy.sin: "sin",
     sympy.cos: "cos",
     sympy.exp: "exp",
@@ -89,7 +91,7 @@ def energy_kernel(mechanism: Mechanism) -> Any:
         *(f"{names[symbol]} = {_text(expression, names)}" for symbol, expression in shared),
         f"found[0], found[1] = add({_text(kinetic, names)}, {_text(potential, names)})",
     ]
-    text = _ENERGY.format(body="\n".join(f"    {line}" for line in lines))
+    text = _written(_ENERGY, lines)
     return _made("energy", text).energy
 
 
@@ -107,6 +109,12 @@ def range_of(mechanism: Mechanism, expression: Any, domain: Any) -> tuple[float,
 def _made(kind: str, text: str) -> Any:
     """The module of a text, run once."""
     return run_module(new_module(kind, text), text)
+
+
+def _written(frame: str, lines: list[str]) -> str:
+    """A module's text."""
+    body = "\n".join(f"    {line}" for line in lines)
+    return frame.format(operations=", ".join(arithmetic.OPERATIONS), body=body)
 
 
 def _names(statics: Statics) -> dict[Any, str]:
@@ -152,7 +160,7 @@ def source(statics: Statics) -> str:
     lines += [written[symbol] for symbol, _ in shared if symbol not in needed]
     for k, slope in enumerate(outputs[n:]):
         lines.append(f"J[{k // n}, {k % n}, 0], J[{k // n}, {k % n}, 1] = {_text(slope, names)}")
-    return _SOURCE.format(body="\n".join(f"    {line}" for line in lines))
+    return _written(_SOURCE, lines)
 
 
 def _sums(force: Any) -> Any:
@@ -198,9 +206,11 @@ def _text(x: Any, names: dict[Any, str]) -> str:
         return base if x.exp.p == 1 else f"power({base}, {x.exp.p})"
     if x.func in _FUNCTIONS and len(x.args) == 1:
         return f"{_FUNCTIONS[x.func]}({_text(x.args[0], names)})"
+    if x.func is sympy.DiracDelta:  # a sign's slope: zero, and unbounded where the sign changes
+        return f"div((0.0, 0.0), {_text(x.args[0], names)})"
     raise InputError(
         f"forces: {shown(str(x))} has no proved bounds; known are sums, products, whole and half powers, "
-        "sin, cos, tan, exp, log and atan of coordinates and parameters"
+        "sin, cos, tan, exp, log, atan, Abs and sign of coordinates and parameters"
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import sympy
 
@@ -31,11 +31,16 @@ def expansion(mechanism: Mechanism, names: Sequence[str]) -> Expansion:
     found = mechanism.equations
     still = dict.fromkeys(v, 0) | found.means
     forces = [sympy.sympify(force).xreplace(values) for force in mechanism.statics().forces]
-    first = [force.diff(x) for force in forces for x in z]
-    second = [slope.diff(x) for slope in first for x in z]
+    # Where a spring passes length zero a sign jumps; its slope is zero elsewhere.
+    first = [_slope(force, x) for force in forces for x in z]
+    second = [_slope(slope, x) for slope in first for x in z]
     damping = [-sympy.diff(force, rate).subs(still) for force in found.forces for rate in v]
     inertia = [sympy.sympify(entry).xreplace(values) for entry in [*found.metric, *damping]]
     return Expansion(
         sympy.lambdify(z, [*forces, *first, *second], modules="math", cse=True),
         sympy.lambdify(z, [*inertia, *(entry.diff(x) for entry in inertia for x in z)], "math", cse=True),
     )
+
+
+def _slope(expression: Any, x: Any) -> Any:
+    return expression.diff(x).replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))

@@ -365,3 +365,23 @@ def test_only_what_the_jacobian_needs_comes_after_the_forces() -> None:
     split = next(i for i, line in enumerate(lines) if "return False" in line)
     assert any("sin(" in line for line in lines[7:split])
     assert not any("cos(" in line for line in lines[7:split])
+
+
+def test_a_spring_on_a_line_passes_length_zero() -> None:
+    """By hand: 100 (x - 1) + 30 (x - 1.3) = 0 right of O, 100 (x + 1) + 30 (x - 1.3) = 0 left of it."""
+    x = fm.lengths("x", -3.0, 3.0)
+    k, L = sp.symbols("k L")
+    bead = fm.Mechanism(
+        x,
+        {"k": 100.0, "L": 1.0},
+        points={"O": (0, 0), "M": (x, 0), "W": (1.5, 0)},
+        masses={"M": 1.0},
+        springs=[fm.Spring("O", "M", k, L), fm.Spring("W", "M", 30.0, 0.2)],
+    )
+    found = fm.find_equilibria(bead)
+    assert sorted(found.position[:, 0]) == pytest.approx([-61.0 / 130.0, 139.0 / 130.0], rel=1e-15)
+    (place,) = found.certificate.places
+    assert place.low[0] < 0.0 < place.high[0]
+    # The left one ends where it comes to O: 100 L = 39.
+    snap = fm.find_snap(bead, (-0.46,), (0.1, 2.0), parameter="L")
+    assert snap.below == pytest.approx(0.39, abs=1e-6)
