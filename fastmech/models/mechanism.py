@@ -139,7 +139,7 @@ class Mechanism:
             }
         )  # fmt: skip
         self.lengths = frozenset(q.name for q in given if q.unit == "m")
-        check(self)
+        self.definite = check(self)  #: whether the metric is proved to be positive definite everywhere
 
     def replace(self, **parameters: float) -> Mechanism:
         """The same mechanism with other values of some parameters."""
@@ -151,7 +151,7 @@ class Mechanism:
         made.parameters, _ = _parameters(self.parameters | parameters)
         if list(map(str, made._means())) != list(map(str, self._means())):
             made._forget()
-        check(made)
+        made.definite = check(made)
         return made
 
     def _means(self) -> list[Any]:
