@@ -27,7 +27,7 @@ def command(out: Path, quiet: bool, as_json: bool) -> None:
     with account("paper", quiet, as_json) as told:
         with told.bars.preparing():
             from fastmech.paper.report import write_paper
-        report = write_paper(out, progress=told.bars.counter("tables and figures"))
+        report = write_paper(out, stage=told.bars.stage)
         told.wrote(report.paths[0], "Report: {}")
         told.say(f"{report.n_rows} printed values compared, {len(report.misprints)} misprints proved")
         told.facts |= {"compared": report.n_rows, "misprints": len(report.misprints)}

@@ -5,8 +5,24 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
+
+import numpy as np
 
 from fastmech.paper.printed import agrees, agrees_legibly, evaluate
+
+HEADINGS = ("Case, part", "Symbol", "Unit", "Printed", "Computed", "Difference", "Verdict")
+
+_NEGLIGIBLE = 1e-9
+_SYMBOLS = {
+    "beta": "β",
+    "alpha": "α",
+    "phi_0": "φ₀",
+    "theta_0": "θ₀",
+    "phi_dot_0": "φ₀′",
+    "theta_dot_0": "θ₀′",
+    "F0": "F₀",
+}
 
 
 class Verdict(StrEnum):
@@ -25,8 +41,7 @@ class Verdict(StrEnum):
         return self not in (Verdict.MISPRINT, Verdict.DIFFERS)
 
 
-@dataclass(frozen=True)
-class Row:
+class Row(NamedTuple):
     """One printed number or word of the paper."""
 
     section: str  #: "Table 2", "Equation (16)", ...
@@ -39,16 +54,43 @@ class Row:
     see: str = ""  #: key of the misprint that explains it
 
     @property
-    def difference(self) -> float | None:
-        """Computed less printed; none for words and for prints that lost characters."""
-        if isinstance(self.computed, str) or "*" in self.printed:
-            return None
-        return self.computed - number(self.printed)
+    def difference(self) -> float:
+        """Computed less printed; NaN for words and for prints that lost characters."""
+        return (
+            np.nan if "*" in self.printed else self.value - (number(self.printed) if self.is_number else 0.0)
+        )
 
     @property
     def is_number(self) -> bool:
         """Whether it is a number, not a word."""
         return not isinstance(self.computed, str)
+
+    @property
+    def value(self) -> float:
+        """The computed number; NaN for words."""
+        return np.nan if isinstance(self.computed, str) else self.computed
+
+    @property
+    def word(self) -> str:
+        """The computed word; empty for numbers."""
+        return self.computed if isinstance(self.computed, str) else ""
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """Its texts in the order of ``HEADINGS``: a dash where there is no number to subtract.
+
+        The computed value has three digits more than the print, or as many as are needed.
+        """
+        differs, difference = abs(self.difference) > _NEGLIGIBLE, f"{self.difference:+.3g}"
+        if np.isnan(self.difference):
+            difference = "–"
+        elif not differs:
+            difference = "0"
+        computed = self.word or f"{self.computed:.7g}"
+        if difference != "–" and "pi" not in self.printed:
+            computed = f"{self.computed:.{len(self.printed.partition('.')[2]) + 3 * differs}f}"
+        symbol = _SYMBOLS.get(self.symbol, self.symbol)
+        return self.place, symbol, self.unit, self.printed, computed, difference, str(self.verdict)
 
 
 def number(printed: str) -> float:

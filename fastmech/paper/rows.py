@@ -38,11 +38,7 @@ def _table_1(judge: Judge, printed: Printed) -> Iterator[Row]:
         if symbol in values:
             row = judge.row("Table 1", "", symbol, units[symbol], value, values[symbol])
             # The one parameter of which the paper used more digits than it prints.
-            yield (
-                Row(**{**vars(row), "verdict": Verdict.ROUNDING})
-                if symbol == "c2" and row.difference
-                else row
-            )
+            yield row._replace(verdict=Verdict.ROUNDING) if symbol == "c2" and row.difference else row
 
 
 def _text(judge: Judge, printed: Printed, computed: Computed) -> Iterator[Row]:
