@@ -11,10 +11,9 @@ from fastmech.basins.label import labels_of
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.ensembles.status import Status
 from fastmech.errors import InputError
-from fastmech.hardcases.case import REFUSED, Floats, HardCase, Row, row_of
+from fastmech.hardcases.case import REFUSED, Floats, HardCase, Row, labels_row, row_of
 from fastmech.hardcases.references import Boundary, boundary
-from fastmech.hardcases.walk import admitted_step, labellers, without_euler
-from fastmech.integrators.methods import find_method
+from fastmech.hardcases.walk import admitted_step, halving_tells, labellers, without_euler
 
 #: Distances from the boundary [rad], on both sides.
 DISTANCES = 10.0 ** -np.arange(3.0, 15.0)
@@ -73,7 +72,7 @@ def _ends(
     error = float(distance[_wrong(edge, run, above)].max(initial=0.0))
     near = integrate(edge.scene, starts, NEAR, dt, method).y[-1]
     half = integrate(edge.scene, starts, NEAR, 0.5 * dt, method).y[-1]
-    estimate = 2.0 * float(np.abs(near - half).max()) / (1.0 - 0.5 ** find_method(method).order)
+    estimate = 2.0 * halving_tells(method, near, half)
     farthest = f"farthest wrong end {error:.0e} rad from the boundary" if error else "every end is right"
     remark, why = f"{dtype}: {farthest}", "rounding, and what halving the step tells"
     return row_of(run, error, allowed + estimate, remark=remark, why=why)
@@ -94,9 +93,7 @@ def _certified(
     nearest = float(distance[proved].min(initial=np.inf))
     others = ", ".join(sorted({Status(s).name.lower() for s in found.status[~proved]}))
     remark = f"labels: {proved.sum()} of {above.size} proved, to {nearest:.0e} rad; nearer: {others}"
-    return Row(
-        method, np.nan, found.steps, float(wrong.sum()), 0.0, np.nan, "ok", True, remark, "fm.labels_of"
-    )
+    return labels_row(method, found, wrong.sum())._replace(remark=remark)
 
 
 CASES = (
