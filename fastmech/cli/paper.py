@@ -6,18 +6,11 @@ from pathlib import Path
 
 import click
 
-from fastmech.cli.reporting import account, reporting_options
+from fastmech.cli.reporting import account, out_option, reporting_options
 
 
 @click.command(name="paper")
-@click.option(
-    "--out",
-    metavar="DIR",
-    type=click.Path(file_okay=False, path_type=Path),
-    default=Path("results/report"),
-    show_default=True,
-    help="Folder for the report.",
-)
+@out_option("Folder for the report.", "results/report")
 @reporting_options
 def command(out: Path, quiet: bool, as_json: bool) -> None:
     """Compute the source paper's tables and figures again.
