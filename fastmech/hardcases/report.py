@@ -99,6 +99,8 @@ def _write(out: Path, quick: bool, stage: Stage, started: float) -> Report:
     pictures, eigenvalues = {}, limiting_eigenvalues(scene, minimum)
     for name, family, title in REGIONS:  # regions, the scene's eigenvalues at the limits, limits on the axes
         members = {key: method for key, method in METHODS.items() if isinstance(method, family)}
+        if not members:
+            continue
         title += "\nλ: eigenvalues at the minimum of Table 1 under the constant force"
         pictures[f"stability_{name}"] = draw_stability_regions(members, eigenvalues, limits, title)
     steps = QUICK_STEPS if quick else STEPS
