@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 from fastmech.bench.entrant import Entrant, Floats, Solve
 from fastmech.bench.problem import Problem
 from fastmech.ensembles.run import Progress
+from fastmech.reports import Stage as Stage
 
 #: Processor seconds of timed calls that one entrant is given, and its calls at most.
 BUDGET = 0.8
@@ -26,33 +26,6 @@ MOST_REPEATS = 7
 
 #: Calls shorter than this [s] are given copies of the starts, up to the entrant's most.
 SHORT_CALL = 0.1
-
-
-#: Measured turns of :func:`in_turns` after one that warms up.
-TURNS = 7
-
-Name = TypeVar("Name")
-
-#: Makes a bar from what is done and how many pieces that are; it is told of each.
-Stage = Callable[[str, int], Progress]
-
-
-def in_turns(
-    works: Mapping[Name, Callable[[], object]],
-    turns: int = TURNS,
-    advance: Progress = lambda done: None,
-    clock: Callable[[], float] = time.process_time,
-) -> dict[Name, list[float]]:
-    """Seconds of each turn's call, after a turn that is not counted; ``advance`` is told 1 for each call."""
-    seconds: dict[Name, list[float]] = {name: [] for name in works}
-    for turn in range(turns + 1):
-        for name, work in works.items():
-            began = clock()
-            work()
-            if turn:
-                seconds[name].append(clock() - began)
-            advance(1)
-    return seconds
 
 
 @dataclass(frozen=True)
@@ -104,6 +77,11 @@ class _Runner:
         self.processor.append(time.process_time() - processor)
         self.wall.append(time.perf_counter() - wall)
 
+    def row(self, problem: str) -> Row:
+        named = self.entrant.family, self.entrant.setting, self.threads, len(self.starts)
+        wall, processor = statistics.median(self.wall), statistics.median(self.processor)
+        return Row(problem, *named, wall, processor, self.first_call, self.errors)
+
 
 def measure(
     problem: Problem,
@@ -132,20 +110,7 @@ def measure(
                 runner.time()
             if turn == 0:
                 advance(1)
-    return [
-        Row(
-            problem.name,
-            runner.entrant.family,
-            runner.entrant.setting,
-            runner.threads,
-            len(runner.starts),
-            statistics.median(runner.wall),
-            statistics.median(runner.processor),
-            runner.first_call,
-            runner.errors,
-        )
-        for runner in runners
-    ]
+    return [runner.row(problem.name) for runner in runners]
 
 
 def _prepare(problem: Problem, entrant: Entrant, threads: int, budget: float) -> _Runner:

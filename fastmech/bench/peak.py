@@ -11,12 +11,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fastmech.bench.measure import TURNS, Stage, in_turns
 from fastmech.bench.problem import Problem
 from fastmech.ensembles.integrate import integrate
 from fastmech.integrators.methods import find_method
 from fastmech.jit import FLAGS
 from fastmech.kernels.select import right_hand_side
+from fastmech.reports import TURNS, Stage, in_turns
 
 Floats = NDArray[np.float64]
 

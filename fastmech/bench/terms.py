@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fastmech.bench.measure import TURNS, Stage, in_turns
 from fastmech.bench.problem import Problem
 from fastmech.ensembles.integrate import integrate
+from fastmech.reports import TURNS, Stage, in_turns
 from fastmech.scene import Scene
 
 METHOD, DT = "rk4", 0.01
