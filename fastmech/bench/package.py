@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fastmech.bench.entrant import Entrant, Prepare, Solve
-from fastmech.bench.problem import Problem
+from fastmech.bench.problem import Entrant, Prepare, Problem, Solve
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import Status
 from fastmech.errors import StepWarning

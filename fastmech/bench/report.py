@@ -13,17 +13,15 @@ import numpy as np
 from fastmech.bench import peers, tables
 from fastmech.bench.atlas import atlas_study
 from fastmech.bench.basins import basins_study
-from fastmech.bench.entrant import Entrant
 from fastmech.bench.fused import METHODS
+from fastmech.bench.machine import costs, throughputs
 from fastmech.bench.measure import BUDGET, Row, measure
-from fastmech.bench.peak import throughputs
 from fastmech.bench.peers import entrants
 from fastmech.bench.picture import draw_bench
-from fastmech.bench.problem import PROBLEMS, Problem
+from fastmech.bench.problem import PROBLEMS, Entrant, Problem
 from fastmech.bench.processes import footprints, started, vectors_study
 from fastmech.bench.stiff import stiff_study
 from fastmech.bench.systems import systems_study
-from fastmech.bench.terms import costs
 from fastmech.bench.threads import threads_study
 from fastmech.bench.tolerances import tolerances_study
 from fastmech.ensembles.run import Progress

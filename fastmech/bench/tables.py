@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from fastmech.bench.measure import Row
-from fastmech.bench.peak import Throughput
-from fastmech.bench.precision import TARGETS, fastest_at, rate_at
+from fastmech.bench.machine import Cost, Throughput
+from fastmech.bench.measure import TARGETS, Row, fastest_at, rate_at
 from fastmech.bench.problem import Problem
-from fastmech.bench.terms import Cost
 from fastmech.reports import table as table
 
 OWN = "fastmech"

@@ -19,7 +19,7 @@ from fastmech.mechanism.lagrange import (
     potential_gradient,
 )
 from fastmech.paper.coefficients import Floats
-from fastmech.paper.printed import evaluate
+from fastmech.paper.compare import evaluate
 from fastmech.paper.scene import PAPER_SCENE, START
 
 #: Angles over a turn, and time [s] of the deviation.

@@ -8,10 +8,9 @@ import numpy as np
 
 from fastmech.mechanism.geometry import Points, constraints, positions
 from fastmech.paper.coefficients import Floats, Terms, equilibrium_20, hamiltonian_16
-from fastmech.paper.compare import Judge, Row, Verdict
+from fastmech.paper.compare import CASES, Judge, Printed, Row, Verdict
 from fastmech.paper.compute import Case, Computed
 from fastmech.paper.misprints import printed_polynomial
-from fastmech.paper.printed import CASES, Printed
 from fastmech.paper.scene import DISTURBANCE, PAPER_SCENE, START, STATIC_SCENE
 
 

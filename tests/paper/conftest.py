@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
+from fastmech.paper.compare import load_printed
 from fastmech.paper.compute import Computed, compute
-from fastmech.paper.printed import load_printed
 from fastmech.paper.report import PaperReport, write_paper
 
 
