@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import timedelta
-from typing import Self
+from typing import Any, Self
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
@@ -63,7 +63,7 @@ class Stage:
         """Time that the rest takes at that rate."""
         return str(timedelta(seconds=int((self.total - self.done) / self.rate))) if self.rate else "unknown"
 
-    def columns(self) -> dict[str, str]:
+    def columns(self) -> dict[str, Any]:
         """What bars show beside the share: the rate, and the time left or, in the end, taken."""
         speed = f"{self.rate:,.0f}/s" if self.rate >= 10 else f"{self.rate:.2g}/s"
         time_left = f"{self.left} left" if self.done < self.total else f"took {self.seconds:.1f} s"

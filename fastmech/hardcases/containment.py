@@ -77,7 +77,7 @@ def _beside(method: str, dt: float, when: float, span: float, repetitions: int) 
     share = np.median([one / max(other, least) for one, other in zip(alone, beside, strict=True)])
     healthy = np.flatnonzero(np.arange(NUMBER) % ONE_IN)
     same = np.array_equal(runs[0].y[:, healthy], runs[1].y[:, healthy], equal_nan=True)
-    return float(share), np.count_nonzero(runs[1].status != Status.OK), same
+    return float(share), int((runs[1].status != Status.OK).sum()), same
 
 
 def containment(quick: bool, progress: Callable[[int], None]) -> Dataset:

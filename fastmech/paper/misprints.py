@@ -52,12 +52,12 @@ def candidates(printed: Printed, computed: Computed) -> list[Misprint]:
     """Every place of the paper that was found suspect, in the paper's order, with evidence computed now."""
     formulas = []
     for key, formula in printed["formula"].items():
-        place, error, *both = (formula[name] for name in ("place", "error", "printed", "corrected"))
+        wrong, right = formula["printed"], formula["corrected"]
         evidence = [
-            Evidence(about, unit, *(of(expression, computed.motion) for expression in both), tolerance)
+            Evidence(about, unit, of(wrong, computed.motion), of(right, computed.motion), tolerance)
             for about, unit, tolerance, of in MEASURES[key]
         ]
-        formulas.append(Misprint(key, place, error, *both, tuple(evidence)))
+        formulas.append(Misprint(key, formula["place"], formula["error"], wrong, right, tuple(evidence)))
     return [
         *formulas,
         _bracket_16(printed, computed),
@@ -90,11 +90,12 @@ def _bracket_16(printed: Printed, computed: Computed) -> Misprint:
     along = Evidence(
         "largest error of the kinetic energy along the motion, over its largest value",
         "1",
-        *(kinetic_error(corrected) for corrected in (False, True)),
+        kinetic_error(False),
+        kinetic_error(True),
         0.02,
     )
     error = "the bracket that `sin(phi)**2` multiplies is closed too early"
-    both = (_denominator(equation, corrected) for corrected in (False, True))
+    both = _denominator(equation, False), _denominator(equation, True)
     return Misprint("equation_16_bracket", "Equation (16), denominator", error, *both, (fitted, along))
 
 
@@ -144,10 +145,11 @@ def _copied_hessian(printed: Printed, cases: tuple[Case, ...]) -> Misprint:
     evidence = Evidence(
         "largest difference of the printed matrix from the Hessian at Case 1 (as printed) and at Case 3",
         "J",
-        *(float(np.max(np.abs(matrix - cases[i].equilibrium.hessian))) for i in (0, 2)),
+        float(np.abs(matrix - true).max()),
+        float(np.abs(matrix - cases[2].equilibrium.hessian).max()),
         half_unit(entries[0][0]) * (1.0 + 1e-9),
     )
-    both = (_matrix(rows) for rows in (entries, [[f"{value:.3f}" for value in row] for row in true]))
+    both = _matrix(entries), _matrix([[f"{value:.3f}" for value in row] for row in true])
     return Misprint("table_3_case_1", "Table 3, Case 1", "the matrix is a copy of Case 3", *both, (evidence,))
 
 
@@ -173,7 +175,8 @@ def _sign_of_polynomials(printed: Printed) -> Misprint:
     evidence = Evidence(
         "difference of the leading coefficient from 1, that of det(lambda - J)",
         "1",
-        *(max(abs(sign * value - 1.0) for value in leading) for sign in (1.0, -1.0)),
+        max(abs(value - 1.0) for value in leading),
+        max(abs(-value - 1.0) for value in leading),
         0.0,
     )
     error = "the polynomials are printed with the opposite sign (their roots are the same)"
@@ -190,7 +193,8 @@ def _copied_polynomial(printed: Printed, cases: tuple[Case, ...]) -> Misprint:
     evidence = Evidence(
         "coefficients whose legible digits contradict the polynomial of Case 1 (as printed) and of Case 3",
         "1",
-        *(contradictions(cases[i]) for i in (0, 2)),
+        contradictions(cases[0]),
+        contradictions(cases[2]),
         0.0,
     )
     error = "a copy of Case 3, from which follows the remark that both cases have the same graphs"

@@ -162,7 +162,7 @@ def _circling(quick: bool) -> Sequence[Row]:
 def _undecided(method: str) -> Row:
     """The label of the circling motion: there is none."""
     found = labels_of(_CIRCLING, _CIRCLING_START, LABELLED, method=method)
-    return labels_row(method, found, np.count_nonzero(found.status == Status.CAPTURED))
+    return labels_row(method, found, int((found.status == Status.CAPTURED).sum()))
 
 
 CASES = (
