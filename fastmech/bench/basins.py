@@ -17,9 +17,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from fastmech.basins.label import labels_of
-from fastmech.bench.measure import Stage, in_turns
 from fastmech.bench.plain import scalar_rhs
-from fastmech.bench.tables import table
 from fastmech.disturbance.size import confining_energy, excess_energy
 from fastmech.ensembles.threads import thread_count
 from fastmech.equilibria.find import find_equilibria
@@ -27,6 +25,7 @@ from fastmech.jit import FLAGS
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import unit
 from fastmech.mechanism.reduced import metric_11, potential, slider_ratio
+from fastmech.reports import Stage, in_turns, table
 from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -146,9 +145,9 @@ def markdown(rows: list[BasinRow]) -> list[str]:
         "Table 1, constant force, random starts at rest; medians of warm calls.",
         "",
         *table(
-            ["labelled by", "threads", "starts", "starts/s", "steps a start", "labels that differ"],
+            "labelled by | threads | starts | starts/s | steps a start | labels that differ",
             (
-                [r.name, str(r.threads), f"{r.starts:,}", f"{r.rate:,.4g}", f"{r.steps:,.4g}", str(r.wrong)]
+                f"{r.name} | {r.threads} | {r.starts:,} | {r.rate:,.4g} | {r.steps:,.4g} | {r.wrong}"
                 for r in rows
             ),
         ),

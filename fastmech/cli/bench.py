@@ -6,18 +6,11 @@ from pathlib import Path
 
 import click
 
-from fastmech.cli.reporting import account, reporting_options
+from fastmech.cli.reporting import account, out_option, reporting_options
 
 
 @click.command(name="bench")
-@click.option(
-    "--out",
-    metavar="DIR",
-    type=click.Path(file_okay=False, path_type=Path),
-    default=Path("results/bench"),
-    show_default=True,
-    help="Folder for the report.",
-)
+@out_option("Folder for the report.", "results/bench")
 @click.option("--quick", is_flag=True, help="Fewer trajectories and methods.")
 @click.option(
     "--only",

@@ -6,32 +6,14 @@ import random
 import time
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field
 
-from fastmech.faults.processes import FaultFound, Place, Reference, check_result, place
-from fastmech.faults.victim import IN_HAND, computed_again, content_of
-
-
-@dataclass
-class KillReport:
-    """What a campaign has found.
-
-    Attributes:
-        kills: runs that were killed.
-        finished: scans that were brought to their end.
-        again: tiles that were computed more than once.
-        stages: kills by what the run was doing.
-    """
-
-    kills: int = 0
-    finished: int = 0
-    again: int = 0
-    stages: Counter[str] = field(default_factory=Counter)
+from fastmech.faults.processes import FaultFound, Found, Place, Reference, check_resumed, place
+from fastmech.faults.victim import content_of
 
 
 def kill_campaign(
     kills: int, expected: Reference, seed: int = 0, tell: Callable[[int], None] = lambda n: None
-) -> KillReport:
+) -> Found:
     """Kill runs at random moments, every third while it assembles, and resume them to the end.
 
     Args:
@@ -43,28 +25,32 @@ def kill_campaign(
     Raises:
         FaultFound: a result differs, something is left behind, or more was computed again than was in hand.
     """
-    rng, report = random.Random(seed), KillReport()
-    while report.kills < kills:
+    rng, stages, finished, again = random.Random(seed), Counter[str](), 0, 0
+    while stages.total() < kills:
         with place() as here:
             here.begin()
-            before = report.kills
+            before = stages.total()
             for _ in range(rng.randint(1, 8)):
-                if not _killed(here, expected, rng, report):
+                stage = _killed_in(here, expected, rng)
+                if not stage:
                     break
+                stages[stage] += 1
                 tell(1)
                 _nothing_broken(here, expected)
             here.finish()
-            again, most = computed_again(here.lines()), IN_HAND * (report.kills - before)
-            if again > most:
-                raise FaultFound(f"{again} tiles were computed again, at most {most} were in hand")
-            check_result(here, expected, f"after {report.kills - before} kills")
-            report.again += again
-            report.finished += 1
-    return report
+            killed = stages.total() - before
+            again += check_resumed(here, expected, f"after {killed} kills", killed)
+            finished += 1
+    while_doing = ", ".join(f"{name} {count}" for name, count in sorted(stages.items()))
+    sentences = (
+        f"{stages.total()} runs killed, {finished} scans resumed to the same result",
+        f"  {again} tiles computed again; killed while {while_doing}",
+    )
+    return Found(sentences, {"killed": {"runs": stages.total(), "tiles_again": again, **stages}})
 
 
-def _killed(here: Place, expected: Reference, rng: random.Random, report: KillReport) -> bool:
-    """Start a run and kill it; False where it was faster."""
+def _killed_in(here: Place, expected: Reference, rng: random.Random) -> str:
+    """Start a run and kill it; what it was doing, empty where it was faster."""
     seen = len(here.lines())
     process = here.start()
     if rng.random() < 1 / 3:
@@ -74,16 +60,13 @@ def _killed(here: Place, expected: Reference, rng: random.Random, report: KillRe
     else:
         time.sleep(rng.uniform(0.0, expected.seconds - expected.assembly))
     if process.exitcode is not None:
-        return False
+        return ""
     process.kill()
     process.join()
     if process.exitcode == 0:
-        return False
-    doing = here.lines()[seen:]
-    what = "starting" if not doing else doing[-1].removeprefix("stage ")
-    report.stages["computing" if what.startswith("tile ") else what] += 1
-    report.kills += 1
-    return True
+        return ""
+    what = "starting" if len(here.lines()) == seen else here.lines()[-1].removeprefix("stage ")
+    return "computing" if what.startswith("tile ") else what
 
 
 def _nothing_broken(here: Place, expected: Reference) -> None:

@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fastmech.hardcases.case import Floats
-from fastmech.hardcases.walk import Goal
+from fastmech.hardcases.references import Floats, Goal
 from fastmech.integrators.batch import Batch, observe_nothing
 from fastmech.integrators.method import ImplicitRungeKutta
 from fastmech.integrators.methods import METHODS

@@ -9,14 +9,13 @@ far too long.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.errors import InputError
-from fastmech.hardcases.case import REFUSED, Floats, Row, row_of, worst
+from fastmech.hardcases.case import REFUSED, Row, row_of, worst
+from fastmech.hardcases.references import Floats, Goal
 from fastmech.integrators.method import Adams
 from fastmech.integrators.methods import METHODS, find_method
 from fastmech.scene import Scene
@@ -36,23 +35,6 @@ SHORTER = 4.0
 
 #: Relative error beyond which a number is worth nothing, and steps that are too many to get one.
 WORTHLESS, MOST_STEPS = 0.1, 200_000
-
-#: Relative error that rounding explains, of motions that are not chaotic.
-ROUNDED = 1e-10
-
-
-class Goal(NamedTuple):
-    """A motion with a known end."""
-
-    scene: Scene
-    start: Floats  #: (4,)
-    t_end: float  #: s
-    expected: Floats  #: (4,), state at that time
-    rounded: float = ROUNDED  #: error that rounding explains, of the largest entry
-
-    def error(self, state: Floats) -> float:
-        """Largest difference from the known end, relative to its largest entry, 1 at least."""
-        return _distance(state, self.expected)
 
 
 def walked(quick: bool) -> tuple[str, ...]:
@@ -115,14 +97,14 @@ def fixed_row(goal: Goal, method: str, dt: float, allowed: float, why: str, dtyp
     return row_of(run, goal.error(run.y[-1, 0]), allowed, why=why, remark=remark)
 
 
+def halving_tells(method: str, state: Floats, half: Floats) -> float:
+    """The error of a result by the same with half the steps: Richardson's estimate, of the largest entry."""
+    return float(np.abs(state - half).max()) / (1.0 - 0.5 ** find_method(method).order)
+
+
 def _own_claim(goal: Goal, method: str, dt: float) -> tuple[Trajectories, float]:
     """A run and the error that it claims: twice Richardson's estimate, rounding added."""
     run, half = (integrate(goal.scene, goal.start, goal.t_end, h, method) for h in (dt, 0.5 * dt))
-    order = find_method(method).order
-    estimate = _distance(run.y[-1, 0], half.y[-1, 0]) / (1.0 - 0.5**order)
-    claim = 2.0 * estimate + goal.rounded
+    size = max(1.0, float(np.abs(half.y[-1, 0]).max()))
+    claim = 2.0 * halving_tells(method, run.y[-1, 0], half.y[-1, 0]) / size + goal.rounded
     return run, claim if np.isfinite(claim) else np.inf
-
-
-def _distance(state: Floats, expected: Floats) -> float:
-    return float(np.abs(state - expected).max() / max(1.0, np.abs(expected).max()))

@@ -11,7 +11,7 @@ from fastmech.basins.label import labels_of
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.ensembles.status import Status
 from fastmech.equilibria.find import find_equilibria
-from fastmech.hardcases.case import HardCase, Row, energy, row_of
+from fastmech.hardcases.case import HardCase, Row, energy, labels_row, row_of
 from fastmech.hardcases.walk import WITHIN, labellers, walked
 from fastmech.integrators.methods import find_method
 from fastmech.scene import Scene
@@ -162,18 +162,7 @@ def _circling(quick: bool) -> Sequence[Row]:
 def _undecided(method: str) -> Row:
     """The label of the circling motion: there is none."""
     found = labels_of(_CIRCLING, _CIRCLING_START, LABELLED, method=method)
-    captured = int((found.status != Status.UNDECIDED).sum())
-    if not captured:
-        status, claimed, error = "ok", True, 0.0
-    else:
-        status, claimed, error = _failed(Status(found.status[0])), False, np.nan
-    remark = "label: " + Status(found.status[0]).name.lower()
-    return Row(method, np.nan, found.steps, error, 0.0, np.nan, status, claimed, remark, "fm.labels_of")
-
-
-def _failed(kind: Status) -> str:
-    """The integration's status of a label's, "ok" for labels: none is right here."""
-    return {Status.NOT_FINITE: "not_finite", Status.STEP_TOO_LARGE: "step_too_large"}.get(kind, "ok")
+    return labels_row(method, found, int((found.status == Status.CAPTURED).sum()))
 
 
 CASES = (

@@ -8,9 +8,8 @@ import numpy as np
 
 from fastmech.ensembles.balance import lowest_potential
 from fastmech.ensembles.integrate import Trajectories, integrate
-from fastmech.hardcases.case import Floats, HardCase, Row, energy, row_of
-from fastmech.hardcases.walk import admitted_step, walked
-from fastmech.integrators.methods import find_method
+from fastmech.hardcases.case import DRIVEN, Floats, HardCase, Row, energy, row_of
+from fastmech.hardcases.walk import admitted_step, halving_tells, walked
 from fastmech.scene import Scene
 
 SCENE = Scene(c2=1100 / 3, beta=0.0, F0=0.0)
@@ -61,13 +60,12 @@ def _walked(start: Sequence[float], method: str, steps: int) -> Row:
     dt = admitted_step(SCENE, method, DT, np.array([start]))
     if dt == 0.0:
         _, error, run = energy_history(start, method, "lagrange", steps)
-        why = "undamped motions grow with every step"
-        return row_of(run, float(np.abs(error).max()), np.nan, claimed=False, why=why)
+        return row_of(run, float(np.abs(error).max()), np.nan, claimed=False, why=DRIVEN)
     count = round(steps * DT / dt)
     fitted = steps * DT / count
     _, error, run = energy_history(start, method, "lagrange", count, fitted)
     half = energy_history(start, method, "lagrange", 2 * count, 0.5 * fitted)
-    estimate = float(np.abs(error - half[1]).max()) / (1.0 - 0.5 ** find_method(method).order)
+    estimate = halving_tells(method, error, half[1])
     drift = float(np.abs(error).max())
     why = "twice what halving the step tells"
     return row_of(run, drift, 2.0 * estimate + ROUNDED, drift, remark="lagrange, largest error", why=why)
