@@ -182,9 +182,19 @@ def test_the_end_of_a_range_and_the_limit_are_told() -> None:
     assert "limit" in few.certificate.sentence
 
 
-def test_degree_is_not_claimed_where_a_force_changes_sign_on_an_end() -> None:
-    statics = of_potential([ranged(x, -1.0, 1.0), ranged(y, -1.0, 1.0)], (), x * y + x**3 / 9)
-    assert prove_equilibria(statics).certificate.expected_sum is None
+def test_indices_sum_to_the_turns_of_the_force_along_the_ends() -> None:
+    """By hand: saddles where no force keeps its sign on an end, a ring, a zero on the boundary."""
+    saddle = of_potential([ranged(x, -1.0, 1.0), ranged(y, -1.0, 1.0)], (), x * y + x**3 / 9)
+    certificate = prove_equilibria(saddle).certificate
+    assert (certificate.expected_sum, certificate.index_sum) == (-1, -1)
+    monkey = of_potential([ranged(x, -1.0, 1.0), ranged(y, -1.1, 0.9)], (), x**3 - 3 * x * y**2 + x / 9)
+    certificate = prove_equilibria(monkey).certificate
+    assert (certificate.expected_sum, certificate.index_sum) == (-2, -2)
+    ring = of_potential([angle(phi), ranged(x, 0.5, 2.0)], (), (x - 1) ** 2 * 5 + x * sp.cos(phi))
+    certificate = prove_equilibria(ring).certificate
+    assert (certificate.expected_sum, certificate.index_sum) == (0, 0)
+    on_end = of_potential([ranged(x, -1.0, 1.0), ranged(y, -1.0, 1.0)], (), (x - 1) ** 2 + y**2)
+    assert prove_equilibria(on_end).certificate.expected_sum is None
 
 
 def random_mechanism(rng: np.random.Generator) -> tuple[Statics, list[float]]:
