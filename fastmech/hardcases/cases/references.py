@@ -9,9 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fastmech.hardcases.case import HardCase, Row
-from fastmech.hardcases.counts import counted, explicit_calls
 from fastmech.hardcases.references import ROUNDED, Goal, motion
-from fastmech.hardcases.walk import claimed_row, fixed_row, status_row, walked
+from fastmech.hardcases.walk import claimed_row, counted, explicit_calls, fixed_row, status_row, walked
 from fastmech.integrators.method import ImplicitRungeKutta
 from fastmech.integrators.methods import find_method
 from fastmech.step_limits.warning import step_warning
