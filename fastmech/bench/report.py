@@ -20,6 +20,7 @@ from fastmech.bench.peers import entrants
 from fastmech.bench.picture import draw_bench
 from fastmech.bench.problem import PROBLEMS, Entrant, Problem
 from fastmech.bench.processes import footprints, started, vectors_study
+from fastmech.bench.proofs import proofs_study
 from fastmech.bench.stiff import stiff_study
 from fastmech.bench.systems import systems_study
 from fastmech.bench.threads import threads_study
@@ -48,6 +49,7 @@ LIBRARIES = ("numba", "scipy", "heyoka", "torch", "jax", "diffrax", "numbalsoda"
 STUDIES: dict[str, Callable[..., list[str]]] = {
     "atlas": atlas_study,
     "basins": basins_study,
+    "proofs": proofs_study,
     "stiff": stiff_study,
     "systems": systems_study,
     "threads": threads_study,

@@ -9,7 +9,7 @@ import numpy as np
 
 from fastmech.paper.compute import Case
 from fastmech.paper.scene import STATIC_SCENE
-from fastmech.plots.mechanism import draw_mechanism, legend_handles
+from fastmech.plots.mechanism import draw_mechanism, drawing_of, legend_handles
 from fastmech.plots.style import PALETTE, new_figure, style
 from fastmech.results import Dataset
 
@@ -88,9 +88,10 @@ def draw_positions(cases: Sequence[Case]) -> Figure:
     with style():
         figure = new_figure(9.6, 9.2)
         grid = figure.subplots(2, 2, sharex=True, sharey=True)
-        for axes, case in zip(grid.flat, cases, strict=True):
-            e = case.equilibrium
-            draw_mechanism(axes, STATIC_SCENE, e.phi, e.theta, STATIC_SCENE.F0)
+        rests = [case.equilibrium for case in cases]
+        drawn = drawing_of(STATIC_SCENE, [e.position for e in rests], STATIC_SCENE.F0)
+        for k, (axes, case, e) in enumerate(zip(grid.flat, cases, rests, strict=True)):
+            draw_mechanism(axes, drawn, k)
             colour = PALETTE["blue"] if case.verdict == "stable" else PALETTE["vermillion"]
             axes.set_title(
                 f"Case {case.number}: {case.verdict} ({e.kind})\n"
@@ -101,7 +102,11 @@ def draw_positions(cases: Sequence[Case]) -> Figure:
         figure.suptitle(
             "Fig. 6 (b)  The mechanism at its static equilibria, to scale; areas of the masses in proportion"
         )
-        figure.legend(handles=legend_handles(STATIC_SCENE.F0), loc="outside lower center", ncols=4)
+        figure.legend(
+            handles=legend_handles(drawn, f"force on $M_2$, {STATIC_SCENE.F0:g} N"),
+            loc="outside lower center",
+            ncols=4,
+        )
     return figure
 
 
