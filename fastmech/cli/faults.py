@@ -41,11 +41,9 @@ def command(
 
     with account("faults", quiet, as_json) as told:
         with told.bars.preparing():
-            from fastmech.faults.disk import can_mount, disk_campaign
+            from fastmech.faults.campaigns import can_mount, disk_campaign, kill_campaign, worker_campaign
             from fastmech.faults.fuzz import fuzz_requests, fuzz_results
-            from fastmech.faults.kill import kill_campaign
             from fastmech.faults.processes import reference
-            from fastmech.faults.worker import worker_campaign
 
         def show(found: Found) -> None:
             for sentence in found.sentences:

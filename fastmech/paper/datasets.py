@@ -77,13 +77,12 @@ _LONG_NAMES = {
 
 
 def _over_time(computed: Computed, values: dict[str, tuple[str, Floats]]) -> Dataset:
-    along = ("time",)
-    return Dataset(
-        {
-            "time": Variable(along, computed.motion.t, "s", "time"),
-            **{name: Variable(along, v, unit, _LONG_NAMES[name]) for name, (unit, v) in values.items()},
-        }
-    )
+    moving = {name: Variable(("time",), v, unit, _LONG_NAMES[name]) for name, (unit, v) in values.items()}
+    return Dataset({"time": Variable(("time",), computed.motion.t, "s", "time")} | moving)
+
+
+def _numbers(cases: Sequence[Case]) -> Variable:
+    return Variable(("case",), np.array([case.number for case in cases]), "1", "case of Table 2")
 
 
 def _equilibria(cases: Sequence[Case]) -> Dataset:
@@ -91,8 +90,10 @@ def _equilibria(cases: Sequence[Case]) -> Dataset:
     grid = np.stack(np.meshgrid(angles, angles, indexing="ij"), axis=-1)
     force = STATIC_SCENE.F0
     gradient = potential_gradient(STATIC_SCENE, grid, force)
-    rest = np.array([(case.equilibrium.phi, case.equilibrium.theta, 0.0, 0.0) for case in cases])
+    found = [case.equilibrium for case in cases]
+    rest = np.array([(e.phi, e.theta, 0.0, 0.0) for e in found])
     plane, along = ("phi", "theta"), ("case",)
+    points = positions(STATIC_SCENE, rest)._asdict().items()
     return Dataset(
         {
             "phi": Variable(("phi",), angles, "rad", "angle phi"),
@@ -100,42 +101,27 @@ def _equilibria(cases: Sequence[Case]) -> Dataset:
             "potential": Variable(plane, potential_energy(STATIC_SCENE, grid, force), "J", "U = Pi - F x2"),
             "condition_phi": Variable(plane, gradient[..., 0], "J", "dU/dphi, first of (20)"),
             "condition_theta": Variable(plane, gradient[..., 1], "J", "dU/dtheta, second of (20)"),
-            "case": Variable(along, np.array([case.number for case in cases]), "1", "case of Table 2"),
+            "case": _numbers(cases),
             "phi_st": Variable(along, rest[:, 0], "rad", "angle phi at rest"),
             "theta_st": Variable(along, rest[:, 1], "rad", "angle theta at rest"),
-            "energy": Variable(
-                along, np.array([case.equilibrium.energy for case in cases]), "J", "U at rest"
-            ),
-            "kind": Variable(
-                along, np.array([case.equilibrium.kind for case in cases]), "1", "kind of equilibrium"
-            ),
-            **{
-                name: Variable(along, value, "m", f"{_LONG_NAMES[name]} at rest")
-                for name, value in positions(STATIC_SCENE, rest)._asdict().items()
-            },
+            **columns("case", found, {"energy": ("J", "U at rest"), "kind": ("1", "kind of equilibrium")}),
+            **{name: Variable(along, x, "m", f"{_LONG_NAMES[name]} at rest") for name, x in points},
         }
     )
 
 
 def _disturbed(cases: Sequence[Case]) -> Dataset:
     along = ("case", "time")
-    variables = {
-        "case": Variable(("case",), np.array([case.number for case in cases]), "1", "case of Table 2"),
-        "time": Variable(("time",), cases[0].disturbed.t, "s", "time"),
-    }
+    variables = {"case": _numbers(cases), "time": Variable(("time",), cases[0].disturbed.t, "s", "time")}
     for which in ("nonlinear", "linearized"):
         for i, (name, (unit, long_name)) in enumerate(_DISTURBANCES.items()):
             data = np.stack([getattr(case.disturbed, which)[:, 0, i] for case in cases])
             variables[f"{name}_{which}"] = Variable(along, data, unit, f"{long_name}, {which} equations")
-        norm = np.stack([getattr(case, f"norm_{which}") for case in cases])
-        variables[f"norm_{which}"] = Variable(
-            along, norm, "rad", f"size of the disturbance, {which} equations"
-        )
-    roots = np.stack([case.classification.eigenvalues for case in cases])
+        norm, about = np.stack([getattr(case, f"norm_{which}") for case in cases]), "size of the disturbance"
+        variables[f"norm_{which}"] = Variable(along, norm, "rad", f"{about}, {which} equations")
+    roots, about = np.stack([case.classification.eigenvalues for case in cases]), "characteristic polynomial"
     for part, data in (("re", roots.real), ("im", roots.imag)):
-        variables[f"root_{part}"] = Variable(
-            ("case", "root"), data, "1/s", f"root of the characteristic polynomial, {part}"
-        )
+        variables[f"root_{part}"] = Variable(("case", "root"), data, "1/s", f"root of the {about}, {part}")
     return Dataset(variables)
 
 

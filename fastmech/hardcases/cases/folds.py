@@ -8,7 +8,8 @@ x = -d tanh(r t / 2) before and d tan(r t / 2) behind it: the ghost is left afte
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -125,17 +126,12 @@ def _labels(passage: _Passage, side: float, method: str) -> Row:
     return labels_row(method, found, wrong, "; none settled")
 
 
-def _beside(side: float) -> Callable[[bool], Sequence[Row]]:
-    def run(quick: bool) -> Sequence[Row]:
-        passage = _passage()
-        rows = [_creeping(passage, side, method) for method in walked(quick)]
-        if not quick:
-            rows += [
-                _whole(passage, side, row.method) for row in rows if row.claimed and row.dt >= AFFORDABLE
-            ]
-        return [*rows, *(_labels(passage, side, method) for method in labellers(quick))]
-
-    return run
+def _beside(side: float, quick: bool) -> Sequence[Row]:
+    passage = _passage()
+    rows = [_creeping(passage, side, method) for method in walked(quick)]
+    if not quick:
+        rows += [_whole(passage, side, row.method) for row in rows if row.claimed and row.dt >= AFFORDABLE]
+    return [*rows, *(_labels(passage, side, method) for method in labellers(quick))]
 
 
 CASES = tuple(
@@ -145,7 +141,7 @@ CASES = tuple(
         "the fold's normal form with the saddle's eigenvalue; error: of the phase on the way, of the time of "
         "leaving, of the minimum's place; of fm.labels_of, the number of wrong labels and of settled motions",
         must,
-        _beside(side),
+        partial(_beside, side),
     )
     for name, side, where, must in (
         (

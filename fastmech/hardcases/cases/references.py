@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from fastmech.hardcases.case import HardCase, Row
-from fastmech.hardcases.counts import counted, explicit_calls
 from fastmech.hardcases.references import ROUNDED, Goal, motion
-from fastmech.hardcases.walk import claimed_row, fixed_row, status_row, walked
+from fastmech.hardcases.walk import claimed_row, counted, explicit_calls, fixed_row, status_row, walked
 from fastmech.integrators.method import ImplicitRungeKutta
 from fastmech.integrators.methods import find_method
 from fastmech.step_limits.warning import step_warning
@@ -104,10 +104,8 @@ _MOTIONS: dict[str, _Motion] = {
 
 def _counted_row(goal: Goal, method: str, dt: float, allowed: float, fewer: float) -> Row:
     """A declared claim with every right-hand side counted; too many of them fail the row."""
-    row, work = (
-        fixed_row(goal, method, dt, allowed, "L-stable"),
-        counted(goal, method, round(goal.t_end / dt)),
-    )
+    row = fixed_row(goal, method, dt, allowed, "L-stable")
+    work = counted(goal, method, round(goal.t_end / dt))
     least = explicit_calls(goal, work.path)
     remark = (
         f"{work.calls:,} right-hand sides and {work.jacobians:,} Jacobians; RK4 at its limit {least:,.0f}, "
@@ -125,22 +123,19 @@ def _end_of(goal: Goal, m: _Motion, method: str) -> Row:
     return claimed_row(goal, method, m.step, m.refused)
 
 
-def _runner(name: str) -> Callable[[bool], Sequence[Row]]:
-    def run(quick: bool) -> Sequence[Row]:
-        m = _MOTIONS[name]
-        goal = motion(name, m.rounded)
-        rows = [_counted_row(goal, *claim) for claim in m.counted]
-        rows += [fixed_row(goal, *claim, "declared") for claim in m.claims]
-        rows += [_end_of(goal, m, method) for method in walked(quick)]
-        if m.single:
-            why = "what fm.integrate says of float32"
-            rows += [fixed_row(goal, method, m.step, SINGLE, why, "float32") for method in ("rk4", "dop853")]
-            rows.append(status_row(goal, "radau5", m.step, "float32 is not offered", "float32"))
-        if m.all_refuse:
-            rows += [status_row(goal, method, m.refused, "a step far too long") for method in walked(quick)]
-        return rows
-
-    return run
+def _run(name: str, quick: bool) -> Sequence[Row]:
+    m = _MOTIONS[name]
+    goal = motion(name, m.rounded)
+    rows = [_counted_row(goal, *claim) for claim in m.counted]
+    rows += [fixed_row(goal, *claim, "declared") for claim in m.claims]
+    rows += [_end_of(goal, m, method) for method in walked(quick)]
+    if m.single:
+        why = "what fm.integrate says of float32"
+        rows += [fixed_row(goal, method, m.step, SINGLE, why, "float32") for method in ("rk4", "dop853")]
+        rows.append(status_row(goal, "radau5", m.step, "float32 is not offered", "float32"))
+    if m.all_refuse:
+        rows += [status_row(goal, method, m.refused, "a step far too long") for method in walked(quick)]
+    return rows
 
 
 def _whip(quick: bool) -> Sequence[Row]:
@@ -149,7 +144,7 @@ def _whip(quick: bool) -> Sequence[Row]:
 
 
 CASES = (
-    *(HardCase(name, m.hard, ORACLE, m.must, _runner(name)) for name, m in _MOTIONS.items()),
+    *(HardCase(name, m.hard, ORACLE, m.must, partial(_run, name)) for name, m in _MOTIONS.items()),
     HardCase(
         "whip",
         "m2/m1 = 1e6, later: M2 drags M1 through cos(phi+theta) = 0 at more than 1e3 rad/s",
