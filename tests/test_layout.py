@@ -46,6 +46,7 @@ LAYERS = (
     "scan_types",
     "tiles",
     "runner",
+    "reports",
     "paper",
     "hardcases",
     "bench",

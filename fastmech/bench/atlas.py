@@ -16,11 +16,10 @@ from scipy import optimize
 
 from fastmech.atlas.folds import trace_folds
 from fastmech.atlas.map import EquilibriumMap, map_equilibria
-from fastmech.bench.measure import Stage, in_turns
-from fastmech.bench.tables import table
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.threads import thread_count
 from fastmech.equilibria.outcome import Outcome
+from fastmech.reports import Stage, in_turns, table
 from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -128,10 +127,8 @@ def gradient(q: Floats, a: float, C: float, b: float, f: float) -> list[float]:
 def hessian(q: Floats, a: float, C: float, b: float, f: float) -> list[list[float]]:
     """Its Jacobian."""
     s = C * np.sin(q[0] + q[1])
-    return [
-        [f * np.cos(q[0]) - a * np.sin(q[0]) + s, s],
-        [s, b * np.cos(q[1]) - f * np.sin(q[1]) + s],
-    ]
+    first, second = f * np.cos(q[0]) - a * np.sin(q[0]) + s, b * np.cos(q[1]) - f * np.sin(q[1]) + s
+    return [[first, s], [s, second]]
 
 
 def loads(s: Scene) -> tuple[float, float, float, float]:
@@ -214,16 +211,6 @@ def row_of(where: str, search: Search) -> AtlasRow:
 
 def markdown(rows: list[AtlasRow], ratios: dict[int, tuple[float, float, float]]) -> list[str]:
     """The table and the ratios."""
-    head = [
-        "search",
-        "threads",
-        "points",
-        "points/s",
-        "equilibria",
-        "missed",
-        "points incomplete",
-        "no proof",
-    ]
     lines = [
         "# The equilibrium atlas",
         "",
@@ -233,14 +220,14 @@ def markdown(rows: list[AtlasRow], ratios: dict[int, tuple[float, float, float]]
         f"{', '.join(map(str, TOLD))} starts; its rate and the other columns are for {STARTS}.",
         "",
         *table(
-            head,
+            "search | threads | points | points/s | equilibria | missed | points incomplete | no proof",
             (
-                [r.name, str(r.threads), f"{r.points:,}", f"{r.rate:,.4g}", f"{r.found:,}",
-                 ", ".join(map(str, r.missed)) if any(r.missed) else "0", str(r.incomplete), str(r.unproved)]
+                f"{r.name} | {r.threads} | {r.points:,} | {r.rate:,.4g} | {r.found:,} | "
+                f"{', '.join(map(str, r.missed)) if any(r.missed) else 0} | {r.incomplete} | {r.unproved}"
                 for r in rows
             ),
         ),
-    ]  # fmt: skip
+    ]
     for row, (low, middle, high) in zip(rows, ratios.values(), strict=False):
         by = f"{row.threads} thread{'s' * (row.threads > 1)}"
         lines += [

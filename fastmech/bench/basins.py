@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import statistics
 import time
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -17,9 +16,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from fastmech.basins.label import labels_of
-from fastmech.bench.measure import Stage, in_turns
 from fastmech.bench.plain import scalar_rhs
-from fastmech.bench.tables import table
 from fastmech.disturbance.size import confining_energy, excess_energy
 from fastmech.ensembles.threads import thread_count
 from fastmech.equilibria.find import find_equilibria
@@ -27,6 +24,7 @@ from fastmech.jit import FLAGS
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import unit
 from fastmech.mechanism.reduced import metric_11, potential, slider_ratio
+from fastmech.reports import Stage, in_turns, table
 from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -69,30 +67,28 @@ def random_starts(n: int) -> Floats:
     return starts
 
 
+def _timed(starts: Floats, turns: int, threads: int, radius: float | None = None) -> tuple[float, float]:
+    """Seconds of labelling, median of warm calls, and its steps a start."""
+    runs = []
+
+    def label() -> None:
+        runs.append(labels_of(SCENE, starts, T_END, settle_radius=radius, threads=threads))
+
+    (seconds,) = in_turns({"": label}, turns, clock=time.perf_counter).values()
+    return statistics.median(seconds), runs[0].steps / len(starts)
+
+
 def certified(starts: Floats, threads: int) -> BasinRow:
     """The package's labels."""
-    steps: list[int] = []
-
-    def labelled() -> None:
-        steps.append(labels_of(SCENE, starts, T_END, threads=threads).steps)
-
-    (seconds,) = in_turns({"": labelled}, REPEATS, clock=time.perf_counter).values()
-    rate = len(starts) / statistics.median(seconds)
-    return BasinRow("capture certificate", threads, len(starts), rate, steps[0] / len(starts), 0)
+    seconds, steps = _timed(starts, REPEATS, threads)
+    return BasinRow("capture certificate", threads, len(starts), len(starts) / seconds, steps, 0)
 
 
 def settled(starts: Floats) -> BasinRow:
     """The same engine, each start followed once, with the certificate's finer step, until it rests."""
-    steps: dict[float | None, int] = {}
-
-    def labelled(radius: float | None) -> None:
-        steps[radius] = labels_of(SCENE, starts, T_END, settle_radius=radius, threads=1).steps
-
-    works = {radius: partial(labelled, radius) for radius in (None, REST)}
-    seconds = {k: v[0] for k, v in in_turns(works, 1, clock=time.perf_counter).items()}
-    rate = len(starts) / (seconds[REST] - seconds[None])
-    each = (steps[REST] - steps[None]) / len(starts)
-    return BasinRow(f"until within {REST:g} of rest", 1, len(starts), rate, each, 0)
+    (label, first), (rest, last) = (_timed(starts, 1, 1, radius) for radius in (None, REST))
+    rate = len(starts) / (rest - label)
+    return BasinRow(f"until within {REST:g} of rest", 1, len(starts), rate, last - first, 0)
 
 
 def _energy_above(y: Floats, p: Floats, bottom: float) -> float:
@@ -146,9 +142,9 @@ def markdown(rows: list[BasinRow]) -> list[str]:
         "Table 1, constant force, random starts at rest; medians of warm calls.",
         "",
         *table(
-            ["labelled by", "threads", "starts", "starts/s", "steps a start", "labels that differ"],
+            "labelled by | threads | starts | starts/s | steps a start | labels that differ",
             (
-                [r.name, str(r.threads), f"{r.starts:,}", f"{r.rate:,.4g}", f"{r.steps:,.4g}", str(r.wrong)]
+                f"{r.name} | {r.threads} | {r.starts:,} | {r.rate:,.4g} | {r.steps:,.4g} | {r.wrong}"
                 for r in rows
             ),
         ),

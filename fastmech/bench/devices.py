@@ -136,7 +136,9 @@ def coupled(rng: Random) -> Mechanism:
             U += _size(rng, -3, 3) * (s - rng.normal()) ** 2 / 2
             U -= _size(rng, -3, 3) * cos(rng.uniform(1, 4) * s)
     for (a, own), (b, other) in pairwise(zip(q, turning, strict=True)):
-        both = cos(a - b) if own and other else (sum(sin(c) if t else c for c, t in ((a, own), (b, other)))) ** 2
+        both = (
+            cos(a - b) if own and other else (sum(sin(c) if t else c for c, t in ((a, own), (b, other)))) ** 2
+        )
         U += _size(rng, -3, 3) * both / 2
     return Mechanism(q, kinetic=sum(s.dot**2 for s in q) / 2, potential=sympy.sympify(U), name="coupled")
 

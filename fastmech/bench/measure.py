@@ -9,16 +9,15 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.bench.entrant import Entrant, Floats, Solve
-from fastmech.bench.problem import Problem
+from fastmech.bench.problem import Entrant, Floats, Problem, Solve
 from fastmech.ensembles.run import Progress
+from fastmech.reports import Stage as Stage
 
 #: Processor seconds of timed calls that one entrant is given, and its calls at most.
 BUDGET = 0.8
@@ -26,33 +25,6 @@ MOST_REPEATS = 7
 
 #: Calls shorter than this [s] are given copies of the starts, up to the entrant's most.
 SHORT_CALL = 0.1
-
-
-#: Measured turns of :func:`in_turns` after one that warms up.
-TURNS = 7
-
-Name = TypeVar("Name")
-
-#: Makes a bar from what is done and how many pieces that are; it is told of each.
-Stage = Callable[[str, int], Progress]
-
-
-def in_turns(
-    works: Mapping[Name, Callable[[], object]],
-    turns: int = TURNS,
-    advance: Progress = lambda done: None,
-    clock: Callable[[], float] = time.process_time,
-) -> dict[Name, list[float]]:
-    """Seconds of each turn's call, after a turn that is not counted; ``advance`` is told 1 for each call."""
-    seconds: dict[Name, list[float]] = {name: [] for name in works}
-    for turn in range(turns + 1):
-        for name, work in works.items():
-            began = clock()
-            work()
-            if turn:
-                seconds[name].append(clock() - began)
-            advance(1)
-    return seconds
 
 
 @dataclass(frozen=True)
@@ -104,6 +76,11 @@ class _Runner:
         self.processor.append(time.process_time() - processor)
         self.wall.append(time.perf_counter() - wall)
 
+    def row(self, problem: str) -> Row:
+        named = self.entrant.family, self.entrant.setting, self.threads, len(self.starts)
+        wall, processor = statistics.median(self.wall), statistics.median(self.processor)
+        return Row(problem, *named, wall, processor, self.first_call, self.errors)
+
 
 def measure(
     problem: Problem,
@@ -132,20 +109,7 @@ def measure(
                 runner.time()
             if turn == 0:
                 advance(1)
-    return [
-        Row(
-            problem.name,
-            runner.entrant.family,
-            runner.entrant.setting,
-            runner.threads,
-            len(runner.starts),
-            statistics.median(runner.wall),
-            statistics.median(runner.processor),
-            runner.first_call,
-            runner.errors,
-        )
-        for runner in runners
-    ]
+    return [runner.row(problem.name) for runner in runners]
 
 
 def _prepare(problem: Problem, entrant: Entrant, threads: int, budget: float) -> _Runner:
@@ -171,3 +135,41 @@ def _prepare(problem: Problem, entrant: Entrant, threads: int, budget: float) ->
         taken *= more
     runner.repeats = int(np.clip(budget / taken, 1, MOST_REPEATS)) - len(runner.wall)
     return runner
+
+
+#: Largest errors [rad, rad/s] at which integrators are compared.
+TARGETS = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)
+
+
+def frontier(rows: Iterable[Row], count: int | None = None) -> list[Row]:
+    """Settings that no other beats in both speed and error, the most accurate first."""
+    best: list[Row] = []
+    # Errors that differ by rounding alone are equal.
+    for row in sorted(rows, key=lambda row: (float(f"{row.max_error(count):.2e}"), -row.rate)):
+        if np.isfinite(row.max_error(count)) and (not best or row.rate > best[-1].rate):
+            best.append(row)
+    return best
+
+
+def rate_at(rows: Iterable[Row], error: float, count: int | None = None) -> float | None:
+    """Trajectories per second at a largest error, between neighbours on the frontier in logarithms.
+
+    An integrator whose every setting is more accurate than that gives its fastest one; ``None`` where none
+    is as accurate.
+    """
+    best = frontier(rows, count)
+    errors = [row.max_error(count) for row in best]
+    if not best or error < errors[0]:
+        return None
+    logs = np.log(np.maximum(errors, 1e-300))
+    return float(np.exp(np.interp(np.log(error), logs, np.log([row.rate for row in best]))))
+
+
+def fastest_at(rows: Iterable[Row], error: float, count: int | None = None) -> tuple[str, float] | None:
+    """The family that is fastest at an error, and its rate."""
+    families: dict[str, list[Row]] = {}
+    for row in rows:
+        families.setdefault(row.family, []).append(row)
+    found = {name: rate_at(own, error, count) for name, own in families.items()}
+    known = {name: rate for name, rate in found.items() if rate is not None}
+    return max(known.items(), key=lambda item: item[1]) if known else None

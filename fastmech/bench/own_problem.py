@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import runpy
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fastmech.bench.frontier import EXPLICIT, WorkPrecision, work_precision
-from fastmech.bench.tables import table
 from fastmech.ensembles.fitting import vibration_frequency
-from fastmech.ensembles.run import Progress
 from fastmech.errors import InputError, one_line, shown, shown_name
 from fastmech.mechanism.coefficients import reduce
 from fastmech.plots.style import save
+from fastmech.reports import Stage, no_stage, table
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import read_request
 
@@ -70,13 +69,13 @@ def tabled(found: WorkPrecision) -> list[str]:
     """Every point, the frontier marked, and the calls to copy."""
     best = found.frontier
     lines = table(
-        ["method", "step [s]", "largest error", "99 % error", "trajectories [1/s]", "fastest at its error"],
+        "method | step [s] | largest error | 99 % error | trajectories [1/s] | fastest at its error",
         (
-            [p.method, f"{p.dt:.3g}", f"{p.largest:.1e}", f"{p.error_99:.1e}", f"{p.rate:,.0f}",
-             "yes" if p in best else ""]
+            f"{p.method} | {p.dt:.3g} | {p.largest:.1e} | {p.error_99:.1e} | {p.rate:,.0f} | "
+            + "yes" * (p in best)
             for p in sorted(found.points, key=lambda p: -p.largest)
         ),
-    )  # fmt: skip
+    )
     least = min((p.largest for p in found.points), default=np.inf)
     for error in found.errors:
         call = found.call(error) if least <= error else "no method keeps it"
@@ -84,9 +83,7 @@ def tabled(found: WorkPrecision) -> list[str]:
     return lines
 
 
-def run_problem(
-    where: str, out: Path, stage: Callable[[str, int], Progress] = lambda name, total: lambda done: None
-) -> tuple[list[str], list[Path]]:
+def run_problem(where: str, out: Path, stage: Stage = no_stage) -> tuple[list[str], list[Path]]:
     """Measure and write ``problem.md`` and ``problem.png`` into the folder ``out``; the table's lines, too.
 
     Raises:

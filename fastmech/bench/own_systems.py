@@ -68,16 +68,9 @@ def double_pendulum(t, a, b, u, v):  # type: ignore[no-untyped-def]
 
 def chain(t, a, b, c, d, p, q, r, s):  # type: ignore[no-untyped-def]
     """Four pendulums, each coupled to its neighbours by a torsion spring."""
-    return (
-        p,
-        q,
-        r,
-        s,
-        -sin(a) + 0.5 * (b - a),
-        -sin(b) + 0.5 * (a - b + c - b),
-        -sin(c) + 0.5 * (b - c + d - c),
-        -sin(d) + 0.5 * (c - d),
-    )
+    f, g = -sin(a) + 0.5 * (b - a), -sin(b) + 0.5 * (a - b + c - b)
+    h, k = -sin(c) + 0.5 * (b - c + d - c), -sin(d) + 0.5 * (c - d)
+    return p, q, r, s, f, g, h, k
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fastmech.bench.entrant import Entrant, Prepare, Solve
-from fastmech.bench.problem import Problem
+from fastmech.bench.problem import Entrant, Prepare, Problem, Solve
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import Status
 from fastmech.errors import StepWarning
@@ -51,28 +50,18 @@ TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 
 def settings(problem: Problem) -> Iterator[tuple[str, str, dict[str, Any]]]:
     """Family, setting and the keywords that ``fm.integrate`` is given."""
-    for method, steps in STEPS.items():
-        for dt in steps:
-            h = dt * problem.pace
-            yield f"fastmech {method}", f"dt = {h:g} s", {"method": method, "dt": h}
-    again = [share * problem.t_end for share in AGAIN]
-    for method, steps in FITTED.items():
-        for dt in steps:
-            chosen = {"method": method, "dt": dt}
-            yield f"fastmech {method}, fitted", f"dt = {dt:g} s", chosen | {"fit": True}
-            yield f"fastmech {method}, fitted again", f"dt = {dt:g} s", chosen | {"fit": again}
-    for method, steps in SINGLE.items():
-        for dt in steps:
-            h = dt * problem.pace
-            yield (
-                f"fastmech {method}, float32",
-                f"dt = {h:g} s",
-                {"method": method, "dt": h, "dtype": "float32"},
-            )
-    for method, steps in SINGLE_FITTED.items():
-        for dt in steps:
-            chosen = {"method": method, "dt": dt, "dtype": "float32", "fit": True}
-            yield f"fastmech {method}, fitted, float32", f"dt = {dt:g} s", chosen
+    again, single = {"fit": [share * problem.t_end for share in AGAIN]}, {"dtype": "float32"}
+    kinds: tuple[tuple[dict[str, tuple[float, ...]], dict[str, dict[str, Any]]], ...] = (
+        (STEPS, {"": {}}),
+        (FITTED, {", fitted": {"fit": True}, ", fitted again": again}),
+        (SINGLE, {", float32": single}),
+        (SINGLE_FITTED, {", fitted, float32": {"fit": True} | single}),
+    )
+    for table, ways in kinds:
+        for method, dt in ((method, dt) for method, steps in table.items() for dt in steps):
+            for way, more in ways.items():
+                h = dt if "fit" in more else dt * problem.pace
+                yield f"fastmech {method}{way}", f"dt = {h:g} s", {"method": method, "dt": h} | more
     for tol in TOLERANCES:
         yield "fastmech tol", f"tol = {tol:g}, every error estimated", {"tol": tol}
         yield "fastmech tol, 99 %", f"tol = {tol:g}, 99 % quantile", {"tol": tol, "quantile": 0.99}

@@ -20,10 +20,9 @@ import numpy as np
 from numba import carray, cfunc, njit, types  # type: ignore[attr-defined]
 
 from fastmech.bench import fused, package, plain
-from fastmech.bench.entrant import Entrant, Floats, Series, Solve
 from fastmech.bench.own_systems import spoken
 from fastmech.bench.plain import accelerations, scalar_rhs
-from fastmech.bench.problem import Problem
+from fastmech.bench.problem import Entrant, Floats, Problem, Series, Solve
 from fastmech.ensembles.system import System
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import FLAGS
@@ -290,28 +289,25 @@ def _several(
 DT, RTOL = "dt = {:g} s", "rtol = {:g}"
 _TOLERANCES = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-13)
 
+_SCIPY = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-13)
+
 SCIPY = (
-    *_several(scipy, "SciPy", RTOL, {"LSODA": (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)}, most=64),
-    *_several(scipy, "SciPy", RTOL, {"DOP853": (1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-13)}, most=64),
-    *_several(scipy, "SciPy", RTOL, {"Radau": (1e-4, 1e-6)}, most=16),
+    *_several(scipy, "SciPy", RTOL, {"LSODA": _SCIPY[:5], "DOP853": _SCIPY}, most=64),
+    *_several(scipy, "SciPy", RTOL, {"Radau": _SCIPY[:2]}, most=16),
 )
 
 _HEYOKA = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10, 1e-12, 1e-14, 2.2e-16)
 
+_TORCH = {
+    "rk4": (0.05, 0.02),
+    "tsit5": (0.12, 0.08, 0.05, 0.03),
+    "dop853": (0.12, 0.08, 0.05, 0.03, 0.018),
+}
+
 #: Module that a library is imported by, and its series: the extra ``bench``, and more.
 LIBRARIES: dict[str, tuple[Series, ...]] = {
     "heyoka": (Series("heyoka batch", "tol = {:g}", _HEYOKA, heyoka),),
-    "torch": _several(
-        torch,
-        "torch.compile",
-        DT,
-        {
-            "rk4": (0.05, 0.02),
-            "tsit5": (0.12, 0.08, 0.05, 0.03),
-            "dop853": (0.12, 0.08, 0.05, 0.03, 0.018),
-        },
-        least=8192,
-    ),
+    "torch": _several(torch, "torch.compile", DT, _TORCH, least=8192),
     "diffrax": (
         Series("diffrax Tsit5, constant step", DT, (0.1, 0.05, 0.02), partial(diffrax, "Tsit5", False), 1024),
         Series("diffrax Dopri8, adaptive", RTOL, (1e-6, 1e-9, 1e-12), partial(diffrax, "Dopri8", True), 1024),
@@ -327,11 +323,6 @@ LIBRARIES: dict[str, tuple[Series, ...]] = {
 def installed() -> list[str]:
     """Libraries that are there."""
     return [name for name in LIBRARIES if find_spec(name) is not None]
-
-
-def missing() -> list[str]:
-    """Libraries that are not installed."""
-    return [name for name in LIBRARIES if name not in installed()]
 
 
 def entrants_of(library: str, problem: Problem) -> Iterator[Entrant]:

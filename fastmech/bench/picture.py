@@ -7,7 +7,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fastmech.bench.precision import frontier
+from fastmech.bench.measure import frontier
 from fastmech.bench.problem import PROBLEMS
 from fastmech.plots.style import LINES, new_figure, save, style
 

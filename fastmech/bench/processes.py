@@ -14,8 +14,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
-from fastmech.bench.measure import Stage
-from fastmech.bench.tables import Footprint, Start, table
+from fastmech.bench.tables import Footprint, Start
+from fastmech.reports import Stage, table
 
 #: Prepares entrants of rest starts, at most so many trajectories a call: of each the seconds from the first
 #: import to its first result, of a later call of 1,024 trajectories on one core (median of five), and the
@@ -176,11 +176,14 @@ def vectors_study(quick: bool, stage: Stage) -> list[str]:
             f"## {name}: vectors of {bits} bit",
             "",
             *table(
-                ["integrator", "rate", "over plain Numba, small arrays", "local numbers", "largest error"],
+                "integrator | rate | over plain Numba, small arrays | local numbers | largest error",
                 (
-                    [f"{family}, {setting}", f"{rate:,.0f}"]
-                    + [f"{rate / slow:.2f}" if family == "fastmech rk4" else "" for slow in rates[:2]]
-                    + [f"{error:.1e}"]
+                    [
+                        f"{family}, {setting}",
+                        f"{rate:,.0f}",
+                        *(f"{rate / slow:.2f}" if family == "fastmech rk4" else "" for slow in rates[:2]),
+                        f"{error:.1e}",
+                    ]
                     for (family, setting), rate, error in zip(WIDE, rates, errors, strict=True)
                 ),
             ),

@@ -57,7 +57,8 @@ def proofs_study(quick: bool, stage: Stage, scenes: int | None = None) -> list[s
         name = list(KINDS)[seed % len(KINDS)]
         mechanism = KINDS[name](np.random.default_rng([7, seed]))
         each = examined(mechanism, FEW_STARTS if quick else STARTS, seed)
-        tallies[name] = Tally(*(a + b for a, b in zip(tallies[name], each, strict=True)))
+        summed: list[Any] = [a + b for a, b in zip(tallies[name], each, strict=True)]
+        tallies[name] = Tally(*summed)
         advance(1)
     rows = [
         [name, *(f"{n:,}" for n in tally[:-1]), f"{1e3 * tally.seconds / max(tally.number, 1):.3g}"]
@@ -71,8 +72,8 @@ def proofs_study(quick: bool, stage: Stage, scenes: int | None = None) -> list[s
     return [
         "# Proved lists beside a multistart",
         "",
-        f"{number:,} random mechanisms of one to three coordinates; Newton's method from {starts:,} starts each. "
-        "Missing is a zero, confirmed in fifty digits, that is neither listed nor left open.",
+        f"{number:,} random mechanisms of one to three coordinates; Newton's method from {starts:,} starts "
+        "each. Missing is a zero, confirmed in fifty digits, that is neither listed nor left open.",
         "",
         *table(head, rows),
     ]
@@ -131,9 +132,7 @@ def newton(statics: Statics, values: list[float], starts: int, seed: int) -> Flo
     return np.array(distinct).reshape(-1, n)
 
 
-def unlisted(
-    statics: Statics, values: list[float], found: RestingPlaces, zeros: Floats
-) -> list[Floats]:
+def unlisted(statics: Statics, values: list[float], found: RestingPlaces, zeros: Floats) -> list[Floats]:
     """Zeros that the proof neither lists nor leaves open."""
     periodic = np.array([c.periodic for c in statics.coordinates])
     missing = []

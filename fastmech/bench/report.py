@@ -4,31 +4,30 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from fastmech.bench import tables
+from fastmech.bench import peers, tables
 from fastmech.bench.atlas import atlas_study
 from fastmech.bench.basins import basins_study
-from fastmech.bench.entrant import Entrant
 from fastmech.bench.fused import METHODS
-from fastmech.bench.measure import BUDGET, Row, Stage, measure
-from fastmech.bench.peak import throughputs
-from fastmech.bench.peers import entrants, missing
+from fastmech.bench.machine import costs, throughputs
+from fastmech.bench.measure import BUDGET, Row, measure
+from fastmech.bench.peers import entrants
 from fastmech.bench.picture import draw_bench
-from fastmech.bench.problem import PROBLEMS, Problem
+from fastmech.bench.problem import PROBLEMS, Entrant, Problem
 from fastmech.bench.processes import footprints, started, vectors_study
+from fastmech.bench.proofs import proofs_study
 from fastmech.bench.stiff import stiff_study
 from fastmech.bench.systems import systems_study
-from fastmech.bench.terms import costs
 from fastmech.bench.threads import threads_study
 from fastmech.bench.tolerances import tolerances_study
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.threads import thread_count
+from fastmech.reports import Stage, columns, no_stage
 from fastmech.results import Dataset, Variable, scene_parameters
 from fastmech.scene import Scene
 from fastmech.store.provenance import processor_name, provenance
@@ -46,11 +45,11 @@ QUICK_LEAST = 8192
 
 LIBRARIES = ("numba", "scipy", "heyoka", "torch", "jax", "diffrax", "numbalsoda", "CyRK", "pynamicalsys")
 
-
 #: Studies with a file of their own, by name: from `quick` and a stage to the lines of Markdown.
 STUDIES: dict[str, Callable[..., list[str]]] = {
     "atlas": atlas_study,
     "basins": basins_study,
+    "proofs": proofs_study,
     "stiff": stiff_study,
     "systems": systems_study,
     "threads": threads_study,
@@ -64,7 +63,7 @@ def run_study(
     out: Path,
     *,
     quick: bool = False,
-    stage: Stage = lambda name, total: lambda done: None,
+    stage: Stage = no_stage,
     **chosen: int,
 ) -> Path:
     """Measure and write a study's ``NAME.md`` into the folder ``out``; ``chosen`` are its own settings."""
@@ -79,7 +78,7 @@ def run_bench(
     out: Path,
     *,
     quick: bool = False,
-    stage: Stage = lambda name, total: lambda done: None,
+    stage: Stage = no_stage,
 ) -> list[Path]:
     """Measure and write ``bench.md``, ``bench.png`` and ``bench.h5`` into the folder ``out``.
 
@@ -113,16 +112,14 @@ def run_bench(
     lines += tables.machine_sections(peak, rhs, prices, starts, memory)
     table.write_text("\n".join(lines) + "\n", encoding="utf-8")
     draw_bench(rows, picture)
-    peaks = {
-        "peak": Variable((), np.array(peak), "1/s", "fused multiply-adds of doubles of one core, measured")
-    }
+    fused = Variable((), np.array(peak), "1/s", "fused multiply-adds of doubles of one core, measured")
     sections = {
         "speed": speed_dataset(rows, problems),
-        "rhs": Dataset(peaks | _columns("place", rhs, _PLACES)),
-        "terms": Dataset(_columns("kind", prices, _KINDS)),
+        "rhs": Dataset({"peak": fused} | columns("place", rhs, _PLACES)),
+        "terms": Dataset(columns("kind", prices, _KINDS)),
     }
     if starts:
-        sections["starts"] = Dataset(_columns("entrant", starts, _STARTS))
+        sections["starts"] = Dataset(columns("entrant", starts, _STARTS))
     write_results(
         data,
         scene_parameters=scene_parameters(Scene(alpha=0.0)),
@@ -167,22 +164,12 @@ def _preamble(quick: bool, failures: list[str]) -> list[str]:
         "turns; rates on one thread are medians per second of processor time, on a quiet machine wall time.",
         "",
     ]
-    if missing():
-        lines += [f"Not installed: {', '.join(missing())}.", ""]
+    missing = [name for name in peers.LIBRARIES if name not in peers.installed()]
+    if missing:
+        lines += [f"Not installed: {', '.join(missing)}.", ""]
     if failures:
         lines += ["Failed:", "", *(f"- {failure}" for failure in failures), ""]
     return lines
-
-
-def _columns(dim: str, rows: Sequence[Any], about: Mapping[str, tuple[str, str]]) -> dict[str, Variable]:
-    """Attributes of rows by name, with unit and description."""
-
-    def column(name: str, unit: str, told: str) -> Variable:
-        values = [value() if callable(value := getattr(row, name)) else value for row in rows]
-        data = np.array(values, dtype=object if values and isinstance(values[0], str) else None)
-        return Variable((dim,), data, unit, told)
-
-    return {name: column(name, *told) for name, told in about.items()}
 
 
 def speed_dataset(rows: list[Row], problems: list[Problem]) -> Dataset:
@@ -191,26 +178,23 @@ def speed_dataset(rows: list[Row], problems: list[Problem]) -> Dataset:
     for line, row in zip(errors, rows, strict=True):
         line[: row.errors.size] = row.errors
     worst = "of the worst component of a final state in rad and rad/s"
-    columns = _columns(
-        "row",
-        rows,
-        {
-            "problem": ("1", "problem"),
-            "family": ("1", "integrator"),
-            "setting": ("1", "step or tolerance"),
-            "threads": ("1", "threads"),
-            "trajectories": ("1", "trajectories in a timed call"),
-            "wall": ("s", "wall time of a call, median"),
-            "processor": ("s", "processor time of a call, median"),
-            "first_call": ("s", "preparing and the first call"),
-            "max_error": ("1", f"largest error, {worst}"),
-            "median_error": ("1", f"median error, {worst}"),
-        },
-    )
-    return Dataset(columns | {"error": Variable(("row", "trajectory"), errors, "1", f"error, {worst}")})
+    about = _ROWS | {f"{name}_error": ("1", f"{told} error, {worst}") for name, told in _ERRORS.items()}
+    each = {"error": Variable(("row", "trajectory"), errors, "1", f"error, {worst}")}
+    return Dataset(columns("row", rows, about) | each)
 
 
-#: Sections of the machine: what is read from each row.
+#: What is read from each row of the sections.
+_ROWS = {
+    "problem": ("1", "problem"),
+    "family": ("1", "integrator"),
+    "setting": ("1", "step or tolerance"),
+    "threads": ("1", "threads"),
+    "trajectories": ("1", "trajectories in a timed call"),
+    "wall": ("s", "wall time of a call, median"),
+    "processor": ("s", "processor time of a call, median"),
+    "first_call": ("s", "preparing and the first call"),
+}
+_ERRORS = {"max": "largest", "median": "median"}
 _PLACES = {"place": ("1", "where they are evaluated"), "rhs": ("1/s", "right-hand sides")}
 _KINDS = {"kind": ("1", "terms of the scene"), "rate": ("1/s", "trajectories")}
 _STARTS = {

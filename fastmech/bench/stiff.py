@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from fastmech.bench.measure import Stage, in_turns
 from fastmech.bench.plain import scalar_rhs
 from fastmech.bench.problem import rest_starts
-from fastmech.bench.tables import table
 from fastmech.ensembles.integrate import integrate
 from fastmech.mechanism.coefficients import reduce
+from fastmech.reports import Stage, in_turns, table
 from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -63,12 +62,8 @@ def stiff_study(quick: bool, stage: Stage) -> list[str]:
         seconds = in_turns(works, REPEATS, advance, time.perf_counter)
         rates = {name: len(final[name]) / statistics.median(each) for name, each in seconds.items()}
         errors = {name: float(np.abs(end[:few] - truth).max()) for name, end in final.items()}
-        rows = ([name, f"{rates[name]:,.0f}", f"{errors[name]:.0e}"] for name in works)
-        lines += [
-            f"## beta = {beta:g} N s/m",
-            "",
-            *table(["integrator", "trajectories/s", "max error"], rows),
-        ]
+        rows = (f"{name} | {rates[name]:,.0f} | {errors[name]:.0e}" for name in works)
+        lines += [f"## beta = {beta:g} N s/m", "", *table("integrator | trajectories/s | max error", rows)]
         for name in theirs:
             equal = [(rates[other], other) for other in ours if errors[other] <= EQUAL * errors[name]]
             if equal:

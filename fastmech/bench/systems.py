@@ -13,19 +13,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fastmech.bench.entrant import Entrant, Floats, Prepare, Solve
 from fastmech.bench.extended import ROUNDINGS, extended, scene_rates
 from fastmech.bench.frontier import work_precision
-from fastmech.bench.measure import Row, Stage, measure
+from fastmech.bench.measure import Row, measure, rate_at
 from fastmech.bench.own_systems import STARTS, SYSTEMS, OwnSystem, spoken
 from fastmech.bench.package import prepared
-from fastmech.bench.peers import heyoka, missing
-from fastmech.bench.precision import rate_at
-from fastmech.bench.problem import Problem
-from fastmech.bench.tables import table
+from fastmech.bench.peers import heyoka, installed
+from fastmech.bench.problem import Entrant, Floats, Prepare, Problem, Solve
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.work_precision import order_statistic
 from fastmech.integrators.methods import find_method
+from fastmech.reports import Stage, table
 from fastmech.scene import Scene
 
 #: Errors at which rates are compared.
@@ -122,7 +120,7 @@ def measured(
     n, found = len(problem.starts), Measured(problem.name, {}, {}, {}, [], 0.0)
     settings = list(candidates(problem, targets))
     asked = [(quantile, target) for quantile in LEVELS for target in targets]
-    peers = [t for t in HEYOKA if t >= 1e-3 * min(targets) and "heyoka" not in missing()]
+    peers = [t for t in HEYOKA if t >= 1e-3 * min(targets) and "heyoka" in installed()]
     advance(1)
     for size in dict.fromkeys((min(SMALL, n), n)):
         everyone = [
@@ -169,9 +167,8 @@ def ratios(found: Measured, target: float) -> dict[str, float]:
     for level, name in LEVELS.items():
         for size in dict.fromkeys((small, n)):
             best = rate(found.fixed[size], target, level)
-            columns[f"time of `tol` over fixed, {name}, {size:,}"] = (
-                best / found.tol[size, level, target].rate
-            )
+            mine = found.tol[size, level, target].rate
+            columns[f"time of `tol` over fixed, {name}, {size:,}"] = best / mine
     return columns
 
 
@@ -181,7 +178,7 @@ def estimate_ratios(found: Measured) -> list[float]:
     return [estimate / true for estimate, true in pairs if 0.0 < true < math.inf and estimate < math.inf]
 
 
-def summary(found: list[Measured], targets: Sequence[float]) -> list[str]:
+def summary(found: Sequence[Measured], targets: Sequence[float]) -> list[str]:
     """Geometric means over systems, and the worst."""
     each = {target: [ratios(one, target) for one in found] for target in targets}
     lines = []
@@ -220,7 +217,7 @@ def section(found: Measured, targets: Sequence[float]) -> list[str]:
         rates = (rate(rows, target, 1.0) for rows in (found.fixed[n], found.heyoka))
         told = ratios(found, target).values()
         lines.append([f"{target:.0e}", setting, *(f"{r:,.0f}" for r in rates), *(f"{r:.2f}" for r in told)])
-    head = ["error", "fastest fixed steps that keep it", "its rate [1/s]", "heyoka's [1/s]"]
+    head = ("error", "fastest fixed steps that keep it", "its rate [1/s]", "heyoka's [1/s]")
     return [f"## {found.name}", "", *table([*head, *ratios(found, targets[0])], lines)]
 
 
@@ -257,10 +254,8 @@ def report(found: list[Measured], targets: Sequence[float], scenes: Sequence[Mea
         *([] if found[0].heyoka else ["Not installed: heyoka.", ""]),
         *summary(found, targets),
     ]
-    for one in found:
-        lines += section(one, targets)
-    if scenes:
-        lines += ["# The mechanism beside heyoka", "", *summary(list(scenes), targets)]
-    for one in scenes:
-        lines += section(one, targets)
-    return lines
+    own = [line for one in found for line in section(one, targets)]
+    if not scenes:
+        return lines + own
+    lines += [*own, "# The mechanism beside heyoka", "", *summary(scenes, targets)]
+    return lines + [line for one in scenes for line in section(one, targets)]

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import NamedTuple
 
-from fastmech.bench.measure import Row
-from fastmech.bench.peak import Throughput
-from fastmech.bench.precision import TARGETS, fastest_at, rate_at
+from fastmech.bench.machine import Cost, Throughput
+from fastmech.bench.measure import TARGETS, Row, fastest_at, rate_at
 from fastmech.bench.problem import Problem
-from fastmech.bench.terms import Cost
+from fastmech.reports import table as table
 
 OWN = "fastmech"
 
@@ -34,16 +33,6 @@ class Footprint(NamedTuple):
 
     trajectories: int
     memory: int  #: bytes, starts and final states included
-
-
-def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
-    """A Markdown table, numbers to the right."""
-    return [
-        f"| {' | '.join(head)} |",
-        f"|---|{'---:|' * (len(head) - 1)}",
-        *(f"| {' | '.join(row)} |" for row in rows),
-        "",
-    ]
 
 
 def own(rows: Iterable[Row]) -> list[Row]:
@@ -97,14 +86,14 @@ def same_step(rows: list[Row]) -> list[str]:
         if family.startswith(FUSED) and min(row.processor, engine.processor) < WORTH_COMPARING:
             left_out += 1
             continue
-        ratio = engine.rate / row.rate
-        lines.append([f"{family}, {setting}", f"{row.rate:,.0f}", f"{engine.rate:,.0f}", f"{ratio:.2f}"])
+        rates = f"{row.rate:,.0f} | {engine.rate:,.0f} | {engine.rate / row.rate:.2f}"
+        lines.append(f"{family}, {setting} | {rates}")
     told = f"Left out: {left_out} whose calls are shorter than {WORTH_COMPARING:g} s."
     return [
         "The same method and step, one thread, trajectories per core second. The hand-fused loop is the "
         "engine's yardstick: this mechanism and this method alone, in the same blocks.",
         "",
-        *table(["against", "its rate", "fastmech", "ratio"], lines),
+        *table("against | its rate | fastmech | ratio", lines),
         *([told, ""] if left_out else []),
     ]
 
@@ -118,32 +107,30 @@ def speed_up(rows: list[Row]) -> list[str]:
             single = one[row.family, row.setting]
             ratio = (single.wall / single.trajectories) / (row.wall / row.trajectories)
             used = row.processor / row.wall
-            lines.append([f"{row.family}, {row.setting}", str(row.threads), f"{ratio:.2f}", f"{used:.2f}"])
+            lines.append(f"{row.family}, {row.setting} | {row.threads} | {ratio:.2f} | {used:.2f}")
     if not lines:
         return []
     return [
         "All threads over one, by wall time, and the cores that it got.",
         "",
-        *table(["integrator", "threads", "speed-up", "cores used"], lines),
+        *table("integrator | threads | speed-up | cores used", lines),
     ]
 
 
 def everything(rows: list[Row]) -> list[str]:
     """Every row."""
-    head = ["integrator", "setting", "threads", "n", "1/s a core", "1/s wall", "largest error",
-            "median error", "compared", "first call [s]"]  # fmt: skip
-    return table(
-        head,
-        (
-            [
-                row.family, row.setting, str(row.threads), str(row.trajectories),
-                f"{row.trajectories / row.processor:,.0f}", f"{row.trajectories / row.wall:,.0f}",
-                f"{row.max_error():.1e}", f"{row.median_error:.1e}", str(len(row.errors)),
-                f"{row.first_call:.2f}",
-            ]
-            for row in rows
-        ),
-    )  # fmt: skip
+    head = (
+        "integrator | setting | threads | n | 1/s a core | 1/s wall | largest error | median error | "
+        "compared | first call [s]"
+    )
+    lines = []
+    for row in rows:
+        rates = (f"{row.trajectories / seconds:,.0f}" for seconds in (row.processor, row.wall))
+        lines.append(
+            f"{row.family} | {row.setting} | {row.threads} | {row.trajectories} | {' | '.join(rates)} | "
+            f"{row.max_error():.1e} | {row.median_error:.1e} | {len(row.errors)} | {row.first_call:.2f}"
+        )
+    return table(head, lines)
 
 
 def problem_section(problem: Problem, rows: list[Row]) -> list[str]:
@@ -169,14 +156,14 @@ def machine_sections(
         f"Measured peak: {peak / 1e9:.1f} billion fused multiply-adds of doubles per core second.",
         "",
         *table(
-            ["where", "million right-hand sides/s", "of the kernel alone", "multiply-adds in that time"],
-            ([t.place, f"{t.rhs / 1e6:.1f}", f"{t.share:.2f}", f"{t.slots:.0f}"] for t in throughputs),
+            "where | million right-hand sides/s | of the kernel alone | multiply-adds in that time",
+            (f"{t.place} | {t.rhs / 1e6:.1f} | {t.share:.2f} | {t.slots:.0f}" for t in throughputs),
         ),
         "## Terms of a scene (RK4, dt = 0.01 s)",
         "",
         *table(
-            ["scene", "trajectories per core second", "relative"],
-            ([c.kind, f"{c.rate:,.0f}", f"{c.relative:.3f}"] for c in costs),
+            "scene | trajectories per core second | relative",
+            (f"{c.kind} | {c.rate:,.0f} | {c.relative:.3f}" for c in costs),
         ),
     ]
     if starts:
@@ -187,20 +174,16 @@ def machine_sections(
             "in a second one that finds what the first has left on the disk, and of a later call.",
             "",
             *table(
-                ["integrator", "first process", "second process", "later call"],
-                ([s.entrant, f"{s.first:.2f}", f"{s.second:.2f}", f"{s.steady:.4f}"]
-                 for s in starts),
+                "integrator | first process | second process | later call",
+                (f"{s.entrant} | {s.first:.2f} | {s.second:.2f} | {s.steady:.4f}" for s in starts),
             ),
-        ]  # fmt: skip
+        ]
     if memory:
         lines += [
             "## Memory",
             "",
             "The most that a process takes which asks for final states, its starts included.",
             "",
-            *table(
-                ["trajectories", "GiB"],
-                ([f"{p.trajectories:,}", f"{p.memory / 2**30:.2f}"] for p in memory),
-            ),
+            *table("trajectories | GiB", (f"{p.trajectories:,} | {p.memory / 2**30:.2f}" for p in memory)),
         ]
     return lines

@@ -14,12 +14,11 @@ from functools import partial
 
 import numpy as np
 
-from fastmech.bench.measure import TURNS, Stage, in_turns
+from fastmech.bench.machine import LANES, multiply_adds
 from fastmech.bench.package import AGAIN, prepared
-from fastmech.bench.peak import LANES, multiply_adds
 from fastmech.bench.problem import Problem, fast_starts, rest_starts
-from fastmech.bench.tables import table
 from fastmech.ensembles.threads import thread_count
+from fastmech.reports import TURNS, Stage, in_turns, table
 
 #: Trajectories of a call: tenths of a second to seconds of work.
 TRAJECTORIES = 32_768
@@ -61,9 +60,9 @@ def threads_study(quick: bool, stage: Stage) -> list[str]:
         "what they fall short of the number of threads, the machine gave to others.",
         "",
         *table(
-            ["run", "speed-up, median", "least", "greatest"],
+            "run | speed-up, median | least | greatest",
             (
-                [name, *(f"{value:.2f}" for value in (statistics.median(r), min(r), max(r)))]
+                f"{name} | {statistics.median(r):.2f} | {min(r):.2f} | {max(r):.2f}"
                 for name, r in ratios.items()
             ),
         ),

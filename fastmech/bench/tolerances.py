@@ -9,15 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.bench.extended import extended_truth, scene_rates
-from fastmech.bench.measure import Stage
-from fastmech.bench.tables import table
 from fastmech.ensembles.integrate import integrate
+from fastmech.reports import Stage, table
 from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -34,8 +33,7 @@ FACTOR = 3.0
 KNOWN = 0.1
 
 
-@dataclass(frozen=True)
-class Estimate:
+class Estimate(NamedTuple):
     """What a run to a tolerance said, and the truth."""
 
     scene: int
@@ -93,17 +91,10 @@ def random_case(rng: np.random.Generator, n: int) -> tuple[Scene, Floats, float,
     m3, length = rng.choice([0.0, 10 ** rng.uniform(-0.5, 1.5)]), 10 ** rng.uniform(-0.5, 0.5)
     weight, rate = (m1 + m2) * 9.8, math.sqrt(9.8 / length)
     c1, c2 = weight / length * 10 ** rng.uniform(-1.0, 1.0, 2)
-    scene = Scene(
-        m1=m1,
-        m2=m2,
-        m3=m3,
-        l=length,
-        c1=c1,
-        c2=c2,
-        beta=rng.choice([0.0, (m1 + m2) * rate * 10 ** rng.uniform(-1.0, 0.5)]),
-        F0=0.5 * weight * rng.normal(),
-        alpha=rng.choice([0.0, rate * 10 ** rng.uniform(-1.0, 0.3)]),
-    )
+    beta = rng.choice([0.0, (m1 + m2) * rate * 10 ** rng.uniform(-1.0, 0.5)])
+    force = 0.5 * weight * rng.normal()
+    alpha = rng.choice([0.0, rate * 10 ** rng.uniform(-1.0, 0.3)])
+    scene = Scene(m1=m1, m2=m2, m3=m3, l=length, c1=c1, c2=c2, beta=beta, F0=force, alpha=alpha)
     rates = rate * rng.normal(size=(n, 2)) * rng.choice([0.0, 1.0])
     starts = np.concatenate([rng.uniform(-np.pi, np.pi, (n, 2)), rates], axis=1)
     return scene, starts, rng.uniform(5.0, 20.0) / rate, 10 ** rng.uniform(-8.0, -3.0)
@@ -149,45 +140,30 @@ def report(found: list[Estimate], n: int) -> list[str]:
         mine = [e for e in found if e.quantile == quantile]
         known = [e for e in mine if e.known]
         ratios = np.array([e.ratio for e in known] or [math.nan])
-        rows.append(
-            [
-                "largest error" if quantile == 1.0 else f"{quantile:.0%} quantile",
-                f"{len(known)} of {len(mine)}",
-                *(
-                    f"{sum(which) / max(len(known), 1):.0%}"
-                    for which in (
-                        [e.right for e in known],
-                        [not e.missed for e in known],
-                        [e.missed and e.said for e in known],
-                        [e.missed and not e.said for e in known],
-                    )
-                ),
-                f"{ratios.min():.2g}",
-                f"{np.median(ratios):.2g}",
-                f"{ratios.max():.2g}",
-            ]
+        shares = (
+            [e.right for e in known],
+            [not e.missed for e in known],
+            [e.missed and e.said for e in known],
+            [e.missed and not e.said for e in known],
         )
-    head = ["whose error", "truth known", f"estimate within a factor {FACTOR:g}", "true error within `tol`",
-            "above it, and said so", "above it, unsaid", "least estimate/truth", "median",
-            "greatest"]  # fmt: skip
-    lines += table(head, rows)
-    told = [e for e in found if e.verdict]
-    if told:
+        whose = "largest error" if quantile == 1.0 else f"{quantile:.0%} quantile"
+        told = " | ".join(f"{sum(which) / max(len(known), 1):.0%}" for which in shares)
+        spread = f"{ratios.min():.2g} | {np.median(ratios):.2g} | {ratios.max():.2g}"
+        rows.append(f"{whose} | {len(known)} of {len(mine)} | {told} | {spread}")
+    lines += table(
+        f"whose error | truth known | estimate within a factor {FACTOR:g} | true error within `tol` | "
+        "above it, and said so | above it, unsaid | least estimate/truth | median | greatest",
+        rows,
+    )
+    odd = [e for e in found if e.verdict]
+    if odd:
         lines += ["Estimates beyond the factor, errors beyond the tolerance, truths that are not known:", ""]
         lines += table(
-            ["scene", "quantile", "method", "`tol`", "estimate", "truth", "its uncertainty", "verdict"],
+            "scene | quantile | method | `tol` | estimate | truth | its uncertainty | verdict",
             (
-                [
-                    str(e.scene),
-                    f"{e.quantile:g}",
-                    e.method,
-                    f"{e.tol:.1e}",
-                    f"{e.estimate:.1e}",
-                    f"{e.true:.1e}",
-                    f"{e.doubt:.0e}",
-                    e.verdict,
-                ]
-                for e in told
+                f"{e.scene} | {e.quantile:g} | {e.method} | {e.tol:.1e} | {e.estimate:.1e} | {e.true:.1e} | "
+                f"{e.doubt:.0e} | {e.verdict}"
+                for e in odd
             ),
         )
     return lines

@@ -6,22 +6,15 @@ from pathlib import Path
 
 import click
 
-from fastmech.cli.reporting import account, reporting_options
+from fastmech.cli.reporting import account, out_option, reporting_options
 
 
 @click.command(name="bench")
-@click.option(
-    "--out",
-    metavar="DIR",
-    type=click.Path(file_okay=False, path_type=Path),
-    default=Path("results/bench"),
-    show_default=True,
-    help="Folder for the report.",
-)
+@out_option("Folder for the report.", "results/bench")
 @click.option("--quick", is_flag=True, help="Fewer trajectories and methods.")
 @click.option(
     "--only",
-    type=click.Choice(["atlas", "basins", "stiff", "systems", "threads", "tolerances", "vectors"]),
+    type=click.Choice(["atlas", "basins", "proofs", "stiff", "systems", "threads", "tolerances", "vectors"]),
     help="One study alone.",
 )
 @click.option(
@@ -30,7 +23,12 @@ from fastmech.cli.reporting import account, reporting_options
     help="Every method on a problem of your own instead: FILE.py:NAME, a function that returns problem, "
     "starts, t_end (and keywords of fm.work_precision); or the scene of a scan request, REQUEST.toml.",
 )
-@click.option("--scenes", metavar="N", type=click.IntRange(min=1), help="Random scenes of `tolerances`.")
+@click.option(
+    "--scenes",
+    metavar="N",
+    type=click.IntRange(min=1),
+    help="Random scenes of `tolerances`, mechanisms of `proofs`.",
+)
 @click.option(
     "--starts", metavar="N", type=click.IntRange(min=1), help="Trajectories of each scene of `tolerances`."
 )
@@ -48,7 +46,7 @@ def command(
     """Measure trajectories per second against the error."""
     chosen = {name: value for name, value in (("scenes", scenes), ("starts", starts)) if value is not None}
     for name in chosen:
-        if only != "tolerances":
+        if only != "tolerances" and (name, only) != ("scenes", "proofs"):
             raise click.UsageError(f"--{name}: goes with --only tolerances")
     if problem is not None and (only is not None or quick):
         raise click.UsageError("--problem: goes without --only and --quick")

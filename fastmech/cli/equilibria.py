@@ -7,7 +7,7 @@ import shutil
 import sys
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -18,13 +18,19 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from fastmech.atlas.snap import Snap
-    from fastmech.equilibria.find import Equilibria
+    from fastmech.equilibria.find import Equilibrium
     from fastmech.scene import Scene
     from fastmech.stability.classify import Classification
 
 
-#: Of stable positions by their numbers: least impulses on M1, M2 and M3 that may leave the well [N s].
-Limits = dict[int, dict[str, float]]
+class Position(NamedTuple):
+    """A resting position; of a stable one where it ends, and its limits if its well is certain."""
+
+    equilibrium: Equilibrium
+    result: Classification
+    snap: Snap | None
+    limit: dict[str, float]  #: least impulses on M1, M2 and M3 that may leave the well [N s]; inf: none
+
 
 #: Columns that the table needs: in a narrower terminal lines break, but no digit is lost.
 LEAST_WIDTH = 84
@@ -106,61 +112,57 @@ def command(
         if position is not None:
             stable = [here.index_of(stable_at(here, position))]
         advance = told.bars.stage(f"where they end over {vary}", len(stable))
-        snaps, limits = {}, {}
+        positions = [Position(e, result, None, {}) for e, result in zip(found, results, strict=True)]
         for k in stable:
-            snaps[k] = find_snap(loaded, here[k], parameter=vary)
+            positions[k] = positions[k]._replace(snap=find_snap(loaded, here[k], parameter=vary))
             with suppress(InputError):  # wells that are not certain have no limits
-                limits[k] = proved_limits(loaded, here[k])
+                positions[k] = positions[k]._replace(limit=proved_limits(loaded, here[k]))
             advance(1)
-        told.facts |= _facts(found, results, snaps, limits)
+        sentence = found.certificate.sentence
+        told.facts |= {
+            "force": found.force,
+            "certificate": sentence,
+            "equilibria": list(map(_facts, positions)),
+        }
     if not as_json:
-        _show(scene, at, found, results, snaps, limits)
+        _show(f"force F = {found.force:g} N on M2{_time(scene, at)}", positions, sentence)
 
 
-def _facts(
-    found: Equilibria, results: list[Classification], snaps: dict[int, Snap], limits: Limits
-) -> dict[str, Any]:
-    """The list for other programs."""
-    equilibria = []
-    for k, (equilibrium, result) in enumerate(zip(found, results, strict=True)):
-        about: dict[str, Any] = {"phi": equilibrium.phi, "theta": equilibrium.theta}
-        about |= {"energy": equilibrium.energy, "kind": equilibrium.kind, "verdict": result.verdict}
-        about["eigenvalues"] = [[value.real, value.imag] for value in map(complex, result.eigenvalues)]
-        if k in snaps:
-            about |= {"snap_parameter": snaps[k].parameter}
-            about |= {"snap_below": snaps[k].below, "snap_above": snaps[k].above}
-        if k in limits:
-            about["shock_limit"] = {on: limit for on, limit in limits[k].items() if math.isfinite(limit)}
-        equilibria.append(about)
-    return {"force": found.force, "certificate": found.certificate.sentence, "equilibria": equilibria}
+def _facts(position: Position) -> dict[str, Any]:
+    """A position for other programs."""
+    e, result, snap, limit = position
+    about: dict[str, Any] = {"phi": e.phi, "theta": e.theta}
+    about |= {"energy": e.energy, "kind": e.kind, "verdict": result.verdict}
+    about["eigenvalues"] = [[value.real, value.imag] for value in map(complex, result.eigenvalues)]
+    if snap is not None:
+        about |= {"snap_parameter": snap.parameter, "snap_below": snap.below, "snap_above": snap.above}
+    if limit:
+        about["shock_limit"] = {on: size for on, size in limit.items() if math.isfinite(size)}
+    return about
 
 
-def _show(
-    scene: Scene,
-    at: float,
-    found: Equilibria,
-    results: list[Classification],
-    snaps: dict[int, Snap],
-    limits: Limits,
-) -> None:
+def _show(head: str, positions: list[Position], certificate: str) -> None:
     """The table and the sentences."""
     from rich.console import Console
 
     terminal = shutil.get_terminal_size().columns if sys.stdout.isatty() else 100
     console = Console(width=max(terminal, LEAST_WIDTH), highlight=False)
-    console.print(f"force F = {found.force:g} N on M2{_time(scene, at)}")
-    if found:
-        console.print(_table(found, results))
-    for number, result in enumerate(results, start=1):
-        console.print(f"{number}: {result.explanation}.")
-    for k, snap in snaps.items():
-        load = "the load " if snap.parameter == "F0" else ""
-        console.print(f"{k + 1}: as {load}{snap.parameter} changes, it {snap.answer}.")
-    for k, limit in limits.items():
-        blows = ", ".join(f"{size:.4g} N s on {on}" for on, size in limit.items() if math.isfinite(size))
-        console.print(f"{k + 1}: no blow at rest leaves its well with less than {blows}.")
-    sentence = found.certificate.sentence
-    console.print(f"{sentence[0].upper()}{sentence[1:]}.")
+    console.print(head)
+    if positions:
+        console.print(_table(positions))
+    lines = [f"{number}: {p.result.explanation}." for number, p in enumerate(positions, start=1)]
+    for number, p in enumerate(positions, start=1):
+        if p.snap is not None:
+            load = "the load " if p.snap.parameter == "F0" else ""
+            lines.append(f"{number}: as {load}{p.snap.parameter} changes, it {p.snap.answer}.")
+    for number, p in enumerate(positions, start=1):
+        if p.limit:
+            blows = ", ".join(
+                f"{size:.4g} N s on {on}" for on, size in p.limit.items() if math.isfinite(size)
+            )
+            lines.append(f"{number}: no blow at rest leaves its well with less than {blows}.")
+    for line in (*lines, f"{certificate[0].upper()}{certificate[1:]}."):
+        console.print(line)
 
 
 def _time(scene: Scene, at: float) -> str:
@@ -170,7 +172,7 @@ def _time(scene: Scene, at: float) -> str:
     return f", {frozen} (F0 = {scene.F0:g} N, alpha = {scene.alpha:g} 1/s)"
 
 
-def _table(found: Equilibria, results: list[Classification]) -> Table:
+def _table(positions: list[Position]) -> Table:
     from rich import box
     from rich.table import Table
 
@@ -182,21 +184,12 @@ def _table(found: Equilibria, results: list[Classification]) -> Table:
     table.add_column("eigenvalues\n1/s", justify="right", no_wrap=True)
     table.add_column("Sylvester\nHurwitz\neigenvalues", no_wrap=True)
     table.add_column("joint verdict", style="bold")
-    for number, (equilibrium, result) in enumerate(zip(found, results, strict=True), start=1):
-        table.add_row(
-            str(number),
-            f"{equilibrium.phi:z.5f}\n{math.degrees(equilibrium.phi):z.3f}",
-            f"{equilibrium.theta:z.5f}\n{math.degrees(equilibrium.theta):z.3f}",
-            f"{equilibrium.energy:z.3f}",
-            equilibrium.kind,
-            "\n".join(
-                _complex(value, error)
-                for value, error in zip(result.eigenvalues, result.eigenvalue_errors, strict=True)
-                if value.imag >= 0.0
-            ),
-            "\n".join(_short(f.verdict) for f in (result.sylvester, result.hurwitz, result.spectrum)),
-            result.verdict,
-        )
+    for number, (e, result, _, _) in enumerate(positions, start=1):
+        angles = (f"{angle:z.5f}\n{math.degrees(angle):z.3f}" for angle in (e.phi, e.theta))
+        pairs = zip(result.eigenvalues, result.eigenvalue_errors, strict=True)
+        values = "\n".join(_complex(value, error) for value, error in pairs if value.imag >= 0.0)
+        verdicts = "\n".join(_short(f.verdict) for f in (result.sylvester, result.hurwitz, result.spectrum))
+        table.add_row(str(number), *angles, f"{e.energy:z.3f}", e.kind, values, verdicts, result.verdict)
     return table
 
 

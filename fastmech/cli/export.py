@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from fastmech.cli.reporting import account, reporting_options, section_option
+from fastmech.cli.reporting import account, out_option, reporting_options, section_option
 
 
 @click.command(name="export")
@@ -23,12 +23,7 @@ from fastmech.cli.reporting import account, reporting_options, section_option
     multiple=True,
     help="The nearest point along a coordinate, or a range (--select F0=-10:10); repeatable.",
 )
-@click.option(
-    "--out",
-    metavar="DIR",
-    type=click.Path(file_okay=False, path_type=Path),
-    help="Folder for the files [default: FILE without its ending].",
-)
+@out_option("Folder for the files [default: FILE without its ending].")
 @click.option("--fresh", is_flag=True, help="Replace files that exist.")
 @reporting_options
 def command(

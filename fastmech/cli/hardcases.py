@@ -6,18 +6,11 @@ from pathlib import Path
 
 import click
 
-from fastmech.cli.reporting import account, reporting_options
+from fastmech.cli.reporting import account, out_option, reporting_options
 
 
 @click.command(name="hardcases")
-@click.option(
-    "--out",
-    metavar="DIR",
-    type=click.Path(file_okay=False, path_type=Path),
-    default=Path("results/hardcases"),
-    show_default=True,
-    help="Folder for the report.",
-)
+@out_option("Folder for the report.", "results/hardcases")
 @click.option("--quick", is_flag=True, help="Shorter runs and fewer methods.")
 @reporting_options
 def command(out: Path, quick: bool, quiet: bool, as_json: bool) -> None:

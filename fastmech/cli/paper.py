@@ -6,18 +6,11 @@ from pathlib import Path
 
 import click
 
-from fastmech.cli.reporting import account, reporting_options
+from fastmech.cli.reporting import account, out_option, reporting_options
 
 
 @click.command(name="paper")
-@click.option(
-    "--out",
-    metavar="DIR",
-    type=click.Path(file_okay=False, path_type=Path),
-    default=Path("results/report"),
-    show_default=True,
-    help="Folder for the report.",
-)
+@out_option("Folder for the report.", "results/report")
 @reporting_options
 def command(out: Path, quiet: bool, as_json: bool) -> None:
     """Compute the source paper's tables and figures again.
@@ -27,7 +20,7 @@ def command(out: Path, quiet: bool, as_json: bool) -> None:
     with account("paper", quiet, as_json) as told:
         with told.bars.preparing():
             from fastmech.paper.report import write_paper
-        report = write_paper(out, progress=told.bars.counter("tables and figures"))
+        report = write_paper(out, stage=told.bars.stage)
         told.wrote(report.paths[0], "Report: {}")
         told.say(f"{report.n_rows} printed values compared, {len(report.misprints)} misprints proved")
         told.facts |= {"compared": report.n_rows, "misprints": len(report.misprints)}

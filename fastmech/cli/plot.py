@@ -6,17 +6,12 @@ from pathlib import Path
 
 import click
 
-from fastmech.cli.reporting import account, reporting_options, section_option
+from fastmech.cli.reporting import account, out_option, reporting_options, section_option
 
 
 @click.command(name="plot")
 @click.argument("file", metavar="FILE", type=click.Path(path_type=Path))
-@click.option(
-    "--out",
-    metavar="DIR",
-    type=click.Path(file_okay=False, path_type=Path),
-    help="Folder for the pictures [default: FILE without its ending].",
-)
+@out_option("Folder for the pictures [default: FILE without its ending].")
 @section_option("Only this section.")
 @click.option(
     "--format", "form", type=click.Choice(["png", "pdf", "svg"]), default="png", help="Format [default: png]."

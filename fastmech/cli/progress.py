@@ -8,47 +8,13 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import timedelta
-from typing import Self
+from typing import Any, Self
 
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    Progress,
-    ProgressColumn,
-    Task,
-    TaskProgressColumn,
-    TextColumn,
-)
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 from rich.table import Column
-from rich.text import Text
 
 from fastmech.interrupts import check, is_noted
-
-
-class _Rate(ProgressColumn):
-    """Items finished per second, loading and compiling apart."""
-
-    def render(self, task: Task) -> Text:
-        """The rate, or nothing where there is none yet."""
-        stage: Stage | None = task.fields["stage"]
-        if stage is None or not stage.rate:
-            return Text()
-        speed = stage.rate
-        return Text(f"{speed:,.0f}/s" if speed >= 10 else f"{speed:.2g}/s", style="progress.data.speed")
-
-
-class _Time(ProgressColumn):
-    """Time left, and in the end the time taken, loading and compiling apart."""
-
-    def render(self, task: Task) -> Text:
-        """The time with its meaning."""
-        stage: Stage | None = task.fields["stage"]
-        if stage is None:
-            return Text()
-        if task.finished:
-            return Text(f"took {stage.seconds:.1f} s")
-        return Text(f"{stage.left} left" if stage.rate else "")
-
 
 #: Seconds between lines in a log file.
 LOG_PERIOD = 30.0
@@ -64,23 +30,23 @@ LOADING = "loading"
 
 
 class Stage:
-    """One piece of work: how far it is and how long it has taken.
+    """One piece of work: how far it is and how long it has taken, loading and compiling apart.
 
     Args:
         name: the piece of work.
-        total: its items; 0 where they are not known yet.
+        total: its items.
         clock: seconds that go on while work is done.
     """
 
     def __init__(self, name: str, total: int, clock: Callable[[], float]) -> None:
         self.name, self.total, self.done, self._clock = name, total, 0, clock
-        self._begun = self.last = clock()
+        self._begun = self.last = self._told = clock()
 
-    def count(self, done: int, total: int, free: float) -> None:
-        """So many items are finished; ``free`` [s]: when other work moved last, which may have come first."""
+    def count(self, finished: int, free: float) -> None:
+        """So many more are finished; ``free`` [s]: when other work moved last, which may have come first."""
         if not self.done:
             self._begun = max(self._begun, free)
-        self.done, self.total, self.last = done, total, self._clock()
+        self.done, self.last = self.done + finished, self._clock()
 
     @property
     def seconds(self) -> float:
@@ -93,36 +59,28 @@ class Stage:
         return self.done / self.seconds if self.seconds else 0.0
 
     @property
-    def left(self) -> timedelta:
+    def left(self) -> str:
         """Time that the rest takes at that rate."""
-        return timedelta(seconds=int((self.total - self.done) / self.rate))
+        return str(timedelta(seconds=int((self.total - self.done) / self.rate))) if self.rate else "unknown"
+
+    def columns(self) -> dict[str, Any]:
+        """What bars show beside the share: the rate, and the time left or, in the end, taken."""
+        speed = f"{self.rate:,.0f}/s" if self.rate >= 10 else f"{self.rate:.2g}/s"
+        time_left = f"{self.left} left" if self.done < self.total else f"took {self.seconds:.1f} s"
+        return {"rate": speed, "time": time_left} if self.rate else {"rate": "", "time": ""}
+
+    def log_line(self) -> str | None:
+        """How far it is, at most once every `LOG_PERIOD` seconds."""
+        if self.last - self._told < LOG_PERIOD:
+            return None
+        self._told = self.last
+        share = self.done / self.total if self.total else 1.0
+        return f"{self.name}: {share:.0%}, {self.rate:,.3g}/s, {self.left} left"
 
     def summary(self) -> dict[str, str | int | float]:
         """The same for other programs."""
         about: dict[str, str | int | float] = {"name": self.name, "done": self.done, "total": self.total}
         return about | {"seconds": round(self.seconds, 3), "rate": round(self.rate, 3)}
-
-
-class LogLine:
-    """One piece of work in a log file: how far it is, at most once every `LOG_PERIOD` seconds.
-
-    Args:
-        stage: the piece of work.
-    """
-
-    def __init__(self, stage: Stage) -> None:
-        self._stage, self._told = stage, stage.last
-
-    def tell(self) -> None:
-        """Say how far it is, if it is time."""
-        now, stage = self._stage.last, self._stage
-        if now - self._told < LOG_PERIOD:
-            return
-        self._told = now
-        left = stage.left if stage.rate else "unknown"
-        share = stage.done / stage.total if stage.total else 1.0
-        line = f"fastmech: {stage.name}: {share:.0%}, {stage.rate:,.3g}/s, {left} left"
-        print(line, file=sys.stderr, flush=True)
 
 
 class Preparation:
@@ -176,8 +134,12 @@ class ProgressBars:
             ),
             BarColumn(bar_width=16),
             TaskProgressColumn(),
-            _Rate(Column(justify="right", min_width=10, no_wrap=True)),
-            _Time(Column(min_width=12, no_wrap=True)),
+            TextColumn(
+                "{task.fields[rate]}",
+                "progress.data.speed",
+                table_column=Column(justify="right", min_width=10, no_wrap=True),
+            ),
+            TextColumn("{task.fields[time]}", table_column=Column(min_width=12, no_wrap=True)),
             console=console,
             disable=quiet or not draws,
             redirect_stdout=False,
@@ -206,38 +168,23 @@ class ProgressBars:
 
     def stage(self, name: str, total: int) -> Callable[[int], None]:
         """Announce a piece of work; the result is told how many items have been finished since."""
-        tell, done = self._begin(name, total), 0
+        stage = Stage(name, total, self._working)
+        task = self._progress.add_task(name, total=total, **stage.columns())
+        self._stages.append(stage)
 
         def advance(finished: int) -> None:
-            nonlocal done
-            done += finished
-            tell(done, total)
+            stage.count(finished, self._moved)
+            self._moved = stage.last
+            self._progress.update(task, completed=stage.done, **stage.columns())
+            if self._logs and (line := stage.log_line()):
+                self.tell(line)
+            check()
 
         return advance
-
-    def counter(self, name: str) -> Callable[[int, int], None]:
-        """Announce a piece of work; the result is told how many items are finished, and of how many."""
-        return self._begin(name, None)
 
     def stages(self) -> list[dict[str, str | int | float]]:
         """What has been done so far, piece by piece."""
         return [stage.summary() for stage in self._stages]
-
-    def _begin(self, name: str, total: int | None) -> Callable[[int, int], None]:
-        stage = Stage(name, total or 0, self._working)
-        task = self._progress.add_task(name, total=total, stage=stage)
-        log = LogLine(stage) if self._logs else None
-        self._stages.append(stage)
-
-        def tell(done: int, total: int) -> None:
-            self._progress.update(task, completed=done, total=total)
-            stage.count(done, total, self._moved)
-            self._moved = stage.last
-            if log is not None:
-                log.tell()
-            check()
-
-        return tell
 
     @property
     def shown(self) -> bool:
@@ -279,18 +226,12 @@ class ProgressBars:
             what = name if name == LOADING else f"compiling {name} (kernel {self._preparation.kernels})"
             if not self._quiet and is_noted() and not stopping:
                 stopping = True
-                self._line("stops when the kernel in hand is compiled, at once when interrupted again")
+                self.tell("stops when the kernel in hand is compiled, at once when interrupted again")
             if task is None:
-                task = self._progress.add_task(what, total=None, stage=None)
+                task = self._progress.add_task(what, total=None, rate="", time="")
             self._progress.update(task, description=f"{what}, {seconds:.0f} s so far")
             if seconds >= due and self._logs:
                 due = seconds + LOG_PERIOD
-                self._line(f"{what}, {seconds:.0f} s so far")
+                self.tell(f"{what}, {seconds:.0f} s so far")
         if task is not None:
             self._progress.remove_task(task)
-
-    def _line(self, line: str) -> None:
-        if self.shown:
-            self.above(f"fastmech: {line}")
-        else:
-            print(f"fastmech: {line}", file=sys.stderr, flush=True)

@@ -33,6 +33,12 @@ def reporting_options(function: Command) -> Command:
     return function
 
 
+def out_option(about: str, default: str | None = None) -> Callable[[Command], Command]:
+    """Add ``--out DIR`` to a command."""
+    folder = click.Path(file_okay=False, path_type=Path)
+    return click.option("--out", metavar="DIR", type=folder, default=default, show_default=True, help=about)
+
+
 def section_option(about: str) -> Callable[[Command], Command]:
     """Add ``--section NAME`` to a command, which may be given once."""
 

@@ -1,22 +1,20 @@
 """Compiling beforehand what computations need, in several processes.
 
 Each job is a small computation by public functions, so that it compiles what they need and nothing else.
-Processes take the jobs one after another; of a kernel that several need one compiles it and the others wait
-(:class:`fastmech.jit.Kernel`). A process is a new interpreter, whatever the caller's main module is. It takes
-its jobs from its standard input and ends when that does, so it never outlives the caller by more than a job.
+Each has a process, as many at once as there are cores; of a kernel that several need one compiles it and the
+others wait (:class:`fastmech.jit.Kernel`). It is a new interpreter, whatever the caller's main module is.
 """
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import subprocess
 import sys
+import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 
 import numpy as np
 
@@ -61,7 +59,7 @@ JOBS: dict[str, dict[str, Callable[[], object]]] = {
 }
 
 #: What a process runs.
-_PROCESS = "from fastmech.cli.warming import _take_jobs; _take_jobs()"
+_PROCESS = "import sys; from fastmech.cli.warming import _run_job; _run_job(*sys.argv[1:])"
 
 
 def warm_up(
@@ -81,78 +79,47 @@ def warm_up(
     Raises:
         RuntimeError: a job failed; what it said last.
     """
-    waiting = [(purpose, name) for purpose in purposes for name in JOBS[purpose]][::-1]
-    ends = [_Process() for _ in range(min(thread_count(processes), len(waiting)))]
+    path = os.pathsep.join(place for place in sys.path if place)
+    running: list[subprocess.Popen[str]] = []
+    over = threading.Event()
 
-    def take(process: _Process) -> int:
-        made = 0
-        while waiting:
-            try:
-                job = waiting.pop()
-            except IndexError:  # another took it
-                break
-            for line in process.run(job):
-                made += 1
-                tell(line)
-            progress(1)
-        return made
-
-    try:
-        with ThreadPoolExecutor(len(ends)) as pool:
-            try:
-                return sum(done.result() for done in [pool.submit(take, process) for process in ends])
-            except BaseException:
-                waiting.clear()
-                for process in ends:
-                    process.end()
-                raise
-    finally:
-        for process in ends:
-            process.end()
-            process.close()
-
-
-class _Process:
-    """An interpreter that takes jobs."""
-
-    def __init__(self) -> None:
-        path = os.pathsep.join(place for place in sys.path if place)
-        self._process = subprocess.Popen(
-            [sys.executable, "-W", "ignore", "-c", _PROCESS],
-            stdin=subprocess.PIPE,
+    def run(purpose: str, name: str) -> int:
+        process = subprocess.Popen(
+            [sys.executable, "-W", "ignore", "-c", _PROCESS, purpose, name],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
             env=os.environ | {"PYTHONPATH": path},
         )
+        running.append(process)
+        with process:
+            assert process.stdout is not None
+            assert process.stderr is not None
+            if over.is_set():
+                process.terminate()
+            made = 0
+            for line in process.stdout:
+                made += 1
+                tell(line.rstrip("\n"))
+            said = process.stderr.read().strip().splitlines()
+        if process.returncode:
+            raise RuntimeError(f"{name}: {said[-1] if said else 'its process has ended'}")
+        progress(1)
+        return made
 
-    def run(self, job: tuple[str, str]) -> Iterator[str]:
-        """The lines that it tells until the job is finished."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        with suppress(BrokenPipeError):
-            print(json.dumps(job), file=self._process.stdin, flush=True)
-        for line in self._process.stdout:
-            told = line.rstrip("\n")
-            if not told:
-                return
-            yield told
-        assert self._process.stderr is not None
-        said = self._process.stderr.read().strip().splitlines()
-        raise RuntimeError(f"{job[1]}: {said[-1] if said else 'its process has ended'}")
-
-    def end(self) -> None:
-        """End it at once."""
-        self._process.terminate()
-        self._process.wait()
-
-    def close(self) -> None:
-        """Close what it was told and told by."""
-        with suppress(BrokenPipeError):
-            self._process.__exit__(None, None, None)
+    with ThreadPoolExecutor(thread_count(processes)) as pool:
+        jobs = [pool.submit(run, purpose, name) for purpose in purposes for name in JOBS[purpose]]
+        try:
+            return sum(job.result() for job in jobs)
+        except BaseException:
+            over.set()
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in running:
+                process.terminate()
+            raise
 
 
-def _take_jobs() -> None:
+def _run_job(purpose: str, name: str) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the terminal tells every process; the caller decides
     begun: list[tuple[str, float]] = []
 
@@ -165,7 +132,4 @@ def _take_jobs() -> None:
             print(f"{time.perf_counter() - since:8.1f} s  {made}", flush=True)
 
     jit.listeners.append(tell)
-    for line in sys.stdin:
-        purpose, name = json.loads(line)
-        JOBS[purpose][name]()
-        print(flush=True)
+    JOBS[purpose][name]()

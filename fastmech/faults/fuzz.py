@@ -8,12 +8,11 @@ import signal
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 
 from fastmech.errors import InputError
-from fastmech.faults.processes import FaultFound
+from fastmech.faults.processes import FaultFound, Found
 from fastmech.faults.victim import REQUEST, content_of, values_of
 from fastmech.runner import run_request
 from fastmech.scan_types import scan_kinds
@@ -25,7 +24,6 @@ PATIENCE = 20
 
 #: Bytes by which reading damaged files may let the process grow.
 GROWTH = 512 << 20
-
 
 #: A request whose result has variables of every kind: scalars, texts, flags, small and chunked arrays.
 SMALL = """
@@ -40,24 +38,7 @@ variables = ["count", "outcome", "phi"]
 """
 
 
-@dataclass
-class FuzzCount:
-    """What damaged files have come to.
-
-    Attributes:
-        tried: files read.
-        refused: of which with one line to the user.
-        slowest: longest time of reading one [s].
-        grown: growth of the process [bytes].
-    """
-
-    tried: int = 0
-    refused: int = 0
-    slowest: float = 0.0
-    grown: int = 0
-
-
-def fuzz_requests(count: int, seed: int, tell: Callable[[int], None] = lambda n: None) -> FuzzCount:
+def fuzz_requests(count: int, seed: int, tell: Callable[[int], None] = lambda n: None) -> Found:
     """Read damaged scan files.
 
     Args:
@@ -76,10 +57,10 @@ def fuzz_requests(count: int, seed: int, tell: Callable[[int], None] = lambda n:
             if Path(name).name != name or name in (".", ".."):
                 raise FaultFound(f"the section {name!r} would leave the folder of the result")
 
-    return _fuzz(texts, read, count, seed, tell)
+    return _fuzz("requests", texts, read, random.Random(seed), count, tell)
 
 
-def fuzz_results(count: int, seed: int, tell: Callable[[int], None] = lambda n: None) -> FuzzCount:
+def fuzz_results(count: int, seed: int, tell: Callable[[int], None] = lambda n: None) -> Found:
     """Read damaged result files, every variable of them: it is refused, or has the undamaged values.
 
     Args and errors as of `fuzz_requests`.
@@ -105,7 +86,7 @@ def fuzz_results(count: int, seed: int, tell: Callable[[int], None] = lambda n: 
         if refusal is not None:
             raise refusal
 
-    return _fuzz([image], read, count, seed, tell)
+    return _fuzz("result files", [image], read, random.Random(seed), count, tell)
 
 
 def damaged(data: bytes, rng: random.Random) -> bytes:
@@ -132,14 +113,14 @@ def damaged(data: bytes, rng: random.Random) -> bytes:
 
 
 def _fuzz(
+    what: str,
     originals: list[bytes],
     read: Callable[[Path], None],
+    rng: random.Random,
     count: int,
-    seed: int,
     tell: Callable[[int], None],
-) -> FuzzCount:
-    rng, found = random.Random(seed), FuzzCount()
-    before = _memory()
+) -> Found:
+    refused, slowest, grown, before = 0, 0.0, 0, _memory()
     previous = signal.signal(signal.SIGALRM, _too_long)
     try:
         with tempfile.TemporaryDirectory() as folder:
@@ -151,7 +132,7 @@ def _fuzz(
                 try:
                     read(path)
                 except InputError as error:
-                    found.refused += 1
+                    refused += 1
                     if "\n" in str(error):
                         raise FaultFound(f"number {number}: not one line: {error}") from None
                 except FaultFound:
@@ -160,15 +141,18 @@ def _fuzz(
                     raise FaultFound(f"number {number}: {type(error).__name__}: {error}") from error
                 finally:
                     signal.alarm(0)
-                found.slowest = max(found.slowest, time.perf_counter() - started)
-                found.tried += 1
+                slowest = max(slowest, time.perf_counter() - started)
                 tell(1)
-                found.grown = _memory() - before
-                if found.grown > GROWTH:
-                    raise FaultFound(f"number {number}: the process grew by {found.grown / 1e6:.0f} MB")
+                grown = _memory() - before
+                if grown > GROWTH:
+                    raise FaultFound(f"number {number}: the process grew by {grown / 1e6:.0f} MB")
     finally:
         signal.signal(signal.SIGALRM, previous)
-    return found
+    sentences = (
+        f"{count} damaged {what} read: {refused} refused, none crashed",
+        f"  slowest {slowest:.2f} s, memory grew by {grown / 1e6:.0f} MB",
+    )
+    return Found(sentences, {what: {"tried": count, "refused": refused}})
 
 
 def _too_long(number: int, frame: FrameType | None) -> None:

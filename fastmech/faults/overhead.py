@@ -6,9 +6,10 @@ import statistics
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import NamedTuple
 
 from fastmech.results import Dataset
 from fastmech.runner import run_request
@@ -18,7 +19,7 @@ from fastmech.store.provenance import provenance
 from fastmech.tiles.assemble import assembled, write_assembled
 from fastmech.tiles.cluster import cluster
 from fastmech.tiles.identity import asked_for, identity_of
-from fastmech.tiles.section import sections_of
+from fastmech.tiles.section import TiledSection, sections_of
 
 #: Threads, and workers of the cluster.
 WORKERS = 2
@@ -43,21 +44,13 @@ _CALIBRATION = 400
 Run = Callable[[], object]
 
 
-@dataclass(frozen=True)
-class Ratio:
-    """One way's wall time over another's.
+class Ratio(NamedTuple):
+    """One way's wall time over another's."""
 
-    Attributes:
-        what: which ways.
-        value: mean of the ratios of runs that followed one another.
-        error: its standard error.
-        seconds: mean wall time of the other way [s].
-    """
-
-    what: str
-    value: float
-    error: float
-    seconds: float
+    what: str  #: which ways
+    value: float  #: mean of the ratios of runs that followed one another
+    error: float  #: its standard error
+    seconds: float  #: mean wall time of the other way [s]
 
     def __str__(self) -> str:
         return f"{self.what}: {self.value:.3f} ± {self.error:.3f} (of {self.seconds:.0f} s, {REPEATS} pairs)"
@@ -72,19 +65,15 @@ def overheads(seconds: float, tell: Callable[[int], None] = lambda n: None) -> l
     with TemporaryDirectory(prefix="fastmech-overhead-") as folder, cluster(WORKERS, None) as hire:
         request, out = Path(folder) / "scan.toml", Path(folder) / "scan.h5"
 
-        def durably() -> None:
-            run_request(request, out, fresh=True, context=RunContext(WORKERS))
-
-        def by_dask() -> None:
-            run_request(request, out, fresh=True, context=RunContext(WORKERS), hire=hire)
-
+        durably = partial(run_request, request, out, fresh=True, context=RunContext(WORKERS))
+        by_dask = partial(durably, hire=hire)
         num = _CALIBRATION
         for _ in range(2):  # the first time also warms up
             request.write_text(_REQUEST.format(num=num), encoding="utf-8")
             by_dask()
             num = max(_CALIBRATION, round(num * seconds / _seconds(durably)))
         return [
-            _ratio("durable over in memory", durably, lambda: _in_memory(request, out), tell),
+            _ratio("durable over in memory", durably, partial(_in_memory, request, out), tell),
             _ratio(f"{WORKERS} Dask workers over {WORKERS} threads", by_dask, durably, tell),
         ]
 
@@ -94,13 +83,9 @@ def _in_memory(path: Path, out: Path) -> None:
     request = read_request(path, scan_kinds())
     sections = {}
     for section in sections_of(request, identity_of(asked_for(request))):
-        tiling = section.tiling
-
-        def compute(index: int) -> Dataset:
-            return tiling.compute(index, RunContext(1))  # noqa: B023 - used up within the loop
-
+        compute = partial(_tile, section)
         with ThreadPoolExecutor(WORKERS) as pool:
-            tiles = list(pool.map(compute, range(tiling.count)))
+            tiles = list(pool.map(compute, range(section.tiling.count)))
         sections[section.name] = assembled(section, tiles.__getitem__, 0.0)
     write_assembled(
         out,
@@ -110,6 +95,10 @@ def _in_memory(path: Path, out: Path) -> None:
         replace=True,
         threads=WORKERS,
     )
+
+
+def _tile(section: TiledSection, index: int) -> Dataset:
+    return section.tiling.compute(index, RunContext(1))
 
 
 def _ratio(what: str, one: Run, other: Run, tell: Callable[[int], None]) -> Ratio:

@@ -7,10 +7,10 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, NamedTuple
 
-from fastmech.faults.victim import REQUEST, content_of, run_victim
+from fastmech.faults.victim import IN_HAND, REQUEST, computed_again, content_of, run_victim
 
 #: Seconds after which a run that should have ended counts as hanging.
 PATIENCE = 120.0
@@ -23,12 +23,23 @@ class FaultFound(AssertionError):  # noqa: N818 - what a campaign is there to fi
     """A run did not keep what it promises."""
 
 
-@dataclass(frozen=True)
-class Place:
+class Found(NamedTuple):
+    """What a campaign has found: sentences for the user, figures for other programs."""
+
+    sentences: tuple[str, ...]
+    facts: dict[str, Any]
+
+
+class Place(NamedTuple):
     """A folder with a request, its result and a log."""
 
     folder: Path
     log: Path
+
+    @property
+    def request(self) -> Path:
+        """The request."""
+        return self.folder / "scan.toml"
 
     @property
     def result(self) -> Path:
@@ -37,7 +48,7 @@ class Place:
 
     def begin(self) -> None:
         """Put the request there."""
-        (self.folder / "scan.toml").write_text(REQUEST, encoding="utf-8")
+        self.request.write_text(REQUEST, encoding="utf-8")
 
     def lines(self) -> list[str]:
         """The log."""
@@ -70,8 +81,7 @@ def place() -> Iterator[Place]:
         yield Place(inner, Path(folder) / "log")
 
 
-@dataclass(frozen=True)
-class Reference:
+class Reference(NamedTuple):
     """The scan when nothing disturbs it: its content, its wall time, and that of the assembly [s]."""
 
     content: dict[str, bytes]
@@ -100,8 +110,14 @@ def reference() -> Reference:
     return result
 
 
-def check_result(here: Place, expected: Reference, what: str) -> None:
-    """The result must be the undisturbed one, with nothing left beside it."""
+def check_resumed(here: Place, expected: Reference, what: str, interruptions: int = 1) -> int:
+    """How many tiles were computed again, no more than were in hand.
+
+    The result must be the undisturbed one, with nothing left beside it.
+    """
+    again, most = computed_again(here.lines()), IN_HAND * interruptions
+    if again > most:
+        raise FaultFound(f"{again} tiles were computed again, at most {most} were in hand")
     found = content_of(here.result)
     if found != expected.content:
         keys = found.keys() | expected.content.keys()
@@ -110,3 +126,4 @@ def check_result(here: Place, expected: Reference, what: str) -> None:
     left = sorted(path.name for path in here.folder.iterdir() if path.name not in ("scan.toml", "scan.h5"))
     if left:
         raise FaultFound(f"{what}: {', '.join(left)} were left behind")
+    return again

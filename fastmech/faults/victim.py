@@ -96,31 +96,21 @@ def run_victim(folder: str, log: str) -> None:
         note("done")
 
 
-class _NotedHiring:
-    together = False
-
+class _NotedHiring(ThreadHiring):
     def __init__(self, note: Callable[[str], None]) -> None:
         self._note = note
 
     @contextmanager
-    def __call__(self, tasks: Sequence[Task], context: RunContext) -> Iterator[_NotedWorkers]:
-        with ThreadHiring()(tasks, context) as workers:
-            yield _NotedWorkers(workers, self._note)
+    def __call__(self, tasks: Sequence[Task], context: RunContext) -> Iterator[ThreadWorkers]:
+        with super().__call__(tasks, context) as workers:
+            submit = workers.submit
 
+            def noted(task: Task) -> Future[Tile]:
+                self._note(f"tile {task.section.name}:{task.index}")
+                return submit(task)
 
-class _NotedWorkers:
-    deaths: tuple[type[Exception], ...] = ()
-
-    def __init__(self, workers: ThreadWorkers, note: Callable[[str], None]) -> None:
-        self._workers, self._note = workers, note
-
-    @property
-    def slots(self) -> int:
-        return self._workers.slots
-
-    def submit(self, task: Task) -> Future[Tile]:
-        self._note(f"tile {task.section.name}:{task.index}")
-        return self._workers.submit(task)
+            workers.submit = noted  # type: ignore[method-assign]
+            yield workers
 
 
 def content_of(path: Path) -> dict[str, bytes]:

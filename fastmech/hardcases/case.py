@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.basins.label import Labels
 from fastmech.ensembles.integrate import Trajectories
 from fastmech.ensembles.status import Status
 from fastmech.mechanism.lagrange import kinetic_energy, potential_energy
@@ -15,12 +16,14 @@ from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
 
+#: Why a method claims nothing of an undamped motion.
+DRIVEN = "undamped motions grow with every step"
+
 #: In place of a status: the request was refused before the run.
 REFUSED = "refused"
 
 
-@dataclass(frozen=True)
-class Row:
+class Row(NamedTuple):
     """What one method did in a case.
 
     A method claims a case to an error, at a step; one that claims nothing must end with a status (or be
@@ -52,8 +55,7 @@ class Row:
         return "a status, as it must" if self.passed else f"FAILED: not claimed, error {self.error:.1e}"
 
 
-@dataclass(frozen=True)
-class HardCase:
+class HardCase(NamedTuple):
     """A case of the gallery; ``run(quick)`` gives its rows, ``quick`` in about a second."""
 
     name: str
@@ -87,3 +89,10 @@ def row_of(
 ) -> Row:
     """A row of what ``integrate`` gave."""
     return Row(run.method, run.dt, run.steps, error, allowed, drift, worst(run.status), claimed, remark, why)
+
+
+def labels_row(method: str, found: Labels, wrong: int, told: str = "") -> Row:
+    """A row of what ``fm.labels_of`` gave: the error is how many are wrong, and none may be."""
+    remark = "labels: " + ", ".join(f"{n} {name}" for name, n in found.counts.items() if n) + told
+    nan, why = float("nan"), "fm.labels_of"
+    return Row(method, nan, found.steps, float(wrong), 0.0, nan, "ok", True, remark, why)

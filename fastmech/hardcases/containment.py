@@ -8,15 +8,16 @@ failures over the time with them. It passes 1 where lanes that have failed have 
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.ensembles.integrate import integrate
+from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
+from fastmech.reports import in_turns, table
 from fastmech.results import Dataset, Variable
 from fastmech.scene import Scene
 
@@ -63,29 +64,32 @@ def ensembles(when: float, span: float) -> tuple[Scene | System, Floats, Floats]
     return System(pendulums, ["phi", "omega", "psi", "rate", "y"], {}), starts, mixed
 
 
+def _beside(method: str, dt: float, when: float, span: float, repetitions: int) -> tuple[float, int, bool]:
+    """The share, how many have failed, and whether the rest is the same to the bit."""
+    what, *both = ensembles(when, span)
+    runs: dict[int, Trajectories] = {}
+
+    def run(kind: int) -> None:
+        runs[kind] = integrate(what, both[kind], span, dt, method, threads=1)
+
+    alone, beside = in_turns({kind: partial(run, kind) for kind in (0, 1)}, repetitions).values()
+    least = np.finfo(np.float64).tiny
+    share = np.median([one / max(other, least) for one, other in zip(alone, beside, strict=True)])
+    healthy = np.flatnonzero(np.arange(NUMBER) % ONE_IN)
+    same = np.array_equal(runs[0].y[:, healthy], runs[1].y[:, healthy], equal_nan=True)
+    return float(share), int((runs[1].status != Status.OK).sum()), same
+
+
 def containment(quick: bool, progress: Callable[[int], None]) -> Dataset:
     """Share of the throughput of healthy trajectories that is left, by method, time of failure and span."""
-    healthy = np.flatnonzero(np.arange(NUMBER) % ONE_IN)
     spans = QUICK_SPANS if quick else SPANS
-    repetitions = 1 if quick else REPETITIONS
-    shape = (len(CONTAINED), len(WHEN), len(spans))
-    shares, flagged, same = np.empty(shape), np.empty(shape, np.int64), np.empty(shape, np.int64)
-    for m, (method, dt) in enumerate(CONTAINED.items()):
-        for w, when in enumerate(WHEN.values()):
-            for s, span in enumerate(spans):
-                what, *both = ensembles(when, span)
-                seconds = np.empty((repetitions + 1, 2))
-                for repetition in range(repetitions + 1):
-                    runs = []
-                    for kind, y in enumerate(both):
-                        begun = time.process_time()
-                        runs.append(integrate(what, y, span, dt, method, threads=1))
-                        seconds[repetition, kind] = time.process_time() - begun
-                ratios = seconds[1:, 0] / np.maximum(seconds[1:, 1], np.finfo(np.float64).tiny)
-                shares[m, w, s] = np.median(ratios)
-                flagged[m, w, s] = np.count_nonzero(runs[1].status != Status.OK)
-                same[m, w, s] = np.array_equal(runs[0].y[:, healthy], runs[1].y[:, healthy], equal_nan=True)
+    found = []
+    for method, dt in CONTAINED.items():
+        for when in WHEN.values():
+            found += [_beside(method, dt, when, span, 1 if quick else REPETITIONS) for span in spans]
         progress(1)
+    shape = (len(CONTAINED), len(WHEN), len(spans))
+    shares, flagged, same = (np.array(part).reshape(shape) for part in zip(*found, strict=True))
     each = ("method", "when", "span")
     return Dataset(
         {
@@ -96,7 +100,7 @@ def containment(quick: bool, progress: Callable[[int], None]) -> Dataset:
             "failed": Variable(each, flagged, "1", "trajectories with a status that is not OK"),
             "same": Variable(each, same, "1", "whether the rest is the same to the bit"),
         },
-        {"trajectories": NUMBER, "failing": NUMBER - healthy.size},
+        {"trajectories": NUMBER, "failing": -(-NUMBER // ONE_IN)},
     )
 
 
@@ -105,12 +109,11 @@ def contained(shares: Dataset) -> bool:
     return bool(shares["same"].data.all() and (shares["failed"].data == shares.attrs["failing"]).all())
 
 
-def containment_markdown(shares: Dataset) -> str:
+def containment_markdown(shares: Dataset) -> list[str]:
     """The table as text."""
     methods, when, spans = (shares[name].data for name in ("method", "when", "span"))
     failing, number = shares.attrs["failing"], shares.attrs["trajectories"]
-    ends = " | ".join(f"{kind}, {span:g} s" for kind in when for span in spans)
-    lines = [
+    return [
         "## Failing neighbours",
         "",
         f"{failing} of {number} trajectories fail: throughput of the rest over that in the same run "
@@ -118,11 +121,11 @@ def containment_markdown(shares: Dataset) -> str:
         "of one thread, median of runs in turn. Failing trajectories have a status and the rest is "
         f"the same to the bit: {'yes' if contained(shares) else 'NO'}.",
         "",
-        f"| method | {ends} |",
-        "|---|" + "---:|" * (len(when) * len(spans)),
+        *table(
+            ["method", *(f"{kind}, {span:g} s" for kind in when for span in spans)],
+            (
+                [method, *(f"{share:.2f}" for share in row.ravel())]
+                for method, row in zip(methods, shares["share"].data, strict=True)
+            ),
+        ),
     ]
-    lines += [
-        f"| {method} | " + " | ".join(f"{share:.2f}" for share in row.ravel()) + " |"
-        for method, row in zip(methods, shares["share"].data, strict=True)
-    ]
-    return "\n".join(lines)

@@ -10,7 +10,17 @@ import numpy as np
 
 from fastmech.ensembles.status import FAILURES, Status
 from fastmech.hardcases.case import REFUSED, HardCase, Row
-from fastmech.hardcases.registry import CASES
+from fastmech.hardcases.cases import (
+    algebraic,
+    chaos,
+    conservative,
+    folds,
+    precision,
+    references,
+    saddle,
+    starts,
+)
+from fastmech.reports import columns, table
 from fastmech.results import Dataset, Variable, flags
 
 #: Statuses of rows in the file: the trajectories', and one for a request that is refused before the run.
@@ -18,6 +28,14 @@ RowStatus = IntEnum(  # type: ignore[misc]
     "RowStatus",
     {status.name: status.value for status in sorted((Status.OK, *FAILURES))} | {REFUSED.upper(): 100},
 )
+
+
+#: Every case by its name.
+CASES: dict[str, HardCase] = {
+    case.name: case
+    for module in (references, conservative, algebraic, folds, saddle, chaos, precision, starts)
+    for case in module.CASES
+}
 
 
 class Result(NamedTuple):
@@ -41,33 +59,31 @@ def run_gallery(quick: bool, progress: Callable[[int], None] = lambda done: None
     return results
 
 
+#: Columns of the file, by the attributes of a row.
+_COLUMNS = {
+    "method": ("1", "method"),
+    "dt": ("s", "step"),
+    "steps": ("1", "steps"),
+    "error": ("1", "error as the case defines it; NaN: it has none"),
+    "allowed": ("1", "error to which the method claims the case; NaN: it does not"),
+    "drift": ("1", "largest relative change of energy; NaN: it is not conserved"),
+    "claimed": ("1", "method claims it"),
+    "passed": ("1", "did what it must"),
+    "why": ("1", "why so far"),
+    "remark": ("1", "remark"),
+}
+
+
 def gallery_dataset(results: Sequence[Result]) -> Dataset:
     """One row a case and method."""
-    rows = [(result.case, row) for result in results for row in result.rows]
-
-    def numbers(name: str, units: str, about: str) -> Variable:
-        return Variable(("row",), np.array([float(getattr(row, name)) for _, row in rows]), units, about)
-
-    codes = np.array([RowStatus[row.status.upper()] for _, row in rows], dtype=np.int8)
-    return Dataset(
-        {
-            "case": Variable(("row",), np.array([case.name for case, _ in rows], object), "1", "case"),
-            "method": Variable(("row",), np.array([row.method for _, row in rows], object), "1", "method"),
-            "dt": numbers("dt", "s", "step"),
-            "steps": Variable(("row",), np.array([row.steps for _, row in rows]), "1", "steps"),
-            "error": numbers("error", "1", "error as the case defines it; NaN: it has none"),
-            "allowed": numbers("allowed", "1", "error to which the method claims the case; NaN: it does not"),
-            "drift": numbers("drift", "1", "largest relative change of energy; NaN: it is not conserved"),
-            "status": Variable(("row",), codes, "1", "worst status", flags(RowStatus)),
-            "claimed": Variable(
-                ("row",), np.array([row.claimed for _, row in rows]), "1", "method claims it"
-            ),
-            "passed": Variable(("row",), np.array([row.passed for _, row in rows]), "1", "did what it must"),
-            "why": Variable(("row",), np.array([row.why for _, row in rows], object), "1", "why so far"),
-            "remark": Variable(("row",), np.array([row.remark for _, row in rows], object), "1", "remark"),
-        },
-        {"failures": sum(not row.passed for _, row in rows)},
-    )
+    rows = [row for result in results for row in result.rows]
+    names = np.array([result.case.name for result in results for _ in result.rows], object)
+    codes = np.array([RowStatus[row.status.upper()] for row in rows], dtype=np.int8)
+    about = {
+        "case": Variable(("row",), names, "1", "case"),
+        "status": Variable(("row",), codes, "1", "worst status", flags(RowStatus)),
+    }
+    return Dataset(about | columns("row", rows, _COLUMNS), {"failures": sum(not row.passed for row in rows)})
 
 
 def verdict(results: Sequence[Result]) -> str:
@@ -88,30 +104,23 @@ _INTRODUCTION = (
 )
 
 
-def gallery_markdown(results: Sequence[Result], tables: str) -> str:
+def gallery_markdown(results: Sequence[Result], tables: Sequence[str]) -> str:
     """The report's text; ``tables`` are those that follow the cases."""
+    head = "method | step [s] | steps | error | claimed to | drift | status | verdict | why | remark"
     lines = ["# Hard cases", "", f"{verdict(results).capitalize()}.", "", _INTRODUCTION, ""]
     for result in results:
         case = result.case
         lines += [f"## {case.name}: {'passed' if result.passed else 'FAILED'}", ""]
         lines += [f"Hard: {case.hard}.  ", f"Oracle: {case.oracle}.  ", f"Must: {case.must}.", ""]
-        lines += [
-            "| method | step [s] | steps | error | claimed to | drift | status | verdict | why | remark |"
-        ]
-        lines += ["|---|---:|---:|---:|---:|---:|---|---|---|---|"]
-        for row in result.rows:
-            claim = _number(row.allowed) if row.claimed else "not claimed"
-            lines.append(
-                f"| {row.method} | {_step(row.dt)} | {row.steps:,} | {_number(row.error)} | {claim} | "
-                f"{_number(row.drift)} | {row.status} | {row.verdict} | {row.why} | {row.remark} |"
-            )
-        lines.append("")
-    return "\n".join([*lines, tables, ""])
+        lines += table(head, map(_line, result.rows), (0, 6, 7, 8, 9))
+    return "\n".join([*lines, *tables])
 
 
-def _step(value: float) -> str:
-    return "" if np.isnan(value) else f"{value:.3g}"
-
-
-def _number(value: float) -> str:
-    return "" if np.isnan(value) else f"{value:.1e}"
+def _line(row: Row) -> str:
+    step, error, allowed, drift = (
+        "" if np.isnan(value) else f"{value:{form}}"
+        for value, form in ((row.dt, ".3g"), (row.error, ".1e"), (row.allowed, ".1e"), (row.drift, ".1e"))
+    )
+    claim = allowed if row.claimed else "not claimed"
+    numbers = f"{row.method} | {step} | {row.steps:,} | {error} | {claim} | {drift}"
+    return f"{numbers} | {row.status} | {row.verdict} | {row.why} | {row.remark}"

@@ -1,4 +1,4 @@
-"""Final states of hard motions in extended precision, made by ``data/make_hardcases.py``."""
+"""Motions with a known end, in extended precision, made by ``data/make_hardcases.py``."""
 
 from __future__ import annotations
 
@@ -12,14 +12,24 @@ from numpy.typing import NDArray
 
 from fastmech.scene import Scene
 
+Floats = NDArray[np.float64]
 
-class Motion(NamedTuple):
-    """A motion whose end is known to better than double precision."""
+#: Relative error that rounding explains, of motions that are not chaotic.
+ROUNDED = 1e-10
+
+
+class Goal(NamedTuple):
+    """A motion whose end is known, of a reference to better than double precision."""
 
     scene: Scene
-    start: NDArray[np.float64]  #: (4,): rad, rad/s
-    t: float  #: s
-    state: NDArray[np.float64]  #: (4,) at that time
+    start: Floats  #: (4,): rad, rad/s
+    t_end: float  #: s
+    expected: Floats  #: (4,), state at that time
+    rounded: float = ROUNDED  #: error that rounding explains, of the largest entry
+
+    def error(self, state: Floats) -> float:
+        """Largest difference from the known end, relative to its largest entry, 1 at least."""
+        return float(np.abs(state - self.expected).max() / max(1.0, np.abs(self.expected).max()))
 
 
 @cache
@@ -27,11 +37,13 @@ def _content() -> dict[str, Any]:
     return tomllib.loads(resources.files(__package__).joinpath("references.toml").read_text(encoding="utf-8"))
 
 
-def motion(name: str) -> Motion:
+def motion(name: str, rounded: float = ROUNDED) -> Goal:
     """The reference of this name; its scene is the paper's with a few changes."""
     entry = _content()[name]
-    scene = Scene(c2=1100 / 3).replace(**entry["scene"])
-    return Motion(scene, np.array(entry["start"]), entry["t"], np.array([float(x) for x in entry["state"]]))
+    end = np.array([float(x) for x in entry["state"]])
+    return Goal(
+        Scene(c2=1100 / 3).replace(**entry["scene"]), np.array(entry["start"]), entry["t"], end, rounded
+    )
 
 
 class Boundary(NamedTuple):
@@ -39,8 +51,8 @@ class Boundary(NamedTuple):
 
     scene: Scene
     phi: float  #: rad, rounded; to 1e-16
-    below: NDArray[np.float64]  #: phi, theta [rad] at the end of motions that start at smaller phi, (2,)
-    above: NDArray[np.float64]  #: the same for greater phi
+    below: Floats  #: phi, theta [rad] at the end of motions that start at smaller phi, (2,)
+    above: Floats  #: the same for greater phi
 
 
 def boundary() -> Boundary:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from fastmech.ensembles.run import Progress
 from fastmech.ensembles.threads import thread_count
-from fastmech.equilibria.find import find_equilibria
+from fastmech.equilibria.find import Equilibrium, find_equilibria
 from fastmech.errors import InputError, StepWarning
 from fastmech.hardcases.cases.conservative import (
     DT,
@@ -22,13 +23,13 @@ from fastmech.hardcases.cases.conservative import (
     energy_history,
 )
 from fastmech.hardcases.containment import CONTAINED, contained, containment, containment_markdown
-from fastmech.hardcases.gallery import gallery_dataset, gallery_markdown, run_gallery, verdict
-from fastmech.hardcases.registry import CASES
+from fastmech.hardcases.gallery import CASES, gallery_dataset, gallery_markdown, run_gallery, verdict
 from fastmech.integrators.method import Adams, ImplicitRungeKutta, RungeKutta
 from fastmech.integrators.methods import METHODS
 from fastmech.plots.energy_drift import draw_energy_drift
 from fastmech.plots.stability_region import draw_stability_regions
 from fastmech.plots.style import save
+from fastmech.reports import Stage, no_stage, table
 from fastmech.results import Dataset, Variable, scene_parameters
 from fastmech.scene import Scene
 from fastmech.step_limits.axes import imaginary_limit, real_limit
@@ -50,8 +51,6 @@ REGIONS = (
     ("implicit", ImplicitRungeKutta, "Stability regions |R(z)| ≤ 1 of the implicit Runge-Kutta methods"),
 )
 
-Stage = Callable[[str, int], Callable[[int], None]]
-
 
 class Report(NamedTuple):
     """What was written, and how the gallery ended."""
@@ -61,9 +60,7 @@ class Report(NamedTuple):
     passed: bool
 
 
-def write_hardcases(
-    out: Path, *, quick: bool = False, stage: Stage = lambda name, total: lambda done: None
-) -> Report:
+def write_hardcases(out: Path, *, quick: bool = False, stage: Stage = no_stage) -> Report:
     """Run the gallery and write ``hardcases.md``, ``hardcases.h5`` and pictures into the folder ``out``.
 
     Raises:
@@ -82,50 +79,36 @@ def write_hardcases(
 def _write(out: Path, quick: bool, stage: Stage, started: float) -> Report:
     results = run_gallery(quick, stage("hard cases", len(CASES)))
     scene = Scene(c2=1100 / 3, alpha=0.0)
-    advance = stage("step limits", len(METHODS))
-    limits = _limits(scene, advance)
-    table, store = out / "hardcases.md", out / "hardcases.h5"
+    minimum = next(e for e in find_equilibria(scene) if e.morse_index == 0)
+    limits = _limits(scene, minimum, stage("step limits", len(METHODS)))
     shares = containment(quick, stage("failing neighbours", len(CONTAINED)))
-    tables = f"{_limits_markdown(limits)}\n\n{containment_markdown(shares)}"
     told, passed = verdict(results), all(result.passed for result in results)
     if not contained(shares):
         told, passed = f"{told}; failing trajectories are not contained", False
-    table.write_text(gallery_markdown(results, tables), encoding="utf-8")
-    attrs = {
-        **provenance(thread_count(None)),
-        "title": "Hard cases",
-        "verdict": told,
-        "wall_time_s": time.perf_counter() - started,
-    }
+    text, store = out / "hardcases.md", out / "hardcases.h5"
+    tables = [*_limits_markdown(limits), *containment_markdown(shares)]
+    text.write_text(gallery_markdown(results, tables), encoding="utf-8")
+    attrs = {"title": "Hard cases", "verdict": told, "wall_time_s": time.perf_counter() - started}
     write_results(
         store,
         scene_parameters=scene_parameters(scene),
         sections={"gallery": gallery_dataset(results), "step_limits": limits, "containment": shares},
-        attrs=attrs,
+        attrs=provenance(thread_count(None)) | attrs,
         replace=True,
     )
-    paths = [table, store]
-    pictures = _region_pictures(scene, limits)
+    pictures, eigenvalues = {}, limiting_eigenvalues(scene, minimum)
+    for name, family, title in REGIONS:  # regions, the scene's eigenvalues at the limits, limits on the axes
+        members = {key: method for key, method in METHODS.items() if isinstance(method, family)}
+        if not members:
+            continue
+        title += "\nλ: eigenvalues at the minimum of Table 1 under the constant force"
+        pictures[f"stability_{name}"] = draw_stability_regions(members, eigenvalues, limits, title)
     steps = QUICK_STEPS if quick else STEPS
     pictures["energy_paper_start"] = _energy_picture("the paper's start", PAPER_START, steps)
     pictures["energy_energetic_start"] = _energy_picture("an energetic start", ENERGETIC_START, steps)
     for name, figure in pictures.items():
-        paths.append(out / f"{name}.png")
-        save(figure, paths[-1])
-    return Report(paths, told, passed)
-
-
-def _region_pictures(scene: Scene, limits: Dataset) -> dict[str, Figure]:
-    """A page a family: regions, the scene's eigenvalues at the limits, limits on the axes."""
-    minimum = next(e for e in find_equilibria(scene) if e.morse_index == 0)
-    eigenvalues = limiting_eigenvalues(scene, minimum)
-    pages = {}
-    for name, family, title in REGIONS:
-        members = {key: method for key, method in METHODS.items() if isinstance(method, family)}
-        if members:
-            full = f"{title}\nλ: eigenvalues at the minimum of Table 1 under the constant force"
-            pages[f"stability_{name}"] = draw_stability_regions(members, eigenvalues, limits, full)
-    return pages
+        save(figure, out / f"{name}.png")
+    return Report([text, store, *(out / f"{name}.png" for name in pictures)], told, passed)
 
 
 def _energy_picture(label: str, start: Sequence[float], steps: int) -> Figure:
@@ -145,50 +128,36 @@ def _energy_picture(label: str, start: Sequence[float], steps: int) -> Figure:
     )
 
 
-def _limits(scene: Scene, advance: Callable[[int], None]) -> Dataset:
+#: Columns of the step limits.
+_LIMITS = {
+    "real_limit": ("1", "stable for -x up to here; inf: no limit"),
+    "imaginary_limit": ("1", "stable for iy up to here; inf: no limit"),
+    "predicted_step": ("s", "largest stable step at the minimum, from coefficients and eigenvalues"),
+    "measured_step": ("s", "the same from the differenced one-step map"),
+}
+
+
+def _limits(scene: Scene, minimum: Equilibrium, advance: Progress) -> Dataset:
     """Axis limits of every method, and at the scene's minimum the step predicted and measured."""
-    minimum = next(e for e in find_equilibria(scene) if e.morse_index == 0)
-    columns: list[tuple[float, ...]] = []
+    rows = []
     for name, method in METHODS.items():
-        columns.append(
-            (
-                real_limit(method),
-                imaginary_limit(method),
-                largest_stable_step(scene, minimum, name),
-                measured_stable_step(scene, minimum, name),
-            )
-        )
+        steps = largest_stable_step(scene, minimum, name), measured_stable_step(scene, minimum, name)
+        rows.append((real_limit(method), imaginary_limit(method), *steps))
         advance(1)
-    values = np.array(columns)
-    about = (
-        ("real_limit", "1", "stable for -x up to here; inf: no limit"),
-        ("imaginary_limit", "1", "stable for iy up to here; inf: no limit"),
-        ("predicted_step", "s", "largest stable step at the minimum, from coefficients and eigenvalues"),
-        ("measured_step", "s", "the same from the differenced one-step map"),
-    )
-    variables = {
-        name: Variable(("method",), values[:, k], units, text) for k, (name, units, text) in enumerate(about)
-    }
     names = Variable(("method",), np.array(list(METHODS), object), "1", "method")
-    return Dataset({"method": names, **variables})
+    found = zip(_LIMITS.items(), np.array(rows).T, strict=True)
+    return Dataset({"method": names} | {key: Variable(("method",), x, *told) for (key, told), x in found})
 
 
-def _limits_markdown(limits: Dataset) -> str:
-    lines = [
-        "## Step limits",
-        "",
-        "At the minimum of Table 1 under the constant force.",
-        "",
-        "| method | real axis | imaginary axis | predicted step [s] | measured step [s] | difference |",
-        "|---|---:|---:|---:|---:|---:|",
-    ]
-    columns = [
-        limits[name].data
-        for name in ("method", "real_limit", "imaginary_limit", "predicted_step", "measured_step")
-    ]
-    for name, real, imaginary, predicted, measured in zip(*columns, strict=True):
+def _limits_markdown(limits: Dataset) -> list[str]:
+    head = "method | real axis | imaginary axis | predicted step [s] | measured step [s] | difference"
+    rows = []
+    for name, real, imaginary, predicted, measured in zip(
+        *(v.data for v in limits.variables.values()), strict=True
+    ):
         difference = f"{measured / predicted - 1:+.1e}" if np.isfinite(predicted) else ""
-        lines.append(
-            f"| {name} | {real:.4f} | {imaginary:.4f} | {predicted:.5f} | {measured:.5f} | {difference} |"
+        rows.append(
+            f"{name} | {real:.4f} | {imaginary:.4f} | {predicted:.5f} | {measured:.5f} | {difference}"
         )
-    return "\n".join(lines)
+    about = "At the minimum of Table 1 under the constant force."
+    return ["## Step limits", "", about, "", *table(head, rows)]

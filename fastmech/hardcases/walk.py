@@ -16,10 +16,17 @@ from numpy.typing import ArrayLike
 
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.errors import InputError
-from fastmech.hardcases.case import REFUSED, Floats, Row, row_of, worst
-from fastmech.integrators.method import Adams
+from fastmech.hardcases.case import REFUSED, Row, row_of, worst
+from fastmech.hardcases.references import Floats, Goal
+from fastmech.integrators.batch import Batch, observe_nothing
+from fastmech.integrators.method import Adams, ImplicitRungeKutta
 from fastmech.integrators.methods import METHODS, find_method
+from fastmech.integrators.tableaus.implicit import IMPLICIT_TABLEAUS
+from fastmech.kernels.counting import CALLS, JACOBIANS, counting_jacobian, counting_lagrange
+from fastmech.kernels.jacobians import lagrange_inverse, lagrange_jacobian
+from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
+from fastmech.step_limits.predict import stable_step
 from fastmech.step_limits.warning import step_limit, step_warning
 
 #: One method of each family: what quick versions walk.
@@ -36,23 +43,6 @@ SHORTER = 4.0
 
 #: Relative error beyond which a number is worth nothing, and steps that are too many to get one.
 WORTHLESS, MOST_STEPS = 0.1, 200_000
-
-#: Relative error that rounding explains, of motions that are not chaotic.
-ROUNDED = 1e-10
-
-
-class Goal(NamedTuple):
-    """A motion with a known end."""
-
-    scene: Scene
-    start: Floats  #: (4,)
-    t_end: float  #: s
-    expected: Floats  #: (4,), state at that time
-    rounded: float = ROUNDED  #: error that rounding explains, of the largest entry
-
-    def error(self, state: Floats) -> float:
-        """Largest difference from the known end, relative to its largest entry, 1 at least."""
-        return _distance(state, self.expected)
 
 
 def walked(quick: bool) -> tuple[str, ...]:
@@ -115,14 +105,62 @@ def fixed_row(goal: Goal, method: str, dt: float, allowed: float, why: str, dtyp
     return row_of(run, goal.error(run.y[-1, 0]), allowed, why=why, remark=remark)
 
 
+def halving_tells(method: str, state: Floats, half: Floats) -> float:
+    """The error of a result by the same with half the steps: Richardson's estimate, of the largest entry."""
+    return float(np.abs(state - half).max()) / (1.0 - 0.5 ** find_method(method).order)
+
+
 def _own_claim(goal: Goal, method: str, dt: float) -> tuple[Trajectories, float]:
     """A run and the error that it claims: twice Richardson's estimate, rounding added."""
     run, half = (integrate(goal.scene, goal.start, goal.t_end, h, method) for h in (dt, 0.5 * dt))
-    order = find_method(method).order
-    estimate = _distance(run.y[-1, 0], half.y[-1, 0]) / (1.0 - 0.5**order)
-    claim = 2.0 * estimate + goal.rounded
+    size = max(1.0, float(np.abs(half.y[-1, 0]).max()))
+    claim = 2.0 * halving_tells(method, run.y[-1, 0], half.y[-1, 0]) / size + goal.rounded
     return run, claim if np.isfinite(claim) else np.inf
 
 
-def _distance(state: Floats, expected: Floats) -> float:
-    return float(np.abs(state - expected).max() / max(1.0, np.abs(expected).max()))
+class Work(NamedTuple):
+    """What a run took."""
+
+    state: Floats  #: (4,) at the end
+    calls: int  #: right-hand sides
+    jacobians: int
+    path: Floats  #: states (steps + 1, 4)
+
+
+def counted(goal: Goal, method: str, steps: int) -> Work:
+    """A run of an implicit method in equal steps with every call counted."""
+    params = np.concatenate([np.array(reduce(goal.scene), dtype=np.float64), np.zeros(2)])
+    batch = Batch(
+        times=np.linspace(0.0, goal.t_end, steps + 1),
+        steps=np.ones(steps, dtype=np.int64),
+        params=params[None, :, None].copy(),
+        observer_params=np.zeros(0),
+        Y=goal.start[None, :, None].copy(),
+        record=np.zeros((1, 0, 1)),
+        out=np.empty((1, steps, 4, 1)),
+    )
+    formula = ImplicitRungeKutta(IMPLICIT_TABLEAUS[method], counting_jacobian, lagrange_inverse)
+    formula.run(counting_lagrange, observe_nothing, batch)
+    calls, jacobians = (int(batch.params[0, row, 0]) for row in (CALLS, JACOBIANS))
+    path = np.concatenate([goal.start[None], batch.out[0, :, :, 0]])
+    return Work(path[-1], calls, jacobians, path)
+
+
+def path_eigenvalues(goal: Goal, path: Floats) -> Floats:
+    """Eigenvalues (states, 4) [1/s] of the motion linearized along a path (states, 4)."""
+    Y = np.ascontiguousarray(path.T)
+    J = np.empty((16, len(path)))
+    own = np.repeat(np.array(reduce(goal.scene), dtype=np.float64)[:, None], len(path), axis=1)
+    lagrange_jacobian(0.0, Y, J, own)
+    return np.asarray(np.linalg.eigvals(J.T.reshape(-1, 4, 4)))
+
+
+def explicit_calls(goal: Goal, path: Floats, method: str = "rk4") -> float:
+    """Right-hand sides of an explicit method whose step is the stability limit all along a path.
+
+    Fewer than with any fixed step, which the narrowest place on the path sets.
+    """
+    formula = METHODS[method]
+    limits = np.array([stable_step(formula, values) for values in path_eigenvalues(goal, path)])
+    steps = goal.t_end * float(np.mean(1.0 / limits))
+    return steps * formula.evaluations(1000) / 1000.0

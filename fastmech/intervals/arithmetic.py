@@ -23,7 +23,8 @@ Interval: TypeAlias = tuple[float, float]
 
 #: Names of what works on intervals.
 OPERATIONS = (
-    "absolute", "add", "atan", "cos", "div", "exp", "log", "mul", "neg", "power", "sign", "sin", "sqrt", "sub",
+    "absolute", "add", "atan", "cos", "div", "exp", "log", "mul", "neg", "power", "sign", "sin", "sqrt",
+    "sub",
 )  # fmt: skip
 
 #: Numbers beyond are not told from infinity: a few operations on others cannot overflow unseen.

@@ -37,7 +37,7 @@ def pendulum_chain(n: int) -> Mechanism:
     return Mechanism(
         q,
         VALUES,
-        points=points,
+        points={"O": (0, 0), **points},
         masses=dict.fromkeys(points, m),
         potential=-c * sum(cos(a - b) for a, b in pairwise(q)),
         forces=[Force(name, Constant(F), (1, 0)) for name in points],

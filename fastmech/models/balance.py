@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import lru_cache, reduce
 from math import inf, isfinite, nextafter
@@ -13,6 +14,7 @@ from sympy.simplify.fu import TR8
 from fastmech.errors import InputError, shown
 from fastmech.generated import new_module, run_module
 from fastmech.intervals import arithmetic
+from fastmech.intervals.arithmetic import Interval
 from fastmech.models.statics import Statics
 
 if TYPE_CHECKING:
@@ -95,14 +97,37 @@ def energy_kernel(mechanism: Mechanism) -> Any:
     return _made("energy", text).energy
 
 
-def range_of(mechanism: Mechanism, expression: Any, domain: Any) -> tuple[float, float]:
-    """Bounds of an expression of coordinates and parameters over a box (n, 2 or more)."""
+def enclosing(mechanism: Mechanism, expressions: Sequence[Any]) -> str:
+    """Text of a function that bounds expressions of coordinates and parameters over boxes."""
     statics = mechanism.statics()
-    place: dict[str, Any] = {f"q{i}": (float(low), float(high)) for i, (low, high, *_) in enumerate(domain)}
-    place |= {f"p{i}": (value, value) for i, value in enumerate(mechanism.parameters.values())}
-    known = {name: getattr(arithmetic, name) for name in arithmetic.OPERATIONS}
-    found: tuple[float, float] = eval(_text(sympy.sympify(expression), _names(statics)), known | place)
-    return found
+    names = _names(statics)
+    closest = [min(x, _sums(x), key=sympy.count_ops) for x in map(sympy.sympify, expressions)]
+    shared, outputs = sympy.cse(closest, symbols=sympy.numbered_symbols("x", real=True))
+    names |= {symbol: f"x{i}" for i, (symbol, _) in enumerate(shared)}
+    lines = [f"    {names[symbol]} = {_text(expression, names)}\n" for symbol, expression in shared]
+    given = [
+        f"{k}{i}" for k, x in (("q", statics.coordinates), ("p", statics.parameters)) for i in range(len(x))
+    ]
+    texts = ", ".join(_text(output, names) for output in outputs)
+    return f"def found({', '.join(given)}):\n{''.join(lines)}    return [{texts}]\n"
+
+
+def enclosures(mechanism: Mechanism, text: str) -> Callable[[Any], list[Interval]]:
+    """The function of such a text over boxes (n, 2 or more), parameters having their values."""
+    known: dict[str, Any] = {name: getattr(arithmetic, name) for name in arithmetic.OPERATIONS}
+    exec(text, known)
+    values = [(value, value) for value in mechanism.parameters.values()]
+
+    def bounds(box: Any) -> list[Interval]:
+        found: list[Interval] = known["found"](*((float(x[0]), float(x[1])) for x in box), *values)
+        return found
+
+    return bounds
+
+
+def range_of(mechanism: Mechanism, expression: Any, domain: Any) -> Interval:
+    """Bounds of an expression of coordinates and parameters over a box (n, 2 or more)."""
+    return enclosures(mechanism, enclosing(mechanism, [expression]))(domain)[0]
 
 
 @lru_cache(maxsize=256)

@@ -34,15 +34,20 @@ UNITS = {
 SIZES = np.array([1.3, 0.7, 1.9])
 
 
-def check(mechanism: Mechanism) -> None:
-    """Refuse what is no mechanism.
+def check(mechanism: Mechanism) -> bool:
+    """Refuse what is no mechanism; whether the metric is proved to be positive definite everywhere.
 
     Raises:
         InputError: the metric is not positive definite, dampers feed energy in, an angle that turns fully
             does not come back to the same, or units do not fit.
     """
+    from fastmech.models.definite import definite  # SymPy: only where a mechanism is there
+
     y, n = trial_states(mechanism), len(mechanism.coordinates)
     _check_metric(mechanism, y[:, :n])
+    proved, place = definite(mechanism)
+    if proved is False:
+        raise _not_definite(mechanism, place)
     damped = mechanism.evaluate("powers", [0.0, *y.T])[1]
     if (damped < -ROUNDING * np.nanmax(np.abs(damped))).any():
         raise InputError("dissipation: feeds energy in; coefficients of dampers must not be negative")
@@ -56,6 +61,7 @@ def check(mechanism: Mechanism) -> None:
             )
     if mechanism.units:
         _check_units(mechanism, y)
+    return proved is True
 
 
 def _check_metric(mechanism: Mechanism, q: Floats) -> None:
@@ -70,13 +76,16 @@ def _check_metric(mechanism: Mechanism, q: Floats) -> None:
         least = np.linalg.eigvalsh(a / scale[:, None] / scale)[:, 0]
         order = np.argsort(least)
         if least[order[0]] < SINGULAR:
-            named = zip(mechanism.state, q[order[0]], strict=False)
-            where = ", ".join(f"{name} = {value:.3g}" for name, value in named)
-            raise InputError(f"kinetic: is not positive definite, as at {where}; every motion needs a mass")
+            raise _not_definite(mechanism, q[order[0]])
         best = q[order[: TRIED // 16]].repeat(16, axis=0)
         q = best + 0.4**closer * spread * random.normal(size=best.shape)
         q[::16] = best[::16]
         q = np.clip(q, [c.low for c in mechanism.coordinates], [c.high for c in mechanism.coordinates])
+
+
+def _not_definite(mechanism: Mechanism, place: Floats) -> InputError:
+    where = ", ".join(f"{name} = {x:.3g}" for name, x in zip(mechanism.state, place, strict=False))
+    return InputError(f"kinetic: is not positive definite, as at {where}; every motion needs a mass")
 
 
 def trial_states(mechanism: Mechanism) -> Floats:

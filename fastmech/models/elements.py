@@ -13,6 +13,7 @@ import sympy
 
 from fastmech.errors import InputError, shown
 from fastmech.loads import Constant, Function, Load, Sampled
+from fastmech.models.drawing import Element
 from fastmech.models.writer import simplest
 
 
@@ -118,6 +119,7 @@ class Builder:
     def __init__(self, q: Sequence[Any], rates: Sequence[Any], known: Mapping[str, Any]) -> None:
         self._q, self._rates, self._known = q, rates, known
         self._points: dict[str, Any] = {}
+        self.drawn: list[tuple[Element, Any, Any, Any]] = []  #: kind, what it is zero with, both ends
 
     def expression(self, where: str, given: Any, rates: bool = False) -> Any:
         """An expression in known symbols, of rates too where they may occur."""
@@ -175,18 +177,22 @@ class Builder:
             center = self.point(where, mass.center)
             m, inertia = (self.expression(where, value) for value in (mass.mass, mass.inertia))
             angle = sympy.Matrix([self.expression(where, mass.angle)])
+            self.drawn.append((Element.MASS, m, center, center))
             metric += m * self._inertia(center) + inertia * self._inertia(angle)
             if gravity is not None:
                 potential -= m * self._gravity(gravity, len(center)).dot(center)
         for number, spring in enumerate(_all("springs", given["springs"], Spring, TorsionSpring)):
             stretch_square = self._stretch_square(f"springs[{number}]", spring)
             stiffness = self.expression(f"springs[{number}].stiffness", spring.stiffness)
+            if isinstance(spring, Spring):
+                self._draw(Element.SPRING, stiffness, spring)
             potential += stiffness * stretch_square / 2
         for number, damper in enumerate(_all("dampers", given["dampers"], Damper, TorsionDamper)):
             rate_square = self._rate_square(f"dampers[{number}]", damper)
-            dissipation += (
-                self.expression(f"dampers[{number}].coefficient", damper.coefficient) * rate_square / 2
-            )
+            coefficient = self.expression(f"dampers[{number}].coefficient", damper.coefficient)
+            if isinstance(damper, Damper):
+                self._draw(Element.DAMPER, coefficient, damper)
+            dissipation += coefficient * rate_square / 2
         loads = tuple(
             self._load(f"forces[{number}]", force)
             for number, force in enumerate(_all("forces", given["forces"], Force, Torque))
@@ -194,6 +200,14 @@ class Builder:
         return Parts(
             metric, kinetic, potential, dissipation, self._generalized(given["generalized_forces"]), loads
         )
+
+    def _draw(self, kind: Element, size: Any, element: Any) -> None:
+        """Between its points; a damper along a direction ends where that leads to."""
+        a, b = self.point("a", element.a), self.point("b", element.b)
+        if kind is Element.DAMPER and element.along is not None:
+            along = self.point("along", element.along)
+            a = b + along * (a - b).dot(along) / self._square(along)
+        self.drawn.append((kind, size, a, b))
 
     def _inertia(self, place: Any) -> Any:
         """Metric of a unit mass, or of a unit of inertia, at a place."""
@@ -261,6 +275,7 @@ class Builder:
             raise InputError(f"{where}.direction = {shown(force.direction)}: must be a unit vector")
         moved = tuple(simplest(point.diff(q).dot(direction), self._q) for q in self._q)
         fixed = not direction.free_symbols & {*self._q}
+        self.drawn.append((Element.LOAD, load, point, point + direction))
         return Acting(load, moved, point.dot(direction) if fixed else None)
 
     def _expression_of(self, where: str, element: Any) -> Any:

@@ -381,20 +381,64 @@ def _merged(
 def expected_sum(statics: Statics, p: Floats) -> int | None:
     """The sum over all equilibria of the signs of the stiffness' determinants: the degree of the forces.
 
-    Without ranges it is 0, the Euler characteristic of a torus. With ranges it is known where on each of
-    their ends the force along the coordinate keeps one sign, which is proved by boxes: then forces can be
-    deformed, without a zero on the boundary, into ones that depend on that coordinate alone, and are
-    constant along a periodic angle if there is one. Else None.
+    Without ranges it is 0, the Euler characteristic of a torus. Of two coordinates it is how often the force
+    turns round on the way along the ends of their ranges, if it is proved that it vanishes nowhere there. Of
+    others it is known where on each end the force along the coordinate keeps one sign, which is proved by
+    boxes: then forces can be deformed, without a zero on the boundary, into ones that depend on that
+    coordinate alone, and are constant along a periodic angle if there is one. Else None.
     """
     domain = domain_of(statics)
-    degree = 0 if any(coordinate.periodic for coordinate in statics.coordinates) else 1
-    for k, coordinate in enumerate(statics.coordinates):
-        if not coordinate.periodic:
+    turning = [coordinate.periodic for coordinate in statics.coordinates]
+    if len(turning) == 2 and not all(turning):
+        return _turns_on_ends(statics, p, domain, turning)
+    degree = 0 if any(turning) else 1
+    for k in range(len(turning)):
+        if not turning[k]:
             signs = [_sign_on_end(statics, p, domain, k, end) for end in (0, 1)]
             if 0 in signs:
                 return None
             degree *= (signs[0] - signs[1]) // 2
     return degree
+
+
+def _turns_on_ends(statics: Statics, p: Floats, domain: Floats, turning: list[bool]) -> int | None:
+    """Turns of two forces on the way round their domain, None where they may vanish on it.
+
+    The sides of a periodic angle are passed in both directions and leave nothing.
+    """
+    low, high = domain[:, 0], domain[:, 1]
+    corners = np.array([low, (high[0], low[1]), high, (low[0], high[1])])
+    total = 0.0
+    for loop in ([0, 1, 2, 3],) if not any(turning) else ([0], [2]) if turning[0] else ([1], [3]):
+        quarters: list[int] = []
+        for side in loop:
+            found = _quarters(statics, p, corners[side], corners[(side + 1) % 4])
+            if found is None:
+                return None
+            quarters += found
+        steps = np.diff([*quarters, quarters[0]])
+        total += float((np.remainder(steps + 1, 4) - 1).sum()) / 4.0
+    return round(total)
+
+
+def _quarters(statics: Statics, p: Floats, start: Floats, end: Floats) -> list[int] | None:
+    """Directions in which the force points along a side: 0 to 3 for +x, +y, -x, -y, one a piece of it."""
+    f, J, forces = np.empty((2, 2)), np.empty((2, 2, 2)), _balance(statics)
+    found: list[int] = []
+    todo = [(0.0, 1.0)]
+    for _ in range(FACES):
+        if not todo:
+            return found
+        first, last = todo.pop()
+        ends = np.stack([(1.0 - share) * start + share * end for share in (first, last)])
+        forces(np.stack([ends.min(0), ends.max(0)], axis=1), p, f, J)
+        ways = [k + 2 * (f[k, 1] < 0.0) for k in (0, 1) if not f[k, 0] <= 0.0 <= f[k, 1]]
+        if not ways:
+            middle = 0.5 * (first + last)
+            todo += [(middle, last), (first, middle)]
+        else:
+            found.append(next((way for way in ways if found and way == found[-1]), ways[0]))
+    return None
 
 
 def _sign_on_end(statics: Statics, p: Floats, domain: Floats, k: int, end: int) -> int:

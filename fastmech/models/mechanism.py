@@ -138,8 +138,9 @@ class Mechanism:
                 "generalized_forces": {} if generalized_forces is None else generalized_forces,
             }
         )  # fmt: skip
+        self._drawn = tuple(builder.drawn)
         self.lengths = frozenset(q.name for q in given if q.unit == "m")
-        check(self)
+        self.definite = check(self)  #: whether the metric is proved to be positive definite everywhere
 
     def replace(self, **parameters: float) -> Mechanism:
         """The same mechanism with other values of some parameters."""
@@ -151,7 +152,7 @@ class Mechanism:
         made.parameters, _ = _parameters(self.parameters | parameters)
         if list(map(str, made._means())) != list(map(str, self._means())):
             made._forget()
-        check(made)
+        made.definite = check(made)
         return made
 
     def _means(self) -> list[Any]:
@@ -246,6 +247,31 @@ class Mechanism:
         given |= dict(zip(self._constants, self.parameters.values(), strict=True))
         jacobian = self.points[point].jacobian(list(self._symbols)).xreplace(given)
         return np.array(jacobian.evalf().tolist(), dtype=np.float64)
+
+    def places(self, q: ArrayLike) -> tuple[dict[str, Floats], list[tuple[Any, float, Floats]]]:
+        """Named points (m, 2) of the plane [m] at positions (m, n), and kind, size and ends of elements.
+
+        Ends are (m, 2, 2), sizes the values [SI] of masses, stiffnesses, coefficients and loads' means.
+        Nothing of a mechanism in space.
+        """
+        import sympy
+
+        if any(len(place) != 2 for place in (*self.points.values(), *(d[2] for d in self._drawn))):
+            return {}, []
+        values, states = list(self.parameters.values()), self._split(q, 1)
+        symbols = [*self._symbols, *self._constants]
+        sizes = [d[1].mean_at(self.parameters) if isinstance(d[1], Load) else d[1] for d in self._drawn]
+        numbers = sympy.lambdify(self._constants, sizes)(*values)
+
+        def evaluated(expressions: list[Any]) -> Floats:
+            found = sympy.lambdify(symbols, expressions, "numpy", cse=True)(*states, *values)
+            shape = states.shape[1:]
+            return np.stack([np.broadcast_to(np.float64(one), shape) for one in found], axis=-1)
+
+        points = {name: evaluated(list(place)) for name, place in self.points.items()}
+        ends = [evaluated([*a, *b]).reshape(-1, 2, 2) for *_, a, b in self._drawn]
+        kinds = [kind for kind, *_ in self._drawn]
+        return points, list(zip(kinds, map(float, numbers), ends, strict=True))
 
     def energy(self) -> Any:
         """T + U, loads at their means, as an expression of coordinates, rates and parameters.

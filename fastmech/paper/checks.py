@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from fastmech.equilibria.find import find_equilibria
 from fastmech.mechanism.geometry import constraints, positions
+from fastmech.paper.compare import CASES, Printed, agrees
 from fastmech.paper.compute import METHOD, MOTION_SPAN, STEP, Computed, nearest
-from fastmech.paper.printed import CASES, Printed, agrees
 from fastmech.paper.scene import PAPER_SCENE, STATIC_SCENE
 from fastmech.scene import Scene
 
 
-@dataclass(frozen=True)
-class Check:
+class Check(NamedTuple):
     """One promise, kept if the value does not exceed the limit."""
 
     name: str
@@ -26,7 +25,7 @@ class Check:
     @property
     def passed(self) -> bool:
         """Whether the promise is kept."""
-        return self.value <= self.limit
+        return bool(self.value <= self.limit)
 
 
 def all_checks(computed: Computed) -> list[Check]:
@@ -37,33 +36,19 @@ def all_checks(computed: Computed) -> list[Check]:
     certificate = computed.certificate
     run = f"over {MOTION_SPAN:g} s ({METHOD}, step {STEP:g} s)"
     missing = abs((certificate.expected or 0) - computed.count) if certificate.complete else float("nan")
+    balance = "energy balance: change of T + Π less the works of damper and force, over max(T + Π) − min Π"
+    both, along = "Lagrange's and Hamilton's equations", "largest residual along the motion"
     return [
-        Check(
-            f"Lagrange's and Hamilton's equations: largest difference of the angles {run}",
-            float(angles.max()),
-            "rad",
-            1e-10,
-        ),
-        Check("the same, rates", float(rates.max()), "rad/s", 1e-10),
-        Check(
-            "constraints (2), (3), (5): largest residual along the motion",
-            float(residual[[0, 1, 3]].max()),
-            "m²",
-            1e-13,
-        ),
-        Check("constraint (4): largest residual along the motion", float(residual[2].max()), "m", 1e-13),
-        Check(
-            "energy balance: change of T + Π less the works of damper and force, over max(T + Π) − min Π",
-            motion.relative_residual,
-            "1",
-            1e-10,
-        ),
+        Check(f"{both}: largest difference of the angles {run}", angles.max(), "rad", 1e-10),
+        Check("the same, rates", rates.max(), "rad/s", 1e-10),
+        Check(f"constraints (2), (3), (5): {along}", residual[[0, 1, 3]].max(), "m²", 1e-13),
+        Check(f"constraint (4): {along}", residual[2].max(), "m", 1e-13),
+        Check(balance, motion.relative_residual, "1", 1e-10),
         Check("equilibria missing from the list, by the counting theorem", missing, "1", 0.0),
     ]
 
 
-@dataclass(frozen=True)
-class Guess:
+class Guess(NamedTuple):
     """A parameter set that might be the paper's, and how many of Table 2's angles it gives."""
 
     c2: str

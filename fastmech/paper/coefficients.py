@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.mechanism.lagrange import metric, potential_energy, potential_gradient
-from fastmech.paper.printed import Printed, evaluate
+from fastmech.paper.compare import Printed, evaluate
 from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]

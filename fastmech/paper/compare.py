@@ -1,12 +1,76 @@
-"""Rows of the report: one printed number or word beside the computed one, and what to think of it."""
+"""The paper's print, read from ``printed.toml``, and its comparison with what is computed.
+
+Every number has exactly its printed digits.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+import tomllib
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from decimal import Decimal
 from enum import StrEnum
+from fnmatch import fnmatchcase
+from importlib import resources
+from typing import Any, NamedTuple
 
-from fastmech.paper.printed import agrees, agrees_legibly, evaluate
+import numpy as np
+
+Printed = Mapping[str, Any]
+
+CASES = ("case_1", "case_2", "case_3", "case_4")
+
+#: Finest rounding tried when characters of a printed number are lost.
+MOST_DECIMALS = 6
+
+_FUNCTIONS = {"pi": np.pi, "sin": np.sin, "cos": np.cos, "sqrt": np.sqrt}
+
+
+def load_printed() -> dict[str, Any]:
+    """Content of ``printed.toml``."""
+    return tomllib.loads(resources.files(__package__).joinpath("printed.toml").read_text(encoding="utf-8"))
+
+
+def evaluate(expression: str, **names: Any) -> Any:
+    """Value of an expression of ``printed.toml`` (Python's syntax) for the quantities it names.
+
+    Beside those it knows ``sin``, ``cos``, ``sqrt`` and ``pi``. Only the package's own file is evaluated.
+    """
+    return eval(expression, {"__builtins__": {}}, {**_FUNCTIONS, **names})
+
+
+def half_unit(printed: str) -> float:
+    """Half a unit in the last printed place: the largest rounding error of a right print."""
+    exponent = Decimal(printed).as_tuple().exponent
+    assert isinstance(exponent, int)
+    return 0.5 * 10.0**exponent
+
+
+def agrees(printed: str, computed: float) -> bool:
+    """Whether a print is a rounding of the computed value; a tie may have been rounded either way."""
+    return abs(float(printed) - computed) <= half_unit(printed) * (1.0 + 1e-9)
+
+
+def agrees_legibly(pattern: str, computed: float) -> bool:
+    """Whether some rounding of the computed value fits a print of which characters are lost.
+
+    ``*`` stands for any lost characters, as in the file.
+    """
+    return any(fnmatchcase(f"{computed:.{places}f}", pattern) for places in range(MOST_DECIMALS + 1))
+
+
+HEADINGS = ("Case, part", "Symbol", "Unit", "Printed", "Computed", "Difference", "Verdict")
+
+_NEGLIGIBLE = 1e-9
+_SYMBOLS = {
+    "beta": "β",
+    "alpha": "α",
+    "phi_0": "φ₀",
+    "theta_0": "θ₀",
+    "phi_dot_0": "φ₀′",
+    "theta_dot_0": "θ₀′",
+    "F0": "F₀",
+}
 
 
 class Verdict(StrEnum):
@@ -25,8 +89,7 @@ class Verdict(StrEnum):
         return self not in (Verdict.MISPRINT, Verdict.DIFFERS)
 
 
-@dataclass(frozen=True)
-class Row:
+class Row(NamedTuple):
     """One printed number or word of the paper."""
 
     section: str  #: "Table 2", "Equation (16)", ...
@@ -39,16 +102,43 @@ class Row:
     see: str = ""  #: key of the misprint that explains it
 
     @property
-    def difference(self) -> float | None:
-        """Computed less printed; none for words and for prints that lost characters."""
-        if isinstance(self.computed, str) or "*" in self.printed:
-            return None
-        return self.computed - number(self.printed)
+    def difference(self) -> float:
+        """Computed less printed; NaN for words and for prints that lost characters."""
+        return (
+            np.nan if "*" in self.printed else self.value - (number(self.printed) if self.is_number else 0.0)
+        )
 
     @property
     def is_number(self) -> bool:
         """Whether it is a number, not a word."""
         return not isinstance(self.computed, str)
+
+    @property
+    def value(self) -> float:
+        """The computed number; NaN for words."""
+        return np.nan if isinstance(self.computed, str) else self.computed
+
+    @property
+    def word(self) -> str:
+        """The computed word; empty for numbers."""
+        return self.computed if isinstance(self.computed, str) else ""
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """Its texts in the order of ``HEADINGS``: a dash where there is no number to subtract.
+
+        The computed value has three digits more than the print, or as many as are needed.
+        """
+        differs, difference = abs(self.difference) > _NEGLIGIBLE, f"{self.difference:+.3g}"
+        if np.isnan(self.difference):
+            difference = "–"
+        elif not differs:
+            difference = "0"
+        computed = self.word or f"{self.computed:.7g}"
+        if difference != "–" and "pi" not in self.printed:
+            computed = f"{self.computed:.{len(self.printed.partition('.')[2]) + 3 * differs}f}"
+        symbol = _SYMBOLS.get(self.symbol, self.symbol)
+        return self.place, symbol, self.unit, self.printed, computed, difference, str(self.verdict)
 
 
 def number(printed: str) -> float:

@@ -13,7 +13,7 @@ from fastmech.ensembles.balance import EnergyBalance, energy_balance
 from fastmech.ensembles.integrate import integrate
 from fastmech.equilibria.find import Certificate, Equilibria, Equilibrium, find_equilibria
 from fastmech.mechanism.hamilton import momenta
-from fastmech.paper.printed import CASES, Printed
+from fastmech.paper.compare import CASES, Printed
 from fastmech.paper.scene import DISTURBANCE, PAPER_SCENE, START, STATIC_SCENE
 from fastmech.stability.classify import Classification, classify
 

@@ -9,8 +9,9 @@ import numpy as np
 from fastmech.mechanism.geometry import constraints, positions
 from fastmech.mechanism.lagrange import potential_energy, potential_gradient
 from fastmech.paper.compare import Row, Verdict
-from fastmech.paper.compute import Case, Computed
+from fastmech.paper.compute import Case, Computed, Floats
 from fastmech.paper.scene import PAPER_SCENE, STATIC_SCENE
+from fastmech.reports import columns
 from fastmech.results import Dataset, Variable
 
 TABLES = ("Table 1", "Table 2", "Table 3", "Table 4")
@@ -34,43 +35,30 @@ def all_datasets(computed: Computed, rows: Sequence[Row]) -> dict[str, Dataset]:
     }
     motion = computed.motion
     points = positions(PAPER_SCENE, motion.y)
-    figures = {
-        "figure_2": _over_time(computed, {"phi": ("rad", motion.y[:, 0]), "theta": ("rad", motion.y[:, 1])}),
-        "figure_3": _over_time(computed, {name: ("m", value) for name, value in points._asdict().items()}),
-        "figure_4": _over_time(
-            computed,
-            {
-                f"f_{i}": ("m" if i == 3 else "m2", residual)
-                for i, residual in enumerate(constraints(PAPER_SCENE, points), start=1)
-            },
-        ),
-        "figure_5": _over_time(
-            computed,
-            {"p_phi": ("kg m2/s", computed.momenta[:, 0]), "p_theta": ("kg m2/s", computed.momenta[:, 1])},
-        ),
-        "figure_6": _equilibria(computed.cases),
-    }
-    disturbed = {
-        name: _disturbed([computed.cases[number - 1] for number in numbers])
-        for name, numbers in DISTURBED.items()
-    }
-    balance = _over_time(
-        computed,
-        {
+    constrained = enumerate(constraints(PAPER_SCENE, points), start=1)
+    p_phi, p_theta = computed.momenta.T
+    over_time: dict[str, dict[str, tuple[str, Floats]]] = {
+        "figure_2": {"phi": ("rad", motion.y[:, 0]), "theta": ("rad", motion.y[:, 1])},
+        "figure_3": {name: ("m", value) for name, value in points._asdict().items()},
+        "figure_4": {f"f_{i}": ("m" if i == 3 else "m2", residual) for i, residual in constrained},
+        "figure_5": {"p_phi": ("kg m2/s", p_phi), "p_theta": ("kg m2/s", p_theta)},
+        "energy_balance": {
             "kinetic_energy": ("J", motion.kinetic),
             "potential_energy": ("J", motion.potential),
             "work_damper": ("J", motion.work_damper),
             "work_force": ("J", motion.work_force),
             "energy_residual": ("J", motion.residual),
         },
-    )
-    return {
-        **tables,
-        **figures,
-        **disturbed,
-        "energy_balance": balance,
-        "printed_numbers": rows_dataset(rows),
     }
+    moving = {name: _over_time(computed, values) for name, values in over_time.items()}
+    balance = moving.pop("energy_balance")
+    disturbed = {
+        name: _disturbed([computed.cases[number - 1] for number in numbers])
+        for name, numbers in DISTURBED.items()
+    }
+    resting = {"figure_6": _equilibria(computed.cases)}
+    last = {"energy_balance": balance, "printed_numbers": rows_dataset(rows)}
+    return tables | moving | resting | disturbed | last
 
 
 _LONG_NAMES = {
@@ -88,14 +76,13 @@ _LONG_NAMES = {
 }
 
 
-def _over_time(computed: Computed, values: dict[str, tuple[str, np.ndarray]]) -> Dataset:
-    along = ("time",)
-    return Dataset(
-        {
-            "time": Variable(along, computed.motion.t, "s", "time"),
-            **{name: Variable(along, v, unit, _LONG_NAMES[name]) for name, (unit, v) in values.items()},
-        }
-    )
+def _over_time(computed: Computed, values: dict[str, tuple[str, Floats]]) -> Dataset:
+    moving = {name: Variable(("time",), v, unit, _LONG_NAMES[name]) for name, (unit, v) in values.items()}
+    return Dataset({"time": Variable(("time",), computed.motion.t, "s", "time")} | moving)
+
+
+def _numbers(cases: Sequence[Case]) -> Variable:
+    return Variable(("case",), np.array([case.number for case in cases]), "1", "case of Table 2")
 
 
 def _equilibria(cases: Sequence[Case]) -> Dataset:
@@ -103,8 +90,10 @@ def _equilibria(cases: Sequence[Case]) -> Dataset:
     grid = np.stack(np.meshgrid(angles, angles, indexing="ij"), axis=-1)
     force = STATIC_SCENE.F0
     gradient = potential_gradient(STATIC_SCENE, grid, force)
-    rest = np.array([(case.equilibrium.phi, case.equilibrium.theta, 0.0, 0.0) for case in cases])
+    found = [case.equilibrium for case in cases]
+    rest = np.array([(e.phi, e.theta, 0.0, 0.0) for e in found])
     plane, along = ("phi", "theta"), ("case",)
+    points = positions(STATIC_SCENE, rest)._asdict().items()
     return Dataset(
         {
             "phi": Variable(("phi",), angles, "rad", "angle phi"),
@@ -112,69 +101,47 @@ def _equilibria(cases: Sequence[Case]) -> Dataset:
             "potential": Variable(plane, potential_energy(STATIC_SCENE, grid, force), "J", "U = Pi - F x2"),
             "condition_phi": Variable(plane, gradient[..., 0], "J", "dU/dphi, first of (20)"),
             "condition_theta": Variable(plane, gradient[..., 1], "J", "dU/dtheta, second of (20)"),
-            "case": Variable(along, np.array([case.number for case in cases]), "1", "case of Table 2"),
+            "case": _numbers(cases),
             "phi_st": Variable(along, rest[:, 0], "rad", "angle phi at rest"),
             "theta_st": Variable(along, rest[:, 1], "rad", "angle theta at rest"),
-            "energy": Variable(
-                along, np.array([case.equilibrium.energy for case in cases]), "J", "U at rest"
-            ),
-            "kind": Variable(
-                along, np.array([case.equilibrium.kind for case in cases]), "1", "kind of equilibrium"
-            ),
-            **{
-                name: Variable(along, value, "m", f"{_LONG_NAMES[name]} at rest")
-                for name, value in positions(STATIC_SCENE, rest)._asdict().items()
-            },
+            **columns("case", found, {"energy": ("J", "U at rest"), "kind": ("1", "kind of equilibrium")}),
+            **{name: Variable(along, x, "m", f"{_LONG_NAMES[name]} at rest") for name, x in points},
         }
     )
 
 
 def _disturbed(cases: Sequence[Case]) -> Dataset:
     along = ("case", "time")
-    variables = {
-        "case": Variable(("case",), np.array([case.number for case in cases]), "1", "case of Table 2"),
-        "time": Variable(("time",), cases[0].disturbed.t, "s", "time"),
-    }
+    variables = {"case": _numbers(cases), "time": Variable(("time",), cases[0].disturbed.t, "s", "time")}
     for which in ("nonlinear", "linearized"):
         for i, (name, (unit, long_name)) in enumerate(_DISTURBANCES.items()):
             data = np.stack([getattr(case.disturbed, which)[:, 0, i] for case in cases])
             variables[f"{name}_{which}"] = Variable(along, data, unit, f"{long_name}, {which} equations")
-        norm = np.stack([getattr(case, f"norm_{which}") for case in cases])
-        variables[f"norm_{which}"] = Variable(
-            along, norm, "rad", f"size of the disturbance, {which} equations"
-        )
-    roots = np.stack([case.classification.eigenvalues for case in cases])
+        norm, about = np.stack([getattr(case, f"norm_{which}") for case in cases]), "size of the disturbance"
+        variables[f"norm_{which}"] = Variable(along, norm, "rad", f"{about}, {which} equations")
+    roots, about = np.stack([case.classification.eigenvalues for case in cases]), "characteristic polynomial"
     for part, data in (("re", roots.real), ("im", roots.imag)):
-        variables[f"root_{part}"] = Variable(
-            ("case", "root"), data, "1/s", f"root of the characteristic polynomial, {part}"
-        )
+        variables[f"root_{part}"] = Variable(("case", "root"), data, "1/s", f"root of the {about}, {part}")
     return Dataset(variables)
+
+
+#: Columns of the printed numbers.
+_ROWS = {
+    "section": ("1", "where it is printed"),
+    "place": ("1", "case or part"),
+    "symbol": ("1", "symbol"),
+    "unit": ("1", "unit of the values"),
+    "printed": ("1", "as printed, * for lost characters"),
+    "word": ("1", "the computed word, for words"),
+    "verdict": ("1", "what the comparison came to"),
+    "see": ("1", "key of the misprint that explains it"),
+    "value": ("1", "value in its unit, NaN for words"),
+    "difference": ("1", "computed less printed in that unit"),
+}
+_ROW_NAMES = {"word": "computed_text", "value": "computed"}
 
 
 def rows_dataset(rows: Sequence[Row]) -> Dataset:
     """Rows of printed against computed values."""
-    along = ("row",)
-    texts = {
-        "section": ("where it is printed", [row.section for row in rows]),
-        "place": ("case or part", [row.place for row in rows]),
-        "symbol": ("symbol", [row.symbol for row in rows]),
-        "unit": ("unit of the values", [row.unit for row in rows]),
-        "printed": ("as printed, * for lost characters", [row.printed for row in rows]),
-        "computed_text": ("the computed word, for words", [_word(row) for row in rows]),
-        "verdict": ("what the comparison came to", [str(row.verdict) for row in rows]),
-        "see": ("key of the misprint that explains it", [row.see for row in rows]),
-    }
-    numbers = [row.computed if not isinstance(row.computed, str) else np.nan for row in rows]
-    differences = [np.nan if row.difference is None else row.difference for row in rows]
-    return Dataset(
-        {
-            **{name: Variable(along, np.array(data), "1", about) for name, (about, data) in texts.items()},
-            "computed": Variable(along, np.array(numbers), "1", "value in its unit, NaN for words"),
-            "difference": Variable(along, np.array(differences), "1", "computed less printed in that unit"),
-        },
-        {"disagreeing": sum(row.verdict == Verdict.DIFFERS for row in rows)},
-    )
-
-
-def _word(row: Row) -> str:
-    return row.computed if isinstance(row.computed, str) else ""
+    found = {_ROW_NAMES.get(name, name): column for name, column in columns("row", rows, _ROWS).items()}
+    return Dataset(found, {"disagreeing": sum(row.verdict == Verdict.DIFFERS for row in rows)})

@@ -9,7 +9,7 @@ import numpy as np
 
 from fastmech.paper.compute import Case
 from fastmech.paper.scene import STATIC_SCENE
-from fastmech.plots.mechanism import draw_mechanism, legend_handles
+from fastmech.plots.mechanism import draw_mechanism, drawing_of, legend_handles
 from fastmech.plots.style import PALETTE, new_figure, style
 from fastmech.results import Dataset
 
@@ -23,7 +23,12 @@ KINDS = {
     "saddle": ("X", "saddle, unstable"),
     "maximum": ("^", "maximum, unstable"),
 }
-PHI_CURVE, THETA_CURVE = "black", PALETTE["vermillion"]
+
+#: Curves on which a condition (20) holds: variable, angle, place, colour, dashes.
+CURVES = (
+    ("condition_phi", r"\varphi", "first", "black", "-"),
+    ("condition_theta", r"\theta", "second", PALETTE["vermillion"], "--"),
+)
 
 
 def draw_potential(data: Dataset) -> Figure:
@@ -38,31 +43,13 @@ def draw_potential(data: Dataset) -> Figure:
         phi, theta = data["phi"].data, data["theta"].data
         filled = axes.contourf(phi, theta, data["potential"].data.T, levels=24)
         figure.colorbar(filled, ax=axes, label="U = Π − F x₂ [J]", shrink=0.9, ticks=MaxNLocator(8))
-        halo: list[patheffects.AbstractPathEffect] = [
-            patheffects.withStroke(linewidth=4.5, foreground="white")
-        ]
-        curves = (("condition_phi", PHI_CURVE, "-"), ("condition_theta", THETA_CURVE, "--"))
-        for name, colour, dashes in curves:
-            axes.contour(
-                phi,
-                theta,
-                data[name].data.T,
-                levels=[0.0],
-                colors=[colour],
-                linestyles=dashes,
-                linewidths=2.2,
-            ).set_path_effects(halo)
-        handles = [
-            Line2D([], [], color=PHI_CURVE, lw=2.2, label=r"$\partial U/\partial\varphi = 0$, first of (20)"),
-            Line2D(
-                [],
-                [],
-                color=THETA_CURVE,
-                ls="--",
-                lw=2.2,
-                label=r"$\partial U/\partial\theta = 0$, second of (20)",
-            ),
-        ]
+        halo: Any = [patheffects.withStroke(linewidth=4.5, foreground="white")]
+        handles = []
+        for name, angle, place, colour, dashes in CURVES:
+            line = axes.contour(phi, theta, data[name].data.T, levels=[0.0], colors=[colour])
+            line.set(linestyles=dashes, linewidths=2.2, path_effects=halo)
+            label = rf"$\partial U/\partial{angle} = 0$, {place} of (20)"
+            handles.append(Line2D([], [], color=colour, ls=dashes, lw=2.2, label=label))
         handles += _mark_equilibria(axes, data)
         _angle_axes(axes)
         axes.set_title("Fig. 6 (a)  Static equilibria: where both curves cross (F = 100 N)")
@@ -81,15 +68,8 @@ def _mark_equilibria(axes: Axes, data: Dataset) -> list[Any]:
     for number, phi, theta, kind in places:
         axes.plot(phi, theta, KINDS[kind][0], zorder=5, **look)
         offset = (0, 14) if theta < 0.7 * np.pi else (0, -22)
-        axes.annotate(
-            f"Case {number}",
-            (phi, theta),
-            offset,
-            textcoords="offset points",
-            ha="center",
-            zorder=6,
-            bbox=box,
-        )
+        text: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "zorder": 6, "bbox": box}
+        axes.annotate(f"Case {number}", (phi, theta), offset, **text)
     present = [kind for kind in KINDS if kind in set(data["kind"].data)]
     return [Line2D([], [], marker=KINDS[kind][0], label=KINDS[kind][1], **look) for kind in present]
 
@@ -108,9 +88,10 @@ def draw_positions(cases: Sequence[Case]) -> Figure:
     with style():
         figure = new_figure(9.6, 9.2)
         grid = figure.subplots(2, 2, sharex=True, sharey=True)
-        for axes, case in zip(grid.flat, cases, strict=True):
-            e = case.equilibrium
-            draw_mechanism(axes, STATIC_SCENE, e.phi, e.theta, STATIC_SCENE.F0)
+        rests = [case.equilibrium for case in cases]
+        drawn = drawing_of(STATIC_SCENE, [e.position for e in rests], STATIC_SCENE.F0)
+        for k, (axes, case, e) in enumerate(zip(grid.flat, cases, rests, strict=True)):
+            draw_mechanism(axes, drawn, k)
             colour = PALETTE["blue"] if case.verdict == "stable" else PALETTE["vermillion"]
             axes.set_title(
                 f"Case {case.number}: {case.verdict} ({e.kind})\n"
@@ -121,7 +102,11 @@ def draw_positions(cases: Sequence[Case]) -> Figure:
         figure.suptitle(
             "Fig. 6 (b)  The mechanism at its static equilibria, to scale; areas of the masses in proportion"
         )
-        figure.legend(handles=legend_handles(STATIC_SCENE.F0), loc="outside lower center", ncols=4)
+        figure.legend(
+            handles=legend_handles(drawn, f"force on $M_2$, {STATIC_SCENE.F0:g} N"),
+            loc="outside lower center",
+            ncols=4,
+        )
     return figure
 
 

@@ -12,69 +12,57 @@ if TYPE_CHECKING:
 
 TIME = "time t [s]"
 
+_POINTS = {1: "point $M_1$", 2: "point $M_2$", 3: "slider $M_3$"}
 
-def draw_angles(data: Dataset) -> Figure:
-    """Figure 2: phi and theta."""
-    return _two_lines(
-        data,
-        {"phi": r"$\varphi$", "theta": r"$\theta$"},
-        "angle [rad]",
+#: Title of a figure, and its panels: label of the ordinate, names of what is drawn.
+PANELS: dict[str, tuple[str, dict[str, dict[str, str]]]] = {
+    "figure_2": (
         "Fig. 2  Generalized coordinates, force decaying as F₀ exp(−αt)",
-    )
-
-
-def draw_momenta(data: Dataset) -> Figure:
-    """Figure 5: generalized momenta from the canonical equations."""
-    return _two_lines(
-        data,
-        {"p_phi": r"$p_\varphi$", "p_theta": r"$p_\theta$"},
-        "generalized momentum [kg m²/s]",
+        {"angle [rad]": {"phi": r"$\varphi$", "theta": r"$\theta$"}},
+    ),
+    "figure_3": (
+        "Fig. 3  Coordinates of the points; the slider stays on its guide, y₃ = 0",
+        {f"{axis} [m]": {f"{axis}{i}": name for i, name in _POINTS.items()} for axis in "xy"},
+    ),
+    "figure_5": (
         "Fig. 5  Generalized momenta, from Hamilton's equations",
-    )
+        {"generalized momentum [kg m²/s]": {"p_phi": r"$p_\varphi$", "p_theta": r"$p_\theta$"}},
+    ),
+}
+
+#: The constraints of Figure 4.
+CONSTRAINTS = {
+    "f_1": "(2)  $x_1^2 + y_1^2 - l^2$",
+    "f_2": "(3)  $(x_2-x_1)^2 + (y_2-y_1)^2 - l^2$",
+    "f_3": "(4)  $y_3$",
+    "f_4": "(5)  $(x_3-x_1)^2 + (y_3-y_1)^2 - 4l^2$",
+}
 
 
-def _two_lines(data: Dataset, labels: dict[str, str], ylabel: str, title: str) -> Figure:
+def draw_over_time(name: str, data: Dataset) -> Figure:
+    """Figures 2, 3 and 5."""
+    title, panels = PANELS[name]
     with style():
-        figure = new_figure()
-        axes = figure.subplots()
-        for name, label in labels.items():
-            axes.plot(data["time"].data, data[name].data, label=label)
-        axes.axhline(0.0, color="0.4", lw=0.8)
-        axes.set(xlabel=TIME, ylabel=ylabel, title=title)
-        axes.margins(x=0)
-        legend_below(figure, axes, 2)
-    return figure
-
-
-def draw_coordinates(data: Dataset) -> Figure:
-    """Figure 3: coordinates of the three points."""
-    with style():
-        figure = new_figure(7.2, 5.6)
-        both = figure.subplots(2, 1, sharex=True)
-        for axes, axis in zip(both, "xy", strict=True):
-            for i, dashes in ((1, "-"), (2, "-"), (3, "--")):
-                label = f"point $M_{i}$" if i < 3 else "slider $M_3$"
-                axes.plot(data["time"].data, data[f"{axis}{i}"].data, dashes, label=label)
-            axes.set_ylabel(f"{axis} [m]")
+        figure = new_figure(7.2, 2.8 + 1.4 * len(panels))
+        rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+        for axes, (label, lines) in zip(rows, panels.items(), strict=True):
+            for dashes, (line, about) in zip(("-", "-", "--"), lines.items(), strict=False):
+                axes.plot(data["time"].data, data[line].data, dashes, label=about)
+            axes.axhline(0.0, color="0.4", lw=0.8, zorder=1.5)
+            axes.set_ylabel(label)
             axes.margins(x=0)
-        both[0].set_title("Fig. 3  Coordinates of the points; the slider stays on its guide, y₃ = 0")
-        both[1].set_xlabel(TIME)
-        legend_below(figure, both[0], 3)
+        rows[0].set_title(title)
+        rows[-1].set_xlabel(TIME)
+        legend_below(figure, rows[0], len(lines))
     return figure
 
 
 def draw_constraints(data: Dataset) -> Figure:
     """Figure 4: residuals of the constraints (2)-(5)."""
-    labels = {
-        "f_1": "(2)  $x_1^2 + y_1^2 - l^2$",
-        "f_2": "(3)  $(x_2-x_1)^2 + (y_2-y_1)^2 - l^2$",
-        "f_3": "(4)  $y_3$",
-        "f_4": "(5)  $(x_3-x_1)^2 + (y_3-y_1)^2 - 4l^2$",
-    }
     with style():
         figure = new_figure(7.2, 6.4)
         rows = figure.subplots(4, 1, sharex=True, sharey=True)
-        for axes, (name, label), colour in zip(rows, labels.items(), LINES, strict=False):
+        for axes, (name, label), colour in zip(rows, CONSTRAINTS.items(), LINES, strict=False):
             axes.plot(data["time"].data, data[name].data / 1e-15, color=colour, lw=0.7)
             unit = data[name].units.replace("m2", "m²")
             axes.set_title(f"{label}", loc="left", fontsize=10)

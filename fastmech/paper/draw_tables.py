@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from fastmech.paper.compare import Row, Verdict
-from fastmech.paper.wording import HEADINGS, cells
+from fastmech.paper.compare import HEADINGS, Row, Verdict
 from fastmech.plots.style import new_figure, style
 
 if TYPE_CHECKING:
@@ -16,7 +15,7 @@ ROW_HEIGHT = 0.27  #: inch
 
 #: Widths of the columns: place, symbol, unit, printed, computed, difference, verdict.
 WIDTHS = (0.10, 0.12, 0.10, 0.13, 0.16, 0.12, 0.27)
-HEADING, PLAIN, MISPRINT, WRONG = "#e6e6e6", "#ffffff", "#fbe3cf", "#f4b6a6"
+HEADING, SHADES = "#e6e6e6", {Verdict.MISPRINT: "#fbe3cf", Verdict.DIFFERS: "#f4b6a6"}
 
 
 def draw_table(title: str, rows: Sequence[Row]) -> Figure:
@@ -28,9 +27,9 @@ def draw_table(title: str, rows: Sequence[Row]) -> Figure:
         axes = figure.subplots()
         axes.axis("off")
         axes.set_title(title, loc="left")
-        shades = [[_shade(row)] * len(WIDTHS) for row in rows]
+        shades = [[SHADES.get(row.verdict, "#ffffff")] * len(WIDTHS) for row in rows]
         table = axes.table(
-            cellText=[list(cells(row)) for row in rows],
+            cellText=[list(row.cells) for row in rows],
             cellColours=shades,
             colLabels=HEADINGS,
             colColours=[HEADING] * len(WIDTHS),
@@ -46,9 +45,3 @@ def draw_table(title: str, rows: Sequence[Row]) -> Figure:
             if 3 <= column <= 5:
                 cell.set_text_props(ha="right")
     return figure
-
-
-def _shade(row: Row) -> str:
-    if row.verdict == Verdict.DIFFERS:
-        return WRONG
-    return MISPRINT if row.verdict == Verdict.MISPRINT else PLAIN

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -19,23 +19,24 @@ from fastmech.mechanism.lagrange import (
     potential_gradient,
 )
 from fastmech.paper.coefficients import Floats
-from fastmech.paper.printed import evaluate
+from fastmech.paper.compare import evaluate
 from fastmech.paper.scene import PAPER_SCENE, START
 
-Formula = Mapping[str, str]
-#: measure, unit, value for the print, value for the correction, tolerance
-Measured = tuple[str, str, float, float, float]
-
-ANGLES, DEVIATION_TIME = 256, 1.0
+#: Angles over a turn, and time [s] of the deviation.
+ANGLES, FIRST = 256, 1.0
 
 
-def formula_evidence(key: str, formula: Formula, motion: EnergyBalance) -> list[Measured]:
-    """What is measured about the formula of this key of ``printed.toml``."""
-    return _MEASURES[key](formula, motion)
+class Measure(NamedTuple):
+    """How wrong an expression is, along the paper's motion."""
+
+    about: str
+    unit: str
+    tolerance: float  #: what rounding explains
+    of: Callable[[str, EnergyBalance], float]
 
 
-def _pair(measure: Callable[[str], float], formula: Formula) -> tuple[float, float]:
-    return measure(formula["printed"]), measure(formula["corrected"])
+def _largest(values: Floats) -> float:
+    return float(np.max(np.abs(values)))
 
 
 def _names(y: Floats, scale: float = 1.0) -> dict[str, Any]:
@@ -47,115 +48,52 @@ def _names(y: Floats, scale: float = 1.0) -> dict[str, Any]:
     return {**scene, **points, **angles}
 
 
-def _length(formula: Formula, motion: EnergyBalance) -> list[Measured]:
-    names = _names(motion.y)
-
-    def residual(expression: str) -> float:
-        return float(np.max(np.abs(evaluate(expression, **names))))
-
-    return [
-        (
-            "largest residual along the motion, which is zero for a rod of length l",
-            "m",
-            *_pair(residual, formula),
-            1e-12,
-        )
-    ]
+def _residual(expression: str, motion: EnergyBalance) -> float:
+    return _largest(evaluate(expression, **_names(motion.y)))
 
 
-def _constraint(formula: Formula, motion: EnergyBalance) -> list[Measured]:
-    names = _names(motion.y)
-
-    def residual(expression: str) -> float:
-        return float(np.max(np.abs(evaluate(expression, **names))))
-
-    return [("largest residual of the constraint along the motion", "m²", *_pair(residual, formula), 1e-12)]
-
-
-def _kinetic(formula: Formula, motion: EnergyBalance) -> list[Measured]:
-    v = velocities(PAPER_SCENE, motion.y)
-    scene = PAPER_SCENE
+def _kinetic(expression: str, motion: EnergyBalance) -> float:
+    scene, v = PAPER_SCENE, velocities(PAPER_SCENE, motion.y)
     true = 0.5 * (scene.m1 * (v.x1**2 + v.y1**2) + scene.m2 * (v.x2**2 + v.y2**2) + scene.m3 * v.x3**2)
-    names = _names(motion.y)
-
-    def error(expression: str) -> float:
-        return float(np.max(np.abs(evaluate(expression, **names) - true)))
-
-    return [
-        ("largest difference from the kinetic energy (8) along the motion", "J", *_pair(error, formula), 1e-9)
-    ]
+    return _largest(evaluate(expression, **_names(motion.y)) - true)
 
 
-def _potential(formula: Formula, motion: EnergyBalance) -> list[Measured]:
-    works = motion.work_damper + motion.work_force
-
-    def imbalance(expression: str) -> float:
-        energy = motion.kinetic + evaluate(expression, **_names(motion.y))
-        return float(np.max(np.abs(energy - energy[0] - works)))
-
-    def change_of_units(expression: str) -> float:
-        metres = evaluate(expression, **_names(motion.y))
-        centimetres = evaluate(expression, **_names(motion.y, 100.0)) / 100.0**2
-        return float(np.max(np.abs(centimetres - metres)))
-
-    return [
-        ("largest violation of the energy balance along the motion", "J", *_pair(imbalance, formula), 1e-6),
-        (
-            "change of the energy if lengths are given in cm instead of m",
-            "J",
-            *_pair(change_of_units, formula),
-            1e-9,
-        ),
-    ]
+def _imbalance(expression: str, motion: EnergyBalance) -> float:
+    energy = motion.kinetic + evaluate(expression, **_names(motion.y))
+    return _largest(energy - energy[0] - (motion.work_damper + motion.work_force))
 
 
-def _christoffel(formula: Formula, motion: EnergyBalance) -> list[Measured]:
+def _change_of_units(expression: str, motion: EnergyBalance) -> float:
+    metres, centimetres = (evaluate(expression, **_names(motion.y, scale)) for scale in (1.0, 100.0))
+    return _largest(centimetres / 100.0**2 - metres)
+
+
+def _christoffel(expression: str, motion: EnergyBalance) -> float:
     phi = 2.0 * np.pi * np.arange(ANGLES) / ANGLES
     a11 = metric(PAPER_SCENE, np.stack([phi, np.zeros(ANGLES)], axis=-1))[:, 0, 0]
     # a11 is analytic and periodic: its Fourier series differentiates it to rounding.
     waves = np.fft.rfft(a11) * 1j * np.arange(ANGLES // 2 + 1)
-    true = 0.5 * np.fft.irfft(waves, ANGLES)
-    names = {**PAPER_SCENE.model_dump(), "phi": phi}
-
-    def error(expression: str) -> float:
-        return float(np.max(np.abs(evaluate(expression, **names) - true)))
-
-    return [("largest difference from (1/2) d a11/d phi over a turn", "kg m²", *_pair(error, formula), 1e-9)]
+    return _largest(
+        evaluate(expression, **PAPER_SCENE.model_dump(), phi=phi) - 0.5 * np.fft.irfft(waves, ANGLES)
+    )
 
 
-def _canonical(formula: Formula, motion: EnergyBalance) -> list[Measured]:
+def _canonical(expression: str, motion: EnergyBalance) -> float:
     q, p = motion.y[:, :2], momenta(PAPER_SCENE, motion.y)
-    true = _momentum_rates(motion.y, motion.t)
+    return _largest(_evaluated_rates(expression, q, p, motion.t) - _momentum_rates(motion.y, motion.t))
 
-    def residual(expression: str) -> float:
-        return float(np.max(np.abs(_evaluated_rates(expression, q, p, motion.t) - true)))
 
-    inside = motion.t[motion.t <= DEVIATION_TIME]
+def _deviation(expression: str, motion: EnergyBalance) -> float:
+    inside = motion.t[motion.t <= FIRST]
 
-    def deviation(expression: str) -> float:
-        def rhs(t: float, state: Floats) -> Floats:
-            now, momentum = state[None, :2], state[None, 2:]
-            slope = _evaluated_rates(expression, now, momentum, np.array([t]))
-            return np.concatenate([rates(PAPER_SCENE, now, momentum)[0], slope[0]])
+    def rhs(t: float, state: Floats) -> Floats:
+        now, momentum = state[None, :2], state[None, 2:]
+        slope = _evaluated_rates(expression, now, momentum, np.array([t]))
+        return np.concatenate([rates(PAPER_SCENE, now, momentum)[0], slope[0]])
 
-        start = np.concatenate([START[:2], momenta(PAPER_SCENE, START)])
-        run = solve_ivp(rhs, (0.0, inside[-1]), start, "DOP853", inside, rtol=1e-9, atol=1e-9)
-        return float(np.max(np.abs(run.y[:2].T - motion.y[: inside.size, :2])))
-
-    return [
-        (
-            "largest difference from the rate of the momenta along the motion",
-            "N m",
-            *_pair(residual, formula),
-            1e-6,
-        ),
-        (
-            f"largest deviation of the angles in the first {DEVIATION_TIME:g} s",
-            "rad",
-            *_pair(deviation, formula),
-            1e-6,
-        ),
-    ]
+    start = np.concatenate([START[:2], momenta(PAPER_SCENE, START)])
+    run = solve_ivp(rhs, (0.0, inside[-1]), start, "DOP853", inside, rtol=1e-9, atol=1e-9)
+    return _largest(run.y[:2].T - motion.y[: inside.size, :2])
 
 
 def _momentum_rates(y: Floats, t: Floats) -> Floats:
@@ -190,11 +128,26 @@ def _gradient_of_hamiltonian(q: Floats, p: Floats) -> Floats:
     return gradient
 
 
-_MEASURES: dict[str, Callable[[Formula, EnergyBalance], list[Measured]]] = {
-    "text_rod": _length,
-    "equation_2": _constraint,
-    "equation_9": _kinetic,
-    "equation_10": _potential,
-    "equation_12": _christoffel,
-    "equation_14": _canonical,
+#: What is measured about the formula of a key of ``printed.toml``.
+MEASURES = {
+    "text_rod": [
+        Measure(
+            "largest residual along the motion, which is zero for a rod of length l", "m", 1e-12, _residual
+        ),
+    ],
+    "equation_2": [Measure("largest residual of the constraint along the motion", "m²", 1e-12, _residual)],
+    "equation_9": [
+        Measure("largest difference from the kinetic energy (8) along the motion", "J", 1e-9, _kinetic),
+    ],
+    "equation_10": [
+        Measure("largest violation of the energy balance along the motion", "J", 1e-6, _imbalance),
+        Measure("change of the energy if lengths are given in cm instead of m", "J", 1e-9, _change_of_units),
+    ],
+    "equation_12": [
+        Measure("largest difference from (1/2) d a11/d phi over a turn", "kg m²", 1e-9, _christoffel),
+    ],
+    "equation_14": [
+        Measure("largest difference from the rate of the momenta along the motion", "N m", 1e-6, _canonical),
+        Measure(f"largest deviation of the angles in the first {FIRST:g} s", "rad", 1e-6, _deviation),
+    ],
 }

@@ -6,19 +6,18 @@ tolerance while the corrected one stays below it. With a right print the same co
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from fastmech.paper.coefficients import Floats, Terms, hamiltonian_16, printed_kinetic
+from fastmech.paper.compare import CASES, Printed, agrees_legibly, half_unit
 from fastmech.paper.compute import Case, Computed
-from fastmech.paper.formulas import formula_evidence
-from fastmech.paper.printed import CASES, Printed, agrees_legibly, half_unit
+from fastmech.paper.formulas import MEASURES
 from fastmech.paper.scene import PAPER_SCENE
 
 
-@dataclass(frozen=True)
-class Evidence:
+class Evidence(NamedTuple):
     """One measure of how wrong a print is, and the correction."""
 
     measure: str
@@ -33,8 +32,7 @@ class Evidence:
         return self.printed > self.tolerance >= self.corrected
 
 
-@dataclass(frozen=True)
-class Misprint:
+class Misprint(NamedTuple):
     """A candidate for a misprint with its evidence."""
 
     key: str
@@ -52,17 +50,14 @@ class Misprint:
 
 def candidates(printed: Printed, computed: Computed) -> list[Misprint]:
     """Every place of the paper that was found suspect, in the paper's order, with evidence computed now."""
-    formulas = [
-        Misprint(
-            key=key,
-            place=formula["place"],
-            error=formula["error"],
-            printed=formula["printed"],
-            corrected=formula["corrected"],
-            evidence=tuple(Evidence(*item) for item in formula_evidence(key, formula, computed.motion)),
-        )
-        for key, formula in printed["formula"].items()
-    ]
+    formulas = []
+    for key, formula in printed["formula"].items():
+        wrong, right = formula["printed"], formula["corrected"]
+        evidence = [
+            Evidence(about, unit, of(wrong, computed.motion), of(right, computed.motion), tolerance)
+            for about, unit, tolerance, of in MEASURES[key]
+        ]
+        formulas.append(Misprint(key, formula["place"], formula["error"], wrong, right, tuple(evidence)))
     return [
         *formulas,
         _bracket_16(printed, computed),
@@ -99,14 +94,9 @@ def _bracket_16(printed: Printed, computed: Computed) -> Misprint:
         kinetic_error(True),
         0.02,
     )
-    return Misprint(
-        key="equation_16_bracket",
-        place="Equation (16), denominator",
-        error="the bracket that `sin(phi)**2` multiplies is closed too early",
-        printed=_denominator(equation, False),
-        corrected=_denominator(equation, True),
-        evidence=(fitted, along),
-    )
+    error = "the bracket that `sin(phi)**2` multiplies is closed too early"
+    both = _denominator(equation, False), _denominator(equation, True)
+    return Misprint("equation_16_bracket", "Equation (16), denominator", error, *both, (fitted, along))
 
 
 def _denominator(equation: Printed, corrected: bool) -> str:
@@ -114,16 +104,12 @@ def _denominator(equation: Printed, corrected: bool) -> str:
     inside, after = list(shape["inside"]), list(shape["after"])
     if corrected:
         inside, after = inside + after, []
-    text = f"{_sum(shape['outside'])} + sin(phi)**2*({_sum(inside)})"
-    return _signs(f"{text} + {_sum(after)}") if after else _signs(text)
+    text = f"{_sum(shape['outside'])} + sin(phi)**2*({_sum(inside)})" + " + " * bool(after) + _sum(after)
+    return text.replace("+ -", "- ").replace("+ 1*", "+ ")
 
 
 def _sum(terms: Terms) -> str:
     return " + ".join(f"{term['value']}*{term['factor']}".removesuffix("*1") for term in terms)
-
-
-def _signs(text: str) -> str:
-    return text.replace("+ -", "- ").replace("+ 1*", "+ ")
 
 
 def _coefficient_16(printed: Printed) -> Misprint:
@@ -153,29 +139,18 @@ def _wrong_digits(key: str, place: str, error: str, value: str, exact: float) ->
     return Misprint(key, place, error, value, right, (evidence,))
 
 
-def _hessian_distance(printed: Printed, name: str, case: Case) -> float:
-    matrix = np.array(printed["table_3"][name]["hessian"], dtype=np.float64)
-    return float(np.max(np.abs(matrix - case.equilibrium.hessian)))
-
-
 def _copied_hessian(printed: Printed, cases: tuple[Case, ...]) -> Misprint:
     entries = printed["table_3"]["case_1"]["hessian"]
-    true = cases[0].equilibrium.hessian
+    matrix, true = np.array(entries, dtype=np.float64), cases[0].equilibrium.hessian
     evidence = Evidence(
         "largest difference of the printed matrix from the Hessian at Case 1 (as printed) and at Case 3",
         "J",
-        _hessian_distance(printed, "case_1", cases[0]),
-        _hessian_distance(printed, "case_1", cases[2]),
+        float(np.abs(matrix - true).max()),
+        float(np.abs(matrix - cases[2].equilibrium.hessian).max()),
         half_unit(entries[0][0]) * (1.0 + 1e-9),
     )
-    return Misprint(
-        key="table_3_case_1",
-        place="Table 3, Case 1",
-        error="the matrix is a copy of Case 3",
-        printed=_matrix(entries),
-        corrected=_matrix([[f"{value:.3f}" for value in row] for row in true]),
-        evidence=(evidence,),
-    )
+    both = _matrix(entries), _matrix([[f"{value:.3f}" for value in row] for row in true])
+    return Misprint("table_3_case_1", "Table 3, Case 1", "the matrix is a copy of Case 3", *both, (evidence,))
 
 
 def _matrix(rows: list[list[str]]) -> str:
@@ -186,14 +161,12 @@ def _elements_case_4(printed: Printed, case: Case) -> list[Misprint]:
     entries = printed["table_3"]["case_4"]["hessian"]
     hessian = case.equilibrium.hessian
     upper = f"the matrix is symmetric, and the equal element is printed as {entries[1][0]}"
-    lower = "the last digits are wrong"
+    places = (("c12", upper, 0, 1), ("c22", "the last digits are wrong", 1, 1))
     return [
         _wrong_digits(
-            "table_3_case_4_c12", "Table 3, Case 4, c12", upper, entries[0][1], float(hessian[0, 1])
-        ),
-        _wrong_digits(
-            "table_3_case_4_c22", "Table 3, Case 4, c22", lower, entries[1][1], float(hessian[1, 1])
-        ),
+            f"table_3_case_4_{c}", f"Table 3, Case 4, {c}", error, entries[i][j], float(hessian[i, j])
+        )
+        for c, error, i, j in places
     ]
 
 
@@ -206,14 +179,8 @@ def _sign_of_polynomials(printed: Printed) -> Misprint:
         max(abs(-value - 1.0) for value in leading),
         0.0,
     )
-    return Misprint(
-        key="table_4_sign",
-        place="Table 4",
-        error="the polynomials are printed with the opposite sign (their roots are the same)",
-        printed="... - lambda**4",
-        corrected="... + lambda**4",
-        evidence=(evidence,),
-    )
+    error = "the polynomials are printed with the opposite sign (their roots are the same)"
+    return Misprint("table_4_sign", "Table 4", error, "... - lambda**4", "... + lambda**4", (evidence,))
 
 
 def _copied_polynomial(printed: Printed, cases: tuple[Case, ...]) -> Misprint:
@@ -230,15 +197,9 @@ def _copied_polynomial(printed: Printed, cases: tuple[Case, ...]) -> Misprint:
         contradictions(cases[2]),
         0.0,
     )
-    right = printed_polynomial(patterns, cases[0])
-    return Misprint(
-        key="table_4_case_1",
-        place="Table 4, Case 1",
-        error="a copy of Case 3, from which follows the remark that both cases have the same graphs",
-        printed=", ".join(patterns),
-        corrected=", ".join(f"{value:.6g}" for value in right),
-        evidence=(evidence,),
-    )
+    error = "a copy of Case 3, from which follows the remark that both cases have the same graphs"
+    right = ", ".join(f"{value:.6g}" for value in printed_polynomial(patterns, cases[0]))
+    return Misprint("table_4_case_1", "Table 4, Case 1", error, ", ".join(patterns), right, (evidence,))
 
 
 def printed_polynomial(patterns: list[str], case: Case) -> Floats:

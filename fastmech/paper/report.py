@@ -3,30 +3,26 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError
 from fastmech.paper.checks import Check, all_checks, parameters_used
-from fastmech.paper.compare import Row
+from fastmech.paper.compare import Row, load_printed
 from fastmech.paper.compute import METHOD, STEP, compute
 from fastmech.paper.datasets import all_datasets
 from fastmech.paper.figures import figure_pictures, table_pictures
 from fastmech.paper.html import to_html
 from fastmech.paper.misprints import Misprint, candidates
-from fastmech.paper.printed import load_printed
 from fastmech.paper.rows import all_rows
 from fastmech.paper.scene import PAPER_SCENE
 from fastmech.paper.text import TITLE, report_text
 from fastmech.plots.style import png
+from fastmech.reports import Stage, no_stage
 from fastmech.results import scene_parameters
 from fastmech.store.provenance import provenance
 from fastmech.store.write import check_writable, write_results
-
-#: ``progress(done, total)``: pieces of work finished.
-Progress = Callable[[int, int], None]
 
 DATA = "paper.h5"
 
@@ -52,7 +48,7 @@ class PaperReport:
         return explained and all(check.passed for check in self.checks)
 
 
-def write_paper(out: Path, *, threads: int | None = None, progress: Progress | None = None) -> PaperReport:
+def write_paper(out: Path, *, threads: int | None = None, stage: Stage = no_stage) -> PaperReport:
     """Compute the paper's tables and figures and set them against what it prints.
 
     Writes into the folder ``out`` (made if missing, files of an earlier report replaced): ``report.html``
@@ -62,14 +58,13 @@ def write_paper(out: Path, *, threads: int | None = None, progress: Progress | N
     Args:
         out: folder of the report.
         threads: threads to use, all processors by default.
-        progress: is told how many pieces of work are finished, of how many.
+        stage: makes a bar; it is told of every picture.
 
     Raises:
         InputError: the folder cannot be written.
     """
     began = time.perf_counter()
     check_writable(out / DATA, replace=True)
-    tell = progress or (lambda done, total: None)
     printed = load_printed()
     computed = compute(printed, threads=threads)
     suspects = candidates(printed, computed)
@@ -78,36 +73,26 @@ def write_paper(out: Path, *, threads: int | None = None, progress: Progress | N
     checks = all_checks(computed)
     datasets = all_datasets(computed, rows)
     tables, figures = table_pictures(rows), figure_pictures(computed, datasets)
-    total = len(tables) + len(figures) + 1
-    tell(1, total)
-
+    advance = stage("tables and figures", len(tables) + len(figures))
     pictures: dict[str, bytes] = {}
-    for done, picture in enumerate([*tables, *figures], start=2):
+    for picture in (*tables, *figures):
         pictures[f"{picture.name}.png"] = png(picture.draw())
-        tell(done, total)
+        advance(1)
     markdown = report_text(computed, rows, suspects, checks, parameters_used(printed), figures)
-    files: Sequence[tuple[str, bytes]] = [
-        ("report.html", to_html(markdown, TITLE, pictures).encode()),
-        ("report.md", markdown.encode()),
-        *pictures.items(),
-    ]
+    files = {"report.html": to_html(markdown, TITLE, pictures).encode(), "report.md": markdown.encode()}
+    files |= pictures
     try:
-        for name, content in files:
+        for name, content in files.items():
             (out / name).write_bytes(content)
     except OSError as error:
         raise InputError(f"{out}: cannot be written: {error.strerror}") from None
+    attrs = {"title": TITLE, "method": METHOD, "dt": STEP, "wall_time_s": time.perf_counter() - began}
     write_results(
         out / DATA,
         scene_parameters=scene_parameters(PAPER_SCENE),
         sections=datasets,
-        attrs={
-            **provenance(thread_count(threads)),
-            "title": TITLE,
-            "method": METHOD,
-            "dt": STEP,
-            "wall_time_s": time.perf_counter() - began,
-        },
+        attrs=provenance(thread_count(threads)) | attrs,
         replace=True,
     )
-    paths = tuple(out / name for name in [name for name, _ in files] + [DATA])
+    paths = tuple(out / name for name in (*files, DATA))
     return PaperReport(paths, tuple(rows), misprints, tuple(checks))

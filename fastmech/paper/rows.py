@@ -8,10 +8,9 @@ import numpy as np
 
 from fastmech.mechanism.geometry import Points, constraints, positions
 from fastmech.paper.coefficients import Floats, Terms, equilibrium_20, hamiltonian_16
-from fastmech.paper.compare import Judge, Row, Verdict
+from fastmech.paper.compare import CASES, Judge, Printed, Row, Verdict
 from fastmech.paper.compute import Case, Computed
 from fastmech.paper.misprints import printed_polynomial
-from fastmech.paper.printed import CASES, Printed
 from fastmech.paper.scene import DISTURBANCE, PAPER_SCENE, START, STATIC_SCENE
 
 
@@ -38,11 +37,7 @@ def _table_1(judge: Judge, printed: Printed) -> Iterator[Row]:
         if symbol in values:
             row = judge.row("Table 1", "", symbol, units[symbol], value, values[symbol])
             # The one parameter of which the paper used more digits than it prints.
-            yield (
-                Row(**{**vars(row), "verdict": Verdict.ROUNDING})
-                if symbol == "c2" and row.difference
-                else row
-            )
+            yield row._replace(verdict=Verdict.ROUNDING) if symbol == "c2" and row.difference else row
 
 
 def _text(judge: Judge, printed: Printed, computed: Computed) -> Iterator[Row]:

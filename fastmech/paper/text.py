@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from fastmech.paper.checks import Check, Guess
-from fastmech.paper.compare import Row, Verdict
+from fastmech.paper.compare import HEADINGS, Row, Verdict
 from fastmech.paper.compute import METHOD, STEP, Computed
 from fastmech.paper.figures import Picture
 from fastmech.paper.misprints import Misprint
-from fastmech.paper.wording import HEADINGS, cells
+from fastmech.reports import table
 
 TITLE = "The source paper, computed again"
 
@@ -50,31 +50,14 @@ def report_text(
         *(line for item in confirmed for line in _misprint(item)),
     ]
     if right:
-        lines += [
-            "## Suspected, but printed rightly",
-            "",
-            *(f"- {item.place}: {item.error}" for item in right),
-            "",
-        ]
-    lines += [
-        "## Parameters used",
-        "",
-        *_guesses(guesses),
-        "## Checks of the computation",
-        "",
-        *_checks(checks),
-    ]
+        lines += ["## Suspected, but printed rightly", ""]
+        lines += [*(f"- {item.place}: {item.error}" for item in right), ""]
+    lines += ["## Parameters used", "", *_guesses(guesses)]
+    lines += ["## Checks of the computation", "", *_checks(checks)]
     lines += ["## Equilibria", "", *_equilibria(computed)]
     lines += ["## Figures", "", "Spans are not printed in the paper; those here show decay or escape.", ""]
-    for picture in figures:
-        lines += [
-            f"### {picture.heading}",
-            "",
-            f"![{picture.heading}]({picture.name}.png)",
-            "",
-            picture.caption,
-            "",
-        ]
+    for name, heading, caption, _ in figures:
+        lines += [f"### {heading}", "", f"![{heading}]({name}.png)", "", caption, ""]
     return "\n".join(lines)
 
 
@@ -98,7 +81,7 @@ def _summary(
     yield ""
     yield f"{len(confirmed)} misprints are proved, formulas included:"
     yield ""
-    yield from (f"- [{item.place}](#{_anchor(item)}): {item.error}" for item in confirmed)
+    yield from (f"- [{item.place}](#{_anchor(item.key)}): {item.error}" for item in confirmed)
     yield ""
     kept = sum(check.passed for check in checks)
     yield (
@@ -107,17 +90,8 @@ def _summary(
     )
 
 
-def _anchor(item: Misprint) -> str:
-    return item.key.replace("_", "-")
-
-
-def _table(
-    headings: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[int] = ()
-) -> Iterator[str]:
-    yield "| " + " | ".join(headings) + " |"
-    yield "|" + "|".join("---:" if i in right else "---" for i in range(len(headings))) + "|"
-    yield from ("| " + " | ".join(row) + " |" for row in rows)
-    yield ""
+def _anchor(key: str) -> str:
+    return key.replace("_", "-")
 
 
 def _rows(rows: Sequence[Row], places: dict[str, str]) -> Iterator[str]:
@@ -127,16 +101,17 @@ def _rows(rows: Sequence[Row], places: dict[str, str]) -> Iterator[str]:
         if section in _NOTES:
             yield _NOTES[section]
             yield ""
-        yield from _table(HEADINGS, [_row(row, places) for row in rows if row.section == section], (3, 4, 5))
+        own = [_row(row, places) for row in rows if row.section == section]
+        yield from table(HEADINGS, own, (0, 1, 2, 6))
 
 
 def _row(row: Row, places: dict[str, str]) -> list[str]:
-    texts = list(cells(row))
+    texts = list(row.cells)
     for i in (0, 1, 3):
         # Markdown would read the stars as emphasis.
         texts[i] = f"`{texts[i]}`" if "*" in texts[i] else texts[i]
     if row.verdict == Verdict.MISPRINT:
-        texts[-1] = f"**misprint**: see [{places[row.see]}](#{row.see.replace('_', '-')})"
+        texts[-1] = f"**misprint**: see [{places[row.see]}](#{_anchor(row.see)})"
     if row.verdict == Verdict.DIFFERS:
         texts[-1] = "**differs**"
     return texts
@@ -144,33 +119,36 @@ def _row(row: Row, places: dict[str, str]) -> list[str]:
 
 def _misprint(item: Misprint) -> Iterator[str]:
     # Plain Markdown has no anchors of its own.
-    yield f'<a id="{_anchor(item)}"></a>'
+    yield f'<a id="{_anchor(item.key)}"></a>'
     yield ""
     yield f"### {item.place}: {item.error}"
     yield ""
     yield f"- printed: `{item.printed}`"
     yield f"- corrected: `{item.corrected}`"
     yield ""
-    rows = [
-        [e.measure, e.unit, f"{e.printed:.3g}", f"{e.corrected:.2g}", f"{e.tolerance:.1g}"]
-        for e in item.evidence
-    ]
-    yield from _table(("Measure", "Unit", "As printed", "Corrected", "Tolerance"), rows, (2, 3, 4))
+    yield from table(
+        "Measure | Unit | As printed | Corrected | Tolerance",
+        (
+            f"{e.measure} | {e.unit} | {e.printed:.3g} | {e.corrected:.2g} | {e.tolerance:.1g}"
+            for e in item.evidence
+        ),
+        (0, 1),
+    )
 
 
 def _guesses(guesses: Sequence[Guess]) -> Iterator[str]:
     yield "Angles of Table 2 that come out to the printed digit with each choice of c2 and g:"
     yield ""
-    rows = [[guess.c2, guess.g, f"{guess.agreeing} of {guess.total}"] for guess in guesses]
-    yield from _table(("c2 [N/m]", "g [m/s²]", "Agreeing angles"), rows, (0, 1, 2))
+    rows = (f"{guess.c2} | {guess.g} | {guess.agreeing} of {guess.total}" for guess in guesses)
+    yield from table("c2 [N/m] | g [m/s²] | Agreeing angles", rows, ())
 
 
-def _checks(checks: Sequence[Check]) -> Iterator[str]:
-    rows = [
-        [c.name, f"{c.value:.2g}", f"{c.limit:.1g}", c.unit, "passed" if c.passed else "**failed**"]
+def _checks(checks: Sequence[Check]) -> list[str]:
+    rows = (
+        f"{c.name} | {c.value:.2g} | {c.limit:.1g} | {c.unit} | {'passed' if c.passed else '**failed**'}"
         for c in checks
-    ]
-    yield from _table(("Check", "Value", "Limit", "Unit", "Result"), rows, (1, 2))
+    )
+    return table("Check | Value | Limit | Unit | Result", rows, (0, 3, 4))
 
 
 def _equilibria(computed: Computed) -> Iterator[str]:
@@ -179,10 +157,9 @@ def _equilibria(computed: Computed) -> Iterator[str]:
         e, c = case.equilibrium, case.classification
         roots = ", ".join(_complex(root) for root in c.eigenvalues if root.imag >= 0.0)
         rows.append(
-            [f"Case {case.number}", f"{e.phi:.10f}", f"{e.theta:.10f}", f"{e.energy:.4f}", e.kind, roots]
+            f"Case {case.number} | {e.phi:.10f} | {e.theta:.10f} | {e.energy:.4f} | {e.kind} | {roots}"
         )
-    headings = ("Case", "φ [rad]", "θ [rad]", "U [J]", "Kind", "Roots [1/s]")
-    yield from _table(headings, rows, (1, 2, 3))
+    yield from table("Case | φ [rad] | θ [rad] | U [J] | Kind | Roots [1/s]", rows, (0, 4, 5))
     for case in computed.cases:
         yield f"- Case {case.number}, {case.classification.verdict}: {case.classification.explanation}."
     yield ""

@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from fastmech.plots.basin_marks import coordinates_of, symbol
+from fastmech.plots.labels import coordinates_of, symbol
 from fastmech.plots.style import PALETTE
 from fastmech.results import Dataset
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.mechanism.lagrange import kinetic_energy, potential_energy
+from fastmech.plots.labels import ANGLES, coordinates_of
 from fastmech.results import Dataset
 from fastmech.scene import Scene
 
@@ -24,22 +25,7 @@ GRID = 401
 IN_SLICE = 1e-3
 
 MARKERS = {0: ("o", "well"), 1: ("D", "saddle"), 2: ("^", "maximum")}
-SYMBOLS = {"phi": "φ", "theta": "θ", "phi_dot": "φ'", "theta_dot": "θ'"}
 DASHES = ["-", "--", ":"]
-
-
-#: The paper's coordinates, of which both turn fully.
-ANGLES = ("phi", "theta")
-
-
-def symbol(name: str) -> str:
-    """How pictures write a coordinate or a rate."""
-    return SYMBOLS.get(name, f"{name.removesuffix('_dot')}'" if name.endswith("_dot") else name)
-
-
-def coordinates_of(dataset: Dataset) -> tuple[str, ...]:
-    """Names of the coordinates of a basin map."""
-    return tuple(dataset.attrs.get("coordinate_names", ANGLES))
 
 
 class Slice:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.plots.basin_colors import FURTHER, basin_color, basin_name
-from fastmech.plots.basin_marks import Slice, decisive, mark, symbol
-from fastmech.plots.labels import Codes, flag_codes
+from fastmech.plots.basin_marks import Slice, decisive, mark
+from fastmech.plots.labels import Codes, flag_codes, quantity, setting_of, symbol
 from fastmech.plots.style import FIELD, new_figure, style
 from fastmech.results import Dataset
 from fastmech.scene import Scene
@@ -39,9 +39,6 @@ WITHOUT_TIME = {"capture_time": "not captured", "settle_time": "not settled"}
 
 #: Colour of starts of a refined map that have not been computed.
 SKIPPED = "#d9d9d9"
-
-#: Parameters of a mechanism that a title tells.
-MOST_TOLD = 6
 
 #: Starts without label up to which each is marked.
 FEW = 400
@@ -201,16 +198,12 @@ def _describe(axes: Axes, view: Slice, parameters: Mapping[str, float]) -> None:
         force = f"F0 = {scene.F0:g} N" + (f" exp(-{scene.alpha:g} t)" if scene.F0 and scene.alpha else "")
         told = f"{force}, c1 = {scene.c1:g} N/m, c2 = {scene.c2:g} N/m"
     else:
-        each = ", ".join(f"{name} = {value:g}" for name, value in list(parameters.items())[:MOST_TOLD])
-        told = f"{view.dataset.attrs['mechanism']}: {each}{', ...' * (len(parameters) > MOST_TOLD)}"
+        told = setting_of(view.dataset, parameters)
     at_rest = all(value == 0.0 for value in view.held.values()) and not set(view.coordinates) & set(view.held)
     held = "starts at rest" if at_rest and set(view.axes) == set(view.coordinates) else _held(view)
     axes.set_title(f"{axes.get_title()}\n{told}; {held}" if held else f"{axes.get_title()}\n{told}")
     for axis, name in (("x", view.axes[0]), ("y", view.axes[1])):
-        unit = view.dataset[name].units
-        kind = {"rad": "angle", "m": "position"}.get(unit, "rate")
-        what = symbol(name) if symbol(name) == kind else f"{kind} {symbol(name)}"
-        getattr(axes, f"set_{axis}label")(f"{what} at the start [{unit}]")
+        getattr(axes, f"set_{axis}label")(quantity(view.dataset, name).replace(" [", " at the start ["))
     axes.grid(visible=False)
 
 

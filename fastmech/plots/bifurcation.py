@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.plots.labels import PI_TICKS, flag_codes, logarithmic
+from fastmech.plots.labels import PI_TICKS, coordinates_of, flag_codes, logarithmic, quantity
 from fastmech.plots.map_curves import not_proved
 from fastmech.plots.map_view import View
 from fastmech.plots.style import PALETTE, legend_below, new_figure
@@ -35,6 +35,17 @@ MARKS = {
     "cusp": ("D", "cusp"),
     "transcritical": ("s", "transcritical"),
 }
+
+#: Colours and marks of equilibria by their verdict.
+VERDICTS = {
+    "asymptotically_stable": (PALETTE["blue"], "o"),
+    "stable": (PALETTE["green"], "s"),
+    "unstable": (PALETTE["vermillion"], "x"),
+    "critical": (PALETTE["black"], "D"),
+}
+
+#: Half of the smallest range of an axis [rad or m].
+LEAST_SPAN = 1e-3
 
 #: How many times the least decay time the picture shows; beyond, damping misses a mode.
 SLOWEST = 1e6
@@ -74,6 +85,53 @@ def draw_bifurcation(view: View) -> Figure:
     panels[0].set_title(f"Equilibria over {name}{_told(view, folds, name)}\n{view.setting}")
     legend_below(figure, panels[0], 4)
     return figure
+
+
+def draw_places(view: View) -> Figure:
+    """All coordinates and the slowest decay time over one parameter, of maps with equilibria not joined."""
+    (name,) = view.axes
+    timed = view.has("decay_time") and np.isfinite(view.data("decay_time").astype(np.float64)).any()
+    rows = [*coordinates_of(view.dataset), *(["decay_time"] if timed else [])]
+    figure = new_figure(7.6, 2.0 + 2.4 * len(rows))
+    panels = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
+    codes, verdict = flag_codes(view.variable("verdict")), view.data("verdict")
+    for axes, variable in zip(panels, rows, strict=True):
+        values = np.asarray(view.data(variable), dtype=np.float64)
+        x = np.broadcast_to(view.axis(name)[:, None], values.shape)
+        for word, (color, marker) in VERDICTS.items():
+            there = (verdict == codes[word]) & np.isfinite(values)
+            if there.any():
+                axes.plot(
+                    x[there],
+                    values[there],
+                    marker,
+                    color=color,
+                    ms=3,
+                    ls="none",
+                    label=word.replace("_", " "),
+                )
+        if variable == "decay_time":
+            axes.set(ylabel="slowest decay time\nof the stable [s]", yscale="log")
+            _widen(axes, 0.9, 1.1)
+            logarithmic(axes.yaxis)
+        else:
+            _widen(axes, -LEAST_SPAN, LEAST_SPAN)
+            axes.set_ylabel(quantity(view.dataset, variable))
+        _own(axes, view)
+    panels[-1].set_xlabel(view.label(name))
+    panels[0].set_title(f"Equilibria over {name}\n{view.setting}")
+    legend_below(figure, panels[0], 4)
+    return figure
+
+
+def _widen(axes: Axes, low: float, high: float) -> None:
+    """Rounding shall not look like structure."""
+    bottom, top = axes.get_ylim()
+    middle = 0.5 * (bottom + top)
+    if axes.get_yscale() == "log":
+        axes.set_ylim(min(bottom, low * middle), max(top, high * middle))
+    else:
+        axes.set_ylim(min(bottom, middle + low), max(top, middle + high))
 
 
 def _looks(

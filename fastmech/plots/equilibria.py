@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fastmech.mechanism.lagrange import potential_energy
-from fastmech.plots.labels import PI_TICKS, equilibrium_names, flag_codes
-from fastmech.plots.mechanism import draw_mechanism
+from fastmech.models.drawing import Drawing
+from fastmech.plots.labels import PI_TICKS, equilibrium_names, flag_codes, setting_of
+from fastmech.plots.mechanism import draw_mechanism, drawing_of, legend_handles
 from fastmech.plots.style import LINES, legend_below, new_figure, style
 from fastmech.results import Dataset
 from fastmech.scene import Scene
@@ -25,11 +26,21 @@ GRID = 241
 
 def draw_equilibria(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
     """Pictures of a dataset of the scan type ``equilibria`` of the scene with these parameters."""
+    of_paper = "mechanism" not in dataset.attrs
     with style():
-        figures = {"potential": _potential(dataset, Scene(**scene))}
+        figures = {"potential": _potential(dataset, Scene(**scene))} if of_paper else {}
         if dataset.sizes["equilibrium"]:
             figures["eigenvalues"] = _eigenvalues(dataset)
-            figures["positions"] = _positions(dataset, Scene(**scene))
+            if of_paper:
+                force = float(dataset.attrs["force"])
+                places = np.stack([dataset["phi"].data, dataset["theta"].data], axis=-1)
+                figures["positions"] = _positions(
+                    dataset, drawing_of(Scene(**scene), places, force), f"force F = {force:g} N on M2"
+                )
+            elif "drawing" in dataset.groups:
+                figures["positions"] = _positions(
+                    dataset, drawing_of(dataset.groups["drawing"]), setting_of(dataset, scene)
+                )
     return figures
 
 
@@ -73,11 +84,12 @@ def _number(axes: Axes, dataset: Dataset) -> None:
 def _eigenvalues(dataset: Dataset) -> Figure:
     figure = new_figure(7.2, 5.4)
     axes = figure.subplots()
+    ranks = [name.rpartition("_")[2] for name in dataset if name.startswith("eigenvalue_re_")]
     for i, name in enumerate(equilibrium_names(dataset)):
         axes.plot(
-            *([dataset[f"eigenvalue_{part}_{k}"].data[i] for k in "1234"] for part in ("re", "im")),
-            SHAPES[i],
-            color=LINES[i],
+            *([dataset[f"eigenvalue_{part}_{k}"].data[i] for k in ranks] for part in ("re", "im")),
+            SHAPES[i % len(SHAPES)],
+            color=LINES[i % len(LINES)],
             mec="white",
             ms=9,
             label=name,
@@ -95,18 +107,25 @@ def _eigenvalues(dataset: Dataset) -> Figure:
     return figure
 
 
-def _positions(dataset: Dataset, scene: Scene) -> Figure:
+def _positions(dataset: Dataset, drawn: Drawing, setting: str) -> Figure:
     names = equilibrium_names(dataset)
-    kinds = {code: kind for kind, code in flag_codes(dataset["kind"]).items()}
-    rows = -(-len(names) // 2)
-    figure = new_figure(9.6, 3.9 * rows + 0.3)
-    figure.suptitle(f"Positions of rest, force F = {dataset.attrs['force']:g} N on M2")
-    panels = figure.subplots(rows, 2, squeeze=False)
+    told = [
+        {code: word.replace("_", " ") for word, code in flag_codes(dataset[of]).items()}
+        for of in ("verdict", "kind")
+    ]
+    rows, columns = -(-len(names) // 2), min(2, len(names))
+    figure = new_figure(1.2 + 4.2 * columns, 3.9 * rows + 0.6)
+    figure.suptitle("Positions of rest, " + setting.replace(": ", ":\n" if columns == 1 else ": "))
+    panels = figure.subplots(rows, columns, squeeze=False)
     for axes in panels.flat[len(names) :]:
         axes.remove()
     for i, name in enumerate(names):
         axes = panels.flat[i]
-        phi, theta = float(dataset["phi"].data[i]), float(dataset["theta"].data[i])
-        draw_mechanism(axes, scene, phi, theta, float(dataset.attrs["force"]))
-        axes.set_title(f"{name} ({kinds.get(int(dataset['kind'].data[i]), 'unknown')})", fontsize=10)
+        draw_mechanism(axes, drawn, i)
+        verdict, kind = (
+            words.get(int(dataset[of].data[i]), "unknown")
+            for words, of in zip(told, ("verdict", "kind"), strict=True)
+        )
+        axes.set_title(f"{name}\n{verdict} ({kind})", fontsize=10)
+    figure.legend(handles=legend_handles(drawn), loc="outside lower center", ncols=2 * columns)
     return figure

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.plots.bifurcation import draw_bifurcation
-from fastmech.plots.labels import flag_codes
+from fastmech.plots.bifurcation import draw_bifurcation, draw_places
+from fastmech.plots.labels import coordinates_of, flag_codes, quantity, symbol
 from fastmech.plots.map_curves import draw_curves, not_proved
 from fastmech.plots.map_view import View, make_view
 from fastmech.plots.style import FIELD, PALETTE, new_figure, style
@@ -53,13 +53,24 @@ def draw_equilibrium_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[s
     view = make_view(dataset, scene)
     with style():
         if len(view.axes) == 1:
-            return {"branches": draw_bifurcation(view)} if view.has("phi", "theta", "morse_index") else {}
+            if not view.has(*coordinates_of(dataset)):
+                return {}
+            if "mechanism" in dataset.attrs:
+                return {"branches": draw_places(view)} if view.has("verdict") else {}
+            return {"branches": draw_bifurcation(view)} if view.has("morse_index") else {}
         figures = {}
         if view.has("count", "count_stable", "outcome"):
             figures["count"] = _counts(view)
-        if not view.has("count_stable", "morse_index", "energy", "phi") or not view.ranks:
+        first, *others = coordinates_of(dataset)
+        needed = (
+            "count_stable",
+            "energy",
+            first,
+            "verdict" if "mechanism" in dataset.attrs else "morse_index",
+        )
+        if not view.has(*needed) or not view.ranks:
             return figures
-        if view.has("theta"):
+        if view.has(*others):
             figures["angles"] = _angles(view)
         if view.has("depth") and np.isfinite(view.stable(0, view.data("depth"))).any():
             figures["barrier"] = _barrier(view)
@@ -69,11 +80,15 @@ def draw_equilibrium_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[s
 
 
 def _counts(view: View) -> Figure:
-    from matplotlib.colors import ListedColormap
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap, to_hex
     from matplotlib.patches import Patch
 
     figure = new_figure(9.6, 5.6)
-    colors = ListedColormap(list(COUNT_COLORS.values()))
+    most = max(6, int(view.data("count").max()))
+    more = colormaps["tab20c"](np.linspace(0.0, 1.0, max(1, most - 6)))
+    looks = {**COUNT_COLORS, **{n: to_hex(more[n - 7]) for n in range(7, most + 1)}}
+    colors = ListedColormap(list(looks.values()))
     for axes, name, title in zip(
         figure.subplots(1, 2),
         ("count", "count_stable"),
@@ -82,11 +97,10 @@ def _counts(view: View) -> Figure:
     ):
         counts = view.data(name)
         axes.pcolormesh(
-            *map(view.axis, view.axes), counts.T, cmap=colors, vmin=-0.5, vmax=6.5, shading="nearest"
+            *map(view.axis, view.axes), counts.T, cmap=colors, vmin=-0.5, vmax=most + 0.5, shading="nearest"
         )
         handles: list[Artist] = [
-            Patch(color=COUNT_COLORS[int(n)], label=f"{n} ({np.mean(counts == n):.1%})")
-            for n in np.unique(counts)
+            Patch(color=looks[int(n)], label=f"{n} ({np.mean(counts == n):.1%})") for n in np.unique(counts)
         ]
         curves = draw_curves(axes, view)
         handles += _mark_unsettled(axes, view) + _mark_own(axes, view)
@@ -116,25 +130,26 @@ def _mark_own(axes: Axes, view: View) -> list[Artist]:
 
 
 def _angles(view: View) -> Figure:
-    figure = new_figure(1.6 + 4.6 * len(view.ranks), 8.0)
-    panels = figure.subplots(2, len(view.ranks), squeeze=False, sharex=True, sharey=True)
-    for row, (name, symbol) in enumerate((("phi", "φ"), ("theta", "θ"))):
+    names = coordinates_of(view.dataset)
+    figure = new_figure(1.6 + 4.6 * len(view.ranks), 0.4 + 3.8 * len(names))
+    panels = figure.subplots(len(names), len(view.ranks), squeeze=False, sharex=True, sharey=True)
+    for row, name in enumerate(names):
         fields = [view.stable(rank, view.data(name)) for rank in view.ranks]
-        look = _angle_look(fields)
+        look = _angle_look(fields, view.dataset[name].units)
         for rank, field in enumerate(fields):
             axes = panels[row, rank]
             mesh = axes.pcolormesh(*map(view.axis, view.axes), field.T, shading="nearest", **look)
             curves = draw_curves(axes, view) + _mark_own(axes, view)
-            _label(axes, view, f"{symbol} of the {_ORDER[rank]} stable equilibrium")
-        figure.colorbar(mesh, ax=panels[row, :], label=f"{symbol} [rad]")
+            _label(axes, view, f"{symbol(name)} of the {_ORDER[rank]} stable equilibrium")
+        figure.colorbar(mesh, ax=panels[row, :], label=quantity(view.dataset, name))
     _finish(figure, view, curves + _nothing(view))
     return figure
 
 
-def _angle_look(fields: list[Floats]) -> dict[str, object]:
+def _angle_look(fields: list[Floats], unit: str) -> dict[str, object]:
     """Colours of an angle: cyclic where its values go round."""
     known = np.concatenate([field[np.isfinite(field)] for field in fields])
-    if np.ptp(known) > 1.5 * np.pi:
+    if unit == "rad" and np.ptp(known) > 1.5 * np.pi:
         return {"cmap": "twilight", "vmin": -np.pi, "vmax": np.pi}
     middle, half = 0.5 * (known.min() + known.max()), max(0.5 * np.ptp(known), LEAST_SPAN)
     return {"cmap": FIELD, "vmin": middle - half, "vmax": middle + half}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container
+from collections.abc import Container, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +12,11 @@ from fastmech.results import Dataset, Variable
 if TYPE_CHECKING:
     from matplotlib.axis import Axis
 
+    from fastmech.store.read import Section
+
+#: Parameters of a mechanism that a title tells.
+MOST_TOLD = 6
+
 #: A code that no variable has.
 NOWHERE = 1 << 40
 
@@ -19,12 +24,44 @@ NOWHERE = 1 << 40
 PI_TICKS = ([-np.pi, -np.pi / 2, 0.0, np.pi / 2, np.pi], ["-π", "-π/2", "0", "π/2", "π"])
 
 
+SYMBOLS = {"phi": "φ", "theta": "θ", "phi_dot": "φ'", "theta_dot": "θ'"}
+
+#: The paper's coordinates, of which both turn fully.
+ANGLES = ("phi", "theta")
+
+
+def symbol(name: str) -> str:
+    """How pictures write a coordinate or a rate."""
+    return SYMBOLS.get(name, f"{name.removesuffix('_dot')}'" if name.endswith("_dot") else name)
+
+
+def coordinates_of(dataset: Dataset | Section) -> tuple[str, ...]:
+    """Names of the coordinates that a section is about."""
+    return tuple(dataset.attrs.get("coordinate_names", ANGLES))
+
+
+def setting_of(dataset: Dataset, parameters: Mapping[str, float]) -> str:
+    """A mechanism and some of its parameters, for titles."""
+    each = ", ".join(f"{name} = {value:g}" for name, value in list(parameters.items())[:MOST_TOLD])
+    return f"{dataset.attrs['mechanism']}: {each}{', ...' * (len(parameters) > MOST_TOLD)}"
+
+
+def quantity(dataset: Dataset, name: str) -> str:
+    """What a coordinate or a rate is, with its unit, for an axis."""
+    unit = dataset[name].units
+    kind = {"rad": "angle", "m": "position"}.get(unit, "rate")
+    return f"{'' if symbol(name) == kind else f'{kind} '}{symbol(name)} [{unit}]"
+
+
 def equilibrium_names(dataset: Dataset) -> list[str]:
     """One name for each equilibrium of a dataset: its number (from 1) and place."""
-    places = zip(dataset["phi"].data, dataset["theta"].data, strict=True)
+    names = coordinates_of(dataset)
+    units = [dataset[name].units for name in names]
+    told = [f" {unit}" if unit != after else "" for unit, after in zip(units, [*units[1:], ""], strict=True)]
     return [
-        f"{number}: φ = {phi:z.3f}, θ = {theta:z.3f} rad"
-        for number, (phi, theta) in enumerate(places, start=1)
+        f"{number}: "
+        + ", ".join(f"{symbol(n)} = {v:z.3f}{unit}" for n, v, unit in zip(names, place, told, strict=True))
+        for number, place in enumerate(zip(*(dataset[name].data for name in names), strict=True), start=1)
     ]
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.plots.labels import coordinates_of, setting_of
 from fastmech.results import Dataset, Variable
 from fastmech.scene import Scene
 from fastmech.store.read import Section
@@ -18,7 +19,10 @@ Floats = NDArray[np.float64]
 MOST_DRAWN = 1000
 
 #: Variables over the equilibria that pictures show; the others stay in the file.
-DRAWN = ("phi", "theta", "energy", "morse_index", "sheet", "depth", "shock_limit_m2", "decay_time")
+DRAWN = ("energy", "morse_index", "verdict", "sheet", "depth", "shock_limit_m2", "decay_time")
+
+#: Verdicts of what stays: asymptotically stable, stable.
+STABLE = (0, 1)
 
 #: Relative difference of energies that rounding may cause.
 ROUNDING = 1e-10
@@ -43,6 +47,9 @@ class View:
         """For titles: what is not on the axes, as far as it differs from Table 1, and what is left out."""
         own = {name: value for name, value in self.scene.items() if name not in self.axes and name != "alpha"}
         own |= {name: float(self.axis(name)[i]) for name, i in self.held.items()}
+        left_out = str(self.dataset.attrs.get("drawn", ""))
+        if "mechanism" in self.dataset.attrs:
+            return setting_of(self.dataset, own) + left_out
         decayed = own.get("alpha", self.scene["alpha"]) > 0.0 and "alpha" not in self.axes
         told = [
             f"{name} = {own[name]:.6g} {unit}"
@@ -51,7 +58,6 @@ class View:
         ]
         if decayed:
             told.append("the force decayed")
-        left_out = str(self.dataset.attrs.get("drawn", ""))
         return " with ".join(["Table 1", *([", ".join(told)] if told else [])]) + left_out
 
     def data(self, name: str) -> NDArray[np.generic]:
@@ -84,18 +90,23 @@ class View:
 
     def stable(self, rank: int, values: NDArray[np.generic]) -> Floats:
         """Of values over the equilibria, that of the stable one of this rank (0: deepest), NaN if none."""
-        energy = np.where(self.data("morse_index") == 0, self.data("energy"), np.inf)
-        # Mirror images are equally deep but for rounding: the angle orders them, so that maps are smooth.
+        stable = self.data("morse_index") == 0
+        if "mechanism" in self.dataset.attrs:  # there may be no potential
+            stable = np.isin(self.data("verdict"), STABLE)
+        energy = np.where(stable, np.nan_to_num(self.data("energy").astype(np.float64)), np.inf)
+        # Mirror images are equally deep but for rounding: their places order them, so that maps are smooth.
         deepest = energy.min(axis=-1, keepdims=True)
         tied = energy <= deepest + ROUNDING * np.abs(deepest)
-        order = np.lexsort((self.data("phi"), np.where(tied, deepest, energy)), axis=-1)
+        order = np.lexsort(
+            (self.data(coordinates_of(self.dataset)[0]), np.where(tied, deepest, energy)), axis=-1
+        )
         chosen = (np.argsort(order, axis=-1) == rank) & np.isfinite(energy)
         return np.where(chosen.any(axis=-1), np.where(chosen, values, 0.0).sum(axis=-1), np.nan)
 
     @property
     def ranks(self) -> range:
-        """Of stable equilibria, the deepest first."""
-        return range(int(self.data("count_stable").max()))
+        """Of stable equilibria, the deepest first, at most three."""
+        return range(min(3, int(self.data("count_stable").max())))
 
     def has(self, *names: str) -> bool:
         """Whether the map kept these variables, or a group in it has them."""
@@ -134,7 +145,11 @@ def load_drawn(section: Section, scene: Mapping[str, float]) -> Dataset:
             step = -(-section.sizes[name] // MOST_DRAWN)
             part[name] = slice(None, None, step)
             left_out += f"; 1 in {step} values of {name}"
-    wanted = [name for name in section if name in DRAWN or not _over_equilibria(section, name)]
+    wanted = [
+        name
+        for name in section
+        if name in (*DRAWN, *coordinates_of(section)) or not _over_equilibria(section, name)
+    ]
     dataset = section.load(wanted, part)
     attrs = {**dataset.attrs, **({"drawn": left_out} if left_out else {})}
     groups = {name: group.load() for name, group in section.groups.items()}

@@ -1,14 +1,17 @@
-"""The mechanism itself, drawn to scale: rods, masses, slider and guide, springs, damper, force."""
+"""Any planar mechanism, drawn to scale: rods, masses, guides, springs, dampers, loads and fixed points."""
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from fastmech.mechanism.geometry import positions
+from fastmech.models.drawing import Drawing, Element, drawing
+from fastmech.models.mechanism import Mechanism
 from fastmech.plots.style import PALETTE
+from fastmech.results import Dataset
 from fastmech.scene import Scene
 
 if TYPE_CHECKING:
@@ -19,88 +22,96 @@ Points = NDArray[np.float64]
 ROD, SPRING, DAMPER, FORCE = PALETTE["black"], PALETTE["green"], PALETTE["purple"], PALETTE["vermillion"]
 MASS, GROUND, INK = PALETTE["blue"], "#8c8c8c", "#404040"
 
-#: Sizes over the rod's length l.
-LARGEST_MASS, ARROW, COIL, HOUSING, TURNS = 0.15, 0.75, 0.055, 0.09, 9
+#: Sizes over the extent of all that is drawn.
+LARGEST_MASS, ARROW, COIL, HOUSING, MARGIN, TURNS = 0.035, 0.17, 0.014, 0.02, 0.12, 9
 
 
-def draw_mechanism(axes: Axes, scene: Scene, phi: float, theta: float, force: float) -> None:
-    """Draw the mechanism at rest in (phi, theta) [rad], with ``force`` [N] on M2 along +x.
+def drawing_of(system: Scene | Mechanism | Dataset, q: ArrayLike = (), force: float = 0.0) -> Drawing:
+    """What is drawn of a mechanism at positions (m, n), or what a section of a file holds.
 
-    Lengths are to scale; masses have areas in proportion to them; the arrow has one length for every force.
-    The springs are drawn from M2 to O and from M1 to A = (0, l), the points where they are unstressed. The
-    axes cover every configuration, so that drawings of one scene can be compared.
+    A scene's mechanism is the shipped one of its parameters under the constant ``force`` [N].
     """
-    l = scene.l
-    p = positions(scene, np.array([phi, theta, 0.0, 0.0]))
-    origin, a = np.zeros(2), np.array([0.0, l])
-    m1, m2, m3 = (np.array(point, dtype=np.float64) for point in ((p.x1, p.y1), (p.x2, p.y2), (p.x3, p.y3)))
-    wall = 3.62 * l
+    if isinstance(system, Dataset):
+        ends = np.stack([system[f"element_{axis}"].data for axis in "xy"], axis=-1)
+        names = tuple(map(str, system["element_name"].data))
+        return Drawing(system["element_kind"].data, names, system["element_mass"].data, ends)
+    if isinstance(system, Scene):
+        from fastmech.mechanisms.slider_pendulum import slider_pendulum
 
+        values = {name: value for name, (value, *_) in system.described().items()}
+        system = slider_pendulum().replace(**values | {"F0": force, "alpha": 0.0})
+    return drawing(system, q)
+
+
+def draw_mechanism(axes: Axes, drawn: Drawing, which: int = 0) -> None:
+    """Draw one of the positions of a mechanism.
+
+    Lengths are to scale; masses have areas in proportion to them; an arrow has one length for every load.
+    The axes cover all positions, so that drawings of one mechanism can be compared.
+    """
+    tied = ~np.isin(drawn.kind, (Element.GUIDE, Element.LOAD))
+    corners = drawn.ends[:, tied].reshape(-1, 2)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    size = max(float((high - low).max()), 1e-12)
+    edge = (MARGIN + ARROW * bool((drawn.kind == Element.LOAD).any())) * size
     axes.set_aspect("equal")
-    axes.set(xlim=(-2.3 * l, wall + 0.1 * l), ylim=(-2.3 * l, 2.3 * l), xlabel="x [m]", ylabel="y [m]")
-    _ground(axes, l, wall)
-    for start, end in ((m2, origin), (m1, a)):
-        axes.plot(*_zigzag(start, end, COIL * l), color=SPRING, lw=1.1, zorder=2)
-    _damper(axes, m3, wall, HOUSING * l)
-    for start, end in ((origin, m1), (m1, m2), (m1, m3)):
-        axes.plot(*np.transpose([start, end]), color=ROD, lw=2.6, solid_capstyle="round", zorder=3)
-    _masses(axes, scene, m1, m2, m3)
-    if force:
-        tip = m2 + np.array([np.sign(force) * ARROW * l, 0.0])
-        arrow = {
-            "arrowstyle": "-|>",
-            "color": FORCE,
-            "lw": 2.4,
-            "mutation_scale": 14,
-            "shrinkA": 0,
-            "shrinkB": 0,
-        }
-        axes.annotate("", xy=tuple(tip), xytext=tuple(m2), arrowprops=arrow, zorder=6)
-    ahead = m2 + np.array([np.sign(force), 0.0])
-    _label(axes, "$M_1$", m1, (origin, m2, m3, a), 0.29 * l, MASS)
-    _label(axes, "$M_2$", m2, (m1, origin, ahead), 0.29 * l, MASS)
-    _label(axes, "$M_3$", m3, (m1, m3 + np.array([1.0, 0.0])), 0.29 * l, MASS)
-    _label(axes, "O", origin, (m1, m2), 0.22 * l, INK)
-    _label(axes, "A", a, (m1,), 0.22 * l, INK)
+    axes.set(xlim=(low[0] - edge, high[0] + edge), ylim=(low[1] - edge, high[1] + edge))
+    axes.set(xlabel="x [m]", ylabel="y [m]")
+    ends = drawn.ends[which]
+    heaviest = np.nanmax(drawn.mass, initial=0.0)
+    ties: list[tuple[Points, Points]] = []
+    for kind, mass, (a, b) in zip(drawn.kind, drawn.mass, ends, strict=True):
+        if kind == Element.GUIDE:
+            axes.axline(tuple(a), tuple(b), color=GROUND, lw=0.9, ls=(0, (6, 3)), zorder=1)
+        elif kind == Element.FIXED:
+            axes.plot(*a, ls="none", marker="s", ms=7, color=GROUND, zorder=4)
+        elif kind == Element.MASS:
+            _mass(axes, a, LARGEST_MASS * size * np.sqrt(mass / heaviest))
+        elif kind == Element.LOAD:
+            b = a + ARROW * size * (b - a)
+            arrow = {
+                "arrowstyle": "-|>",
+                "color": FORCE,
+                "lw": 2.4,
+                "mutation_scale": 14,
+                "shrinkA": 0,
+                "shrinkB": 0,
+            }
+            axes.annotate("", xy=tuple(b), xytext=tuple(a), arrowprops=arrow, zorder=6)
+        elif kind == Element.ROD:
+            axes.plot(*np.transpose([a, b]), color=ROD, lw=2.6, solid_capstyle="round", zorder=3)
+        elif kind == Element.SPRING:
+            axes.plot(*_zigzag(a, b, COIL * size), color=SPRING, lw=1.1, zorder=2)
+        elif kind == Element.DAMPER:
+            _damper(axes, b, a, HOUSING * size)
+        ties += [(a, b), (b, a)] * (kind in (Element.ROD, Element.SPRING, Element.DAMPER, Element.LOAD))
+    for kind, name, (place, _) in zip(drawn.kind, drawn.name, ends, strict=True):
+        if name:
+            others = [other - at for at, other in ties if np.allclose(at, place)]
+            colour = INK if kind == Element.FIXED else MASS
+            _label(axes, name, place, np.array(others).reshape(-1, 2), 1.4 * LARGEST_MASS * size, colour)
 
 
-def _label(
-    axes: Axes, text: str, place: Points, others: tuple[Points, ...], distance: float, colour: str
-) -> None:
-    """Name a point on the side where nothing is tied to it."""
-    ties = np.array([other - place for other in others])
+def _label(axes: Axes, name: str, place: Points, ties: Points, distance: float, colour: str) -> None:
+    """Name a point on the side where nothing is tied to it, above where nothing is."""
     lengths = np.hypot(*ties.T)
     tied = lengths > 1e-9
-    # A point that coincides with all it is tied to gets its name above.
     ties = ties[tied] / lengths[tied, None] if tied.any() else np.array([[0.0, -1.0]])
     # The free direction is the one farthest from every tie.
     angles = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
     directions = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     away = directions[np.argmin(np.max(directions @ ties.T, axis=1))]
     x, y = place + distance * away
-    axes.text(x, y, text, ha="center", va="center", color=colour, fontsize=10, zorder=7)
+    text = re.sub(r"^([A-Za-z])(\d+)$", r"$\1_{\2}$", name)
+    sides = [("center", "left", "right")[int(np.sign(np.round(part)))] for part in away]
+    ha, va = sides[0], {"left": "bottom", "right": "top"}.get(sides[1], "center")
+    axes.text(x, y, text, ha=ha, va=va, color=colour, fontsize=10, zorder=7)
 
 
-def _ground(axes: Axes, l: float, wall: float) -> None:
-    """Guide, wall and the fixed points O and A."""
-    axes.axhline(0.0, color=GROUND, lw=0.9, ls=(0, (6, 3)), zorder=1)
-    axes.plot([wall, wall], [-0.3 * l, 0.3 * l], color=GROUND, lw=3.0, zorder=1)
-    axes.plot([0.0, 0.0], [0.0, l], ls="none", marker="s", ms=7, color=GROUND, zorder=4)
+def _mass(axes: Axes, center: Points, radius: float) -> None:
+    from matplotlib.patches import Circle
 
-
-def _masses(axes: Axes, scene: Scene, m1: Points, m2: Points, m3: Points) -> None:
-    from matplotlib.patches import Circle, Rectangle
-
-    l = scene.l
-    heaviest = max(scene.m1, scene.m2, scene.m3)
-    for name, mass, center in (("M1", scene.m1, m1), ("M2", scene.m2, m2), ("M3", scene.m3, m3)):
-        radius = LARGEST_MASS * l * np.sqrt(mass / heaviest)
-        if name == "M3":
-            # A square of the area that a circle of this mass would have.
-            side = radius * np.sqrt(np.pi)
-            axes.add_patch(Rectangle(tuple(center - side / 2), side, side, color=MASS, zorder=5))
-        else:
-            axes.add_patch(Circle(tuple(center), radius, color=MASS, zorder=5))
+    axes.add_patch(Circle(tuple(center), radius, color=MASS, zorder=5))
 
 
 def _zigzag(start: Points, end: Points, width: float) -> tuple[Points, Points]:
@@ -115,26 +126,38 @@ def _zigzag(start: Points, end: Points, width: float) -> tuple[Points, Points]:
     return line[:, 0], line[:, 1]
 
 
-def _damper(axes: Axes, slider: Points, wall: float, half: float) -> None:
-    """Piston rod from the slider into a housing that is fixed to the wall."""
-    x, span = float(slider[0]), wall - float(slider[0])
-    back, front, piston = wall - 0.18 * span, wall - 0.72 * span, wall - 0.45 * span
-    axes.plot([x, piston], [0.0, 0.0], color=DAMPER, lw=1.6, zorder=2)
-    axes.plot([piston, piston], [-0.8 * half, 0.8 * half], color=DAMPER, lw=2.6, zorder=2)
-    axes.plot([front, back, back, front], [half, half, -half, -half], color=DAMPER, lw=1.6, zorder=2)
-    axes.plot([back, wall], [0.0, 0.0], color=DAMPER, lw=1.6, zorder=2)
+def _damper(axes: Axes, start: Points, end: Points, half: float) -> None:
+    """Piston rod from the start into a housing that is tied to the end."""
+    along = end - start
+    across = half * np.array([-along[1], along[0]]) / max(float(np.hypot(*along)), 1e-12)
+
+    def line(width: float, *places: tuple[float, float]) -> None:
+        where = np.array([start + s * along + t * across for s, t in places])
+        axes.plot(*where.T, color=DAMPER, lw=width, zorder=2)
+
+    line(1.6, (0.0, 0.0), (0.55, 0.0))
+    line(2.6, (0.55, -0.8), (0.55, 0.8))
+    line(1.6, (0.28, 1.0), (0.82, 1.0), (0.82, -1.0), (0.28, -1.0))
+    line(1.6, (0.82, 0.0), (1.0, 0.0))
 
 
-def legend_handles(force: float) -> list[Any]:
-    """What the drawing's colours mean, for a legend; ``force`` [N]."""
+def legend_handles(drawn: Drawing, load: str = "load") -> list[Any]:
+    """What a drawing's colours mean, for a legend; ``load`` says which one it is."""
     from matplotlib.lines import Line2D
 
-    return [
-        Line2D([], [], color=ROD, lw=2.6, label="rod"),
-        Line2D([], [], color=MASS, marker="o", ms=9, ls="none", label="mass"),
-        Line2D([], [], color=SPRING, lw=1.4, label="spring"),
-        Line2D([], [], color=DAMPER, lw=1.8, label="damper"),
-        Line2D([], [], color=FORCE, marker=">", lw=2.4, label=f"force on $M_2$, {force:g} N"),
-        Line2D([], [], color=GROUND, marker="s", ls="none", label="fixed points O and A"),
-        Line2D([], [], color=GROUND, lw=1.2, ls="--", label="guide of the slider"),
-    ]
+    looks: dict[Element, dict[str, Any]] = {
+        Element.ROD: {"color": ROD, "lw": 2.6, "label": "rod"},
+        Element.MASS: {
+            "color": MASS,
+            "marker": "o",
+            "ms": 9,
+            "ls": "none",
+            "label": "mass, its area in proportion",
+        },
+        Element.SPRING: {"color": SPRING, "lw": 1.4, "label": "spring"},
+        Element.DAMPER: {"color": DAMPER, "lw": 1.8, "label": "damper"},
+        Element.LOAD: {"color": FORCE, "marker": ">", "lw": 2.4, "label": load},
+        Element.FIXED: {"color": GROUND, "marker": "s", "ls": "none", "label": "fixed point"},
+        Element.GUIDE: {"color": GROUND, "lw": 1.2, "ls": "--", "label": "guide"},
+    }
+    return [Line2D([], [], **look) for kind, look in looks.items() if kind in drawn.kind]

@@ -16,9 +16,11 @@ from fastmech.basins.runs import rounds_until
 from fastmech.capture.steps import fastest_followed, shortest_step
 from fastmech.ensembles import checks
 from fastmech.ensembles.spans import MOST_STEPS
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown
 from fastmech.mechanism.coefficients import reduce
-from fastmech.scene import STATE, Number, Scene
+from fastmech.models.mechanism import Mechanism
+from fastmech.results import ANGLE_UNITS
+from fastmech.scene import STATE, Number, Scene, nearest
 
 #: Values of the longest axis.
 MOST_VALUES = 100_000
@@ -89,6 +91,41 @@ def arrays(axes: Mapping[str, Axis]) -> dict[str, NDArray[np.float64]]:
     return {name: axis.array for name, axis in axes.items()}
 
 
+def coordinate_units(system: Scene | Mechanism) -> dict[str, str]:
+    """Names of coordinates with their units."""
+    if isinstance(system, Scene):
+        return dict(ANGLE_UNITS)
+    names = system.state[: len(system.coordinates)]
+    return {name: "m" if name in system.lengths else "rad" for name in names}
+
+
+def state_units(system: Scene | Mechanism) -> dict[str, str]:
+    """Names of coordinates, then of rates, with their units."""
+    units = coordinate_units(system)
+    return units | {f"{name}_dot": f"{unit}/s" for name, unit in units.items()}
+
+
+def told(system: Scene | Mechanism) -> dict[str, Any]:
+    """What a section says of a mechanism that is not the paper's."""
+    if isinstance(system, Scene):
+        return {}
+    return {"mechanism": system.name, "coordinate_names": tuple(coordinate_units(system))}
+
+
+def known_parameters(system: Scene | Mechanism, axes: Mapping[str, Axis]) -> None:
+    """Refuse axes that are no parameters, or too many.
+
+    Raises:
+        InputError: they are.
+    """
+    known = list(system.described())
+    if len(axes) > 3:
+        raise InputError("axes: must be three axes at most")
+    for name in axes:
+        if name not in known:
+            raise InputError(f"axes.{name}: unknown parameter {shown(name)}; {nearest(name, known)}")
+
+
 def check_size(where: str, axes: Mapping[str, Axis], what: str, most: int, numbers: int) -> None:
     """Refuse grids of more points than can be, or than fit into memory at so many ``numbers`` a point.
 
@@ -137,7 +174,7 @@ def check_rising(name: str, axis: Axis) -> None:
         )
 
 
-def check_parameters(scene: Scene, axes: Mapping[str, Axis], where: str) -> None:
+def check_parameters(scene: Scene | Mechanism, axes: Mapping[str, Axis], where: str) -> None:
     """Refuse values that the scene does not accept: what it allows of a parameter is an interval.
 
     Raises:

@@ -23,7 +23,15 @@ from fastmech.ensembles.status import FAILURES, LABELS, Status
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers
-from fastmech.scan_types.axis import Axis, arrays, check_duration, check_rising, check_size, check_starts
+from fastmech.scan_types.axis import (
+    Axis,
+    arrays,
+    check_duration,
+    check_rising,
+    check_size,
+    check_starts,
+    told,
+)
 from fastmech.scan_types.request import TiledScan, UsualMethod, failures
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
 from fastmech.scene import STATE, Number, Scene, nearest
@@ -39,9 +47,8 @@ MOST_POINTS, POINT_NUMBERS = 20_000_000, 20
 TILE_POINTS = 1 << 14
 USUAL_END = 60.0
 
-#: The dimension of turns in a tile, and names that coordinates cannot have beside the result's own.
+#: The dimension of turns in a tile.
 TURNED = "turned_coordinate"
-RESERVED = {TURNED, "label", "well", "turns", "time", "capture_time", "settle_time", "status", "computed"}
 
 #: What a tile knows of every start, by the names in `fastmech.basins.map.BasinMap`.
 _ARRAYS = ("well", "turns", "time", "settle_time", "status", "computed")
@@ -58,6 +65,9 @@ class Basins(TiledScan):
 
     kind: ClassVar[str] = "basins"
     of_mechanisms = True
+    taken = frozenset(
+        {TURNED, "label", "well", "turns", "time", "capture_time", "settle_time", "status", "computed"}
+    )
 
     axes: Annotated[dict[str, Axis], Field(min_length=2, max_length=4)]
     fixed: dict[str, float] = Field(
@@ -77,8 +87,6 @@ class Basins(TiledScan):
         """Without a damper there are no basins; and a map has its limits."""
         require_damper(scene)
         names = _states(scene)
-        for name in RESERVED & set(names):
-            raise InputError(f"mechanism: {name} is the name of a coordinate and of a variable of the result")
         for where, entries in (("axes", self.axes), ("fixed", self.fixed)):
             for name in entries:
                 if name not in names:
@@ -183,7 +191,7 @@ class BasinTiling(Tiling):
         }
         if isinstance(self.scene, Mechanism):
             turning = [n for n, period in zip(certificate.names, certificate.periods, strict=True) if period]
-            attrs |= {"mechanism": self.scene.name, "coordinate_names": certificate.names}
+            attrs |= told(self.scene)
             attrs |= {"turning_names": tuple(turning)} if turning else {}
         attrs |= {"steps": found.steps, "refine": self.request.refine or 0}
         attrs |= {f"fixed_{name}": value for name, value in found.fixed.items()}

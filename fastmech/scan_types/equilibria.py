@@ -1,32 +1,38 @@
-"""All equilibria of the scene with the proof that they are all, and their stability by three criteria."""
+"""All equilibria with the proof that they are all, their stability by three criteria, and what is drawn."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from enum import IntEnum
-from typing import TYPE_CHECKING, ClassVar
+from itertools import product
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+import scipy.linalg
 
-from fastmech.equilibria.find import KINDS, find_equilibria
+from fastmech.models.equilibria import find_equilibria
+from fastmech.models.mechanism import Mechanism
+from fastmech.models.stability import classify
 from fastmech.results import Dataset, Variable, flags, numbers, parts
-from fastmech.scan_types.map_layout import HESSIAN, eigenvalue_variables
-from fastmech.scan_types.request import RunContext, Scan
+from fastmech.scan_types.axis import coordinate_units, told
+from fastmech.scan_types.map_layout import HESSIAN, about_of, drawing_group, eigenvalue_variables
+from fastmech.scan_types.request import TiledScan
+from fastmech.scan_types.tiling import Each, Tiling
 from fastmech.scene import Scene
-from fastmech.stability.classify import classify
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
 class Kind(IntEnum):
-    """Kind of an equilibrium by the Hessian of the potential."""
+    """Kind of an equilibrium by the Hessian, without a potential by the stiffness' determinant."""
 
     MINIMUM = 0
     SADDLE = 1
     MAXIMUM = 2
     DEGENERATE = 3
+    POSITIVE = 4
+    NEGATIVE = 5
 
 
 class StabilityVerdict(IntEnum):
@@ -38,25 +44,38 @@ class StabilityVerdict(IntEnum):
     CRITICAL = 3
 
 
-class EquilibriaScan(Scan):
-    """Equilibria with the force at rest: F0 where alpha = 0, else none."""
+class EquilibriaScan(TiledScan):
+    """Equilibria with loads at rest: of the paper's force F0 where alpha = 0, else none."""
 
     kind: ClassVar[str] = "equilibria"
+    of_mechanisms = True
+    taken = frozenset(
+        {"equilibrium", "energy", "kind", "morse_index", "decay_time", "verdict", "explanation"}
+    )
 
-    def run(self, scene: Scene, context: RunContext) -> Dataset:
+    def tiling(self, scene: Scene | Mechanism) -> Tiling:
+        """One tile; what is drawn of a mechanism is added to it."""
+
+        def join(tiles: list[Dataset]) -> Dataset:
+            (found,) = tiles
+            if isinstance(scene, Scene):
+                return found
+            q = np.stack([found[name].data for name in coordinate_units(scene)], axis=-1)
+            return Dataset(found.variables, found.attrs, drawing_group(scene, q))
+
+        return Each("equilibria", 1, lambda _: self._found(scene), join)
+
+    def _found(self, scene: Scene | Mechanism) -> Dataset:
         """Find and classify."""
         equilibria = find_equilibria(scene)
         found = [classify(scene, equilibrium) for equilibrium in equilibria]
-        each = ("equilibrium",)
+        coordinates, each = coordinate_units(scene), ("equilibrium",)
+        n, of_paper = len(coordinates), isinstance(scene, Scene)
 
-        def column(values: list[object], *shape: int) -> NDArray[np.float64]:
-            return np.array(values, dtype=np.float64).reshape(len(found), *shape)
-
-        def columns(
-            name: str, values: list[object], units: tuple[str, ...], about: str
-        ) -> dict[str, Variable]:
+        def columns(name: str, values: list[Any], units: Iterable[str], about: str) -> dict[str, Variable]:
             entries = {str(k): unit for k, unit in enumerate(units, start=1)}
-            return parts(name, each, column(values, len(units)), entries, about)
+            columns = np.array(values, dtype=np.float64).reshape(len(found), len(entries))
+            return parts(name, each, columns, entries, about)
 
         def verdicts(values: list[str], criterion: str) -> Variable:
             codes = [StabilityVerdict[value.upper().replace(" ", "_")] for value in values]
@@ -64,51 +83,55 @@ class EquilibriaScan(Scan):
                 each, np.array(codes, dtype=np.int8), "1", f"verdict: {criterion}", flags(StabilityVerdict)
             )
 
-        eigenvalues = np.array([f.eigenvalues for f in found]).reshape(-1, 4)
-        kinds = np.array([Kind[KINDS[int(index)].upper()] for index in equilibria.morse_index], dtype=np.int8)
+        kinds = np.array([Kind[name.upper()] for name in equilibria.kind], dtype=np.int8)
+        index = [-1 if e.morse_index is None else e.morse_index for e in equilibria]
+        energy = "potential energy Pi - F x2" if of_paper else "potential energy, loads at their means"
+        swings = [_swings(scene, e, f) for e, f in zip(equilibria, found, strict=True)]
         variables = {
             **numbers("equilibrium", len(found), "number of the equilibrium"),
-            "phi": Variable(each, equilibria.phi, "rad", "angle phi"),
-            "theta": Variable(each, equilibria.theta, "rad", "angle theta"),
-            "energy": Variable(each, equilibria.energy, "J", "potential energy Pi - F x2"),
+            **{
+                name: Variable(each, equilibria.position[:, k], unit, f"{about_of(unit)} {name}")
+                for k, (name, unit) in enumerate(coordinates.items())
+            },
+            "energy": Variable(each, equilibria.energy, "J", energy),
             "kind": Variable(each, kinds, "1", "kind of equilibrium", flags(Kind)),
-            "morse_index": Variable(each, equilibria.morse_index, "1", "negative eigenvalues of the Hessian"),
-            **parts(
-                "hessian",
+            "morse_index": Variable(
                 each,
-                equilibria.hessian.reshape(-1, 4)[:, [0, 1, 3]],
-                HESSIAN,
-                "Hessian of Pi - F x2, paper (19): {}",
+                np.array(index, dtype=np.int8),
+                "1",
+                "negative eigenvalues of the Hessian, -1: no potential",
             ),
-            **columns(
-                "minor", [f.minors for f in found], ("J", "J2"), "Sylvester's leading minor {} of the Hessian"
-            ),
+            **_stiffness(scene, equilibria, found),
             **columns(
                 "polynomial",
                 [f.polynomial[1:] for f in found],
-                ("s-1", "s-2", "s-3", "s-4"),
-                "monic characteristic polynomial of degree 4: coefficient of power 4 - {}",
+                [f"s-{k}" for k in range(1, 2 * n + 1)],
+                f"monic characteristic polynomial of degree {2 * n}: coefficient of power {2 * n} - {{}}",
             ),
             **columns(
                 "hurwitz",
                 [f.hurwitz_determinants for f in found],
-                ("s-1", "s-3", "s-6", "s-10"),
+                [f"s-{k * (k + 1) // 2}" for k in range(1, 2 * n + 1)],
                 "Hurwitz determinant {}",
             ),
-            **eigenvalue_variables(each, eigenvalues),
+            **eigenvalue_variables(each, np.array([f.eigenvalues for f in found]).reshape(-1, 2 * n)),
             **columns(
                 "natural_frequency",
-                [f.natural_frequencies for f in found],
-                ("rad/s", "rad/s"),
+                [frequencies for frequencies, _ in swings],
+                ["rad/s"] * n,
                 "undamped natural frequency {}, NaN for a direction that grows",
             ),
             "decay_time": Variable(
                 each,
-                column([f.decay_time for f in found]),
+                np.array([time for _, time in swings]),
                 "s",
                 "slowest linear mode falls to 1/e; NaN: unstable",
             ),
-            "verdict_sylvester": verdicts([f.sylvester.verdict for f in found], "Lagrange-Dirichlet"),
+            **(
+                {"verdict_sylvester": verdicts([f.sylvester.verdict for f in found], "Lagrange-Dirichlet")}
+                if of_paper
+                else {}
+            ),
             "verdict_hurwitz": verdicts([f.hurwitz.verdict for f in found], "Hurwitz"),
             "verdict_eigenvalues": verdicts([f.spectrum.verdict for f in found], "eigenvalues"),
             "verdict": verdicts([f.verdict for f in found], "joint"),
@@ -117,7 +140,7 @@ class EquilibriaScan(Scan):
             ),
         }
         attrs = {
-            "force": equilibria.force,
+            **({"force": equilibria.force} if of_paper else told(scene)),
             "certificate": equilibria.certificate.sentence,
             "outcome": equilibria.certificate.outcome.name.lower(),
         }
@@ -125,7 +148,38 @@ class EquilibriaScan(Scan):
 
     @staticmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
-        """Potential with the equilibria, and the eigenvalues in the complex plane."""
+        """Potential with the equilibria, their positions, and the eigenvalues in the complex plane."""
         from fastmech.plots.equilibria import draw_equilibria
 
         return draw_equilibria(dataset, scene)
+
+
+def _stiffness(scene: Scene | Mechanism, equilibria: Any, found: list[Any]) -> dict[str, Variable]:
+    """Of the paper's mechanism the Hessian with its minors, of any other minus the forces' derivatives."""
+    each = ("equilibrium",)
+    if isinstance(scene, Scene):
+        entries = equilibria.hessian.reshape(-1, 4)[:, [0, 1, 3]]
+        minors = np.array([f.minors for f in found]).reshape(-1, 2)
+        about = "Sylvester's leading minor {} of the Hessian"
+        return parts("hessian", each, entries, HESSIAN, "Hessian of Pi - F x2, paper (19): {}") | parts(
+            "minor", each, minors, {"1": "J", "2": "J2"}, about
+        )
+    names = coordinate_units(scene)
+    force = {0: "J", 1: "N", 2: "N/m"}
+    units = {f"{a}_{b}": force[(names[a] == "m") + (names[b] == "m")] for a, b in product(names, names)}
+    stiffness = np.array([e.stiffness for e in equilibria]).reshape(-1, len(units))
+    return parts("stiffness", each, stiffness, units, "minus the derivative of a force by a coordinate: {}")
+
+
+def _swings(scene: Scene | Mechanism, e: Any, f: Any) -> tuple[Any, float]:
+    """Undamped natural frequencies, rising, and the time in which the slowest mode falls to 1/e."""
+    if isinstance(scene, Scene):
+        return f.natural_frequencies, f.decay_time
+    mass, _, stiffness = scene.linear(e.position)
+    squares = scipy.linalg.eigvals(stiffness, mass)
+    swings = (np.abs(squares.imag) <= 1e-12 * np.abs(squares).max()) & (squares.real > 0.0)
+    slowest = -float(f.eigenvalues.real.max())
+    decay = {"unstable": np.nan, "critical": np.nan, "stable": np.inf}.get(
+        f.verdict, 1.0 / slowest if slowest else np.inf
+    )
+    return np.sort(np.where(swings, np.sqrt(squares).real, np.nan)), decay

@@ -24,18 +24,36 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
 from fastmech.atlas.axes import grid_coefficients, refuse_decaying_load
 from fastmech.atlas.map import BLOCK, Slab, solve_block
+from fastmech.atlas.resting_map import RestingMap, map_resting_places
 from fastmech.atlas.sheets import SheetBuilder
 from fastmech.ensembles.threads import thread_count
+from fastmech.equilibria.outcome import Outcome
 from fastmech.equilibria.search import MOST
-from fastmech.errors import shown
+from fastmech.errors import InputError, shown
+from fastmech.models.mechanism import Mechanism
 from fastmech.results import Dataset, Variable, numbers
-from fastmech.scan_types.axis import Axis, arrays, check_parameters, check_size
+from fastmech.scan_types.axis import (
+    Axis,
+    arrays,
+    check_parameters,
+    check_size,
+    coordinate_units,
+    known_parameters,
+    told,
+)
 from fastmech.scan_types.map_curves import curve_variables
-from fastmech.scan_types.map_layout import TOGETHER, point_variables, sheet_table, sheet_variables
+from fastmech.scan_types.map_layout import (
+    RESTING,
+    TOGETHER,
+    point_variables,
+    resting_variables,
+    sheet_table,
+    sheet_variables,
+)
 from fastmech.scan_types.request import TiledScan
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
 from fastmech.scene import Scene, nearest
@@ -53,47 +71,42 @@ MOST_POINTS = 50_000_000
 SHEET_NUMBERS, POINT_NUMBERS = 3, 250
 
 
-def known_parameters(axes: dict[str, Axis]) -> dict[str, Axis]:
-    """Refuse axes that are no parameters of a scene, or too many."""
-    if len(axes) > 3:
-        raise ValueError("must be three axes at most")
-    for name in axes:
-        if name not in Scene.model_fields:
-            raise ValueError(f"unknown parameter {shown(name)}; {nearest(name, list(Scene.model_fields))}")
-    return axes
-
-
-def _known_variables(names: list[str]) -> list[str]:
-    known = [*point_variables(("x",), Slab.empty(1)), *TOGETHER]
-    for name in names:
-        if name not in known:
-            raise ValueError(f"unknown variable {shown(name)}; {nearest(name, known)}")
-    return names
-
-
 class EquilibriumMap(TiledScan):
     """Every equilibrium at every point of a grid of parameters, with the proof that none is missing."""
 
     kind: ClassVar[str] = "equilibrium_map"
+    of_mechanisms = True
+    taken = frozenset({"root", *RESTING})
 
-    axes: Annotated[dict[str, Axis], Field(min_length=1), AfterValidator(known_parameters)]
-    variables: Annotated[list[str], AfterValidator(_known_variables)] | None = Field(
+    axes: Annotated[dict[str, Axis], Field(min_length=1)]
+    variables: list[str] | None = Field(
         None, description="what to keep of every point (all by default); large maps are smaller with less"
     )
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Scene | Mechanism) -> None:
         """Every value of every axis must be one the scene accepts, and every axis must matter."""
-        refuse_decaying_load(scene, self.axes)
+        known_parameters(scene, self.axes)
+        if isinstance(scene, Scene):
+            refuse_decaying_load(scene, self.axes)
+            known, most = [*point_variables(("x",), Slab.empty(1)), *TOGETHER], MOST_POINTS
+        else:
+            known, most = [*coordinate_units(scene), *RESTING, *TOGETHER], MOST_OF_MECHANISMS
+            for name in self.taken & {*self.axes}:
+                raise InputError(f"axes.{name}: is the name of a variable of the result too")
+        for name in self.variables or ():
+            if name not in known:
+                raise InputError(f"variables: unknown variable {shown(name)}; {nearest(name, known)}")
         check_parameters(scene, self.axes, "axes")
-        check_size("axes", self.axes, "points", MOST_POINTS, SHEET_NUMBERS)
+        check_size("axes", self.axes, "points", most, SHEET_NUMBERS)
         first, *others = self.axes
         plane = {name: self.axes[name] for name in others} or {first: self.axes[first]}
         if others:
-            check_size("axes", plane, f"points in a plane of {first}", MOST_POINTS, POINT_NUMBERS)
+            check_size("axes", plane, f"points in a plane of {first}", most, POINT_NUMBERS)
 
-    def tiling(self, scene: Scene) -> Tiling:
-        """Planes of the first axis, and the curves as a tile of their own."""
-        return MapTiling(self, scene, arrays(self.axes))
+    def tiling(self, scene: Scene | Mechanism) -> Tiling:
+        """Planes of the first axis, and of a scene the curves as a tile of their own."""
+        made = MapTiling if isinstance(scene, Scene) else RestingTiling
+        return made(self, scene, arrays(self.axes))
 
     @property
     def wells(self) -> bool:
@@ -123,6 +136,9 @@ class EquilibriumMap(TiledScan):
 
         return draw_equilibrium_map(dataset, scene)
 
+
+#: Points of a mechanism's largest map, which is joined in memory, and of a tile of one.
+MOST_OF_MECHANISMS, RESTING_POINTS = 1_000_000, 1 << 11
 
 #: Points of a tile, about: a second of one thread where all is asked for.
 TILE_POINTS = 1 << 15
@@ -240,3 +256,77 @@ class MapTiling(Tiling):
         variables = point_variables(tuple(self.axes), Slab(**arrays))
         kept = self.request.kept(variables)
         return kept | {name: variables[name] for name in _FOR_SHEETS} if for_sheets else kept
+
+
+class RestingTiling(Tiling):
+    """Some planes of the first axis of a mechanism's map; slots are as many as the most equilibria.
+
+    Args:
+        request: what to keep.
+        scene: the mechanism, which gives every parameter that is no axis.
+        axes: parameter names with their values.
+    """
+
+    what = "points of the map"
+
+    def __init__(
+        self, request: EquilibriumMap, scene: Mechanism, axes: dict[str, NDArray[np.float64]]
+    ) -> None:
+        self.request, self.scene, self.axes = request, scene, axes
+        self.first, *others = axes
+        self.others = tuple(len(axes[other]) for other in others)
+        length = len(axes[self.first])
+        planes = max(1, RESTING_POINTS // math.prod(self.others))
+        self.parts = [slice(k, min(k + planes, length)) for k in range(0, length, planes)]
+        self.count = len(self.parts)
+
+    def items(self, index: int) -> int:
+        """Points."""
+        return (self.parts[index].stop - self.parts[index].start) * math.prod(self.others)
+
+    def compute(self, index: int, context: RunContext) -> Dataset:
+        """Prove some planes."""
+        axes = {**self.axes, self.first: self.axes[self.first][self.parts[index]]}
+        return self._tile(
+            map_resting_places(self.scene, axes, threads=context.threads, progress=lambda _: context.check())
+        )
+
+    def assemble(self, tile: Tiles) -> Dataset:
+        """Join the planes."""
+        tiles = [dict(tile(index).variables) for index in range(self.count)]
+        slots = max(one["count"].data.max(initial=0) for one in tiles)
+        described = self.scene.described()
+        variables = {name: Variable((name,), v, *described[name][1:]) for name, v in self.axes.items()}
+        variables |= numbers("root", int(slots), "rank of the equilibrium by energy")
+        for name, like in self.request.kept(tiles[0]).items():
+            arrays = []
+            for one in tiles:
+                data = one[name].data
+                if "root" in like.dims:
+                    missing = [(0, 0)] * (data.ndim - 1) + [(0, int(slots) - data.shape[-1])]
+                    data = np.pad(data, missing, constant_values=-1 if data.dtype.kind == "i" else np.nan)
+                arrays.append(data)
+            variables[name] = Variable(
+                like.dims, np.concatenate(arrays), like.units, like.long_name, like.attrs
+            )
+        layout = "slots along root, the deepest first; beyond count NaN, codes _FillValue"
+        return Dataset(variables, told(self.scene) | {"axes": tuple(self.axes), "layout": layout})
+
+    def missing(self, index: int) -> Dataset:
+        """No equilibria at the points."""
+        grid = (self.items(index) // math.prod(self.others), *self.others)
+        n, axes = (
+            len(self.scene.coordinates),
+            {**self.axes, self.first: self.axes[self.first][self.parts[index]]},
+        )
+        real, code = np.zeros((*grid, 0)), np.zeros((*grid, 0), dtype=np.int8)
+        none = np.zeros(grid, dtype=np.int16)
+        position, roots = np.zeros((*grid, 0, n)), np.zeros((*grid, 0, 2 * n), dtype=np.complex128)
+        names = tuple(coordinate_units(self.scene))
+        undecided = np.full(grid, Outcome.UNPROVED, dtype=np.int8)
+        return self._tile(
+            RestingMap(axes, names, none, undecided, position, real, real, code, code, code, roots)
+        )
+
+    def _tile(self, found: RestingMap) -> Dataset:
+        return Dataset(resting_variables(self.scene, tuple(self.axes), found))

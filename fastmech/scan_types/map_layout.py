@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.atlas.coincidence import Coincidence
 from fastmech.atlas.map import Slab
+from fastmech.atlas.resting_map import RestingMap
 from fastmech.equilibria.outcome import Outcome
 from fastmech.mechanism.impulse import POINTS
-from fastmech.results import NO_CODE, Variable, flags, numbers, parts
+from fastmech.models.drawing import Element, drawing
+from fastmech.models.mechanism import Mechanism
+from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers, parts
+from fastmech.scan_types.axis import coordinate_units
 from fastmech.stability.criteria import Verdict
 
 CRITERIA = {
@@ -77,18 +83,92 @@ def point_variables(grid: tuple[str, ...], found: Slab) -> dict[str, Variable]:
 
 
 def eigenvalue_variables(dims: tuple[str, ...], values: NDArray[np.complex128]) -> dict[str, Variable]:
-    """The four eigenvalues of the motion, ranked by real part, each in two variables."""
+    """All eigenvalues of the motion, ranked by real part, each in two variables."""
     about = "eigenvalue {} of the motion by real part"
-    real, imaginary = (dict.fromkeys("1234", unit) for unit in ("1/s", "rad/s"))
+    ranks = "12345678"[: values.shape[-1]]
+    real, imaginary = (dict.fromkeys(ranks, unit) for unit in ("1/s", "rad/s"))
     return parts("eigenvalue_re", dims, values.real, real, f"real part of {about}") | parts(
         "eigenvalue_im", dims, values.imag, imaginary, f"imaginary part of {about}"
     )
 
 
+#: Names of what a mechanism's map knows of every point beside positions and eigenvalues.
+RESTING = ("count", "count_stable", "outcome", "radius", "energy", "morse_index", "verdict", "decay_time")
+
+
+def resting_variables(mechanism: Mechanism, grid: tuple[str, ...], found: RestingMap) -> dict[str, Variable]:
+    """Everything known of a mechanism's equilibria at every point."""
+    roots = (*grid, "root")
+    units = coordinate_units(mechanism)
+    eigenvalues = np.where(np.isnan(found.eigenvalues), complex(np.nan, np.nan), found.eigenvalues)
+    slowest = -found.eigenvalues[..., 0].real
+    falling = found.verdict == Verdict.ASYMPTOTICALLY_STABLE
+    time = np.where(
+        falling,
+        1.0 / np.where(falling, slowest, 1.0),
+        np.where(found.verdict == Verdict.STABLE, np.inf, np.nan),
+    )
+    stable = np.isin(found.verdict, (Verdict.ASYMPTOTICALLY_STABLE, Verdict.STABLE)).sum(axis=-1)
+    return {
+        "count": Variable(grid, found.count, "1", "number of equilibria"),
+        "count_stable": Variable(grid, stable.astype(np.int16), "1", "number of stable equilibria"),
+        "outcome": Variable(grid, found.outcome, "1", "what is proved of the count", flags(Outcome)),
+        **{
+            name: Variable(roots, found.position[..., k], unit, f"{about_of(unit)} {name}")
+            for k, (name, unit) in enumerate(units.items())
+        },
+        "radius": Variable(
+            roots,
+            found.radius,
+            one_of(units.values()),
+            "by each coordinate the equilibrium is proved to be within",
+        ),
+        "energy": Variable(roots, found.energy, "J", "potential energy, loads at their means"),
+        "morse_index": Variable(
+            roots, found.morse_index, "1", "directions in which the energy falls, -2: not proved", NO_CODE
+        ),
+        "verdict": Variable(roots, found.verdict, "1", "stability", flags(Verdict, fill=Verdict.NONE)),
+        **eigenvalue_variables(roots, eigenvalues),
+        "decay_time": Variable(
+            roots, time, "s", "slowest linear mode falls to 1/e; inf: never, NaN: not stable"
+        ),
+    }
+
+
+def one_of(units: Iterable[str]) -> str:
+    """The unit that all have, or none."""
+    different = set(units)
+    return different.pop() if len(different) == 1 else "1"
+
+
+def about_of(unit: str) -> str:
+    """What a coordinate of this unit is."""
+    return {"rad": "angle", "m": "length"}[unit]
+
+
+def drawing_group(mechanism: Mechanism, q: NDArray[np.float64]) -> dict[str, Dataset]:
+    """What is drawn of a mechanism at its equilibria (n, coordinates), as a group of a section."""
+    drawn = drawing(mechanism, q)
+    if not drawn.kind.size or not len(q):
+        return {}
+    each = ("element",)
+    variables = {
+        "element_kind": Variable(each, drawn.kind, "1", "what is drawn", flags(Element)),
+        "element_name": Variable(each, np.array(drawn.name, dtype=object), "1", "name of a point"),
+        "element_mass": Variable(each, drawn.mass, "kg", "mass, NaN of what is no mass"),
+    } | {
+        f"element_{axis}": Variable(
+            ("equilibrium", "element", "end"), drawn.ends[..., k], "m", f"{axis} of both ends of an element"
+        )
+        for k, axis in enumerate("xy")
+    }
+    return {"drawing": Dataset(variables)}
+
+
 #: Names in requests that stand for several variables.
 TOGETHER = {
     "hessian": tuple(f"hessian_{entry}" for entry in HESSIAN),
-    **{name: tuple(f"{name}_{k}" for k in "1234") for name in ("eigenvalue_re", "eigenvalue_im")},
+    **{name: tuple(f"{name}_{k}" for k in "12345678") for name in ("eigenvalue_re", "eigenvalue_im")},
 }
 
 

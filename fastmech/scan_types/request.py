@@ -62,6 +62,7 @@ class Scan(BaseModel, ABC):
     kind: ClassVar[str]
 
     of_mechanisms: ClassVar[bool] = False  #: whether it works for any mechanism, not for the paper's alone
+    taken: ClassVar[frozenset[str]] = frozenset()  #: names of results that no coordinate may have
 
     scene: dict[str, Any] = Field(default={}, description="parameters that differ from the file's scene")
 
@@ -221,6 +222,11 @@ def request_of_text(
                 usable = ", ".join(kind for kind, made in kinds.items() if made.of_mechanisms)
                 raise InputError(
                     f"scan.{name}.kind = {scan.kind}: is for the paper's mechanism; of others: {usable}"
+                )
+            for taken in scan.taken & {*scene.state}:
+                raise InputError(
+                    f"scan.{name}.mechanism: {taken} is the name of a coordinate and of a variable of"
+                    " the result"
                 )
             if name in scene.parameters:
                 raise InputError(f"scan.{name}: is the name of a parameter of the mechanism; choose another")

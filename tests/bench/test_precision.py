@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fastmech.bench.measure import Row
-from fastmech.bench.precision import fastest_at, frontier, rate_at
+from fastmech.bench.measure import Row, fastest_at, frontier, rate_at
 from fastmech.bench.tables import equal_error, same_step
 
 pytestmark = pytest.mark.nojit

@@ -10,10 +10,9 @@ import pytest
 
 from fastmech.bench import peers as everyone
 from fastmech.bench import report, tables
-from fastmech.bench.entrant import Entrant
+from fastmech.bench.machine import multiply_adds
 from fastmech.bench.measure import Row, measure
-from fastmech.bench.peak import multiply_adds
-from fastmech.bench.problem import rest_starts
+from fastmech.bench.problem import Entrant, rest_starts
 
 
 def exact(problem, threads):

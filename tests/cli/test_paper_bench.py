@@ -20,9 +20,9 @@ class Report:
 def test_paper(invoke, monkeypatch, as_expected, code):
     asked = []
 
-    def write_paper(out, *, progress):
+    def write_paper(out, *, stage):
         asked.append(out)
-        progress(1, 2)
+        stage("pictures", 2)(1)
         return Report(as_expected)
 
     monkeypatch.setattr("fastmech.paper.report.write_paper", write_paper)

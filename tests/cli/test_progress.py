@@ -13,9 +13,9 @@ from fastmech.jit import listeners
 
 def use(bars: ProgressBars) -> None:
     with bars:
-        tell = bars.counter("pictures")
-        tell(1, 3)
-        tell(3, 3)
+        advance = bars.stage("pictures", 3)
+        advance(1)
+        advance(2)
         advance = bars.stage("map: points", 2000)
         advance(500)
         advance(1500)
@@ -48,10 +48,10 @@ def test_a_line_every_so_often_in_a_log(monkeypatch: pytest.MonkeyPatch, capsys:
     lines = capsys.readouterr().err.splitlines()
     assert lines == []
     with ProgressBars() as bars:
-        advance, tell = bars.stage("map: points", 8), bars.counter("pictures")
-        for done in range(8):
-            advance(1)
-            tell(done + 1, 8)
+        both = bars.stage("map: points", 8), bars.stage("pictures", 8)
+        for _ in range(8):
+            for advance in both:
+                advance(1)
     lines = capsys.readouterr().err.splitlines()
     assert any(line.startswith("fastmech: map: points: ") and line.endswith(" left") for line in lines)
     assert any(line.startswith("fastmech: pictures: ") and "/s, " in line for line in lines)

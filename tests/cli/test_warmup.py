@@ -67,7 +67,7 @@ def test_of_several_processes_one_compiles(tmp_path: Path) -> None:
 
 
 def test_a_process_that_ends_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(warming, "_PROCESS", "import sys; sys.stdin.readline(); sys.exit('no room')")
+    monkeypatch.setattr(warming, "_PROCESS", "import sys; sys.exit('no room')")
     with pytest.raises(RuntimeError, match=r"^map of equilibria: no room$|^folds: no room$"):
         warming.warm_up(("atlas",))
 
@@ -77,7 +77,8 @@ def test_an_interrupt_leaves_no_process(tmp_path: Path) -> None:
     running = started(tmp_path, "-m", "fastmech", "warmup", "--for", "integrate")
     assert running.stdout is not None
     assert running.stdout.readline()
-    children = Path(f"/proc/{running.pid}/task/{running.pid}/children").read_text().split()
+    threads = Path(f"/proc/{running.pid}/task").iterdir()
+    children = [child for thread in threads for child in (thread / "children").read_text().split()]
     assert children
     running.send_signal(signal.SIGINT)
     assert "interrupted" in running.communicate(timeout=20)[1]

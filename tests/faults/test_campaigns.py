@@ -26,14 +26,14 @@ def test_runs_killed_at_random_moments() -> None:
 
 def test_damaged_requests_are_refused() -> None:
     found = fuzz_requests(400, seed=1)
-    assert found.tried == 400
-    assert found.refused > 100
+    assert found.facts["requests"]["tried"] == 400
+    assert found.facts["requests"]["refused"] > 100
 
 
 def test_damaged_results_are_refused_or_have_their_values() -> None:
     found = fuzz_results(150, seed=1)
-    assert found.tried == 150
-    assert found.refused > 100
+    assert found.facts["result files"]["tried"] == 150
+    assert found.facts["result files"]["refused"] > 100
 
 
 @pytest.mark.nojit

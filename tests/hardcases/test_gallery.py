@@ -9,10 +9,9 @@ import pytest
 
 import fastmech as fm
 from fastmech.hardcases.case import Row
-from fastmech.hardcases.cases.references import goal_of
-from fastmech.hardcases.counts import counted, explicit_calls, path_eigenvalues
-from fastmech.hardcases.gallery import Result, gallery_dataset, gallery_markdown, verdict
-from fastmech.hardcases.registry import CASES
+from fastmech.hardcases.gallery import CASES, Result, gallery_dataset, gallery_markdown, verdict
+from fastmech.hardcases.references import motion
+from fastmech.hardcases.walk import counted, explicit_calls, path_eigenvalues
 from fastmech.integrators.methods import METHODS
 from fastmech.step_limits.predict import stable_step
 
@@ -56,14 +55,14 @@ def test_a_failure_is_said_in_one_line_and_in_the_file(tmp_path: Path) -> None:
     dataset = gallery_dataset([good, bad])
     assert dataset.attrs["failures"] == 1
     assert dataset["passed"].data.tolist() == [1, 1, 0]
-    text = gallery_markdown([bad], "")
+    text = gallery_markdown([bad], [])
     assert "## chaos_reversed: FAILED" in text
     assert "| euler | 0.1 | 3 | 1.0e+00 | 1.0e-08 |  | ok | FAILED: claimed to 1e-08 |" in text
 
 
 def test_fifty_times_fewer_right_hand_sides_than_rk4_at_its_limit() -> None:
     """beta = 1e6: radau5 to 1e-8, every call counted, against 4 calls a step at RK4's limit on the way."""
-    goal = goal_of("damping_1e6")
+    goal = motion("damping_1e6")
     work = counted(goal, "radau5", 120)
     assert goal.error(work.state) < 1e-8
     assert work.jacobians >= 120

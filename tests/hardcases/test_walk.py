@@ -7,10 +7,9 @@ import pytest
 
 from fastmech.ensembles.integrate import integrate
 from fastmech.hardcases.case import REFUSED
+from fastmech.hardcases.references import ROUNDED, Goal
 from fastmech.hardcases.walk import (
     FAMILIES,
-    ROUNDED,
-    Goal,
     admitted_step,
     claimed_row,
     status_row,

@@ -6,7 +6,6 @@ import math
 from itertools import pairwise
 from typing import Any
 
-import mpmath
 import numpy as np
 import pytest
 import scipy.optimize
@@ -27,6 +26,7 @@ from devices import (
 )
 
 import fastmech as fm
+from fastmech.bench.proofs import newton, unlisted
 from fastmech.equilibria.outcome import Outcome
 from fastmech.errors import InputError
 from fastmech.models.equilibria import prove_equilibria, search_rows
@@ -35,82 +35,9 @@ from fastmech.models.stability import assess
 from fastmech.models.statics import Coordinate, Statics
 
 
-def newton(statics: Statics, values: Any, starts: int, seed: int) -> np.ndarray[Any, Any]:
-    """Distinct zeros (count, n) by Newton's method from random starts, all at once."""
-    symbols = [c.symbol for c in statics.coordinates]
-    n = len(symbols)
-    given = dict(zip(statics.parameters, map(sp.Float, values), strict=True))
-    forces = [sp.sympify(f).subs(given) for f in statics.forces]
-    f = sp.lambdify(symbols, forces, "numpy")
-    slopes = sp.lambdify(symbols, [f.diff(s) for f in forces for s in symbols], "numpy")
-    low, high = (np.array([getattr(c, end) for c in statics.coordinates]) for end in ("low", "high"))
-    periodic = np.array([c.periodic for c in statics.coordinates])
-    rng = np.random.default_rng(seed)
-    q = rng.uniform(low, high, (starts, n))
-
-    def evaluated(q: Any) -> tuple[Any, Any]:
-        F = np.stack(np.broadcast_arrays(*f(*q.T), q[:, 0])[:-1], 1)
-        J = np.stack(np.broadcast_arrays(*slopes(*q.T), q[:, 0])[:-1], 1).reshape(-1, n, n)
-        return F, J
-
-    with np.errstate(all="ignore"):
-        for _ in range(60):
-            F, J = evaluated(q)
-            regular = np.isfinite(J).all((1, 2)) & np.isfinite(F).all(1)
-            step = np.zeros_like(q)
-            step[regular] = (np.linalg.pinv(J[regular]) @ F[regular, :, None])[..., 0]
-            q = q - np.clip(step, -0.5, 0.5)
-        F, J = evaluated(q)
-        scale = np.abs(J).max((1, 2)) + 1e-300
-        ends = np.abs(F).max(1) < 1e-12 * scale
-    ends &= np.where(periodic, True, (q >= low) & (q <= high)).all(1)
-    q = q[ends]
-    q = np.where(periodic, np.angle(np.exp(1j * q)), q)
-    distinct: list[Any] = []
-    for place in q:
-        away = [
-            np.where(periodic, np.angle(np.exp(1j * (place - other))), place - other) for other in distinct
-        ]
-        if not any(np.abs(a).max() < 1e-6 for a in away):
-            distinct.append(place)
-    return np.array(distinct).reshape(-1, n)
-
-
-def is_zero(statics: Statics, values: Any, place: Any) -> bool:
-    """Whether Newton's method in fifty digits ends nearby: beside a fold forces merely are small."""
-    symbols = [c.symbol for c in statics.coordinates]
-    given = dict(zip(statics.parameters, map(sp.Float, values), strict=True))
-    forces = [sp.sympify(f).subs(given) for f in statics.forces]
-    f = sp.lambdify(symbols, forces, "mpmath")
-    J = sp.lambdify(symbols, sp.Matrix(forces).jacobian(symbols), "mpmath")
-    with mpmath.workdps(50):
-        q = mpmath.matrix([mpmath.mpf(float(value)) for value in place])
-        for _ in range(80):
-            step = mpmath.lu_solve(J(*q), mpmath.matrix(f(*q)))
-            q -= step
-            if mpmath.norm(step) < 1e-40:
-                return bool(mpmath.norm(q - mpmath.matrix(place.tolist())) < 1e-3)
-    return False
-
-
-def unlisted(statics: Statics, values: Any, starts: int, seed: int = 0) -> list[Any]:
-    """Zeros that the search finds and the proof neither lists nor leaves open."""
-    found = prove_equilibria(statics, values)
-    periodic = np.array([c.periodic for c in statics.coordinates])
-
-    def away(a: Any, b: Any) -> Any:
-        return np.abs(np.where(periodic, np.angle(np.exp(1j * (a - b))), a - b))
-
-    missing = []
-    for place in newton(statics, values, starts, seed):
-        listed = any((away(place, item.position) < 1e-5).all() for item in found)
-        open_still = any(
-            (away(place, 0.5 * (p.low + p.high)) <= 0.5 * (p.high - p.low) + 1e-5).all()
-            for p in found.certificate.places
-        )
-        if not listed and not open_still and is_zero(statics, values, place):
-            missing.append(place)
-    return missing
+def missing(statics: Statics, values: Any, starts: int, seed: int = 0) -> list[Any]:
+    """Zeros that Newton's method finds and the proof neither lists nor leaves open."""
+    return unlisted(statics, values, prove_equilibria(statics, values), newton(statics, values, starts, seed))
 
 
 def slider_metric_and_damping(scene: fm.Scene, phi: float, theta: float) -> tuple[Any, Any]:
@@ -202,7 +129,7 @@ def test_where_a_bar_has_no_length_it_is_said_that_forces_are_not_defined() -> N
     for place in found.certificate.places:
         assert "not defined" in place.reason
         np.testing.assert_allclose(np.abs(0.5 * (place.low + place.high)), [1.0, 0.0], atol=1e-7)
-    assert not unlisted(truss(2.0), [100.0, 1.2, 5.0], 5000)
+    assert not missing(truss(2.0), [100.0, 1.2, 5.0], 5000)
 
 
 def test_inverted_pendulum_on_a_cart() -> None:
@@ -255,9 +182,19 @@ def test_the_end_of_a_range_and_the_limit_are_told() -> None:
     assert "limit" in few.certificate.sentence
 
 
-def test_degree_is_not_claimed_where_a_force_changes_sign_on_an_end() -> None:
-    statics = of_potential([ranged(x, -1.0, 1.0), ranged(y, -1.0, 1.0)], (), x * y + x**3 / 9)
-    assert prove_equilibria(statics).certificate.expected_sum is None
+def test_indices_sum_to_the_turns_of_the_force_along_the_ends() -> None:
+    """By hand: saddles where no force keeps its sign on an end, a ring, a zero on the boundary."""
+    saddle = of_potential([ranged(x, -1.0, 1.0), ranged(y, -1.0, 1.0)], (), x * y + x**3 / 9)
+    certificate = prove_equilibria(saddle).certificate
+    assert (certificate.expected_sum, certificate.index_sum) == (-1, -1)
+    monkey = of_potential([ranged(x, -1.0, 1.0), ranged(y, -1.1, 0.9)], (), x**3 - 3 * x * y**2 + x / 9)
+    certificate = prove_equilibria(monkey).certificate
+    assert (certificate.expected_sum, certificate.index_sum) == (-2, -2)
+    ring = of_potential([angle(phi), ranged(x, 0.5, 2.0)], (), (x - 1) ** 2 * 5 + x * sp.cos(phi))
+    certificate = prove_equilibria(ring).certificate
+    assert (certificate.expected_sum, certificate.index_sum) == (0, 0)
+    on_end = of_potential([ranged(x, -1.0, 1.0), ranged(y, -1.0, 1.0)], (), (x - 1) ** 2 + y**2)
+    assert prove_equilibria(on_end).certificate.expected_sum is None
 
 
 def random_mechanism(rng: np.random.Generator) -> tuple[Statics, list[float]]:
@@ -297,7 +234,7 @@ def test_nothing_is_found_beside_the_list_in_random_mechanisms() -> None:
     outcomes = []
     for seed in range(12):
         statics, values = random_mechanism(rng)
-        assert unlisted(statics, values, 1000, seed) == []
+        assert missing(statics, values, 1000, seed) == []
         certificate = prove_equilibria(statics, values).certificate
         outcomes.append(certificate.outcome)
         if certificate.complete and certificate.expected_sum is not None:
@@ -334,7 +271,7 @@ def test_public_names_take_a_mechanism() -> None:
 
 @pytest.mark.parametrize(
     ("force", "line"),
-    [(sp.Abs(x) - 1, "no proved bounds"), (x ** sp.Rational(1, 3), "no proved bounds"), (phi * x, "phi")],
+    [(sp.tanh(x) - 1, "no proved bounds"), (x ** sp.Rational(1, 3), "no proved bounds"), (phi * x, "phi")],
 )
 def test_what_has_no_bounds_is_refused(force: Any, line: str) -> None:
     with pytest.raises(InputError, match=line):

@@ -242,3 +242,19 @@ def test_a_scene_under_another_load_is_a_mechanism(states: np.ndarray) -> None:
         fm.Scene(c1=-1.0, load=fm.loads.Constant(1.0))
     with pytest.raises(fm.InputError, match="must be a number or a SymPy expression"):
         fm.Scene(load="strong")
+
+
+def test_a_metric_is_proved_to_be_positive_definite() -> None:
+    """Also where a narrow place escapes what is tried; where functions have no bounds it stays open."""
+    assert all(
+        getattr(fm.mechanisms, name)().definite for name in fm.mechanisms.__all__ if name != "pendulum_chain"
+    )
+    assert fm.mechanisms.pendulum_chain(3).definite
+    assert not fm.mechanisms.pendulum_chain(4).definite  # too long
+    q, (a, b) = fm.lengths("q", -2.0, 2.0), sympy.symbols("a b")
+    pit = a - sympy.exp(-((q - b) ** 2) * 1e10)
+    mechanism = fm.Mechanism(q, {"a": 1.5, "b": 0.123}, kinetic=pit * q.dot**2 / 2, potential=q**2)
+    assert mechanism.definite
+    with pytest.raises(fm.InputError, match=r"not positive definite, as at q = 0\.123"):
+        mechanism.replace(a=0.9)
+    assert not fm.Mechanism(q, kinetic=(2 + sympy.tanh(q)) * q.dot**2 / 2, potential=q**2).definite

@@ -1,13 +1,14 @@
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from fastmech.paper.compare import load_printed
 from fastmech.paper.compute import Computed, compute
-from fastmech.paper.printed import load_printed
 from fastmech.paper.report import PaperReport, write_paper
 
 
@@ -29,12 +30,17 @@ def computed(print_: dict[str, Any]) -> Computed:
 
 
 @pytest.fixture(scope="session")
-def told() -> list[tuple[int, int]]:
-    """What the report's progress was told."""
+def told() -> list[int]:
+    """Of how many pieces of work the report told, and when each was done."""
     return []
 
 
 @pytest.fixture(scope="session")
-def report(tmp_path_factory: pytest.TempPathFactory, told: list[tuple[int, int]]) -> PaperReport:
+def report(tmp_path_factory: pytest.TempPathFactory, told: list[int]) -> PaperReport:
     out: Path = tmp_path_factory.mktemp("paper") / "report"
-    return write_paper(out, progress=lambda done, total: told.append((done, total)))
+
+    def stage(name: str, total: int) -> Callable[[int], None]:
+        told.append(total)
+        return told.append
+
+    return write_paper(out, stage=stage)

@@ -5,7 +5,7 @@ import pytest
 from oracles import TABLE_1, oracle
 
 from fastmech.paper.scene import STATIC_SCENE
-from fastmech.plots.mechanism import ROD, draw_mechanism
+from fastmech.plots.mechanism import ROD, draw_mechanism, drawing_of
 from fastmech.plots.style import new_figure, png, style
 
 
@@ -15,7 +15,7 @@ def test_rods_are_where_the_oracle_has_the_points(angles: tuple[float, float], f
     with style():
         figure = new_figure()
         axes = figure.subplots()
-        draw_mechanism(axes, STATIC_SCENE, *angles, force)
+        draw_mechanism(axes, drawing_of(STATIC_SCENE, angles, force))
     rods = [np.transpose(line.get_data()) for line in axes.lines if line.get_color() == ROD]
     x1, y1, x2, y2, x3, y3 = (float(x) for x in oracle().positions(TABLE_1, angles))
     expected = [[(0, 0), (x1, y1)], [(x1, y1), (x2, y2)], [(x1, y1), (x3, y3)]]

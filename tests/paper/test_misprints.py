@@ -7,10 +7,9 @@ import pytest
 from oracles import TABLE_1, oracle
 
 from fastmech.paper.coefficients import hamiltonian_16
-from fastmech.paper.compare import Verdict
+from fastmech.paper.compare import Verdict, evaluate
 from fastmech.paper.compute import Computed
 from fastmech.paper.misprints import Misprint, candidates
-from fastmech.paper.printed import evaluate
 from fastmech.paper.rows import all_rows
 from fastmech.paper.scene import PAPER_SCENE
 

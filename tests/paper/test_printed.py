@@ -2,8 +2,16 @@ from __future__ import annotations
 
 import pytest
 
-from fastmech.paper.compare import Judge, Verdict, compare, number
-from fastmech.paper.printed import agrees, agrees_legibly, evaluate, half_unit
+from fastmech.paper.compare import (
+    Judge,
+    Verdict,
+    agrees,
+    agrees_legibly,
+    compare,
+    evaluate,
+    half_unit,
+    number,
+)
 
 pytestmark = pytest.mark.nojit
 

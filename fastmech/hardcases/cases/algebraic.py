@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastmech.basins.label import labels_of
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.ensembles.status import Status
 from fastmech.equilibria.find import find_equilibria
-from fastmech.hardcases.case import HardCase, Row, energy, row_of
+from fastmech.hardcases.case import Floats, HardCase, Row, energy, labels_row, row_of
 from fastmech.hardcases.walk import WITHIN, labellers, walked
 from fastmech.integrators.methods import find_method
 from fastmech.scene import Scene
-from fastmech.stability.linearize import Rest, jacobian
+from fastmech.stability.linearize import jacobian
 from fastmech.step_limits.amplification import amplification
 from fastmech.step_limits.warning import beyond_stability, step_limit
 
@@ -57,7 +57,7 @@ LABELLED = 60.0
 OUTPUTS, BINS = 4000, 10
 
 
-def decay_power(t: NDArray[np.float64], level: NDArray[np.float64]) -> float:
+def decay_power(t: Floats, level: Floats) -> float:
     """The p of E = C (t + t0)^-p, over the last three quarters of a run.
 
     E / -E' = (t + t0) / p is a straight line in t whatever the unknown t0; rates come from means over bins,
@@ -87,34 +87,30 @@ def _kept_step(method: str, scene: Scene, frequency: float, length: float, most:
     return 0.0
 
 
-def _missed(name: str) -> Callable[[bool], Sequence[Row]]:
+def _missed(name: str, quick: bool) -> Sequence[Row]:
     changes, (phi, theta), expected, _ = _SETS[name]
     scene = Scene(alpha=0.0).replace(**changes)
+    near = min(find_equilibria(scene), key=lambda e: abs(e.phi - phi) + abs(e.theta - theta))
+    values = np.linalg.eigvals(jacobian(scene, near))
+    frequency = float(np.abs(values[np.argmin(np.abs(values.real))].imag))
+    at = np.array([near.phi, near.theta, 0.0, 0.0])
+    return [_decay(scene, at, frequency, expected, method, quick) for method in walked(quick)]
 
-    def run(quick: bool) -> Sequence[Row]:
-        near = min(find_equilibria(scene), key=lambda e: abs(e.phi - phi) + abs(e.theta - theta))
-        values = np.linalg.eigvals(jacobian(scene, near))
-        frequency = float(np.abs(values[np.argmin(np.abs(values.real))].imag))
-        return [_decay(near, method, frequency, quick) for method in walked(quick)]
 
-    def _decay(near: Rest, method: str, frequency: float, quick: bool) -> Row:
-        length, most = (QUICK, QUICK_MOST_STEPS) if quick else (FULL, MOST_STEPS)
+def _decay(scene: Scene, at: Floats, frequency: float, expected: float, method: str, quick: bool) -> Row:
+    length, most = (QUICK, QUICK_MOST_STEPS) if quick else (FULL, MOST_STEPS)
+    dt = _kept_step(method, scene, frequency, length, most)
+    if dt == 0.0 and not quick:  # the shorter run asks for less
+        length = QUICK
         dt = _kept_step(method, scene, frequency, length, most)
-        if dt == 0.0 and not quick:  # the shorter run asks for less
-            length = QUICK
-            dt = _kept_step(method, scene, frequency, length, most)
-        times = np.linspace(0.0, length, OUTPUTS + 1)[1:]
-        start = [near.phi, near.theta + SIZE, 0.0, 0.0]
-        if dt == 0.0:
-            result = integrate(scene, start, length, TOO_LONG, method)
-            return row_of(result, np.nan, np.nan, claimed=False, why="drives the mode that nothing damps")
-        result = integrate(scene, start, t_eval=times, dt=dt, method=method)
-        level = energy(scene, result.y[:, 0]) - energy(scene, np.array([near.phi, near.theta, 0.0, 0.0]))
-        power = decay_power(times, level)
-        why = "its own damping of the mode is far less"
-        return row_of(result, abs(power - expected), ALLOWED, remark=f"E ~ t^-{power:.3f}", why=why)
-
-    return run
+    times, start = np.linspace(0.0, length, OUTPUTS + 1)[1:], at + np.array([0.0, SIZE, 0.0, 0.0])
+    if dt == 0.0:
+        result = integrate(scene, start, length, TOO_LONG, method)
+        return row_of(result, np.nan, np.nan, claimed=False, why="drives the mode that nothing damps")
+    result = integrate(scene, start, t_eval=times, dt=dt, method=method)
+    power = decay_power(times, energy(scene, result.y[:, 0]) - energy(scene, at))
+    why = "its own damping of the mode is far less"
+    return row_of(result, abs(power - expected), ALLOWED, remark=f"E ~ t^-{power:.3f}", why=why)
 
 
 _CIRCLING = Scene(F0=0.0, c1=94.14384, c2=50.0, alpha=0.0)
@@ -162,18 +158,7 @@ def _circling(quick: bool) -> Sequence[Row]:
 def _undecided(method: str) -> Row:
     """The label of the circling motion: there is none."""
     found = labels_of(_CIRCLING, _CIRCLING_START, LABELLED, method=method)
-    captured = int((found.status != Status.UNDECIDED).sum())
-    if not captured:
-        status, claimed, error = "ok", True, 0.0
-    else:
-        status, claimed, error = _failed(Status(found.status[0])), False, np.nan
-    remark = "label: " + Status(found.status[0]).name.lower()
-    return Row(method, np.nan, found.steps, error, 0.0, np.nan, status, claimed, remark, "fm.labels_of")
-
-
-def _failed(kind: Status) -> str:
-    """The integration's status of a label's, "ok" for labels: none is right here."""
-    return {Status.NOT_FINITE: "not_finite", Status.STEP_TOO_LARGE: "step_too_large"}.get(kind, "ok")
+    return labels_row(method, found, int((found.status == Status.CAPTURED).sum()))
 
 
 CASES = (
@@ -183,7 +168,7 @@ CASES = (
             f"the damping misses a mode, {what}: linear theory is silent and the decay algebraic",
             f"the energy falls like t^-{power:g}; error: distance of the fitted power",
             "the amplitude falls slowly, as it should, and neither freezes nor grows",
-            _missed(name),
+            partial(_missed, name),
         )
         for name, (_, _, power, what) in _SETS.items()
     ),

@@ -10,10 +10,9 @@ from scipy.integrate import solve_ivp
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
-from fastmech.hardcases.case import Floats, HardCase, Row, energy, row_of
+from fastmech.hardcases.case import DRIVEN, Floats, HardCase, Row, energy, row_of
 from fastmech.hardcases.references import motion
-from fastmech.hardcases.walk import Goal, admitted_step, claimed_row, fixed_row, walked
-from fastmech.integrators.methods import find_method
+from fastmech.hardcases.walk import admitted_step, claimed_row, fixed_row, halving_tells, walked
 from fastmech.scene import Scene
 from fastmech.transients.lyapunov import largest_lyapunov
 
@@ -56,8 +55,7 @@ def _predictability(quick: bool) -> Sequence[Row]:
         dt = admitted_step(SCENE, method, 0.01, starts)
         run = integrate(SCENE, starts, t_eval=times, dt=dt or 0.01, method=method)
         if dt == 0.0:
-            why = "undamped motions grow with every step"
-            rows.append(row_of(run, np.nan, np.nan, claimed=False, why=why))
+            rows.append(row_of(run, np.nan, np.nan, claimed=False, why=DRIVEN))
             continue
         apart = np.linalg.norm(run.y[:, 1:] - run.y[:, :1], axis=2)
         lost = apart > LOST
@@ -92,7 +90,7 @@ def _returned(method: str) -> Row:
     while 0.0 < REVERSE <= MOST_STEPS * dt:
         again, end, drift = _there_and_back(method, dt)
         _, finer, _ = _there_and_back(method, 0.5 * dt)
-        estimate = float(np.abs(end - finer).max()) / (1.0 - 0.5 ** find_method(method).order)
+        estimate = halving_tells(method, end, finer)
         if estimate <= 0.5 * WORTHLESS:
             error, claim = float(np.abs(end - START).max()), 2.0 * estimate + ROUNDED
             return row_of(again, error, claim, drift, why="twice what halving the step tells")
@@ -150,8 +148,7 @@ def _published(quick: bool) -> Sequence[Row]:
 
 
 def _reference(quick: bool) -> Sequence[Row]:
-    m = motion("chaos")
-    goal = Goal(m.scene, m.start, m.t, m.state, ROUNDED_REFERENCE)
+    goal = motion("chaos", ROUNDED_REFERENCE)
     declared = (("dop853", 0.01, 1e-6), ("gauss6", 0.005, 1e-6), ("abm12", 0.004, 1e-6))
     rows = [fixed_row(goal, method, dt, allowed, "declared") for method, dt, allowed in declared]
     return rows + [claimed_row(goal, method, 0.01, TOO_LONG) for method in walked(quick)]

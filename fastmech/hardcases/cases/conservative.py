@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
 from fastmech.ensembles.balance import lowest_potential
 from fastmech.ensembles.integrate import Trajectories, integrate
-from fastmech.hardcases.case import Floats, HardCase, Row, energy, row_of
-from fastmech.hardcases.walk import admitted_step, walked
-from fastmech.integrators.methods import find_method
+from fastmech.hardcases.case import DRIVEN, Floats, HardCase, Row, energy, row_of
+from fastmech.hardcases.walk import admitted_step, halving_tells, walked
 from fastmech.scene import Scene
 
 SCENE = Scene(c2=1100 / 3, beta=0.0, F0=0.0)
@@ -61,57 +61,55 @@ def _walked(start: Sequence[float], method: str, steps: int) -> Row:
     dt = admitted_step(SCENE, method, DT, np.array([start]))
     if dt == 0.0:
         _, error, run = energy_history(start, method, "lagrange", steps)
-        why = "undamped motions grow with every step"
-        return row_of(run, float(np.abs(error).max()), np.nan, claimed=False, why=why)
+        return row_of(run, float(np.abs(error).max()), np.nan, claimed=False, why=DRIVEN)
     count = round(steps * DT / dt)
     fitted = steps * DT / count
     _, error, run = energy_history(start, method, "lagrange", count, fitted)
     half = energy_history(start, method, "lagrange", 2 * count, 0.5 * fitted)
-    estimate = float(np.abs(error - half[1]).max()) / (1.0 - 0.5 ** find_method(method).order)
+    estimate = halving_tells(method, error, half[1])
     drift = float(np.abs(error).max())
     why = "twice what halving the step tells"
     return row_of(run, drift, 2.0 * estimate + ROUNDED, drift, remark="lagrange, largest error", why=why)
 
 
-def _case(name: str, start: Sequence[float], entries: Sequence[tuple[str, str, float, float]]) -> HardCase:
-    """``entries``: method, formulation, allowed trend, allowed drift."""
+#: Start, and of the methods that the case is about: formulation, allowed trend and allowed drift.
+_STARTS: dict[str, tuple[Sequence[float], tuple[tuple[str, str, float, float], ...]]] = {
+    "undamped_paper_start": (
+        PAPER_START,
+        (
+            ("gauss6", "hamilton", 1e-10, 1e-10),
+            ("gauss6", "lagrange", 1e-9, 1e-9),
+            ("dop853", "lagrange", 1e-8, 1e-8),
+            ("rk4", "lagrange", 1e-3, 1e-3),
+        ),
+    ),
+    "undamped_energetic_start": (
+        ENERGETIC_START,
+        (
+            ("gauss6", "hamilton", 1e-10, 1e-6),
+            ("gauss6", "lagrange", 1e-8, 1e-6),
+            ("dop853", "lagrange", 1e-6, 1e-6),
+            ("rk4", "lagrange", 1e-2, 1e-2),
+        ),
+    ),
+}
 
-    def run(quick: bool) -> Sequence[Row]:
-        rows = [_long(start, entry, QUICK_STEPS if quick else STEPS) for entry in entries]
-        return rows + [
-            _walked(start, method, QUICK_WALK_STEPS if quick else WALK_STEPS) for method in walked(quick)
-        ]
 
-    return HardCase(
+def _run(name: str, quick: bool) -> Sequence[Row]:
+    (start, entries), short = _STARTS[name], QUICK_WALK_STEPS if quick else WALK_STEPS
+    rows = [_long(start, entry, QUICK_STEPS if quick else STEPS) for entry in entries]
+    return rows + [_walked(start, method, short) for method in walked(quick)]
+
+
+CASES = tuple(
+    HardCase(
         name,
         f"beta = 0 for a million steps from {start}: whatever a step loses adds up",
         "energy is conserved; the error is the trend of E over E - U_min during the whole run; of shorter "
         "runs of all methods, the largest error of E",
         "Gauss 6 on the canonical equations keeps the energy to 1e-10 and shows no trend; the others drift "
         "slowly, by what their order lets them; Euler's method ends with a status",
-        run,
+        partial(_run, name),
     )
-
-
-CASES = (
-    _case(
-        "undamped_paper_start",
-        PAPER_START,
-        [
-            ("gauss6", "hamilton", 1e-10, 1e-10),
-            ("gauss6", "lagrange", 1e-9, 1e-9),
-            ("dop853", "lagrange", 1e-8, 1e-8),
-            ("rk4", "lagrange", 1e-3, 1e-3),
-        ],
-    ),
-    _case(
-        "undamped_energetic_start",
-        ENERGETIC_START,
-        [
-            ("gauss6", "hamilton", 1e-10, 1e-6),
-            ("gauss6", "lagrange", 1e-8, 1e-6),
-            ("dop853", "lagrange", 1e-6, 1e-6),
-            ("rk4", "lagrange", 1e-2, 1e-2),
-        ],
-    ),
+    for name, (start, _) in _STARTS.items()
 )

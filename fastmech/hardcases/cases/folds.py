@@ -8,7 +8,8 @@ x = -d tanh(r t / 2) before and d tan(r t / 2) behind it: the ghost is left afte
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ from fastmech.basins.label import labels_of
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import Status
 from fastmech.equilibria.find import Equilibria, find_equilibria
-from fastmech.hardcases.case import Floats, HardCase, Row, row_of
+from fastmech.hardcases.case import DRIVEN, Floats, HardCase, Row, labels_row, row_of
 from fastmech.hardcases.walk import admitted_step, labellers, walked
 from fastmech.scene import Scene
 from fastmech.stability.linearize import jacobian
@@ -81,7 +82,7 @@ def _creeping(passage: _Passage, side: float, method: str) -> Row:
         phase = np.arctan(x) if side > 0.0 else -np.arctanh(x)
     error = abs(float(phase) / (0.5 * passage.rate * CREEPING) - 1.0)
     if dt == 0.0:
-        return row_of(run, error, np.nan, claimed=False, why="undamped motions grow with every step")
+        return row_of(run, error, np.nan, claimed=False, why=DRIVEN)
     return row_of(run, error, ALLOWED, remark=f"{x * passage.half:.2e} rad on", why="resolves the slow rate")
 
 
@@ -122,22 +123,15 @@ def _labels(passage: _Passage, side: float, method: str) -> Row:
     inside = (OUTWARDS <= 0.0) & (side < 0.0)
     right = np.where(inside, np.isin(found.well, shallow) & (OUTWARDS < 0.0), found.well == deep)
     wrong = int((captured & ~right).sum() + np.isfinite(found.settle_time).sum())
-    kinds = {name: n for name, n in found.counts.items() if n}
-    remark = "labels: " + ", ".join(f"{n} {name}" for name, n in kinds.items()) + "; none settled"
-    return Row(method, np.nan, found.steps, float(wrong), 0.0, np.nan, "ok", True, remark, "fm.labels_of")
+    return labels_row(method, found, wrong, "; none settled")
 
 
-def _beside(side: float) -> Callable[[bool], Sequence[Row]]:
-    def run(quick: bool) -> Sequence[Row]:
-        passage = _passage()
-        rows = [_creeping(passage, side, method) for method in walked(quick)]
-        if not quick:
-            rows += [
-                _whole(passage, side, row.method) for row in rows if row.claimed and row.dt >= AFFORDABLE
-            ]
-        return [*rows, *(_labels(passage, side, method) for method in labellers(quick))]
-
-    return run
+def _beside(side: float, quick: bool) -> Sequence[Row]:
+    passage = _passage()
+    rows = [_creeping(passage, side, method) for method in walked(quick)]
+    if not quick:
+        rows += [_whole(passage, side, row.method) for row in rows if row.claimed and row.dt >= AFFORDABLE]
+    return [*rows, *(_labels(passage, side, method) for method in labellers(quick))]
 
 
 CASES = tuple(
@@ -147,7 +141,7 @@ CASES = tuple(
         "the fold's normal form with the saddle's eigenvalue; error: of the phase on the way, of the time of "
         "leaving, of the minimum's place; of fm.labels_of, the number of wrong labels and of settled motions",
         must,
-        _beside(side),
+        partial(_beside, side),
     )
     for name, side, where, must in (
         (

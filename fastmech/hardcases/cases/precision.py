@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.basins.label import labels_of
-from fastmech.ensembles.integrate import Trajectories, integrate
+from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import Status
 from fastmech.errors import InputError
-from fastmech.hardcases.case import REFUSED, Floats, HardCase, Row, row_of
+from fastmech.hardcases.case import REFUSED, Floats, HardCase, Row, labels_row, row_of
 from fastmech.hardcases.references import Boundary, boundary
-from fastmech.hardcases.walk import admitted_step, labellers, without_euler
-from fastmech.integrators.methods import find_method
+from fastmech.hardcases.walk import admitted_step, halving_tells, labellers, without_euler
 
 #: Distances from the boundary [rad], on both sides.
 DISTANCES = 10.0 ** -np.arange(3.0, 15.0)
@@ -29,60 +29,51 @@ NEAR = 5.0
 RIGHT_FROM = {"float64": 1e-12, "float32": 1e-4}
 
 
-def _starts(edge: Boundary) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]:
-    """Starts (n, 4), whether each lies above the boundary, and its distance [rad]."""
-    shift = np.concatenate([-DISTANCES, DISTANCES])
+class _Line(NamedTuple):
+    """Starts at rest on both sides of the boundary."""
+
+    edge: Boundary
+    starts: Floats  #: (n, 4)
+    above: NDArray[np.bool_]  #: whether each lies above the boundary
+    distance: Floats  #: from it [rad]
+
+
+def _line() -> _Line:
+    edge, shift = boundary(), np.concatenate([-DISTANCES, DISTANCES])
     starts = np.zeros((shift.size, 4))
     starts[:, 0] = edge.phi + shift
-    return starts, shift > 0.0, np.abs(shift)
-
-
-def _wrong(edge: Boundary, run: Trajectories, above: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which trajectories have not ended where they must."""
-    to_above, to_below = (np.abs(run.y[-1, :, :2] - end).max(axis=1) for end in (edge.above, edge.below))
-    return np.asarray((to_above < to_below) != above)
+    return _Line(edge, starts, shift > 0.0, np.abs(shift))
 
 
 def _run(quick: bool) -> Sequence[Row]:
-    edge = boundary()
-    starts, above, distance = _starts(edge)
-    rows = []
+    line, rows = _line(), []
     for method in without_euler(quick):
-        dt = admitted_step(edge.scene, method, DT)
-        for dtype, allowed in RIGHT_FROM.items():
-            rows.append(_ends(edge, starts, above, distance, method, dt, dtype, allowed))
-    return [*rows, *(_certified(edge, starts, above, distance, method) for method in labellers(quick))]
+        dt = admitted_step(line.edge.scene, method, DT)
+        rows += [_ends(line, method, dt, dtype) for dtype in RIGHT_FROM]
+    return [*rows, *(_certified(line, method) for method in labellers(quick))]
 
 
-def _ends(
-    edge: Boundary,
-    starts: Floats,
-    above: NDArray[np.bool_],
-    distance: Floats,
-    method: str,
-    dt: float,
-    dtype: str,
-    allowed: float,
-) -> Row:
+def _ends(line: _Line, method: str, dt: float, dtype: str) -> Row:
     """Where motions end in one precision; the boundary that a method sees moves by its own error, too."""
+    edge, starts, above, distance = line
     try:
         run = integrate(edge.scene, starts, T_END, dt, method, dtype=dtype)
     except InputError as refusal:
         why = "float32 is not offered"
         return Row(method, dt, 0, np.nan, np.nan, np.nan, REFUSED, False, str(refusal), why)
-    error = float(distance[_wrong(edge, run, above)].max(initial=0.0))
+    to_above, to_below = (np.abs(run.y[-1, :, :2] - end).max(axis=1) for end in (edge.above, edge.below))
+    error = float(distance[(to_above < to_below) != above].max(initial=0.0))
     near = integrate(edge.scene, starts, NEAR, dt, method).y[-1]
     half = integrate(edge.scene, starts, NEAR, 0.5 * dt, method).y[-1]
-    estimate = 2.0 * float(np.abs(near - half).max()) / (1.0 - 0.5 ** find_method(method).order)
+    estimate = 2.0 * halving_tells(method, near, half)
     farthest = f"farthest wrong end {error:.0e} rad from the boundary" if error else "every end is right"
     remark, why = f"{dtype}: {farthest}", "rounding, and what halving the step tells"
-    return row_of(run, error, allowed + estimate, remark=remark, why=why)
+    return row_of(run, error, RIGHT_FROM[dtype] + estimate, remark=remark, why=why)
 
 
-def _certified(
-    edge: Boundary, starts: Floats, above: NDArray[np.bool_], distance: Floats, method: str
-) -> Row:
+def _certified(line: _Line, method: str) -> Row:
     """Labels with a proof: none may be wrong, and near the boundary there must be none but a status."""
+    edge, starts, above, distance = line
     found = labels_of(edge.scene, starts, T_END, method=method)
     tree = found.tree
     assert tree is not None
@@ -94,9 +85,7 @@ def _certified(
     nearest = float(distance[proved].min(initial=np.inf))
     others = ", ".join(sorted({Status(s).name.lower() for s in found.status[~proved]}))
     remark = f"labels: {proved.sum()} of {above.size} proved, to {nearest:.0e} rad; nearer: {others}"
-    return Row(
-        method, np.nan, found.steps, float(wrong.sum()), 0.0, np.nan, "ok", True, remark, "fm.labels_of"
-    )
+    return labels_row(method, found, wrong.sum())._replace(remark=remark)
 
 
 CASES = (

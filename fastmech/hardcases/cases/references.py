@@ -1,13 +1,19 @@
-"""Extreme parameters, rates, angles and forces: the end of one motion against extended precision."""
+"""Extreme damping, parameters, rates, angles and forces: the end of one motion against extended precision."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
+import numpy as np
+
 from fastmech.hardcases.case import HardCase, Row
-from fastmech.hardcases.references import motion
-from fastmech.hardcases.walk import ROUNDED, Goal, claimed_row, fixed_row, status_row, walked
+from fastmech.hardcases.references import ROUNDED, Goal, motion
+from fastmech.hardcases.walk import claimed_row, counted, explicit_calls, fixed_row, status_row, walked
+from fastmech.integrators.method import ImplicitRungeKutta
+from fastmech.integrators.methods import find_method
+from fastmech.step_limits.warning import step_warning
 
 ORACLE = "heyoka in 80-bit arithmetic; relative error of the final state"
 
@@ -23,12 +29,30 @@ class _Motion(NamedTuple):
     all_refuse: bool = True  #: whether no method may give a number with the step ``refused``
     single: bool = False  #: whether lanes of float32 claim it
     rounded: float = ROUNDED
+    stiff: bool = False  #: whether explicit methods whose limit the step exceeds end with a status
+    #: Method, step [s], error that it must keep, and how many times fewer calls than RK4's it takes.
+    counted: tuple[tuple[str, float, float, float], ...] = ()
 
 
 #: Error that lanes of float32 claim: fm.integrate's documentation.
 SINGLE = 1e-4
 
+_L_STABLE = "the L-stable methods reach 1e-8 at steps far above RK4's limit"
+_BEYOND = "methods whose limit the step exceeds end with a status"
+
 _MOTIONS: dict[str, _Motion] = {
+    "damping_1e4": _Motion(
+        "beta = 1e4 N s/m: one rate of motion is a hundred times the others",
+        f"{_L_STABLE}; {_BEYOND}",
+        0.005, 0.005, (("radau5", 0.005, 1e-8), ("sdirk4", 0.002, 1e-8), ("gauss6", 0.005, 1e-8)),
+        all_refuse=False, stiff=True,
+    ),
+    "damping_1e6": _Motion(
+        "beta = 1e6 N s/m: one rate of motion is ten thousand times the others",
+        f"{_L_STABLE}, Radau IIA with a fiftieth of RK4's right-hand sides; {_BEYOND}",
+        1 / 60, 1 / 60, all_refuse=False, stiff=True,
+        counted=(("radau5", 1 / 60, 1e-8, 50.0), ("sdirk4", 0.005, 1e-8, 0.0)),
+    ),
     "fast_rates": _Motion(
         "both bodies turn at 100 rad/s",
         "a step of a few hundredths of a radian keeps ten digits; 5 rad in a step are told by a status",
@@ -78,36 +102,49 @@ _MOTIONS: dict[str, _Motion] = {
 }  # fmt: skip
 
 
-def goal_of(name: str, rounded: float = ROUNDED) -> Goal:
-    """A reference motion as what methods are sent to."""
-    m = motion(name)
-    return Goal(m.scene, m.start, m.t, m.state, rounded)
+def _counted_row(goal: Goal, method: str, dt: float, allowed: float, fewer: float) -> Row:
+    """A declared claim with every right-hand side counted; too many of them fail the row."""
+    row = fixed_row(goal, method, dt, allowed, "L-stable")
+    work = counted(goal, method, round(goal.t_end / dt))
+    least = explicit_calls(goal, work.path)
+    remark = (
+        f"{work.calls:,} right-hand sides and {work.jacobians:,} Jacobians; RK4 at its limit {least:,.0f}, "
+        f"{least / work.calls:.0f} times as many"
+    )
+    error = max(row.error, goal.error(work.state)) if least >= fewer * work.calls else np.inf
+    return row._replace(error=error, remark=remark)
 
 
-def _runner(name: str) -> Callable[[bool], Sequence[Row]]:
-    def run(quick: bool) -> Sequence[Row]:
-        m = _MOTIONS[name]
-        goal = goal_of(name, m.rounded)
-        rows = [fixed_row(goal, method, dt, allowed, "declared") for method, dt, allowed in m.claims]
-        rows += [claimed_row(goal, method, m.step, m.refused) for method in walked(quick)]
-        if m.single:
-            why = "what fm.integrate says of float32"
-            rows += [fixed_row(goal, method, m.step, SINGLE, why, "float32") for method in ("rk4", "dop853")]
-            rows.append(status_row(goal, "radau5", m.step, "float32 is not offered", "float32"))
-        if m.all_refuse:
-            rows += [status_row(goal, method, m.refused, "a step far too long") for method in walked(quick)]
-        return rows
+def _end_of(goal: Goal, m: _Motion, method: str) -> Row:
+    """The end by one method to its own claim, or its status at a step beyond its limit."""
+    explicit = not isinstance(find_method(method), ImplicitRungeKutta)
+    if m.stiff and explicit and step_warning(goal.scene, m.step, method, goal.start) is not None:
+        return status_row(goal, method, m.step, "beyond its stability limit")
+    return claimed_row(goal, method, m.step, m.refused)
 
-    return run
+
+def _run(name: str, quick: bool) -> Sequence[Row]:
+    m = _MOTIONS[name]
+    goal = motion(name, m.rounded)
+    rows = [_counted_row(goal, *claim) for claim in m.counted]
+    rows += [fixed_row(goal, *claim, "declared") for claim in m.claims]
+    rows += [_end_of(goal, m, method) for method in walked(quick)]
+    if m.single:
+        why = "what fm.integrate says of float32"
+        rows += [fixed_row(goal, method, m.step, SINGLE, why, "float32") for method in ("rk4", "dop853")]
+        rows.append(status_row(goal, "radau5", m.step, "float32 is not offered", "float32"))
+    if m.all_refuse:
+        rows += [status_row(goal, method, m.refused, "a step far too long") for method in walked(quick)]
+    return rows
 
 
 def _whip(quick: bool) -> Sequence[Row]:
-    goal = goal_of("whip")
+    goal = motion("whip")
     return [status_row(goal, method, 1e-3, "1e3 rad/s and more for a moment") for method in walked(quick)]
 
 
 CASES = (
-    *(HardCase(name, m.hard, ORACLE, m.must, _runner(name)) for name, m in _MOTIONS.items()),
+    *(HardCase(name, m.hard, ORACLE, m.must, partial(_run, name)) for name, m in _MOTIONS.items()),
     HardCase(
         "whip",
         "m2/m1 = 1e6, later: M2 drags M1 through cos(phi+theta) = 0 at more than 1e3 rad/s",

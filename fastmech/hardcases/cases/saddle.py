@@ -12,7 +12,7 @@ from fastmech.basins.label import labels_of
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.ensembles.status import Status
 from fastmech.equilibria.find import find_equilibria
-from fastmech.hardcases.case import Floats, HardCase, Row, row_of
+from fastmech.hardcases.case import Floats, HardCase, Row, labels_row, row_of
 from fastmech.hardcases.walk import admitted_step, labellers, without_euler
 from fastmech.scene import Scene
 from fastmech.stability.linearize import jacobian
@@ -103,12 +103,8 @@ def _labels(saddle: _Saddle, root: float, method: str) -> Row:
     wrong = captured & (
         (found.well != far.well[right]) | (found.turns != far.turns[right]).any(axis=1) | (offsets == 0.0)
     )
-    kinds = ", ".join(f"{n} {name}" for name, n in found.counts.items() if n)
     nearest = np.abs(offsets[captured]).min(initial=np.inf)
-    remark = f"labels: {kinds}" + (f", to {nearest:.0e} rad" if captured.any() else "")
-    return Row(
-        method, np.nan, found.steps, float(wrong.sum()), 0.0, np.nan, "ok", True, remark, "fm.labels_of"
-    )
+    return labels_row(method, found, wrong.sum(), f", to {nearest:.0e} rad" if captured.any() else "")
 
 
 def _run(quick: bool) -> Sequence[Row]:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import Status
 from fastmech.equilibria.find import find_equilibria
-from fastmech.hardcases.case import Floats, HardCase, Row, worst
+from fastmech.hardcases.case import Floats, HardCase, Row, row_of, worst
 from fastmech.hardcases.references import motion
-from fastmech.hardcases.walk import Goal, claimed_row, walked
+from fastmech.hardcases.walk import claimed_row, walked
 from fastmech.integrators.methods import find_method
 from fastmech.scene import Scene
 from fastmech.step_limits.predict import largest_stable_step
@@ -22,7 +21,6 @@ SCENE = Scene(c2=1100 / 3, alpha=0.0)
 
 #: Step [s] for methods that claim nothing.
 FAR_TOO_LONG = 2.0
-
 
 #: Starts that are not finite, or nearly so, by the trajectory that has one.
 BAD = {3: np.nan, 17: np.inf, 18: -np.inf, 40: 1e200, 41: 5e-324, 42: -1e-310}
@@ -50,27 +48,24 @@ def _block(starts: Floats, mixed: Floats, method: str, dtype: str) -> Row:
     fine = (together.status[healthy] == Status.OK).all() and (together.status[[41, 42]] == Status.OK).all()
     remark = f"{dtype}; unusual starts: {', '.join(worst([together.status[lane]]) for lane in BAD)}"
     error = 0.0 if same and told and fine else np.inf
-    return Row(
-        method, together.dt, together.steps, error, 0.0, np.nan, worst(together.status[healthy]), True,
-        remark, "lanes do not know each other",
-    )  # fmt: skip
+    row = row_of(together, error, 0.0, remark=remark, why="lanes do not know each other")
+    return row._replace(status=worst(together.status[healthy]))
 
 
 def _sudden(quick: bool) -> Sequence[Row]:
     m = motion("sudden_decay")
     gone = 50.0 / m.scene.alpha
-    after = m.scene.replace(F0=0.0)
-    goal = Goal(after, m.start, m.t - gone, m.state)
+    after = m._replace(scene=m.scene.replace(F0=0.0), t_end=m.t_end - gone)
     rows = []
     for method in walked(quick):
         # Short steps while the force lasts, then those of the motion.
         first = integrate(m.scene, m.start, gone, 0.01 / m.scene.alpha, method)
-        row = claimed_row(goal._replace(start=first.y[-1, 0]), method, 0.005, FAR_TOO_LONG)
+        row = claimed_row(after._replace(start=first.y[-1, 0]), method, 0.005, FAR_TOO_LONG)
         warned = step_warning(m.scene, row.dt, method)
         wrong = "" if warned and "impulse" in warned else "; NOT warned"
         times = impulse_ratio(find_method(method), row.dt * m.scene.alpha)
         remark = f"at dt = {row.dt:.3g} s from the start the impulse would be {times:.3g} times itself{wrong}"
-        rows.append(replace(row, error=row.error if not wrong else np.inf, remark=remark))
+        rows.append(row._replace(error=row.error if not wrong else np.inf, remark=remark))
     return rows
 
 
@@ -88,9 +83,8 @@ def _too_long(quick: bool) -> Sequence[Row]:
         # Every single trajectory must be flagged, not just one.
         status = worst(run.status) if share == 1.0 and told else "ok"
         remark = f"{share:.0%} flagged{', warned before' if told else ', NOT warned before'}"
-        rows.append(
-            Row(method, run.dt, run.steps, np.nan, np.nan, np.nan, status, False, remark, "beyond its limit")
-        )
+        row = row_of(run, np.nan, np.nan, claimed=False, remark=remark, why="beyond its limit")
+        rows.append(row._replace(status=status))
     return rows
 
 

@@ -1,0 +1,92 @@
+"""What a planar mechanism looks like: its elements between points of the plane, at given positions."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from itertools import combinations
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from fastmech.models.mechanism import Mechanism
+
+#: Positions of the whole range that tell which points are fixed, guided or joined by a rod, and what lengths
+#: without a range are looked at within [m].
+SAMPLES, FAR = 16, 1.0
+
+#: Rounding of lengths, relative.
+ROUNDING = 1e-9
+
+
+class Element(IntEnum):
+    """What is drawn."""
+
+    FIXED = 0  #: a point that never moves
+    POINT = 1
+    GUIDE = 2  #: the straight line on which a point stays
+    ROD = 3  #: between two points that keep their distance
+    SPRING = 4
+    DAMPER = 5
+    LOAD = 6  #: from its point a unit along its mean
+    MASS = 7
+
+
+class Drawing(NamedTuple):
+    """Elements at some positions; springs, dampers and loads whose parameter is zero are left out."""
+
+    kind: NDArray[np.int8]  #: :class:`Element` (elements,)
+    name: tuple[str, ...]  #: of points
+    mass: NDArray[np.float64]  #: [kg] (elements,), NaN of others than masses
+    ends: NDArray[np.float64]  #: [m] (positions, elements, 2, 2): both ends, x and y
+
+
+def drawing(mechanism: Mechanism, q: ArrayLike) -> Drawing:
+    """The elements of a planar mechanism at positions (m, n); none of one in space.
+
+    Rods are not told: two points that keep their distance everywhere are joined by one.
+    """
+    places = np.asarray(q, dtype=np.float64).reshape(-1, len(mechanism.coordinates))
+    low, high = (
+        np.array([end if np.isfinite(end) else np.sign(end) * FAR for end in ends])
+        for ends in zip(*(c[1:3] for c in mechanism.coordinates), strict=True)
+    )
+    samples = low + (high - low) * np.random.default_rng(0).random((SAMPLES, len(low)))
+    points, elements = mechanism.places(np.concatenate([places, samples]))
+    count = len(places)
+    found: list[tuple[Element, str, float, NDArray[np.float64]]] = []
+
+    def add(kind: Element, ends: NDArray[np.float64], name: str = "", mass: float = np.nan) -> None:
+        found.append((kind, name, mass, ends[:count]))
+
+    def varies(values: NDArray[np.float64]) -> bool:
+        scale = 1.0 + np.abs(values[count:]).max()
+        return not np.ptp(values[count:], axis=0).max() <= ROUNDING * scale
+
+    for name, place in points.items():
+        add(Element.POINT if varies(place) else Element.FIXED, np.stack([place, place], axis=1), name)
+        away = place[count:] - place[count:].mean(axis=0)
+        along = np.linalg.svd(away)[2][0]
+        if varies(place) and np.abs(away @ [-along[1], along[0]]).max() <= ROUNDING * np.abs(away).max():
+            add(Element.GUIDE, np.stack([place, place + along], axis=1))
+    for a, b in combinations(points.values(), 2):
+        length = np.hypot(*(b - a).T)
+        if (varies(a) or varies(b)) and not varies(length) and length.min() > ROUNDING:
+            add(Element.ROD, np.stack([a, b], axis=1))
+    for kind, size, ends in elements:
+        if kind is Element.MASS:
+            add(kind, ends, mass=size)
+        elif size:
+            add(kind, ends if size > 0.0 or kind is not Element.LOAD else mirrored(ends))
+    return Drawing(
+        np.array([one[0] for one in found], dtype=np.int8),
+        tuple(one[1] for one in found),
+        np.array([one[2] for one in found]),
+        np.stack([one[3] for one in found], axis=1) if found else np.zeros((count, 0, 2, 2)),
+    )
+
+
+def mirrored(ends: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The second end on the other side of the first."""
+    return np.stack([ends[:, 0], 2.0 * ends[:, 0] - ends[:, 1]], axis=1)
