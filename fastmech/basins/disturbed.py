@@ -19,10 +19,10 @@ from fastmech.basins.measures.fractions import Shares, basin_stability
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.capture.steps import MOST_OCTAVES, TURNING
 from fastmech.disturbance.motion import equilibria_to_disturb
-from fastmech.disturbance.observe import EXCURSION, LAST_OUTSIDE, observe_departure
+from fastmech.disturbance.observe import EXCURSION, LAST_OUTSIDE, SWUNG, observe_departure
 from fastmech.disturbance.size import Size, confining_energy, excess_energy, size_of, uniform_ball
 from fastmech.ensembles import checks
-from fastmech.ensembles.run import Observation, Progress, run_ensemble
+from fastmech.ensembles.run import Ensemble, Observation, Progress, run_ensemble
 from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.status import ENDS, FAILURES, Status, failure_counts, failure_line
 from fastmech.equilibria.find import Equilibrium
@@ -32,6 +32,13 @@ from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+#: By how much excursions by two steps may differ, over the larger coordinate's.
+AGREED = 0.01
+
+#: They are compared until so many times the time of the largest one.
+BEYOND = 2.0
 
 #: Starts that one stream of random numbers gives; the next ones have a stream of their own.
 STREAM = 65_536
@@ -64,8 +71,8 @@ class DisturbedEnsemble:
     turns: NDArray[np.int64]  #: full turns of each coordinate on the way there, 0 where none; (n, coords)
     time_to_return: Floats  #: s, first step from which on it was in the ball; NaN: not by t_end; (n,)
     excursion: Floats
-    """Largest departures of coordinates [rad or m], NaN of those that failed or, by these steps, end
-    elsewhere; (n, coords)."""
+    """Largest departures of coordinates [rad or m], at and between steps; NaN of those that failed or, by
+    these steps, end elsewhere; by default compared with half the step, save of the undecided; (n, coords)."""
 
     @property
     def failures(self) -> str:
@@ -145,10 +152,10 @@ def disturb(
         seed: seed of the starts.
         t_end: end of the run [s].
         dt: longest step [s]; by default each start's own, from the scene's frequencies, its damping and the
-            start's energy, see ``Certificate.measuring_steps``. Motions that fail with it, or come to another
-            well than is proved, are followed again with a 16th of it, and so on, down to the shortest step of
-            the fastest starts, by default. Of one that never comes to its proved well, what is measured is
-            NaN.
+            start's energy, see ``Certificate.measuring_steps``. Motions that fail with it, come to another
+            well than is proved, or by default swing more than 1 % otherwise with half of it, are followed
+            again with a 16th of it, and so on, down to the shortest step of the fastest starts, by default.
+            What is measured of one that remains so is NaN.
         method: name of the method; by default ``dop853``, or ``radau5`` (implicit) where the damper would
             set the explicit method's steps.
         return_radius: radius of the ball of return [rad].
@@ -187,31 +194,37 @@ def disturb(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StepWarning)  # it has been told
         ends = label_starts(scene, starts, t_end, How(dt, method, threads=threads))
-    longest = certificate.measuring_steps(starts, method) if dt is None else np.full(len(starts), dt)
     moment = certificate.slow_step
     at_first = certificate.damped_times(method, min(dt or moment, t_end))
     times = np.array([0.0, *at_first, t_end])
     departure = np.abs(starts - center)
     final, last, failed = np.empty_like(starts), np.empty_like(starts), np.empty(len(starts))
-    status, records = np.empty(len(starts), dtype=np.int8), np.empty((1 + coordinates, len(starts)))
+    rows = EXCURSION + coordinates
+    status, records = np.empty(len(starts), dtype=np.int8), np.empty((rows, len(starts)))
     taken, again = np.empty(len(starts)), np.arange(len(starts))
     astray = np.zeros(len(starts), dtype=np.bool_)
     shortest, first = np.inf if dt is not None else certificate.shortest_step, True
-    rhs, params = certificate.motion
-    while again.size:
-        run = run_ensemble(
-            rhs,
-            params,
-            starts[again],
-            times,
-            longest[again],
-            certificate.formula(method),
-            _observation(center, size, return_radius),
-            threads=threads,
-            progress=progress if first else None,
+    longest = certificate.measuring_steps(starts, method) if dt is None else np.full(len(starts), dt)
+    (rhs, params), formula = certificate.motion, certificate.formula(method)
+    observation = _observation(center, size, return_radius)
+
+    def follow(which: Integers, until: float, steps: Floats, told: Progress | None = None) -> Ensemble:
+        some, moments = starts[which], np.append(times[:-1], until)
+        return run_ensemble(
+            rhs, params, some, moments, steps, formula, observation, threads=threads, progress=told
         )
+
+    def apart(which: Integers, until: float) -> Integers:
+        """Those that half the step leads to other excursions until then [s], well after the largest."""
+        half = follow(which, until, 0.5 * longest[which]).records[EXCURSION:rows]
+        least = departure[which, :coordinates].T
+        half, found = np.maximum(half, least), np.maximum(records[EXCURSION:, which], least)
+        return which[~(np.abs(half - found) <= AGREED * half.max(axis=0)).all(axis=0)]
+
+    while again.size:
+        run = follow(again, t_end, longest[again], progress if first else None)
         final[again], last[again], failed[again] = run.states[-1], run.last, run.failed
-        records[:, again] = run.records
+        records[:, again] = run.records[:rows]
         steps, which = np.unique(longest[again], return_inverse=True)
         number = np.array([output_steps(times[-2:], float(step))[0] for step in steps])
         taken[again] = ((t_end - times[-2]) / number)[which]
@@ -228,6 +241,11 @@ def disturb(
         )
         astray[again] = False
         astray[again[kept[lost]]] = True
+        if dt is None:
+            same = again[kept[~lost]]
+            spans = np.exp2(np.ceil(np.log2(BEYOND * (records[SWUNG, same] + moment))))
+            for span in np.unique(spans):
+                astray[apart(same[spans == span], min(span, t_end))] = True
         status[again] = reached
         again, first = again[((reached != Status.OK) | astray[again]) & (longest[again] > shortest)], False
         longest[again] *= 0.0625
@@ -302,4 +320,4 @@ def _starts_in_ball(seed: int, index: int, n: int, chosen: range, dim: int) -> F
 def _observation(center: Floats, size: Size, return_radius: float) -> Observation:
     n = len(center) // 2
     params = [*center[:n], *size.metric.ravel(), 1.0 / size.omega**2, return_radius**2]
-    return Observation(observe_departure, np.array(params), np.zeros(1 + n))
+    return Observation(observe_departure, np.array(params), np.zeros(EXCURSION + 3 * n), states=2 * n)

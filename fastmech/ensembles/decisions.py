@@ -2,7 +2,8 @@
 
 Smooth arithmetic compiles to arithmetic. Every jump and every kink needs one of few instructions: a
 comparison of floating-point numbers, a conversion to a whole number, a rounding, a magnitude, a sign, or a
-look at a number's bits. What none of them reaches from time or state is smooth, as far as its operations are.
+look at a number's bits; or an inverse that folds: the root of a square, an angle by its own sine. What none
+of them reaches from time or state is smooth, as far as its operations are: not where one has a pole.
 """
 
 from __future__ import annotations
@@ -29,11 +30,16 @@ _ROOT = re.compile(r"fcmp (?:\w+ )*oeq double %\S+, 0xFFF0000000000000")
 
 #: What compiled code may call: mathematics without jumps, memory, sums of products.
 _SMOOTH = re.compile(
-    r"llvm\.\S+|a?(?:sin|cos|tan)h?|exp[2m1]*|log(?:2|10|1p)?|sqrt|cbrt|pow|hypot|erfc?|[tl]?gamma"
+    r"llvm\.\S+|a?(?:sin|cos|tan)h?|exp[2m1]*|log(?:2|10|1p)?|sqrt|cbrt|pow|hypot|erfc?|(?:numba_)?[tl]?gamma"
     r"|NRT_\w+|numba_xx(?:dot|gemv|gemm)|numba_gil_\w+|numba_fatal_error|Py_FatalError"
 )
 
 _NAME = r'%(?:"[^"]+"|[\w.$-]+)'
+
+#: Smooth functions that make a kink or a jump of another one: the root of a square, an angle's own angle.
+_INVERSE = re.compile(rf"call .*@(?:llvm\.)?(sqrt|a(?:sin|cos|tan))(?:\.f64)?\(double ({_NAME})\)")
+_FOLDED = {"sqrt": re.compile(rf"fmul (?:\w+ )*double ({_NAME}), \1$")}
+_TURNING = re.compile(r"call .*@(?:llvm\.)?(?:sin|cos|tan)(?:\.f64)?\(")
 
 
 def decides(function: Any, arguments: list[Any], steady: Collection[str]) -> bool:
@@ -71,5 +77,14 @@ def _decides(body: str, steady: Collection[str]) -> bool:
         values = re.sub(rf", {_NAME} \]", "", instruction)  # without the places that a phi comes from
         return any(changes(name) for name in re.findall(_NAME, values))
 
-    deciding = {name for name, rest in made.items() if _DECIDES.search(rest) and not _ROOT.search(rest)}
+    def folds(instruction: str) -> bool:
+        """Whether it is the inverse of the function that made what it is given, and folds there."""
+        inverse = _INVERSE.search(instruction)
+        return bool(inverse and _FOLDED.get(inverse[1], _TURNING).search(made.get(inverse[2], "")))
+
+    deciding = {
+        name
+        for name, rest in made.items()
+        if (_DECIDES.search(rest) and not _ROOT.search(rest)) or folds(rest)
+    }
     return any(reaches(made[name]) for name in deciding)

@@ -87,7 +87,18 @@ def by_a_complex_angle(t, x, y):
     return 1.0, 1e4 / math.pi * np.log((x - 7.0) * (x - 7.002) + 0j).imag
 
 
+def by_roots_of_squares(t, x, y):
+    a, b = x - 7.0, x - 7.002
+    return 1.0, 5e3 * (a / math.sqrt(a * a) - b / (b**2) ** 0.5)
+
+
+def by_an_angle_of_its_tangent(t, x, y):
+    return 1.0, 1e4 / math.pi * (math.atan(math.tan(x - 7.0)) - math.atan(math.tan(x - 7.002)) + 0.002)
+
+
 HIDDEN = [
+    by_roots_of_squares,
+    by_an_angle_of_its_tangent,
     in_a_comprehension,
     by_a_starred_argument,
     in_an_inner_function,
@@ -123,6 +134,10 @@ def with_roots_and_powers(t, x, y):
     return y, -x - 0.1 * (x * x + 1.0) ** 0.5 * math.sqrt(1.0 + y * y) - 0.1 * math.hypot(1.0, y) ** 1.5
 
 
+def with_a_gamma_function(t, x, y):
+    return y, -x - 0.1 * math.gamma(2.0 + x * x)
+
+
 def with_a_choice_by_a_parameter(t, x, y, k):
     return y, (-x if k > 0.5 else -x * x * x) * (abs(k) + 1.0) - 0.1 * fm.sin(y)
 
@@ -133,6 +148,7 @@ SMOOTH = [
     with_arrays,
     with_complex_numbers,
     with_roots_and_powers,
+    with_a_gamma_function,
     with_a_choice_by_a_parameter,
 ]
 

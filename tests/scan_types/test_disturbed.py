@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.interpolate
 import scipy.linalg
 import scipy.stats
 from scan_types.values import (
@@ -166,8 +167,16 @@ def test_starts_are_uniform_in_the_ball(run: Run) -> None:
 
 def test_finals_and_excursions_are_runge_kutta_s(run: Run) -> None:
     np.testing.assert_allclose(together(run.section, "final"), run.states[-1], rtol=0, atol=1e-6)
-    departures = np.abs(run.states - run.centers[:, None])[..., :2].max(axis=0)
+    times = np.linspace(0.0, run.scan.t_end, len(run.states))
+    away_by = (run.states - run.centers[:, None])[..., :2].reshape(len(times), -1)
+    rates = run.states[..., 2:].reshape(len(times), -1)
+    farthest = []
+    for way, rate in zip(away_by.T, rates.T, strict=True):
+        spline = scipy.interpolate.CubicHermiteSpline(times, way, rate)
+        turns_at = spline.derivative().roots(extrapolate=False)
+        farthest.append(np.abs(spline(np.append(times, turns_at))).max())
     found = together(run.section, "excursion")
+    departures = np.reshape(farthest, found.shape)
     # These steps lead a few elsewhere than they are proved to go: nothing is said of how far they swing.
     end, turns = run.section["end_equilibrium"].data, together(run.section, "turns")
     away = np.linalg.norm(run.states[-1][..., :2] - run.angles[end] - 2 * np.pi * turns, axis=-1)
