@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import fastmech as fm
-
 from fastmech.errors import InputError
 from fastmech.results import Dataset
 from fastmech.scan_types import scan_kinds
