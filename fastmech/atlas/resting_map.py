@@ -15,7 +15,7 @@ from fastmech.ensembles.threads import in_parts
 from fastmech.equilibria.outcome import Outcome
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.intervals.search import Found
-from fastmech.models.equilibria import outcome_of_row, search_rows, wrapped
+from fastmech.models.equilibria import DIGITS, alike, outcome_of_row, search_rows, wrapped
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import VERDICTS, spectra, verdicts
 from fastmech.scene import nearest
@@ -179,7 +179,8 @@ def _assessed(mechanism: Mechanism, rows: Floats, found: Found) -> _Block:
         "morse_index": index.astype(np.int8), "verdict": verdicts(own, index),
         "eigenvalues": own.roots * own.rate[:, None],
     }  # fmt: skip
-    keys = (*position.T[::-1], np.nan_to_num(energy), point)
+    level = np.concatenate([np.zeros(0), *(alike(part) for part in np.split(energy, np.cumsum(number)[:-1]))])
+    keys = (*np.round(position, DIGITS).T[::-1], np.nan_to_num(level), point)
     order = np.lexsort(keys)
     each = {name: values[order] for name, values in each.items()}
     outcome = np.array([outcome_of_row(statics, row, found, k) for k, row in enumerate(rows)], dtype=np.int8)

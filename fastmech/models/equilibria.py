@@ -38,6 +38,9 @@ SMALL_PLACE = 1e-4
 #: For a curve of equilibria if they span more of their own widths.
 CURVE = 20.0
 
+#: Digits of energies, over the largest, and of positions by which equilibria are put in order.
+DIGITS = 9
+
 #: Boxes that are tried to show the sign of a force on one end of a range.
 FACES = 1000
 
@@ -182,8 +185,8 @@ def find_equilibria(system: Any, at: float = math.inf) -> find.Equilibria | Rest
         still[: len(found.names)] = found.position.T
         energies = system.evaluate("bounding", still)[0]
         items = [replace(item, energy=float(u)) for item, u in zip(found, energies, strict=True)]
-        items.sort(key=lambda item: item.energy)  # the deepest first; equal ones stay in the order of places
-        found = replace(found, items=tuple(items))
+        order = np.argsort(alike(energies), kind="stable")  # the deepest first, equal ones in their order
+        found = replace(found, items=tuple(items[k] for k in order))
     if all(isinstance(load, Constant) for load in system.loads):
         return found
     told = f"{found.certificate.sentence}; loads that change are at their means, or at what they come to"
@@ -213,9 +216,15 @@ def prove_equilibria(
         index = (positive if positive >= 0 else -2) if statics.conservative else None
         radius = float((zero[:, 1] - zero[:, 0]).max() + 1e-15 * (1.0 + np.abs(raw).max()))
         items.append(RestingPlace(position, radius, -J.mean(2), orientation, index))
-    items.sort(key=lambda item: (item.morse_index or 0, -item.orientation, *item.position))
+    items.sort(key=lambda item: (item.morse_index or 0, -item.orientation, *item.position.round(DIGITS)))
     names = tuple(str(coordinate.symbol) for coordinate in statics.coordinates)
     return RestingPlaces(tuple(items), names, _proof(statics, p, found, items))
+
+
+def alike(energies: Floats) -> Floats:
+    """Energies (..., count) without the digits that rounding and positions' errors may change."""
+    scale = np.abs(energies).max(axis=-1, keepdims=True, initial=np.finfo(float).tiny)
+    return np.asarray(np.round(energies / scale, DIGITS))
 
 
 def wrapped(positions: Floats, statics: Statics) -> Floats:

@@ -96,3 +96,14 @@ def test_the_truss_snaps_at_its_closed_form() -> None:
 def test_what_is_wrong_gets_a_line(axes: dict[str, object], told: str) -> None:
     with pytest.raises(fm.InputError, match=told):
         fm.map_equilibria(fm.mechanisms.pendulum_chain(2), axes)  # type: ignore[arg-type]
+
+
+def test_equally_deep_equilibria_keep_their_order() -> None:
+    """Without a load the truss rests above and below alike: rounding does not decide which comes first."""
+    truss = fm.mechanisms.von_mises_truss()
+    found = fm.map_equilibria(truss, {"rise": np.linspace(0.2, 0.8, 31)})
+    assert (found.position[:, 0, 1] < 0.0).all()
+    assert (found.position[:, 1, 1] > 0.0).all()
+    for k, rise in enumerate(found.axes["rise"]):
+        alone = fm.find_equilibria(truss.replace(rise=float(rise)))
+        np.testing.assert_allclose(found.position[k], alone.position, atol=1e-12)
