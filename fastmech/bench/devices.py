@@ -146,3 +146,13 @@ def coupled(rng: Random) -> Mechanism:
 KINDS: dict[str, Callable[[Random], Mechanism]] = {
     kind.__name__: kind for kind in (chain, truss, cart, zero_length, beside_fold, coupled)
 }
+
+
+def explicit(mechanism: Mechanism) -> tuple[list[Any], list[Any]]:
+    """States as symbols, and their rates as expressions, parameters having their values."""
+    found, q = mechanism.equations, [c.symbol for c in mechanism.coordinates]
+    v = [sympy.Symbol(f"{symbol}_dot", real=True) for symbol in q]
+    values = {sympy.Symbol(name, real=True): value for name, value in mechanism.parameters.items()}
+    right = [f - h for f, h in zip(found.forces, found.inertia, strict=True)]
+    solved = found.metric.LUsolve(sympy.Matrix(right)).subs(found.means).subs(values)
+    return [*q, *v], [*v, *solved]

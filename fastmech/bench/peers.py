@@ -17,9 +17,11 @@ from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
+import sympy
 from numba import carray, cfunc, njit, types  # type: ignore[attr-defined]
 
 from fastmech.bench import fused, package, plain
+from fastmech.bench.devices import explicit
 from fastmech.bench.own_systems import spoken
 from fastmech.bench.plain import accelerations, scalar_rhs
 from fastmech.bench.problem import Entrant, Floats, Problem, Series, Solve
@@ -27,6 +29,7 @@ from fastmech.ensembles.system import System
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import FLAGS
 from fastmech.mechanism.coefficients import Coefficients
+from fastmech.models.mechanism import Mechanism
 
 _COUNT = len(Coefficients._fields)
 _POINTER = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
@@ -222,6 +225,10 @@ def _heyoka_equations(problem: Problem) -> list[Any]:
         rhs = spoken(problem.scene.rhs, sin=hy.sin, cos=hy.cos, inverse_cube=lambda s: s**-1.5)
         state = hy.make_vars(*problem.scene.state)
         return list(zip(state, rhs(hy.time, *state), strict=True))
+    if isinstance(problem.scene, Mechanism):
+        state, rates = explicit(problem.scene)
+        known = {symbol: hy.make_vars(symbol.name) for symbol in state}
+        return [(known[s], hy.from_sympy(sympy.sympify(r), known)) for s, r in zip(state, rates, strict=True)]
     p = problem.coefficients
     phi, theta, u, w = hy.make_vars("phi", "theta", "u", "w")
     s, c, s12, c12 = hy.sin(phi), hy.cos(phi), hy.sin(phi + theta), hy.cos(phi + theta)

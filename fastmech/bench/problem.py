@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from fastmech.ensembles.system import System
 from fastmech.mechanism.coefficients import Coefficients, reduce
+from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -30,7 +31,7 @@ class Problem:
 
     name: str
     description: str
-    scene: Scene | System
+    scene: Scene | System | Mechanism
     starts: Floats  #: shape (n, dim)
     truth: Floats  #: final states, shape (n, dim)
     t_end: float  #: s

@@ -12,7 +12,9 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+import sympy
 
+from fastmech.bench.devices import KINDS, explicit
 from fastmech.bench.extended import ROUNDINGS, extended, scene_rates
 from fastmech.bench.frontier import work_precision
 from fastmech.bench.measure import Row, measure, rate_at
@@ -47,6 +49,10 @@ LEVELS = {0.99: "99 %", 1.0: "largest"}
 SCENES = {"Table 1, from rest": 0.0, "Table 1, moving": 3.0}
 
 
+#: Random mechanisms of :mod:`fastmech.bench.devices`: seed, size of the starts' numbers, end [s].
+DEVICES = {"random chain": (1, 1.0, 2.0), "random cart": (0, 0.5, 2.0)}
+
+
 class Measured(NamedTuple):
     """What was measured on one system."""
 
@@ -72,6 +78,17 @@ def mechanism(name: str, n: int) -> Problem:
     starts = np.ascontiguousarray(np.random.default_rng(1).uniform(low, high, (STARTS, 4))[:n])
     truth = extended(scene_rates(scene), starts, t_end, ROUNDINGS[1])
     return Problem(name, name, scene, starts, truth.astype(np.float64), t_end, 1.0)
+
+
+def device(name: str, n: int) -> Problem:
+    """A random mechanism with its first n starts and their truth."""
+    seed, spread, t_end = DEVICES[name]
+    made = KINDS[name.split()[-1]](np.random.default_rng(seed))
+    state, rates = explicit(made)
+    function = sympy.lambdify(state, rates, "numpy", cse=True)
+    starts = np.random.default_rng(1).uniform(-spread, spread, (STARTS, len(state)))[:n]
+    truth = extended(lambda t, y: np.stack(np.broadcast_arrays(*function(*y))), starts, t_end, ROUNDINGS[1])
+    return Problem(name, name, made, starts, truth.astype(np.float64), t_end, 1.0)
 
 
 def candidates(problem: Problem, targets: Sequence[float]) -> Iterator[dict[str, Any]]:
@@ -224,7 +241,7 @@ def section(found: Measured, targets: Sequence[float]) -> list[str]:
 def systems_study(quick: bool, stage: Stage) -> list[str]:
     """``systems.md``; ``quick`` takes few starts of one system."""
     systems = dict(list(SYSTEMS.items())[1:2]) if quick else SYSTEMS
-    scenes = () if quick else tuple(SCENES)
+    scenes = () if quick else (*SCENES, *DEVICES)
     n, targets = (QUICK, TARGETS[:2]) if quick else (STARTS, TARGETS)
     advance = stage("systems", 4 * (len(systems) + len(scenes)))
 
@@ -236,7 +253,9 @@ def systems_study(quick: bool, stage: Stage) -> list[str]:
         return found
 
     own = measure_all(problem_of(name, system, n) for name, system in systems.items())
-    return report(own, targets, measure_all(mechanism(name, n) for name in scenes))
+    return report(
+        own, targets, measure_all((mechanism if name in SCENES else device)(name, n) for name in scenes)
+    )
 
 
 def report(found: list[Measured], targets: Sequence[float], scenes: Sequence[Measured] = ()) -> list[str]:
@@ -257,5 +276,5 @@ def report(found: list[Measured], targets: Sequence[float], scenes: Sequence[Mea
     own = [line for one in found for line in section(one, targets)]
     if not scenes:
         return lines + own
-    lines += [*own, "# The mechanism beside heyoka", "", *summary(scenes, targets)]
+    lines += [*own, "# Mechanisms beside heyoka", "", *summary(scenes, targets)]
     return lines + [line for one in scenes for line in section(one, targets)]

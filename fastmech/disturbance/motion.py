@@ -146,23 +146,22 @@ def equilibria_to_disturb(scene: Scene | Mechanism) -> Any:
     Raises:
         InputError: a load changes, or no equilibrium is isolated.
     """
-    if isinstance(scene, Mechanism):
-        require_constant_force(scene)
-    else:
-        require_isolated(scene)
+    require_isolated(scene)
     equilibria = find_equilibria(scene)
     if not equilibria:
         raise InputError(f"scene: has no equilibrium to disturb: {equilibria.certificate.sentence}")
     return equilibria
 
 
-def require_isolated(scene: Scene) -> None:
-    """Refuse, before equilibria are looked for, a scene whose force changes or that rests all along a line.
+def require_isolated(scene: Scene | Mechanism) -> None:
+    """Refuse, before equilibria are looked for, loads that change, and a scene that rests all along a line.
 
     Raises:
         InputError: it does.
     """
     require_constant_force(scene)
+    if isinstance(scene, Mechanism):
+        return
     c = reduce(scene)
     if vanishing(pulls(c.mass, c.lift, c.spring, c.gravity, c.force)) >= 2:
         raise InputError(f"scene: has no equilibrium to disturb: {degenerate_sentence(scene, scene.F0)}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.plots.labels import equilibrium_names, flag_codes, logarithmic
+from fastmech.plots.labels import coordinates_of, equilibrium_names, flag_codes, logarithmic, symbol
 from fastmech.plots.style import LINES, PALETTE, legend_below, new_figure, style
 from fastmech.results import Dataset
 
@@ -34,7 +34,7 @@ UNKNOWN = "#b3a2c7"
 #: What a picture of outcomes cannot show without a variable, the one that leaves out most first.
 NOT_KEPT = {
     "end_equilibrium": "(which other equilibrium was not kept)",
-    "turns_phi": "(full turns on the way to another equilibrium were not kept)",
+    "turns": "(full turns on the way to another equilibrium were not kept)",
 }
 #: Without ``end_equilibrium``; yellow is no equilibrium's colour.
 ANOTHER = ("rest at another, or full turns further", {"color": PALETTE["yellow"]})
@@ -49,10 +49,11 @@ def draw_disturbed(dataset: Dataset) -> dict[str, Figure]:
     """Pictures of a dataset of the scan type ``disturbed``, of what was kept of the trajectories."""
     if not dataset.sizes["equilibrium"]:
         return {}
+    names = coordinates_of(dataset)
     pictures = {
         "outcomes": (_outcomes, {"outcome"}),
         "time_to_return": (_time_to_return, {"time_to_return"}),
-        "excursions": (_excursions, {"excursion_phi", "excursion_theta"}),
+        "excursions": (_excursions, {f"excursion_{name}" for name in names}),
         "linear_range": (_linear_range, {"linear_limit"}),
     }
     with style():
@@ -87,7 +88,8 @@ def _outcomes(dataset: Dataset) -> Figure:
     axes.set(xlim=(0.0, 100.0), xlabel="share of the disturbed trajectories [%]")
     axes.grid(visible=False)
     elsewhere = (dataset["outcome"].data == flag_codes(dataset["outcome"])["elsewhere"]).any()
-    unknown = [text for name, text in NOT_KEPT.items() if elsewhere and name not in dataset]
+    kept = {"turns" if name.startswith("turns_") else name for name in dataset}
+    unknown = [text for name, text in NOT_KEPT.items() if elsewhere and name not in kept]
     axes.set_title("\n".join(["Where disturbances of each equilibrium end", *unknown[:1]]))
     labelled = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
     order = sorted(labelled, key=lambda label: (not label.startswith("rest"), label))
@@ -108,7 +110,7 @@ def _segments(dataset: Dataset, row: int) -> list[tuple[float, str, dict[str, An
     codes = flag_codes(dataset["outcome"])
     outcome = dataset["outcome"].data[row]
     elsewhere = outcome == codes["elsewhere"]
-    parts = [(outcome == codes["returned"], f"rest at {row + 1}", {"color": LINES[row]})]
+    parts = [(outcome == codes["returned"], f"rest at {row + 1}", {"color": LINES[row % len(LINES)]})]
     if "end_equilibrium" in dataset:
         parts += _resting_elsewhere(dataset, row, elsewhere)
     else:
@@ -127,13 +129,13 @@ def _resting_elsewhere(
     """Those at rest at each other equilibrium, or at their own some turns further."""
     end = dataset["end_equilibrium"].data[row]
     # Elsewhere and yet at its own equilibrium is full turns further, known without the turns themselves.
-    turns = [dataset[f"turns_{angle}"].data[row] for angle in ("phi", "theta") if f"turns_{angle}" in dataset]
+    turns = [dataset[name].data[row] for name in dataset if name.startswith("turns_")]
     turned = np.any(turns, axis=0) if turns else end == row
     parts: list[tuple[Flags, str, dict[str, Any]]] = []
     for other in range(dataset.sizes["equilibrium"]):
         there = elsewhere & (end == other)
-        further = {"color": LINES[other], "hatch": "//"}
-        parts.append((there & ~turned, f"rest at {other + 1}", {"color": LINES[other]}))
+        further = {"color": LINES[other % len(LINES)], "hatch": "//"}
+        parts.append((there & ~turned, f"rest at {other + 1}", {"color": LINES[other % len(LINES)]}))
         parts.append((there & turned, f"rest at {other + 1}, full turns further", further))
     return parts
 
@@ -155,8 +157,8 @@ def _time_to_return(dataset: Dataset) -> Figure:
         label = f"{name}, {_returned(dataset, row)} return\n({texts})"
         # Who returns after the run's end counts, so that a curve may end below 100 %.
         known = 100.0 * min(1.0, times.size / (returned * every.size))
-        axes.plot(np.quantile(times, share), known * share, color=LINES[row], label=label)
-        axes.plot(at, 100.0 * level, "o", color=LINES[row], mec="white", ms=7)
+        axes.plot(np.quantile(times, share), known * share, color=LINES[row % len(LINES)], label=label)
+        axes.plot(at, 100.0 * level, "o", color=LINES[row % len(LINES)], mec="white", ms=7)
     axes.set(xlabel="time to return t [s]", ylabel="share of those that return [%]", ylim=(0.0, 103.0))
     axes.set_xlim(left=0.0)
     if axes.lines:
@@ -184,15 +186,19 @@ def _returned(dataset: Dataset, row: int) -> str:
 
 def _excursions(dataset: Dataset) -> Figure:
     figure, axes = _rows_of_equilibria(dataset, 0.85)
-    for column, (angle, symbol, shift) in enumerate((("phi", "φ", -0.18), ("theta", "θ", 0.18))):
-        for row, values in enumerate(dataset[f"excursion_{angle}"].data):
+    names = coordinates_of(dataset)
+    units = {dataset[name].units for name in names}
+    for column, name in enumerate(names):
+        shift = 0.36 * (column - 0.5 * (len(names) - 1)) / max(1, len(names) - 1)
+        told = symbol(name) if len(units) == 1 else f"{symbol(name)} [{dataset[name].units}]"
+        for row, values in enumerate(dataset[f"excursion_{name}"].data):
             values = values[np.isfinite(values)]
             if values.size:
                 _box(axes, row + shift, np.quantile(values, BOX), LINES[column])
                 axes.plot(values.max(), row + shift, "|", color=LINES[column], ms=9, mew=2)
-        axes.plot([], [], "s", color=LINES[column], label=f"largest |{symbol} - {symbol} of the equilibrium|")
+        axes.plot([], [], "s", color=LINES[column], label=f"largest departure of {told}")
     axes.plot([], [], "|", color="black", mew=2, ms=9, label="median")
-    axes.set(xscale="log", xlabel="excursion [rad]")
+    axes.set(xscale="log", xlabel=f"excursion [{units.pop()}]" if len(units) == 1 else "excursion")
     logarithmic(axes.xaxis)
     axes.set_title("How far trajectories go (box: 25-75 %, line: 5-95 %, coloured tick: the farthest)")
     legend_below(figure, axes, 3)
@@ -223,7 +229,7 @@ def _linear_range(dataset: Dataset) -> Figure:
         # The lower value at each quantile, because no mean can be taken with infinity.
         quantiles = np.quantile(ordered, BOX, method="lower")
         _box(axes, row, np.clip(quantiles, 0.9 * low, 1.1 * high), LINES[0])
-    axes.set(xscale="log", xlabel="size of the disturbance [rad]")
+    axes.set(xscale="log", xlabel=f"size of the disturbance [{dataset['linear_limit'].units}]")
     logarithmic(axes.xaxis)
     axes.set_title(
         f"Size up to which the linearized motion is within {100.0 * tolerance:g} % for {horizon:g} s\n"
@@ -237,7 +243,7 @@ def _rows_of_equilibria(dataset: Dataset, height: float) -> tuple[Figure, Axes]:
     names = equilibrium_names(dataset)
     figure = new_figure(8.4, height * len(names) + 1.9)
     axes = figure.subplots()
-    axes.set_yticks(range(len(names)), [name.replace(", θ", ",\nθ") for name in names])
+    axes.set_yticks(range(len(names)), [name.replace(", ", ",\n", 1) for name in names])
     axes.set_ylim(len(names) - 0.4, -0.6)
     axes.grid(visible=False, axis="y")
     return figure, axes

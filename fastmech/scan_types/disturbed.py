@@ -13,15 +13,22 @@ from fastmech.basins.disturbed import MOST_RADIUS, DisturbedEnsemble, disturb
 from fastmech.capture.select import require_damper
 from fastmech.capture.steps import method_for, shortest_step
 from fastmech.disturbance.motion import require_constant_force, require_isolated
-from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError, shown
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
+from fastmech.models.mechanism import Mechanism
 from fastmech.results import Dataset
-from fastmech.scan_types.axis import Axis, arrays, check_duration, check_parameters, check_size, check_steps
+from fastmech.scan_types.axis import (
+    Axis,
+    arrays,
+    check_duration,
+    check_parameters,
+    check_size,
+    check_steps,
+    known_parameters,
+)
 from fastmech.scan_types.disturbed_map import MOST_POINTS, MOST_TRAJECTORIES, DisturbedMap
-from fastmech.scan_types.disturbed_tiling import TRAJECTORY_VARIABLES, DisturbedTiling
-from fastmech.scan_types.equilibrium_map import known_parameters
+from fastmech.scan_types.disturbed_tiling import ABOUT_SHARES, TRAJECTORY_VARIABLES, DisturbedTiling
 from fastmech.scan_types.request import Seed, TiledScan, UsualMethod
 from fastmech.scan_types.tiling import RunContext, Tiling
 from fastmech.scene import Scene, nearest
@@ -57,8 +64,10 @@ class Disturbed(TiledScan):
     """Ensembles about every equilibrium, uniform in a ball of the kinetic-energy norm."""
 
     kind: ClassVar[str] = "disturbed"
+    of_mechanisms = True
+    taken = frozenset({"equilibrium", "trajectory", "omega", *TRAJECTORY_VARIABLES, *ABOUT_SHARES})
 
-    axes: Annotated[dict[str, Axis], AfterValidator(known_parameters)] = Field(
+    axes: dict[str, Axis] = Field(
         default={}, description="parameters over which all equilibria are disturbed; none: the scene's alone"
     )
 
@@ -81,8 +90,17 @@ class Disturbed(TiledScan):
         description="what to keep of every trajectory (all by default); large scans are smaller with less",
     )
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Scene | Mechanism) -> None:
         """A constant force and a damper all over a map, and no more work than is possible."""
+        known_parameters(scene, self.axes)
+        if isinstance(scene, Mechanism):
+            if self.axes:
+                raise InputError("axes: are for the paper's mechanism alone; give a value in [scene] instead")
+            require_damper(scene)
+            require_isolated(scene)
+            if self.dt is not None:
+                check_steps("t_end", self.t_end, self.dt)
+            return
         check_parameters(scene, self.axes, "axes")
         for corner in self._corners(scene):
             require_damper(corner)
@@ -107,9 +125,9 @@ class Disturbed(TiledScan):
                 f"trajectories = {self.trajectories}: must be at most {MOST_TRAJECTORIES} on a map"
             )
 
-    def step_warning(self, scene: Scene) -> str | None:
+    def step_warning(self, scene: Scene | Mechanism) -> str | None:
         """By the scene's limit; without ``dt`` each start's step is chosen."""
-        if self.dt is None:
+        if self.dt is None or isinstance(scene, Mechanism):
             return None
         told = [
             step_warning(corner, self.dt, method_for(corner, self.method)) for corner in self._corners(scene)
@@ -121,14 +139,15 @@ class Disturbed(TiledScan):
         ends = [axis.array[[0, -1]].tolist() for axis in self.axes.values()]
         return [scene.replace(**dict(zip(self.axes, values, strict=True))) for values in product(*ends)]
 
-    def tiling(self, scene: Scene) -> Tiling:
+    def tiling(self, scene: Scene | Mechanism) -> Tiling:
         """Blocks of directions and of trajectories; of a map the equilibria one by one."""
         if self.axes:
+            assert isinstance(scene, Scene)
             return DisturbedMap(self, scene, arrays(self.axes))
         return DisturbedTiling(self, scene)
 
     def ensemble(
-        self, scene: Scene, equilibrium: Equilibrium, context: RunContext, part: slice | None = None
+        self, scene: Scene | Mechanism, equilibrium: Any, context: RunContext, part: slice | None = None
     ) -> DisturbedEnsemble:
         """Disturb one equilibrium, or a part of its trajectories."""
         return disturb(

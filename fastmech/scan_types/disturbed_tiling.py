@@ -7,7 +7,7 @@ groups ``linear``, ``quantiles`` and ``halving``.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,15 +19,17 @@ from fastmech.basins.disturbed import (
     refuse_meeting_balls,
 )
 from fastmech.capture.select import certificate_of
-from fastmech.capture.steps import method_for
 from fastmech.disturbance.linear_range import linear_range
 from fastmech.disturbance.motion import damped_times, equilibria_to_disturb
-from fastmech.disturbance.size import size_at
+from fastmech.disturbance.size import size_of
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.status import ENDS, FAILURES
 from fastmech.integrators.methods import find_method
-from fastmech.results import ANGLE_UNITS, NO_CODE, STATE_UNITS, Dataset, Variable, flags, numbers, parts
+from fastmech.models.mechanism import Mechanism
+from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers, parts
+from fastmech.scan_types.axis import coordinate_units, state_units, told
+from fastmech.scan_types.map_layout import about_of, one_of
 from fastmech.scan_types.request import HALVING, counted_failures
 from fastmech.scan_types.tally import SHARES, Tally
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
@@ -49,17 +51,23 @@ ABOUT_SHARES = {
 ABOUT_QUANTILES = "quantiles of the time to return over those that return, inf: later than the end of the run"
 
 _EACH, _EVERY = ("equilibrium",), ("equilibrium", "trajectory")
-_TURNS = dict.fromkeys(ANGLE_UNITS, "1")
+
+Units = Callable[[Scene | Mechanism], Mapping[str, str]]
+
+
+def _turns(system: Scene | Mechanism) -> dict[str, str]:
+    return dict.fromkeys(coordinate_units(system), "1")
+
 
 #: What is known of every trajectory: type, what stands for one that is not computed yet, unit, meaning. What
 #: has several units is a variable for each of them.
-_TRAJECTORY: dict[str, tuple[str, float, str | Mapping[str, str], str]] = {
-    "start": ("f8", np.nan, STATE_UNITS, "{} at the start"),
-    "final": ("f8", np.nan, STATE_UNITS, "{} at the end, or of the last finite state"),
+_TRAJECTORY: dict[str, tuple[str, float, str | Units, str]] = {
+    "start": ("f8", np.nan, state_units, "{} at the start"),
+    "final": ("f8", np.nan, state_units, "{} at the end, or of the last finite state"),
     "failed": ("f8", np.nan, "s", "time of the last finite state where it failed on the way"),
     "outcome": ("i1", -1, "1", "where it ends"),
     "end_equilibrium": ("i1", -1, "1", "stable equilibrium at which it is proved to end"),
-    "turns": ("i8", 0, _TURNS, "full turns of {} made on the way there"),
+    "turns": ("i8", 0, _turns, "full turns of {} made on the way there"),
     "time_to_return": (
         "f8",
         np.nan,
@@ -69,7 +77,7 @@ _TRAJECTORY: dict[str, tuple[str, float, str | Mapping[str, str], str]] = {
     "excursion": (
         "f8",
         np.nan,
-        ANGLE_UNITS,
+        coordinate_units,
         "largest departure of {} at the ends of steps, NaN: not followed to its end",
     ),
 }
@@ -78,16 +86,19 @@ _TRAJECTORY: dict[str, tuple[str, float, str | Mapping[str, str], str]] = {
 TRAJECTORY_VARIABLES = tuple(_TRAJECTORY)
 
 
-def empty_trajectories(names: list[str], count: int) -> dict[str, NDArray[Any]]:
+def empty_trajectories(system: Scene | Mechanism, names: list[str], count: int) -> dict[str, NDArray[Any]]:
     """Arrays of so many trajectories that have not been computed."""
     found = {}
     for name in names:
         dtype, nothing, unit, _ = _TRAJECTORY[name]
-        found[name] = np.full((count,) if isinstance(unit, str) else (count, len(unit)), nothing, dtype)
+        entries = () if isinstance(unit, str) else (len(unit(system)),)
+        found[name] = np.full((count, *entries), nothing, dtype)
     return found
 
 
-def trajectory_variables(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Variable]:
+def trajectory_variables(
+    system: Scene | Mechanism, arrays: Mapping[str, NDArray[Any]]
+) -> dict[str, Variable]:
     """Arrays over (equilibrium, trajectory, ...) as variables."""
     codes: dict[str, Any] = {"outcome": flags(ENDS, fill=-1), "end_equilibrium": NO_CODE}
     found: dict[str, Variable] = {}
@@ -97,20 +108,8 @@ def trajectory_variables(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Variab
         if isinstance(unit, str):
             found[name] = Variable(_EVERY, arrays[name], unit, about, codes.get(name, {}))
         else:
-            found |= parts(name, _EVERY, arrays[name], unit, about)
+            found |= parts(name, _EVERY, arrays[name], unit(system), about)
     return found
-
-
-def equilibrium_variables(
-    phi: NDArray[np.float64], theta: NDArray[np.float64], omega: NDArray[np.float64]
-) -> dict[str, Variable]:
-    """The disturbed equilibria."""
-    return {
-        **numbers("equilibrium", len(phi), "number of the equilibrium"),
-        "phi": Variable(_EACH, phi, "rad", "angle phi of the disturbed equilibrium"),
-        "theta": Variable(_EACH, theta, "rad", "angle theta of the disturbed equilibrium"),
-        "omega": Variable(_EACH, omega, "rad/s", "frequency in the norm"),
-    }
 
 
 def share_variables(shares: Mapping[str, NDArray[np.float64]]) -> dict[str, Variable]:
@@ -124,31 +123,36 @@ def quantile_variables(quantiles: NDArray[np.float64]) -> dict[str, Variable]:
     return {"quantile": QUANTILE, "time_to_return_quantile": Variable(dims, quantiles, "s", ABOUT_QUANTILES)}
 
 
-def halving_variables(errors: NDArray[np.float64]) -> dict[str, Variable]:
+def halving_variables(errors: NDArray[np.float64], units: Mapping[str, str]) -> dict[str, Variable]:
     """How far final states of some trajectories are from those of half the step."""
+    unit = one_of(units.values())
+    what = "angle" if unit == "rad" else "position"
     return parts(
         "halving_difference",
         ("equilibrium", "sample"),
         errors,
-        {"angle": "rad", "rate": "rad/s"},
+        {what: unit, "rate": f"{unit}/s" * (unit != "1") or "1"},
         "largest difference of a final {} from that with half the step, first trajectories; NaN: failed",
     )
 
 
-def linear_variables(directions: NDArray[np.float64], limit: NDArray[np.float64]) -> dict[str, Variable]:
+def linear_variables(
+    system: Scene | Mechanism, directions: NDArray[np.float64], limit: NDArray[np.float64]
+) -> dict[str, Variable]:
     """How far the linearized motion can be trusted."""
+    *_, unit = coordinate_units(system).values()
     return {
         **parts(
             "linear_direction",
             ("equilibrium", "direction"),
             directions,
-            STATE_UNITS,
-            "{} of a disturbance of size 1 rad",
+            state_units(system),
+            f"{{}} of a disturbance of size 1 {unit}",
         ),
         "linear_limit": Variable(
             ("equilibrium", "direction"),
             limit,
-            "rad",
+            unit,
             "size up to which the linearized motion keeps the tolerance, inf: beyond all tried, 0: below",
         ),
     }
@@ -181,16 +185,16 @@ class DisturbedTiling(Tiling):
 
     what = "disturbed trajectories"
 
-    def __init__(self, request: Disturbed, scene: Scene) -> None:
+    def __init__(self, request: Disturbed, scene: Scene | Mechanism) -> None:
         self.request, self.scene = request, scene
         self.equilibria = equilibria_to_disturb(scene)
         refuse_meeting_balls(scene, self.equilibria, request.return_radius, range(len(self.equilibria)))
-        self.method = method_for(scene, request.method)
+        certificate = certificate_of(scene)
+        self.method = certificate.method(request.method)
         self.rays = _blocks(request.linear_directions, DIRECTIONS)
-        rest = np.column_stack(
-            [self.equilibria.phi, self.equilibria.theta, *np.zeros((2, len(self.equilibria)))]
-        )
-        step = request.dt or float(certificate_of(scene).measuring_steps(rest, self.method).min())
+        places = self.equilibria.position
+        rest = np.concatenate([places, np.zeros_like(places)], axis=1)
+        step = request.dt or float(certificate.measuring_steps(rest, self.method).min())
         self.parts = _blocks(request.trajectories, self._tile_length(step))
         self.count = len(self.equilibria) * (len(self.rays) + len(self.parts))
 
@@ -225,14 +229,19 @@ class DisturbedTiling(Tiling):
     def assemble(self, tile: Tiles) -> Stream:
         """Join the blocks and count."""
         each = list(self.equilibria)
-        omega = np.array([size_at(self.scene, e.phi, e.theta).omega for e in each])
-        fixed = equilibrium_variables(self.equilibria.phi, self.equilibria.theta, omega)
+        omega = np.array([size_of(self.scene, e).omega for e in each])
+        fixed = numbers("equilibrium", len(each), "number of the equilibrium")
+        for k, (name, unit) in enumerate(coordinate_units(self.scene).items()):
+            about = f"{about_of(unit)} {name} of the disturbed equilibrium"
+            fixed[name] = Variable(_EACH, self.equilibria.position[:, k], unit, about)
+        fixed["omega"] = Variable(_EACH, omega, "rad/s", "frequency in the norm")
         fixed |= numbers("trajectory", self.request.trajectories, "number of the trajectory")
         count, request = len(each), self.request
-        nothing = empty_trajectories(request.kept, 1)
+        nothing = empty_trajectories(self.scene, request.kept, 1)
         arrays = {n: np.broadcast_to(a, (1, request.trajectories, *a.shape[1:])) for n, a in nothing.items()}
-        plane = trajectory_variables(arrays) | share_variables(dict.fromkeys(SHARES, np.zeros(1)))
+        plane = trajectory_variables(self.scene, arrays) | share_variables(dict.fromkeys(SHARES, np.zeros(1)))
         attrs = {
+            **told(self.scene),
             **request.settings,
             "method": self.method,
             "distribution": "uniform in the ball of the given radius, kinetic-energy norm at the equilibrium",
@@ -245,10 +254,14 @@ class DisturbedTiling(Tiling):
         if part is None:
             block = self.rays[index // len(self.equilibria)]
             rays = block.stop - block.start
-            arrays = {"directions": Variable(("ray", "component"), np.full((rays, 4), np.nan))}
+            arrays = {
+                "directions": Variable(
+                    ("ray", "component"), np.full((rays, 2 * self.equilibria.position.shape[1]), np.nan)
+                )
+            }
             return Dataset(arrays | {"limit": Variable(("ray",), np.full(rays, np.nan))})
         sample = min(SAMPLE, self.request.trajectories) if part.start == 0 else 0
-        nothing = empty_trajectories(self.request.kept, self.items(index))
+        nothing = empty_trajectories(self.scene, self.request.kept, self.items(index))
         return self._tile(nothing, np.full((sample, 2), np.nan), Tally())
 
     def _tile_length(self, dt: float) -> int:
@@ -295,16 +308,19 @@ class DisturbedTiling(Tiling):
             held.append({n: np.stack([one[n].data for one in found]) for n in self.request.kept})
             if part is self.parts[-1] or sum(a.nbytes for h in held for a in h.values()) >= PIECE_BYTES:
                 joined = {n: np.concatenate([h[n] for h in held], axis=1) for n in self.request.kept}
-                yield (slice(0, count), slice(begun, part.stop)), _data(trajectory_variables(joined))
+                yield (
+                    (slice(0, count), slice(begun, part.stop)),
+                    _data(trajectory_variables(self.scene, joined)),
+                )
                 begun, held = part.stop, []
         each = [t.shares() for t in tallies]
         shares = {name: np.array([share[name] for share in each]) for name in SHARES}
         quantiles = np.array([t.quantiles(QUANTILES) for t in tallies])
         each_one = numbers("equilibrium", count, "number of the equilibrium")
         groups = {
-            "linear": Dataset(each_one | linear_variables(directions, limit)),
+            "linear": Dataset(each_one | linear_variables(self.scene, directions, limit)),
             "quantiles": Dataset(each_one | quantile_variables(quantiles)),
-            "halving": Dataset(each_one | halving_variables(np.stack(errors))),
+            "halving": Dataset(each_one | halving_variables(np.stack(errors), coordinate_units(self.scene))),
         }
         attrs: dict[str, Any] = {
             "error_estimate": float(np.max(errors)),
@@ -330,8 +346,8 @@ def _blocks(total: int, length: int) -> list[slice]:
     return [slice(k, min(k + length, total)) for k in range(0, total, length)]
 
 
-def _sampled_errors(scene: Scene, e: DisturbedEnsemble, method: str) -> Floats:
-    """Largest differences of the first final angles and rates from those of half the step, (sample, 2)."""
+def _sampled_errors(scene: Scene | Mechanism, e: DisturbedEnsemble, method: str) -> Floats:
+    """Largest differences of first final coordinates and rates from those of half the step (sample, 2)."""
     final, dt = e.final[:SAMPLE], e.dt[:SAMPLE]
     finer = np.empty_like(final)
     for step in np.unique(dt):
@@ -339,5 +355,5 @@ def _sampled_errors(scene: Scene, e: DisturbedEnsemble, method: str) -> Floats:
         half = 0.5 * float(step)
         times = np.append(damped_times(scene, method, min(half, e.t_end)), e.t_end)
         finer[some] = integrate(scene, e.starts[some], dt=half, method=method, t_eval=times).y[-1]
-    difference = np.abs(finer - final).reshape(-1, 2, 2).max(axis=2)
+    difference = np.abs(finer - final).reshape(len(final), 2, -1).max(axis=2)
     return np.where(np.isnan(e.failed[:SAMPLE])[:, None], difference, np.nan)

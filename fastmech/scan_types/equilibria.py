@@ -67,8 +67,8 @@ class EquilibriaScan(TiledScan):
 
     def _found(self, scene: Scene | Mechanism) -> Dataset:
         """Find and classify."""
-        equilibria = find_equilibria(scene)
-        found = [classify(scene, equilibrium) for equilibrium in equilibria]
+        equilibria: Any = find_equilibria(scene)
+        found: list[Any] = [classify(scene, equilibrium) for equilibrium in equilibria]
         coordinates, each = coordinate_units(scene), ("equilibrium",)
         n, of_paper = len(coordinates), isinstance(scene, Scene)
 
@@ -94,7 +94,9 @@ class EquilibriaScan(TiledScan):
                 for k, (name, unit) in enumerate(coordinates.items())
             },
             "energy": Variable(each, equilibria.energy, "J", energy),
-            "kind": Variable(each, kinds, "1", "kind of equilibrium", flags(Kind)),
+            "kind": Variable(
+                each, kinds, "1", "kind of equilibrium", flags(list(Kind)[: 4 if of_paper else None])
+            ),
             "morse_index": Variable(
                 each,
                 np.array(index, dtype=np.int8),

@@ -105,8 +105,8 @@ class EquilibriumMap(TiledScan):
 
     def tiling(self, scene: Scene | Mechanism) -> Tiling:
         """Planes of the first axis, and of a scene the curves as a tile of their own."""
-        made = MapTiling if isinstance(scene, Scene) else RestingTiling
-        return made(self, scene, arrays(self.axes))
+        axes = arrays(self.axes)
+        return MapTiling(self, scene, axes) if isinstance(scene, Scene) else RestingTiling(self, scene, axes)
 
     @property
     def wells(self) -> bool:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import fastmech as fm
 from fastmech.errors import InputError
 from fastmech.results import Dataset
 from fastmech.scan_types import scan_kinds
@@ -168,8 +169,8 @@ def test_chosen_variables_only() -> None:
     result = EquilibriumMap(axes=AXES, variables=["count", "phi"]).run(SCENE, RunContext())
     assert {"count", "phi", "sheet"} <= set(result)
     assert "depth" not in result
-    with pytest.raises(ValueError, match="unknown variable 'phii'; did you mean 'phi'"):
-        EquilibriumMap(axes=AXES, variables=["phii"])
+    with pytest.raises(fm.InputError, match="unknown variable 'phii'; did you mean 'phi'"):
+        EquilibriumMap(axes=AXES, variables=["phii"]).check(SCENE)
 
 
 def test_requests_of_the_atlas_are_valid() -> None:
