@@ -36,9 +36,8 @@ def observe_departure(t: float, Y: Floats, params: Floats, record: Floats) -> No
                 square += a * (away * (Y[k, i] - params[k]) + inverse_square * Y[n + j, i] * Y[n + k, i])
             most = max(abs(away), record[EXCURSION + j, i])
             first, last = h * record[before + n + j, i], h * Y[n + j, i]
-            if (
-                first * last < 0.0
-            ):  # the cubic's slope: first + b s + (last - first - b) s^2 for s from 0 to 1
+            # The cubic's slope is first + b s + (last - first - b) s^2, s from 0 to 1.
+            if first * last < 0.0:
                 moved = Y[j, i] - record[before + j, i]
                 b = 6.0 * moved - 4.0 * first - 2.0 * last
                 root = math.sqrt(b * b - 4.0 * first * (last - first - b))
