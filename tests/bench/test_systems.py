@@ -110,8 +110,8 @@ def test_the_mean_is_geometric_and_the_worst_is_named():
     text = "\n".join(report([made(), slow], (1e-3, 1e-5)))
     assert "| fixed over heyoka | 2.00 (slow 1.00) | 2.00 (slow 1.00) |" in text
     assert "within a factor 3 of the truth in 8 of 8 runs (2 to 2 times it)" in text
-    assert "# The mechanism" not in text
-    assert "# The mechanism beside heyoka" in report([made()], (1e-3, 1e-5), [slow])
+    assert "# Mechanisms" not in text
+    assert "# Mechanisms beside heyoka" in report([made()], (1e-3, 1e-5), [slow])
     assert "Not installed" in "\n".join(report([made()._replace(heyoka=[])], (1e-3, 1e-5)))
 
 
