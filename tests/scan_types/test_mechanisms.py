@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from scipy.optimize import brentq
 
 import fastmech as fm
 from fastmech.cli import main
+from fastmech.results import Variable
 from fastmech.runner import draw_results, run_request
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import read_request
@@ -61,6 +63,110 @@ def test_a_shipped_mechanism_by_name_gives_what_python_gives(tmp_path: Path) -> 
         assert groups["equilibrium_y"].units == "m"
     pictures = list(draw_results(out, tmp_path / "pictures"))
     assert {p.name for p in pictures} == {"map_labels.png", "map_capture_time.png"}
+
+
+def run(tmp_path: Path, text: str, name: str = "scan") -> fm.Results:
+    request, out = tmp_path / f"{name}.toml", tmp_path / f"{name}.h5"
+    request.write_text(text)
+    run_request(request, out)
+    return fm.open_results(out)
+
+
+def words(variable: Variable) -> list[str]:
+    known = {code: word for word, code in variable.codes.items()}
+    return [known.get(int(code), "none") for code in variable.data.ravel()]
+
+
+def test_equilibria_of_a_truss_are_those_of_its_closed_form(tmp_path: Path) -> None:
+    text = 'mechanism = "von_mises_truss"\n[scene]\nb = 2.0\nP = {P}\n[scan.rest]\nkind = "equilibria"\n'
+    with run(tmp_path, text.format(P=20.0), "loaded") as results:
+        section = results["rest"].load()
+    free, k, P = np.sqrt(1.25), 1000.0, 20.0
+
+    def excess(y: float) -> float:  # of both bars' push over the load
+        return 2.0 * k * y * (free / np.hypot(1.0, y) - 1.0) - P
+
+    expected = [brentq(excess, *ends, xtol=1e-15) for ends in ((-0.9, -0.5), (0.4, 0.5), (0.0, 0.2))]
+    np.testing.assert_allclose(section["y"].data, expected, rtol=1e-12)
+    np.testing.assert_allclose(section["x"].data, 0.0, atol=1e-12)
+    assert section["y"].units == "m"
+    assert words(section["kind"]) == ["minimum", "minimum", "saddle"]
+    assert words(section["verdict"]) == ["asymptotically_stable", "asymptotically_stable", "unstable"]
+    assert section.attrs["outcome"] == "complete"
+    with run(tmp_path, text.format(P=0.0), "free") as results:
+        section = results["rest"].load()
+    up = int(np.argmax(section["y"].data))
+    across, along = 2.0 * k * np.array([0.25, 1.0]) / 1.25  # 2 k sin^2 a, 2 k cos^2 a with m = 1
+    frequencies = [section[f"natural_frequency_{i}"].data[up] for i in (1, 2)]
+    np.testing.assert_allclose(frequencies, np.sqrt([across, along]), rtol=1e-12)
+    assert section["stiffness_y_y"].units == "N/m"
+    np.testing.assert_allclose(section["stiffness_y_y"].data[up], across, rtol=1e-12)
+    np.testing.assert_allclose(section["decay_time"].data[up], 1.0, rtol=1e-12)  # 2 m / b
+    pictures = {p.name for p in draw_results(tmp_path / "loaded.h5", tmp_path)}
+    assert pictures == {"rest_eigenvalues.png", "rest_positions.png"}
+
+
+def test_map_of_a_truss_ends_at_its_snap_load(tmp_path: Path) -> None:
+    text = """
+mechanism = "von_mises_truss"
+[scene]
+b = 2.0
+[scan.map]
+kind = "equilibrium_map"
+[scan.map.axes]
+P = { start = 1.0, stop = 60.0, num = 60 }
+rise = { start = 0.2, stop = 0.6, num = 5 }
+"""
+    with run(tmp_path, text) as results:
+        section = results["map"].load()
+        low = results["map"].select(P=10.0, rise=0.5)
+    rise = section["rise"].data
+    cosine = 1.0 / np.hypot(1.0, rise)
+    snap = 2000.0 / cosine * (1.0 - cosine ** (2.0 / 3.0)) ** 1.5
+    below = section["P"].data[:, None] < snap
+    assert section["count"].data.tolist() == np.where(below, 3, 1).tolist()
+    assert section["count_stable"].data.tolist() == np.where(below, 2, 1).tolist()
+    assert (section["outcome"].data == section["outcome"].codes["complete"]).all()
+    assert np.isnan(section["y"].data[~below][:, 1:]).all()
+    assert np.isnan(section["eigenvalue_im_1"].data[~below][:, 1:]).all()
+    assert low["y"].units == "m"
+    assert np.isfinite(low["y"].data).sum() == 3
+    drawn = {p.name for p in draw_results(tmp_path / "scan.h5", tmp_path)}
+    assert drawn == {"map_count.png", "map_angles.png", "map_decay.png"}
+
+
+def test_map_of_a_column_flutters_where_ziegler_says(tmp_path: Path) -> None:
+    axes = "P = { start = 1.2, stop = 1.9, num = 36 }\nb = { values = [0.1, 0.5, 0.8] }\n"
+    head = 'mechanism = "ziegler_column"\n[scan.map]\nkind = "equilibrium_map"\n[scan.map.axes]\n'
+    with run(tmp_path, head + axes) as results:
+        section = results["map"].load()
+    limit = 41.0 / 28.0 + section["b"].data ** 2 / 2.0
+    still = section["P"].data[:, None] < limit
+    straight = (np.abs(section["lower"].data) < 1e-9) & (np.abs(section["upper"].data) < 1e-9)
+    verdict = np.array(words(section["verdict"])).reshape(straight.shape)
+    assert (straight.sum(axis=-1) == 1).all()
+    expected = np.where(still, "asymptotically_stable", "unstable")
+    np.testing.assert_array_equal(verdict[straight].reshape(still.shape), expected)
+    assert (section["morse_index"].data == -1).all()  # a follower force has no potential
+    assert {p.name for p in draw_results(tmp_path / "scan.h5", tmp_path)} >= {"map_count.png"}
+
+
+def test_disturbances_of_a_truss_are_those_of_python(tmp_path: Path) -> None:
+    more = "trajectories = 64\nradius = 0.3\nt_end = 20.0\nlinear_directions = 4\n"
+    text = TRUSS[: TRUSS.index("[scan.map]")] + f'[scan.shock]\nkind = "disturbed"\n{more}'
+    with run(tmp_path, text) as results:
+        section = results["shock"].load()
+    truss = fm.mechanisms.von_mises_truss().replace(b=2.0, P=20.0)
+    equilibria = fm.find_equilibria(truss)
+    for k, equilibrium in enumerate(equilibria):
+        found = fm.disturb(truss, equilibrium, 64, radius=0.3, t_end=20.0)
+        np.testing.assert_array_equal(section["end_equilibrium"].data[k], found.end_index)
+        np.testing.assert_array_equal(section["excursion_y"].data[k], found.excursion[:, 1])
+    assert section["excursion_y"].units == section["start_x"].units == "m"
+    assert section["start_x_dot"].units == "m/s"
+    assert section.groups["linear"]["linear_limit"].units == "m"
+    names = {p.name for p in draw_results(tmp_path / "scan.h5", tmp_path)}
+    assert names == {f"shock_{n}.png" for n in ("outcomes", "time_to_return", "excursions", "linear_range")}
 
 
 @pytest.mark.parametrize("path", sorted(Path("scans/mechanisms").glob("*.toml")), ids=lambda path: path.stem)
