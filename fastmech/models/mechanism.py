@@ -347,9 +347,10 @@ class Mechanism:
         """T and U [J] of states (..., 2 n); parameters' other values have shapes that fit."""
         return Energies(*self.evaluate("energies", self._split(y, 2), parameters))
 
-    def powers(self, t: float, y: ArrayLike, parameters: Mapping[str, ArrayLike] | None = None) -> Powers:
-        """Powers [W] at a time [s] in states (..., 2 n)."""
-        brought, damped, taken = self.evaluate("powers", [t, *self._split(y, 2)], parameters)
+    def powers(self, t: ArrayLike, y: ArrayLike, parameters: Mapping[str, ArrayLike] | None = None) -> Powers:
+        """Powers [W] in states (..., 2 n), at a time [s] or each at its own."""
+        times = np.asarray(t, dtype=np.float64)[()]
+        brought, damped, taken = self.evaluate("powers", [times, *self._split(y, 2)], parameters)
         return Powers(brought, damped + taken)
 
     def accelerations(

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.plots.labels import logarithmic
+from fastmech.plots.labels import coordinates_of, logarithmic, symbol
 from fastmech.plots.style import new_figure, style
-from fastmech.results import STATE_UNITS, Dataset
+from fastmech.results import Dataset
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 TIME = "time t [s]"
+KINDS = {"rad": "angle", "m": "position"}
 
 _REACTIONS = {
     "rod_om1": "Rod OM1, tension positive",
@@ -29,42 +30,56 @@ _REACTIONS = {
 
 def draw_motion(dataset: Dataset) -> dict[str, Figure]:
     """Pictures of a dataset of the scan type ``motion``."""
+    names = coordinates_of(dataset)
+    states = (*names, *(f"{name}_dot" for name in names))
+    points = _points(dataset)
     with style():
-        return {
-            "angles": _angles(dataset),
-            "coordinates": _coordinates(dataset),
-            "reactions": _reactions(dataset),
-            "energies": _energies(dataset),
-            "residuals": _residuals(dataset),
-        }
+        figures = {"angles": _states(dataset, states)}
+        if points:
+            figures["coordinates"] = _coordinates(dataset, points)
+        if set(_REACTIONS) <= set(dataset):
+            figures["reactions"] = _reactions(dataset)
+        return figures | {"energies": _energies(dataset), "residuals": _residuals(dataset, states)}
 
 
-def _angles(dataset: Dataset) -> Figure:
+def _states(dataset: Dataset, states: tuple[str, ...]) -> Figure:
+    """A panel for each unit."""
     t = dataset["time"].data
-    figure, (angles, rates) = _rows(2)
-    for axes, suffix in ((angles, ""), (rates, "_dot")):
-        prime = "'" if suffix else ""
-        axes.plot(t, dataset[f"phi{suffix}"].data, label=f"φ{prime}")
-        axes.plot(t, dataset[f"theta{suffix}"].data, "--", label=f"θ{prime}")
+    units = list(dict.fromkeys(dataset[name].units for name in states))
+    figure, panels = _rows(len(units))
+    for axes, unit in zip(panels, units, strict=True):
+        for k, name in enumerate(n for n in states if dataset[n].units == unit):
+            axes.plot(t, dataset[name].data, ("-", "--", "-.", ":")[k], label=symbol(name))
+        axes.set(ylabel=f"{KINDS.get(unit, 'rate')} [{unit}]")
         _legend(axes)
-    angles.set(ylabel="angle [rad]", title="Angles and their rates")
-    rates.set(ylabel="rate [rad/s]")
+    panels[0].set_title("Coordinates and their rates")
     return figure
 
 
-def _coordinates(dataset: Dataset) -> Figure:
+def _points(dataset: Dataset) -> dict[str, tuple[str, str | None]]:
+    """Names of moving points with the variables of their coordinates; one that is None stays 0."""
+    if "x1" in dataset:
+        return {"M1": ("x1", "y1"), "M2": ("x2", "y2"), "M3": ("x3", None)}
+    found = [name.removesuffix("_x") for name in dataset if name.startswith("point_") and name.endswith("_x")]
+    return {name.removeprefix("point_"): (f"{name}_x", f"{name}_y") for name in found}
+
+
+def _coordinates(dataset: Dataset, points: dict[str, tuple[str, str | None]]) -> Figure:
     t = dataset["time"].data
     figure = new_figure(7.2, 7.4)
     over_time, paths = figure.subplots(2, 1, height_ratios=[1.0, 1.3])
-    for name, line in (("x1", "-"), ("y1", "--"), ("x2", "-"), ("y2", "--"), ("x3", "-")):
-        over_time.plot(t, dataset[name].data, line, label=name)
+    for point, (along, up) in points.items():
+        for axis, name, line in (("x", along, "-"), ("y", up, "--")):
+            if name is not None:
+                over_time.plot(t, dataset[name].data, line, label=f"{axis} of {point}")
+        if up is None:
+            continue
+        x, y = dataset[along].data, dataset[up].data
+        (path,) = paths.plot(x, y, lw=1.2, label=f"path of {point}")
+        paths.plot(x[0], y[0], "o", color=path.get_color(), mfc="white", label=f"start of {point}")
+        paths.plot(x[-1], y[-1], "o", color=path.get_color(), label=f"end of {point}")
     over_time.set(xlabel=TIME, ylabel="coordinate [m]", title="Coordinates of the points")
     _legend(over_time)
-    for point in ("1", "2"):
-        x, y = dataset[f"x{point}"].data, dataset[f"y{point}"].data
-        (line,) = paths.plot(x, y, lw=1.2, label=f"path of M{point}")
-        paths.plot(x[0], y[0], "o", color=line.get_color(), mfc="white", label=f"start of M{point}")
-        paths.plot(x[-1], y[-1], "o", color=line.get_color(), label=f"end of M{point}")
     paths.set(xlabel="x [m]", ylabel="y [m]", title="Paths in the plane")
     paths.set_aspect("equal", adjustable="datalim")
     _legend(paths)
@@ -100,32 +115,39 @@ def _energies(dataset: Dataset) -> Figure:
     energies.plot(t, kinetic, label="kinetic T")
     energies.plot(t, potential, "--", label="potential Π")
     energies.plot(t, kinetic + potential, "-.", label="T + Π")
-    energies.set(ylabel="energy [J]", title="Energies, and works since t = 0")
-    works.plot(t, dataset["work_force"].data, label="force")
-    works.plot(t, dataset["work_damper"].data, "--", label="damper")
-    works.set(ylabel="work [J]")
+    energies.set(ylabel="energy [J]", title="Energies, and what changes them")
+    if "work_force" in dataset:
+        works.plot(t, dataset["work_force"].data, label="force")
+        works.plot(t, dataset["work_damper"].data, "--", label="damper")
+        works.set(ylabel="work [J]")
+    else:
+        works.plot(t, dataset["power_loads"].data, label="brought by loads")
+        works.plot(t, dataset["power_lost"].data, "--", label="lost")
+        works.set(ylabel="power [W]")
     for axes in (energies, works):
         _legend(axes)
     return figure
 
 
-def _residuals(dataset: Dataset) -> Figure:
+def _residuals(dataset: Dataset, states: tuple[str, ...]) -> Figure:
     t = dataset["time"].data
-    figure, (formulations, constraints, energy) = _rows(3)
-    symbols = ("φ", "θ", "φ'", "θ'")
-    for symbol, (entry, unit) in zip(symbols, STATE_UNITS.items(), strict=True):
-        difference = dataset[f"formulation_difference_{entry}"].data
-        _log_plot(formulations, t, difference, f"{symbol} [{unit}]")
-    formulations.set(ylabel="difference [rad], [rad/s]", title="Canonical equations less Lagrange's")
-    for number, unit in {2: "m²", 3: "m²", 4: "m", 5: "m²"}.items():
-        residual = dataset[f"constraint_residual_{number}"].data
-        _log_plot(constraints, t, residual, f"({number}) [{unit}]")
-    constraints.set(ylabel="residual [m²], [m]", title="Constraints, paper (2)-(5)")
-    _log_plot(energy, t, dataset["energy_residual"].data, "[J]")
-    energy.set(ylabel="residual [J]", title="Change of T + Π less the works of damper and force")
-    for axes in (formulations, constraints, energy):
+    of_paper = "energy_residual" in dataset
+    figure, panels = _rows(3 if of_paper else 1)
+    for name in states:
+        difference = dataset[f"formulation_difference_{name}"]
+        _log_plot(panels[0], t, difference.data, f"{symbol(name)} [{difference.units}]")
+    panels[0].set(ylabel="difference [SI]", title="Canonical equations less Lagrange's")
+    if of_paper:
+        _, constraints, energy = panels
+        for number, unit in {2: "m²", 3: "m²", 4: "m", 5: "m²"}.items():
+            residual = dataset[f"constraint_residual_{number}"].data
+            _log_plot(constraints, t, residual, f"({number}) [{unit}]")
+        constraints.set(ylabel="residual [m²], [m]", title="Constraints, paper (2)-(5)")
+        _log_plot(energy, t, dataset["energy_residual"].data, "[J]")
+        energy.set(ylabel="residual [J]", title="Change of T + Π less the works of damper and force")
+    for axes in panels:
         logarithmic(axes.yaxis)
-    for axes in (formulations, constraints):
+    for axes in panels[:2]:
         _legend(axes)
     return figure
 

@@ -32,7 +32,7 @@ from fastmech.scan_types.axis import (
     check_starts,
     told,
 )
-from fastmech.scan_types.request import TiledScan, UsualMethod, failures
+from fastmech.scan_types.request import Scan, UsualMethod, failures
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
 from fastmech.scene import STATE, Number, Scene, nearest
 from fastmech.step_limits.warning import step_warning
@@ -60,7 +60,7 @@ def _power_of_two(value: int | None) -> int | None:
     return value
 
 
-class Basins(TiledScan):
+class Basins(Scan):
     """A basin map of a slice of state space, labels proved by capture."""
 
     kind: ClassVar[str] = "basins"

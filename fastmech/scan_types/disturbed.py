@@ -29,7 +29,7 @@ from fastmech.scan_types.axis import (
 )
 from fastmech.scan_types.disturbed_map import MOST_POINTS, MOST_TRAJECTORIES, DisturbedMap
 from fastmech.scan_types.disturbed_tiling import ABOUT_SHARES, TRAJECTORY_VARIABLES, DisturbedTiling
-from fastmech.scan_types.request import Seed, TiledScan, UsualMethod
+from fastmech.scan_types.request import Scan, Seed, UsualMethod
 from fastmech.scan_types.tiling import RunContext, Tiling
 from fastmech.scene import Scene, nearest
 from fastmech.step_limits.warning import step_warning
@@ -60,7 +60,7 @@ def _known_variables(names: list[str]) -> list[str]:
 _NOT_OF_A_MAP = ("variables", "linear_horizon", "linear_tolerance", "linear_directions")
 
 
-class Disturbed(TiledScan):
+class Disturbed(Scan):
     """Ensembles about every equilibrium, uniform in a ball of the kinetic-energy norm."""
 
     kind: ClassVar[str] = "disturbed"

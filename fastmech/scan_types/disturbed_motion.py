@@ -27,7 +27,7 @@ from fastmech.equilibria.search import MOST
 from fastmech.mechanism.coefficients import reduce
 from fastmech.results import STATE_UNITS, Dataset, Variable, numbers, parts
 from fastmech.scan_types.axis import check_steps
-from fastmech.scan_types.request import HALVING, TiledScan, UsualMethod, failures
+from fastmech.scan_types.request import HALVING, Scan, UsualMethod, failures
 from fastmech.scan_types.tiling import Each, Tiling
 from fastmech.scene import Scene
 from fastmech.step_limits.warning import step_warning
@@ -41,7 +41,7 @@ Floats = NDArray[np.float64]
 Size = Annotated[float, Field(ge=-MOST_RADIUS, le=MOST_RADIUS)]
 
 
-class DisturbedMotionScan(TiledScan):
+class DisturbedMotionScan(Scan):
     """The same disturbance of every equilibrium; the default is the paper's: xi1 = 0.1, eta1 = 0.1."""
 
     kind: ClassVar[str] = "disturbed_motion"

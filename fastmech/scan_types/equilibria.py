@@ -16,7 +16,7 @@ from fastmech.models.stability import classify
 from fastmech.results import Dataset, Variable, flags, numbers, parts
 from fastmech.scan_types.axis import coordinate_units, told
 from fastmech.scan_types.map_layout import HESSIAN, about_of, drawing_group, eigenvalue_variables
-from fastmech.scan_types.request import TiledScan
+from fastmech.scan_types.request import Scan
 from fastmech.scan_types.tiling import Each, Tiling
 from fastmech.scene import Scene
 
@@ -44,7 +44,7 @@ class StabilityVerdict(IntEnum):
     CRITICAL = 3
 
 
-class EquilibriaScan(TiledScan):
+class EquilibriaScan(Scan):
     """Equilibria with loads at rest: of the paper's force F0 where alpha = 0, else none."""
 
     kind: ClassVar[str] = "equilibria"

@@ -54,7 +54,7 @@ from fastmech.scan_types.map_layout import (
     sheet_table,
     sheet_variables,
 )
-from fastmech.scan_types.request import TiledScan
+from fastmech.scan_types.request import Scan
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
 from fastmech.scene import Scene, nearest
 from fastmech.store.stream import Piece, Stream
@@ -71,7 +71,7 @@ MOST_POINTS = 50_000_000
 SHEET_NUMBERS, POINT_NUMBERS = 3, 250
 
 
-class EquilibriumMap(TiledScan):
+class EquilibriumMap(Scan):
     """Every equilibrium at every point of a grid of parameters, with the proof that none is missing."""
 
     kind: ClassVar[str] = "equilibrium_map"

@@ -29,7 +29,7 @@ from fastmech.scan_types.axis import (
     check_size,
     check_starts,
 )
-from fastmech.scan_types.request import Seed, TiledScan
+from fastmech.scan_types.request import Scan, Seed
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
 from fastmech.scene import STATE, Scene, nearest
 
@@ -73,7 +73,7 @@ def _known_states(axes: dict[str, Axis]) -> dict[str, Axis]:
     return axes
 
 
-class Erosion(TiledScan):
+class Erosion(Scan):
     """How much room each well has, along one parameter."""
 
     kind: ClassVar[str] = "erosion"

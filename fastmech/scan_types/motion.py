@@ -1,8 +1,8 @@
-"""One motion of the mechanism in full: both formulations, points, constraints, energies, reactions."""
+"""One motion in full: both formulations, points and energies; of the paper's mechanism reactions too."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
@@ -14,24 +14,27 @@ from fastmech.ensembles.balance import energy_balance
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.status import FAILURES
+from fastmech.errors import InputError, shown
 from fastmech.mechanism.coefficients import force
 from fastmech.mechanism.geometry import constraints, positions
 from fastmech.mechanism.hamilton import momenta
 from fastmech.mechanism.reactions import reactions
-from fastmech.results import STATE_UNITS, Dataset, Variable, parts
-from fastmech.scan_types.axis import check_steps
-from fastmech.scan_types.request import HALVING, MethodName, TiledScan, failures
+from fastmech.models.mechanism import Mechanism
+from fastmech.results import Dataset, Variable, parts
+from fastmech.scan_types.axis import check_steps, state_units, told
+from fastmech.scan_types.request import HALVING, MethodName, Scan, failures
 from fastmech.scan_types.tiling import Each, Tiling
-from fastmech.scene import Scene
+from fastmech.scene import Scene, nearest
 from fastmech.step_limits.warning import step_warning
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+Floats = NDArray[np.float64]
+
 #: Numbers of a section for every output.
 OUTPUT_NUMBERS = 30
 
-_STATE = {"phi": "angle phi", "theta": "angle theta", "phi_dot": "rate of phi", "theta_dot": "rate of theta"}
 _REACTIONS = {
     "rod_om1": "axial force in rod O-M1, tension positive",
     "rod_m1m2": "axial force in rod M1-M2, tension positive",
@@ -46,12 +49,20 @@ _BALANCE = {
     "energy_residual": "change of T + Pi less the work of damper and force",
 }
 
+_POWERS = {"power_loads": "power that loads bring", "power_lost": "power lost in dampers and to forces"}
+_OF_PAPER = ("phi", "theta", "phi_dot", "theta_dot")
 
-class Motion(TiledScan):
-    """Motion from one start; the default start is the paper's (Table 1)."""
+
+class Motion(Scan):
+    """Motion from one start; of the paper's mechanism the default start is that of Table 1."""
 
     kind: ClassVar[str] = "motion"
+    of_mechanisms = True
+    taken = frozenset({"time", *_BALANCE, *_POWERS})
 
+    start: dict[str, float] = Field(
+        default={}, description="of mechanisms: coordinates and rates at the start, 0 by default"
+    )
     phi: float = Field(default=4.0 * np.pi / 13.0, description="start of phi [rad]")
     theta: float = Field(default=np.pi / 7.0, description="start of theta [rad]")
     phi_dot: float = Field(default=0.0, description="start of phi' [rad/s]")
@@ -61,18 +72,28 @@ class Motion(TiledScan):
     dt: Annotated[float, Field(gt=0)] = 0.01
     method: MethodName = "dop853"
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Scene | Mechanism) -> None:
         """So many steps must be possible, and what is kept of every output fit into memory."""
+        own, known = isinstance(scene, Mechanism), list(state_units(scene))
+        for name in self.model_fields_set & {*_OF_PAPER} if own else self.start:
+            there, instead = (name, f"start.{known[0]}") if own else (f"start.{name}", known[0])
+            owner = "the paper's" if own else "any other"
+            raise InputError(f"{there}: is for {owner} mechanism; give {instead}")
+        for name in self.start:
+            if name not in known:
+                raise InputError(f"start.{name}: unknown coordinate {shown(name)}; {nearest(name, known)}")
         check_steps("t_end", self.t_end, self.dt)
         checks.memory(self.outputs * OUTPUT_NUMBERS, 3, "outputs: the motion", "fewer outputs")
 
-    def step_warning(self, scene: Scene) -> str | None:
-        """By the scene's limit, the decaying force and the rates of the start."""
-        return step_warning(scene, self.dt, self.method, self._start)
+    def step_warning(self, scene: Scene | Mechanism) -> str | None:
+        """By the scene's limit, its load and the rates of the start."""
+        return step_warning(scene, self.dt, self.method, self._start(scene))
 
-    def tiling(self, scene: Scene) -> Tiling:
-        """Four integrations of the same motion, none of which needs another."""
-        parts = (self._lagrangian, self._canonical, self._balance, self._halved)
+    def tiling(self, scene: Scene | Mechanism) -> Tiling:
+        """Integrations of the same motion, none of which needs another."""
+        parts: list[Callable[[Any], Dataset]] = [self._lagrangian, self._canonical, self._halved]
+        if isinstance(scene, Scene):
+            parts.append(self._balance)
         return Each(
             "integrations of the motion",
             len(parts),
@@ -80,24 +101,25 @@ class Motion(TiledScan):
             lambda tiles: self._joined(scene, tiles),
         )
 
-    @property
-    def _start(self) -> list[float]:
-        return [self.phi, self.theta, self.phi_dot, self.theta_dot]
+    def _start(self, scene: Scene | Mechanism) -> list[float]:
+        if isinstance(scene, Scene):
+            return [self.phi, self.theta, self.phi_dot, self.theta_dot]
+        return [self.start.get(name, 0.0) for name in scene.state]
 
     @property
     def _times(self) -> NDArray[np.float64]:
         return np.linspace(0.0, self.t_end, self.outputs)
 
-    def _lagrangian(self, scene: Scene) -> Dataset:
-        run = integrate(scene, self._start, dt=self.dt, method=self.method, t_eval=self._times)
+    def _lagrangian(self, scene: Scene | Mechanism) -> Dataset:
+        run = integrate(scene, self._start(scene), dt=self.dt, method=self.method, t_eval=self._times)
         return Dataset(_states(run.y), {"steps": run.steps} | failures(run.status, FAILURES))
 
-    def _canonical(self, scene: Scene) -> Dataset:
+    def _canonical(self, scene: Scene | Mechanism) -> Dataset:
         settings: dict[str, Any] = {"dt": self.dt, "method": self.method, "formulation": "hamilton"}
-        return Dataset(_states(integrate(scene, self._start, t_eval=self._times, **settings).y))
+        return Dataset(_states(integrate(scene, self._start(scene), t_eval=self._times, **settings).y))
 
     def _balance(self, scene: Scene) -> Dataset:
-        balance = energy_balance(scene, self._start, self._times, dt=self.dt, method=self.method)
+        balance = energy_balance(scene, self._start(scene), self._times, dt=self.dt, method=self.method)
         values = (
             balance.kinetic,
             balance.potential,
@@ -107,31 +129,49 @@ class Motion(TiledScan):
         )
         return Dataset({n: Variable(("time",), v) for n, v in zip(_BALANCE, values, strict=True)})
 
-    def _halved(self, scene: Scene) -> Dataset:
+    def _halved(self, scene: Scene | Mechanism) -> Dataset:
         t = self._times
         step = float(np.max(np.diff(t) / output_steps(t, self.dt)))  # the step that the others take
-        return Dataset(_states(integrate(scene, self._start, dt=0.5 * step, method=self.method, t_eval=t).y))
+        return Dataset(
+            _states(integrate(scene, self._start(scene), dt=0.5 * step, method=self.method, t_eval=t).y)
+        )
 
-    def _joined(self, scene: Scene, tiles: list[Dataset]) -> Dataset:
+    def _joined(self, scene: Scene | Mechanism, tiles: list[Dataset]) -> Dataset:
         """Derive everything else from the Lagrangian motion."""
-        lagrangian, _, balance, _ = tiles
-        t, y, canonical, halved = self._times, *(tiles[k]["y"].data for k in (0, 1, 3))
-        p = momenta(scene, canonical)
-        points = positions(scene, y)
-        along = ("time",)
+        t, y, canonical, halved = self._times, *(tile["y"].data for tile in tiles[:3])
+        along, units = ("time",), state_units(scene)
+        kinds = {"rad": "angle {}", "m": "length {}"}
         variables = {
             "time": Variable(along, t, "s", "time"),
             **{
-                name: Variable(along, y[:, i], STATE_UNITS[name], about)
-                for i, (name, about) in enumerate(_STATE.items())
+                name: Variable(
+                    along, y[:, k], unit, kinds.get(unit, "rate of {}").format(name.removesuffix("_dot"))
+                )
+                for k, (name, unit) in enumerate(units.items())
             },
-            "p_phi": Variable(along, p[:, 0], "kg m2/s", "generalized momentum of phi, canonical equations"),
-            "p_theta": Variable(
-                along, p[:, 1], "kg m2/s", "generalized momentum of theta, canonical equations"
-            ),
-            **parts(
-                "formulation_difference", along, canonical - y, STATE_UNITS, "{}, canonical less Lagrangian"
-            ),
+            **parts("formulation_difference", along, canonical - y, units, "{}, canonical less Lagrangian"),
+        }
+        if isinstance(scene, Scene):
+            variables |= self._of_scene(scene, y, canonical, tiles[3])
+        else:
+            variables |= _of_mechanism(scene, t, y)
+        left_out = {"scene", "start"} if isinstance(scene, Scene) else {"scene", "start", *_OF_PAPER}
+        attrs = self.model_dump(exclude=left_out) | {
+            **tiles[0].attrs,
+            "error_estimate": float(np.max(np.abs(halved - y))),
+            "error_estimate_is": HALVING
+            if isinstance(scene, Scene)
+            else HALVING.replace("rad or rad/s", "SI"),
+        }
+        return Dataset(variables, attrs | told(scene))
+
+    def _of_scene(self, scene: Scene, y: Floats, canonical: Floats, balance: Dataset) -> dict[str, Variable]:
+        """What is known of the paper's mechanism: momenta, points, constraints, reactions and works."""
+        along, t = ("time",), self._times
+        p, points = momenta(scene, canonical), positions(scene, y)
+        about = "generalized momentum of {}, canonical equations"
+        return {
+            **parts("p", along, p, dict.fromkeys(("phi", "theta"), "kg m2/s"), about),
             **{
                 name: Variable(along, value, "m", f"coordinate {name[0]} of M{name[1]}")
                 for name, value in points._asdict().items()
@@ -150,12 +190,6 @@ class Motion(TiledScan):
             },
             **{name: Variable(along, balance[name].data, "J", about) for name, about in _BALANCE.items()},
         }
-        attrs = self.model_dump(exclude={"scene"}) | {
-            **lagrangian.attrs,
-            "error_estimate": float(np.max(np.abs(halved - y))),
-            "error_estimate_is": HALVING,
-        }
-        return Dataset(variables, attrs)
 
     @staticmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
@@ -165,6 +199,25 @@ class Motion(TiledScan):
         return draw_motion(dataset)
 
 
+def _of_mechanism(mechanism: Mechanism, t: Floats, y: Floats) -> dict[str, Variable]:
+    """Energies, powers and moving points of any mechanism."""
+    along = ("time",)
+    kinetic, potential = mechanism.energies(y)
+    energies = {"kinetic_energy": kinetic, "potential_energy": potential}
+    variables = {
+        name: Variable(along, np.broadcast_to(value, t.shape), "J", _BALANCE[name].split(" Pi")[0])
+        for name, value in energies.items()
+    }
+    for (name, about), value in zip(_POWERS.items(), mechanism.powers(t, y), strict=True):
+        variables[name] = Variable(along, np.broadcast_to(value, t.shape), "W", about)
+    points, _ = mechanism.places(y[:, : len(mechanism.coordinates)])
+    for name, place in points.items():
+        if np.ptp(place, axis=0).any():
+            axes = dict.fromkeys(("x", "y"), "m")
+            variables |= parts(f"point_{name}", along, place, axes, f"coordinate {{}} of {name}")
+    return variables
+
+
 def _states(y: NDArray[np.float64]) -> dict[str, Variable]:
-    """States of one motion (time, 1, 4) as a tile keeps them."""
+    """States of one motion (time, 1, states) as a tile keeps them."""
     return {"y": Variable(("time", "component"), y[:, 0])}

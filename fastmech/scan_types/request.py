@@ -19,7 +19,7 @@ from fastmech.integrators.methods import find_method
 from fastmech.models.mechanism import MOST_COORDINATES, Mechanism
 from fastmech.results import Dataset, Variable, check_name, scene_parameters
 from fastmech.scan_types.tiling import RunContext as RunContext
-from fastmech.scan_types.tiling import Tiles, Tiling
+from fastmech.scan_types.tiling import Tiling
 from fastmech.scene import Scene, explain, nearest, parse_toml, read_text
 from fastmech.store.stream import Stream, in_memory
 
@@ -50,11 +50,10 @@ LONGEST_NAME = 100
 
 
 class Scan(BaseModel, ABC):
-    """A kind of scan: its request (the fields), how it runs and how its result is drawn.
+    """A kind of scan: its request (the fields), how its work is divided and how its result is drawn.
 
     To add one, write a module in :mod:`fastmech.scan_types` with a sub-class: the fields of its request with
-    defaults and limits, ``kind`` (the name in request files), ``run`` and ``draw``. It is found by itself.
-    One that takes more than a minute is a :class:`TiledScan`: ``tiling`` instead of ``run``.
+    defaults and limits, ``kind`` (the name in request files), ``tiling`` and ``draw``. It is found by itself.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
@@ -78,12 +77,19 @@ class Scan(BaseModel, ABC):
         return None
 
     @abstractmethod
-    def run(self, scene: Scene, context: RunContext) -> Dataset:
-        """Compute the result in memory. ``scene`` has the changes."""
-
     def tiling(self, scene: Scene) -> Tiling:
-        """How the work is divided: not at all, unless a kind of scan says otherwise."""
-        return Whole(self, scene)
+        """How the work is divided; must be cheap."""
+
+    def run(self, scene: Scene, context: RunContext) -> Dataset:
+        """Compute one tile after the other, in memory. ``scene`` has the changes."""
+        tiling = self.tiling(scene)
+        advance = context.stage(tiling.what, sum(tiling.items(index) for index in range(tiling.count)))
+        tiles = []
+        for index in range(tiling.count):
+            tiles.append(tiling.compute(index, RunContext(context.threads)))
+            advance(tiling.items(index))
+        result = tiling.assemble(tiles.__getitem__)
+        return in_memory(result) if isinstance(result, Stream) else result
 
     @staticmethod
     def read(section: Section, scene: Mapping[str, float]) -> Dataset:
@@ -94,47 +100,6 @@ class Scan(BaseModel, ABC):
     @abstractmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
         """Pictures of a result, by name. ``scene`` are the scene's parameters with this scan's changes."""
-
-
-class TiledScan(Scan):
-    """A kind of scan whose work is divided into tiles."""
-
-    @abstractmethod
-    def tiling(self, scene: Scene) -> Tiling:
-        """How the work is divided; must be cheap."""
-
-    def run(self, scene: Scene, context: RunContext) -> Dataset:
-        """Compute one tile after the other."""
-        tiling = self.tiling(scene)
-        advance = context.stage(tiling.what, sum(tiling.items(index) for index in range(tiling.count)))
-        tiles = []
-        for index in range(tiling.count):
-            tiles.append(tiling.compute(index, RunContext(context.threads)))
-            advance(tiling.items(index))
-        result = tiling.assemble(tiles.__getitem__)
-        return in_memory(result) if isinstance(result, Stream) else result
-
-
-class Whole(Tiling):
-    """The one tile of a scan that is not divided."""
-
-    what = "all"
-    count = 1
-
-    def __init__(self, scan: Scan, scene: Scene) -> None:
-        self.scan, self.scene = scan, scene
-
-    def items(self, index: int) -> int:
-        """One: the scan itself tells its progress."""
-        return 1
-
-    def compute(self, index: int, context: RunContext) -> Dataset:
-        """Run the scan."""
-        return self.scan.run(self.scene, context)
-
-    def assemble(self, tile: Tiles) -> Dataset:
-        """The tile is the section."""
-        return tile(0)
 
 
 #: What ``error_estimate`` of a section is.

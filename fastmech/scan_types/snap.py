@@ -12,7 +12,7 @@ from fastmech.atlas.snap import MOVING, find_snap, stable_at
 from fastmech.equilibria.find import Equilibrium, find_equilibria
 from fastmech.errors import InputError
 from fastmech.results import Dataset, Variable
-from fastmech.scan_types.request import TiledScan
+from fastmech.scan_types.request import Scan
 from fastmech.scan_types.tiling import Each, Tiling
 from fastmech.scene import Number, Scene, nearest
 
@@ -26,7 +26,7 @@ def _moving(name: str) -> str:
     return name
 
 
-class SnapScan(TiledScan):
+class SnapScan(Scan):
     """Values of a parameter, below and above the present one, at which a stable position ends."""
 
     kind: ClassVar[str] = "snap"

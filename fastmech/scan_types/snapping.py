@@ -21,7 +21,7 @@ from fastmech.ensembles.status import FAILURES, LABELS, Status
 from fastmech.errors import InputError
 from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers
 from fastmech.scan_types.axis import Axis, check_duration, check_parameters, check_rising, check_size
-from fastmech.scan_types.request import TiledScan, UsualMethod, failures
+from fastmech.scan_types.request import Scan, UsualMethod, failures
 from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
 from fastmech.scene import Scene
 
@@ -44,7 +44,7 @@ class Rates(Axis):
     spacing: Literal["linear", "log"] = "log"
 
 
-class Snapping(TiledScan):
+class Snapping(Scan):
     """The (F0, alpha) map of dynamic snapping, with the critical curve and its limit."""
 
     kind: ClassVar[str] = "snapping"

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import fastmech as fm
@@ -167,6 +168,53 @@ def test_disturbances_of_a_truss_are_those_of_python(tmp_path: Path) -> None:
     assert section.groups["linear"]["linear_limit"].units == "m"
     names = {p.name for p in draw_results(tmp_path / "scan.h5", tmp_path)}
     assert names == {f"shock_{n}.png" for n in ("outcomes", "time_to_return", "excursions", "linear_range")}
+
+
+def test_motion_of_a_cart_is_that_of_its_equations(tmp_path: Path) -> None:
+    text = 'mechanism = "cart_pendulum"\n[scene]\nb = 6.0\nkt = 8.0\n[scan.swing]\nkind = "motion"\n'
+    with run(tmp_path, text + "start = { x = 0.2, angle = 0.1 }\nt_end = 4.0\noutputs = 41\n") as results:
+        section = results["swing"].load()
+
+    def rates(t: float, state: list[float]) -> list[float]:  # M = 2, m = l = 1, k = 10
+        x, angle, speed, turn = state
+        sine, cosine = np.sin(angle), np.cos(angle)
+        push = [-10.0 * x - 6.0 * speed + sine * turn**2, -8.0 * angle + 9.81 * sine]
+        return [speed, turn, *np.linalg.solve([[3.0, cosine], [cosine, 1.0]], push)]
+
+    times = section["time"].data
+    expected = solve_ivp(rates, (0.0, 4.0), [0.2, 0.1, 0.0, 0.0], "DOP853", times, rtol=1e-12, atol=1e-13).y
+    x, angle, speed, turn = expected
+    for name, values in zip(("x", "angle", "x_dot", "angle_dot"), expected, strict=True):
+        np.testing.assert_allclose(section[name].data, values, atol=1e-10)
+        assert np.abs(section[f"formulation_difference_{name}"].data).max() < 1e-11
+    kinetic = speed**2 + 0.5 * ((speed + np.cos(angle) * turn) ** 2 + (np.sin(angle) * turn) ** 2)
+    potential = 5.0 * x**2 + 4.0 * angle**2 + 9.81 * np.cos(angle)
+    np.testing.assert_allclose(section["kinetic_energy"].data, kinetic, atol=1e-9)
+    np.testing.assert_allclose(np.diff(section["potential_energy"].data), np.diff(potential), atol=1e-9)
+    np.testing.assert_allclose(section["power_lost"].data, 6.0 * speed**2, atol=1e-9)
+    np.testing.assert_allclose(section["point_mass_x"].data, x + np.sin(angle), atol=1e-9)
+    assert (section["x"].units, section["point_mass_y"].units, section["power_lost"].units) == ("m", "m", "W")
+    assert 0.0 < section.attrs["error_estimate"] < 1e-10
+    names = {p.name for p in draw_results(tmp_path / "scan.h5", tmp_path)}
+    assert names == {f"swing_{n}.png" for n in ("angles", "coordinates", "energies", "residuals")}
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "line", "told"),
+    [
+        ("cart_pendulum", "phi = 1.0", "phi: is for the paper's mechanism; give start.x"),
+        ("cart_pendulum", "start = { y = 1.0 }", "start.y: unknown coordinate 'y'"),
+        (None, "start = { phi = 1.0 }", "start.phi: is for any other mechanism; give phi"),
+    ],
+)
+def test_starts_of_motions_are_named_by_coordinates(
+    tmp_path: Path, mechanism: str | None, line: str, told: str
+) -> None:
+    request = tmp_path / "scan.toml"
+    head = f'mechanism = "{mechanism}"\n' if mechanism else ""
+    request.write_text(f'{head}[scan.swing]\nkind = "motion"\n{line}\n')
+    with pytest.raises(fm.InputError, match=told):
+        read_request(request, scan_kinds())
 
 
 @pytest.mark.parametrize("path", sorted(Path("scans/mechanisms").glob("*.toml")), ids=lambda path: path.stem)
