@@ -383,7 +383,7 @@ class Mechanism:
 
     def _matrices(self, name: str, q: ArrayLike, parameters: Mapping[str, ArrayLike] | None) -> Floats:
         found, n = self.evaluate(name, self._split(q, 1), parameters), len(self.coordinates)
-        return np.moveaxis(found.reshape(-1, n, n, *found.shape[1:]), (1, 2), (-2, -1))
+        return np.moveaxis(found.reshape(len(found) // n**2, n, n, *found.shape[1:]), (1, 2), (-2, -1))
 
     def _split(self, y: ArrayLike, halves: int) -> Floats:
         states, count = np.asarray(y, dtype=np.float64), halves * len(self.coordinates)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+import sympy
 
 import fastmech as fm
 from fastmech.equilibria.outcome import Outcome
@@ -107,3 +108,12 @@ def test_equally_deep_equilibria_keep_their_order() -> None:
     for k, rise in enumerate(found.axes["rise"]):
         alone = fm.find_equilibria(truss.replace(rise=float(rise)))
         np.testing.assert_allclose(found.position[k], alone.position, atol=1e-12)
+
+
+def test_a_map_may_hold_no_equilibrium() -> None:
+    x, a = fm.lengths("x", -1.0, 1.0), sympy.Symbol("a", real=True)
+    falls = fm.Mechanism(x, {"a": 3.0}, kinetic=x.dot**2 / 2, potential=a * x)
+    found = fm.map_equilibria(falls, {"a": [-1.0, 1.0, 2.0]})
+    assert found.position.shape == (3, 0, 1)
+    assert (found.outcome == Outcome.COMPLETE).all()
+    assert fm.critical_values(falls, "a", [1.0, 2.0]) == []
