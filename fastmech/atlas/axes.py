@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastmech.ensembles.checks import one_way
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.mechanism.coefficients import reduce
+from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene, nearest, require_scene
 
 Floats = NDArray[np.float64]
@@ -56,7 +57,8 @@ def check_axis(scene: Scene, name: str, values: ArrayLike) -> Floats:
     Raises:
         InputError: as ``check_axes``, the parameter is alpha, which moves no fold, or there is one value.
     """
-    require_scene(scene, "; fm.critical_values and fm.critical_curves are for a Mechanism")
+    hint = "; fm.critical_values and fm.critical_curves are for a Mechanism"
+    require_scene(scene, hint if isinstance(scene, Mechanism) else "")
     vector = _check_values(scene, name, values)
     if name == "alpha":
         raise InputError("axes.alpha: equilibria do not depend on how fast a force decays; choose another")
