@@ -39,6 +39,8 @@ LAYERS = (
     "atlas",
     "disturbance",
     "capture",
+    "samplers",
+    "attractors",
     "basins",
     "results",
     "store",

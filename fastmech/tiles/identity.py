@@ -21,7 +21,16 @@ from fastmech.store.read import open_results
 TILE_SCHEMA = 1
 
 #: Sources besides the compiled ones that decide a section's values.
-_SOURCES = (*COMPILED, "mechanisms", "basins", "scene.py", "results.py", "scan_types")
+_SOURCES = (
+    *COMPILED,
+    "mechanisms",
+    "samplers.py",
+    "attractors",
+    "basins",
+    "scene.py",
+    "results.py",
+    "scan_types",
+)
 
 _LIBRARIES = ("numba", "llvmlite", "numpy", "scipy", "sympy")
 
