@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from fastmech.atlas.folds import trace_folds
     from fastmech.atlas.map import map_equilibria
     from fastmech.atlas.snap import find_snap
+    from fastmech.attractors.branches import frequency_response
     from fastmech.attractors.find import find_attractors
+    from fastmech.attractors.follow import follow_basins, tipping_probabilities
     from fastmech.basins.copies import copy_labels, copy_of_label
     from fastmech.basins.disturbed import disturb
     from fastmech.basins.edge import saddle_at, track_edge
@@ -113,9 +115,11 @@ _MODULES = {
     "erosion": "fastmech.basins.erosion",
     "find_attractors": "fastmech.attractors.find",
     "find_equilibria": "fastmech.models.equilibria",
+    "follow_basins": "fastmech.attractors.follow",
     "find_folds": "fastmech.atlas.fold_points",
     "find_snap": "fastmech.atlas.snap",
     "finite_time_basin_stability": "fastmech.basins.measures.fractions",
+    "frequency_response": "fastmech.attractors.branches",
     "fractal_boundary_test": "fastmech.basins.measures.entropy",
     "impulse_start": "fastmech.basins.shock_limit",
     "integrate": "fastmech.ensembles.integrate",
@@ -137,6 +141,7 @@ _MODULES = {
     "shock_limit": "fastmech.basins.shock_limit",
     "sin": "fastmech.kernels.sincos",
     "step_warning": "fastmech.step_limits.warning",
+    "tipping_probabilities": "fastmech.attractors.follow",
     "system_info": "fastmech.system_info",
     "trace_folds": "fastmech.atlas.folds",
     "trace_unreached": "fastmech.atlas.damping",
@@ -185,7 +190,9 @@ __all__ = [
     "find_folds",
     "find_snap",
     "finite_time_basin_stability",
+    "follow_basins",
     "fractal_boundary_test",
+    "frequency_response",
     "impulse_start",
     "integrate",
     "integrity",
@@ -207,6 +214,7 @@ __all__ = [
     "sin",
     "step_warning",
     "system_info",
+    "tipping_probabilities",
     "trace_folds",
     "trace_unreached",
     "track_edge",

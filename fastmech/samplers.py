@@ -39,7 +39,8 @@ class Sampler:
         ranged = np.flatnonzero(high > low)
         starts = np.tile(low, (n, 1))
         if ranged.size:
-            starts[:, ranged] += (high - low)[ranged] * self._unit(n, [names[k] for k in ranged], seed)
+            unit: Any = self._unit(n, [names[k] for k in ranged.tolist()], seed)
+            starts[:, ranged] += (high - low)[ranged] * unit
         return starts
 
     def _unit(self, n: int, names: Sequence[str], seed: int) -> Floats:
@@ -140,7 +141,7 @@ class Ball(Sampler):
         size = np.linalg.norm(z[:, :-1][:, ranged], axis=1)
         from scipy.stats import norm
 
-        radius = norm.cdf(z[:, -1]) ** (1.0 / max(1, np.count_nonzero(ranged)))
+        radius = norm.cdf(z[:, -1]) ** (1.0 / max(1, int(np.count_nonzero(ranged))))
         inside = z[:, :-1] * (radius / np.where(size > 0.0, size, 1.0))[:, None]
         return np.asarray(0.5 * (low + high) + 0.5 * (high - low) * np.where(ranged, inside, 0.0))
 

@@ -58,8 +58,8 @@ LAYERS = (
     "__main__",
 )
 
-#: A scene under another load is a mechanism, which is made where one is asked for.
-UPWARD = {("scene.py", "mechanisms")}
+#: A scene under another load is a mechanism, which is made where one is asked for; results draw themselves.
+UPWARD = {("scene.py", "mechanisms"), ("branches.py", "plots"), ("follow.py", "plots")}
 
 MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path != PACKAGE / "__init__.py")
 

@@ -11,7 +11,7 @@ Wagemakers, Chaos 32 (2022) 023104); a motion has arrived that has been in them 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,21 +74,22 @@ def balls(flow: Flow, orbit: Orbit) -> Balls:
         forms[j, :dim] = np.sqrt(np.maximum(squares, ROUNDING * squares[-1]))[:, None] * axes.T @ keep
     own = Balls(places, forms, slopes, 0.0)
     # Shells of the same V about all places.
-    size = min(float(np.linalg.norm(forms[j, :dim] * flow.scale, 2)) for j in tried)
-    sizes = size * 0.5 ** np.arange(SHELLS)
+    first = min(float(np.linalg.norm(forms[j, :dim] * flow.scale, 2)) for j in tried.tolist())
+    sizes = first * 0.5 ** np.arange(SHELLS)
     u = rng.standard_normal((DIRECTIONS * min(dim, 8), dim))
     lanes = []
-    for j in tried:
+    for j in tried.tolist():
         e = u @ np.linalg.pinv(forms[j, :dim]).T
         e /= np.linalg.norm(e @ forms[j, :dim].T, axis=1)[:, None]
         lanes.append(places[j] + sizes[:, None, None] * e)
     starts = np.stack(lanes).reshape(-1, dim)
     before, after = (levels_of(flow, own, y)[1] for y in (starts, flow.after(starts, period, FINER)))
-    falls = (after < before).reshape(len(tried), SHELLS, -1).all(axis=(0, 2))
+    fall = np.asarray(after < before).reshape(len(tried), SHELLS, -1)
+    falls: Any = fall.all(axis=(0, 2))
     good = SHELLS - int(np.argmin(np.append(falls[::-1], False)))
-    radius = SAFE * sizes[good] if good < SHELLS else sizes[-1]
+    radius = float(SAFE * sizes[good] if good < SHELLS else sizes[-1])
     forms[:, :dim] /= radius
-    widest = max(float(np.linalg.norm(forms[j, :dim] * flow.scale, 2)) for j in tried)
+    widest = max(float(np.linalg.norm(forms[j, :dim] * flow.scale, 2)) for j in tried.tolist())
     return own._replace(radius=1.0 / widest)
 
 

@@ -1,12 +1,12 @@
 """``fm.frequency_response``: branches of periodic motion over a parameter, stable and unstable.
 
-A motion of period p T is a fixed point x of the map over p periods: G(x, lambda) = Phi(x, lambda) - x = 0, where
-the period T may depend on the parameter. Branches are followed by pseudo-arclength continuation (Keller; Allgower
-and Georg, *Numerical Continuation Methods*, chapter 10), with derivatives by differences: all of them run side
-by side on lanes, each in its own time over its own period. On the way multipliers tell stability: +1 at a
-fold, -1 where the period doubles, a pair on the unit circle at a Neimark-Sacker point (Guckenheimer, Holmes,
-section 3.5). Branches begin at what Newton's method finds at several values of the parameter from many starts,
-so that isolated ones are found where a start comes near.
+A motion of period p T is a fixed point x of the map over p periods: G(x, lambda) = Phi(x, lambda) - x = 0;
+the period T may depend on the parameter. Branches are followed by pseudo-arclength continuation (Keller;
+Allgower and Georg, *Numerical Continuation Methods*, chapter 10). Derivatives are differences, which all run
+side by side on lanes, each in its own time over its own period. Multipliers tell stability: +1 at a fold, -1
+where the period doubles, a pair on the unit circle at a Neimark-Sacker point (Guckenheimer, Holmes, section
+3.5). Branches begin at what Newton's method finds at several values of the parameter from many starts, so
+that isolated ones are found where a start comes near.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numba
@@ -134,15 +135,16 @@ def frequency_response(
         system: a system of your own with a ``period``, or a mechanism under loads that repeat.
         parameter: its name.
         between: least and greatest value.
-        starts: ranges by name, a sampler or states (n, dim), as for :func:`fastmech.find_attractors`: Newton's
-            method begins at 64 of them, and at where these are after 48 periods, at nine values.
-        periods: how many periods of the forcing a motion takes.
+        starts: ranges by name, a sampler or states (n, dim), as for :func:`fastmech.find_attractors`.
+            Newton's method begins at 64 of them, and at where these are after 48 periods, at nine values.
+        periods: how many periods of the forcing a motion takes; motions that take a part of them are branches
+            too.
         seed: of the sampler.
         threads: threads to use, all processors by default.
 
     Returns:
-        branches with multipliers, amplitudes, and folds, period doublings and Neimark-Sacker points located to
-        rounding of the map. A branch that no start leads to is not found.
+        branches with multipliers, amplitudes, and folds, period doublings and Neimark-Sacker points located
+        to rounding of the map. A branch that no start leads to is not found.
 
     Raises:
         InputError: an argument is wrong, or the system does not depend on the time.
@@ -174,8 +176,9 @@ def frequency_response(
 def _units(system: System | Mechanism) -> dict[str, str]:
     if isinstance(system, System):
         return {}
-    units = ["rad" if q.periodic or q.unit == "rad" else "m" for q in system.coordinates]
-    return dict(zip(system.state, [*units, *(f"{u}/s" for u in units)], strict=True)) | dict(system.units)
+    names = system.state[: len(system.coordinates)]
+    units = {name: "m" if name in system.lengths else "rad" for name in names}
+    return units | {f"{name}_dot": f"{unit}/s" for name, unit in units.items()} | dict(system.units)
 
 
 class Family:
@@ -194,7 +197,9 @@ class Family:
         self.threads = threads
         #: Values at which branches begin, inside the range.
         inside = np.linspace(*between, VALUES + 2)[1:-1]
-        self.flows = {float(v): flow_of(scene, starts, {parameter: float(v)}, threads=threads) for v in inside}
+        self.flows = {
+            float(v): flow_of(scene, starts, {parameter: float(v)}, threads=threads) for v in inside
+        }
         first: Flow = next(iter(self.flows.values()))
         if not first.forced:
             raise InputError("system: does not depend on the time; give it a period, or a load that repeats")
@@ -213,11 +218,11 @@ class Family:
         """The system in which a period is a unit of time, and period and parameters for a value."""
         if isinstance(self.scene, Mechanism):
             mechanism = self.scene.with_terms({self.parameter})
-            own = system_of(mechanism, "lagrange")
-            values_at = mechanism.coefficients
+            own: System = system_of(mechanism, "lagrange")
+            values_at: Any = mechanism.coefficients
         else:
             own = self.scene
-            values_at = own.parameters.__or__
+            values_at = dict(own.parameters).__or__
 
         def known(value: float) -> tuple[float, list[float]]:
             found = values_at({self.parameter: value})
@@ -319,7 +324,7 @@ def _branch(family: Family, place: Floats, value: float) -> Branch:
         back, begin = _follow(family, start._replace(tangent=-start.tangent))
     points = [p._replace(tangent=-p.tangent) for p in back[::-1]] + [start, *forth]
     special = []
-    for one, two in zip(points, points[1:], strict=False):
+    for one, two in pairwise(points):
         special += _between(family, one, two)
     us = np.array([p.u for p in points])
     values = family.between[0] + us[:, -1] * (family.between[1] - family.between[0])
@@ -337,7 +342,8 @@ def _branch(family: Family, place: Floats, value: float) -> Branch:
 
 def _follow(family: Family, start: _Point) -> tuple[list[_Point], str]:
     """Points along a branch, and how it ends: at the end of the range, "closed" where it began, or "cut"."""
-    points, last, length = [], start, FIRST
+    points: list[_Point] = []
+    last, length = start, FIRST
     while len(points) < POINTS and length > SHORTEST:
         new = _correct(family, last.u + length * last.tangent, last.tangent)
         if new is None or new.tangent @ last.tangent < BEND:
@@ -422,5 +428,9 @@ def _at(family: Family, branch: Branch, value: float) -> list[Floats]:
         share = (value - branch.values[k]) / rise if rise else 0.0
         guess = branch.places[k] + share * (branch.places[k + 1] - branch.places[k])
         place, residual, _ = newton(family.flows[value], guess[None], family.periods)
-        found.append(place[0] if residual[0] < RESIDUAL else guess)
+        begin = place if residual[0] < RESIDUAL else guess[None]
+        found.append(begin[0])
+        if family.periods > 1:  # the same motion begins at its other strobes too
+            strobes = family.flows[value].run(begin, np.arange(1.0, family.periods), FINER).y[:, 0]
+            found += list(strobes)
     return found

@@ -40,9 +40,7 @@ class Attractor:
     """A place of rest, a periodic motion, a torus or chaos that motions come to."""
 
     kind: str  #: "fixed point", "periodic", "torus" or "chaos"
-    points: (
-        Floats  #: (m, dim): the place; after each forcing period, or all along; a sample
-    )
+    points: Floats  #: (m, dim): the place; after each forcing period, or all along; a sample
     period: float | None  #: of a periodic motion [s]
     forcing_periods: int | None  #: the same in periods of the forcing, where there is one
     multipliers: NDArray[np.complex128] | None  #: of the map over its period; None of a torus and of chaos

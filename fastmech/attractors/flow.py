@@ -53,7 +53,7 @@ class Reached(NamedTuple):
 
     y: Floats  #: (outputs, n, dim); NaN from the first output on at which a motion is not finite
     stopped: Flags  #: by the system's stopping condition (n,)
-    far: Flags  #: beyond :data:`FAR` scales when last finite (n,)
+    far: Flags  #: beyond :data:`FAR` scales, or on the way to infinity, when last finite (n,)
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,14 @@ class Flow:
         stops = self.problem.observation.stops
         stopped = solution.records[0] != 0.0 if stops else np.zeros(len(y), dtype=np.bool_)
         last = solution.y[-1] if solution.last is None else solution.last
-        return Reached(solution.y, stopped, self.is_far(last))
+        far = self.is_far(last)
+        lost = np.flatnonzero(~np.isfinite(solution.y[-1]).all(axis=1) & ~far & ~self.angles.all())
+        if lost.size:  # a motion that grows by more than itself in a step goes to infinity
+            with np.errstate(invalid="ignore", over="ignore"):
+                outward = (last[lost] - self.middle) * self.rates(last[lost]) * dt
+                grows = outward > (last[lost] - self.middle) ** 2
+            far[lost] = grows[:, ~self.angles].any(axis=1)
+        return Reached(solution.y, stopped, far)
 
     def after(self, y: Floats, periods: float = 1.0, finer: float = 1.0) -> Floats:
         """States (n, dim) after so many periods."""

@@ -1,4 +1,4 @@
-"""``fm.follow_basins``: attractors and their shares of the starts along a parameter, and where they come and go.
+"""``fm.follow_basins``: attractors and their shares of the starts along a parameter.
 
 An attractor goes on at the next value in the one that lies next to it. One that has none is followed there in
 steps, by Newton's method and by motions that begin on it, each as short as it takes to find it again: it has
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
 Integers = NDArray[np.int64]
 
-#: Points of an attractor from which motions begin, distance over the scale within which they have come back to
-#: it, and halvings of the step to where it comes or goes.
+#: Points of an attractor from which motions begin, distance over the scale within which it is the same,
+#: and halvings of the step to where it comes or goes.
 SEEDS, NEAR, HALVINGS = 16, 0.05, 12
 
 
@@ -51,14 +51,18 @@ class BasinsAlong:
 
     parameter: str
     values: Floats  #: of the parameter (m,)
-    fractions: Floats  #: share of the starts that ends at each attractor (m, attractors), NaN: it is not there
+    fractions: (
+        Floats  #: share of the starts that ends at each attractor (m, attractors), NaN: it is not there
+    )
     unlabelled: Floats  #: share that escapes, is unsure, undecided or not finite (m,)
     attractors: tuple[dict[int, Attractor], ...]  #: at each value, by number
     tipping: tuple[Tipping, ...]
 
     def __repr__(self) -> str:
         first, last, n = self.values[0], self.values[-1], self.fractions.shape[1]
-        lines = [f"{n} attractors along {self.parameter} = {first:g} ... {last:g} ({self.values.size} values)"]
+        lines = [
+            f"{n} attractors along {self.parameter} = {first:g} ... {last:g} ({self.values.size} values)"
+        ]
         for t in self.tipping[:5]:
             lines.append(f"  {t.attractor} {t.kind} between {self.parameter} = {t.low:.6g} and {t.high:.6g}")
         if len(self.tipping) > 5:
@@ -173,9 +177,7 @@ class _Tracer(NamedTuple):
     sample: Floats
     threads: int | None
 
-    def follow(
-        self, attractor: Attractor, there: float, end: float
-    ) -> tuple[float, float | None, Attractor]:
+    def follow(self, attractor: Attractor, there: float, end: float) -> tuple[float, float | None, Attractor]:
         """From where it is there towards an end: the last value where it is, the first where not, and it.
 
         None in place of the first where not: it is there at the end.
@@ -217,10 +219,10 @@ def _apart(flow: Flow, a: Floats, b: Floats) -> float:
 
 
 def tipping_probabilities(before: ArrayLike, after: ArrayLike) -> Floats:
-    """Share (i, j) of the starts with label i before that have label j after a sudden change of parameters.
+    """Share (i, j) of the starts with label i before that have label j after a sudden change.
 
-    Labels are whole numbers from 0 on of the same starts, of any one shape, negative without a label; the last
-    column is the share without one after (Kaszas, Feudel, Tel, Scientific Reports 9 (2019) 8654).
+    Labels are whole numbers from 0 on of the same starts, of any one shape, negative without a label. The
+    last column is the share without one after (Kaszas, Feudel, Tel, Scientific Reports 9 (2019) 8654).
 
     Raises:
         InputError: labels are no whole numbers, or of different shapes.

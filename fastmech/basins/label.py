@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -116,7 +116,7 @@ def labels_of(
 
 
 def _by_attractors(
-    scene: Mechanism | System,
+    scene: Any,
     starts: ArrayLike,
     t_end: float | None,
     method: str | None,

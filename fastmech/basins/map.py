@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.attractors.find import Attractors, find_attractors
+from fastmech.attractors.find import find_attractors
 from fastmech.attractors.flow import keeps_moving
 from fastmech.attractors.settle import Ends
 from fastmech.basins.copies import copy_numbers
@@ -132,28 +132,28 @@ def map_basins(
         raise InputError("parameters: may differ between starts only with a stopping condition")
     collected = _Collected(size, len(names) // 2 if not isinstance(scene, System) else 2)
 
-    moving = keeps_moving(scene)
-    t_end = 60.0 if t_end is None and not moving else t_end
-    attractors: Attractors | None = None
+    moving: Any = scene if keeps_moving(scene) else None
+    attractors: Any = None  # found with the first starts
+    until = 60.0 if t_end is None else t_end
 
     def compute(points: NDArray[np.intp], tell: Progress | None) -> NDArray[np.int64]:
         nonlocal attractors
         starts = grid_starts(values, held, names, points)
-        if moving and attractors is None:
+        if moving is not None and attractors is None:
             attractors = find_attractors(
-                scene, starts, t_end=t_end, method=method or "dop853", threads=threads, progress=tell
+                moving, starts, t_end=t_end, method=method or "dop853", threads=threads, progress=tell
             )
             found = attractors
             part = of_attractors(found, Ends(found.label, found.status, found.time, starts, found.steps))
-        elif moving:
+        elif moving is not None:
             part = of_attractors(attractors, attractors.labels_of(starts, tell))
         elif not isinstance(scene, System):
-            part = label_starts(scene, starts, t_end, How(dt, method, settle_radius, threads), tell)
+            part = label_starts(scene, starts, until, How(dt, method, settle_radius, threads), tell)
         else:
             part = system_labels_of(
                 scene,
                 starts,
-                t_end,
+                until,
                 dt=dt,
                 method=method or "dop853",
                 parameters={name: value.ravel()[points] for name, value in own.items()},
@@ -191,7 +191,7 @@ def map_basins(
         settle_time=None if settle is None else settle.reshape(shape),
         status=collected.status[source].reshape(shape),
         computed=computed.reshape(shape),
-        t_end=attractors.t_end if attractors is not None else t_end,
+        t_end=until if attractors is None else attractors.t_end,
         steps=collected.steps,
     )
 

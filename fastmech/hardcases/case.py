@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.basins.label import Labels
+from fastmech.basins.labels import Labels
 from fastmech.ensembles.integrate import Trajectories
 from fastmech.ensembles.status import Status
 from fastmech.mechanism.lagrange import kinetic_energy, potential_energy

@@ -70,7 +70,11 @@ def draw_fractions(along: Any, ax: Axes | None) -> Axes:
         colors = [LINES[k % len(LINES)] for k in range(number)]
         rest = np.maximum(along.unlabelled, 0.0)
         if (rest > 0.0).any():
-            shares, names, colors = np.vstack([shares, rest]), [*names, "without a label"], [*colors, "#d9d9d9"]
+            shares, names, colors = (
+                np.vstack([shares, rest]),
+                [*names, "without a label"],
+                [*colors, "#d9d9d9"],
+            )
         ax.stackplot(along.values, shares, labels=names, colors=colors, alpha=0.85)
         for tipping in along.tipping:
             ax.axvline(0.5 * (tipping.low + tipping.high), color="black", lw=0.8, ls=":")

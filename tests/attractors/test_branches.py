@@ -1,0 +1,154 @@
+"""Branches of periodic motion against linear theory and harmonic balance."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import fsolve
+
+import fastmech as fm
+
+Floats = NDArray[np.float64]
+
+#: Duffing's equation x'' + 0.1 x' + x + x^3 = 0.2 cos(omega t), and places of a period.
+DELTA, FORCE, PLACES = 0.1, 0.2, 64
+
+
+def duffing(t, x, v, delta, A, omega):  # type: ignore[no-untyped-def]
+    return v, -delta * v - x - x * x * x + A * fm.cos(omega * t)
+
+
+SYSTEM = fm.System(
+    duffing,
+    ["x", "v"],
+    {"delta": DELTA, "A": FORCE, "omega": 1.0},
+    period=lambda omega: 2.0 * math.pi / omega,
+)
+REGION = {"x": (-2.0, 2.0), "v": (-2.0, 2.0)}
+
+
+def balance(x: Floats, omega: float) -> Floats:
+    """Duffing's equation at equal times of a period: derivatives by Fourier's coefficients."""
+    k = np.fft.rfftfreq(PLACES, 1.0 / PLACES) * omega
+    spectrum = np.fft.rfft(x)
+    first, second = np.fft.irfft(1j * k * spectrum, PLACES), np.fft.irfft(-(k**2) * spectrum, PLACES)
+    tau = 2.0 * np.pi * np.arange(PLACES) / PLACES
+    return np.asarray(second + DELTA * first + x + x**3 - FORCE * np.cos(tau))
+
+
+def slopes(x: Floats, omega: float) -> Floats:
+    """Its Jacobian by the values."""
+    identity = np.eye(PLACES)
+    k = np.fft.rfftfreq(PLACES, 1.0 / PLACES) * omega
+    spectra = np.fft.rfft(identity, axis=0)
+    symbol = (1j * DELTA * k - k**2)[:, None]
+    return np.asarray(np.fft.irfft(symbol * spectra, PLACES, axis=0) + identity * (1.0 + 3.0 * x**2)[:, None])
+
+
+def test_duffings_branch_and_its_folds_are_those_of_harmonic_balance() -> None:
+    found = fm.frequency_response(SYSTEM, "omega", (0.8, 2.0), REGION)
+    assert len(found.branches) == 1
+    branch = found.branches[0]
+    assert (branch.values.min(), branch.values.max()) == (pytest.approx(0.8), pytest.approx(2.0))
+    for k in range(0, branch.values.size, 7):
+        omega = branch.values[k]
+        run = fm.integrate(
+            SYSTEM.with_parameters({"omega": omega}),
+            branch.places[k],
+            t_eval=2.0 * np.pi / omega * np.arange(PLACES) / PLACES,
+            dt=0.02,
+            method="dop853",
+        )
+        solved = fsolve(balance, run.y[:, 0, 0], args=(omega,), fprime=slopes, xtol=1e-12)
+        assert np.abs(solved - run.y[:, 0, 0]).max() < 1e-7
+        fine = np.fft.irfft(np.fft.rfft(solved), 4096) * 64
+        assert branch.amplitudes[k, 0] == pytest.approx(0.5 * np.ptp(fine), abs=2e-6)
+    folds = [s for s in found.special if s.kind == "fold"]
+    assert len(folds) == len(found.special) == 2
+
+    def singular(z: Floats) -> Floats:
+        x, v, omega = z[:PLACES], z[PLACES:-1], z[-1]
+        return np.concatenate([balance(x, omega), slopes(x, omega) @ v, [v @ v - 1.0]])
+
+    for fold in folds:
+        run = fm.integrate(
+            SYSTEM.with_parameters({"omega": fold.value}),
+            fold.place,
+            t_eval=2.0 * np.pi / fold.value * np.arange(PLACES) / PLACES,
+            dt=0.02,
+            method="dop853",
+        )
+        x = run.y[:, 0, 0]
+        v = np.linalg.svd(slopes(x, fold.value))[2][-1]
+        solved = fsolve(singular, np.concatenate([x, v, [fold.value + 1e-3]]), xtol=1e-12)
+        assert fold.value == pytest.approx(solved[-1], abs=1e-8)
+    assert not branch.stable[np.abs(branch.values - 1.4) < 0.05].all()
+    assert branch.stable[branch.values > 1.6].all()
+
+
+def test_a_linear_mechanism_has_its_resonance_curve() -> None:
+    """|x| = F / sqrt((k - m w^2)^2 + (c w)^2), of a mass on a spring under a harmonic force."""
+    import sympy
+
+    x = fm.lengths("x")
+    omega = sympy.Symbol("omega")
+    mechanism = fm.Mechanism(
+        x,
+        {"omega": 1.0},
+        points={"M": (x, 0), "O": (0, 0)},
+        masses={"M": 2.0},
+        potential=4.5 * x**2,
+        dissipation=0.3 * x.dot**2,
+        forces=[fm.Force("M", fm.loads.Harmonic(0.7, omega), (1, 0))],
+        name="resonator",
+    )
+    found = fm.frequency_response(mechanism, "omega", (0.5, 4.0), {"x": (-1.0, 1.0), "x_dot": (-1.0, 1.0)})
+    assert len(found.branches) == 1
+    branch = found.branches[0]
+    w = branch.values
+    np.testing.assert_allclose(branch.amplitudes[:, 0], 0.7 / np.hypot(9.0 - 2.0 * w**2, 0.6 * w), rtol=1e-6)
+    assert branch.stable.all()
+    # Multipliers are exp(lambda T), lambda the roots of 2 s^2 + 0.6 s + 9.
+    k = w.size // 2
+    expected = np.exp(np.roots([2.0, 0.6, 9.0]) * 2.0 * np.pi / w[k])
+    np.testing.assert_allclose(np.sort_complex(branch.multipliers[k]), np.sort_complex(expected), atol=1e-8)
+    axes = found.plot("x")
+    assert axes.get_xlabel() == "omega"
+    assert axes.get_ylabel() == "amplitude of x [m]"
+
+
+def test_periods_double_where_the_longer_motion_begins() -> None:
+    """Of Duffing's oscillator without a linear spring; both methods know nothing of each other."""
+
+    def rhs(t, x, v, A):  # type: ignore[no-untyped-def]
+        return v, -0.08 * v - x * x * x + A * fm.cos(t)
+
+    system = fm.System(rhs, ["x", "v"], {"A": 0.2}, period=2.0 * math.pi)
+    region = {"x": (-1.0, 1.0), "v": (-0.5, 1.0)}
+    folds = [s.value for s in fm.frequency_response(system, "A", (0.15, 0.26), region, periods=2).special]
+    along = fm.follow_basins(system, "A", [0.16, 0.2], region, 1500)
+    born = [t for t in along.tipping if t.kind == "born"]
+    assert len(born) == 2
+    assert all(t.low <= min(folds) <= t.high for t in born)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("omege", (0.5, 1.0), REGION), "parameter"),
+        (("omega", (1.0, 0.5), REGION), "between"),
+        (("omega", (0.5, 1.0), {"y": 1.0}), "ranges.y"),
+    ],
+)
+def test_wrong_calls_get_one_line(arguments: tuple[object, ...], message: str) -> None:
+    with pytest.raises(fm.InputError, match=message):
+        fm.frequency_response(SYSTEM, *arguments)  # type: ignore[arg-type]
+
+
+def test_without_time_there_is_no_response() -> None:
+    system = fm.System(lambda t, x, v, c: (v, -x - c * v), ["x", "v"], {"c": 0.1})
+    with pytest.raises(fm.InputError, match="does not depend on the time"):
+        fm.frequency_response(system, "c", (0.1, 0.2), {"x": (-1.0, 1.0)})

@@ -1,0 +1,245 @@
+"""Attractors found without being told what to look for: against published shares, closed forms and SciPy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+import fastmech as fm
+from fastmech.ensembles.status import Status
+
+Floats = NDArray[np.float64]
+
+
+def pendulum(t, x, x_dot, alpha, T, K):  # type: ignore[no-untyped-def]
+    return x_dot, -alpha * x_dot + T - K * fm.sin(x)
+
+
+def duffing(t, x, x_dot, delta, A):  # type: ignore[no-untyped-def]
+    return x_dot, -delta * x_dot - x * x * x + A * fm.cos(t)
+
+
+def lorenz(t, x, y, z, sigma, r, b):  # type: ignore[no-untyped-def]
+    return sigma * (y - x), r * x - y - x * z, x * y - b * z
+
+
+def van_der_pol(t, x, v, mu):  # type: ignore[no-untyped-def]
+    return v, mu * (1.0 - x * x) * v - x
+
+
+def magnets(t, x, y, vx, vy, alpha, omega):  # type: ignore[no-untyped-def]
+    ax, ay = -omega * omega * x - alpha * vx, -omega * omega * y - alpha * vy
+    for k in range(3):
+        dx, dy = x - np.cos(2.0 * np.pi * k / 3.0), y - np.sin(2.0 * np.pi * k / 3.0)
+        cube = (dx * dx + dy * dy + 0.09) ** 1.5
+        ax -= dx / cube
+        ay -= dy / cube
+    return vx, vy, ax, ay
+
+
+PENDULUM = fm.System(pendulum, ["x", "x_dot"], {"alpha": 0.1, "T": 0.5, "K": 1.0}, angles=["x"])
+DUFFING = fm.System(duffing, ["x", "x_dot"], {"delta": 0.08, "A": 0.2}, period=2.0 * math.pi)
+LORENZ = fm.System(lorenz, ["x", "y", "z"], {"sigma": 0.12, "r": 0.0, "b": -0.6})
+VAN_DER_POL = fm.System(van_der_pol, ["x", "v"], {"mu": 1.0})
+MAGNETS = fm.System(magnets, ["x", "y", "vx", "vy"], {"alpha": 0.2, "omega": 0.5})
+
+
+def near(share: float, published: float, n: int) -> bool:
+    """Within four standard deviations of two samples, the published one of 4,000 starts."""
+    return abs(share - published) < 4.0 * math.sqrt(published * (1.0 - published) * (1.0 / n + 1.0 / 4000))
+
+
+def followed(rhs: Callable[..., Floats], start: Floats, t_end: float) -> Floats:
+    """Where SciPy's DOP853 ends."""
+    return np.asarray(solve_ivp(rhs, (0.0, t_end), start, "DOP853", rtol=1e-11, atol=1e-12).y[:, -1])
+
+
+def test_pendulum_rests_or_turns_as_often_as_published() -> None:
+    """0.152 at rest (bSTAB, Stender and Hoffmann 2022, case 1)."""
+    middle = math.asin(0.5)
+    ranges = {"x": (middle - math.pi, middle + math.pi), "x_dot": (-10.0, 10.0)}
+    found = fm.find_attractors(PENDULUM, ranges, 4000)
+    assert {one.kind for one in found} == {"fixed point", "periodic"}
+    rest = next(one for one in found if one.kind == "fixed point")
+    np.testing.assert_allclose(rest.points, [[middle, 0.0]], atol=1e-9)
+    assert near(rest.found / 4000, 0.152, 4000)
+    # The eigenvalues there: -alpha/2 +- i sqrt(cos x - alpha^2/4).
+    assert rest.exponent == pytest.approx(-0.05, abs=1e-8)
+    y = fm.samplers.Uniform(ranges).draw(4000, PENDULUM.state)
+    for i in range(0, 4000, 100):
+        end = followed(lambda t, s: np.array([s[1], -0.1 * s[1] + 0.5 - np.sin(s[0])]), y[i], 200.0)
+        assert (abs(end[1]) < 0.1) == (found[int(found.label[i])].kind == "fixed point")
+
+
+def test_duffing_has_its_five_attractors() -> None:
+    """Shares of pybasin's tests; the product of multipliers is exp(-delta t) by Liouville's formula."""
+    n = 4000
+    found = fm.find_attractors(DUFFING, {"x": (-1.0, 1.0), "x_dot": (-0.5, 1.0)}, n)
+    assert [one.forcing_periods for one in found] == [1, 3, 1, 2, 2]
+    for one, published in zip(found, (0.4945, 0.25625, 0.1955, 0.0275, 0.02625), strict=True):
+        assert near(one.found / n, published, n)
+        assert one.period is not None
+        assert one.multipliers is not None
+        assert np.prod(one.multipliers).real == pytest.approx(math.exp(-0.08 * one.period), rel=1e-7)
+        end = followed(
+            lambda t, s: np.array([s[1], -0.08 * s[1] - s[0] ** 3 + 0.2 * np.cos(t)]),
+            one.points[0],
+            one.period,
+        )
+        np.testing.assert_allclose(end, one.points[0], atol=1e-8)
+    assert not found.counts["unsure"]
+    assert len(repr(found).splitlines()) == 6
+
+
+def test_lorenz_escapes_or_ends_in_one_of_two_chaotic_attractors() -> None:
+    """0.820 escape, 0.093 and 0.087 stay (bSTAB, case 3)."""
+    n = 2000
+    found = fm.find_attractors(LORENZ, {"x": (-10.0, 10.0), "y": (-20.0, 20.0)}, n)
+    assert [one.kind for one in found] == ["chaos", "chaos"]
+    assert near(found.counts["escaped"] / n, 0.820, n)
+    by_side = sorted(found, key=lambda one: float(one.points[:, 0].mean()))
+    for one, published in zip(by_side, (0.093, 0.087), strict=True):
+        assert near(one.found / n, published, n)
+        assert one.exponent > 5.0 * one.exponent_error
+    assert found.counts["unsure"] <= 0.01 * n
+
+
+def test_a_cycle_of_a_system_without_time_is_one_attractor() -> None:
+    """Period of van der Pol's equation with mu = 1: 6.66328685931 (Andersen and Geer 1982)."""
+    found = fm.find_attractors(VAN_DER_POL, {"x": (-3.0, 3.0), "v": (-3.0, 3.0)}, 500)
+    assert len(found) == 1
+    assert found[0].found == 500
+    assert found[0].period == pytest.approx(6.66328685931, abs=1e-9)
+    assert found[0].forcing_periods is None
+
+
+def test_three_magnets_share_the_plane_by_symmetry() -> None:
+    n = 1500
+    found = fm.find_attractors(MAGNETS, {"x": (-2.0, 2.0), "y": (-2.0, 2.0)}, n)
+    assert len(found) == 3
+    assert all(near(one.found / n, 1.0 / 3.0, n) for one in found)
+    assert all(one.exponent == pytest.approx(-0.1, abs=1e-6) for one in found)  # -alpha / 2
+
+
+def test_a_torus_is_told_from_chaos() -> None:
+    """A circle turned by an irrational angle at each look: its largest exponent is zero."""
+
+    def rhs(t, x, y, z):  # type: ignore[no-untyped-def]
+        s = 1.0 - x * x - y * y
+        return s * x - y, s * y + x, -z + fm.cos(1.4142135623730951 * t)
+
+    system = fm.System(rhs, ["x", "y", "z"], {}, period=math.sqrt(2.0) * math.pi)
+    found = fm.find_attractors(system, {"x": (-2.0, 2.0), "y": (-2.0, 2.0)}, 300)
+    assert [one.kind for one in found] == ["torus"]
+    assert abs(found[0].exponent) <= 3.0 * found[0].exponent_error
+    np.testing.assert_allclose(np.hypot(*found[0].points[-100:, :2].T), 1.0, atol=1e-5)
+
+
+def test_labels_maps_and_refinement_agree() -> None:
+    axes = {"x": np.linspace(-1.0, 1.0, 33), "x_dot": np.linspace(-0.5, 1.0, 33)}
+    found = fm.map_basins(DUFFING, axes)
+    starts = np.stack(np.meshgrid(*axes.values(), indexing="ij"), axis=-1).reshape(-1, 2)
+    labels = fm.labels_of(DUFFING, starts)
+    np.testing.assert_array_equal(labels.well, found.well.ravel())
+    assert len(found.tree) == 5
+    _, shares = fm.basin_fractions(found.labels[0])
+    np.testing.assert_allclose(shares.fraction, [one.found / 33**2 for one in found.tree])
+    coarse = fm.map_basins(DUFFING, axes, refine=4)
+    computed = coarse.computed
+    assert 0.2 < computed.mean() < 1.0
+    # Attractors are numbered by how many starts end there, of the coarse grid here.
+    number = {k: min(range(5), key=lambda j: float(np.abs(found.tree[j].points[0] - one.points[0]).sum()))
+              for k, one in enumerate(coarse.tree)}  # fmt: skip
+    own = np.vectorize(lambda k: number.get(k, -1))(coarse.well)
+    assert len(set(number.values())) == len(coarse.tree)
+    np.testing.assert_array_equal(own[computed], found.well[computed])
+
+
+def test_results_do_not_depend_on_threads_or_on_other_starts() -> None:
+    ranges = {"x": (-1.0, 1.0), "x_dot": (-0.5, 1.0)}
+    one, two = (fm.find_attractors(DUFFING, ranges, 600, threads=k) for k in (1, 2))
+    np.testing.assert_array_equal(one.label, two.label)
+    np.testing.assert_array_equal(one.time, two.time)
+    y = fm.samplers.Uniform(ranges).draw(600, DUFFING.state)
+    again = one.labels_of(y[100:200])
+    np.testing.assert_array_equal(again.label, one.label[100:200])
+
+
+def test_what_a_start_does_is_told_apart() -> None:
+    """x' = x^3 - x escapes in finite time from |x| > 1; a stopping condition is escape too."""
+
+    def cubic(t, x):  # type: ignore[no-untyped-def]
+        return (x * x * x - x,)
+
+    y = np.array([[0.5], [-0.9], [1.5], [-2.0], [np.nan], [0.0]])
+    found = fm.find_attractors(fm.System(cubic, ["x"], {}), y)
+    assert len(found) == 1
+    expected = ["CAPTURED", "CAPTURED", "ESCAPED", "ESCAPED", "START_NOT_FINITE", "CAPTURED"]
+    assert [Status(s).name for s in found.status] == expected
+    bounded = fm.System(cubic, ["x"], {}, stop=lambda t, x: 1.0 if x > 1.2 else 0.0)
+    assert fm.find_attractors(bounded, y).status[2] == Status.ESCAPED
+    short = fm.find_attractors(PENDULUM, {"x": (-3.0, 3.0), "x_dot": (-10.0, 10.0)}, 200, t_end=6.0)
+    assert short.counts["undecided"] > 50
+
+
+def test_a_mechanism_under_a_load_that_repeats_is_labelled_by_its_attractors() -> None:
+    """A hanging pendulum with a weak torque: one periodic motion, of the linear amplitude nearly."""
+    import sympy
+
+    q = fm.angles("q")
+    mechanism = fm.Mechanism(
+        q,
+        points={"M": (sympy.sin(q), -sympy.cos(q))},
+        masses={"M": 1.0},
+        dampers=[fm.TorsionDamper(q, 0.5)],
+        forces=[fm.Torque(q, fm.loads.Harmonic(0.01, 2.0))],
+        gravity=9.81,
+        name="shaken",
+    )
+    found = fm.find_attractors(mechanism, {"q": (-3.0, 3.0), "q_dot": (-2.0, 2.0)}, 300)
+    assert [one.forcing_periods for one in found] == [1]
+    labels = fm.labels_of(mechanism, [[0.1, 0.0], [2.0, -1.0]])
+    assert labels.counts["captured"] == 2
+    # x = Re(A e^(i 2 t)) with A = -0.01 i / (9.81 - 4 + i), at t = 0.
+    assert found[0].points[0, 0] == pytest.approx((-0.01j / (9.81 - 4.0 + 1.0j)).real, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"period": None}, "period: missing"),
+        ({"period": -1.0}, "period"),
+        ({"period": lambda omega: omega}, "'omega', which is no parameter"),
+        ({"angles": ["z"]}, "angles: 'z' is no state"),
+    ],
+)
+def test_wrong_systems_get_one_line(change: dict[str, object], message: str) -> None:
+    given: dict[str, object] = {"period": 1.0, "angles": (), **change}
+
+    def call() -> None:
+        system: Any = fm.System(duffing, ["x", "x_dot"], {"delta": 0.1, "A": 0.1}, **given)  # type: ignore
+        fm.find_attractors(system, {"x": (-1.0, 1.0)}, 10)
+
+    with pytest.raises(fm.InputError, match=message) as error:
+        call()
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("starts", "message"),
+    [
+        ({"y": (0.0, 1.0)}, "ranges.y: unknown name"),
+        ({"x": (1.0, 0.0)}, "must be"),
+        ([[0.0, 1.0, 2.0]], "must be"),
+        ([[np.nan, 0.0]], "two or more finite"),
+    ],
+)
+def test_wrong_starts_get_one_line(starts: object, message: str) -> None:
+    with pytest.raises(fm.InputError, match=message):
+        fm.find_attractors(DUFFING, starts)  # type: ignore[arg-type]

@@ -1,0 +1,60 @@
+"""Samplers: ranges, prefixes, seeds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import fastmech as fm
+from fastmech.samplers import Ball, Gaussian, Grid, LatinHypercube, Sampler, Sobol, Uniform
+
+pytestmark = pytest.mark.nojit
+
+NAMES = ("x", "y", "z")
+RANGES = {"x": (-1.0, 3.0), "z": 0.5}
+KINDS = [Uniform, Sobol, LatinHypercube, Gaussian, Ball]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_first_starts_are_the_same_for_every_number(kind: type[Sampler]) -> None:
+    sampler = kind({**RANGES, "y": (0.0, 2.0)})
+    many = sampler.draw(4096, NAMES, 7)
+    np.testing.assert_array_equal(sampler.draw(100, NAMES, 7), many[:100])
+    assert not np.array_equal(sampler.draw(100, NAMES, 8), many[:100])
+    assert np.all(many[:, 2] == 0.5)
+    if kind is not Gaussian:
+        assert many[:, 0].min() >= -1.0
+        assert many[:, 0].max() <= 3.0
+    assert many[:, 0].mean() == pytest.approx(1.0, abs=0.12)
+
+
+def test_a_ball_is_filled_evenly() -> None:
+    """Half of a disk's area lies within radius sqrt(1/2)."""
+    z = Ball({"x": (-2.0, 2.0), "y": (0.0, 1.0)}).draw(20_000, ("x", "y"))
+    radius = np.hypot(z[:, 0] / 2.0, (z[:, 1] - 0.5) / 0.5)
+    assert radius.max() <= 1.0
+    assert np.mean(radius < np.sqrt(0.5)) == pytest.approx(0.5, abs=0.015)
+
+
+def test_a_hypercube_has_a_point_in_every_slice() -> None:
+    drawn = LatinHypercube({"x": (0.0, 1.0), "y": (0.0, 1.0)}).draw(1024, ("x", "y"))
+    for column in drawn.T:
+        np.testing.assert_array_equal(np.sort(np.floor(column * 1024)), np.arange(1024))
+
+
+def test_a_grid_holds_its_ends() -> None:
+    grid = Grid({"x": (0.0, 1.0), "z": (2.0, 4.0), "y": 9.0}, {"x": 2, "z": 3})
+    expected = [[0, 9, 2], [0, 9, 3], [0, 9, 4], [1, 9, 2], [1, 9, 3], [1, 9, 4]]
+    np.testing.assert_array_equal(grid.draw(6, NAMES), expected)
+    with pytest.raises(fm.InputError, match="counts"):
+        grid.draw(7, NAMES)
+    with pytest.raises(fm.InputError, match="counts"):
+        Grid({"x": (0.0, 1.0)}, {}).draw(1, NAMES)
+
+
+@pytest.mark.parametrize(
+    "ranges", [{"w": (0.0, 1.0)}, {"x": (1.0, 0.0)}, {"x": "a"}, {"x": (0.0, np.nan)}, {"x": (1, 2, 3)}, 3]
+)
+def test_wrong_ranges_get_one_line(ranges: object) -> None:
+    with pytest.raises(fm.InputError, match="ranges"):
+        Uniform(ranges).draw(3, NAMES)  # type: ignore[arg-type]
