@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from fastmech.bench.measure import Floats, Problem, Series, Solve
 from fastmech.bench.package import STEPS
-from fastmech.bench.problem import Floats, Problem, Series, Solve
 from fastmech.integrators.tableau import Tableau
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import FLAGS

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from fastmech.bench.measure import rest_starts
 from fastmech.bench.plain import scalar_rhs
-from fastmech.bench.problem import rest_starts
 from fastmech.ensembles.integrate import integrate
 from fastmech.mechanism.coefficients import reduce
 from fastmech.reports import Stage, in_turns, table

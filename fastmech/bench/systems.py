@@ -17,11 +17,10 @@ import sympy
 from fastmech.bench.devices import KINDS, explicit
 from fastmech.bench.extended import ROUNDINGS, extended, scene_rates
 from fastmech.bench.frontier import work_precision
-from fastmech.bench.measure import Row, measure, rate_at
+from fastmech.bench.measure import Entrant, Floats, Prepare, Problem, Row, Solve, measure, rate_at
 from fastmech.bench.own_systems import STARTS, SYSTEMS, OwnSystem, spoken
 from fastmech.bench.package import prepared
 from fastmech.bench.peers import heyoka, installed
-from fastmech.bench.problem import Entrant, Floats, Prepare, Problem, Solve
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.work_precision import order_statistic
 from fastmech.integrators.methods import find_method

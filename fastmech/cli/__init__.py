@@ -14,7 +14,7 @@ from typing import Any
 import click
 
 from fastmech import __version__
-from fastmech.cli.failure import SUMMARY, Failure, told_in_one_line
+from fastmech.cli.reporting import SUMMARY, Failure, told_in_one_line
 from fastmech.errors import shown
 from fastmech.interrupts import listen
 

@@ -15,7 +15,7 @@ from fastmech.cli.reporting import Account, account, reporting_options
 if TYPE_CHECKING:
     from fastmech.models.mechanism import Mechanism
     from fastmech.scan_types.request import RunContext
-    from fastmech.tiles.report import RunReport
+    from fastmech.tiles.run import RunReport
     from fastmech.tiles.work import Hiring
 
 

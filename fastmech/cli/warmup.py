@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import click
 
-from fastmech.cli.failure import Failure
-from fastmech.cli.reporting import account, reporting_options
+from fastmech.cli.reporting import Failure, account, reporting_options
 
 
 @click.command(name="warmup")

@@ -16,10 +16,9 @@ from fastmech.runner import run_request
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import RunContext, read_request
 from fastmech.store.provenance import provenance
-from fastmech.tiles.assemble import assembled, write_assembled
 from fastmech.tiles.cluster import cluster
 from fastmech.tiles.identity import asked_for, identity_of
-from fastmech.tiles.section import TiledSection, sections_of
+from fastmech.tiles.section import TiledSection, assembled, sections_of, write_assembled
 
 #: Threads, and workers of the cluster.
 WORKERS = 2

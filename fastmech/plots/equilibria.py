@@ -9,9 +9,17 @@ import numpy as np
 
 from fastmech.mechanism.lagrange import potential_energy
 from fastmech.models.drawing import Drawing
-from fastmech.plots.labels import PI_TICKS, equilibrium_names, flag_codes, setting_of
 from fastmech.plots.mechanism import draw_mechanism, drawing_of, legend_handles
-from fastmech.plots.style import LINES, legend_below, new_figure, style
+from fastmech.plots.style import (
+    LINES,
+    PI_TICKS,
+    equilibrium_names,
+    flag_codes,
+    legend_below,
+    new_figure,
+    setting_of,
+    style,
+)
 from fastmech.results import Dataset
 from fastmech.scene import Scene
 

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.plots.labels import coordinates_of, logarithmic, symbol
-from fastmech.plots.style import new_figure, style
+from fastmech.plots.style import coordinates_of, logarithmic, new_figure, style, symbol
 from fastmech.results import Dataset
 
 if TYPE_CHECKING:

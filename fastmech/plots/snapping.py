@@ -7,10 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fastmech.plots.basin_colors import FURTHER, basin_color, basin_name
-from fastmech.plots.basins import FEW, NAMED, unlabelled
-from fastmech.plots.labels import flag_codes
-from fastmech.plots.style import new_figure, style
+from fastmech.plots.basins import FEW, FURTHER, NAMED, basin_color, basin_name, unlabelled
+from fastmech.plots.style import flag_codes, new_figure, style
 from fastmech.results import Dataset
 
 if TYPE_CHECKING:

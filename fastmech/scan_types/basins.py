@@ -32,8 +32,7 @@ from fastmech.scan_types.axis import (
     check_starts,
     told,
 )
-from fastmech.scan_types.request import Scan, UsualMethod, failures
-from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
+from fastmech.scan_types.request import RunContext, Scan, Tiles, Tiling, UsualMethod, failures
 from fastmech.scene import STATE, Number, Scene, nearest
 from fastmech.step_limits.warning import step_warning
 

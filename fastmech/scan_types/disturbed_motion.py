@@ -27,8 +27,7 @@ from fastmech.equilibria.search import MOST
 from fastmech.mechanism.coefficients import reduce
 from fastmech.results import STATE_UNITS, Dataset, Variable, numbers, parts
 from fastmech.scan_types.axis import check_steps
-from fastmech.scan_types.request import HALVING, Scan, UsualMethod, failures
-from fastmech.scan_types.tiling import Each, Tiling
+from fastmech.scan_types.request import HALVING, Each, Scan, Tiling, UsualMethod, failures
 from fastmech.scene import Scene
 from fastmech.step_limits.warning import step_warning
 
@@ -133,6 +132,6 @@ class DisturbedMotionScan(Scan):
     @staticmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
         """Nonlinear and linearized disturbances of every equilibrium over time."""
-        from fastmech.plots.disturbed_motion import draw_disturbed_motion
+        from fastmech.plots.disturbed import draw_disturbed_motion
 
         return draw_disturbed_motion(dataset)

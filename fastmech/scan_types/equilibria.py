@@ -16,8 +16,7 @@ from fastmech.models.stability import classify
 from fastmech.results import Dataset, Variable, flags, numbers, parts
 from fastmech.scan_types.axis import coordinate_units, told
 from fastmech.scan_types.map_layout import HESSIAN, about_of, drawing_group, eigenvalue_variables
-from fastmech.scan_types.request import Scan
-from fastmech.scan_types.tiling import Each, Tiling
+from fastmech.scan_types.request import Each, Scan, Tiling
 from fastmech.scene import Scene
 
 if TYPE_CHECKING:

@@ -45,17 +45,16 @@ from fastmech.scan_types.axis import (
     known_parameters,
     told,
 )
-from fastmech.scan_types.map_curves import curve_variables
 from fastmech.scan_types.map_layout import (
     RESTING,
     TOGETHER,
+    curve_variables,
     point_variables,
     resting_variables,
     sheet_table,
     sheet_variables,
 )
-from fastmech.scan_types.request import Scan
-from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
+from fastmech.scan_types.request import RunContext, Scan, Tiles, Tiling
 from fastmech.scene import Scene, nearest
 from fastmech.store.stream import Piece, Stream
 

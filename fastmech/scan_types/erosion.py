@@ -29,8 +29,7 @@ from fastmech.scan_types.axis import (
     check_size,
     check_starts,
 )
-from fastmech.scan_types.request import Scan, Seed
-from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
+from fastmech.scan_types.request import RunContext, Scan, Seed, Tiles, Tiling
 from fastmech.scene import STATE, Scene, nearest
 
 if TYPE_CHECKING:

@@ -22,8 +22,7 @@ from fastmech.mechanism.reactions import reactions
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import Dataset, Variable, parts
 from fastmech.scan_types.axis import check_steps, state_units, told
-from fastmech.scan_types.request import HALVING, MethodName, Scan, failures
-from fastmech.scan_types.tiling import Each, Tiling
+from fastmech.scan_types.request import HALVING, Each, MethodName, Scan, Tiling, failures
 from fastmech.scene import Scene, nearest
 from fastmech.step_limits.warning import step_warning
 

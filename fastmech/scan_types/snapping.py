@@ -21,8 +21,7 @@ from fastmech.ensembles.status import FAILURES, LABELS, Status
 from fastmech.errors import InputError
 from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers
 from fastmech.scan_types.axis import Axis, check_duration, check_parameters, check_rising, check_size
-from fastmech.scan_types.request import Scan, UsualMethod, failures
-from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
+from fastmech.scan_types.request import RunContext, Scan, Tiles, Tiling, UsualMethod, failures
 from fastmech.scene import Scene
 
 if TYPE_CHECKING:

@@ -10,14 +10,12 @@ from pathlib import Path
 from fastmech.errors import InputError
 from fastmech.results import Dataset
 from fastmech.scan_types import scan_kinds
-from fastmech.scan_types.request import Request, request_of_text
-from fastmech.scan_types.tiling import Tiles
+from fastmech.scan_types.request import Request, Tiles, request_of_text
 from fastmech.store.provenance import provenance
 from fastmech.store.read import open_results
-from fastmech.tiles.assemble import assembled, write_assembled
 from fastmech.tiles.identity import asked_for, identity_of
 from fastmech.tiles.parts import Manifest, Parts
-from fastmech.tiles.section import TiledSection, sections_of
+from fastmech.tiles.section import TiledSection, assembled, sections_of, write_assembled
 from fastmech.tiles.tile_file import DamagedTileError
 
 

@@ -8,6 +8,7 @@ import shlex
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -16,17 +17,46 @@ from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError
 from fastmech.interrupts import signal_of
 from fastmech.results import Dataset
-from fastmech.scan_types.request import Request, RunContext
-from fastmech.scan_types.tiling import Tiles
+from fastmech.scan_types.request import Request, RunContext, Tiles
 from fastmech.store.provenance import provenance
-from fastmech.tiles.assemble import assembled, write_assembled
 from fastmech.tiles.ends import CrashedTilesError, Stopped
 from fastmech.tiles.identity import asked_for, asked_of_result, differences, identity_of
 from fastmech.tiles.parts import DamagedManifestError, Manifest, Parts
-from fastmech.tiles.report import RunReport
-from fastmech.tiles.section import TiledSection, sections_of
+from fastmech.tiles.section import TiledSection, assembled, sections_of, write_assembled
 from fastmech.tiles.tile_file import DamagedTileError, Tile
 from fastmech.tiles.work import Crash, Hiring, Task, compute_tiles, still_computing
+
+
+@dataclass
+class RunReport:
+    """What a run has done.
+
+    Attributes:
+        path: the result file.
+        tiles: tiles in all.
+        computed: tiles that this run has computed.
+        damaged: files of tiles that were found damaged and computed again.
+        was_complete: whether there was nothing to do.
+        seconds: wall time of this run [s].
+    """
+
+    path: Path
+    tiles: int = 0
+    computed: int = 0
+    damaged: list[Path] = field(default_factory=list)
+    was_complete: bool = False
+    seconds: float = 0.0
+
+    def summary(self) -> dict[str, str | int | bool | list[str]]:
+        """The same as plain values, for other programs."""
+        return {
+            "result": str(self.path),
+            "tiles": self.tiles,
+            "computed": self.computed,
+            "damaged": [str(path) for path in self.damaged],
+            "was_complete": self.was_complete,
+        }
+
 
 #: Seconds for tiles in hand to notice an interrupt before the user is told that they do not.
 PATIENCE = 0.3

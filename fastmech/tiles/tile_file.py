@@ -8,10 +8,13 @@ cryptographic digest does.
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
 import zlib
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
@@ -20,6 +23,42 @@ from numpy.typing import NDArray
 from fastmech.errors import InputError
 from fastmech.results import Dataset
 from fastmech.store.image import ALIGNMENT, dataset_image, dataset_of_image
+
+#: Ending of what is not whole yet.
+UNFINISHED = ".tmp"
+
+
+def write_durably(path: Path, chunks: Iterable[bytes | memoryview]) -> None:
+    """Write aside, flush to the disk, take the name, flush the folder.
+
+    There must be one writer of ``path``.
+
+    Raises:
+        OSError: as the system says; the older file is then as it was.
+    """
+    aside = path.with_name(path.name + UNFINISHED)
+    try:
+        with aside.open("wb") as file:
+            file.writelines(chunks)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(aside, path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            aside.unlink(missing_ok=True)
+        raise
+    flush_folder(path.parent)
+
+
+def flush_folder(folder: Path) -> None:
+    """Make new names in a folder durable, where the system can."""
+    with contextlib.suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
 
 FORMAT = "fastmech tile 1"
 SUM_BYTES = 4

@@ -13,10 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fastmech.results import Dataset, Variable
-from fastmech.store.chunks import packed
 from fastmech.store.provenance import provenance
 from fastmech.store.read import open_results
-from fastmech.store.stream import Piece, Stream, write_stream
+from fastmech.store.stream import Piece, Stream, packed, write_stream
 
 ROWS, COLUMNS = 23, 37
 VALUES = np.random.default_rng(3).normal(size=(ROWS, COLUMNS, 2))
