@@ -15,8 +15,7 @@ if TYPE_CHECKING:
     from fastmech import mechanisms as mechanisms
     from fastmech.atlas.critical import critical_values
     from fastmech.atlas.critical_curves import critical_curves
-    from fastmech.atlas.fold_points import find_folds
-    from fastmech.atlas.folds import trace_folds
+    from fastmech.atlas.folds import find_folds, trace_folds
     from fastmech.atlas.map import map_equilibria
     from fastmech.atlas.snap import find_snap
     from fastmech.basins.copies import copy_labels, copy_of_label
@@ -110,7 +109,7 @@ _MODULES = {
     "disturbed_motion": "fastmech.disturbance.motion",
     "erosion": "fastmech.basins.erosion",
     "find_equilibria": "fastmech.models.equilibria",
-    "find_folds": "fastmech.atlas.fold_points",
+    "find_folds": "fastmech.atlas.folds",
     "find_snap": "fastmech.atlas.snap",
     "finite_time_basin_stability": "fastmech.basins.measures.fractions",
     "fractal_boundary_test": "fastmech.basins.measures.entropy",

@@ -17,6 +17,7 @@ pytestmark = pytest.mark.nojit
 
 #: Each layer may import itself and the ones before it.
 LAYERS = (
+    "arrays",
     "errors",
     "interrupts",
     "kernel_cache",

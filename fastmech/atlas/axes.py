@@ -7,15 +7,14 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fastmech.arrays import Floats
 from fastmech.ensembles.checks import one_way
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.mechanism.coefficients import reduce
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene, nearest, require_scene
-
-Floats = NDArray[np.float64]
 
 
 def check_axes(scene: Scene, axes: Mapping[str, ArrayLike], most: int = 3) -> dict[str, Floats]:

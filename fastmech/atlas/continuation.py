@@ -10,9 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from fastmech.arrays import Floats
 
 #: Gives values F(z) and Jacobian.
 Equations = Callable[[Floats], tuple[Floats, Floats]]

@@ -24,11 +24,10 @@ from numba import types
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from fastmech.arrays import Floats
 from fastmech.atlas.continuation import Curve
 from fastmech.atlas.enclosure import ROUNDING, System
 from fastmech.jit import CUBE, MATRIX, inlined, kernel
-
-Floats = NDArray[np.float64]
 
 #: Boxes of the start along an angle and along a parameter.
 ANGLES, PARTS = 16, 4

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 from typing import Any, Literal, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
+from fastmech.arrays import Floats
 from fastmech.atlas.continuation import LONGEST, Curve, Equations, distance, newton, trace
 from fastmech.atlas.critical import Known, Pairs, changes, named, narrowed
 from fastmech.atlas.defining import Balance
@@ -24,8 +25,6 @@ from fastmech.atlas.resting_map import map_resting_places
 from fastmech.equilibria.outcome import Outcome
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
-
-Floats = NDArray[np.float64]
 
 #: Halvings of an edge of the grid before Newton's method is tried.
 HALVINGS = 10

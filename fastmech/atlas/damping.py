@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.arrays import Floats
 from fastmech.atlas.continuation import LONGEST, distance, newton, regular, trace
 from fastmech.atlas.cover import apart
 from fastmech.atlas.enclosure import System
@@ -20,8 +21,6 @@ from fastmech.atlas.map import EquilibriumMap, map_equilibria
 from fastmech.atlas.systems import Plane, dead_centre, point_at, straight, unloaded
 from fastmech.scene import Scene
 from fastmech.stability.modes import SIN_PHI, SIN_PSI, UNLOADED
-
-Floats = NDArray[np.float64]
 
 SYSTEMS: dict[str, Callable[[Plane], System]] = {
     SIN_PHI: dead_centre,

@@ -16,9 +16,8 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.jit import CUBE, INTEGERS, MATRIX, VECTOR, kernel
-
-Floats = NDArray[np.float64]
 
 CONSTANT, VARIABLE, ADD, SUBTRACT, MULTIPLY, SINE, COSINE = range(7)
 

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.atlas.continuation import newton
 from fastmech.atlas.defining import Balance
 from fastmech.atlas.resting_map import map_resting_places
 from fastmech.models.mechanism import Mechanism
-
-Floats = NDArray[np.float64]
 
 #: Longest and shortest step of a position [rad, lengths over their ranges by 2 pi].
 LONGEST, SHORTEST = 0.05, 1e-9

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.equilibria.balance import HALF_PI, normal_form, pulls, vanishing, wrap
 from fastmech.equilibria.search import angles
 from fastmech.jit import MATRIX, VECTOR, kernel
-
-Floats = NDArray[np.float64]
 
 
 @kernel(types.void(MATRIX, VECTOR, VECTOR, VECTOR, VECTOR))

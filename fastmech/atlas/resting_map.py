@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.arrays import Codes, Floats
 from fastmech.ensembles import checks
 from fastmech.ensembles.threads import in_parts
 from fastmech.equilibria.outcome import Outcome
@@ -19,9 +20,6 @@ from fastmech.models.equilibria import DIGITS, alike, outcome_of_row, search_row
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import VERDICTS, spectra, verdicts
 from fastmech.scene import nearest
-
-Floats = NDArray[np.float64]
-Codes = NDArray[np.int8]
 
 #: Points that a thread proves at a time, and the numbers of 8 bytes that each takes meanwhile.
 BLOCK, POINT_NUMBERS = 64, 1200

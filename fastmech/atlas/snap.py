@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.atlas.continuation import Equations, newton, tangent_at
 from fastmech.atlas.defining import Balance
 from fastmech.atlas.systems import Plane, fold, point_at, rest
@@ -20,8 +20,6 @@ from fastmech.models.equilibria import find_equilibria as resting_places
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import assess
 from fastmech.scene import Scene, nearest, require_scene
-
-Floats = NDArray[np.float64]
 
 #: Longest step along the branch [rad, and parts of the range], and the shortest.
 STEP, SHORTEST = 0.02, 1e-9

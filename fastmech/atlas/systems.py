@@ -13,14 +13,12 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.atlas.axes import coefficient_columns
 from fastmech.atlas.enclosure import System
 from fastmech.mechanism.reduced import potential_gradient, potential_hessian
 from fastmech.scene import Scene
-
-Floats = NDArray[np.float64]
 
 #: A part of a load that is this small beside the largest load of a plane is rounding.
 ROUNDING = 1e-14

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fastmech.arrays import Floats, Integers
 from fastmech.basins.label import How, Labels, label_starts
-from fastmech.basins.measures.labels import Floats, Integers, LabelOf, check_point
+from fastmech.basins.measures.labels import LabelOf, check_point
 from fastmech.basins.measures.norm import kinetic_norm
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.ensembles import checks

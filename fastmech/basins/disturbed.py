@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Floats, Integers
 from fastmech.basins.label import How, label_starts
 from fastmech.basins.measures.fractions import Shares, basin_stability
 from fastmech.capture.select import certificate_of, require_damper
@@ -30,9 +31,6 @@ from fastmech.errors import InputError, StepWarning
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 #: By how much excursions by two steps may differ, over the larger coordinate's.
 AGREED = 0.01
@@ -68,7 +66,7 @@ class DisturbedEnsemble:
     failed: Floats  #: time of the last finite state of those that failed on the way [s], else NaN; shape (n,)
     outcome: NDArray[np.int8]  #: :class:`fastmech.ensembles.status.Status`, one of its ``ENDS``, shape (n,)
     end_index: NDArray[np.int8]  #: the stable equilibrium at which it is proved to end, -1: none; shape (n,)
-    turns: NDArray[np.int64]  #: full turns of each coordinate on the way there, 0 where none; (n, coords)
+    turns: Integers  #: full turns of each coordinate on the way there, 0 where none; (n, coords)
     time_to_return: Floats  #: s, first step from which on it was in the ball; NaN: not by t_end; (n,)
     excursion: Floats
     """Largest departures of coordinates [rad or m], at and between steps; NaN of those that failed or, by

@@ -32,8 +32,7 @@ from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import FAILURES, LABELS, Status, counts
 from fastmech.ensembles.threads import thread_count
 from fastmech.errors import StepWarning
-from fastmech.integrators.method import Method
-from fastmech.integrators.methods import find_method
+from fastmech.integrators.methods import Method, find_method
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
 

@@ -19,7 +19,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.basins.measures.labels import Floats, Integers, check_point
+from fastmech.arrays import Floats, Integers
+from fastmech.basins.measures.labels import check_point
 from fastmech.basins.switched import Switched
 from fastmech.capture.scene import scene_certificate
 from fastmech.capture.select import require_damper

@@ -7,17 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.basins.ladder import SUBSTEPS, Indices, climb, near_saddle, tell_the_same
 from fastmech.basins.runs import Paths
 from fastmech.capture.scene import SceneCertificate
 from fastmech.capture.steps import coarse_steps
-from fastmech.ensembles.energy_bounds import breaks_energy_bounds, energies
+from fastmech.ensembles.fitting import breaks_energy_bounds, energies
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import Status
 from fastmech.mechanism.coefficients import reduce
-
-Floats = NDArray[np.float64]
 
 #: Time between looks at what is captured [s].
 PIECE = 1.0

@@ -15,11 +15,11 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.bench.plain import accelerations
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 
-Floats = NDArray[np.float64]
 Extended = NDArray[np.longdouble]
 
 #: Times (n,) and states (dim, n) to derivatives (dim, n).

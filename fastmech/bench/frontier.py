@@ -26,8 +26,7 @@ from fastmech.ensembles.work_precision import (
     times_to_fit,
 )
 from fastmech.errors import InputError, called_here, shown
-from fastmech.integrators.method import ImplicitRungeKutta, Method
-from fastmech.integrators.methods import METHODS, find_method
+from fastmech.integrators.methods import METHODS, ImplicitRungeKutta, Method, find_method
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots.style import LINES, new_figure, style
 from fastmech.scene import Scene

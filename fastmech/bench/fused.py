@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from fastmech.bench.measure import Floats, Problem, Series, Solve
+from fastmech.arrays import Floats
+from fastmech.bench.measure import Problem, Series, Solve
 from fastmech.bench.package import STEPS
 from fastmech.integrators.tableau import Tableau
 from fastmech.integrators.tableaus import TABLEAUS

@@ -18,16 +18,14 @@ from importlib.resources import files
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.system import System
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.models.mechanism import Mechanism
 from fastmech.reports import Stage as Stage
 from fastmech.scene import Scene
-
-Floats = NDArray[np.float64]
 
 #: Starts of a problem that have a reference; larger ensembles repeat them.
 STARTS = 1024
@@ -138,7 +136,7 @@ class Row:
     wall: float  #: s, median of timed calls
     processor: float  #: s of processor time, median of timed calls
     first_call: float  #: s, preparing and the first call: compiling or loading included
-    errors: NDArray[np.float64] = field(repr=False)  #: largest error of any component, by trajectory
+    errors: Floats = field(repr=False)  #: largest error of any component, by trajectory
 
     @property
     def rate(self) -> float:

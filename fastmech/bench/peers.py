@@ -20,9 +20,10 @@ import numpy as np
 import sympy
 from numba import carray, cfunc, njit, types  # type: ignore[attr-defined]
 
+from fastmech.arrays import Floats
 from fastmech.bench import fused, package, plain
 from fastmech.bench.devices import explicit
-from fastmech.bench.measure import Entrant, Floats, Problem, Series, Solve
+from fastmech.bench.measure import Entrant, Problem, Series, Solve
 from fastmech.bench.own_systems import spoken
 from fastmech.bench.plain import accelerations, scalar_rhs
 from fastmech.ensembles.system import System

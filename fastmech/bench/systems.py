@@ -14,10 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import sympy
 
+from fastmech.arrays import Floats
 from fastmech.bench.devices import KINDS, explicit
 from fastmech.bench.extended import ROUNDINGS, extended, scene_rates
 from fastmech.bench.frontier import work_precision
-from fastmech.bench.measure import Entrant, Floats, Prepare, Problem, Row, Solve, measure, rate_at
+from fastmech.bench.measure import Entrant, Prepare, Problem, Row, Solve, measure, rate_at
 from fastmech.bench.own_systems import STARTS, SYSTEMS, OwnSystem, spoken
 from fastmech.bench.package import prepared
 from fastmech.bench.peers import heyoka, installed

@@ -12,14 +12,12 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.bench.extended import extended_truth, scene_rates
 from fastmech.ensembles.integrate import integrate
 from fastmech.reports import Stage, table
 from fastmech.scene import Scene
-
-Floats = NDArray[np.float64]
 
 #: Scenes, and trajectories of each: more than the sample of the calibration.
 SCENES, STARTS = 40, 512

@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.equilibria.descent import (
     MOST_STEPS,
     TURN,
@@ -22,8 +22,6 @@ from fastmech.equilibria.descent import (
 )
 from fastmech.jit import VECTOR, inlined, kernel
 from fastmech.mechanism.reduced import potential
-
-Floats = NDArray[np.float64]
 
 #: Places in the vector: reduced coefficients of the potential, amplitude and rate of the decaying force,
 #: time between stops [s], number of wells, cells along a turn; then four numbers a well; then the cells.

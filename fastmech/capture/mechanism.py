@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.callee import callee
 from fastmech.capture.cells import bound_states
 from fastmech.capture.certificate import Certificate, Early, Noted
@@ -27,12 +28,9 @@ from fastmech.ensembles.ends import STOP_CODE
 from fastmech.ensembles.run import CALL_STEPS_WITH_STOPS, Observation
 from fastmech.errors import InputError
 from fastmech.generated import new_module, run_module
-from fastmech.integrators.method import Method
-from fastmech.integrators.methods import find_method
+from fastmech.integrators.methods import Method, find_method
 from fastmech.models.balance import energy_kernel, range_of
 from fastmech.models.mechanism import Mechanism, in_precision
-
-Floats = NDArray[np.float64]
 
 #: Places along each coordinate at which frequencies are looked up, by the number of coordinates.
 LOOKED_AT = {1: 512, 2: 48, 3: 12, 4: 7}

@@ -10,15 +10,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.capture.locate import AMPLITUDE, FIRST_WELL, INTERVAL, RATE, WELLS, locate
 from fastmech.ensembles.ends import STOP_CODE, note_stop
 from fastmech.jit import OBSERVER_SIGNATURE, inlined, kernel
 from fastmech.kernels.sincos import REDUCTION_LIMIT, sincos
 from fastmech.mechanism.reduced import metric_11, potential, slider_ratio
-
-Floats = NDArray[np.float64]
 
 #: Rows of the record behind those of ``stopping`` (code: the well's number, from 1; time; state): the energy
 #: below which the lane's position is looked at next (minus infinity once captured), its energy at the last

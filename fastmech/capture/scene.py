@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.atlas.wells import ROUNDING
+from fastmech.arrays import Floats
+from fastmech.atlas.map import ROUNDING
 from fastmech.capture.barriers import BarrierTree, barrier_tree, frozen_coefficients
 from fastmech.capture.certificate import Certificate, Early, Noted
 from fastmech.capture.locate import FIRST_WELL, INTERVAL, fill_cells, pack
@@ -37,10 +38,9 @@ from fastmech.capture.steps import (
 from fastmech.disturbance.motion import damped_times
 from fastmech.disturbance.size import Size, confining_energy, size_of
 from fastmech.ensembles.ends import STOP_CODE
-from fastmech.ensembles.energy_bounds import breaks_energy_bounds
+from fastmech.ensembles.fitting import breaks_energy_bounds
 from fastmech.ensembles.run import CALL_STEPS_WITH_STOPS, Observation
-from fastmech.integrators.method import ImplicitRungeKutta, Method, with_jacobian
-from fastmech.integrators.methods import find_method
+from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method, with_jacobian
 from fastmech.kernels.jacobians import lagrange_inverse, lagrange_jacobian
 from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import Coefficients, reduce
@@ -48,8 +48,6 @@ from fastmech.mechanism.lagrange import unit
 from fastmech.mechanism.reduced import metric_11, slider_ratio
 from fastmech.scene import STATE, Scene
 from fastmech.step_limits.warning import drives_rest, is_beyond, step_limit, warn_of_step
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -15,15 +15,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Floats, Integers
 from fastmech.callee import callee
 from fastmech.capture.cells import bound_cells, bound_states, convex_box, fill_component, first_exits
 from fastmech.errors import InputError, shown
 from fastmech.models.balance import balance_kernel, energy_kernel
 from fastmech.models.equilibria import Place, RestingPlaces, domain_of, find_equilibria
 from fastmech.models.mechanism import Mechanism
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 #: Cells along a coordinate, by the number of coordinates; odd, so that the middle of a range is inside one.
 SIDES = {1: 8191, 2: 255, 3: 61, 4: 23}

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.disturbance.motion import disturbed_motion, equilibria_to_disturb
 from fastmech.disturbance.size import Size, size_of, unit_directions
 from fastmech.ensembles import checks
@@ -14,8 +14,6 @@ from fastmech.equilibria.find import Equilibrium
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
-
-Floats = NDArray[np.float64]
 
 SMALLEST, LARGEST, GRID = 1e-6, np.pi, 24
 BISECTIONS = 13

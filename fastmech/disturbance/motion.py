@@ -9,6 +9,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.arrays import Floats
 from fastmech.disturbance.size import size_of
 from fastmech.ensembles import checks
 from fastmech.ensembles.fitting import damping_rate
@@ -16,16 +17,12 @@ from fastmech.ensembles.integrate import integrate
 from fastmech.equilibria.balance import pulls, vanishing
 from fastmech.equilibria.find import Equilibrium, degenerate_sentence
 from fastmech.errors import InputError
-from fastmech.integrators.method import ImplicitRungeKutta
-from fastmech.integrators.methods import find_method
+from fastmech.integrators.methods import ImplicitRungeKutta, find_method
 from fastmech.mechanism.coefficients import reduce
 from fastmech.models.equilibria import RestingPlace, find_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene, require_scene
 from fastmech.stability.linearize import jacobian
-
-Floats = NDArray[np.float64]
-
 
 #: Default step times the highest frequency [rad].
 PHASE = 0.05

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from fastmech.arrays import Floats
 from fastmech.jit import OBSERVER_SIGNATURE, kernel
-
-Floats = NDArray[np.float64]
 
 #: Rows of the record, which begins with zeros and ends with the state that the step began with; the
 #: excursions' rows go on with the other coordinates, and SWUNG is when the last of them was reached.

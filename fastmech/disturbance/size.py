@@ -7,15 +7,13 @@ from functools import cached_property
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.equilibria.find import Equilibrium
 from fastmech.mechanism.lagrange import kinetic_energy, metric, potential_energy, potential_hessian, unit
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

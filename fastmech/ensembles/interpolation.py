@@ -13,14 +13,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.ensembles.fitting import EXPONENT_ONCE, fit_steps
 from fastmech.ensembles.problem import Case, Problem
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.solve import Settings, Solution, nothing, put_into, solve
-
-Floats = NDArray[np.float64]
 
 #: Steps between outputs, on average, from which on steps end at the outputs. With fewer, two runs with steps
 #: that differ by sqrt(2) could have the same ones: 2.13 are enough for one step more.

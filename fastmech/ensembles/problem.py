@@ -14,14 +14,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.arrays import Floats
 from fastmech.ensembles import checks
 from fastmech.ensembles.derived import system_of
 from fastmech.ensembles.fitting import damping_rate, vibration_frequency
-from fastmech.ensembles.parameters import Parameters
+from fastmech.ensembles.lanes import Parameters
 from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
-from fastmech.integrators.method import Method, with_jacobian
+from fastmech.integrators.methods import Method, with_jacobian
 from fastmech.kernels.jacobians import canonical_jacobian, lagrange_inverse, lagrange_jacobian
 from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import Coefficients, reduce
@@ -29,8 +30,6 @@ from fastmech.mechanism.equations import momenta_from_rates, rates_from_momenta
 from fastmech.mechanism.reduced import metric_determinant, slider_ratio
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene, nearest
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

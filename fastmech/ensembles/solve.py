@@ -2,23 +2,85 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Flags, Floats
 from fastmech.ensembles.ends import STOP_CODE
-from fastmech.ensembles.energy_bounds import breaks_energy_bounds
-from fastmech.ensembles.fitting import EXPONENT_AGAIN, EXPONENT_ONCE, fit_steps, fitted_steps
+from fastmech.ensembles.fitting import (
+    EXPONENT_AGAIN,
+    EXPONENT_ONCE,
+    breaks_energy_bounds,
+    fit_steps,
+    fitted_steps,
+    speed_bound,
+)
 from fastmech.ensembles.problem import Case, Problem
-from fastmech.ensembles.run import Ensemble, Progress, run_ensemble
+from fastmech.ensembles.run import Ensemble, Observation, Progress, run_ensemble
 from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.status import Status
-from fastmech.ensembles.turning import TURNED, TURNS
-from fastmech.integrators.method import Method
+from fastmech.integrators.methods import Method
+from fastmech.jit import OBSERVER_SIGNATURE, kernel
+from fastmech.mechanism.coefficients import Coefficients
+from fastmech.step_limits.warning import TURN
 
-Floats = NDArray[np.float64]
+#: By how much rounding may make a step longer than the dt that it was to be.
+ROUNDED = 1e-6
+
+#: Rows of the record: the greatest turn of an angle in a step [rad], and the angles that the step began with.
+TURNED, BEFORE = 0, 1
+
+
+@kernel(OBSERVER_SIGNATURE)
+def observe_turns(t: float, Y: Floats, params: Floats, record: Floats) -> None:
+    """Keep the greatest turn of every lane."""
+    for angle in range(2):
+        for i in range(Y.shape[1]):
+            turned = abs(Y[angle, i] - record[BEFORE + angle, i])
+            record[TURNED, i] = turned if turned > record[TURNED, i] else record[TURNED, i]
+            record[BEFORE + angle, i] = Y[angle, i]
+
+
+TURNS = Observation(observe_turns, np.zeros(0), np.zeros(3), states=2)
+
+
+def may_turn(c: Coefficients, starts: Floats, dt: float | Floats, threads: int | None = None) -> Flags:
+    """Whether a body may turn by more than :data:`TURN` in a step of ``dt`` [s], by its energy; shape (n,).
+
+    Of rates whose kinetic-energy norm is 1 none is greater than sqrt((mass + 1) / mass): the inverse of
+    the mass matrix has no greater diagonal entry in any configuration.
+    """
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        turn = speed_bound(c, starts, threads)
+        turn *= np.sqrt((c.mass + 1.0) / c.mass)
+        turn *= dt
+        return np.asarray(turn > TURN)
+
+
+def watched(problem: Problem, starts: Floats, dt: float, threads: int | None = None) -> Problem:
+    """The problem, with turns observed where the steps of ``dt`` [s] are long enough for them."""
+    c = problem.coefficients
+    some = c is not None and may_turn(c, starts, (1.0 + ROUNDED) * dt, threads).any()
+    return replace(problem, observation=TURNS) if some else problem
+
+
+def counted_turns(
+    problem: Problem, starts: Floats, dt: Floats, records: Floats, threads: int | None = None
+) -> Floats | None:
+    """The turns (n,) in the records of a watched problem with steps of at most ``dt`` (n,) [s].
+
+    Only those count that the energy allows in a trajectory's own steps, else they are 0: they do not depend
+    on whether its companions' were a reason to watch. ``None``: nobody is watched.
+    """
+    c = problem.coefficients
+    if c is None or problem.observation is not TURNS:
+        return None
+    return np.where(may_turn(c, starts, dt, threads), records[TURNED], 0.0)
+
+
 Precision = type[np.floating[Any]]
 
 
@@ -56,7 +118,7 @@ def nothing(problem: Problem, outputs: int, n: int, dim: int) -> Solution:
     return Solution(y, records, np.zeros(n, dtype=np.int8), number, dt, failed, None, term)
 
 
-def part_of(solution: Solution, who: NDArray[np.int64] | NDArray[np.bool_]) -> Solution:
+def part_of(solution: Solution, who: NDArray[np.int64] | Flags) -> Solution:
     """Some of a solution's trajectories."""
     s = solution
     last = None if s.last is None else s.last[who]
@@ -142,7 +204,7 @@ def solve(case: Case, settings: Settings, progress: Progress | None = None) -> S
     return solution
 
 
-def tell_aside(solution: Solution, starts: Floats, outputs: Floats, aside: NDArray[np.bool_]) -> None:
+def tell_aside(solution: Solution, starts: Floats, outputs: Floats, aside: Flags) -> None:
     """What is told of trajectories (n,) that did not run because no steps can follow them."""
     solution.status[aside] = Status.STEP_TOO_LARGE
     solution.y[: 1 if outputs[0] == 0.0 else 0, aside] = starts[aside]

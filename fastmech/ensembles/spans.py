@@ -14,11 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.errors import InputError
-from fastmech.integrators.method import Method
+from fastmech.integrators.methods import Method
 from fastmech.kernels.blocks import VECTOR_LANES
-
-Floats = NDArray[np.float64]
 
 #: More steps than this take hours, and the times of their pieces more memory than most machines have.
 MOST_STEPS = 2.0**34

@@ -13,7 +13,7 @@ import numpy as np
 from fastmech.equilibria.evidence import Evidence, gather
 from fastmech.equilibria.outcome import Outcome
 from fastmech.equilibria.search import FloatArray
-from fastmech.equilibria.solution import explain, solve_rows
+from fastmech.equilibria.solve import explain, solve_rows
 from fastmech.errors import InputError, shown
 from fastmech.mechanism.coefficients import Coefficients, force, reduce
 from fastmech.mechanism.reduced import potential_hessian

@@ -6,15 +6,14 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fastmech.arrays import Floats
 from fastmech.basins.label import Labels
 from fastmech.ensembles.integrate import Trajectories
 from fastmech.ensembles.status import Status
 from fastmech.mechanism.lagrange import kinetic_energy, potential_energy
 from fastmech.scene import Scene
-
-Floats = NDArray[np.float64]
 
 #: Why a method claims nothing of an undamped motion.
 DRIVEN = "undamped motions grow with every step"

@@ -12,16 +12,14 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
 from fastmech.reports import in_turns, table
 from fastmech.results import Dataset, Variable
 from fastmech.scene import Scene
-
-Floats = NDArray[np.float64]
 
 #: Methods that are measured, explicit, multistep and implicit ones, with the step [s].
 CONTAINED = {"rk4": 0.01, "dop853": 0.02, "ab6": 0.005, "abm8": 0.01, "gauss6": 0.05, "sdirk4": 0.02}

@@ -9,18 +9,20 @@ far too long.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import tomllib
+from functools import cache
+from importlib import resources
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fastmech.arrays import Floats
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.errors import InputError
 from fastmech.hardcases.case import REFUSED, Row, row_of, worst
-from fastmech.hardcases.references import Floats, Goal
 from fastmech.integrators.batch import Batch, observe_nothing
-from fastmech.integrators.method import Adams, ImplicitRungeKutta
-from fastmech.integrators.methods import METHODS, find_method
+from fastmech.integrators.methods import METHODS, Adams, ImplicitRungeKutta, find_method
 from fastmech.integrators.tableaus.implicit import IMPLICIT_TABLEAUS
 from fastmech.kernels.counting import CALLS, JACOBIANS, counting_jacobian, counting_lagrange
 from fastmech.kernels.jacobians import lagrange_inverse, lagrange_jacobian
@@ -28,6 +30,54 @@ from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 from fastmech.step_limits.predict import stable_step
 from fastmech.step_limits.warning import step_limit, step_warning
+
+#: Relative error that rounding explains, of motions that are not chaotic.
+ROUNDED = 1e-10
+
+
+class Goal(NamedTuple):
+    """A motion whose end is known, of a reference to better than double precision."""
+
+    scene: Scene
+    start: Floats  #: (4,): rad, rad/s
+    t_end: float  #: s
+    expected: Floats  #: (4,), state at that time
+    rounded: float = ROUNDED  #: error that rounding explains, of the largest entry
+
+    def error(self, state: Floats) -> float:
+        """Largest difference from the known end, relative to its largest entry, 1 at least."""
+        return float(np.abs(state - self.expected).max() / max(1.0, np.abs(self.expected).max()))
+
+
+@cache
+def _content() -> dict[str, Any]:
+    return tomllib.loads(resources.files(__package__).joinpath("references.toml").read_text(encoding="utf-8"))
+
+
+def motion(name: str, rounded: float = ROUNDED) -> Goal:
+    """The reference of this name; its scene is the paper's with a few changes."""
+    entry = _content()[name]
+    end = np.array([float(x) for x in entry["state"]])
+    return Goal(
+        Scene(c2=1100 / 3).replace(**entry["scene"]), np.array(entry["start"]), entry["t"], end, rounded
+    )
+
+
+class Boundary(NamedTuple):
+    """Where a line of starts at rest, theta = 0, crosses a basin boundary, and where motions end."""
+
+    scene: Scene
+    phi: float  #: rad, rounded; to 1e-16
+    below: Floats  #: phi, theta [rad] at the end of motions that start at smaller phi, (2,)
+    above: Floats  #: the same for greater phi
+
+
+def boundary() -> Boundary:
+    """The crossing found by bisection in extended precision."""
+    entry = _content()["boundary"]
+    below, above = (np.array(end) for end in entry["ends"])
+    return Boundary(Scene(c2=1100 / 3).replace(**entry["scene"]), float(entry["phi"]), below, above)
+
 
 #: One method of each family: what quick versions walk.
 FAMILIES = ("euler", "rk4", "dop853", "abm8", "gauss6", "radau5", "sdirk4")

@@ -7,12 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
+from fastmech.arrays import Floats, Integers
 from fastmech.jit import INTEGERS, OBSERVER_SIGNATURE, VECTOR, kernel, lanes, named_tuple
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 BlockRHS = Callable[[float, Floats, Floats, Floats], None]
 Observer = Callable[[float, Floats, Floats, Floats], None]
 

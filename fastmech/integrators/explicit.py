@@ -15,8 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
+from fastmech.arrays import Floats, Integers
 from fastmech.callee import CalleeType, callee, entry
-from fastmech.integrators.batch import ROUNDED_TIME, Batch, BlockRHS, Floats, Integers, Observer, batch_type
+from fastmech.integrators.batch import ROUNDED_TIME, Batch, BlockRHS, Observer, batch_type
 from fastmech.integrators.tableau import Tableau
 from fastmech.jit import (
     INTEGERS,

@@ -11,6 +11,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.callee import callee
 from fastmech.equilibria import find
 from fastmech.equilibria.outcome import Outcome
@@ -20,8 +21,6 @@ from fastmech.loads import Constant
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.statics import Statics
 from fastmech.scene import Scene
-
-Floats = NDArray[np.float64]
 
 #: Boxes that are treated at most, by the number of coordinates; a chain of four pendulums takes 9,600.
 LIMITS = {1: 10_000, 2: 50_000, 3: 300_000, 4: 1_000_000}

@@ -13,8 +13,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
 from fastmech.generated import kept_text
 from fastmech.kernels.fingerprint import fingerprint
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
     from fastmech.models.derivation import Derived, Equations
     from fastmech.models.elements import Acting
 
-Floats = NDArray[np.float64]
 
 #: Coordinates at most.
 MOST_COORDINATES = 4

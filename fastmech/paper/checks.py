@@ -9,8 +9,7 @@ import numpy as np
 from fastmech.equilibria.find import find_equilibria
 from fastmech.mechanism.geometry import constraints, positions
 from fastmech.paper.compare import CASES, Printed, agrees
-from fastmech.paper.compute import METHOD, MOTION_SPAN, STEP, Computed, nearest
-from fastmech.paper.scene import PAPER_SCENE, STATIC_SCENE
+from fastmech.paper.compute import METHOD, MOTION_SPAN, PAPER_SCENE, STATIC_SCENE, STEP, Computed, nearest
 from fastmech.scene import Scene
 
 

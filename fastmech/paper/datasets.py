@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fastmech.arrays import Floats
 from fastmech.mechanism.geometry import constraints, positions
 from fastmech.mechanism.lagrange import potential_energy, potential_gradient
 from fastmech.paper.compare import Row, Verdict
-from fastmech.paper.compute import Case, Computed, Floats
-from fastmech.paper.scene import PAPER_SCENE, STATIC_SCENE
+from fastmech.paper.compute import PAPER_SCENE, STATIC_SCENE, Case, Computed
 from fastmech.reports import columns
 from fastmech.results import Dataset, Variable
 

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.paper.compare import HEADINGS, Row, Verdict
-from fastmech.paper.compute import DISTURBED_SPAN, MOTION_SPAN, Case, Computed
+from fastmech.paper.compute import DISTURBED_SPAN, MOTION_SPAN, STATIC_SCENE, Case, Computed
 from fastmech.paper.datasets import DISTURBED, TABLES
-from fastmech.paper.scene import STATIC_SCENE
 from fastmech.plots.mechanism import draw_mechanism, drawing_of, legend_handles
 from fastmech.plots.style import LINES, PALETTE, legend_below, new_figure, style
 from fastmech.results import Dataset

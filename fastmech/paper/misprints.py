@@ -10,11 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fastmech.paper.coefficients import Floats, Terms, hamiltonian_16, printed_kinetic
+from fastmech.arrays import Floats
 from fastmech.paper.compare import CASES, Printed, agrees_legibly, half_unit
-from fastmech.paper.compute import Case, Computed
-from fastmech.paper.formulas import MEASURES
-from fastmech.paper.scene import PAPER_SCENE
+from fastmech.paper.compute import PAPER_SCENE, Case, Computed
+from fastmech.paper.formulas import MEASURES, Terms, hamiltonian_16, printed_kinetic
 
 
 class Evidence(NamedTuple):

@@ -10,14 +10,12 @@ from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError
 from fastmech.paper.checks import Check, all_checks, parameters_used
 from fastmech.paper.compare import Row, load_printed
-from fastmech.paper.compute import METHOD, STEP, compute
+from fastmech.paper.compute import METHOD, PAPER_SCENE, STEP, compute
 from fastmech.paper.datasets import all_datasets
 from fastmech.paper.figures import figure_pictures, table_pictures
-from fastmech.paper.html import to_html
 from fastmech.paper.misprints import Misprint, candidates
 from fastmech.paper.rows import all_rows
-from fastmech.paper.scene import PAPER_SCENE
-from fastmech.paper.text import TITLE, report_text
+from fastmech.paper.text import TITLE, report_text, to_html
 from fastmech.plots.style import png
 from fastmech.reports import Stage, no_stage
 from fastmech.results import scene_parameters

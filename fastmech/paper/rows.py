@@ -6,12 +6,12 @@ from collections.abc import Collection, Iterator
 
 import numpy as np
 
+from fastmech.arrays import Floats
 from fastmech.mechanism.geometry import Points, constraints, positions
-from fastmech.paper.coefficients import Floats, Terms, equilibrium_20, hamiltonian_16
 from fastmech.paper.compare import CASES, Judge, Printed, Row, Verdict
-from fastmech.paper.compute import Case, Computed
+from fastmech.paper.compute import DISTURBANCE, PAPER_SCENE, START, STATIC_SCENE, Case, Computed
+from fastmech.paper.formulas import Terms, equilibrium_20, hamiltonian_16
 from fastmech.paper.misprints import printed_polynomial
-from fastmech.paper.scene import DISTURBANCE, PAPER_SCENE, START, STATIC_SCENE
 
 
 def all_rows(printed: Printed, computed: Computed, misprints: Collection[str]) -> list[Row]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.mechanism.lagrange import kinetic_energy, potential_energy
 from fastmech.plots.style import (
     ANGLES,
@@ -87,8 +88,6 @@ def basin_name(dataset: Dataset, well: int, turns: tuple[int, ...]) -> str:
     made = [f"{t:+d} {name}" for t, name in zip(turns, names, strict=True) if t]
     return f"{text}, {', '.join(made)} turn{'s' * (len(made) > 1 or abs(sum(turns)) > 1)}" if made else text
 
-
-Floats = NDArray[np.float64]
 
 #: Points along each side on which energies are evaluated for their contours.
 GRID = 401

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Flags, Floats
 from fastmech.plots.map_view import View, make_view
 from fastmech.plots.style import (
     ANGLES,
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 UNSTABLE = ("still at an unstable one", "#8c8c8c")
 LEFT_OVER = {
@@ -429,7 +428,7 @@ def _percent(view: View, name: str) -> Floats:
     return 100.0 * view.data(name).astype(np.float64)
 
 
-def _untold(view: View, sheet: int) -> NDArray[np.bool_]:
+def _untold(view: View, sheet: int) -> Flags:
     """Where a sheet has an equilibrium of which not all, or nothing, could be computed."""
     there = np.isfinite(view.data("phi")[..., sheet])
     return there & ~(view.data("share_failed")[..., sheet] == 0.0)

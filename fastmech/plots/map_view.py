@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.plots.style import PALETTE, coordinates_of, flag_codes, setting_of
 from fastmech.results import Dataset, Variable
 from fastmech.scene import Scene
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-Floats = NDArray[np.float64]
 
 #: Points of an axis that are drawn at most; of longer ones every n-th is read.
 MOST_DRAWN = 1000

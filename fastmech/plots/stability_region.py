@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.integrators.method import Method
+from fastmech.integrators.methods import Method
 from fastmech.plots.style import PALETTE, new_figure, style
 from fastmech.results import Dataset
 from fastmech.step_limits.amplification import amplification

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
+from fastmech.arrays import Floats
 from fastmech.atlas.map import map_equilibria
 from fastmech.basins.disturbed import (
     MOST_RADIUS,
@@ -81,7 +82,6 @@ if TYPE_CHECKING:
 
     from fastmech.store.read import Section
 
-Floats = NDArray[np.float64]
 
 _ENDED = "ended_"
 
@@ -228,18 +228,18 @@ def trajectory_variables(
     return found
 
 
-def share_variables(shares: Mapping[str, NDArray[np.float64]]) -> dict[str, Variable]:
+def share_variables(shares: Mapping[str, Floats]) -> dict[str, Variable]:
     """The shares of a tally of each equilibrium."""
     return {name: Variable(_EACH, shares[name], "1", about) for name, about in ABOUT_SHARES.items()}
 
 
-def quantile_variables(quantiles: NDArray[np.float64]) -> dict[str, Variable]:
+def quantile_variables(quantiles: Floats) -> dict[str, Variable]:
     """Quantiles of the times to return to each equilibrium."""
     dims = ("equilibrium", "quantile")
     return {"quantile": QUANTILE, "time_to_return_quantile": Variable(dims, quantiles, "s", ABOUT_QUANTILES)}
 
 
-def halving_variables(errors: NDArray[np.float64], units: Mapping[str, str]) -> dict[str, Variable]:
+def halving_variables(errors: Floats, units: Mapping[str, str]) -> dict[str, Variable]:
     """How far final states of some trajectories are from those of half the step."""
     unit = one_of(units.values())
     what = "angle" if unit == "rad" else "position"
@@ -252,9 +252,7 @@ def halving_variables(errors: NDArray[np.float64], units: Mapping[str, str]) -> 
     )
 
 
-def linear_variables(
-    system: Scene | Mechanism, directions: NDArray[np.float64], limit: NDArray[np.float64]
-) -> dict[str, Variable]:
+def linear_variables(system: Scene | Mechanism, directions: Floats, limit: Floats) -> dict[str, Variable]:
     """How far the linearized motion can be trusted."""
     *_, unit = coordinate_units(system).values()
     return {

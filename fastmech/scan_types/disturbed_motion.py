@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from fastmech.arrays import Floats
 from fastmech.basins.disturbed import MOST_RADIUS
 from fastmech.capture.steps import highest_frequency
 from fastmech.disturbance.motion import (
@@ -33,8 +33,6 @@ from fastmech.step_limits.warning import step_warning
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Floats = NDArray[np.float64]
 
 
 Size = Annotated[float, Field(ge=-MOST_RADIUS, le=MOST_RADIUS)]

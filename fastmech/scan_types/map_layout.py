@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.atlas.coincidence import Coincidence
+from fastmech.arrays import Floats
 from fastmech.atlas.damping import trace_unreached
-from fastmech.atlas.fold_points import find_folds
-from fastmech.atlas.folds import trace_folds
-from fastmech.atlas.map import Slab
+from fastmech.atlas.folds import find_folds, trace_folds
+from fastmech.atlas.map import Coincidence, Slab
 from fastmech.atlas.resting_map import RestingMap
 from fastmech.equilibria.outcome import Outcome
 from fastmech.mechanism.impulse import POINTS
@@ -153,7 +152,7 @@ def about_of(unit: str) -> str:
     return {"rad": "angle", "m": "length"}[unit]
 
 
-def drawing_group(mechanism: Mechanism, q: NDArray[np.float64]) -> dict[str, Dataset]:
+def drawing_group(mechanism: Mechanism, q: Floats) -> dict[str, Dataset]:
     """What is drawn of a mechanism at its equilibria (n, coordinates), as a group of a section."""
     drawn = drawing(mechanism, q)
     if not drawn.kind.size or not len(q):
@@ -205,8 +204,6 @@ def sheet_table(
         "sheet_break": Variable(("break", "break_entry"), breaks, "1", torn),
     }
 
-
-Floats = NDArray[np.float64]
 
 #: Values of an axis that seed the vanishing-damping curves.
 SEED_VALUES = 151

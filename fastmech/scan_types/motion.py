@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from fastmech.arrays import Floats
 from fastmech.ensembles import checks
 from fastmech.ensembles.balance import energy_balance
 from fastmech.ensembles.integrate import integrate
@@ -29,7 +29,6 @@ from fastmech.step_limits.warning import step_warning
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Floats = NDArray[np.float64]
 
 #: Numbers of a section for every output.
 OUTPUT_NUMBERS = 30
@@ -106,7 +105,7 @@ class Motion(Scan):
         return [self.start.get(name, 0.0) for name in scene.state]
 
     @property
-    def _times(self) -> NDArray[np.float64]:
+    def _times(self) -> Floats:
         return np.linspace(0.0, self.t_end, self.outputs)
 
     def _lagrangian(self, scene: Scene | Mechanism) -> Dataset:
@@ -217,6 +216,6 @@ def _of_mechanism(mechanism: Mechanism, t: Floats, y: Floats) -> dict[str, Varia
     return variables
 
 
-def _states(y: NDArray[np.float64]) -> dict[str, Variable]:
+def _states(y: Floats) -> dict[str, Variable]:
     """States of one motion (time, 1, states) as a tile keeps them."""
     return {"y": Variable(("time", "component"), y[:, 0])}

@@ -13,12 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.jit import inlined
 from fastmech.stability.linearize import SmallMotion, polynomial, small_motion
 from fastmech.stability.modes import slowest_decay, squares
 from fastmech.stability.quartic import ROUNDING, Quadruple, motion_roots
-
-Floats = NDArray[np.float64]
 
 
 class Verdict(IntEnum):

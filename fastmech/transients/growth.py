@@ -12,14 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
 from fastmech.scene import Scene
 from fastmech.stability.linearize import Rest, jacobian, linearized
-
-Floats = NDArray[np.float64]
 
 #: Times looked at between 0 and the end.
 TIMES = 400

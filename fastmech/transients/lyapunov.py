@@ -4,27 +4,114 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numba import types
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.arrays import Floats
 from fastmech.callee import callee
 from fastmech.ensembles import checks
-from fastmech.ensembles.energy_bounds import breaks_energy_bounds
+from fastmech.ensembles.fitting import breaks_energy_bounds
 from fastmech.ensembles.integrate import problem_of
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.problem import extreme_scenes
 from fastmech.ensembles.status import Status, failure_counts, failure_line
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError
+from fastmech.integrators.batch import BlockRHS
+from fastmech.integrators.implicit import difference_jacobian
 from fastmech.integrators.methods import find_method
 from fastmech.integrators.tableaus import TABLEAUS
+from fastmech.jit import JACOBIAN, MATRIX, RHS, VECTOR, kernel, named_tuple
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
 from fastmech.step_limits.warning import too_long, warn_of_step
-from fastmech.transients.tangent import Disturbed, Flow, Stages, advance_tangents
 
-Floats = NDArray[np.float64]
+
+class Flow(NamedTuple):
+    """Derivatives of the states and of their disturbances."""
+
+    rhs: BlockRHS
+    jacobian: BlockRHS
+    analytic: bool  #: else the Jacobian is taken from differences of ``rhs``
+
+
+class Stages(NamedTuple):
+    """An explicit Runge-Kutta method."""
+
+    a: Floats
+    b: Floats
+    c: Floats
+
+
+class Disturbed(NamedTuple):
+    """Trajectories and a disturbance of each, advanced in place."""
+
+    Y: Floats  #: states (dim, lanes)
+    D: Floats  #: disturbances (dim, lanes)
+    params: Floats  #: (count, lanes)
+    growth: Floats  #: (lanes,) is added the logarithm of what a disturbance has grown by
+
+
+FLOW = named_tuple([RHS, JACOBIAN, types.boolean], Flow)
+STAGES = named_tuple([MATRIX, VECTOR, VECTOR], Stages)
+DISTURBED = named_tuple([MATRIX, MATRIX, MATRIX, VECTOR], Disturbed)
+
+
+@kernel(types.void(FLOW, STAGES, DISTURBED, types.float64, types.float64, types.int64))
+def advance_tangents(
+    flow: Flow, method: Stages, lanes: Disturbed, begin: float, h: float, steps: int
+) -> None:
+    """Take states and disturbances so many steps of ``h`` on from time ``begin`` [s].
+
+    D' = J(y) D along the motion, by the same stages as y. After every step each disturbance is scaled to
+    length 1.
+    """
+    Y, D, stages = lanes.Y, lanes.D, method.b.shape[0]
+    dim, count = Y.shape
+    K, L = np.empty((stages, dim, count)), np.empty((stages, dim, count))
+    Z, W = np.empty((dim, count)), np.empty((dim, count))
+    J = np.empty((dim * dim, count))
+    for step in range(steps):
+        for s in range(stages):
+            t = begin + step * h + method.c[s] * h
+            for x in range(dim):
+                for i in range(count):
+                    Z[x, i], W[x, i] = Y[x, i], D[x, i]
+            for m in range(s):
+                weight = h * method.a[s, m]
+                for x in range(dim):
+                    for i in range(count):
+                        Z[x, i] += weight * K[m, x, i]
+                        W[x, i] += weight * L[m, x, i]
+            flow.rhs(t, Z, K[s], lanes.params)
+            if flow.analytic:
+                flow.jacobian(t, Z, J, lanes.params)
+            else:
+                difference_jacobian(flow.rhs, t, Z, J, lanes.params)
+            for x in range(dim):
+                for i in range(count):
+                    total = 0.0
+                    for y in range(dim):
+                        total += J[x * dim + y, i] * W[y, i]
+                    L[s, x, i] = total
+        for s in range(stages):
+            weight = h * method.b[s]
+            for x in range(dim):
+                for i in range(count):
+                    Y[x, i] += weight * K[s, x, i]
+                    D[x, i] += weight * L[s, x, i]
+        for i in range(count):
+            square = 0.0
+            for x in range(dim):
+                square += D[x, i] * D[x, i]
+            length = np.sqrt(square)
+            lanes.growth[i] += np.log(length)
+            for x in range(dim):
+                D[x, i] /= length
+
 
 #: Method of motion and tangents.
 METHOD = "dop853"

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from fastmech.atlas.damping import trace_unreached
-from fastmech.atlas.fold_points import find_folds
-from fastmech.atlas.folds import trace_folds
+from fastmech.atlas.folds import find_folds, trace_folds
 from fastmech.atlas.map import EquilibriumMap, map_equilibria
 from fastmech.atlas.snap import find_snap
 from fastmech.equilibria.find import find_equilibria

@@ -8,8 +8,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from fastmech.atlas.coincidence import Coincidence
-from fastmech.atlas.map import map_equilibria
+from fastmech.atlas.map import Coincidence, map_equilibria
 from fastmech.equilibria.outcome import Outcome
 from fastmech.scene import Scene
 

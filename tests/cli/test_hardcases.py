@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fastmech import open_results
-from fastmech.hardcases import containment, gallery, report
+from fastmech.hardcases import containment, report
 from fastmech.hardcases.case import HardCase, Row
 from fastmech.hardcases.containment import CONTAINED, NUMBER, ONE_IN
 from fastmech.integrators.methods import METHODS
@@ -21,7 +21,6 @@ def one_case(monkeypatch: pytest.MonkeyPatch):
     def gallery_of(error: float) -> None:
         row = Row("rk4", 0.1, 3, error, 1e-8, np.nan, "ok", True)
         cases = {"easy": HardCase("easy", "nothing", "a closed form", "pass", lambda quick: [row])}
-        monkeypatch.setattr(gallery, "CASES", cases)
         monkeypatch.setattr(report, "CASES", cases)
         monkeypatch.setattr(report, "METHODS", {name: METHODS[name] for name in ("rk4", "dop853", "gauss6")})
 

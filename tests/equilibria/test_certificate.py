@@ -15,8 +15,7 @@ from fastmech.equilibria.balance import EPS, expected_count, normal_form, pulls
 from fastmech.equilibria.certificate import certify, existence_radius
 from fastmech.equilibria.find import find_equilibria
 from fastmech.equilibria.outcome import Outcome
-from fastmech.equilibria.solution import solve_rows
-from fastmech.equilibria.solve import Solution
+from fastmech.equilibria.solve import Solution, solve_rows
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 

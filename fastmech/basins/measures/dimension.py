@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from fastmech.basins.measures.labels import Floats, Integers, LabelsLike, check_map, too_thin
+from fastmech.arrays import Floats, Integers
+from fastmech.basins.measures.labels import LabelsLike, check_map, too_thin
 from fastmech.basins.measures.slopes import PARTS, half_width, is_smooth, line, part_of
 from fastmech.errors import InputError
 

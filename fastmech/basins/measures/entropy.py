@@ -24,8 +24,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import entr
 
+from fastmech.arrays import Floats, Integers
 from fastmech.basins.measures.dimension import BoundaryDimension, boundary_dimension
-from fastmech.basins.measures.labels import Floats, Integers, LabelsLike, check_map, check_point, known_labels
+from fastmech.basins.measures.labels import LabelsLike, check_map, check_point, known_labels
 from fastmech.basins.measures.slopes import PARTS, half_width, part_of
 from fastmech.ensembles import checks
 from fastmech.errors import InputError

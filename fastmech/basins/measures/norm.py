@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastmech.basins.measures.labels import Floats
+from fastmech.arrays import Floats
 from fastmech.disturbance.size import size_of
 from fastmech.ensembles import checks
 from fastmech.equilibria.find import Equilibrium
@@ -21,7 +21,7 @@ from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import require_own
 from fastmech.scene import STATE, Scene, nearest
-from fastmech.stability.arguments import require_rest
+from fastmech.stability.linearize import require_rest
 
 #: Angles lie within so many turns of zero: what is beyond was meant in degrees.
 FEW_TURNS = 4

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm, t
 
-from fastmech.basins.measures.labels import Floats, Integers
+from fastmech.arrays import Floats, Integers
 
 #: Half width above which an error bar round 1 does not tell a smooth boundary from a fractal one.
 TELLING = 0.15
@@ -46,9 +46,7 @@ def is_smooth(exponent: float, error: float) -> bool | None:
     return True if error <= TELLING else None
 
 
-def fit_counts(
-    scales: Floats, hits: NDArray[np.int64], trials: NDArray[np.int64], fitted: NDArray[np.bool_]
-) -> PowerLaw:
+def fit_counts(scales: Floats, hits: Integers, trials: Integers, fitted: NDArray[np.bool_]) -> PowerLaw:
     """Fit shares ``hits / trials`` of independent trials at rising ``scales``, all of shape (scales,).
 
     Scales that are not ``fitted`` have local slopes and take no part in the exponent.
@@ -119,7 +117,7 @@ def line(x: Floats, y: Floats, weight: Floats) -> tuple[Floats, float]:
 PARTS = 5
 
 
-def part_of(indices: Sequence[NDArray[np.int64]], shape: tuple[int, ...]) -> Integers:
+def part_of(indices: Sequence[Integers], shape: tuple[int, ...]) -> Integers:
     """Number of the part, below PARTS^axes, that points with these indices along every axis are in."""
     part = np.zeros(1, dtype=np.int64)
     for index, length in zip(indices, shape, strict=True):

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.basins.measures.labels import Floats, Integers, LabelOf, ask, check_point
+from fastmech.arrays import Floats, Integers
+from fastmech.basins.measures.labels import LabelOf, ask, check_point
 from fastmech.basins.measures.slopes import PowerLaw, fit_counts, is_smooth
 from fastmech.ensembles import checks
 from fastmech.errors import InputError

@@ -7,9 +7,10 @@ from functools import partial
 
 import numpy as np
 
+from fastmech.arrays import Floats
 from fastmech.ensembles.balance import lowest_potential
 from fastmech.ensembles.integrate import Trajectories, integrate
-from fastmech.hardcases.case import DRIVEN, Floats, HardCase, Row, energy, row_of
+from fastmech.hardcases.case import DRIVEN, HardCase, Row, energy, row_of
 from fastmech.hardcases.walk import admitted_step, halving_tells, walked
 from fastmech.scene import Scene
 
