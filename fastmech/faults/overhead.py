@@ -16,9 +16,10 @@ from fastmech.runner import run_request
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import RunContext, read_request
 from fastmech.store.provenance import provenance
+from fastmech.store.write import write_results
 from fastmech.tiles.cluster import cluster
 from fastmech.tiles.identity import asked_for, identity_of
-from fastmech.tiles.section import TiledSection, assembled, sections_of, write_assembled
+from fastmech.tiles.section import TiledSection, assembled, sections_of
 
 #: Threads, and workers of the cluster.
 WORKERS = 2
@@ -86,10 +87,10 @@ def _in_memory(path: Path, out: Path) -> None:
         with ThreadPoolExecutor(WORKERS) as pool:
             tiles = list(pool.map(compute, range(section.tiling.count)))
         sections[section.name] = assembled(section, tiles.__getitem__, 0.0)
-    write_assembled(
+    write_results(
         out,
-        sections,
-        parameters=request.parameters,
+        scene_parameters=request.parameters,
+        sections=sections,
         attrs=lambda: {**provenance(WORKERS), "title": request.title},
         replace=True,
         threads=WORKERS,

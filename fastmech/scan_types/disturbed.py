@@ -75,7 +75,7 @@ from fastmech.scan_types.request import (
 )
 from fastmech.scene import Scene, nearest
 from fastmech.step_limits.warning import step_warning
-from fastmech.store.stream import Piece, Stream
+from fastmech.store.write import Piece, Stream
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -56,7 +56,7 @@ from fastmech.scan_types.map_layout import (
 )
 from fastmech.scan_types.request import RunContext, Scan, Tiles, Tiling
 from fastmech.scene import Scene, nearest
-from fastmech.store.stream import Piece, Stream
+from fastmech.store.write import Piece, Stream
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

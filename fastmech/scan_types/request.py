@@ -19,7 +19,7 @@ from fastmech.integrators.methods import find_method
 from fastmech.models.mechanism import MOST_COORDINATES, Mechanism
 from fastmech.results import Dataset, Variable, check_name, scene_parameters
 from fastmech.scene import Scene, explain, nearest, parse_toml, read_text
-from fastmech.store.stream import Stream, in_memory
+from fastmech.store.write import Stream, in_memory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -34,7 +34,7 @@ def put_dataset(group: h5py.Group, dataset: Dataset, numbers: Iterator[int]) -> 
     variables = {name: _characters(variable) for name, variable in dataset.variables.items()}
     sizes = {dim: size for variable in variables.values() for dim, size in variable.sizes.items()}
     dim_numbers = {dim: np.int32(next(numbers)) for dim in sizes}
-    scales = {dim: _put_scale(group, dim, size, variables) for dim, size in sizes.items()}
+    scales = {dim: put_scale(group, dim, size, variables) for dim, size in sizes.items()}
     for dim, scale in scales.items():
         scale.attrs[DIM_NUMBER] = dim_numbers[dim]
     for name, variable in variables.items():
@@ -98,9 +98,10 @@ def _characters(variable: Variable) -> Variable | _Characters:
     return _Characters(dims, data, variable.units, variable.long_name, variable.attrs)
 
 
-def _put_scale(
+def put_scale(
     group: h5py.Group, dim: str, size: int, variables: Mapping[str, Variable | _Characters]
 ) -> h5py.Dataset:
+    """Make a dimension, of the variable of its name if there is one."""
     if dim in variables:
         scale = _put_variable(group, dim, variables[dim])
         scale.make_scale(dim)

@@ -13,9 +13,10 @@ from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import Request, Tiles, request_of_text
 from fastmech.store.provenance import provenance
 from fastmech.store.read import open_results
+from fastmech.store.write import write_results
 from fastmech.tiles.identity import asked_for, identity_of
 from fastmech.tiles.parts import Manifest, Parts
-from fastmech.tiles.section import TiledSection, assembled, sections_of, write_assembled
+from fastmech.tiles.section import TiledSection, assembled, sections_of
 from fastmech.tiles.tile_file import DamagedTileError
 
 
@@ -146,11 +147,11 @@ class ScanLook:
             "request": self.manifest.request,
             "partial": "a scan in progress",
         }
-        write_assembled(
+        write_results(
             out,
-            shown,
-            parameters=self.request.parameters,
-            attrs=lambda: {**provenance(1), **notes},
+            scene_parameters=self.request.parameters,
+            sections=shown,
+            attrs={**provenance(1), **notes},
             replace=replace,
             deflate=False,  # which takes minutes where the rest takes seconds
         )

@@ -19,10 +19,11 @@ from fastmech.interrupts import signal_of
 from fastmech.results import Dataset
 from fastmech.scan_types.request import Request, RunContext, Tiles
 from fastmech.store.provenance import provenance
+from fastmech.store.write import write_results
 from fastmech.tiles.ends import CrashedTilesError, Stopped
 from fastmech.tiles.identity import asked_for, asked_of_result, differences, identity_of
 from fastmech.tiles.parts import DamagedManifestError, Manifest, Parts
-from fastmech.tiles.section import TiledSection, assembled, sections_of, write_assembled
+from fastmech.tiles.section import TiledSection, assembled, sections_of
 from fastmech.tiles.tile_file import DamagedTileError, Tile
 from fastmech.tiles.work import Crash, Hiring, Task, compute_tiles, still_computing
 
@@ -307,10 +308,10 @@ class ScanRun:
             for section in self.sections:
                 seconds = sum(s for task, s in self.seconds.items() if task.section == section)
                 parts[section.name] = assembled(section, tiles(section), seconds)
-            write_assembled(
+            write_results(
                 self.parts.target,
-                parts,
-                parameters=self.request.parameters,
+                scene_parameters=self.request.parameters,
+                sections=parts,
                 attrs=self._attrs,
                 replace=self.replace,
                 aside=self.parts.folder,

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from pathlib import Path
-from typing import Any
 
 from fastmech.errors import InputError
-from fastmech.results import Dataset, Variable
+from fastmech.results import Dataset
 from fastmech.scan_types.request import Request, RunContext, Scan, Tiles, Tiling
 from fastmech.scene import Scene
 from fastmech.store.schema import CHANGE
-from fastmech.store.stream import Stream, in_memory, write_stream
-from fastmech.store.write import write_results
+from fastmech.store.write import Stream, in_memory
 from fastmech.tiles.tile_file import Tile, make_tile
 
 
@@ -105,37 +102,3 @@ def assembled(
         attrs = {**own, **result.fixed.attrs, "wall_time_s": seconds}
         return replace(result, fixed=replace(result.fixed, attrs=attrs))
     return replace(result, attrs={**own, **result.attrs, "wall_time_s": seconds})
-
-
-def write_assembled(
-    target: Path,
-    sections: Mapping[str, Dataset | Stream],
-    *,
-    parameters: Mapping[str, Variable],
-    attrs: Callable[[], Mapping[str, Any]],
-    replace: bool,
-    aside: Path | None = None,
-    threads: int = 1,
-    deflate: bool = True,
-) -> None:
-    """Write a result file of sections, of which large ones are streams.
-
-    Raises:
-        InputError: it cannot be written.
-    """
-    whole = {name: section for name, section in sections.items() if isinstance(section, Dataset)}
-    if len(whole) < len(sections):
-        write_stream(
-            target,
-            scene_parameters=parameters,
-            sections=sections,
-            attrs=attrs,
-            replace=replace,
-            aside=aside,
-            threads=threads,
-            deflate=deflate,
-        )
-    else:
-        write_results(
-            target, scene_parameters=parameters, sections=whole, attrs=attrs(), replace=replace, aside=aside
-        )

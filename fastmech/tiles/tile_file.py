@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from fastmech.errors import InputError
 from fastmech.results import Dataset
 from fastmech.store.image import ALIGNMENT, dataset_image, dataset_of_image
+from fastmech.store.write import flush_folder
 
 #: Ending of what is not whole yet.
 UNFINISHED = ".tmp"
@@ -48,16 +49,6 @@ def write_durably(path: Path, chunks: Iterable[bytes | memoryview]) -> None:
             aside.unlink(missing_ok=True)
         raise
     flush_folder(path.parent)
-
-
-def flush_folder(folder: Path) -> None:
-    """Make new names in a folder durable, where the system can."""
-    with contextlib.suppress(OSError):
-        descriptor = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
 
 
 FORMAT = "fastmech tile 1"

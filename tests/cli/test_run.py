@@ -288,7 +288,7 @@ def test_the_command_of_a_crash_report_makes_that_tile(invoke, monkeypatch):
     alone = invoke(*command[1:])
     assert alone.exit_code == 0
     with monkeypatch.context() as patched:
-        patched.setattr("fastmech.tiles.run.write_assembled", interrupt)
+        patched.setattr("fastmech.tiles.run.write_results", interrupt)
         assert invoke("run", request, "--out", "deep/x.h5").exit_code == 130
     again = invoke(*command[1:-2])
     assert "The tile kept beside the result is the same." in again.stdout

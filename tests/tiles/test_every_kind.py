@@ -15,7 +15,7 @@ from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import RunContext, read_request
 from fastmech.store.image import dataset_image, dataset_of_image
 from fastmech.store.read import open_results
-from fastmech.store.stream import Stream, in_memory
+from fastmech.store.write import Stream, in_memory
 from fastmech.tiles.alone import compute_alone
 from fastmech.tiles.ends import Stopped
 from fastmech.tiles.look import ScanLook

@@ -206,7 +206,7 @@ def test_an_interrupt_when_the_file_is_complete_says_so(
     assert run().was_complete
     assert not (tmp_path / "scan.h5.parts").exists()
     with monkeypatch.context() as patched:
-        patched.setattr("fastmech.tiles.run.write_assembled", interrupt)
+        patched.setattr("fastmech.tiles.run.write_results", interrupt)
         with pytest.raises(Stopped, match=rf"^interrupted; {TILES} of {TILES} tiles are kept"):
             run(fresh=True)
     assert content(tmp_path / "scan.h5") == whole
