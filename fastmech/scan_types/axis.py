@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from fastmech.arrays import Floats
 from fastmech.basins.ladder import SUBSTEPS
 from fastmech.basins.measures.norm import check_angles
 from fastmech.basins.runs import rounds_until
@@ -19,7 +19,7 @@ from fastmech.ensembles.spans import MOST_STEPS
 from fastmech.errors import InputError, shown
 from fastmech.mechanism.coefficients import reduce
 from fastmech.models.mechanism import Mechanism
-from fastmech.results import ANGLE_UNITS
+from fastmech.results import ANGLE_UNITS, Variable
 from fastmech.scene import STATE, Number, Scene, nearest
 
 #: Values of the longest axis.
@@ -67,7 +67,7 @@ class Axis(BaseModel):
         return self
 
     @property
-    def array(self) -> NDArray[np.float64]:
+    def array(self) -> Floats:
         """The values."""
         if self.values is not None:
             return np.array(self.values, dtype=np.float64)
@@ -86,9 +86,15 @@ class Axis(BaseModel):
         return self.num or len(self.values or ())
 
 
-def arrays(axes: Mapping[str, Axis]) -> dict[str, NDArray[np.float64]]:
+def arrays(axes: Mapping[str, Axis]) -> dict[str, Floats]:
     """The values of axes by their names."""
     return {name: axis.array for name, axis in axes.items()}
+
+
+def axis_variables(system: Scene | Mechanism, axes: Mapping[str, Floats]) -> dict[str, Variable]:
+    """Axes over parameters as the coordinates of a section."""
+    described = system.described()
+    return {name: Variable((name,), values, *described[name][1:]) for name, values in axes.items()}
 
 
 def coordinate_units(system: Scene | Mechanism) -> dict[str, str]:
@@ -188,7 +194,7 @@ def check_parameters(scene: Scene | Mechanism, axes: Mapping[str, Axis], where: 
                 raise InputError(f"{where}.{name}: {error}") from None
 
 
-def check_starts(scene: Scene, starts: Mapping[str, NDArray[np.float64]]) -> None:
+def check_starts(scene: Scene, starts: Mapping[str, Floats]) -> None:
     """Refuse angles that must be degrees, and rates that no step of a basin map can follow.
 
     Args:

@@ -53,6 +53,7 @@ from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers, parts
 from fastmech.scan_types.axis import (
     Axis,
     arrays,
+    axis_variables,
     check_duration,
     check_parameters,
     check_size,
@@ -538,8 +539,7 @@ class DisturbedMap(Tiling):
             array[place] = values
             return Variable((*names, "sheet", *dims), array, unit, about)
 
-        described = self.scene.described()
-        variables = {name: Variable((name,), line, *described[name][1:]) for name, line in self.axes.items()}
+        variables = axis_variables(self.scene, self.axes)
         about = "equilibrium, continued, as the atlas of these axes numbers them"
         variables |= numbers("sheet", grid[-1], about)
         about = "negative eigenvalues of the Hessian all over a sheet, 0: stable"

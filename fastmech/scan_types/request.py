@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -10,9 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
+from fastmech.arrays import Floats
 from fastmech.ensembles.status import failure_counts, failure_line
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.integrators.methods import find_method
@@ -104,6 +106,47 @@ class Each(Tiling):
     def assemble(self, tile: Tiles) -> Dataset:
         """Join the pieces."""
         return self._join([tile(index) for index in range(self.count)])
+
+
+class Planes(Tiling):
+    """Tiles that hold some planes of the first axis of a grid.
+
+    Args:
+        axes: the grid's values by name.
+        points: of a tile, about.
+        spread: whether the planes of a tile lie all over the axis: tiles then take about as long as others,
+            so that progress tells the time left. Else they are neighbours.
+    """
+
+    def __init__(self, axes: dict[str, Floats], points: int, spread: bool = False) -> None:
+        self.axes = axes
+        self.first, *others = axes
+        self.others = tuple(len(axes[other]) for other in others)
+        length, planes = len(axes[self.first]), max(1, points // math.prod(self.others))
+        self.count = -(-length // planes)
+        self.parts = [slice(k, length, self.count) for k in range(self.count)]
+        if not spread:
+            self.parts = [slice(k, min(k + planes, length)) for k in range(0, length, planes)]
+
+    def grid(self, index: int) -> tuple[int, ...]:
+        """Shape of a tile's part of the grid."""
+        return (len(range(len(self.axes[self.first]))[self.parts[index]]), *self.others)
+
+    def axes_of(self, index: int) -> dict[str, Floats]:
+        """The axes of that part."""
+        return {**self.axes, self.first: self.axes[self.first][self.parts[index]]}
+
+    def items(self, index: int) -> int:
+        """Points."""
+        return math.prod(self.grid(index))
+
+    def joined(self, tiles: list[Dataset], name: str) -> NDArray[Any]:
+        """An array of all tiles, every plane in its place."""
+        first = tiles[0][name].data
+        array = np.empty((len(self.axes[self.first]), *first.shape[1:]), first.dtype)
+        for part, tile in zip(self.parts, tiles, strict=True):
+            array[part] = tile[name].data
+        return array
 
 
 def _known_method(name: str) -> str:
