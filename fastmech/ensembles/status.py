@@ -25,6 +25,8 @@ class Status(IntEnum):
     RETURNED = 8
     ELSEWHERE = 9
     OUT_OF_RANGE = 10
+    ESCAPED = 11
+    UNSURE = 12
 
     @property
     def advice(self) -> str:
@@ -46,11 +48,21 @@ _ADVICE = {
     Status.RETURNED: "proved to end at its equilibrium without a full turn",
     Status.ELSEWHERE: "proved to end at another stable equilibrium, or at its own some turns further",
     Status.OUT_OF_RANGE: "leaves the range of a coordinate, beyond which the mechanism is not described",
+    Status.ESCAPED: "goes far beyond all attractors that were found, or stops where its system says so",
+    Status.UNSURE: "ends at another attractor with other steps or cells; its start is near a boundary",
 }
 
 #: Statuses of motions that have failed; of labels; and of where disturbances end.
 FAILURES = (Status.NOT_FINITE, Status.STEP_TOO_LARGE, Status.NOT_CONVERGED, Status.START_NOT_FINITE)
-LABELS = (Status.CAPTURED, Status.UNDECIDED, Status.AT_SADDLE, Status.OUT_OF_RANGE, *FAILURES)
+LABELS = (
+    Status.CAPTURED,
+    Status.UNDECIDED,
+    Status.AT_SADDLE,
+    Status.OUT_OF_RANGE,
+    Status.ESCAPED,
+    Status.UNSURE,
+    *FAILURES,
+)
 ENDS = (Status.RETURNED, Status.ELSEWHERE, Status.AT_SADDLE, Status.UNDECIDED, Status.OUT_OF_RANGE, *FAILURES)
 
 

@@ -80,6 +80,9 @@ class System:
         stop: ``stop(t, *state)`` (or ``stop(t, y)``) gives 0 while the trajectory runs on, any other whole
             number as the code of why it stops (True is 1); it is looked at after every step. A trajectory
             that has stopped costs nothing any more.
+        period: after which the right-hand side repeats, where it depends on the time: a number [s], or a
+            function of parameters by their names, ``lambda omega: 2 * math.pi / omega``.
+        angles: names of states of which only the value modulo a turn of 2 pi counts.
 
     Raises:
         InputError: names do not match the functions' arguments, or values are no finite numbers. A function
@@ -90,6 +93,8 @@ class System:
     state: Sequence[str]
     parameters: Mapping[str, float]
     stop: Callable[..., float] | None = None
+    period: float | Callable[..., float] | None = None
+    angles: Sequence[str] = ()
     vector: bool = field(default=False, init=False)  #: whether functions take arrays
 
     def __post_init__(self) -> None:
@@ -109,6 +114,26 @@ class System:
             raise InputError("rhs: returns something, must write the rates into its last argument")
         if self.stop is not None:
             _check_function("stop", self.stop, ["y"] if vector else state, [])
+        angles = _names("angles", self.angles, least=0)
+        for name in set(angles) - set(state):
+            raise InputError(f"angles: {name!r} is no state; must be some of {shown(state)}")
+        object.__setattr__(self, "angles", tuple(angles))
+        self.period_at({})
+
+    def period_at(self, values: Mapping[str, float]) -> float | None:
+        """Period of the right-hand side [s], None: it has none; with other ``values`` of some parameters.
+
+        Raises:
+            InputError: it is not positive, or asks for something that is no parameter.
+        """
+        period: Any = self.period
+        if callable(period):
+            names = list(inspect.signature(period).parameters)
+            for name in set(names) - set(self.parameters):
+                raise InputError(f"period: asks for {name!r}, which is no parameter of the system")
+            known = {**self.parameters, **values}
+            period = period(**{name: known[name] for name in names})
+        return None if period is None else checks.number("period", period, "s", above=0.0)
 
     @property
     def observation(self) -> Observation:

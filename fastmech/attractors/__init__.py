@@ -1,0 +1,1 @@
+"""Attractors of any system: found without knowing them, and who ends at which."""

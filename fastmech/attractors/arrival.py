@@ -1,0 +1,210 @@
+"""Where motions have arrived: balls about orbits in which the map contracts, and cells that chaos fills.
+
+A ball is V(e) = e' P e < r^2 about a place of an orbit, e the distance from it, with P = J' P J + Q, J the
+Jacobian of the map over the orbit's period (Stein's equation: V falls by e' Q e in the linear map). How large
+the ball may be is measured: V must fall for points on shells in many directions, and on all smaller ones.
+About a cycle e is the part that is no shift along it, w e = 0 with J' w = w.
+
+Cells are those of a grid that motions have visited which keep visiting the same ones (Datseris and
+Wagemakers, Chaos 32 (2022) 023104); a motion has arrived that has been in them so many times together.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+from scipy.linalg import eig, solve_discrete_lyapunov
+
+from fastmech.attractors.flow import FINER, Floats, Flow
+from fastmech.attractors.orbits import ATTRACTS, Orbit
+from fastmech.jit import CUBE, INTEGERS, MATRIX, VECTOR, inlined, kernel
+
+Integers = NDArray[np.int64]
+
+#: Shells of half the radius each, directions on each, and places of a cycle that are tried.
+SHELLS, DIRECTIONS, TRIED = 15, 96, 16
+
+#: Newton steps to the nearest phase of a cycle.
+PROJECTIONS = 4
+
+#: Squares of a form's axes that are rounding beside the largest.
+ROUNDING = 1e-14
+
+#: Share of the greatest radius found that is taken: between shells, and between directions, nothing is tried.
+SAFE = 0.5
+
+
+
+
+class Balls(NamedTuple):
+    """Balls about places; a state is in one where V there is below 1."""
+
+    places: Floats  #: (m, dim)
+    forms: Floats  #: (m, dim + 1, dim): V is the sum of squares of the first rows times e; the last row gives
+    # how far along a cycle e goes, in distances to the next place
+    slopes: Floats  #: (m, dim): rates of change from place to place along a cycle, else zero
+    radius: float  #: the least distance to a ball's border, over the scale
+
+
+@inlined
+def hermite(a: float, begin: float, end: float, slope: float, at_end: float) -> float:
+    """The cubic between two values with these slopes, at a from 0 to 1."""
+    b = 1.0 - a
+    return b * b * ((1.0 + 2.0 * a) * begin + a * slope) + a * a * ((1.0 + 2.0 * b) * end - b * at_end)
+
+
+@kernel(types.void(MATRIX, MATRIX, CUBE, MATRIX, VECTOR, INTEGERS, VECTOR))
+def levels(
+    states: Floats,
+    places: Floats,
+    forms: Floats,
+    slopes: Floats,
+    turning: Floats,
+    found: Integers,
+    level: Floats,
+) -> None:
+    """The place about which V is least for each state (n, dim), into ``found`` (n,), and V into ``level``.
+
+    Beside a cycle's place, e is the distance from the cubic through its neighbours at the same phase.
+    """
+    dim, m = states.shape[1], places.shape[0]
+    e = np.empty(dim)
+    for i in range(states.shape[0]):
+        found[i], level[i] = -1, np.inf
+        for j in range(m):
+            along = 0.0
+            for d in range(dim):
+                e[d] = states[i, d] - places[j, d]
+                if turning[d]:
+                    e[d] -= 2.0 * np.pi * np.rint(e[d] / (2.0 * np.pi))
+                along += forms[j, dim, d] * e[d]
+            if not abs(along) <= 0.75:
+                continue
+            if along != 0.0:
+                sign = 1.0 if along > 0.0 else -1.0
+                k = (j + 1) % m if along > 0.0 else (j + m - 1) % m
+                a, correction = 0.0, abs(along)
+                for _ in range(PROJECTIONS):
+                    a += correction
+                    correction = 0.0
+                    for d in range(dim):
+                        gone, away = places[k, d] - places[j, d], states[i, d] - places[j, d]
+                        if turning[d]:
+                            gone -= 2.0 * np.pi * np.rint(gone / (2.0 * np.pi))
+                            away -= 2.0 * np.pi * np.rint(away / (2.0 * np.pi))
+                        e[d] = away - hermite(a, 0.0, gone, sign * slopes[j, d], sign * slopes[k, d])
+                        correction += sign * forms[j, dim, d] * e[d]
+            size = 0.0
+            for row in range(dim):
+                part = 0.0
+                for d in range(dim):
+                    part += forms[j, row, d] * e[d]
+                size += part * part
+            if size < level[i]:
+                found[i], level[i] = j, size
+
+
+def levels_of(flow: Flow, of: Balls, states: Floats) -> tuple[Integers, Floats]:
+    """The place about which V is least for each state (n, dim), -1: none; and V (n,)."""
+    found, level = np.empty(len(states), dtype=np.int64), np.empty(len(states))
+    turning = flow.angles.astype(np.float64)
+    levels(np.ascontiguousarray(states), of.places, of.forms, of.slopes, turning, found, level)
+    return found, level
+
+
+def balls(flow: Flow, orbit: Orbit) -> Balls:
+    """The balls of an orbit that attracts."""
+    places, (m, dim) = np.ascontiguousarray(orbit.points), orbit.points.shape
+    period = orbit.periods or 1.0
+    tried = np.unique(np.linspace(0, m - 1, TRIED).astype(int)) if orbit.cycle else np.arange(m)
+    forms, slopes, rng = np.zeros((m, dim + 1, dim)), np.zeros((m, dim)), np.random.default_rng(0)
+    if orbit.cycle:
+        slopes = np.ascontiguousarray(flow.rates(places) * (flow.period * period / m))
+    for j in range(m):
+        keep = np.eye(dim)
+        if orbit.cycle:
+            values, left = eig(orbit.jacobians[j].T)
+            w = left[:, np.argmin(np.abs(values - 1.0))].real
+            keep -= np.outer(slopes[j], w) / (w @ slopes[j])
+            along = slopes[j] / flow.scale**2
+            forms[j, dim] = along / (along @ slopes[j])
+        J = keep @ orbit.jacobians[j] @ keep
+        J *= min(1.0, ATTRACTS / max(float(np.abs(np.linalg.eigvals(J)).max()), 1e-300))
+        P = solve_discrete_lyapunov(J.T, np.diag(flow.scale**-2.0))
+        squares, axes = np.linalg.eigh(0.5 * (P + P.T))
+        forms[j, :dim] = np.sqrt(np.maximum(squares, ROUNDING * squares[-1]))[:, None] * axes.T @ keep
+    own = Balls(places, forms, slopes, 0.0)
+    # Shells of the same V about all places.
+    size = min(float(np.linalg.norm(forms[j, :dim] * flow.scale, 2)) for j in tried)
+    sizes = size * 0.5 ** np.arange(SHELLS)
+    u = rng.standard_normal((DIRECTIONS * min(dim, 8), dim))
+    lanes = []
+    for j in tried:
+        e = u @ np.linalg.pinv(forms[j, :dim]).T
+        e /= np.linalg.norm(e @ forms[j, :dim].T, axis=1)[:, None]
+        lanes.append(places[j] + sizes[:, None, None] * e)
+    starts = np.stack(lanes).reshape(-1, dim)
+    before, after = (levels_of(flow, own, y)[1] for y in (starts, flow.after(starts, period, FINER)))
+    falls = (after < before).reshape(len(tried), SHELLS, -1).all(axis=(0, 2))
+    good = SHELLS - int(np.argmin(np.append(falls[::-1], False)))
+    radius = SAFE * sizes[good] if good < SHELLS else sizes[-1]
+    forms[:, :dim] /= radius
+    widest = max(float(np.linalg.norm(forms[j, :dim] * flow.scale, 2)) for j in tried)
+    return own._replace(radius=1.0 / widest)
+
+
+def keys_of(flow: Flow, size: Floats, states: Floats) -> Integers:
+    """One number for the cell of each state (..., dim)."""
+    place = states - flow.middle
+    if flow.angles.any():
+        place[..., flow.angles] %= 2.0 * np.pi
+    with np.errstate(invalid="ignore"):
+        index = np.floor(place / size)
+        index = np.where(np.abs(index) < 2.0**53, index, -(2.0**53)).astype(np.int64)
+    key = np.zeros(states.shape[:-1], dtype=np.uint64)
+    for d in range(states.shape[-1]):  # a hash of 64 bit: among a million cells no two share one
+        key = (key ^ index[..., d].view(np.uint64)) * np.uint64(0x9E3779B97F4A7C15)
+        key ^= key >> np.uint64(29)
+    return key.view(np.int64)
+
+
+class Cloud(NamedTuple):
+    """Cells that motions keep visiting, and where they were."""
+
+    points: Floats  #: (m, dim)
+    size: Floats  #: of a cell (dim,)
+    exponent: float = 0.0  #: largest Lyapunov exponent [1/s]
+    error: float = 0.0  #: its standard error, and what a linear growth of disturbances would give
+
+
+class Cells(NamedTuple):
+    """Cells of several clouds by their numbers, rising; those of two clouds are nobody's."""
+
+    size: Floats  #: (dim,)
+    keys: Integers  #: (cells,)
+    owner: Integers  #: whose (cells,)
+
+
+def cells_of(flow: Flow, clouds: list[Cloud], wider: float) -> Cells:
+    """Cells of clouds, ``wider`` by a factor than the widest of theirs."""
+    size = wider * np.max([cloud.size for cloud in clouds], axis=0)
+    each = [np.unique(keys_of(flow, size, cloud.points)) for cloud in clouds]
+    keys, first, count = np.unique(np.concatenate(each), return_index=True, return_counts=True)
+    owner = np.repeat(np.arange(len(clouds)), [k.size for k in each])[first]
+    return Cells(size, keys, np.where(count == 1, owner, -1))
+
+
+def owners(flow: Flow, cells: Cells, states: Floats) -> Integers:
+    """In whose cell each state (..., dim) is, -1: nobody's."""
+    keys = keys_of(flow, cells.size, states)
+    place = np.minimum(np.searchsorted(cells.keys, keys), cells.keys.size - 1)
+    return np.where(cells.keys[place] == keys, cells.owner[place], -1)
+
+
+def in_balls(flow: Flow, of: Balls, states: Floats) -> Integers:
+    """Which ball each state (n, dim) is in, -1: none."""
+    found, level = levels_of(flow, of, states)
+    return np.where(level < 1.0, found, -1)

@@ -1,0 +1,236 @@
+"""``fm.find_attractors``: where motions of a system settle, without knowing it beforehand, and how many do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import binomtest
+
+from fastmech.attractors.flow import Floats, Flow, flow_of
+from fastmech.attractors.search import Search
+from fastmech.attractors.settle import settle
+from fastmech.ensembles import checks
+from fastmech.ensembles.run import Progress
+from fastmech.ensembles.status import LABELS, Status, counts
+from fastmech.ensembles.system import System
+from fastmech.errors import InputError, shown
+from fastmech.models.mechanism import Mechanism
+from fastmech.samplers import Sampler, sampler_of
+
+Integers = NDArray[np.int64]
+
+#: Starts by default, those of a sample that is searched, and searches of what arrives nowhere.
+STARTS, SAMPLE, ROUNDS = 10_000, 256, 4
+
+#: Periods that motions have to arrive: so many times those of the sample's last, and at least and at most.
+LATER, FEWEST, MOST = 8, 256, 1 << 14
+
+#: Lines of attractors that are printed.
+LINES = 5
+
+
+@dataclass(frozen=True)
+class Attractor:
+    """A place of rest, a periodic motion, a torus or chaos that motions come to."""
+
+    kind: str  #: "fixed point", "periodic", "torus" or "chaos"
+    points: Floats  #: (m, dim): the place; a periodic motion's after each forcing period, or all along; a sample
+    period: float | None  #: of a periodic motion [s]
+    forcing_periods: int | None  #: the same in periods of the forcing, where there is one
+    multipliers: NDArray[np.complex128] | None  #: of the map over its period; None of a torus and of chaos
+    exponent: float  #: largest Lyapunov exponent [1/s]
+    exponent_error: float  #: its error
+    residual: float | None  #: of the map over its period, as a share of the scale
+    radius: float | None  #: of the ball about it in which the map was measured to contract, of the scale
+    found: int  #: how many starts end there
+
+    @property
+    def name(self) -> str:
+        """Kind, period and place in a few words."""
+        where = ", ".join(f"{x:.4g}" for x in self.points[0])
+        period = "" if self.period is None else f", period {self.period:.6g} s"
+        if self.forcing_periods is not None and self.period is not None:
+            period = f", period {self.forcing_periods}"
+        place = f"at ({where})" if self.kind in ("fixed point", "periodic") else f"about ({where})"
+        return f"{self.kind}{period} {place}"
+
+
+@dataclass(frozen=True, repr=False)
+class Attractors(Sequence[Attractor]):
+    """Attractors, the most frequent first, and where each start ends; printed, the shares."""
+
+    attractors: tuple[Attractor, ...]
+    label: Integers  #: index of the attractor of each start, -1: none (n,)
+    status: NDArray[np.int8]  #: :class:`fastmech.ensembles.status.Status` (n,)
+    time: Floats  #: when each had arrived [s], NaN: it had not (n,)
+    names: tuple[str, ...]  #: of the states
+    t_end: float  #: how long motions had [s]
+    looks: float  #: time between looks at them: the forcing's period, or one that suits [s]
+    dt: float  #: longest step [s]
+    scale: Floats  #: typical size of each state
+    cell: Floats | None  #: size of the cells of tori and chaos; None where there are none
+    steps: int  #: of all motions together
+    search: Search  #: what the attractors are looked for with
+
+    def __len__(self) -> int:
+        return len(self.attractors)
+
+    def __getitem__(self, index):  # type: ignore[no-untyped-def]
+        return self.attractors[index]
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many starts have each status."""
+        return counts(self.status, LABELS)
+
+    @property
+    def fractions(self) -> Floats:
+        """Share of the starts that ends at each."""
+        return np.array([one.found for one in self.attractors]) / max(self.status.size, 1)
+
+    def __repr__(self) -> str:
+        n = self.status.size
+        told = ", ".join(f"{count:,} {name}" for name, count in self.counts.items() if count)
+        lines = [f"{len(self)} attractors of {n:,} starts: {told}"]
+        for one in self.attractors[: LINES if len(self) <= LINES else LINES - 1]:
+            low, high = binomtest(one.found, n).proportion_ci(method="wilson")
+            lines.append(f"  {one.found / n:.4f} ({low:.4f} to {high:.4f}): {one.name}")
+        if len(self) > LINES:
+            rest = sum(one.found for one in self.attractors[LINES - 1 :])
+            lines.append(f"  {rest / n:.4f}: {len(self) - LINES + 1} more")
+        return "\n".join(lines)
+
+
+def find_attractors(
+    system: System | Mechanism,
+    starts: Sampler | Mapping[str, ArrayLike] | ArrayLike,
+    n: int | None = None,
+    *,
+    t_end: float | None = None,
+    seed: int = 0,
+    method: str = "dop853",
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Attractors:
+    """Find the attractors of a system and the starts that end at each.
+
+    Args:
+        system: a system of your own or a mechanism. One that depends on the time needs its ``period``; a
+            mechanism's is that of its loads. States that count modulo a turn are its ``angles``.
+        starts: ranges by name, ``{"x": (-1, 1), "x_dot": (-0.5, 1)}`` for uniform starts (what is not named is
+            zero), a sampler of ``fm.samplers``, or states (n, dim).
+        n: how many starts, 10,000 by default; of states given all.
+        t_end: how long a motion has to arrive [s]; by default eight times as long as the last motion of the
+            sample takes.
+        seed: of the sampler.
+        method: of integration, with a fixed step that a sample chooses; "radau5" where motion is stiff.
+        threads: threads to use, all processors by default. The result does not depend on it.
+        progress: is told how many starts are done since its last call.
+
+    Returns:
+        attractors and labels. A start is captured when two runs with different steps stay together until both
+        have come into a region about the same attractor in which the map over its period was measured to
+        contract, or have visited the cells of a torus or of chaos 24 times in a row. It is ``unsure`` where
+        they come apart with the finest steps too, ``escaped`` where it goes a thousand times as far as motions
+        do or where the system's stopping condition ends it, ``undecided`` where it has not arrived by
+        ``t_end``.
+
+    Raises:
+        InputError: an argument is wrong, or the system depends on the time and has no period.
+    """
+    if not isinstance(system, System | Mechanism):
+        raise InputError(f"system = {shown(system)}: must be a System or a Mechanism")
+    y = starts_of(starts, system.state, n, seed)
+    checks.progress_function(progress, "starts")
+    if t_end is not None:
+        t_end = checks.number("t_end", t_end, "s", above=0.0)
+    usable = y[np.isfinite(y).all(axis=1)]
+    if len(usable) < 2:
+        raise InputError("starts: must be two or more finite states")
+    sample = usable[np.unique(np.linspace(0, len(usable) - 1, SAMPLE).astype(np.int64))]
+    search = Search(flow_of(system, sample, {}, method, threads))
+    search.look(sample)
+    return labelled(search, y, t_end, progress)
+
+
+def starts_of(given: object, names: Sequence[str], n: int | None, seed: int) -> Floats:
+    """Starts (n, dim) from a sampler, ranges or states.
+
+    Raises:
+        InputError: none of these, or a wrong one.
+    """
+    sampler = sampler_of(given)
+    if sampler is not None:
+        count = checks.whole_number("n", STARTS if n is None else n, least=1, most=1 << 31)
+        checks.memory(count * len(names), 2, f"n: {count:,} starts", "fewer")
+        return sampler.draw(count, tuple(names), checks.whole_number("seed", seed, least=0))
+    array = np.array(checks.states("starts", given, len(names)))  # type: ignore[arg-type]
+    return array if n is None else array[: checks.whole_number("n", n, least=1)]
+
+
+def labelled(
+    search: Search, starts: Floats, t_end: float | None, progress: Progress | None = None
+) -> Attractors:
+    """Labels of starts by the attractors of a search, and by those that turn up on the way."""
+    flow = search.flow
+    for attempt in range(ROUNDS):
+        periods = min(max(LATER * search.latest, FEWEST), MOST)
+        if t_end is not None:
+            periods = max(1, math.ceil(t_end / flow.period))
+        ends = settle(search, starts, periods, progress if attempt == 0 else None)
+        before = search.count
+        if len(ends.last):
+            search.look(ends.last)
+        if search.count == before:
+            break
+    orbits = [_of_orbit(flow, orbit, ball.radius) for orbit, ball in search.orbits]
+    clouds = [
+        Attractor(
+            "chaos" if cloud.exponent > 3.0 * cloud.error else "torus", cloud.points, None, None, None,
+            cloud.exponent, cloud.error, None, None, 0,
+        )
+        for cloud in search.clouds
+    ]  # fmt: skip
+    every = [*orbits, *clouds]
+    found = np.bincount(ends.label[ends.label >= 0], minlength=len(every))
+    order = np.argsort(-found, kind="stable")
+    rank = np.empty(len(every) + 1, dtype=np.int64)
+    rank[order], rank[-1] = np.arange(len(every)), -1
+    return Attractors(
+        attractors=tuple(Attractor(**{**vars(every[k]), "found": int(found[k])}) for k in order),
+        label=rank[ends.label],
+        status=ends.status,
+        time=ends.time,
+        names=tuple(flow.scene.state),
+        t_end=periods * flow.period,
+        looks=flow.period,
+        dt=flow.period / flow.steps,
+        scale=flow.scale,
+        cell=None if not search.clouds else np.max([cloud.size for cloud in search.clouds], axis=0),
+        steps=ends.steps,
+        search=search,
+    )
+
+
+def _of_orbit(flow: Flow, orbit, radius: float) -> Attractor:  # type: ignore[no-untyped-def]
+    rest = orbit.periods == 0.0
+    period = None if rest else orbit.periods * flow.period
+    largest = float(np.abs(orbit.multipliers).max()) if orbit.multipliers.size else 0.0
+    over = flow.period if rest else period
+    # Differences give multipliers to about 1e-9; along a cycle nothing grows or falls.
+    exponent = 0.0 if orbit.cycle else math.log(max(largest, 1e-300)) / over
+    error = 1e-9 / (over * max(largest, 1e-300))
+    forced = round(orbit.periods) if flow.forced else None
+    return Attractor(
+        "fixed point" if rest else "periodic", orbit.points, period, forced, orbit.multipliers, exponent,
+        error, orbit.residual, radius, 0,
+    )  # fmt: skip
+
+
+def undecided(found: Attractors) -> int:
+    """How many starts may end at any attractor."""
+    return int(np.count_nonzero((found.status == Status.UNDECIDED) | (found.status == Status.UNSURE)))

@@ -1,0 +1,240 @@
+"""The map that takes states through one period, on lanes: what attractors are looked for in.
+
+Of a system whose right-hand side repeats after a period it is the stroboscopic map. Of one that knows no time
+it is the flow over a time of its own, in which a typical state changes by about its size.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.ensembles.problem import Case, Problem, mechanism_problem, system_problem
+from fastmech.ensembles.solve import Settings, solve
+from fastmech.ensembles.status import Status
+from fastmech.ensembles.system import System
+from fastmech.errors import InputError
+from fastmech.integrators.method import Method
+from fastmech.integrators.methods import find_method
+from fastmech.models.mechanism import Mechanism
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+#: Steps of a period at least and at most, and the share of the scale that a period's error may have.
+FEWEST, MOST, ERROR = 8, 1 << 14, 1e-6
+
+#: Steps of a period for orbits, times those of motions: the eighth power is below rounding of differences.
+FINER = 4
+
+#: Steps of a period in the second of two runs, times those of the first.
+COARSER = 2.0 / 3.0
+
+#: States of a sample that choose steps, and the share of them that must keep the error.
+CHOOSING, MOSTLY = 64, 0.9
+
+#: Differences for derivatives, as a share of the scale: the third root of a run's rounding.
+DIFFERENCE = 1e-5
+
+#: Loads' periods that fit into a common one at most so often.
+MULTIPLES = 64
+
+#: Motions beyond so many times the scale have escaped.
+FAR = 1e3
+
+
+class Reached(NamedTuple):
+    """States after some periods."""
+
+    y: Floats  #: (outputs, n, dim); NaN from the first output on at which a motion is not finite
+    stopped: Flags  #: by the system's stopping condition (n,)
+    far: Flags  #: beyond :data:`FAR` scales when last finite (n,)
+
+
+@dataclass(frozen=True)
+class Flow:
+    """A system with its parameters, its period, and how it is integrated."""
+
+    scene: System | Mechanism
+    problem: Problem
+    period: float  #: s
+    forced: bool  #: whether the right-hand side depends on the time
+    angles: Flags  #: which states count modulo a turn (dim,)
+    scale: Floats  #: typical size of each state (dim,)
+    middle: Floats  #: about where motions are (dim,)
+    method: Method
+    steps: int = FEWEST  #: of a period
+    threads: int | None = None
+
+    def run(self, y: Floats, times: Floats, finer: float = 1.0) -> Reached:
+        """States at rising times [periods], from the states y (n, dim) at time zero."""
+        dt = self.period / math.ceil(self.steps * finer) * (1.0 + 1e-12)
+        solution = solve(
+            Case(self.problem, y, times * self.period, self.threads), Settings(self.method, dt)
+        )
+        stops = self.problem.observation.stops
+        stopped = solution.records[0] != 0.0 if stops else np.zeros(len(y), dtype=np.bool_)
+        last = solution.y[-1] if solution.last is None else solution.last
+        return Reached(solution.y, stopped, self.is_far(last))
+
+    def after(self, y: Floats, periods: float = 1.0, finer: float = 1.0) -> Floats:
+        """States (n, dim) after so many periods."""
+        return self.run(y, np.array([float(periods)]), finer).y[-1]
+
+    def is_far(self, y: Floats) -> Flags:
+        """Which states (n, dim) lie far out."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray((np.abs(y - self.middle) > FAR * self.scale)[:, ~self.angles].any(axis=1))
+
+    def away(self, a: Floats, b: Floats) -> Floats:
+        """a - b with turns taken off angles."""
+        difference = a - b
+        if self.angles.any():
+            turns = difference[..., self.angles] / (2.0 * np.pi)
+            difference[..., self.angles] = 2.0 * np.pi * (turns - np.round(turns))
+        return np.asarray(difference)
+
+    def distance(self, a: Floats, b: Floats) -> Floats:
+        """Largest component of a - b over the scale, without the last axis."""
+        return np.asarray(np.abs(self.away(a, b) / self.scale).max(axis=-1))
+
+    def rates(self, y: Floats, t: float = 0.0) -> Floats:
+        """Rates (n, dim) of states at a time [s]."""
+        Y = np.ascontiguousarray(y.T)
+        found = np.zeros_like(Y)
+        self.problem.rhs(t, Y, found, self.problem.params.block(len(y)))
+        return found.T
+
+    def derivative(self, y: Floats, periods: float) -> tuple[Floats, Floats]:
+        """The map of states (n, dim) over so many periods, and its Jacobian (n, dim, dim), by differences."""
+        n, dim = y.shape
+        h = DIFFERENCE * self.scale
+        shifts = np.concatenate([np.zeros((1, dim)), np.diag(h), np.diag(-h)])
+        lanes = (y[:, None] + shifts).reshape(-1, dim)
+        image = self.after(lanes, periods, FINER).reshape(n, 1 + 2 * dim, dim)
+        J = self.away(image[:, 1 : 1 + dim], image[:, 1 + dim :]) / (2.0 * h[:, None])
+        return image[:, 0], np.swapaxes(J, 1, 2)
+
+
+def flow_of(
+    scene: System | Mechanism,
+    sample: Floats,
+    values: Mapping[str, float],
+    method: str = "dop853",
+    threads: int | None = None,
+) -> Flow:
+    """The flow of a system with ``values`` of some of its parameters, in steps that suit a sample (n, dim).
+
+    Raises:
+        InputError: it depends on the time and has no period, or its motions need too many steps.
+    """
+    if isinstance(scene, Mechanism):
+        scene = scene.replace(**values)
+        problem, period = mechanism_problem(scene, len(sample), {}, "lagrange"), _period_of_loads(scene)
+        turning = [q.periodic for q in scene.coordinates] + [False] * len(scene.coordinates)
+    else:
+        scene = replace(scene, parameters={**scene.parameters, **values}) if values else scene
+        problem, period = system_problem(scene, len(sample), {}), scene.period_at({})
+        turning = [name in scene.angles for name in scene.state]
+    angles = np.array(turning)
+    scale = _spread(sample, angles)
+    flow = Flow(
+        scene, problem, period or 1.0, period is not None, angles, scale, np.median(sample, axis=0),
+        find_method(method), threads=threads,
+    )  # fmt: skip
+    if period is None:
+        few = sample[:CHOOSING]
+        if any(not _alike(flow.rates(few), flow.rates(few, t)) for t in (0.7320508, 5.1961524, 31.4159)):
+            raise InputError(
+                "period: missing; the right-hand side depends on the time, System(period=...) tells after "
+                "how many seconds it repeats"
+            )
+        speed = np.abs(flow.rates(few) / scale).max(axis=1)
+        speed = speed[np.isfinite(speed) & (speed > 0.0)]
+        flow = replace(flow, period=2.0 * math.pi / float(np.median(speed)) if speed.size else 1.0)
+    return _settled(_with_steps(flow, sample[:CHOOSING]), sample[:CHOOSING])
+
+
+def _alike(a: Floats, b: Floats) -> bool:
+    return bool(np.array_equal(a, b, equal_nan=True))
+
+
+def _spread(sample: Floats, angles: Flags) -> Floats:
+    """Half the range of a sample in each state; where it has none the others', a turn of angles is pi."""
+    scale = 0.5 * np.ptp(sample, axis=0)
+    scale[~(scale > 0.0)] = max(float(scale.max()), float(np.abs(sample).max()), 1e-300)
+    return np.where(angles, np.pi, np.where(scale > 1e-250, scale, 1.0))
+
+
+def _settled(flow: Flow, sample: Floats) -> Flow:
+    """The same with the scale of where the sample's motions are after some periods, if they are there."""
+    y = flow.after(sample, 8.0)
+    kept = np.isfinite(y).all(axis=1) & ~flow.is_far(y)
+    if np.count_nonzero(kept) < 2:
+        return flow
+    both = np.concatenate([sample, y[kept]])
+    low, high = np.quantile(both, [0.02, 0.98], axis=0)
+    scale = np.where(flow.angles, np.pi, np.maximum(0.5 * (high - low), 1e-6 * flow.scale))
+    return _with_steps(replace(flow, scale=scale, middle=0.5 * (low + high)), y[kept])
+
+
+def _with_steps(flow: Flow, sample: Floats) -> Flow:
+    """The same with as many steps of a period as keep :data:`ERROR` for nearly all of a sample.
+
+    Raises:
+        InputError: no number of steps does.
+    """
+    before = flow.after(sample)
+    while flow.steps < MOST:
+        finer = replace(flow, steps=2 * flow.steps)
+        now = finer.after(sample)
+        usable = np.isfinite(now).all(axis=1) & ~flow.is_far(now)
+        error = np.sort(np.nan_to_num(flow.distance(before[usable], now[usable]), nan=np.inf))
+        if not error.size or error[int(MOSTLY * (error.size - 1))] <= ERROR:
+            return flow
+        flow, before = finer, now
+    raise InputError(
+        f"dt: even steps of {flow.period / MOST:.3g} s leave errors above {ERROR:g} of the states' size in a "
+        f"period of {flow.period:.3g} s; choose an implicit method (method='radau5') where motion is stiff"
+    )
+
+
+def _period_of_loads(mechanism: Mechanism) -> float | None:
+    """The common period [s] of a mechanism's loads; None where they are constant.
+
+    Raises:
+        InputError: a load is not periodic, or they have none in common.
+    """
+    periods = []
+    for load in mechanism.loads:
+        if sum(load.to_come(0.0)) == 0.0:
+            continue
+        period = load.facts().period
+        if period is None:
+            raise InputError(
+                f"loads: {type(load).__name__} is not periodic; motions settle under loads that repeat "
+                "or stay"
+            )
+        periods.append(period)
+    if not periods:
+        return None
+    for k in range(1, MULTIPLES + 1):
+        common = k * max(periods)
+        if all(abs(common / p - round(common / p)) < 1e-9 * common / p for p in periods):
+            return common
+    raise InputError(
+        f"loads: their periods {', '.join(f'{p:g}' for p in periods)} s have no common multiple of "
+        f"{MULTIPLES} or fewer of the longest"
+    )
+
+
+def statuses(reached: Reached) -> NDArray[np.int8]:
+    """What became of motions: OK, ESCAPED or NOT_FINITE (n,)."""
+    lost = ~np.isfinite(reached.y[-1]).all(axis=1)
+    status = np.where(lost, Status.NOT_FINITE, Status.OK)
+    return np.where(reached.far | reached.stopped, Status.ESCAPED, status).astype(np.int8)

@@ -1,0 +1,190 @@
+"""Fixed points and periodic orbits by Newton's method on the period map, many guesses on lanes at once.
+
+Multipliers are eigenvalues of the map's Jacobian; a fixed point of the map over p periods whose multipliers
+lie inside the unit circle attracts (Guckenheimer, Holmes, *Nonlinear Oscillations*, section 1.5).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.attractors.flow import FINER, Flags, Floats, Flow
+
+#: Newton's iterations at most, and the residual over the scale of what counts as found: rounding of a run.
+ITERATIONS, RESIDUAL = 16, 1e-9
+
+#: Multipliers below this attract: beyond it a motion needs a million periods.
+ATTRACTS = 1.0 - 1e-5
+
+#: Places of the same orbit are nearer than this share of the scale.
+SAME = 1e-5
+
+#: Times at most that what was found may go around a cycle.
+WOUND = 16
+
+#: Places along a cycle that are kept.
+ALONG = 256
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """A periodic motion, or a place of rest."""
+
+    points: Floats  #: places (m, dim): after each forcing period, or all along a cycle
+    periods: float  #: its period in the flow's periods; of a place of rest 0
+    jacobians: Floats  #: of the map over its period at each place (m, dim, dim)
+    multipliers: NDArray[np.complex128]  #: of the map; of a cycle without the one along it
+    residual: float  #: of the map, over the scale
+    cycle: bool = False  #: of a system that knows no time
+
+
+def newton(flow: Flow, guesses: Floats, periods: int) -> tuple[Floats, Floats, Floats]:
+    """Fixed points of the map over so many periods: places (n, dim), residuals (n,), Jacobians.
+
+    The residual is infinite where the iteration ends elsewhere than it began or nowhere.
+    """
+    y, best = guesses.copy(), np.full(len(guesses), np.inf)
+    J = np.zeros((*y.shape, y.shape[1]))
+    identity, active = np.eye(y.shape[1]), np.arange(len(y))
+    step = np.zeros_like(y)
+    for _ in range(ITERATIONS):
+        if not active.size:
+            break
+        image, jacobian = flow.derivative(y[active], periods)
+        error = flow.away(image, y[active])
+        residual = np.abs(error / flow.scale).max(axis=1)
+        usable = np.isfinite(residual) & np.isfinite(jacobian).all(axis=(1, 2))
+        better = usable & (residual < best[active])
+        J[active[better]], best[active[better]] = jacobian[better], residual[better]
+        # A step that did not help is halved.
+        worse = active[~better]
+        step[worse] *= 0.5
+        y[worse] -= step[worse]
+        for k in np.flatnonzero(better):
+            i = active[k]
+            step[i] = _solution(jacobian[k] - identity, -error[k])
+            limit = np.abs(step[i] / flow.scale).max()
+            step[i] *= min(1.0, 0.5 / limit) if limit > 0.0 else 1.0
+            y[i] += step[i]
+        done = (best[active] < 1e-13) | (np.abs(step[active] / flow.scale).max(axis=1) < 1e-14)
+        active = active[~done]
+    found = flow.distance(y, guesses) < 2.0
+    return y, np.where(found, best, np.inf), J
+
+
+def _solution(matrix: Floats, right: Floats) -> Floats:
+    if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
+        return np.zeros_like(right)
+    return np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-13)[0])
+
+
+def periodic(flow: Flow, guesses: Floats, periods: int) -> list[Orbit]:
+    """Orbits of a system that repeats itself, or places of rest (periods = 1 of one that knows no time)."""
+    found: list[Orbit] = []
+    y, residual, _ = newton(flow, guesses, periods)
+    for k in np.flatnonzero(residual < RESIDUAL):
+        place = y[k]
+        if any(visits(flow, orbit, place) for orbit in found):
+            continue
+        points = place[None]
+        if periods > 1:
+            after = flow.run(place[None], np.arange(1.0, periods), FINER).y[:, 0]
+            points = np.concatenate([points, after])
+            again = np.flatnonzero(flow.distance(points[1:], place) < SAME)
+            points = points[: again[0] + 1] if again.size else points
+        length = len(points)
+        _, jacobians = flow.derivative(points, length)
+        rest = not flow.forced
+        multipliers = np.linalg.eigvals(jacobians[0])
+        found.append(Orbit(points, 0.0 if rest else float(length), jacobians, multipliers, residual[k]))
+    return found
+
+
+def visits(flow: Flow, orbit: Orbit, place: Floats) -> bool:
+    """Whether an orbit comes to a place, as nearly as :data:`SAME` (of a cycle a twentieth of its places' distance)."""
+    distance = flow.distance(orbit.points, place)
+    j = int(np.argmin(distance))
+    if not orbit.cycle:
+        return bool(distance[j] < SAME)
+    ahead, behind = orbit.points[(j + 1) % ALONG], orbit.points[j - 1]
+    along = flow.away(ahead, behind) / flow.scale
+    e = flow.away(place, orbit.points[j]) / flow.scale
+    length = float(np.linalg.norm(along))
+    e -= along * (e @ along) / length**2
+    return float(np.linalg.norm(e)) < max(0.05 * length, SAME)
+
+
+def cycle(flow: Flow, guess: Floats, periods: float) -> Orbit | None:
+    """The periodic orbit of a system that knows no time near a place (dim,), with a period near ``periods``.
+
+    Newton's method for place and period, the place staying in the plane through the guess across the flow.
+    """
+    y, T, dim = guess.copy(), float(periods), guess.size
+    direction = flow.rates(guess[None])[0] / flow.scale**2
+    best = np.inf
+    for _ in range(ITERATIONS):
+        image, J = flow.derivative(y[None], T)
+        error = flow.away(image[0], y)
+        residual = float(np.abs(error / flow.scale).max())
+        if not (np.isfinite(residual) and np.isfinite(J).all()):
+            return None
+        if residual >= best and residual < RESIDUAL:
+            break
+        best = residual
+        rate = flow.rates(image)[0] * flow.period
+        matrix = np.block([[J[0] - np.eye(dim), rate[:, None]], [direction[None], np.zeros((1, 1))]])
+        step = _solution(matrix, -np.append(error, direction @ flow.away(y, guess)))
+        limit = max(np.abs(step[:dim] / flow.scale).max(), abs(step[dim]) / (0.25 * T))
+        step *= min(1.0, 0.5 / limit) if limit > 0.0 else 1.0
+        y, T = y + step[:dim], T + step[dim]
+        if not 0.25 * periods < T < 4.0 * periods:
+            return None
+    if not best < RESIDUAL:
+        return None
+    for k in range(WOUND, 1, -1):  # it may have gone around several times
+        if flow.distance(flow.after(y[None], T / k, FINER), y[None])[0] < SAME:
+            T /= k
+            break
+    times = T * np.arange(1, ALONG) / ALONG
+    points = np.concatenate([y[None], flow.run(y[None], times, FINER).y[:, 0]])
+    if np.abs(flow.away(points, y) / flow.scale).max() < SAME:
+        return None  # a place of rest
+    jacobians = _around(flow.derivative(points, T / ALONG)[1])
+    values = np.linalg.eigvals(jacobians[0])
+    multipliers = np.delete(values, np.argmin(np.abs(values - 1.0)))
+    return Orbit(points, T, jacobians, multipliers, best, cycle=True)
+
+
+def _around(parts: Floats) -> Floats:
+    """Jacobians once around from each place, from those to the next (m, dim, dim).
+
+    Differences over the whole way would lie where the map is no longer linear.
+    """
+    whole = parts
+    for k in range(1, len(parts)):
+        whole = np.roll(parts, -k, axis=0) @ whole
+    return whole
+
+
+def attracts(orbit: Orbit) -> bool:
+    """Whether all multipliers lie inside the unit circle."""
+    return bool(np.all(np.abs(orbit.multipliers) < ATTRACTS))
+
+
+def returns(flow: Flow, paths: Floats, places: int) -> tuple[NDArray[np.int64], Flags]:
+    """First p up to ``places`` after which strobes (k, n, dim) are back: (n,), and whether there is one.
+
+    Back is: nearer than a twentieth of the scale over the last 2 p strobes, and not further than before.
+    """
+    n = paths.shape[1]
+    period, known = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)
+    for p in range(1, places + 1):
+        if 3 * p + 1 > len(paths):
+            break
+        late = flow.distance(paths[-2 * p :], paths[-3 * p : -p]).max(axis=0)
+        fits = ~known & (late < 0.05)
+        period[fits], known[fits] = p, True
+    return period, known

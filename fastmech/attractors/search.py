@@ -1,0 +1,232 @@
+"""Where motions of a sample settle: on orbits, which Newton's method finds, or in cells that they keep visiting.
+
+The sample is followed over windows of periods, each twice as long as the one before. Motions that come back
+near to where they were give guesses of orbits. What keeps visiting the same cells of a grid (Datseris and
+Wagemakers, Chaos 32 (2022) 023104) and is no orbit is a torus or chaos, as the largest Lyapunov exponent tells.
+An orbit may be found from any guess: who ends there is found out later, by running until arrival.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import connected_components
+
+from fastmech.attractors.arrival import (
+    Balls,
+    Cells,
+    Cloud,
+    balls,
+    cells_of,
+    in_balls,
+    keys_of,
+    levels_of,
+    owners,
+)
+from fastmech.attractors.flow import COARSER, Flags, Floats, Flow, statuses
+from fastmech.attractors.flow import MOST as MOST_STEPS
+from fastmech.attractors.orbits import Orbit, attracts, cycle, periodic, returns, visits
+from fastmech.ensembles.status import Status
+from fastmech.transients.lyapunov import largest_lyapunov
+
+Integers = NDArray[np.int64]
+
+#: Periods of the first window, and of all together; strobes in a period of a system that knows no time.
+WINDOW, PATIENCE, DENSE = 64, 4096, 8
+
+#: Longest period looked for, in forcing periods; guesses for Newton's method in a window.
+LONGEST, GUESSES = 32, 32
+
+#: Windows before cells are looked at, and periods in which motions must stay in them.
+WINDOWS, STAYS = 3, 512
+
+#: Sizes of cells as shares of the scale: the smallest that motions fill is taken.
+SIZES = (1 / 128, 1 / 64, 1 / 32, 1 / 16, 1 / 8)
+
+#: Share of a motion's later strobes that lie in cells of its earlier ones, of one that fills cells; and share
+#: of cells in common of two motions on the same attractor.
+FILLED, SHARED = 0.95, 0.3
+
+#: Motions of one attractor that are followed for its exponent, and periods.
+FOLLOWED, EXPONENT_PERIODS = 8, 512
+
+#: V about an orbit's places that motions on it may have, after a period with the longest steps used.
+INSIDE = 0.1
+
+#: Attractors at most: a system without damping has a continuum of motions that stay.
+MOST = 100
+
+
+class Search:
+    """Attractors found so far: orbits with their balls first, then clouds."""
+
+    def __init__(self, flow: Flow) -> None:
+        self.flow = flow
+        self.orbits: list[tuple[Orbit, Balls]] = []
+        self.clouds: list[Cloud] = []
+        self.latest = 0  #: periods after which the last motion of a sample had arrived
+
+    @property
+    def count(self) -> int:
+        """How many attractors."""
+        return len(self.orbits) + len(self.clouds)
+
+    def arrived(self, states: Floats) -> Integers:
+        """The orbit in whose balls each state (n, dim) is, -1: in none."""
+        found = np.full(len(states), -1, dtype=np.int64)
+        for k, (_, own) in enumerate(self.orbits):
+            left = np.flatnonzero(found < 0)
+            found[left[in_balls(self.flow, own, states[left]) >= 0]] = k
+        return found
+
+    def cells(self, wider: float) -> Cells | None:
+        """Cells of the clouds."""
+        return cells_of(self.flow, self.clouds, wider) if self.clouds else None
+
+    def look(self, sample: Floats) -> None:
+        """Follow a sample (n, dim) until all have arrived somewhere, or for :data:`PATIENCE` periods."""
+        flow, y, window, passed, number = self.flow, sample, WINDOW, 0, 0
+        dense = 1 if flow.forced else DENSE
+        while len(y) and passed < PATIENCE and self.count < MOST:
+            reached = flow.run(y, np.arange(1, window * dense + 1) / dense)
+            passed, number = passed + window, number + 1
+            paths = reached.y[:, statuses(reached) == Status.OK]
+            paths = self._leave_out(paths, passed)
+            self._find_orbits(paths)
+            paths = self._leave_out(paths, passed)
+            if number >= WINDOWS and paths.shape[1]:
+                self._find_clouds(paths[dense - 1 :: dense])
+                paths = self._leave_out(paths, passed)
+            y, window = paths[-1], 2 * window
+
+    def _leave_out(self, paths: Floats, passed: int) -> Floats:
+        """Paths (k, n, dim) that have not arrived."""
+        done = self.arrived(paths[-1]) >= 0
+        cells = self.cells(1.0)
+        if cells is not None and paths.shape[1]:
+            late = owners(self.flow, cells, paths[len(paths) // 2 :])
+            done |= (late == late[-1]).mean(axis=0) * (late[-1] >= 0) > FILLED
+        if done.any():
+            self.latest = max(self.latest, passed)
+        return paths[:, ~done]
+
+    def _find_orbits(self, paths: Floats) -> None:
+        """Look for orbits that paths (k, n, dim) come near to."""
+        flow, forced = self.flow, self.flow.forced
+        if not paths.shape[1]:
+            return
+        strobes = paths if forced else paths[DENSE - 1 :: DENSE]
+        period, known = returns(flow, strobes, LONGEST if forced else 1)
+        for p in np.unique(period[known]):
+            self._try(strobes[-1][known & (period == p)], int(p))
+        if not flow.angles.any():  # a slow spiral goes around it
+            self._try(strobes[len(strobes) // 2 :].mean(axis=0), 1)
+        tried = 0
+        for i in np.flatnonzero((self.arrived(paths[-1]) < 0) & ~known) if not forced else ():
+            if tried == GUESSES or self._known(paths[-1, i]):
+                continue
+            back = _time_back(flow, paths[:, i])
+            if back:
+                tried += 1
+                found = cycle(flow, paths[-1, i], back / DENSE)
+                if found is not None:
+                    self._add(found)
+
+    def _try(self, guesses: Floats, periods: int) -> None:
+        """Newton's method from guesses (n, dim) that are not near one another."""
+        chosen: list[Floats] = []
+        for guess in guesses:
+            near = any(self.flow.distance(guess, other) < 0.02 for other in chosen)
+            if len(chosen) < GUESSES and not near and not self._known(guess):
+                chosen.append(guess)
+        if chosen:
+            for orbit in periodic(self.flow, np.array(chosen), periods):
+                self._add(orbit)
+
+    def _known(self, place: Floats) -> bool:
+        return any(visits(self.flow, orbit, place) for orbit, _ in self.orbits)
+
+    def _add(self, orbit: Orbit) -> None:
+        if not attracts(orbit) or self._known(orbit.points[0]):
+            return
+        own = balls(self.flow, orbit)
+        self.orbits.append((orbit, own))
+        # Steps must be short enough for motions on the orbit to stay in its balls.
+        while self.flow.steps < MOST_STEPS:
+            after = self.flow.after(orbit.points, orbit.periods or 1.0, COARSER)
+            if (levels_of(self.flow, own, after)[1] < INSIDE).all():
+                break
+            self.flow = replace(self.flow, steps=2 * self.flow.steps)
+
+    def _find_clouds(self, strobes: Floats) -> None:
+        """Look for cells that strobes (k, n, dim) fill."""
+        flow, half = self.flow, len(strobes) // 2
+        for share in SIZES:
+            size = share * flow.scale
+            keys = keys_of(flow, size, strobes)
+            again = [np.isin(own[half:], own[:half]).mean() for own in keys.T]
+            filling = np.flatnonzero(np.array(again) > FILLED)
+            if 2 * filling.size >= keys.shape[1]:
+                break
+        else:
+            return
+        for group in _groups([np.unique(own) for own in keys[:, filling].T]):
+            members = filling[group]
+            stays = flow.run(strobes[-1, members[:16]], np.arange(1.0, STAYS + 1.0)).y
+            points = np.concatenate([strobes[:, members].reshape(-1, stays.shape[2])[: 1 << 16],
+                                     stays.reshape(-1, stays.shape[2])])  # fmt: skip
+            left = ~np.isin(keys_of(flow, size, stays), np.unique(keys[:, members]))
+            if np.isfinite(stays).all() and left.mean() < 0.2 and (self.arrived(stays[-1]) < 0).all():
+                self._add_cloud(Cloud(points, size), stays[-1])
+
+    def _add_cloud(self, new: Cloud, last: Floats) -> None:
+        """Add a cloud, or its points to the one with which it has many cells in common."""
+        cells = np.unique(keys_of(self.flow, new.size, new.points))
+        for k, cloud in enumerate(self.clouds):
+            own = np.unique(keys_of(self.flow, new.size, cloud.points))
+            if np.isin(cells, own).sum() > SHARED * min(cells.size, own.size):
+                points = np.concatenate([cloud.points, new.points])
+                self.clouds[k] = cloud._replace(points=points, size=np.maximum(cloud.size, new.size))
+                return
+        exponent, error = _exponent(self.flow, last)
+        self.clouds.append(new._replace(exponent=exponent, error=error))
+
+
+def _groups(cells: list[Integers]) -> list[Flags]:
+    """Motions that share cells (rising numbers of each): which belong together."""
+    every, place = np.unique(np.concatenate(cells), return_inverse=True)
+    rows = np.repeat(np.arange(len(cells)), [c.size for c in cells])
+    visits = csr_matrix((np.ones(place.size), (rows, place)), shape=(len(cells), every.size))
+    common = (visits @ visits.T).toarray()
+    number = common.diagonal()
+    _, group = connected_components(common > SHARED * np.minimum(number, number[:, None]))
+    return [group == k for k in np.unique(group)]
+
+
+def _time_back(flow: Flow, path: Floats) -> int:
+    """Strobes back to where a path (k, dim) was nearest to its end after it had gone away; 0: never near."""
+    distance = flow.distance(path[::-1][1:], path[-1])
+    gone = np.flatnonzero(distance > 0.5 * distance.max())
+    later = distance[gone[0] :] if gone.size else np.zeros(0)
+    for k in range(1, later.size - 1):
+        if later[k] <= min(later[k - 1], later[k + 1]) and later[k] < 0.15 * distance.max():
+            return int(gone[0] + k + 1)
+    return 0
+
+
+def _exponent(flow: Flow, starts: Floats) -> tuple[float, float]:
+    """Largest Lyapunov exponent [1/s] of motions on an attractor from starts (n, dim), and its error.
+
+    The growth over the later half of the run counts, its mean over the motions; what grows linearly, as on a
+    torus, shows as log 2 over that time.
+    """
+    lanes, t_end = starts[:FOLLOWED], EXPONENT_PERIODS * flow.period
+    found = largest_lyapunov(flow.scene, lanes, t_end, flow.period / flow.steps)
+    grown = found.exponents * found.t[:, None]
+    half = len(grown) // 2
+    rates = (grown[-1] - grown[half - 1]) / (found.t[-1] - found.t[half - 1])
+    spread = float(rates.std(ddof=1)) / np.sqrt(rates.size) if rates.size > 1 else 0.0
+    return float(rates.mean()), float(spread + np.log(2.0) / (found.t[-1] - found.t[half - 1]))

@@ -1,0 +1,144 @@
+"""Who ends at which attractor: motions run until they have arrived, each with two lengths of steps.
+
+A label counts where both runs arrive at the same attractor and have stayed together on the way: where they have
+not, a disturbance as small as the steps' error has grown, and the motions run again with finer steps. Cells of
+the second run are twice as wide. Who still comes apart is unsure.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.attractors.arrival import owners
+from fastmech.attractors.flow import COARSER, Flags, Floats, statuses
+from fastmech.attractors.search import Search
+from fastmech.ensembles.run import Progress
+from fastmech.ensembles.status import Status
+
+Integers = NDArray[np.int64]
+
+#: How much finer the steps of both runs are in each repetition.
+REPEATED = (1.0, 2.0, 4.0)
+
+#: Distance over the scale that the two runs may have before they arrive.
+TOGETHER = 0.02
+
+#: Visits of a cloud's cells in a row after which a motion has arrived there.
+VISITS = 24
+
+#: Motions followed together: their states are all that is held of them.
+CHUNK = 1 << 15
+
+#: Periods of a piece at most, and share of those passed.
+PIECE, SHARE = 64, 8
+
+
+class Ends(NamedTuple):
+    """Where n motions end."""
+
+    label: Integers  #: number of the attractor (orbits, then clouds), -1: none
+    status: NDArray[np.int8]  #: CAPTURED, ESCAPED, UNSURE, UNDECIDED or NOT_FINITE
+    time: Floats  #: of arrival, a look's [s]; NaN: not arrived
+    last: Floats  #: states of some that are undecided (m, dim)
+    steps: int  #: of all motions together
+
+
+class _Run:
+    """One of the two runs of some motions."""
+
+    def __init__(self, search: Search, y: Floats, finer: float, wider: float) -> None:
+        self.search, self.finer, self.y = search, finer, y
+        self.cells = search.cells(wider)
+        n = len(y)
+        self.label = np.full(n, -1, dtype=np.int64)
+        self.status = np.full(n, Status.OK, dtype=np.int8)
+        self.visits, self.owner = np.zeros(n, dtype=np.int64), np.full(n, -1, dtype=np.int64)
+
+    def advance(self, active: Integers, periods: int) -> None:
+        """Take motions on by so many periods; label those that arrive or end."""
+        flow = self.search.flow
+        times = np.arange(1.0, periods + 1.0) if self.cells is not None else np.array([float(periods)])
+        reached = flow.run(self.y[active], times, self.finer)
+        self.y[active] = reached.y[-1]
+        self.status[active] = np.where(self.label[active] < 0, statuses(reached), self.status[active])
+        if self.cells is not None:
+            orbits = len(self.search.orbits)
+            for states in reached.y:
+                now = owners(flow, self.cells, states)
+                same = (now >= 0) & (now == self.owner[active])
+                self.visits[active] = np.where(same, self.visits[active] + 1, (now >= 0).astype(np.int64))
+                self.owner[active] = now
+                done = (self.visits[active] >= VISITS) & (self.label[active] < 0)
+                self.label[active[done]] = orbits + now[done]
+        ball = self.search.arrived(reached.y[-1])
+        new = (ball >= 0) & (self.label[active] < 0)
+        self.label[active[new]] = ball[new]
+
+    @property
+    def ended(self) -> Flags:
+        """Who has arrived, escaped or failed."""
+        return (self.label >= 0) | (self.status != Status.OK)
+
+
+def settle(search: Search, starts: Floats, periods: int, progress: Progress | None = None) -> Ends:
+    """Follow starts (n, dim) for so many periods at most."""
+    flow, n = search.flow, len(starts)
+    label, status = np.full(n, -1, dtype=np.int64), np.full(n, Status.UNDECIDED, dtype=np.int8)
+    time, last, steps = np.full(n, np.nan), [np.empty((0, starts.shape[1]))], 0
+    for first in range(0, n, CHUNK):
+        members = np.arange(first, min(n, first + CHUNK))
+        done = members.size
+        for finer in REPEATED:
+            if not members.size:
+                break
+            found, apart, undecided = _together(search, starts[members], periods, finer)
+            for own, new in ((label, found.label), (status, found.status), (time, found.time)):
+                own[members] = new
+            steps += found.steps
+            last.append(undecided[: max(0, 256 - sum(map(len, last)))])
+            members = members[apart]
+        if progress is not None:
+            progress(done)
+    return Ends(label, status, time * flow.period, np.concatenate(last), steps)
+
+
+def _together(search: Search, starts: Floats, periods: int, finer: float) -> tuple[Ends, Flags, Floats]:
+    """Two runs side by side; also who came apart (n,), and states of those that are undecided."""
+    flow, n = search.flow, len(starts)
+    ok = np.isfinite(starts).all(axis=1)
+    fine, coarse = _Run(search, starts.copy(), finer, 1.0), _Run(search, starts.copy(), COARSER * finer, 2.0)
+    active, passed, steps = np.flatnonzero(ok), 0, 0
+    distance, begun, apart = np.zeros(n), np.zeros(n), np.zeros(n, dtype=np.bool_)
+    time = np.full(n, np.nan)
+    while active.size and passed < periods:
+        piece = min(max(1, passed // SHARE), PIECE, periods - passed)
+        visiting = fine.visits[active] > 0
+        for run in (fine, coarse):
+            run.advance(active, piece)
+        passed += piece
+        steps += int(active.size * piece * flow.steps * finer * (1.0 + COARSER))
+        with np.errstate(invalid="ignore"):
+            now = np.nan_to_num(flow.distance(fine.y[active], coarse.y[active]), nan=0.0)
+        counts = ~fine.ended[active] | np.isnan(time[active])
+        distance[active] = np.where(counts, np.maximum(distance[active], now), distance[active])
+        begun[active] = np.where(visiting & (fine.visits[active] > 0), begun[active], distance[active])
+        time[active] = np.where(fine.ended[active] & np.isnan(time[active]), passed, time[active])
+        both = fine.ended[active] & coarse.ended[active]
+        cloud = fine.label[active] >= len(search.orbits)
+        grown = np.where(cloud, begun[active], distance[active])
+        differ = (fine.label[active] != coarse.label[active]) | (grown > TOGETHER)
+        differ |= fine.status[active] != coarse.status[active]
+        gone = both & (fine.label[active] < 0) & (fine.status[active] == coarse.status[active])
+        apart[active] = both & differ & ~gone
+        active = active[~both]
+    label = np.where(apart, -1, fine.label)
+    label[active] = -1
+    status = np.where(label >= 0, Status.CAPTURED, fine.status)
+    status = np.where(apart, Status.UNSURE, np.where(status == Status.OK, Status.UNDECIDED, status))
+    status[active] = Status.UNDECIDED
+    status[~ok] = Status.START_NOT_FINITE
+    ends = Ends(label, status.astype(np.int8), np.where(label >= 0, time, np.nan), starts[:0], steps)
+    return ends, apart, fine.y[active]

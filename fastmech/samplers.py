@@ -1,0 +1,152 @@
+"""Samplers: where starts are drawn from, as data; ``draw(n, names, seed)`` gives the first n of a sequence.
+
+Each names states by ranges ``(low, high)`` or by one value; what is not named is zero. A plain mapping of names
+to ranges is :class:`Uniform`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.errors import InputError, shown
+from fastmech.scene import nearest
+
+Floats = NDArray[np.float64]
+
+#: Points of one Latin hypercube.
+HYPERCUBE = 1024
+
+
+@dataclass(frozen=True)
+class Sampler:
+    """What samplers share."""
+
+    ranges: Mapping[str, Any]  #: by name (low, high), or a value
+
+    def draw(self, n: int, names: Sequence[str], seed: int = 0) -> Floats:
+        """The first n starts, shape (n, len(names)), in the order of ``names``.
+
+        Raises:
+            InputError: a name is unknown, or a range is no pair of finite numbers that does not fall.
+        """
+        low, high = self._ends(names)
+        ranged = np.flatnonzero(high > low)
+        starts = np.tile(low, (n, 1))
+        if ranged.size:
+            starts[:, ranged] += (high - low)[ranged] * self._unit(n, [names[k] for k in ranged], seed)
+        return starts
+
+    def _unit(self, n: int, names: Sequence[str], seed: int) -> Floats:
+        """Points (n, len(names)) of the unit cube."""
+        raise NotImplementedError
+
+    def _ends(self, names: Sequence[str]) -> tuple[Floats, Floats]:
+        if not isinstance(self.ranges, Mapping):
+            raise InputError(
+                f"ranges = {shown(self.ranges)}: must map names to (low, high) or to a value"
+            )
+        for name in self.ranges:
+            if name not in names:
+                raise InputError(f"ranges.{name}: unknown name; {nearest(str(name), list(names))}")
+        ends = np.zeros((2, len(names)))
+        for k, name in enumerate(names):
+            given = self.ranges.get(name, 0.0)
+            try:
+                found = np.array(given, dtype=np.float64).ravel()
+            except (TypeError, ValueError):
+                found = np.zeros(0)
+            if found.size not in (1, 2) or not np.isfinite(found).all() or found[0] > found[-1]:
+                raise InputError(
+                    f"ranges.{name} = {shown(given)}: must be (low, high) with low <= high, or a value"
+                )
+            ends[:, k] = found[0], found[-1]
+        return ends[0], ends[1]
+
+
+@dataclass(frozen=True)
+class Uniform(Sampler):
+    """Independent uniform starts."""
+
+    def _unit(self, n: int, names: Sequence[str], seed: int) -> Floats:
+        return np.random.default_rng(seed).random((n, len(names)))
+
+
+@dataclass(frozen=True)
+class Sobol(Sampler):
+    """Scrambled Sobol points, more even than independent ones (``scipy.stats.qmc.Sobol``)."""
+
+    def _unit(self, n: int, names: Sequence[str], seed: int) -> Floats:
+        from scipy.stats import qmc
+
+        drawn = qmc.Sobol(len(names), rng=seed).random_base2(math.ceil(math.log2(max(n, 1))))
+        return np.asarray(drawn[:n])
+
+
+@dataclass(frozen=True)
+class LatinHypercube(Sampler):
+    """Latin hypercubes (SciPy's) of 1,024 points, one after the other; the last one may be cut off."""
+
+    def _unit(self, n: int, names: Sequence[str], seed: int) -> Floats:
+        from scipy.stats import qmc
+
+        drawn = qmc.LatinHypercube(len(names), rng=seed)
+        return np.concatenate([drawn.random(HYPERCUBE) for _ in range(-(-max(n, 1) // HYPERCUBE))])[:n]
+
+
+@dataclass(frozen=True)
+class Grid(Sampler):
+    """A grid over the ranges, ends included, the last state fastest; ``counts`` are its points by name."""
+
+    counts: Mapping[str, int]
+
+    def _unit(self, n: int, names: Sequence[str], seed: int) -> Floats:
+        try:
+            shape = tuple(int(self.counts[name]) for name in names)
+        except (KeyError, TypeError, ValueError):
+            shape = (0,)
+        if min(shape) < 2 or math.prod(shape) < n:
+            raise InputError(
+                f"counts = {shown(self.counts)}: must be 2 or more for each of {', '.join(names)}, and give "
+                f"the {n:,} starts asked for"
+            )
+        places = np.unravel_index(np.arange(n), shape)
+        return np.stack([place / (count - 1) for place, count in zip(places, shape, strict=True)], axis=1)
+
+
+@dataclass(frozen=True)
+class Gaussian(Sampler):
+    """Independent normal starts, of which (low, high) is one standard deviation about the mean."""
+
+    def draw(self, n: int, names: Sequence[str], seed: int = 0) -> Floats:
+        """As of any sampler."""
+        low, high = self._ends(names)
+        z = np.random.default_rng(seed).standard_normal((n, len(names)))
+        return np.asarray(0.5 * (low + high) + 0.5 * (high - low) * z)
+
+
+@dataclass(frozen=True)
+class Ball(Sampler):
+    """Uniform in the ellipsoid that fills the ranges: a ball of radius 1 in the norm of their halves."""
+
+    def draw(self, n: int, names: Sequence[str], seed: int = 0) -> Floats:
+        """As of any sampler."""
+        low, high = self._ends(names)
+        ranged = high > low
+        z = np.random.default_rng(seed).standard_normal((n, len(names) + 1))
+        size = np.linalg.norm(z[:, :-1][:, ranged], axis=1)
+        from scipy.stats import norm
+
+        radius = norm.cdf(z[:, -1]) ** (1.0 / max(1, np.count_nonzero(ranged)))
+        inside = z[:, :-1] * (radius / np.where(size > 0.0, size, 1.0))[:, None]
+        return np.asarray(0.5 * (low + high) + 0.5 * (high - low) * np.where(ranged, inside, 0.0))
+
+
+def sampler_of(given: Any) -> Sampler | None:
+    """A sampler, also from a mapping of ranges; None of anything else."""
+    return Uniform(given) if isinstance(given, Mapping) else given if isinstance(given, Sampler) else None
