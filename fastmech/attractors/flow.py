@@ -19,8 +19,7 @@ from fastmech.ensembles.solve import Settings, solve
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError
-from fastmech.integrators.method import Method
-from fastmech.integrators.methods import find_method
+from fastmech.integrators.methods import Method, find_method
 from fastmech.models.mechanism import Mechanism
 
 Floats = NDArray[np.float64]
@@ -74,9 +73,7 @@ class Flow:
     def run(self, y: Floats, times: Floats, finer: float = 1.0) -> Reached:
         """States at rising times [periods], from the states y (n, dim) at time zero."""
         dt = self.period / math.ceil(self.steps * finer) * (1.0 + 1e-12)
-        solution = solve(
-            Case(self.problem, y, times * self.period, self.threads), Settings(self.method, dt)
-        )
+        solution = solve(Case(self.problem, y, times * self.period, self.threads), Settings(self.method, dt))
         stops = self.problem.observation.stops
         stopped = solution.records[0] != 0.0 if stops else np.zeros(len(y), dtype=np.bool_)
         last = solution.y[-1] if solution.last is None else solution.last
