@@ -12,8 +12,7 @@ from scipy.spatial import cKDTree
 from fastmech.arrays import Floats
 from fastmech.atlas.axes import check_axis, coefficient_columns, grid_coefficients
 from fastmech.atlas.continuation import LONGEST, Curve, newton, trace
-from fastmech.atlas.cover import TURNS, Found, apart, solutions, wrapped
-from fastmech.atlas.enclosure import System
+from fastmech.atlas.cover import TURNS, Found, System, apart, solutions, wrapped
 from fastmech.atlas.margin import margins
 from fastmech.atlas.systems import Plane, Point, cusp, families, point_at, rest, suited
 from fastmech.errors import InputError, shown

@@ -22,10 +22,9 @@ from fastmech.atlas.resting_map import map_resting_places
 from fastmech.atlas.sheets import SheetBuilder
 from fastmech.ensembles import checks
 from fastmech.ensembles.threads import thread_count
-from fastmech.equilibria.balance import wrap
 from fastmech.equilibria.descent import convex_radius, descend, step_off
 from fastmech.equilibria.outcome import Outcome
-from fastmech.equilibria.search import MOST
+from fastmech.equilibria.search import MOST, wrap
 from fastmech.equilibria.solve import INDICES, MERGE, SINGULAR, SOLUTION, Solution, solve
 from fastmech.errors import InputError
 from fastmech.jit import CUBE, MATRIX, STATUSES, kernel, named_tuple

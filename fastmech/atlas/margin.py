@@ -6,8 +6,7 @@ import numpy as np
 from numba import types
 
 from fastmech.arrays import Floats
-from fastmech.equilibria.balance import HALF_PI, normal_form, pulls, vanishing, wrap
-from fastmech.equilibria.search import angles
+from fastmech.equilibria.search import HALF_PI, angles, normal_form, pulls, vanishing, wrap
 from fastmech.jit import MATRIX, VECTOR, kernel
 
 

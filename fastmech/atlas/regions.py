@@ -19,9 +19,8 @@ from numba import types
 from numpy.typing import NDArray
 
 from fastmech.arrays import Codes, Floats
-from fastmech.equilibria.balance import EPS
 from fastmech.equilibria.certificate import apart
-from fastmech.equilibria.search import MOST
+from fastmech.equilibria.search import EPS, MOST
 from fastmech.equilibria.solve import INDICES
 from fastmech.jit import INTEGERS, MATRIX, STATUSES, inlined, kernel, named_tuple
 from fastmech.mechanism.reduced import potential_gradient, potential_hessian

@@ -19,7 +19,7 @@ from fastmech.arrays import Floats
 from fastmech.callee import callee
 from fastmech.capture.cells import bound_states
 from fastmech.capture.certificate import Certificate, Early, Noted
-from fastmech.capture.look import HEAD, RECORD, TABLE_ROWS
+from fastmech.capture.observe import HEAD, RECORD, TABLE_ROWS
 from fastmech.capture.steps import MEASURING, MOST_OCTAVES, PHASE, TURNING
 from fastmech.capture.wells import ROUNDING, Wells, prove_wells, values_of
 from fastmech.disturbance.size import Size, confining_energy, size_of
@@ -57,7 +57,7 @@ _OBSERVER = '''"""Made by fastmech: looks at the bounding energy of lanes."""
 
 import numpy as np
 
-from fastmech.capture.look import finish, work_left
+from fastmech.capture.observe import finish, work_left
 from fastmech.jit import OBSERVER_SIGNATURE, inlined, kernel, rounded_to
 from fastmech.kernels.exponential import exp
 from fastmech.kernels.sincos import cos, reduction_limit, sin, sincos
@@ -147,7 +147,7 @@ class MechanismCertificate(Certificate):
         return run_module(new_module("observer", source), source).observe
 
     def params(self, levels: Floats) -> Floats:
-        """Coefficients, then what :mod:`fastmech.capture.look` reads."""
+        """Coefficients, then what :mod:`fastmech.capture.observe` reads."""
         tree, n = self.tree, len(self.names)
         places = tree.equilibria.position[list(tree.wells)]
         head = np.array([0.0, n, len(tree.wells), self.fades, len(self.work), self.origin])

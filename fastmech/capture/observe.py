@@ -3,18 +3,26 @@
 Energy is looked at for all lanes at once; the position only for lanes whose energy has fallen below the
 highest level at which any well captures, which happens about once a lane. A captured lane runs on to the next
 multiple of an interval, so that computations with different steps stop it at the same time.
+
+``params`` are the energy's coefficients, then from ``first`` on: time between stops [s], coordinates, wells,
+time [s] by which loads have faded, number of works, time of the run's begin [s]; by coordinate the domain's
+low end, cells by unit, number of cells, period, high end; by well places, half widths of convex boxes (both
+wells x coordinates), levels; works [J]; cells.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from fastmech.arrays import Floats
+from fastmech.capture.cells import MOST_TURNS, WELL_DIGITS
+from fastmech.capture.certificate import OUT
 from fastmech.capture.locate import AMPLITUDE, FIRST_WELL, INTERVAL, RATE, WELLS, locate
 from fastmech.ensembles.ends import STOP_CODE, note_stop
-from fastmech.jit import OBSERVER_SIGNATURE, inlined, kernel
+from fastmech.jit import OBSERVER_SIGNATURE, called, inlined, kernel
 from fastmech.kernels.sincos import REDUCTION_LIMIT, sincos
 from fastmech.mechanism.reduced import metric_11, potential, slider_ratio
 
@@ -112,3 +120,102 @@ def observe_capture(t: float, Y: Floats, params: Floats, record: Floats) -> None
 def observe_capture_decaying(t: float, Y: Floats, params: Floats, record: Floats) -> None:
     """Capture while the force decays."""
     look(t, Y, params, record, params[AMPLITUDE] * math.exp(-params[RATE] * t))
+
+
+#: Numbers behind the coefficients, before those of coordinates.
+HEAD = 6
+
+#: Rows of numbers, one a coordinate, in front of the wells'.
+TABLE_ROWS = 5
+
+#: Rows of the record behind code, time and state of a stop: the energy below which the position is looked at
+#: next, the energy; of a captured lane the well's number, the time, and the energy where it stops; its turns.
+RECORD = 5
+
+
+@called
+def work_left(t: float, params: Any, first: int) -> float:
+    """The most work that loads can still do at a time."""
+    count = int(params[first + 4])
+    k = int(t / params[first + 3] * (count - 1)) if t < params[first + 3] else count - 1
+    begin = first + HEAD + TABLE_ROWS * int(params[first + 1])
+    begin += int(params[first + 2]) * (2 * int(params[first + 1]) + 1)
+    return float(params[begin + min(max(k, 0), count - 1)])
+
+
+@called
+def finish(t: float, Y: Any, params: Any, record: Any, first: int, low: int) -> None:
+    """Mark lanes that are captured or out of range, and at times of stopping stop those marked."""
+    n, row, at = int(params[first + 1]), first + HEAD, t - params[first + 5]
+    level, energy, well = 2 + 2 * n, 3 + 2 * n, 4 + 2 * n
+    if low:
+        for i in range(Y.shape[1]):
+            if record[energy, i] < record[level, i]:
+                _capture(at, Y, params, record, first, i)
+    for j in range(n):
+        if params[row + 3 * n + j] == 0.0:
+            for i in range(Y.shape[1]):
+                beyond = Y[j, i] < params[row + j] or Y[j, i] > params[row + 4 * n + j]
+                if beyond and record[well, i] == 0.0:
+                    record[well, i], record[well + 1, i], record[level, i] = OUT, at, -np.inf
+    if is_stop(at, params[first]):
+        for i in range(Y.shape[1]):
+            if record[well, i] != 0.0 and record[STOP_CODE, i] == 0.0:
+                record[well + 2, i] = record[energy, i]
+                note_stop(record[well, i], t, Y, record, i)
+
+
+@called
+def _capture(t: float, Y: Any, params: Any, record: Any, first: int, i: int) -> None:
+    """Mark lane ``i`` if it is below its well's level, else set the energy of its next look.
+
+    Above the level of the well w that its position leads to, a lane is in a component that holds other
+    minima with w, and only wells of that component whose level is no higher can still take it.
+    """
+    n, wells = int(params[first + 1]), int(params[first + 2])
+    row, turns = first + HEAD, 2 + 2 * n + RECORD
+    places = row + TABLE_ROWS * n
+    levels = places + 2 * wells * n
+    table = levels + wells + int(params[first + 4])
+    cell = 0
+    for j in range(n):
+        period, turned = params[row + 3 * n + j], 0.0
+        if period > 0.0:
+            turned = np.floor((Y[j, i] - params[row + j]) / period)
+        k = np.floor((Y[j, i] - turned * period - params[row + j]) * params[row + n + j])
+        count = params[row + 2 * n + j]
+        if not (k >= 0.0 and k < count):
+            if period == 0.0 or not abs(turned) < 1e9:
+                return
+            k = min(max(k, 0.0), count - 1.0)
+        cell = cell * int(count) + int(k)
+        record[turns + j, i] = turned
+    code, found = int(params[table + cell]), -1
+    if code > 0:
+        found, code = (code - 1) % WELL_DIGITS, (code - 1) // WELL_DIGITS
+        for j in range(n - 1, -1, -1):
+            record[turns + j, i] += code % (2 * MOST_TURNS + 1) - MOST_TURNS
+            code //= 2 * MOST_TURNS + 1
+    else:
+        for w in range(wells):
+            inside = True
+            for j in range(n):
+                period, away = params[row + 3 * n + j], Y[j, i] - params[places + w * n + j]
+                turned = np.floor(away / period + 0.5) if period > 0.0 else 0.0
+                inside &= abs(away - turned * period) < params[places + (wells + w) * n + j]
+            if inside:
+                found = w
+                for j in range(n):
+                    period, away = params[row + 3 * n + j], Y[j, i] - params[places + w * n + j]
+                    record[turns + j, i] = np.floor(away / period + 0.5) if period > 0.0 else 0.0
+                break
+    if found < 0:
+        return
+    energy, following = record[3 + 2 * n, i], -np.inf
+    if energy < params[levels + found]:
+        record[4 + 2 * n, i], record[5 + 2 * n, i] = found + 1.0, t
+    else:
+        for w in range(wells):
+            if params[levels + w] <= energy:
+                following = max(following, params[levels + w])
+    record[2 + 2 * n, i] = following

@@ -15,8 +15,7 @@ from typing import IO, TYPE_CHECKING, Any, TypeVar
 import click
 
 from fastmech.errors import InputError, one_line, shown_name
-from fastmech.interrupts import Interrupt, check, signal_of
-from fastmech.tiles.ends import CrashedTilesError
+from fastmech.interrupts import CrashedTilesError, Interrupt, check, signal_of
 
 if TYPE_CHECKING:
     from fastmech.cli.progress import ProgressBars

@@ -170,7 +170,7 @@ def _run_tile(
     mechanism: Mechanism | None,
 ) -> None:
     from fastmech.store.write import check_writable
-    from fastmech.tiles.alone import compute_alone
+    from fastmech.tiles.look import compute_alone
 
     if keep is not None:
         check_writable(keep)

@@ -14,8 +14,8 @@ from fastmech.disturbance.size import size_of
 from fastmech.ensembles import checks
 from fastmech.ensembles.fitting import damping_rate
 from fastmech.ensembles.integrate import integrate
-from fastmech.equilibria.balance import pulls, vanishing
 from fastmech.equilibria.find import Equilibrium, degenerate_sentence
+from fastmech.equilibria.search import pulls, vanishing
 from fastmech.errors import InputError
 from fastmech.integrators.methods import ImplicitRungeKutta, find_method
 from fastmech.mechanism.coefficients import reduce

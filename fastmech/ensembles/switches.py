@@ -32,8 +32,7 @@ from numpy.typing import NDArray
 from fastmech.arrays import Floats
 from fastmech.callee import CalleeType
 from fastmech.jit import INLINED, VECTOR, inlined
-from fastmech.kernels.fingerprint import enclosed
-from fastmech.kernels.rebuilding import rebuilt
+from fastmech.kernels.rebuilding import enclosed, rebuilt
 from fastmech.kernels.sincos import WITHIN, cos, sin
 
 #: Instructions of LLVM that decide.

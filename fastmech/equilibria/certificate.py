@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fastmech.equilibria.balance import EPS, Normal, Pulls, expected_count, wrap
 from fastmech.equilibria.outcome import Outcome
-from fastmech.equilibria.search import FloatArray, gradient, hessian
+from fastmech.equilibria.search import EPS, FloatArray, Normal, Pulls, expected_count, gradient, hessian, wrap
 from fastmech.jit import inlined
 
 COMPLETE = int(Outcome.COMPLETE)

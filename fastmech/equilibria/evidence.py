@@ -21,8 +21,8 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.equilibria.balance import EPS, pulls
 from fastmech.equilibria.certificate import existence_radius
+from fastmech.equilibria.search import EPS, pulls
 from fastmech.mechanism.coefficients import Coefficients
 from fastmech.mechanism.reduced import potential_gradient, potential_hessian
 

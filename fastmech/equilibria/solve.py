@@ -8,10 +8,23 @@ import numpy as np
 from numba import boolean, types
 from numpy.typing import NDArray
 
-from fastmech.equilibria.balance import EPS, Pulls, expected_count, normal_form, pulls, vanishing, wrap
 from fastmech.equilibria.certificate import AT_FOLD, COMPLETE, UNPROVED, apart, certify, unbalance
 from fastmech.equilibria.outcome import Outcome
-from fastmech.equilibria.search import LAPS, MOST, FloatArray, candidates, hessian, polish
+from fastmech.equilibria.search import (
+    EPS,
+    LAPS,
+    MOST,
+    FloatArray,
+    Pulls,
+    candidates,
+    expected_count,
+    hessian,
+    normal_form,
+    polish,
+    pulls,
+    vanishing,
+    wrap,
+)
 from fastmech.jit import MATRIX, STATUSES, VECTOR, inlined, interpreted, kernel, named_tuple
 from fastmech.mechanism.reduced import potential
 

@@ -16,7 +16,6 @@ from fastmech.ensembles.status import FAILURES, Status
 from fastmech.ensembles.threads import thread_count
 from fastmech.equilibria.find import Equilibrium, find_equilibria
 from fastmech.errors import InputError, StepWarning
-from fastmech.hardcases.case import REFUSED, HardCase, Row
 from fastmech.hardcases.cases import (
     algebraic,
     chaos,
@@ -36,6 +35,7 @@ from fastmech.hardcases.cases.conservative import (
     energy_history,
 )
 from fastmech.hardcases.containment import CONTAINED, contained, containment, containment_markdown
+from fastmech.hardcases.walk import REFUSED, HardCase, Row
 from fastmech.integrators.methods import METHODS, Adams, ImplicitRungeKutta, RungeKutta
 from fastmech.plots.energy_drift import draw_energy_drift
 from fastmech.plots.stability_region import draw_stability_regions

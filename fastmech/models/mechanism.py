@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
 from fastmech.generated import kept_text
-from fastmech.kernels.fingerprint import fingerprint
+from fastmech.kernels.rebuilding import fingerprint
 from fastmech.loads import BEFORE, Function, Load, Sampled
 from fastmech.models.checks import check
 from fastmech.models.statics import Coordinate, Statics

@@ -22,7 +22,7 @@ from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers, parts
 from fastmech.scan_types.axis import coordinate_units
 from fastmech.scene import Scene
 from fastmech.stability.criteria import Verdict
-from fastmech.stability.modes import SIN_PHI, SIN_PSI, UNLOADED
+from fastmech.stability.linearize import SIN_PHI, SIN_PSI, UNLOADED
 
 CRITERIA = {
     "verdict_sylvester": "verdict: Lagrange-Dirichlet",

@@ -8,8 +8,8 @@ from typing import Literal, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.equilibria.balance import pulls
 from fastmech.equilibria.certificate import existence_radius
+from fastmech.equilibria.search import pulls
 from fastmech.equilibria.solve import morse_index
 from fastmech.mechanism.lagrange import unit
 from fastmech.scene import Scene
@@ -24,8 +24,7 @@ from fastmech.stability.criteria import (
     hurwitz_determinants,
     root_errors,
 )
-from fastmech.stability.linearize import FloatArray, Rest, linearized
-from fastmech.stability.modes import MEANING, reach
+from fastmech.stability.linearize import MEANING, FloatArray, Rest, linearized, reach
 
 Word = Literal["asymptotically stable", "stable", "unstable", "critical"]
 

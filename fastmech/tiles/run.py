@@ -15,12 +15,11 @@ from pathlib import Path
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError
-from fastmech.interrupts import signal_of
+from fastmech.interrupts import CrashedTilesError, Stopped, signal_of
 from fastmech.results import Dataset
 from fastmech.scan_types.request import Request, RunContext, Tiles
 from fastmech.store.provenance import provenance
 from fastmech.store.write import write_results
-from fastmech.tiles.ends import CrashedTilesError, Stopped
 from fastmech.tiles.identity import asked_for, asked_of_result, differences, identity_of
 from fastmech.tiles.parts import DamagedManifestError, Manifest, Parts
 from fastmech.tiles.section import TiledSection, assembled, sections_of

@@ -9,8 +9,8 @@ import pytest
 
 from fastmech import open_results
 from fastmech.hardcases import containment, report
-from fastmech.hardcases.case import HardCase, Row
 from fastmech.hardcases.containment import CONTAINED, NUMBER, ONE_IN
+from fastmech.hardcases.walk import HardCase, Row
 from fastmech.integrators.methods import METHODS
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from fastmech.ensembles.integrate import integrate
-from fastmech.hardcases.case import REFUSED
 from fastmech.hardcases.walk import (
     FAMILIES,
+    REFUSED,
     ROUNDED,
     Goal,
     admitted_step,

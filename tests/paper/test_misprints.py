@@ -8,8 +8,7 @@ from oracles import TABLE_1, oracle
 
 from fastmech.paper.compare import Verdict, evaluate
 from fastmech.paper.compute import PAPER_SCENE, Computed
-from fastmech.paper.formulas import hamiltonian_16
-from fastmech.paper.misprints import Misprint, candidates
+from fastmech.paper.misprints import Misprint, candidates, hamiltonian_16
 from fastmech.paper.rows import all_rows
 
 KEYS = (

@@ -14,11 +14,11 @@ from filelock import FileLock
 from tiles.conftest import REQUEST, TILES, Run, content
 
 from fastmech.errors import InputError
+from fastmech.interrupts import CrashedTilesError, Stopped
 from fastmech.runner import run_request
 from fastmech.scan_types.equilibrium_map import MapTiling
 from fastmech.store.read import open_results
 from fastmech.tiles import identity
-from fastmech.tiles.ends import CrashedTilesError, Stopped
 from fastmech.tiles.look import ScanLook
 from fastmech.tiles.parts import Parts
 from fastmech.tiles.tile_file import DamagedTileError, check_tile

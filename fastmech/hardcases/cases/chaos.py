@@ -11,8 +11,19 @@ from fastmech.arrays import Floats
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
-from fastmech.hardcases.case import DRIVEN, HardCase, Row, energy, row_of
-from fastmech.hardcases.walk import admitted_step, claimed_row, fixed_row, halving_tells, motion, walked
+from fastmech.hardcases.walk import (
+    DRIVEN,
+    HardCase,
+    Row,
+    admitted_step,
+    claimed_row,
+    energy,
+    fixed_row,
+    halving_tells,
+    motion,
+    row_of,
+    walked,
+)
 from fastmech.scene import Scene
 from fastmech.transients.lyapunov import largest_lyapunov
 

@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fastmech.hardcases.case import HardCase, Row
 from fastmech.hardcases.walk import (
     ROUNDED,
     Goal,
+    HardCase,
+    Row,
     claimed_row,
     counted,
     explicit_calls,

@@ -13,8 +13,7 @@ from fastmech.basins.label import labels_of
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.ensembles.status import Status
 from fastmech.equilibria.find import find_equilibria
-from fastmech.hardcases.case import HardCase, Row, labels_row, row_of
-from fastmech.hardcases.walk import admitted_step, labellers, without_euler
+from fastmech.hardcases.walk import HardCase, Row, admitted_step, labellers, labels_row, row_of, without_euler
 from fastmech.scene import Scene
 from fastmech.stability.linearize import jacobian
 

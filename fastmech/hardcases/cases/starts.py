@@ -10,8 +10,7 @@ from fastmech.arrays import Floats
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import Status
 from fastmech.equilibria.find import find_equilibria
-from fastmech.hardcases.case import HardCase, Row, row_of, worst
-from fastmech.hardcases.walk import claimed_row, motion, walked
+from fastmech.hardcases.walk import HardCase, Row, claimed_row, motion, row_of, walked, worst
 from fastmech.integrators.methods import find_method
 from fastmech.scene import Scene
 from fastmech.step_limits.predict import largest_stable_step
