@@ -69,8 +69,7 @@ if TYPE_CHECKING:
     from fastmech.step_limits.warning import step_warning
     from fastmech.store.read import open_results
     from fastmech.system_info import system_info
-    from fastmech.transients.growth import transient_growth
-    from fastmech.transients.lyapunov import largest_lyapunov
+    from fastmech.transients.lyapunov import largest_lyapunov, transient_growth
 
 try:
     __version__ = metadata.version("fastmech")
@@ -137,7 +136,7 @@ _MODULES = {
     "trace_folds": "fastmech.atlas.folds",
     "trace_unreached": "fastmech.atlas.damping",
     "track_edge": "fastmech.basins.edge",
-    "transient_growth": "fastmech.transients.growth",
+    "transient_growth": "fastmech.transients.lyapunov",
     "trapped": "fastmech.capture.select",
     "uncertainty_exponent": "fastmech.basins.measures.uncertainty",
     "wada_merge_test": "fastmech.basins.measures.wada",

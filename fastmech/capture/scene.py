@@ -13,16 +13,19 @@ from fastmech.arrays import Floats
 from fastmech.atlas.map import ROUNDING
 from fastmech.capture.barriers import BarrierTree, barrier_tree, frozen_coefficients
 from fastmech.capture.certificate import Certificate, Early, Noted
-from fastmech.capture.locate import FIRST_WELL, INTERVAL, fill_cells, pack
 from fastmech.capture.observe import (
     CAPTURE_TIME,
+    FIRST_WELL,
+    INTERVAL,
     LEVEL,
     ROWS,
     STOP_ENERGY,
     TURNS_PHI,
     TURNS_THETA,
+    fill_cells,
     observe_capture,
     observe_capture_decaying,
+    pack,
 )
 from fastmech.capture.steps import (
     FINEST,

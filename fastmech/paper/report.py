@@ -12,8 +12,7 @@ from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError
 from fastmech.paper.compare import HEADINGS, Row, Verdict, load_printed
 from fastmech.paper.compute import METHOD, PAPER_SCENE, STEP, Computed, compute
-from fastmech.paper.datasets import all_datasets
-from fastmech.paper.figures import Picture, figure_pictures, table_pictures
+from fastmech.paper.figures import Picture, all_datasets, figure_pictures, table_pictures
 from fastmech.paper.misprints import Misprint, candidates
 from fastmech.paper.rows import Check, Guess, all_checks, all_rows, parameters_used
 from fastmech.plots.style import png

@@ -13,14 +13,13 @@ from fastmech.models.mechanism import Mechanism
 from fastmech.results import Dataset
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import Request, RunContext, Tiles, read_request, request_of_text
-from fastmech.store.image import dataset_image, dataset_of_image
 from fastmech.store.provenance import provenance
 from fastmech.store.read import open_results
 from fastmech.store.write import write_results
 from fastmech.tiles.identity import asked_for, identity_of
 from fastmech.tiles.parts import Manifest, Parts
 from fastmech.tiles.section import TiledSection, assembled, sections_of
-from fastmech.tiles.tile_file import DamagedTileError
+from fastmech.tiles.tile_file import DamagedTileError, dataset_image, dataset_of_image
 
 
 @dataclass(frozen=True)
