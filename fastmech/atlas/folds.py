@@ -10,12 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from fastmech.arrays import Floats
-from fastmech.atlas.axes import check_axis, coefficient_columns, grid_coefficients
+from fastmech.atlas.axes import check_axis, check_pair, coefficient_columns, grid_coefficients
 from fastmech.atlas.continuation import LONGEST, Curve, newton, trace
 from fastmech.atlas.cover import TURNS, Found, System, apart, solutions, wrapped
 from fastmech.atlas.margin import margins
 from fastmech.atlas.systems import Plane, Point, cusp, families, point_at, rest, suited
-from fastmech.errors import InputError, shown
 from fastmech.scene import Scene
 
 #: Points after which no further curve is begun.
@@ -142,11 +141,7 @@ def checked_plane(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLik
     Raises:
         InputError: see ``trace_folds``.
     """
-    for name, given in (("x", x), ("y", y)):
-        if not isinstance(given, tuple | list) or len(given) != 2 or not isinstance(given[0], str):
-            raise InputError(f"{name} = {shown(given)}: must be a parameter's name and its values")
-    if x[0] == y[0]:
-        raise InputError(f"axes: {x[0]} is given twice; two different parameters are needed")
+    check_pair(x, y)
     return {name: check_axis(scene, name, values) for name, values in (x, y)}
 
 

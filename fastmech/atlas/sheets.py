@@ -43,11 +43,12 @@ from fastmech.arrays import Codes, Floats, Integers
 from fastmech.atlas.axes import coefficient_columns
 from fastmech.atlas.margin import margins
 from fastmech.equilibria.certificate import apart
+from fastmech.equilibria.descent import slope
 from fastmech.equilibria.outcome import Outcome
 from fastmech.equilibria.search import EPS, MOST
 from fastmech.equilibria.solve import INDICES, Solution, solve_rows
 from fastmech.jit import INTEGERS, MATRIX, STATUSES, inlined, kernel, named_tuple
-from fastmech.mechanism.reduced import potential_gradient, potential_hessian
+from fastmech.mechanism.reduced import potential_hessian
 from fastmech.scene import Scene
 
 #: A partner is plain if the next candidate is this many times as far, and if both Hessians stay regular
@@ -64,10 +65,7 @@ LEAP = 0.05
 @inlined
 def newton_step(c: Floats, phi: float, theta: float) -> tuple[float, float, float]:
     """Newton step of the reduced gradient and the Hessian's determinant; ``c`` as ``Coefficients``."""
-    s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
-    s12, c12 = s1 * c2 + c1 * s2, c1 * c2 - s1 * s2
-    g1, g2 = potential_gradient(s1, c1, s2, c2, c12, c[2], c[3], c[4], c[5])
-    h11, h12, h22 = potential_hessian(s1, c1, s2, c2, s12, c[2], c[3], c[4], c[5])
+    g1, g2, h11, h12, h22 = slope(c, phi, theta)
     determinant = h11 * h22 - h12 * h12
     return -(h22 * g1 - h12 * g2) / determinant, -(h11 * g2 - h12 * g1) / determinant, determinant
 

@@ -17,7 +17,9 @@ from fastmech.plots.style import (
     PALETTE,
     Codes,
     coordinates_of,
+    entry,
     flag_codes,
+    in_fifths,
     new_figure,
     quantity,
     setting_of,
@@ -144,15 +146,11 @@ class Slice:
 
 def mark(marker: str, text: str, face: str = "white") -> Artist:
     """What a marker in a legend means."""
-    from matplotlib.lines import Line2D
-
-    return Line2D([], [], marker=marker, color="black", mfc=face, ms=8, ls="none", label=text)
+    return entry(text, marker=marker, mfc=face, ms=8, ls="none")
 
 
 def decisive(axes: Axes, view: Slice) -> list[Artist]:
     """Equilibria in the slice, and where the energy is that of each well's barrier."""
-    from matplotlib.lines import Line2D
-
     handles: list[Artist] = []
     data = view.dataset
     wells = np.flatnonzero(data["equilibrium_morse_index"].data == 0)
@@ -165,9 +163,7 @@ def decisive(axes: Axes, view: Slice) -> list[Artist]:
             axes.contour(x, y, energy.T, levels=[level], colors="black", linewidths=1.6, linestyles=look)
             which = " and ".join(str(i + 1) for i in np.flatnonzero(barriers == level))
             of = f" of well{'s' * (' ' in which)} {which}" if wells.size > 1 else ""
-            handles.append(
-                Line2D([], [], color="black", lw=1.6, ls=look, label=f"barrier energy{of}, {level:.4g} J")
-            )
+            handles.append(entry(f"barrier energy{of}, {level:.4g} J", lw=1.6, ls=look))
     for index, (marker, name) in MARKERS.items():
         for inside in (True, False):
             places = _places(view, index, inside)
@@ -344,7 +340,6 @@ def _share(where: NDArray[np.bool_]) -> str:
 def _times(view: Slice, name: str, title: str) -> Figure:
     from matplotlib.colors import ListedColormap, LogNorm, Normalize
     from matplotlib.patches import Patch
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     figure = new_figure(8.2, 7.0)
     axes = figure.subplots()
@@ -376,9 +371,7 @@ def _times(view: Slice, name: str, title: str) -> Figure:
     )
     bar = figure.colorbar(mesh, ax=axes, label=f"{name.replace('_', ' ')} [s]")
     if isinstance(norm, LogNorm):
-        bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        bar.ax.yaxis.set_minor_formatter(NullFormatter())
+        in_fifths(bar.ax.yaxis)
     handles = decisive(axes, view)
     meanings = {"white": WITHOUT_TIME[name], SKIPPED: "not computed: filled in between equal labels"}
     handles[:0] = [

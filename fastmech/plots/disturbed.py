@@ -17,6 +17,7 @@ from fastmech.plots.style import (
     LINES,
     PALETTE,
     coordinates_of,
+    entry,
     equilibrium_names,
     flag_codes,
     legend_below,
@@ -435,7 +436,6 @@ def _untold(view: View, sheet: int) -> Flags:
 
 
 def _marks(view: View, sheets: NDArray[np.int_], fields: list[tuple[str, Floats, str]]) -> list[Artist]:
-    from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
     handles: list[Artist] = []
@@ -447,7 +447,7 @@ def _marks(view: View, sheets: NDArray[np.int_], fields: list[tuple[str, Floats,
     if any(np.isinf(field[..., sheets]).any() for _, field, _ in fields):
         handles.append(Patch(facecolor=LATER, label="later than the end of the run"))
     if any(_untold(view, int(sheet)).any() for sheet in sheets):
-        handles.append(Line2D([], [], marker=UNTOLD, color="black", ms=5, ls="none", label=ABOUT_UNTOLD))
+        handles.append(entry(ABOUT_UNTOLD, marker=UNTOLD, ms=5, ls="none"))
     return handles
 
 

@@ -17,6 +17,7 @@ from fastmech.plots.style import (
     PI_TICKS,
     coordinates_of,
     flag_codes,
+    in_fifths,
     legend_below,
     logarithmic,
     new_figure,
@@ -431,13 +432,8 @@ def _field(axes: Axes, view: View, field: Floats, low: float, high: float) -> An
 
 def _bar(figure: Figure, mesh: Any, panels: list[Axes], label: str, extend: str) -> None:
     """A colour bar with an arrow at the end beyond which there are values."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
     bar = figure.colorbar(mesh, ax=panels, label=label, extend=extend)
-    if mesh.norm.vmax <= 3.0 * mesh.norm.vmin / SHALLOWEST:
-        bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    bar.ax.yaxis.set_minor_formatter(NullFormatter())
+    in_fifths(bar.ax.yaxis, mesh.norm.vmax <= 3.0 * mesh.norm.vmin / SHALLOWEST)
 
 
 def _nothing(view: View) -> list[Artist]:

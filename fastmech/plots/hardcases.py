@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
 from fastmech.integrators.methods import Method
-from fastmech.plots.style import PALETTE, legend_below, new_figure, style
+from fastmech.plots.style import PALETTE, entry, legend_below, new_figure, style
 from fastmech.results import Dataset
 from fastmech.step_limits.amplification import amplification
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -106,11 +107,10 @@ def _no_limit(value: float) -> str:
 
 
 def _legend(figure: Figure, bounded: bool) -> None:
-    from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    def mark(marker: str, color: str, label: str, face: str | None = None) -> Line2D:
-        return Line2D([], [], ls="", marker=marker, mfc=face or color, mec=color, ms=6, label=label)
+    def mark(marker: str, color: str, label: str, face: str | None = None) -> Artist:
+        return entry(label, ls="", marker=marker, mfc=face or color, mec=color, ms=6)
 
     stable = Patch(facecolor=PALETTE["sky"], edgecolor=PALETTE["blue"], alpha=0.5, label="no step amplifies")
     if bounded:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fastmech.plots.basins import FEW, FURTHER, NAMED, basin_color, basin_name, unlabelled
-from fastmech.plots.style import flag_codes, new_figure, style
+from fastmech.plots.style import entry, flag_codes, in_fifths, new_figure, style
 from fastmech.results import Dataset
 
 if TYPE_CHECKING:
@@ -23,7 +23,6 @@ BACK = "#e6e6e6"
 def draw_snapping(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
     """Picture of a dataset of the scan type ``snapping`` about the scene with these parameters."""
     from matplotlib.colors import ListedColormap
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     with style():
         figure = new_figure(8.2, 6.6)
@@ -43,9 +42,7 @@ def draw_snapping(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Fig
         handles += _unlabelled(axes, dataset) + _curves(axes, dataset)
         axes.set_xlim(*_edges(np.log(alpha), exponential=True)[[0, -1]])
         axes.set_ylim(*_edges(force)[[0, -1]])
-        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axes.xaxis.set_minor_formatter(NullFormatter())
+        in_fifths(axes.xaxis)
         axes.set_xlabel("rate α at which the force decays [1/s]")
         axes.set_ylabel("force F0 when it is switched on [N]")
         axes.set_title(
@@ -96,7 +93,6 @@ def _ends(dataset: Dataset) -> tuple[np.ndarray, list[str], list[Artist]]:
 
 def _unlabelled(axes: Axes, dataset: Dataset) -> list[Artist]:
     """Motions without a label, each marked where they are few."""
-    from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
     status, codes = dataset["status"].data, flag_codes(dataset["status"])
@@ -114,7 +110,7 @@ def _unlabelled(axes: Axes, dataset: Dataset) -> list[Artist]:
         axes.plot(
             dataset["alpha"].data[k], dataset["F0"].data[j], marker, color="black", ms=5, ls="none", zorder=4
         )
-        handles.append(Line2D([], [], marker=marker, color="black", ms=6, ls="none", label=text))
+        handles.append(entry(text, marker=marker, ms=6, ls="none"))
     return handles
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from fastmech.results import Dataset, Variable
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
@@ -169,10 +170,22 @@ def flag_codes(variable: Variable) -> Codes:
 
 def logarithmic(axis: Axis) -> None:
     """Ticks of a logarithmic axis whose labels keep apart, over a part of a decade or over many."""
+    low, high = axis.get_view_interval()
+    in_fifths(axis, high < 30.0 * low)
+
+
+def in_fifths(axis: Axis, labelled: bool = True) -> None:
+    """Ticks of a logarithmic axis at 1, 2 and 5 in every decade, else as usual; none between."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    low, high = axis.get_view_interval()
-    if high < 30.0 * low:
+    if labelled:
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
+
+
+def entry(label: str, **look: Any) -> Artist:
+    """A line or a mark of a legend, black unless it has another colour."""
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], **{"color": "black", "label": label, **look})
