@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats
 from fastmech.atlas.resting_map import RestingMap, map_resting_places, resting_places_at
-from fastmech.equilibria.outcome import Outcome
+from fastmech.equilibria.certificate import Outcome
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import VERDICTS

@@ -23,7 +23,7 @@ from fastmech.atlas.critical import Known, Pairs, changes, named, narrowed
 from fastmech.atlas.defining import Balance
 from fastmech.atlas.folds import finish_on_edge
 from fastmech.atlas.resting_map import map_resting_places
-from fastmech.equilibria.outcome import Outcome
+from fastmech.equilibria.certificate import Outcome
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
 

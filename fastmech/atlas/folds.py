@@ -10,10 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from fastmech.arrays import Floats
-from fastmech.atlas.axes import check_axis, check_pair, coefficient_columns, grid_coefficients
+from fastmech.atlas.axes import check_axis, check_pair, coefficient_columns, grid_coefficients, margins
 from fastmech.atlas.continuation import LONGEST, Curve, newton, trace
 from fastmech.atlas.cover import TURNS, Found, System, apart, solutions, wrapped
-from fastmech.atlas.margin import margins
 from fastmech.atlas.systems import Plane, Point, cusp, families, point_at, rest, suited
 from fastmech.scene import Scene
 

@@ -22,8 +22,8 @@ from fastmech.atlas.resting_map import map_resting_places
 from fastmech.atlas.sheets import SheetBuilder
 from fastmech.ensembles import checks
 from fastmech.ensembles.threads import thread_count
+from fastmech.equilibria.certificate import Outcome
 from fastmech.equilibria.descent import convex_radius, descend, step_off
-from fastmech.equilibria.outcome import Outcome
 from fastmech.equilibria.search import MOST, wrap
 from fastmech.equilibria.solve import INDICES, MERGE, SINGULAR, SOLUTION, Solution, solve
 from fastmech.errors import InputError
@@ -32,7 +32,7 @@ from fastmech.mechanism.impulse import POINTS, impulse_for, mobility
 from fastmech.mechanism.reduced import potential_hessian
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
-from fastmech.stability.criteria import assess_one
+from fastmech.stability.classify import assess_one
 
 
 class Coincidence(IntEnum):

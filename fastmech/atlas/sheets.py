@@ -40,11 +40,9 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from fastmech.arrays import Codes, Floats, Integers
-from fastmech.atlas.axes import coefficient_columns
-from fastmech.atlas.margin import margins
-from fastmech.equilibria.certificate import apart
+from fastmech.atlas.axes import coefficient_columns, margins
+from fastmech.equilibria.certificate import Outcome, apart
 from fastmech.equilibria.descent import slope
-from fastmech.equilibria.outcome import Outcome
 from fastmech.equilibria.search import EPS, MOST
 from fastmech.equilibria.solve import INDICES, Solution, solve_rows
 from fastmech.jit import INTEGERS, MATRIX, STATUSES, inlined, kernel, named_tuple

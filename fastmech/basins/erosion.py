@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Floats, Integers
-from fastmech.atlas.following import follow_wells
 from fastmech.atlas.map import map_equilibria
+from fastmech.atlas.resting_map import follow_wells
 from fastmech.basins.label import label_starts
 from fastmech.basins.measures.fractions import basin_stability
 from fastmech.basins.measures.integrity import integrity

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from fastmech.arrays import Floats
 from fastmech.capture.certificate import Certificate
 from fastmech.ensembles.ends import STOP_TIME
-from fastmech.ensembles.lanes import finite_rows
+from fastmech.ensembles.lanes import MOST_STEPS, finite_rows
 from fastmech.ensembles.run import run_ensemble
-from fastmech.ensembles.spans import MOST_STEPS
 from fastmech.errors import InputError
 from fastmech.integrators.methods import Method
 

@@ -19,7 +19,7 @@ from fastmech.atlas.folds import trace_folds
 from fastmech.atlas.map import EquilibriumMap, map_equilibria
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.threads import thread_count
-from fastmech.equilibria.outcome import Outcome
+from fastmech.equilibria.certificate import Outcome
 from fastmech.reports import Stage, in_turns, table
 from fastmech.scene import Scene
 

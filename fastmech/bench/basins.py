@@ -17,7 +17,7 @@ from scipy.integrate import solve_ivp
 from fastmech.arrays import Floats
 from fastmech.basins.label import labels_of
 from fastmech.bench.plain import scalar_rhs
-from fastmech.disturbance.size import confining_energy, excess_energy
+from fastmech.disturbance.motion import confining_energy, excess_energy
 from fastmech.ensembles.threads import thread_count
 from fastmech.equilibria.find import find_equilibria
 from fastmech.jit import FLAGS

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import problem_of
-from fastmech.ensembles.interpolation import solve_at
 from fastmech.ensembles.problem import Case
 from fastmech.ensembles.run import Progress
+from fastmech.ensembles.solve import solve_at
 from fastmech.ensembles.system import System
 from fastmech.ensembles.tolerance import SAMPLE, evenly, usable_starts
 from fastmech.ensembles.work_precision import (

@@ -14,7 +14,7 @@ from fastmech.arrays import Floats
 from fastmech.bench.devices import KINDS
 from fastmech.bench.measure import Stage
 from fastmech.bench.tables import table
-from fastmech.equilibria.outcome import Outcome
+from fastmech.equilibria.certificate import Outcome
 from fastmech.models.equilibria import RestingPlaces, prove_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.statics import Statics

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.disturbance.size import Size
+from fastmech.disturbance.motion import Size
 from fastmech.ensembles.run import CALL_STEPS_WITH_STOPS, Observation
 from fastmech.integrators.methods import Method
 

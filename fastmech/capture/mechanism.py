@@ -26,7 +26,7 @@ from fastmech.capture.cells import bound_cells, bound_states, convex_box, fill_c
 from fastmech.capture.certificate import Certificate, Early, Noted
 from fastmech.capture.observe import HEAD, RECORD, TABLE_ROWS
 from fastmech.capture.steps import MEASURING, MOST_OCTAVES, PHASE, TURNING
-from fastmech.disturbance.size import Size, confining_energy, size_of
+from fastmech.disturbance.motion import Size, confining_energy, size_of
 from fastmech.ensembles.ends import STOP_CODE
 from fastmech.ensembles.problem import system_of
 from fastmech.ensembles.run import CALL_STEPS_WITH_STOPS, Observation

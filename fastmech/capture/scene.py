@@ -38,8 +38,7 @@ from fastmech.capture.steps import (
     shortest_step,
     step_of_fading,
 )
-from fastmech.disturbance.motion import damped_times
-from fastmech.disturbance.size import Size, confining_energy, size_of
+from fastmech.disturbance.motion import Size, confining_energy, damped_times, size_of
 from fastmech.ensembles.ends import STOP_CODE
 from fastmech.ensembles.fitting import breaks_energy_bounds
 from fastmech.ensembles.run import CALL_STEPS_WITH_STOPS, Observation
@@ -191,7 +190,7 @@ class SceneCertificate(Certificate):
         return energy_change(c, np.abs(most), states, apart)
 
     def size(self, equilibrium: int) -> Size:
-        """See :func:`fastmech.disturbance.size.size_at`."""
+        """See :func:`fastmech.disturbance.motion.size_at`."""
         e = self.tree.equilibria[equilibrium]
         return size_of(self.held, e)
 

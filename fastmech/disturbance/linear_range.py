@@ -7,8 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from fastmech.arrays import Floats
-from fastmech.disturbance.motion import disturbed_motion, equilibria_to_disturb
-from fastmech.disturbance.size import Size, size_of, unit_directions
+from fastmech.disturbance.motion import (
+    Size,
+    disturbed_motion,
+    equilibria_to_disturb,
+    size_of,
+    unit_directions,
+)
 from fastmech.ensembles import checks
 from fastmech.equilibria.find import Equilibrium
 from fastmech.models.equilibria import RestingPlace
@@ -47,9 +52,9 @@ def linear_range(
 
     The deviation of a disturbance is the maximum of size(nonlinear - linearized) divided by that of
     size(nonlinear), both over 201 evenly spaced times of [0, horizon], in the norm of
-    :class:`fastmech.disturbance.size.Size`. Along every direction (uniform on the sphere) sizes from 1e-6 rad
-    to pi rad are tried upwards, and the first crossing of the tolerance is refined by bisection to one part
-    in 10,000. ``dt`` is the longest step [s], by default that of
+    :class:`fastmech.disturbance.motion.Size`. Along every direction (uniform on the sphere) sizes from
+    1e-6 rad to pi rad are tried upwards, and the first crossing of the tolerance is refined by bisection to
+    one part in 10,000. ``dt`` is the longest step [s], by default that of
     :func:`fastmech.disturbance.motion.disturbed_motion`. ``part`` says which of the directions to try, all by
     default.
 

@@ -20,10 +20,8 @@ from numba import types
 
 from fastmech.arrays import Floats, Integers
 from fastmech.callee import callee
-from fastmech.ensembles.lanes import Lanes
-from fastmech.ensembles.spans import Span
-from fastmech.integrators.batch import PHASE, Batch
-from fastmech.integrators.explicit import WEIGHTS, Moment, Stepped, step_by_stages, weights_of
+from fastmech.ensembles.lanes import Lanes, Span
+from fastmech.integrators.explicit import PHASE, WEIGHTS, Batch, Moment, Stepped, step_by_stages, weights_of
 from fastmech.integrators.implicit import CALLS, SCHEME, Calls, drive_implicit, inverse_by_elimination
 from fastmech.integrators.methods import Adams, ImplicitRungeKutta, Method
 from fastmech.jit import MATRIX, OBSERVER, OBSERVER_SIGNATURE, RHS, VECTOR, inlined, kernel, named_tuple

@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 from fastmech.arrays import Flags, Floats
 from fastmech.ensembles.fitting import EXPONENT_ONCE, fit_steps, speed_bound, vibration_frequency
-from fastmech.ensembles.interpolation import solve_at
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.piecewise import METHOD, follow_to_tolerance
 from fastmech.ensembles.problem import Case, Problem
@@ -33,6 +32,7 @@ from fastmech.ensembles.solve import (
     part_of,
     put_into,
     solve,
+    solve_at,
     tell_aside,
 )
 from fastmech.ensembles.status import missed_line

@@ -25,11 +25,10 @@ from fastmech.ensembles.fitting import (
     speed_bound,
     vibration_frequency,
 )
-from fastmech.ensembles.interpolation import STEPS_BETWEEN, solve_at
+from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.problem import Case
 from fastmech.ensembles.run import Sample
-from fastmech.ensembles.solve import Settings, Solution, distances, nothing
-from fastmech.ensembles.spans import output_steps
+from fastmech.ensembles.solve import STEPS_BETWEEN, Settings, Solution, distances, nothing, solve_at
 from fastmech.integrators.methods import Adams, Explicit, ImplicitRungeKutta, Method, find_method
 from fastmech.kernels.rebuilding import rebuilt
 from fastmech.kernels.sincos import cos, sin

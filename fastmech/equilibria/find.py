@@ -24,8 +24,7 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.equilibria.certificate import existence_radius
-from fastmech.equilibria.outcome import Outcome
+from fastmech.equilibria.certificate import Outcome, existence_radius
 from fastmech.equilibria.search import EPS, FloatArray, pulls
 from fastmech.equilibria.solve import explain, solve_rows
 from fastmech.errors import InputError, shown

@@ -8,8 +8,7 @@ import numpy as np
 from numba import boolean, types
 from numpy.typing import NDArray
 
-from fastmech.equilibria.certificate import AT_FOLD, COMPLETE, UNPROVED, apart, certify, unbalance
-from fastmech.equilibria.outcome import Outcome
+from fastmech.equilibria.certificate import AT_FOLD, COMPLETE, UNPROVED, Outcome, apart, certify, unbalance
 from fastmech.equilibria.search import (
     EPS,
     LAPS,

@@ -23,11 +23,11 @@ from fastmech.basins.label import Labels
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.ensembles.status import Status
 from fastmech.errors import InputError
-from fastmech.integrators.batch import Batch, observe_nothing
+from fastmech.integrators.explicit import Batch, observe_nothing
 from fastmech.integrators.methods import METHODS, Adams, ImplicitRungeKutta, find_method
 from fastmech.integrators.tableaus.implicit import IMPLICIT_TABLEAUS
-from fastmech.kernels.counting import CALLS, JACOBIANS, counting_jacobian, counting_lagrange
 from fastmech.kernels.jacobians import lagrange_inverse, lagrange_jacobian
+from fastmech.kernels.work import CALLS, JACOBIANS, counting_jacobian, counting_lagrange
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import kinetic_energy, potential_energy
 from fastmech.scene import Scene

@@ -21,7 +21,7 @@ import numpy as np
 from numba import types
 
 from fastmech.arrays import Floats, Integers
-from fastmech.integrators.batch import ROUNDED_TIME, Batch, BlockRHS, Observer, batch_type
+from fastmech.integrators.explicit import ROUNDED_TIME, Batch, BlockRHS, Observer, batch_type
 from fastmech.integrators.tableau import Scheme
 from fastmech.jit import (
     INVERSE,

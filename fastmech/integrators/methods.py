@@ -39,8 +39,7 @@ import numpy as np
 from fastmech.arrays import Floats
 from fastmech.callee import callee
 from fastmech.errors import InputError, shown
-from fastmech.integrators.batch import Batch
-from fastmech.integrators.explicit import Weights, formula_of, take_steps, weights_of
+from fastmech.integrators.explicit import Batch, Weights, formula_of, take_steps, weights_of
 from fastmech.integrators.implicit import Calls, drive_implicit, inverse_by_elimination
 from fastmech.integrators.tableau import ImplicitTableau, Tableau
 from fastmech.integrators.tableaus import TABLEAUS

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fastmech.arrays import Floats
 from fastmech.callee import callee
 from fastmech.equilibria import find
-from fastmech.equilibria.outcome import Outcome
+from fastmech.equilibria.certificate import Outcome
 from fastmech.errors import InputError, shown
 from fastmech.intervals.search import AT_END, LIMIT, TWO_PI, UNCLEAR, UNDEFINED, Found, search, work
 from fastmech.loads import Constant

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fastmech.arrays import Floats
-from fastmech.disturbance.motion import DisturbedMotion, disturbed_motion
-from fastmech.disturbance.size import size_at
+from fastmech.disturbance.motion import DisturbedMotion, disturbed_motion, size_at
 from fastmech.ensembles.balance import EnergyBalance, energy_balance
 from fastmech.ensembles.integrate import integrate
 from fastmech.equilibria.find import Certificate, Equilibria, Equilibrium, find_equilibria

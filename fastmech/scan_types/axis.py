@@ -15,7 +15,7 @@ from fastmech.basins.measures.norm import check_angles
 from fastmech.basins.runs import rounds_until
 from fastmech.capture.steps import fastest_followed, shortest_step
 from fastmech.ensembles import checks
-from fastmech.ensembles.spans import MOST_STEPS
+from fastmech.ensembles.lanes import MOST_STEPS
 from fastmech.errors import InputError, shown
 from fastmech.mechanism.coefficients import reduce
 from fastmech.models.mechanism import Mechanism

@@ -39,10 +39,10 @@ from fastmech.disturbance.motion import (
     equilibria_to_disturb,
     require_constant_force,
     require_isolated,
+    size_of,
 )
-from fastmech.disturbance.size import size_of
 from fastmech.ensembles.integrate import integrate
-from fastmech.ensembles.spans import output_steps
+from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.status import ENDS, FAILURES, failure_counts
 from fastmech.equilibria.find import Equilibrium, find_equilibria
 from fastmech.errors import InputError, shown

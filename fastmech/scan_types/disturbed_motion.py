@@ -20,7 +20,7 @@ from fastmech.disturbance.motion import (
     require_isolated,
 )
 from fastmech.ensembles import checks
-from fastmech.ensembles.spans import output_steps
+from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.status import FAILURES
 from fastmech.equilibria.find import Equilibria, Equilibrium
 from fastmech.equilibria.search import MOST

@@ -31,7 +31,7 @@ from fastmech.atlas.map import BLOCK, Slab, solve_block
 from fastmech.atlas.resting_map import RestingMap, map_resting_places
 from fastmech.atlas.sheets import SheetBuilder
 from fastmech.ensembles.threads import thread_count
-from fastmech.equilibria.outcome import Outcome
+from fastmech.equilibria.certificate import Outcome
 from fastmech.equilibria.search import MOST
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism

@@ -14,14 +14,14 @@ from fastmech.atlas.damping import trace_unreached
 from fastmech.atlas.folds import find_folds, trace_folds
 from fastmech.atlas.map import Coincidence, Slab
 from fastmech.atlas.resting_map import RestingMap
-from fastmech.equilibria.outcome import Outcome
+from fastmech.equilibria.certificate import Outcome
 from fastmech.mechanism.impulse import POINTS
 from fastmech.models.drawing import Element, drawing
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers, parts
 from fastmech.scan_types.axis import coordinate_units
 from fastmech.scene import Scene
-from fastmech.stability.criteria import Verdict
+from fastmech.stability.classify import Verdict
 from fastmech.stability.linearize import SIN_PHI, SIN_PSI, UNLOADED
 
 CRITERIA = {

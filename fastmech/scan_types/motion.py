@@ -12,7 +12,7 @@ from fastmech.arrays import Floats
 from fastmech.ensembles import checks
 from fastmech.ensembles.balance import energy_balance
 from fastmech.ensembles.integrate import integrate
-from fastmech.ensembles.spans import output_steps
+from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.status import FAILURES
 from fastmech.errors import InputError, shown
 from fastmech.mechanism.coefficients import force

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.integrators.batch import Batch, observe_nothing
+from fastmech.integrators.explicit import Batch, observe_nothing
 from fastmech.integrators.methods import Adams, Method, find_method, with_jacobian
 from fastmech.kernels.jacobians import lagrange_inverse, lagrange_jacobian
 from fastmech.kernels.select import right_hand_side

@@ -27,7 +27,7 @@ from fastmech.ensembles.problem import extreme_scenes
 from fastmech.ensembles.status import Status, failure_counts, failure_line
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError
-from fastmech.integrators.batch import BlockRHS
+from fastmech.integrators.explicit import BlockRHS
 from fastmech.integrators.implicit import difference_jacobian
 from fastmech.integrators.methods import find_method
 from fastmech.integrators.tableaus import TABLEAUS

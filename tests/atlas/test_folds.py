@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from fastmech.atlas.folds import FoldSet, find_folds, trace_folds
 from fastmech.atlas.map import Coincidence, map_equilibria
-from fastmech.equilibria.outcome import Outcome
+from fastmech.equilibria.certificate import Outcome
 from fastmech.errors import InputError
 from fastmech.scene import Scene
 

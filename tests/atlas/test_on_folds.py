@@ -10,7 +10,7 @@ from test_folds import PAPER, PLANES, WEIGHT
 from fastmech.atlas.axes import coefficient_columns
 from fastmech.atlas.folds import trace_folds
 from fastmech.atlas.map import Coincidence, map_equilibria
-from fastmech.equilibria.outcome import Outcome
+from fastmech.equilibria.certificate import Outcome
 from fastmech.equilibria.solve import Solution, solve_rows
 from fastmech.scene import Scene
 

@@ -9,7 +9,7 @@ import pytest
 from scenes import exact_unit_roots, loads, polynomial, random_scenes, roots
 
 from fastmech.atlas.axes import coefficient_columns
-from fastmech.equilibria.outcome import Outcome
+from fastmech.equilibria.certificate import Outcome
 from fastmech.equilibria.solve import Solution, solve_rows
 from fastmech.scene import Scene
 

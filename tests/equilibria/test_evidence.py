@@ -10,8 +10,8 @@ import mpmath
 import numpy as np
 import pytest
 
+from fastmech.equilibria.certificate import Outcome
 from fastmech.equilibria.find import find_equilibria, gather, rest_polynomial
-from fastmech.equilibria.outcome import Outcome
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 

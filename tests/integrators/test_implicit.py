@@ -8,7 +8,7 @@ from integrators.driving import A, W, drive, one_block, polynomial, rotation
 from integrators.systems import Floats
 
 import fastmech as fm
-from fastmech.integrators.batch import observe_nothing
+from fastmech.integrators.explicit import observe_nothing
 from fastmech.integrators.methods import METHODS, ImplicitRungeKutta
 from fastmech.integrators.tableau import ImplicitTableau
 from fastmech.integrators.tableaus.implicit import IMPLICIT_TABLEAUS
