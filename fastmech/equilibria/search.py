@@ -35,8 +35,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.jit import inlined
 from fastmech.mechanism.reduced import potential_gradient, potential_hessian
 
@@ -227,8 +227,6 @@ def expected_count(n: Normal) -> int:
     return 0
 
 
-FloatArray = NDArray[np.float64]
-
 #: The exact bound on the number of equilibria of a scene whose equilibria are isolated.
 MOST = 6
 
@@ -324,7 +322,7 @@ def polish(p: Pulls, phi: float, theta: float) -> tuple[float, float]:
 
 
 @inlined
-def candidates(p: Pulls, n: Normal, phi: FloatArray, theta: FloatArray) -> int:
+def candidates(p: Pulls, n: Normal, phi: Floats, theta: Floats) -> int:
     """Write every equilibrium's angles into ``phi, theta`` (``LAPS`` slots each) and return their number.
 
     Where the fold is within rounding the laps that may have merged are all searched; what they give

@@ -8,23 +8,22 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fastmech.arrays import Floats
 from fastmech.mechanism.reduced import slider_ratio
 from fastmech.scene import Scene
-
-Array = NDArray[np.float64]
 
 
 class Points(NamedTuple):
     """A vector quantity of M1, M2 and the slider M3, each component of shape (...)."""
 
-    x1: Array
-    y1: Array
-    x2: Array
-    y2: Array
-    x3: Array
-    y3: Array
+    x1: Floats
+    y1: Floats
+    x2: Floats
+    y2: Floats
+    x3: Floats
+    y3: Floats
 
 
 def positions(scene: Scene, y: ArrayLike) -> Points:
@@ -64,7 +63,7 @@ def accelerations(scene: Scene, y: ArrayLike, angular: ArrayLike) -> Points:
     return Points(x1, y1, x2, y2, x3, np.zeros_like(x3))
 
 
-def constraints(scene: Scene, points: Points) -> Array:
+def constraints(scene: Scene, points: Points) -> Floats:
     """Residuals of the constraints (2)-(5), shape (4, ...): m^2, m^2, m, m^2.
 
     The paper's (2) prints x2 where x1 belongs.
@@ -81,6 +80,6 @@ def constraints(scene: Scene, points: Points) -> Array:
     )
 
 
-def _components(values: ArrayLike) -> Array:
+def _components(values: ArrayLike) -> Floats:
     """The last axis in front, as float64."""
     return np.moveaxis(np.asarray(values, dtype=np.float64), -1, 0)

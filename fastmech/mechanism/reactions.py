@@ -9,24 +9,23 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
 from fastmech.mechanism.coefficients import force
 from fastmech.mechanism.geometry import accelerations, positions, velocities
 from fastmech.mechanism.lagrange import angular_accelerations
 from fastmech.scene import Scene
 
-Array = NDArray[np.float64]
-
 
 class Reactions(NamedTuple):
     """Constraint forces [N], each of the shape of the states given."""
 
-    rod_om1: Array  #: axial force in rod O-M1, tension positive
-    rod_m1m2: Array  #: axial force in rod M1-M2, tension positive
-    rod_m1m3: Array  #: axial force in rod M1-M3, tension positive
-    slider_normal: Array  #: force of the guide on the slider, upwards positive
+    rod_om1: Floats  #: axial force in rod O-M1, tension positive
+    rod_m1m2: Floats  #: axial force in rod M1-M2, tension positive
+    rod_m1m3: Floats  #: axial force in rod M1-M3, tension positive
+    slider_normal: Floats  #: force of the guide on the slider, upwards positive
 
 
 def reactions(scene: Scene, y: ArrayLike, t: ArrayLike) -> Reactions:

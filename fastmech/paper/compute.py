@@ -11,7 +11,7 @@ from fastmech.disturbance.motion import DisturbedMotion, disturbed_motion, size_
 from fastmech.ensembles.balance import EnergyBalance, energy_balance
 from fastmech.ensembles.integrate import integrate
 from fastmech.equilibria.find import Certificate, Equilibria, Equilibrium, find_equilibria
-from fastmech.mechanism.hamilton import momenta
+from fastmech.mechanism.lagrange import momenta
 from fastmech.paper.compare import CASES, Printed
 from fastmech.scene import Scene
 from fastmech.stability.classify import Classification, classify

@@ -18,14 +18,16 @@ from scipy.integrate import solve_ivp
 from fastmech.arrays import Floats
 from fastmech.ensembles.balance import EnergyBalance
 from fastmech.mechanism.geometry import positions, velocities
-from fastmech.mechanism.hamilton import hamiltonian, momenta, rates
 from fastmech.mechanism.lagrange import (
     angular_accelerations,
     christoffel,
     generalized_forces,
+    hamiltonian,
     metric,
+    momenta,
     potential_energy,
     potential_gradient,
+    rates,
 )
 from fastmech.paper.compare import CASES, Printed, agrees_legibly, evaluate, half_unit
 from fastmech.paper.compute import PAPER_SCENE, START, Case, Computed

@@ -17,7 +17,7 @@ from fastmech.ensembles.status import FAILURES
 from fastmech.errors import InputError, shown
 from fastmech.mechanism.coefficients import force
 from fastmech.mechanism.geometry import constraints, positions
-from fastmech.mechanism.hamilton import momenta
+from fastmech.mechanism.lagrange import momenta
 from fastmech.mechanism.reactions import reactions
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import Dataset, Variable, parts

@@ -10,8 +10,8 @@ from numbers import Real
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
 from fastmech.jit import inlined
 from fastmech.mechanism.coefficients import Coefficients, reduce
@@ -59,9 +59,6 @@ def require_rest(scene: Any, equilibrium: Any) -> None:
             f"this scene (F0 = {scene.F0:g} N, alpha = {scene.alpha:g} 1/s) does not rest there; "
             "take one of fastmech.find_equilibria(scene)"
         )
-
-
-FloatArray = NDArray[np.float64]
 
 
 class Rest(Protocol):
@@ -164,7 +161,7 @@ def polynomial(s: SmallMotion) -> tuple[float, float, float, float]:
 
 
 @inlined
-def fill_state_matrix(s: SmallMotion, out: FloatArray) -> None:
+def fill_state_matrix(s: SmallMotion, out: Floats) -> None:
     """Write the 4 x 4 matrix that takes (xi_phi, xi_theta, eta_phi, eta_theta) to its rate, eta = xi'."""
     d = s.determinant
     out[:] = 0.0
@@ -192,7 +189,7 @@ def linearized(scene: Scene, equilibrium: Rest) -> tuple[Coefficients, SmallMoti
     return c, SmallMotion(*(float(value) for value in motion))
 
 
-def jacobian(scene: Scene, equilibrium: Rest) -> FloatArray:
+def jacobian(scene: Scene, equilibrium: Rest) -> Floats:
     """State matrix (4, 4) of the linearized motion of (xi_phi, xi_theta, eta_phi, eta_theta), paper (21).
 
     Raises:
