@@ -10,7 +10,8 @@ from enum import IntEnum
 
 import numpy as np
 
-from fastmech.equilibria.search import EPS, FloatArray, Normal, Pulls, expected_count, gradient, hessian, wrap
+from fastmech.arrays import Floats
+from fastmech.equilibria.search import EPS, Normal, Pulls, expected_count, gradient, hessian, wrap
 from fastmech.jit import inlined
 
 
@@ -119,7 +120,7 @@ def apart(phi1: float, theta1: float, phi2: float, theta2: float) -> float:
 
 
 @inlined
-def certify(p: Pulls, n: Normal, count: int, phi: FloatArray, theta: FloatArray, radius: FloatArray) -> int:
+def certify(p: Pulls, n: Normal, count: int, phi: Floats, theta: Floats, radius: Floats) -> int:
     """Outcome for a list of ``count`` equilibria; writes the existence radius [rad] of each into ``radius``.
 
     COMPLETE needs all three: every entry proved, the balls disjoint (so all are different), and as many as

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
 from fastmech.equilibria.certificate import Outcome, existence_radius
-from fastmech.equilibria.search import EPS, FloatArray, pulls
+from fastmech.equilibria.search import EPS, pulls
 from fastmech.equilibria.solve import explain, solve_rows
 from fastmech.errors import InputError, shown
 from fastmech.mechanism.coefficients import Coefficients, force, reduce
@@ -221,13 +221,13 @@ class Equilibrium:
     phi: float  #: [rad] in (-pi, pi]
     theta: float  #: [rad] in (-pi, pi]
     energy: float  #: U = Pi - F x2 [J]
-    hessian: FloatArray  #: second derivatives of U (2, 2) [J], paper (19)
+    hessian: Floats  #: second derivatives of U (2, 2) [J], paper (19)
     morse_index: int  #: number of negative eigenvalues of the Hessian; -2: singular within rounding
     radius: float  #: the true equilibrium is proved to be within so many rad; inf: not proved
     force: float  #: the frozen force F that it holds for [N]
 
     @property
-    def position(self) -> FloatArray:
+    def position(self) -> Floats:
         """Both angles (2,) [rad]."""
         return np.array([self.phi, self.theta])
 
@@ -295,7 +295,7 @@ class Equilibria(Sequence[Equilibrium]):
         )
 
     @property
-    def position(self) -> FloatArray:
+    def position(self) -> Floats:
         """Angles phi, theta (n, 2) [rad]."""
         return np.array([item.position for item in self.items]).reshape(-1, 2)
 
@@ -304,22 +304,22 @@ class Equilibria(Sequence[Equilibrium]):
         return f"phi = {self.items[k].phi:.4g}, theta = {self.items[k].theta:.4g} rad"
 
     @property
-    def phi(self) -> FloatArray:
+    def phi(self) -> Floats:
         """Angles phi (n,) [rad]."""
         return np.array([item.phi for item in self.items])
 
     @property
-    def theta(self) -> FloatArray:
+    def theta(self) -> Floats:
         """Angles theta (n,) [rad]."""
         return np.array([item.theta for item in self.items])
 
     @property
-    def energy(self) -> FloatArray:
+    def energy(self) -> Floats:
         """U = Pi - F x2 (n,) [J]."""
         return np.array([item.energy for item in self.items])
 
     @property
-    def hessian(self) -> FloatArray:
+    def hessian(self) -> Floats:
         """Second derivatives of U (n, 2, 2) [J]."""
         return np.array([item.hessian for item in self.items]).reshape(-1, 2, 2)
 
@@ -386,7 +386,7 @@ def frozen_force(scene: Scene, at: float) -> float:
     return 0.0 if math.isinf(at) else float(force(scene, at))
 
 
-def stiffness(scene: Scene, coefficients: Coefficients, phi: float, theta: float) -> FloatArray:
+def stiffness(scene: Scene, coefficients: Coefficients, phi: float, theta: float) -> Floats:
     """Hessian of U (2, 2) [J], paper (19)."""
     c = coefficients
     h11, h12, h22 = potential_hessian(

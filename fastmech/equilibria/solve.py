@@ -8,12 +8,12 @@ import numpy as np
 from numba import boolean, types
 from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.equilibria.certificate import AT_FOLD, COMPLETE, UNPROVED, Outcome, apart, certify, unbalance
 from fastmech.equilibria.search import (
     EPS,
     LAPS,
     MOST,
-    FloatArray,
     Pulls,
     candidates,
     expected_count,
@@ -47,24 +47,22 @@ INDICES = types.Array(types.int8, 2, "C")
 class Solution(NamedTuple):
     """What :func:`solve` writes for n scenes; slots without an equilibrium hold NaN."""
 
-    phi: FloatArray  #: (n, 6) [rad] in (-pi, pi]
-    theta: FloatArray  #: the same
-    energy: FloatArray  #: (n, 6) U over m2 l^2 less the springs' constant [1/s^2]
-    radius: FloatArray  #: (n, 6) distance [rad] within which the true equilibrium is; infinite: not proved
+    phi: Floats  #: (n, 6) [rad] in (-pi, pi]
+    theta: Floats  #: the same
+    energy: Floats  #: (n, 6) U over m2 l^2 less the springs' constant [1/s^2]
+    radius: Floats  #: (n, 6) distance [rad] within which the true equilibrium is; infinite: not proved
     index: SmallIntegers  # type: ignore[assignment]  #: (n, 6) Morse index, ``SINGULAR`` or ``NO_EQUILIBRIUM``
     count: SmallIntegers  # type: ignore[assignment]  #: (n,) number found
     expected: SmallIntegers  #: (n,) number by the counting theorem, 0 where rounding hides it
     outcome: SmallIntegers  #: (n,) ``Outcome``
-    margin: FloatArray  #: (n,) distance to the fold [rad], positive with six equilibria; NaN if undefined
+    margin: Floats  #: (n,) distance to the fold [rad], positive with six equilibria; NaN if undefined
 
 
 SOLUTION: Any = named_tuple([*[MATRIX] * 4, INDICES, *[STATUSES] * 3, VECTOR], Solution)
 
 
 @inlined
-def merge_singular(
-    p: Pulls, error: float, count: int, phi: FloatArray, theta: FloatArray, radius: FloatArray
-) -> int:
+def merge_singular(p: Pulls, error: float, count: int, phi: Floats, theta: Floats, radius: Floats) -> int:
     """Of unproved entries that are the same one, displaced by rounding, keep the one that balances best.
 
     The margin to the fold is uncertain by ``error`` rad, a position at a cusp by the cube root of that.
@@ -108,7 +106,7 @@ def morse_index(p: Pulls, phi: float, theta: float, radius: float) -> int:
 
 
 @inlined
-def is_before(energy: FloatArray, phi: FloatArray, theta: FloatArray, i: int, j: int) -> bool:
+def is_before(energy: Floats, phi: Floats, theta: Floats, i: int, j: int) -> bool:
     """Whether entry i is listed before j: the deeper one; of mirror images the one with the smaller theta."""
     if abs(energy[i] - energy[j]) > EVEN:
         return bool(energy[i] < energy[j])
@@ -118,9 +116,7 @@ def is_before(energy: FloatArray, phi: FloatArray, theta: FloatArray, i: int, j:
 
 
 @inlined
-def sort_by_energy(
-    count: int, energy: FloatArray, phi: FloatArray, theta: FloatArray, radius: FloatArray
-) -> None:
+def sort_by_energy(count: int, energy: Floats, phi: Floats, theta: Floats, radius: Floats) -> None:
     """Deepest first; where a scene is its own mirror image rounding does not decide."""
     for i in range(1, count):
         for j in range(i, 0, -1):
@@ -133,7 +129,7 @@ def sort_by_energy(
 
 
 @kernel(types.void(MATRIX, boolean, SOLUTION))
-def solve(coefficients: FloatArray, inherit: bool, out: Solution) -> None:
+def solve(coefficients: Floats, inherit: bool, out: Solution) -> None:
     """Equilibria of every row of ``coefficients``, deepest first, with the outcome of the proof.
 
     Args:
@@ -183,7 +179,7 @@ def solve(coefficients: FloatArray, inherit: bool, out: Solution) -> None:
         count[row] = found
 
 
-def solve_rows(coefficients: FloatArray, inherit: bool = False, compiled: bool = True) -> Solution:
+def solve_rows(coefficients: Floats, inherit: bool = False, compiled: bool = True) -> Solution:
     """Equilibria of n scenes from their (n, 8) reduced coefficients, contiguous, the force frozen.
 
     ``inherit`` starts each scene from the one before it, which pays where neighbours are alike. Without

@@ -26,7 +26,6 @@ from fastmech.mechanism.lagrange import unit
 from fastmech.scene import Scene
 from fastmech.stability.linearize import (
     MEANING,
-    FloatArray,
     Rest,
     SmallMotion,
     linearized,
@@ -403,12 +402,12 @@ class Finding(NamedTuple):
 class Classification:
     """Everything that decides an equilibrium's stability; SI units."""
 
-    minors: FloatArray  #: Sylvester's leading minors of the Hessian of U (2,) [J, J^2]
-    polynomial: FloatArray  #: characteristic polynomial (5,), monic, powers falling
-    hurwitz_determinants: FloatArray  #: D1 .. D4
+    minors: Floats  #: Sylvester's leading minors of the Hessian of U (2,) [J, J^2]
+    polynomial: Floats  #: characteristic polynomial (5,), monic, powers falling
+    hurwitz_determinants: Floats  #: D1 .. D4
     eigenvalues: NDArray[np.complex128]  #: (4,) [1/s], largest real part first
-    eigenvalue_errors: FloatArray  #: bound on the error of each [1/s]
-    natural_frequencies: FloatArray  #: undamped (2,) [rad/s], rising; NaN for a direction that grows
+    eigenvalue_errors: Floats  #: bound on the error of each [1/s]
+    natural_frequencies: Floats  #: undamped (2,) [rad/s], rising; NaN for a direction that grows
     sylvester: Finding  #: Lagrange-Dirichlet with Sylvester's minors
     hurwitz: Finding
     spectrum: Finding  #: by the eigenvalues
@@ -514,7 +513,7 @@ def _by_hurwitz(a: Assessment) -> Finding:
     return Finding(_word(a.hurwitz), reason)
 
 
-def _by_spectrum(a: Assessment, roots: NDArray[np.complex128], errors: FloatArray) -> Finding:
+def _by_spectrum(a: Assessment, roots: NDArray[np.complex128], errors: Floats) -> Finding:
     """The eigenvalues' real parts, counted."""
     if a.spectrum == ASYMPTOTIC:
         return Finding(_word(ASYMPTOTIC), "every eigenvalue has a negative real part")
