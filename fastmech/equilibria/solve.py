@@ -179,11 +179,11 @@ def solve(coefficients: Floats, inherit: bool, out: Solution) -> None:
         count[row] = found
 
 
-def solve_rows(coefficients: Floats, inherit: bool = False, compiled: bool = True) -> Solution:
+def solve_rows(coefficients: Floats, compiled: bool = True) -> Solution:
     """Equilibria of n scenes from their (n, 8) reduced coefficients, contiguous, the force frozen.
 
-    ``inherit`` starts each scene from the one before it, which pays where neighbours are alike. Without
-    ``compiled`` plain Python does the same, up to rounding: in milliseconds a scene, with nothing to compile.
+    Without ``compiled`` plain Python does the same, up to rounding: in milliseconds a scene, with nothing to
+    compile.
     """
     n = len(coefficients)
     result = Solution(
@@ -198,7 +198,7 @@ def solve_rows(coefficients: Floats, inherit: bool = False, compiled: bool = Tru
         margin=np.empty(n),
     )
     with np.errstate(all="ignore"):
-        (solve if compiled else interpreted(solve))(coefficients, inherit, result)
+        (solve if compiled else interpreted(solve))(coefficients, False, result)
     return result
 
 

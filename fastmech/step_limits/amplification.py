@@ -15,7 +15,7 @@ from math import factorial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.arrays import Floats
+from fastmech.arrays import Flags, Floats
 from fastmech.integrators.methods import Adams, ImplicitRungeKutta, Method, RungeKutta, bashforth, moulton
 
 #: Ratio of neighbouring places of the search: finer than any lobe of a stability region.
@@ -89,7 +89,7 @@ def amplification(method: Method, z: ArrayLike) -> Floats:
     return np.asarray(np.abs(np.linalg.eigvals(companion(method, z))).max(axis=-1))
 
 
-def amplifies(method: Method, z: ArrayLike, factor: ArrayLike) -> NDArray[np.bool_]:
+def amplifies(method: Method, z: ArrayLike, factor: ArrayLike) -> Flags:
     """Whether a step multiplies small motions by more than ``factor`` > 0: quicker to tell than by how much.
 
     For an Adams method whether a root of the characteristic polynomial lies outside a circle of that radius.
@@ -101,7 +101,7 @@ def amplifies(method: Method, z: ArrayLike, factor: ArrayLike) -> NDArray[np.boo
     return _outside(history_row(method, points) * radius ** -np.arange(1.0, method.predictor.size + 1.0))
 
 
-def _outside(weights: NDArray[np.complex128]) -> NDArray[np.bool_]:
+def _outside(weights: NDArray[np.complex128]) -> Flags:
     """Whether x^k - w_1 x^(k-1) - ... - w_k, of weights (..., k), has a root outside the unit circle.
 
     By Schur's recursion (Henrici, *Applied and Computational Complex Analysis I*, section 6.8): all roots lie
@@ -119,12 +119,10 @@ def _outside(weights: NDArray[np.complex128]) -> NDArray[np.bool_]:
     return outside
 
 
-def first_crossing(
-    beyond: Callable[[Floats], NDArray[np.bool_]], start: float, stop: float, divisions: int = DIVISIONS
-) -> float:
+def first_crossing(beyond: Callable[[Floats], Flags], start: float, stop: float) -> float:
     """Least x at which ``beyond`` turns true; 0.0 if so at ``start``, inf if not up to ``stop``.
 
-    From places that grow by :data:`RATIO` it is narrowed down by so many divisions. ``beyond`` is asked of
+    From places that grow by :data:`RATIO` it is narrowed down to rounding. ``beyond`` is asked of
     many places (m,) in one call: it pays to compute with arrays.
     """
     last = max(int(np.ceil(np.log(stop / start) / np.log(RATIO))), 0)
@@ -133,18 +131,16 @@ def first_crossing(
         found = np.flatnonzero(beyond(places))
         if found.size:
             at = float(places[found[0]])
-            return 0.0 if first + found[0] == 0 else _narrowed(beyond, at / RATIO, at, divisions)
+            return 0.0 if first + found[0] == 0 else _narrowed(beyond, at / RATIO, at)
     return float("inf")
 
 
-def _narrowed(
-    beyond: Callable[[Floats], NDArray[np.bool_]], below: float, above: float, divisions: int
-) -> float:
+def _narrowed(beyond: Callable[[Floats], Flags], below: float, above: float) -> float:
     """Where it turns true between two places: in the first part whose end is beyond, again and again.
 
     Importing SciPy's root finders takes longer than a first run, and every run asks for a step limit.
     """
-    for _ in range(divisions):
+    for _ in range(DIVISIONS):
         places = below + (above - below) * np.arange(1, PARTS) / PARTS
         found = np.flatnonzero(beyond(places))
         first = int(found[0]) if found.size else places.size
