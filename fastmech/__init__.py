@@ -43,8 +43,7 @@ if TYPE_CHECKING:
     from fastmech.bench.frontier import work_precision
     from fastmech.capture.barriers import barrier_tree
     from fastmech.capture.select import trapped
-    from fastmech.disturbance.linear_range import linear_range
-    from fastmech.disturbance.motion import disturbed_motion
+    from fastmech.disturbance.motion import disturbed_motion, linear_range
     from fastmech.ensembles.integrate import integrate
     from fastmech.ensembles.status import Status
     from fastmech.ensembles.system import System
@@ -120,7 +119,7 @@ _MODULES = {
     "largest_lyapunov": "fastmech.transients.lyapunov",
     "largest_stable_step": "fastmech.step_limits.predict",
     "lengths": "fastmech.models.coordinates",
-    "linear_range": "fastmech.disturbance.linear_range",
+    "linear_range": "fastmech.disturbance.motion",
     "map_basins": "fastmech.basins.map",
     "map_equilibria": "fastmech.atlas.map",
     "map_snapping": "fastmech.basins.snapping",

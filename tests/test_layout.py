@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from fastmech.kernel_cache import COMPILED, PACKAGE, compiled_sources
-from fastmech.tiles.identity import _SOURCES
+from fastmech.tiles.section import _SOURCES
 
 pytestmark = pytest.mark.nojit
 

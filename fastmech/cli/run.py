@@ -130,7 +130,7 @@ def _mechanism_named(where: str) -> Mechanism:
 def _asked_in(source: Path) -> tuple[Path, str, str | None]:
     """Name and text of the request that a result was made from, and all that decided its values."""
     from fastmech.store.read import open_results
-    from fastmech.tiles.identity import asked_of_result
+    from fastmech.tiles.section import asked_of_result
 
     with open_results(source) as results:
         name = Path(str(results.attrs.get("request_file", ""))).name
@@ -140,7 +140,7 @@ def _asked_in(source: Path) -> tuple[Path, str, str | None]:
 
 def _compare(told: Account, before: str, target: Path) -> None:
     """Say what else than the request decides the values, and differs."""
-    from fastmech.tiles.identity import asked_of_result, differences
+    from fastmech.tiles.section import asked_of_result, differences
 
     now = asked_of_result(target)
     if now is not None and now != before:

@@ -18,8 +18,7 @@ from fastmech.scan_types.request import RunContext, read_request
 from fastmech.store.provenance import provenance
 from fastmech.store.write import write_results
 from fastmech.tiles.cluster import cluster
-from fastmech.tiles.identity import asked_for, identity_of
-from fastmech.tiles.section import TiledSection, assembled, sections_of
+from fastmech.tiles.section import TiledSection, asked_for, assembled, identity_of, sections_of
 
 #: Threads, and workers of the cluster.
 WORKERS = 2

@@ -23,16 +23,22 @@ from fastmech.ensembles.status import FAILURES, LABELS, Status
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers
-from fastmech.scan_types.axis import (
+from fastmech.scan_types.request import (
     Axis,
+    Planes,
+    RunContext,
+    Scan,
+    Tiles,
+    Tiling,
+    UsualMethod,
     arrays,
     check_duration,
     check_rising,
     check_size,
     check_starts,
+    failures,
     told,
 )
-from fastmech.scan_types.request import Planes, RunContext, Scan, Tiles, Tiling, UsualMethod, failures
 from fastmech.scene import STATE, Number, Scene, nearest
 from fastmech.step_limits.warning import step_warning
 

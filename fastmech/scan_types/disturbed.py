@@ -33,10 +33,10 @@ from fastmech.basins.disturbed import (
 from fastmech.basins.measures.fractions import wilson
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.capture.steps import method_for, shortest_step
-from fastmech.disturbance.linear_range import linear_range
 from fastmech.disturbance.motion import (
     damped_times,
     equilibria_to_disturb,
+    linear_range,
     require_constant_force,
     require_isolated,
     size_of,
@@ -50,8 +50,16 @@ from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers, parts
-from fastmech.scan_types.axis import (
+from fastmech.scan_types.map_layout import about_of, one_of
+from fastmech.scan_types.request import (
+    HALVING,
     Axis,
+    RunContext,
+    Scan,
+    Seed,
+    Tiles,
+    Tiling,
+    UsualMethod,
     arrays,
     axis_variables,
     check_duration,
@@ -59,20 +67,10 @@ from fastmech.scan_types.axis import (
     check_size,
     check_steps,
     coordinate_units,
+    counted_failures,
     known_parameters,
     state_units,
     told,
-)
-from fastmech.scan_types.map_layout import about_of, one_of
-from fastmech.scan_types.request import (
-    HALVING,
-    RunContext,
-    Scan,
-    Seed,
-    Tiles,
-    Tiling,
-    UsualMethod,
-    counted_failures,
 )
 from fastmech.scene import Scene, nearest
 from fastmech.step_limits.warning import step_warning

@@ -26,8 +26,7 @@ from fastmech.equilibria.find import Equilibria, Equilibrium
 from fastmech.equilibria.search import MOST
 from fastmech.mechanism.coefficients import reduce
 from fastmech.results import STATE_UNITS, Dataset, Variable, numbers, parts
-from fastmech.scan_types.axis import check_steps
-from fastmech.scan_types.request import HALVING, Each, Scan, Tiling, UsualMethod, failures
+from fastmech.scan_types.request import HALVING, Each, Scan, Tiling, UsualMethod, check_steps, failures
 from fastmech.scene import Scene
 from fastmech.step_limits.warning import step_warning
 

@@ -36,16 +36,6 @@ from fastmech.equilibria.search import MOST
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import Dataset, Variable, numbers
-from fastmech.scan_types.axis import (
-    Axis,
-    arrays,
-    axis_variables,
-    check_parameters,
-    check_size,
-    coordinate_units,
-    known_parameters,
-    told,
-)
 from fastmech.scan_types.map_layout import (
     RESTING,
     TOGETHER,
@@ -55,7 +45,21 @@ from fastmech.scan_types.map_layout import (
     sheet_table,
     sheet_variables,
 )
-from fastmech.scan_types.request import Planes, RunContext, Scan, Tiles, Tiling
+from fastmech.scan_types.request import (
+    Axis,
+    Planes,
+    RunContext,
+    Scan,
+    Tiles,
+    Tiling,
+    arrays,
+    axis_variables,
+    check_parameters,
+    check_size,
+    coordinate_units,
+    known_parameters,
+    told,
+)
 from fastmech.scene import Scene, nearest
 from fastmech.store.write import Piece, Stream
 

@@ -19,7 +19,7 @@ from fastmech.mechanism.impulse import POINTS
 from fastmech.models.drawing import Element, drawing
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers, parts
-from fastmech.scan_types.axis import coordinate_units
+from fastmech.scan_types.request import coordinate_units
 from fastmech.scene import Scene
 from fastmech.stability.classify import Verdict
 from fastmech.stability.linearize import SIN_PHI, SIN_PSI, UNLOADED

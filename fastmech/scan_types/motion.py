@@ -21,8 +21,17 @@ from fastmech.mechanism.lagrange import momenta
 from fastmech.mechanism.reactions import reactions
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import Dataset, Variable, parts
-from fastmech.scan_types.axis import check_steps, state_units, told
-from fastmech.scan_types.request import HALVING, Each, MethodName, Scan, Tiling, failures
+from fastmech.scan_types.request import (
+    HALVING,
+    Each,
+    MethodName,
+    Scan,
+    Tiling,
+    check_steps,
+    failures,
+    state_units,
+    told,
+)
 from fastmech.scene import Scene, nearest
 from fastmech.step_limits.warning import step_warning
 

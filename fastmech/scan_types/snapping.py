@@ -21,8 +21,20 @@ from fastmech.capture.steps import method_for
 from fastmech.ensembles.status import FAILURES, LABELS, Status
 from fastmech.errors import InputError
 from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers
-from fastmech.scan_types.axis import Axis, check_duration, check_parameters, check_rising, check_size
-from fastmech.scan_types.request import Planes, RunContext, Scan, Tiles, Tiling, UsualMethod, failures
+from fastmech.scan_types.request import (
+    Axis,
+    Planes,
+    RunContext,
+    Scan,
+    Tiles,
+    Tiling,
+    UsualMethod,
+    check_duration,
+    check_parameters,
+    check_rising,
+    check_size,
+    failures,
+)
 from fastmech.scene import Scene
 
 if TYPE_CHECKING:

@@ -16,9 +16,8 @@ from fastmech.scan_types.request import Request, RunContext, Tiles, read_request
 from fastmech.store.provenance import provenance
 from fastmech.store.read import open_results
 from fastmech.store.write import write_results
-from fastmech.tiles.identity import asked_for, identity_of
 from fastmech.tiles.parts import Manifest, Parts
-from fastmech.tiles.section import TiledSection, assembled, sections_of
+from fastmech.tiles.section import TiledSection, asked_for, assembled, identity_of, sections_of
 from fastmech.tiles.tile_file import DamagedTileError, dataset_image, dataset_of_image
 
 

@@ -52,7 +52,7 @@ class Manifest:
     """What was asked for.
 
     Attributes:
-        asked: see `fastmech.tiles.identity.asked_for`.
+        asked: see `fastmech.tiles.section.asked_for`.
         request_file: name of the request file.
         request: its text.
         replace: whether the result may replace an older file.

@@ -20,9 +20,16 @@ from fastmech.results import Dataset
 from fastmech.scan_types.request import Request, RunContext, Tiles
 from fastmech.store.provenance import provenance
 from fastmech.store.write import write_results
-from fastmech.tiles.identity import asked_for, asked_of_result, differences, identity_of
 from fastmech.tiles.parts import DamagedManifestError, Manifest, Parts
-from fastmech.tiles.section import TiledSection, assembled, sections_of
+from fastmech.tiles.section import (
+    TiledSection,
+    asked_for,
+    asked_of_result,
+    assembled,
+    differences,
+    identity_of,
+    sections_of,
+)
 from fastmech.tiles.tile_file import DamagedTileError, Tile
 from fastmech.tiles.work import Crash, Hiring, Task, compute_tiles, still_computing
 

@@ -157,7 +157,7 @@ class TileHead:
     """What a tile is.
 
     Attributes:
-        identity: of the request, see `fastmech.tiles.identity`.
+        identity: of the request, see `fastmech.tiles.section`.
         section: name of the section.
         index: number of the tile.
         seconds: share of the wall time that it took [s].

@@ -18,7 +18,7 @@ from fastmech.interrupts import CrashedTilesError, Stopped
 from fastmech.runner import run_request
 from fastmech.scan_types.equilibrium_map import MapTiling
 from fastmech.store.read import open_results
-from fastmech.tiles import identity
+from fastmech.tiles import section as identity
 from fastmech.tiles.look import ScanLook
 from fastmech.tiles.parts import Parts
 from fastmech.tiles.tile_file import DamagedTileError, check_tile

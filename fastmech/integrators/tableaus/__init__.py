@@ -8,8 +8,8 @@ measure its order.
 
 from __future__ import annotations
 
+import fastmech.integrators.tableaus.explicit as explicit
 from fastmech.integrators.tableau import Tableau
-from fastmech.integrators.tableaus import explicit
 
 #: Every tableau by its name.
 TABLEAUS: dict[str, Tableau] = {
