@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     "--keep", metavar="FILE.h5", type=click.Path(dir_okay=False, path_type=Path), help="Keep that tile here."
 )
 @reporting_options
-def command(
+def run(
     request_file: Path | None,
     source: Path | None,
     out: Path | None,
