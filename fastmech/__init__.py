@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from fastmech.ensembles.system import System
     from fastmech.errors import InputError
     from fastmech.kernels.sincos import cos, sin
-    from fastmech.mechanism.reactions import reactions
+    from fastmech.mechanism.geometry import reactions
     from fastmech.models.coordinates import angles, lengths
     from fastmech.models.elements import (
         Body,
@@ -126,7 +126,7 @@ _MODULES = {
     "minimal_shock": "fastmech.basins.shock",
     "number_turns": "fastmech.basins.measures.labels",
     "open_results": "fastmech.store.read",
-    "reactions": "fastmech.mechanism.reactions",
+    "reactions": "fastmech.mechanism.geometry",
     "saddle_at": "fastmech.basins.edge",
     "shock_limit": "fastmech.basins.shock_limit",
     "sin": "fastmech.kernels.sincos",

@@ -16,9 +16,8 @@ from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.status import FAILURES
 from fastmech.errors import InputError, shown
 from fastmech.mechanism.coefficients import force
-from fastmech.mechanism.geometry import constraints, positions
+from fastmech.mechanism.geometry import constraints, positions, reactions
 from fastmech.mechanism.lagrange import momenta
-from fastmech.mechanism.reactions import reactions
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import Dataset, Variable, parts
 from fastmech.scan_types.request import (

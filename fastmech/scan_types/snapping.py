@@ -109,7 +109,7 @@ class Snapping(Scan):
     @staticmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
         """The map with the critical curve."""
-        from fastmech.plots.snapping import draw_snapping
+        from fastmech.plots.basins import draw_snapping
 
         return draw_snapping(dataset.merged, scene)
 

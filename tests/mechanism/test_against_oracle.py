@@ -12,7 +12,7 @@ from mechanism.draws import Draw, doubles
 from oracles import oracle
 
 from fastmech.mechanism import coefficients, geometry, lagrange
-from fastmech.mechanism.reactions import reactions
+from fastmech.mechanism.geometry import reactions
 
 pytestmark = pytest.mark.nojit
 
