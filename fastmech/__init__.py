@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from fastmech.basins.erosion import erosion
     from fastmech.basins.label import labels_of
     from fastmech.basins.map import map_basins
-    from fastmech.basins.measures.dimension import boundary_dimension
     from fastmech.basins.measures.entropy import basin_entropy, fractal_boundary_test
     from fastmech.basins.measures.fractions import (
         basin_fractions,
@@ -35,7 +34,7 @@ if TYPE_CHECKING:
     from fastmech.basins.measures.integrity import integrity
     from fastmech.basins.measures.labels import number_turns
     from fastmech.basins.measures.norm import kinetic_norm
-    from fastmech.basins.measures.uncertainty import uncertainty_exponent
+    from fastmech.basins.measures.slopes import boundary_dimension, uncertainty_exponent
     from fastmech.basins.measures.wada import wada_merge_test
     from fastmech.basins.shock import brute_force_shock, minimal_shock
     from fastmech.basins.shock_limit import impulse_start, shock_limit
@@ -94,7 +93,7 @@ _MODULES = {
     "basin_entropy": "fastmech.basins.measures.entropy",
     "basin_fractions": "fastmech.basins.measures.fractions",
     "basin_stability": "fastmech.basins.measures.fractions",
-    "boundary_dimension": "fastmech.basins.measures.dimension",
+    "boundary_dimension": "fastmech.basins.measures.slopes",
     "brute_force_shock": "fastmech.basins.shock",
     "classify": "fastmech.models.stability",
     "copy_labels": "fastmech.basins.copies",
@@ -137,7 +136,7 @@ _MODULES = {
     "track_edge": "fastmech.basins.edge",
     "transient_growth": "fastmech.transients.lyapunov",
     "trapped": "fastmech.capture.select",
-    "uncertainty_exponent": "fastmech.basins.measures.uncertainty",
+    "uncertainty_exponent": "fastmech.basins.measures.slopes",
     "wada_merge_test": "fastmech.basins.measures.wada",
     "wilson": "fastmech.basins.measures.fractions",
     "work_precision": "fastmech.bench.frontier",

@@ -40,7 +40,7 @@ def copy_labels(scene: Scene | Mechanism, t_end: float = 60.0, *, threads: int |
     """A function that labels starts (n, states) with a number for each copy of each well, -1: not proved.
 
     It is what :func:`fastmech.basins.shock.minimal_shock`, :func:`fastmech.basins.edge.track_edge` and
-    :func:`fastmech.basins.measures.uncertainty.uncertainty_exponent` ask; :func:`copy_of_label` reads its
+    :func:`fastmech.basins.measures.slopes.uncertainty_exponent` ask; :func:`copy_of_label` reads its
     numbers.
 
     Args:

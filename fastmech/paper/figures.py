@@ -14,7 +14,7 @@ from fastmech.mechanism.geometry import constraints, positions
 from fastmech.mechanism.lagrange import potential_energy, potential_gradient
 from fastmech.paper.compare import HEADINGS, Row, Verdict
 from fastmech.paper.compute import DISTURBED_SPAN, MOTION_SPAN, PAPER_SCENE, STATIC_SCENE, Case, Computed
-from fastmech.plots.mechanism import draw_mechanism, drawing_of, legend_handles
+from fastmech.plots.equilibria import draw_mechanism, drawing_of, legend_handles
 from fastmech.plots.style import LINES, PALETTE, legend_below, new_figure, style
 from fastmech.reports import columns
 from fastmech.results import Dataset, Variable

@@ -5,7 +5,7 @@ import pytest
 from oracles import TABLE_1, oracle
 
 from fastmech.paper.compute import STATIC_SCENE
-from fastmech.plots.mechanism import ROD, draw_mechanism, drawing_of
+from fastmech.plots.equilibria import ROD, draw_mechanism, drawing_of
 from fastmech.plots.style import new_figure, png, style
 
 
