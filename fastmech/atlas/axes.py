@@ -1,4 +1,4 @@
-"""The axes of a map: checked, and the reduced coefficients at their points."""
+"""The axes of a map, checked, with the reduced coefficients and the margin to the fold at their points."""
 
 from __future__ import annotations
 

@@ -13,10 +13,11 @@ by a solution. Hence all solutions of this neighbourhood lie on the one arc thro
 needs no further look. The set of solutions is **complete** when no box is left. Bounds hold in double
 precision, with an allowance for rounding.
 
-An expression is recorded as a list of operations and interpreted by one kernel, in forward differentiation
-with a remainder. Over the box |z - c| <= h a function has the value v and the slopes d at the centre c, and
-nowhere in the box are its slopes further than e from d. So it stays within (|d| + e/2) h of v: e grows with
-the box at least as fast as the box, hence the mean of its bound on the way from c is at most one half of it.
+Values, slopes and bounds of an expression over many boxes, compiled once for every expression. An expression
+is recorded as a list of operations and interpreted by one kernel, in forward differentiation with a
+remainder. Over the box |z - c| <= h a function has the value v and the slopes d at the centre c, and nowhere
+in the box are its slopes further than e from d. So it stays within (|d| + e/2) h of v: e grows with the box
+at least as fast as the box, hence the mean of its bound on the way from c is at most one half of it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Fold curves, pitchfork curves and cusps over two parameters, all of them, with the proof."""
+"""Folds over one parameter; fold curves, pitchfork curves and cusps over two: all of them, with the proof."""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 """Equilibria, their stability, their certificates and their sheets over grids of one to three parameters.
 
-Angles count their turns here: a copy of the same minimum one turn further is another minimum.
+How deep each well is: the energy at which its sublevel set first meets another minimum. Angles count their
+turns here: a copy of the same minimum one turn further is another minimum.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Equilibria of any mechanism over a grid of parameters, each point proved, with their stability."""
+"""Equilibria of any mechanism over a grid of parameters, each point proved; its wells along a parameter."""
 
 from __future__ import annotations
 

@@ -14,16 +14,17 @@ Hence neighbouring points with the same sheet number have the same equilibrium, 
 line between them, except on the edges that are listed as **breaks**: where two folds pass between
 neighbours, or where going round a hole of the map exchanges two equilibria.
 
+Ways between neighbouring regions of a map through channels of parameters that are narrower than its grid.
 Towards a cusp two folds come together like a horn, and the grid's points between them fall apart into
 islands. Whether two islands are one region is decided by walking from one to the other between the folds.
 
-Points whose equilibria continue one another completely, none appearing or vanishing, form a *region*. Within
-a region an equilibrium is known by its rank there (0 to 5); its label is 8 times the region's number plus the
-rank. Regions are found in one pass over the grid in the order of memory. Where two turn out to be one, the
-second refers to the first together with how its ranks are permuted, so a label stands for one equilibrium at
-every point, whatever the order. Continuing round a hole of a region may permute the equilibria; there the
-region has a cut, on which the pass happens to close. The edges of that cut are listed with those between
-regions.
+Compiled labelling of equilibria over a grid: equal labels are one equilibrium, continued. Points whose
+equilibria continue one another completely, none appearing or vanishing, form a *region*. Within a region an
+equilibrium is known by its rank there (0 to 5); its label is 8 times the region's number plus the rank.
+Regions are found in one pass over the grid in the order of memory. Where two turn out to be one, the second
+refers to the first together with how its ranks are permuted, so a label stands for one equilibrium at every
+point, whatever the order. Continuing round a hole of a region may permute the equilibria; there the region
+has a cut, on which the pass happens to close. The edges of that cut are listed with those between regions.
 """
 
 from __future__ import annotations

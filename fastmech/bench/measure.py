@@ -4,8 +4,9 @@ Rates are trajectories per second of processor time, all threads of the process 
 that is wall time on one thread, on a busy one the time spent waiting for a core does not count, and an
 integrator that secretly takes two threads pays for both. Wall times stand beside them.
 
-Problems are ensembles whose final states are known to more digits than a double holds: the references come
-from ``data/make_bench_reference.py``, which computes them without this package.
+The benchmark's problems, and what takes part: one integrator at one setting. Problems are ensembles whose
+final states are known to more digits than a double holds: the references come from
+``data/make_bench_reference.py``, which computes them without this package.
 """
 
 from __future__ import annotations

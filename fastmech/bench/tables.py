@@ -1,4 +1,4 @@
-"""The benchmark as Markdown: speed at equal error first, then everything that was measured."""
+"""The benchmark as Markdown and as a picture: speed at equal error first, then all that was measured."""
 
 from __future__ import annotations
 

@@ -4,10 +4,11 @@ The bounding energy is T + U with loads at what they come to, and all work that 
 belongs to a well by the cells of :mod:`fastmech.capture.mechanism`, or by a box about the well in which U is
 convex: the way straight to the minimum does not rise.
 
-The barrier of a well is the least energy at which its component of {U < E} meets another well, a copy of
-itself some turns away, or an end of a range. The first two happen at saddles with one falling direction and
-nowhere else (Morse): a flood through cells, whose bounds are outward, tells an energy below which they cannot
-happen, and so they happen no earlier than at the lowest such saddle above it.
+Wells of a mechanism and their barriers, proved on cells of its domain. The barrier of a well is the least
+energy at which its component of {U < E} meets another well, a copy of itself some turns away, or an end of a
+range. The first two happen at saddles with one falling direction and nowhere else (Morse): a flood through
+cells, whose bounds are outward, tells an energy below which they cannot happen, and so they happen no earlier
+than at the lowest such saddle above it.
 """
 
 from __future__ import annotations

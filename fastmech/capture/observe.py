@@ -4,11 +4,13 @@ Energy is looked at for all lanes at once; the position only for lanes whose ene
 highest level at which any well captures, which happens about once a lane. A captured lane runs on to the next
 multiple of an interval, so that computations with different steps stop it at the same time.
 
-``params`` are the energy's coefficients, then from ``first`` on: time between stops [s], coordinates, wells,
-time [s] by which loads have faded, number of works, time of the run's begin [s]; by coordinate the domain's
-low end, cells by unit, number of cells, period, high end; by well places, half widths of convex boxes (both
-wells x coordinates), levels; works [J]; cells.
+What observers of any mechanism share: positions to wells, capture, ranges, stops. ``params`` are the energy's
+coefficients, then from ``first`` on: time between stops [s], coordinates, wells, time [s] by which loads have
+faded, number of works, time of the run's begin [s]; by coordinate the domain's low end, cells by unit, number
+of cells, period, high end; by well places, half widths of convex boxes (both wells x coordinates), levels;
+works [J]; cells.
 
+Which well a position belongs to: a table of proved cells, and the proved way down where that is silent.
 Everything an observer needs lies in one vector, because observers take one: see ``pack``.
 """
 

@@ -1,4 +1,4 @@
-"""What every long command shares: ``--quiet``, ``--json``, progress, and an account of what it has done."""
+"""What commands share: ``--quiet``, ``--json``, progress, failures in one line, an account of it all."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One disturbance of an equilibrium: the nonlinear motion and the linearized one side by side."""
+"""Disturbances of an equilibrium: their size, motions beside the linearized ones, how far both agree."""
 
 from __future__ import annotations
 

@@ -9,6 +9,7 @@ A damper that acts on light bodies stops them at a rate far above the frequencie
 An explicit method must then step with that rate although nothing moves so fast; an L-stable one need not
 (Hairer, Wanner, *Solving ODEs II*, section IV.1).
 
+Energy bounds that no motion of a scene breaks, only too large a step; told in compiled passes over lanes.
 Under a constant force T + U never grows, and without damper it is conserved; under a decaying force T + Pi
 grows by at most F0 (2 l - sgn(F0) x2), the work done if M2 went to the far end of its reach at full force,
 and without damper falls by at most F0 (2 l + sgn(F0) x2).

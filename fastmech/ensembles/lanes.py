@@ -1,8 +1,8 @@
-"""The trajectories of one task in blocks of equal width, and how those that have ended make room.
+"""The trajectories of one task in blocks of equal width, their parameters, and how times are passed.
 
-Where a piece ends depends on output times and step alone, never on who runs: it decides how times round.
-How many pieces a call takes is free. Trajectories of equal steps share tasks, of which a thread runs one at a
-time.
+How the times of a run are passed: steps between outputs, in pieces of which a call takes some. Where a piece
+ends depends on output times and step alone, never on who runs: it decides how times round. How many pieces a
+call takes is free. Trajectories of equal steps share tasks, of which a thread runs one at a time.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What an ensemble integrates: a scene in one of two formulations, or a system of the user's own.
+"""What an ensemble integrates: a scene or a mechanism in one of two formulations, or a user's own system.
 
 Either is a block right-hand side, the parameters of every trajectory, and how public states turn into the
 integrated ones and back.

@@ -1,9 +1,10 @@
-"""One run of a problem with given settings: a method, a step that may fit each trajectory, a precision.
+"""One run of a problem with given settings; how far bodies turn in its steps; states between the steps.
 
-Where a tolerance allows steps longer than the intervals between outputs, the run takes equal steps over its
-whole time. A polynomial through the states and their derivatives at ``k`` neighbouring steps, of degree
-2 k - 1 (Stoer, Bulirsch, *Introduction to Numerical Analysis*, section 2.1.5), gives the outputs; k is such
-that its error is far below the method's.
+Outputs that are closer than steps: states between them by Hermite's interpolation. Where a tolerance allows
+steps longer than the intervals between outputs, the run takes equal steps over its whole time. A polynomial
+through the states and their derivatives at ``k`` neighbouring steps, of degree 2 k - 1 (Stoer, Bulirsch,
+*Introduction to Numerical Analysis*, section 2.1.5), gives the outputs; k is such that its error is far below
+the method's.
 """
 
 from __future__ import annotations

@@ -6,10 +6,11 @@ depend on time or state, the difference of its two sides and its outcome; ``abs`
 their like decide too. Equal outcomes at two points of a motion then mean that they lie on the same smooth
 piece, and the differences tell how near it was to being left.
 
-Smooth arithmetic compiles to arithmetic. Every jump and every kink needs one of few instructions: a
-comparison of floating-point numbers, a conversion to a whole number, a rounding, a magnitude, a sign, or a
-look at a number's bits; or an inverse that folds: the root of a square, an angle by its own sine. What none
-of them reaches from time or state is smooth, as far as its operations are: not where one has a pole.
+Whether a function decides anything, by its compiled code: the last word on what its source hides. Smooth
+arithmetic compiles to arithmetic. Every jump and every kink needs one of few instructions: a comparison of
+floating-point numbers, a conversion to a whole number, a rounding, a magnitude, a sign, or a look at a
+number's bits; or an inverse that folds: the root of a square, an angle by its own sine. What none of them
+reaches from time or state is smooth, as far as its operations are: not where one has a pole.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Work against precision on a sample: which method, with which steps, keeps a tolerance with least work.
+"""Work against precision on a sample: what a right-hand side costs, and which method and steps need least.
 
 A method of order p has errors e(h) ~ h^p (Hairer, Norsett, Wanner, *Solving ODEs I*, section II.4): two runs
 with different steps tell the error of the shorter, and how long the steps for another error must be. So a

@@ -1,8 +1,8 @@
 """All equilibria of one scene, with their certificate.
 
-With z = exp(i phi) the conditions of rest
-a cos phi + f sin phi = b sin theta + f cos theta = C cos(phi + theta) become, theta eliminated (f is the
-force's coefficient, a, b, C those of lift, gravity and spring),
+The polynomial of degree 6 among whose roots on the unit circle lie exp(i phi) of all equilibria. With z =
+exp(i phi) the conditions of rest a cos phi + f sin phi = b sin theta + f cos theta = C cos(phi + theta)
+become, theta eliminated (f is the force's coefficient, a, b, C those of lift, gravity and spring),
 
     C^2 z [(f + ib) z^2 - (f - ib)]^2 + [(a - if) z^2 + (a + if)]^2 [(f - ib) - C z] [(f + ib) z - C] = 0.
 

@@ -1,6 +1,7 @@
 """Candidates: one bracket for every lap of every branch of the balance, solved and polished by Newton.
 
-With psi = phi + theta the potential over m2 l^2 (paper (10), reduced) is
+The conditions of rest as three balanced sinusoids, and how many solutions they have. With psi = phi + theta
+the potential over m2 l^2 (paper (10), reduced) is
 
     U = A1 sin y1 + A2 sin y2 + A3 sin y3,     A1 cos y1 = a cos phi + f sin phi      (lift, force)
                                                A2 cos y2 = b sin theta + f cos theta  (gravity, force)

@@ -1,4 +1,4 @@
-"""Driver of explicit Runge-Kutta and Adams methods with a fixed step over blocks of lanes.
+"""What one call of a method is given; driver of explicit Runge-Kutta and Adams methods over blocks of lanes.
 
 The driver knows neither the mechanism nor the method: right-hand side, observer and whole steps
 (:mod:`fastmech.kernels.whole`) come as functions, the method's weights as arrays. By those it takes steps

@@ -1,4 +1,4 @@
-"""Every method by its name, and which one to use.
+"""What a method is to those who run it; every method by its name, and which one to use.
 
 Measured on the mechanism (largest error of final states, right-hand sides a trajectory): the Adams methods
 need the fewest right-hand sides at every accuracy, because each step costs one or two. With steps fitted to
@@ -21,9 +21,9 @@ The implicit methods are stable at any step for every decaying motion: ``gauss2`
 ``radau5`` and ``sdirk4`` (L-stable) are for heavy damping, where the explicit methods' limit and not the
 accuracy would set the step.
 
-An Adams formula advances by the integral over one step of the polynomial that interpolates the derivative
-at equidistant times (Hairer, Norsett, Wanner, *Solving ODEs I*, section III.1); its weights are computed
-exactly from that.
+What a fixed-step method is to those who run it: a name, what a step costs, and one call. An Adams formula
+advances by the integral over one step of the polynomial that interpolates the derivative at equidistant times
+(Hairer, Norsett, Wanner, *Solving ODEs I*, section III.1); its weights are computed exactly from that.
 """
 
 from __future__ import annotations

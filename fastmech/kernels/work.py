@@ -1,4 +1,8 @@
-"""Lagrange's equations that keep account: of the work of damper and force, or of how often they are asked."""
+"""Lagrange's equations that keep account: of the work of damper and force, or of how often they are asked.
+
+Those that count have two parameters after the eight coefficients: calls of the right-hand side and of the
+Jacobian, of the block's first lane.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""All pictures of the report, in the paper's order, with their captions."""
+"""The report's tables and figures as labelled data, and all its pictures with their captions."""
 
 from __future__ import annotations
 

@@ -3,8 +3,9 @@
 Nothing here is believed: a candidate counts as a misprint only if every measure of the print exceeds its
 tolerance while the corrected one stays below it. With a right print the same code reports none.
 
-A formula that is a sum of known functions of the angles times unknown numbers is fitted at many angles; if
-the functions are the right ones nothing is left over, and the numbers are exact to rounding.
+Coefficients of the printed formulas (16) and (20), found from the mechanism's functions. A formula that is a
+sum of known functions of the angles times unknown numbers is fitted at many angles; if the functions are the
+right ones nothing is left over, and the numbers are exact to rounding.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""``fastmech paper``: tables, figures, data and the report, written into one folder."""
+"""``fastmech paper``: the report as Markdown and HTML, data and pictures, written into one folder."""
 
 from __future__ import annotations
 

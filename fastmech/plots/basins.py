@@ -1,4 +1,4 @@
-"""Basin maps: who ends where, with what decides it drawn on top, and how long that takes."""
+"""Basin maps and dynamic snapping: who ends where, with what decides it on top, and how long that takes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What became of random disturbances: outcomes, times to return, excursions, range of the linearization."""
+"""What became of disturbances: single ones, random ones, and those of every equilibrium over parameters."""
 
 from __future__ import annotations
 

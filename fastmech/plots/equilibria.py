@@ -1,4 +1,4 @@
-"""Equilibria on the potential's map, drawn to scale, and their eigenvalues in the complex plane."""
+"""Equilibria on the potential's map, mechanisms drawn to scale, and eigenvalues in the complex plane."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Equilibria over two parameters: how many, where, how deep the wells are and how fast motions settle."""
+"""Equilibria over one or two parameters: how many, where, how deep wells are, how fast motions settle."""
 
 from __future__ import annotations
 

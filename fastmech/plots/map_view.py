@@ -1,4 +1,4 @@
-"""What is drawn of an equilibrium map: up to two of its axes, not too many points, values picked by depth."""
+"""What is drawn of an equilibrium map: two of its axes, not too many points, values by depth, its curves."""
 
 from __future__ import annotations
 

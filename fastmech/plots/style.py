@@ -1,4 +1,4 @@
-"""How every picture of the package looks: fonts, colours, saving; matplotlib's global state is left alone."""
+"""How every picture looks: fonts, colours, labels, saving; matplotlib is left alone globally."""
 
 from __future__ import annotations
 

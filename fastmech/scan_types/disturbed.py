@@ -1,8 +1,10 @@
 """Thousands of random disturbances of every equilibrium, and how far the linearized motion can be trusted.
 
-A table of the section has a row for each trajectory of each equilibrium; what has other dimensions is in the
-groups ``linear``, ``quantiles`` and ``halving``.
+Disturbed ensembles in tiles: blocks of directions and blocks of trajectories, of every equilibrium. A table
+of the section has a row for each trajectory of each equilibrium; what has other dimensions is in the groups
+``linear``, ``quantiles`` and ``halving``.
 
+Disturbed ensembles of every equilibrium at every point of a grid of parameters, one tile an equilibrium.
 Layout: arrays over the grid and ``sheet``, NaN where the sheet has no equilibrium; a sheet is one
 equilibrium, continued, as the atlas of these axes numbers them (:mod:`fastmech.atlas.sheets`). Each ensemble
 is that of ``fm.disturb`` with the scene of its point. The group ``quantiles`` holds those of times to return.

@@ -1,4 +1,4 @@
-"""The variables of an equilibrium map: names, dimensions, units and meanings, in one place."""
+"""The variables of an equilibrium map and of its curves: names, dimensions, units and meanings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a request file holds: a scene and named scans of it, validated as a whole before anything runs."""
+"""What a request file holds: a scene, scans with their axes, and how each scan is divided into tiles."""
 
 from __future__ import annotations
 

@@ -1,11 +1,13 @@
 """Stability of one equilibrium by three criteria, and what they come to together.
 
+Three criteria of stability as codes with their rounding bounds: one source for maps and single calls.
 Lagrange-Dirichlet with Sylvester's minors looks at U alone, Hurwitz at the characteristic polynomial, and the
 eigenvalues at its roots. Each says ``CRITICAL`` where rounding hides the sign that it needs. Kernels compile
 these functions; in Python they take NumPy's doubles, which divide by zero as kernels do.
 
-The polynomial knows more than a state matrix in doubles: strong damping puts rates of 1e12 and 1e-12 1/s
-beside one another, and its coefficients hold both to rounding where the matrix loses the slow ones.
+Eigenvalues of small motion: two real quadratic factors of its polynomial by Newton's method. The polynomial
+knows more than a state matrix in doubles: strong damping puts rates of 1e12 and 1e-12 1/s beside one another,
+and its coefficients hold both to rounding where the matrix loses the slow ones.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The equations of small motion at an equilibrium, M x'' + B x' + K x = 0, reduced (over m2 l^2).
+"""Small motion at an equilibrium, M x'' + B x' + K x = 0, reduced (over m2 l^2), and its undamped modes.
 
 M is the metric (paper (11)), B = diag(beta k^2 l^2, 0) the slider's damper, K the Hessian of U (paper (19)).
 """

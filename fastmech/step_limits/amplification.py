@@ -1,4 +1,4 @@
-"""What one step does to y' = lambda y: the stability function of every method, from its own coefficients.
+"""What one step does to y' = lambda y: every method's stability function, and its limits on the axes.
 
 Runge-Kutta methods multiply y by R(z), z = h lambda, R(z) = 1 + z b (I - z A)^-1 1 (Hairer, Wanner, *Solving
 ODEs II*, section IV.3), a polynomial for an explicit one. An Adams method maps its history; the roots of its

@@ -1,4 +1,4 @@
-"""Reading a result file for analysis offline; data are read when they are asked for."""
+"""Reading a result file for analysis offline: sections or parts by coordinate, when they are asked for."""
 
 from __future__ import annotations
 

@@ -1,12 +1,13 @@
 """Writing a result file: whole under its final name, or not at all.
 
-HDF5 may crash the process when a write fails, at the latest when it closes the file. So it never learns of
-it: after the first failure nothing is written any more, and whoever writes asks for the failure.
+A file for HDF5 on a disk that may fill up. HDF5 may crash the process when a write fails, at the latest when
+it closes the file. So it never learns of it: after the first failure nothing is written any more, and whoever
+writes asks for the failure.
 
-HDF5 packs one chunk at a time, and that takes most of the time of writing a large result. Here its filters
-are applied outside of it: byte shuffling, deflate and the Fletcher-32 checksum, as HDF5's file format
-specification (sections "Shuffle filter", "Deflate filter", "Fletcher32 filter") lays them out. The bytes do
-not depend on the number of threads.
+Chunks of streamed variables, packed in threads and written in order. HDF5 packs one chunk at a time, and that
+takes most of the time of writing a large result. Here its filters are applied outside of it: byte shuffling,
+deflate and the Fletcher-32 checksum, as HDF5's file format specification (sections "Shuffle filter", "Deflate
+filter", "Fletcher32 filter") lays them out. The bytes do not depend on the number of threads.
 """
 
 from __future__ import annotations

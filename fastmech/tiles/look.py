@@ -1,4 +1,4 @@
-"""A look at a scan in progress: how far it is, and what there is of its result."""
+"""A look at a scan in progress, how far it is and what there is; one tile computed alone."""
 
 from __future__ import annotations
 

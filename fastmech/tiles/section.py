@@ -1,4 +1,4 @@
-"""One section of a request and its tiles, in a form that any process can compute them from."""
+"""One section of a request: its tiles, computed by any process, its assembly, and what decides its bits."""
 
 from __future__ import annotations
 

@@ -1,13 +1,14 @@
-"""A tile as bytes: a line that says what it is, its content, and a checksum of the line.
+"""A tile as bytes, which are written whole or not at all: a line of what it is, its content, a checksum.
 
 The line holds a checksum of the content and its length, so every byte is covered; a tile under another name,
 of another request or cut short is told as surely as one with a flipped bit. The checksum is CRC-32: it finds
 every error within 32 neighbouring bits, misses one in 2^32 of the others, and costs a fifth of what a
 cryptographic digest does.
 
-A length, so many bytes of JSON with everything but the arrays, then the arrays as they lie in memory. HDF5,
-which lets one thread at a time do anything, would take some ten milliseconds for the same. Nothing is copied
-on the way out and nothing on the way back: at tens of megabytes a copy costs as much as writing them.
+One dataset as bytes in memory and back, for pieces of a result that are not published yet. A length, so many
+bytes of JSON with everything but the arrays, then the arrays as they lie in memory. HDF5, which lets one
+thread at a time do anything, would take some ten milliseconds for the same. Nothing is copied on the way out
+and nothing on the way back: at tens of megabytes a copy costs as much as writing them.
 """
 
 from __future__ import annotations

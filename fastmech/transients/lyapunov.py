@@ -1,9 +1,9 @@
-"""``fm.largest_lyapunov``: the largest Lyapunov exponent along motions, by the tangent flow.
+"""How small disturbances grow: ``fm.largest_lyapunov`` by the tangent flow, and growth before decay.
 
-The norm of (xi, eta) is xi |K| xi + eta M eta with the small motion's matrices: twice the energy at a
-minimum; elsewhere the directions in which U falls count as if it rose, so that the norm stays one.
-Reactivity and amplification: Neubert, Caswell, Ecology 78 (1997); Trefethen, Embree, *Spectra and
-Pseudospectra*, chapter 14.
+Growth of small disturbances of an equilibrium before the eigenvalues rule, measured in energy. The norm of
+(xi, eta) is xi |K| xi + eta M eta with the small motion's matrices: twice the energy at a minimum; elsewhere
+the directions in which U falls count as if it rose, so that the norm stays one. Reactivity and amplification:
+Neubert, Caswell, Ecology 78 (1997); Trefethen, Embree, *Spectra and Pseudospectra*, chapter 14.
 """
 
 from __future__ import annotations

@@ -5,11 +5,12 @@ structure off, and the oscillation of a fractal that is similar to itself only a
 exponent depend on the scales that it is fitted to. Its measure is the largest difference between exponents
 of parts of the scales.
 
-A start is uncertain at eps if a start at the distance eps from it ends elsewhere. The share of uncertain
-starts falls like f(eps) ~ eps^alpha, and the boundary's (box-counting) dimension is d = D - alpha in D
-dimensions: alpha = 1 for a smooth boundary, less for a fractal one, where halving f takes 2^(1/alpha) times
-the accuracy (Grebogi, McDonald, Ott, Yorke, Phys. Lett. A 99 (1983) 415; McDonald, Grebogi, Ott, Yorke,
-Physica D 17 (1985) 125).
+Uncertainty exponent: how fast the end becomes predictable as the start becomes more exact. A start is
+uncertain at eps if a start at the distance eps from it ends elsewhere. The share of uncertain starts falls
+like f(eps) ~ eps^alpha, and the boundary's (box-counting) dimension is d = D - alpha in D dimensions: alpha =
+1 for a smooth boundary, less for a fractal one, where halving f takes 2^(1/alpha) times the accuracy
+(Grebogi, McDonald, Ott, Yorke, Phys. Lett. A 99 (1983) 415; McDonald, Grebogi, Ott, Yorke, Physica D 17
+(1985) 125).
 """
 
 from __future__ import annotations
