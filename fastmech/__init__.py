@@ -13,11 +13,13 @@ from fastmech import kernel_cache as _kernel_cache  # noqa: F401  first: it note
 if TYPE_CHECKING:
     from fastmech import loads as loads
     from fastmech import mechanisms as mechanisms
+    from fastmech import samplers as samplers
     from fastmech.atlas.critical import critical_values
     from fastmech.atlas.critical_curves import critical_curves
     from fastmech.atlas.folds import find_folds, trace_folds
     from fastmech.atlas.map import map_equilibria
     from fastmech.atlas.snap import find_snap
+    from fastmech.attractors.find import find_attractors
     from fastmech.basins.copies import copy_labels, copy_of_label
     from fastmech.basins.disturbed import disturb
     from fastmech.basins.edge import saddle_at, track_edge
@@ -105,6 +107,7 @@ _MODULES = {
     "disturb": "fastmech.basins.disturbed",
     "disturbed_motion": "fastmech.disturbance.motion",
     "erosion": "fastmech.basins.erosion",
+    "find_attractors": "fastmech.attractors.find",
     "find_equilibria": "fastmech.models.equilibria",
     "find_folds": "fastmech.atlas.folds",
     "find_snap": "fastmech.atlas.snap",
@@ -173,6 +176,7 @@ __all__ = [
     "disturb",
     "disturbed_motion",
     "erosion",
+    "find_attractors",
     "find_equilibria",
     "find_folds",
     "find_snap",
@@ -212,7 +216,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name in ("loads", "mechanisms"):
+    if name in ("loads", "mechanisms", "samplers"):
         return import_module(f"fastmech.{name}")
     if name not in _MODULES:
         raise AttributeError(f"module 'fastmech' has no attribute {name!r}")

@@ -78,7 +78,8 @@ class Load:
         put = {
             s: values[s.name] for v in given.values() for s in v.free_symbols
         }  # whatever is assumed of them
-        return replace(self, **{name: float(value.subs(put)) for name, value in given.items()})
+        found = {k: values[v.name] if v.is_Symbol else v.subs(put) for k, v in given.items()}
+        return replace(self, **{name: float(value) for name, value in found.items()})
 
     def _require(self, name: str, least: float = -inf, above: float = -inf) -> None:
         """Refuse a number that is out of its range."""

@@ -1,7 +1,7 @@
 """Samplers: where starts are drawn from, as data; ``draw(n, names, seed)`` gives the first n of a sequence.
 
-Each names states by ranges ``(low, high)`` or by one value; what is not named is zero. A plain mapping of names
-to ranges is :class:`Uniform`.
+Each names states by ranges ``(low, high)`` or by one value; what is not named is zero. A plain mapping of
+names to ranges is :class:`Uniform`.
 """
 
 from __future__ import annotations
@@ -48,9 +48,7 @@ class Sampler:
 
     def _ends(self, names: Sequence[str]) -> tuple[Floats, Floats]:
         if not isinstance(self.ranges, Mapping):
-            raise InputError(
-                f"ranges = {shown(self.ranges)}: must map names to (low, high) or to a value"
-            )
+            raise InputError(f"ranges = {shown(self.ranges)}: must map names to (low, high) or to a value")
         for name in self.ranges:
             if name not in names:
                 raise InputError(f"ranges.{name}: unknown name; {nearest(str(name), list(names))}")

@@ -40,6 +40,8 @@ LAYERS = (
     "atlas",
     "disturbance",
     "capture",
+    "samplers",
+    "attractors",
     "basins",
     "results",
     "store",

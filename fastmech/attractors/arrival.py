@@ -14,29 +14,23 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 from scipy.linalg import eig, solve_discrete_lyapunov
 
 from fastmech.attractors.flow import FINER, Floats, Flow
 from fastmech.attractors.orbits import ATTRACTS, Orbit
-from fastmech.jit import CUBE, INTEGERS, MATRIX, VECTOR, inlined, kernel
+from fastmech.kernels.levels import levels
 
 Integers = NDArray[np.int64]
 
 #: Shells of half the radius each, directions on each, and places of a cycle that are tried.
 SHELLS, DIRECTIONS, TRIED = 15, 96, 16
 
-#: Newton steps to the nearest phase of a cycle.
-PROJECTIONS = 4
-
 #: Squares of a form's axes that are rounding beside the largest.
 ROUNDING = 1e-14
 
 #: Share of the greatest radius found that is taken: between shells, and between directions, nothing is tried.
 SAFE = 0.5
-
-
 
 
 class Balls(NamedTuple):
@@ -47,64 +41,6 @@ class Balls(NamedTuple):
     # how far along a cycle e goes, in distances to the next place
     slopes: Floats  #: (m, dim): rates of change from place to place along a cycle, else zero
     radius: float  #: the least distance to a ball's border, over the scale
-
-
-@inlined
-def hermite(a: float, begin: float, end: float, slope: float, at_end: float) -> float:
-    """The cubic between two values with these slopes, at a from 0 to 1."""
-    b = 1.0 - a
-    return b * b * ((1.0 + 2.0 * a) * begin + a * slope) + a * a * ((1.0 + 2.0 * b) * end - b * at_end)
-
-
-@kernel(types.void(MATRIX, MATRIX, CUBE, MATRIX, VECTOR, INTEGERS, VECTOR))
-def levels(
-    states: Floats,
-    places: Floats,
-    forms: Floats,
-    slopes: Floats,
-    turning: Floats,
-    found: Integers,
-    level: Floats,
-) -> None:
-    """The place about which V is least for each state (n, dim), into ``found`` (n,), and V into ``level``.
-
-    Beside a cycle's place, e is the distance from the cubic through its neighbours at the same phase.
-    """
-    dim, m = states.shape[1], places.shape[0]
-    e = np.empty(dim)
-    for i in range(states.shape[0]):
-        found[i], level[i] = -1, np.inf
-        for j in range(m):
-            along = 0.0
-            for d in range(dim):
-                e[d] = states[i, d] - places[j, d]
-                if turning[d]:
-                    e[d] -= 2.0 * np.pi * np.rint(e[d] / (2.0 * np.pi))
-                along += forms[j, dim, d] * e[d]
-            if not abs(along) <= 0.75:
-                continue
-            if along != 0.0:
-                sign = 1.0 if along > 0.0 else -1.0
-                k = (j + 1) % m if along > 0.0 else (j + m - 1) % m
-                a, correction = 0.0, abs(along)
-                for _ in range(PROJECTIONS):
-                    a += correction
-                    correction = 0.0
-                    for d in range(dim):
-                        gone, away = places[k, d] - places[j, d], states[i, d] - places[j, d]
-                        if turning[d]:
-                            gone -= 2.0 * np.pi * np.rint(gone / (2.0 * np.pi))
-                            away -= 2.0 * np.pi * np.rint(away / (2.0 * np.pi))
-                        e[d] = away - hermite(a, 0.0, gone, sign * slopes[j, d], sign * slopes[k, d])
-                        correction += sign * forms[j, dim, d] * e[d]
-            size = 0.0
-            for row in range(dim):
-                part = 0.0
-                for d in range(dim):
-                    part += forms[j, row, d] * e[d]
-                size += part * part
-            if size < level[i]:
-                found[i], level[i] = j, size
 
 
 def levels_of(flow: Flow, of: Balls, states: Floats) -> tuple[Integers, Floats]:

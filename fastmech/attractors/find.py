@@ -1,21 +1,23 @@
-"""``fm.find_attractors``: where motions of a system settle, without knowing it beforehand, and how many do."""
+"""``fm.find_attractors``: where motions of a system settle, found without knowing it beforehand."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import binomtest
 
+from fastmech.attractors.arrival import Cloud
 from fastmech.attractors.flow import Floats, Flow, flow_of
+from fastmech.attractors.orbits import Orbit
 from fastmech.attractors.search import Search
-from fastmech.attractors.settle import settle
+from fastmech.attractors.settle import Ends, settle
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
-from fastmech.ensembles.status import LABELS, Status, counts
+from fastmech.ensembles.status import LABELS, counts
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
@@ -38,7 +40,9 @@ class Attractor:
     """A place of rest, a periodic motion, a torus or chaos that motions come to."""
 
     kind: str  #: "fixed point", "periodic", "torus" or "chaos"
-    points: Floats  #: (m, dim): the place; a periodic motion's after each forcing period, or all along; a sample
+    points: (
+        Floats  #: (m, dim): the place; after each forcing period, or all along; a sample
+    )
     period: float | None  #: of a periodic motion [s]
     forcing_periods: int | None  #: the same in periods of the forcing, where there is one
     multipliers: NDArray[np.complex128] | None  #: of the map over its period; None of a torus and of chaos
@@ -51,10 +55,10 @@ class Attractor:
     @property
     def name(self) -> str:
         """Kind, period and place in a few words."""
-        where = ", ".join(f"{x:.4g}" for x in self.points[0])
+        where = ", ".join(f"{x:.4g}" for x in np.round(self.points[0], 9) + 0.0)
         period = "" if self.period is None else f", period {self.period:.6g} s"
-        if self.forcing_periods is not None and self.period is not None:
-            period = f", period {self.forcing_periods}"
+        if self.forcing_periods is not None:
+            period = f", period {self.forcing_periods} of the forcing"
         place = f"at ({where})" if self.kind in ("fixed point", "periodic") else f"about ({where})"
         return f"{self.kind}{period} {place}"
 
@@ -74,13 +78,20 @@ class Attractors(Sequence[Attractor]):
     scale: Floats  #: typical size of each state
     cell: Floats | None  #: size of the cells of tori and chaos; None where there are none
     steps: int  #: of all motions together
-    search: Search  #: what the attractors are looked for with
+    search: Search = field(repr=False)  #: what they were found with
+    rank: Integers = field(repr=False)  #: place among the attractors of what the search has found
 
     def __len__(self) -> int:
         return len(self.attractors)
 
     def __getitem__(self, index):  # type: ignore[no-untyped-def]
         return self.attractors[index]
+
+    def labels_of(self, starts: Floats, progress: Progress | None = None) -> Ends:
+        """Labels, statuses and times of other starts (n, dim) by these attractors."""
+        periods = max(1, round(self.t_end / self.looks))
+        ends = settle(self.search, starts, periods, progress)
+        return ends._replace(label=self.rank[ends.label])
 
     @property
     def counts(self) -> dict[str, int]:
@@ -121,8 +132,8 @@ def find_attractors(
     Args:
         system: a system of your own or a mechanism. One that depends on the time needs its ``period``; a
             mechanism's is that of its loads. States that count modulo a turn are its ``angles``.
-        starts: ranges by name, ``{"x": (-1, 1), "x_dot": (-0.5, 1)}`` for uniform starts (what is not named is
-            zero), a sampler of ``fm.samplers``, or states (n, dim).
+        starts: ranges by name, ``{"x": (-1, 1), "x_dot": (-0.5, 1)}`` for uniform starts (what is not named
+            is zero), a sampler of ``fm.samplers``, or states (n, dim).
         n: how many starts, 10,000 by default; of states given all.
         t_end: how long a motion has to arrive [s]; by default eight times as long as the last motion of the
             sample takes.
@@ -135,8 +146,8 @@ def find_attractors(
         attractors and labels. A start is captured when two runs with different steps stay together until both
         have come into a region about the same attractor in which the map over its period was measured to
         contract, or have visited the cells of a torus or of chaos 24 times in a row. It is ``unsure`` where
-        they come apart with the finest steps too, ``escaped`` where it goes a thousand times as far as motions
-        do or where the system's stopping condition ends it, ``undecided`` where it has not arrived by
+        they come apart with the finest steps too, ``escaped`` where it goes a thousand times as far as
+        motions do or where the system's stopping condition ends it, ``undecided`` where it has not arrived by
         ``t_end``.
 
     Raises:
@@ -148,13 +159,24 @@ def find_attractors(
     checks.progress_function(progress, "starts")
     if t_end is not None:
         t_end = checks.number("t_end", t_end, "s", above=0.0)
-    usable = y[np.isfinite(y).all(axis=1)]
-    if len(usable) < 2:
+    return labelled(search_of(system, y, method, threads), y, t_end, progress)
+
+
+def search_of(
+    system: System | Mechanism, starts: Floats, method: str = "dop853", threads: int | None = None
+) -> Search:
+    """Attractors that a sample of starts (n, dim) comes to.
+
+    Raises:
+        InputError: there are no two finite starts, or the system depends on the time and has no period.
+    """
+    usable = np.flatnonzero(np.isfinite(starts).all(axis=1))
+    if usable.size < 2:
         raise InputError("starts: must be two or more finite states")
-    sample = usable[np.unique(np.linspace(0, len(usable) - 1, SAMPLE).astype(np.int64))]
+    sample = starts[usable[np.unique(np.linspace(0, usable.size - 1, SAMPLE).astype(np.int64))]]
     search = Search(flow_of(system, sample, {}, method, threads))
     search.look(sample)
-    return labelled(search, y, t_end, progress)
+    return search
 
 
 def starts_of(given: object, names: Sequence[str], n: int | None, seed: int) -> Floats:
@@ -187,50 +209,54 @@ def labelled(
             search.look(ends.last)
         if search.count == before:
             break
-    orbits = [_of_orbit(flow, orbit, ball.radius) for orbit, ball in search.orbits]
-    clouds = [
-        Attractor(
-            "chaos" if cloud.exponent > 3.0 * cloud.error else "torus", cloud.points, None, None, None,
-            cloud.exponent, cloud.error, None, None, 0,
-        )
-        for cloud in search.clouds
-    ]  # fmt: skip
-    every = [*orbits, *clouds]
+    every = [_of_orbit(flow, orbit, ball.radius) for orbit, ball in search.orbits]
+    every += [_of_cloud(cloud) for cloud in search.clouds]
     found = np.bincount(ends.label[ends.label >= 0], minlength=len(every))
     order = np.argsort(-found, kind="stable")
     rank = np.empty(len(every) + 1, dtype=np.int64)
     rank[order], rank[-1] = np.arange(len(every)), -1
     return Attractors(
-        attractors=tuple(Attractor(**{**vars(every[k]), "found": int(found[k])}) for k in order),
+        attractors=tuple(replace(every[k], found=int(found[k])) for k in order),
         label=rank[ends.label],
         status=ends.status,
         time=ends.time,
         names=tuple(flow.scene.state),
         t_end=periods * flow.period,
         looks=flow.period,
-        dt=flow.period / flow.steps,
+        dt=search.flow.period / search.flow.steps,
         scale=flow.scale,
         cell=None if not search.clouds else np.max([cloud.size for cloud in search.clouds], axis=0),
         steps=ends.steps,
         search=search,
+        rank=rank,
     )
 
 
-def _of_orbit(flow: Flow, orbit, radius: float) -> Attractor:  # type: ignore[no-untyped-def]
+def _of_cloud(cloud: Cloud) -> Attractor:
+    kind = "chaos" if cloud.exponent > 3.0 * cloud.error else "torus"
+    return Attractor(
+        kind, cloud.points, None, None, None, cloud.exponent, cloud.error, residual=None, radius=None, found=0
+    )
+
+
+def _of_orbit(flow: Flow, orbit: Orbit, radius: float) -> Attractor:
     rest = orbit.periods == 0.0
-    period = None if rest else orbit.periods * flow.period
+    over = flow.period * (orbit.periods or 1.0)
     largest = float(np.abs(orbit.multipliers).max()) if orbit.multipliers.size else 0.0
-    over = flow.period if rest else period
     # Differences give multipliers to about 1e-9; along a cycle nothing grows or falls.
     exponent = 0.0 if orbit.cycle else math.log(max(largest, 1e-300)) / over
     error = 1e-9 / (over * max(largest, 1e-300))
-    forced = round(orbit.periods) if flow.forced else None
+    points = orbit.points.copy()
+    points[:, flow.angles] = flow.away(points, np.zeros_like(points))[:, flow.angles]
     return Attractor(
-        "fixed point" if rest else "periodic", orbit.points, period, forced, orbit.multipliers, exponent,
-        error, orbit.residual, radius, 0,
-    )  # fmt: skip
-
-
-def undecided(found: Attractors) -> int:
-    """How many starts may end at any attractor."""
-    return int(np.count_nonzero((found.status == Status.UNDECIDED) | (found.status == Status.UNSURE)))
+        kind="fixed point" if rest else "periodic",
+        points=points,
+        period=None if rest else over,
+        forcing_periods=round(orbit.periods) if flow.forced else None,
+        multipliers=orbit.multipliers,
+        exponent=exponent,
+        exponent_error=error,
+        residual=orbit.residual,
+        radius=radius,
+        found=0,
+    )

@@ -132,11 +132,11 @@ def flow_of(
     """
     if isinstance(scene, Mechanism):
         scene = scene.replace(**values)
-        problem, period = mechanism_problem(scene, len(sample), {}, "lagrange"), _period_of_loads(scene)
+        problem, period = mechanism_problem(scene, len(sample), {}, "lagrange"), period_of(scene, {})
         turning = [q.periodic for q in scene.coordinates] + [False] * len(scene.coordinates)
     else:
-        scene = replace(scene, parameters={**scene.parameters, **values}) if values else scene
-        problem, period = system_problem(scene, len(sample), {}), scene.period_at({})
+        scene = scene.with_parameters(values) if values else scene
+        problem, period = system_problem(scene, len(sample), {}), period_of(scene, {})
         turning = [name in scene.angles for name in scene.state]
     angles = np.array(turning)
     scale = _spread(sample, angles)
@@ -201,14 +201,26 @@ def _with_steps(flow: Flow, sample: Floats) -> Flow:
     )
 
 
-def _period_of_loads(mechanism: Mechanism) -> float | None:
-    """The common period [s] of a mechanism's loads; None where they are constant.
+def keeps_moving(scene: object) -> bool:
+    """Whether motions settle on attractors to be looked for: nothing stops them, or loads that repeat."""
+    if isinstance(scene, System):
+        return scene.stop is None
+    loads = scene.loads if isinstance(scene, Mechanism) else ()
+    return any(math.isinf(sum(load.to_come(0.0))) and load.facts().period for load in loads)
+
+
+def period_of(scene: System | Mechanism, values: Mapping[str, float]) -> float | None:
+    """The period [s] of a system, or the common one of a mechanism's loads, with ``values`` of parameters.
+
+    None: it has none, loads are constant.
 
     Raises:
         InputError: a load is not periodic, or they have none in common.
     """
-    periods = []
-    for load in mechanism.loads:
+    if isinstance(scene, System):
+        return scene.period_at(values)
+    periods: list[float] = []
+    for load in (acting.at({**scene.parameters, **values}) for acting, *_ in scene.acting):
         if sum(load.to_come(0.0)) == 0.0:
             continue
         period = load.facts().period

@@ -104,7 +104,7 @@ def periodic(flow: Flow, guesses: Floats, periods: int) -> list[Orbit]:
 
 
 def visits(flow: Flow, orbit: Orbit, place: Floats) -> bool:
-    """Whether an orbit comes to a place, as nearly as :data:`SAME` (of a cycle a twentieth of its places' distance)."""
+    """Whether an orbit comes to a place, to within :data:`SAME` or a twentieth of a step along a cycle."""
     distance = flow.distance(orbit.points, place)
     j = int(np.argmin(distance))
     if not orbit.cycle:

@@ -1,9 +1,9 @@
-"""Where motions of a sample settle: on orbits, which Newton's method finds, or in cells that they keep visiting.
+"""Where motions of a sample settle: on orbits that Newton's method finds, or in cells that they fill.
 
 The sample is followed over windows of periods, each twice as long as the one before. Motions that come back
 near to where they were give guesses of orbits. What keeps visiting the same cells of a grid (Datseris and
-Wagemakers, Chaos 32 (2022) 023104) and is no orbit is a torus or chaos, as the largest Lyapunov exponent tells.
-An orbit may be found from any guess: who ends there is found out later, by running until arrival.
+Wagemakers, Chaos 32 (2022) 023104) and is no orbit is a torus or chaos: the largest Lyapunov exponent tells
+which. An orbit may be found from any guess: who ends there is found out later, by running until arrival.
 """
 
 from __future__ import annotations
@@ -134,6 +134,16 @@ class Search:
                 found = cycle(flow, paths[-1, i], back / DENSE)
                 if found is not None:
                     self._add(found)
+
+    def seek(self, places: Floats, period: float | None) -> None:
+        """Look for orbits near places (n, dim), of a period [s] that a cycle has; None: a place of rest."""
+        periods = 1.0 if period is None else period / self.flow.period
+        if self.flow.forced or period is None:
+            self._try(places, max(1, round(periods)))
+            return
+        found = cycle(self.flow, places[0], periods)
+        if found is not None:
+            self._add(found)
 
     def _try(self, guesses: Floats, periods: int) -> None:
         """Newton's method from guesses (n, dim) that are not near one another."""

@@ -1,8 +1,8 @@
 """Who ends at which attractor: motions run until they have arrived, each with two lengths of steps.
 
-A label counts where both runs arrive at the same attractor and have stayed together on the way: where they have
-not, a disturbance as small as the steps' error has grown, and the motions run again with finer steps. Cells of
-the second run are twice as wide. Who still comes apart is unsure.
+A label counts where both runs arrive at the same attractor and have stayed together on the way. Where they
+have not, a disturbance as small as the steps' error has grown, and the motions run again with finer steps.
+Cells of the second run are twice as wide. Motions that still come apart are unsure.
 """
 
 from __future__ import annotations

@@ -13,23 +13,28 @@ damper stops part of a motion as quickly: steps are as short at first, and then 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.attractors.find import find_attractors
+from fastmech.attractors.flow import keeps_moving
+from fastmech.attractors.settle import Ends
+from fastmech.basins.labels import Labels, of_attractors, pieces_of
 from fastmech.basins.ladder import SUBSTEPS, climb, lingering, tell_the_same
 from fastmech.basins.measures.norm import FEW_TURNS, beyond_turns
 from fastmech.basins.runs import Paths, follow, rounds_until
+from fastmech.basins.system import system_labels_of
 from fastmech.capture.certificate import Certificate
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.run import Progress
-from fastmech.ensembles.status import FAILURES, LABELS, Status, counts
+from fastmech.ensembles.status import FAILURES, Status
+from fastmech.ensembles.system import System
 from fastmech.ensembles.threads import thread_count
 from fastmech.errors import StepWarning
 from fastmech.integrators.methods import Method, find_method
@@ -45,67 +50,20 @@ _FIRST = float(np.float32(2.0 * np.pi))
 _SECOND = float(np.float32(2.0 * np.pi - _FIRST))
 TURN = (_FIRST, _SECOND, 2.0 * np.pi - _FIRST - _SECOND + 2.4492935982947064e-16)
 
-#: Starts that are followed together, at most; and so many pieces, if they are not smaller than the least.
-#: Every piece takes something of everywhere, so that all take about as long and progress tells the time left.
-BATCH, PIECES, LEAST = 1 << 16, 16, 1 << 11
-
 #: Least growth from step to step while a strong damper stops part of a motion.
 FINEST_GROWTH = 0.2
 
 #: Angles larger than this are none in degrees either.
 MOST_DEGREES = 720.0
 
-#: Wells that have a line of their own where ends are printed.
-MOST_LINES = 3
-
 #: Numbers of 8 bytes that memory holds of every start on the way.
 START_NUMBERS = 20
 
 
-@dataclass(frozen=True, repr=False)
-class Labels:
-    """Where n starts end; printed, how many end where, and when."""
-
-    tree: Any  #: wells, barriers and equilibria; of a system of your own: None
-    well: NDArray[np.int8]  #: index of the well among the equilibria, -1: no label; shape (n,)
-    turns: NDArray[np.int32]  #: full turns of each coordinate of that well from its listed place, (n, coords)
-    time: Floats  #: of capture [s], NaN: not captured; the end of a step; (n,)
-    settle_time: Floats | None  #: s, from then on within the settling ball; NaN: not by t_end; (n,)
-    status: NDArray[np.int8]  #: :class:`Status`, (n,)
-    steps: int  #: integration steps of all computations of all starts
-
-    @property
-    def counts(self) -> dict[str, int]:
-        """How many starts have each status."""
-        return counts(self.status, LABELS)
-
-    def __repr__(self) -> str:
-        return told_ends(f"{self.status.size:,} starts", self)
-
-
-def told_ends(what: str, found: Any) -> str:
-    """At most six lines on ``what`` has the wells, statuses and times of :class:`Labels`, and its tree."""
-    n, well = found.status.size, found.well.ravel()
-    known, number = np.unique(well[well >= 0], return_counts=True)
-    order = np.argsort(-number, kind="stable")
-    statuses = ", ".join(f"{count:,} {name}" for name, count in found.counts.items() if count)
-    lines = [f"{what}: {statuses}"]
-    for k in order[:MOST_LINES]:
-        place = "" if found.tree is None else f" at {found.tree.equilibria.place(int(known[k]))}"
-        name = f"code {known[k]}" if found.tree is None else f"well {known[k]}"
-        lines.append(f"  {name}{place}: {number[k]:,} ({number[k] / n:.1%})")
-    if order.size > MOST_LINES:
-        lines.append(f"  {order.size - MOST_LINES} more: {number[order[MOST_LINES:]].sum():,}")
-    times = found.time[np.isfinite(found.time)]
-    if times.size:
-        lines.append(f"  after {np.median(times):.3g} s (median), {times.max():.3g} s at most")
-    return "\n".join(lines)
-
-
 def labels_of(
-    scene: Scene | Mechanism,
+    scene: Scene | Mechanism | System,
     starts: ArrayLike,
-    t_end: float = 60.0,
+    t_end: float | None = None,
     *,
     dt: float | None = None,
     method: str | None = None,
@@ -113,13 +71,17 @@ def labels_of(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Labels:
-    """Label starts by the well that captures them.
+    """Label starts by the well that captures them, or by the attractor at which they arrive.
 
     Args:
-        scene: the mechanism, with a damper. A decaying force leads to the wells of springs and weights.
+        scene: the mechanism, with a damper. A decaying force leads to the wells of springs and weights. Under
+            a load that repeats, and of a system of your own without a stopping condition, labels are those
+            of :func:`fastmech.find_attractors`, the attractors are in ``tree``, and ``dt`` and
+            ``settle_radius`` do not apply; with a stopping condition the label is its code.
         starts: phi, theta [rad], phi', theta' [rad/s], shape (n, 4) or (4,), of a ``Mechanism`` coordinates,
             then rates; angles count their turns, and more than four give a warning, if they may be degrees.
-        t_end: end of the run [s]; what is not captured by then is undecided.
+        t_end: end of the run [s], 60 by default (for attractors see there); what is not captured by then is
+            undecided.
         dt: coarsest step [s]: each path is computed with it and with two thirds of it, and with less where
             these differ. By default it follows from the scene's frequencies and the start's energy; paths
             that fail with it are computed again with a 16th of it, and so on.
@@ -134,6 +96,14 @@ def labels_of(
     Raises:
         InputError: an argument is wrong, the scene has no damper, or its wells are not certain.
     """
+    if keeps_moving(scene):
+        return _by_attractors(scene, starts, t_end, method, threads, progress)
+    t_end = 60.0 if t_end is None else t_end
+    if isinstance(scene, System):
+        states = checks.states("starts", starts, len(scene.state))
+        return system_labels_of(
+            scene, states, t_end, dt=dt, method=method or "dop853", threads=threads, progress=progress
+        )
     require_damper(scene)
     turning = [c.periodic for c in scene.coordinates] if isinstance(scene, Mechanism) else [True, True]
     states = checks.states("starts", starts, 2 * len(turning))
@@ -142,6 +112,20 @@ def labels_of(
     if 2.0 * np.pi * FEW_TURNS < largest <= MOST_DEGREES:
         warnings.warn(f"starts: {beyond_turns(largest)}", stacklevel=2)
     return label_starts(scene, states, t_end, How(dt, method, settle_radius, threads), progress)
+
+
+def _by_attractors(
+    scene: Mechanism | System,
+    starts: ArrayLike,
+    t_end: float | None,
+    method: str | None,
+    threads: int | None,
+    progress: Progress | None,
+) -> Labels:
+    found = find_attractors(
+        scene, starts, t_end=t_end, method=method or "dop853", threads=threads, progress=progress
+    )
+    return of_attractors(found, Ends(found.label, found.status, found.time, found.scale, found.steps))
 
 
 class How(NamedTuple):
@@ -262,13 +246,6 @@ class Prelude:
                 threads=self.threads,
             )
         return run.y[-1], run.status
-
-
-def pieces_of(n: int) -> Iterator[NDArray[np.intp]]:
-    """Indices of n starts, piece by piece."""
-    pieces = max(-(-n // BATCH), min(PIECES, n // LEAST), 1)
-    for piece in range(pieces):
-        yield np.arange(piece, n, pieces)
 
 
 @dataclass

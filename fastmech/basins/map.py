@@ -10,8 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.attractors.find import Attractors, find_attractors
+from fastmech.attractors.flow import keeps_moving
+from fastmech.attractors.settle import Ends
 from fastmech.basins.copies import copy_numbers
-from fastmech.basins.label import How, Labels, label_starts, told_ends
+from fastmech.basins.label import How, label_starts
+from fastmech.basins.labels import Labels, of_attractors, told_ends
 from fastmech.basins.measures.labels import number_turns
 from fastmech.basins.measures.norm import check_angles
 from fastmech.basins.refine import LevelProgress, refine_grid
@@ -39,8 +43,8 @@ class BasinMap:
 
     axes: dict[str, Floats]  #: values along each axis [rad, rad/s]
     fixed: dict[str, float]  #: the other coordinates of the starts
-    tree: Any  #: wells, barriers and equilibria; of a system of your own: None
-    well: NDArray[np.int8]  #: index of the well among the equilibria (a system's stop code), -1: no label
+    tree: Any  #: wells, barriers and equilibria, or :class:`~.find.Attractors`; of stop codes: None
+    well: NDArray[np.int8]  #: index of the well or attractor (a system's stop code), -1: no label
     turns: NDArray[np.int32]  #: full turns of each coordinate of that well from its place, (..., coordinates)
     time: Floats  #: of capture [s]; NaN: not captured, or not computed (refinement)
     settle_time: Floats | None  #: s, from then on within the settling ball; NaN as in ``time``
@@ -70,7 +74,7 @@ class BasinMap:
 def map_basins(
     scene: Scene | Mechanism | System,
     axes: Mapping[str, ArrayLike],
-    t_end: float = 60.0,
+    t_end: float | None = None,
     *,
     fixed: Mapping[str, float] | None = None,
     refine: int | None = None,
@@ -85,10 +89,13 @@ def map_basins(
 
     Args:
         scene: the mechanism, with a damper; or a system of your own with a stopping condition, whose stop
-            code is the label.
+            code is the label. Without one, and of a mechanism under loads that repeat, starts are labelled
+            by the attractors that a sample of the grid finds, see :func:`fastmech.find_attractors`: they are
+            in ``tree``.
         axes: values along two, three or four of phi, theta [rad], phi_dot, theta_dot [rad/s], rising (of a
             system: names of its states, one or more).
-        t_end: end of the run [s]; what is not captured by then is undecided.
+        t_end: end of the run [s], 60 by default (for attractors see there); what is not captured by then is
+            undecided.
         fixed: values of the other coordinates, 0 by default.
         refine: compute a coarse grid with so many points between neighbours (a power of two) and then only
             what is near boundaries, see :mod:`fastmech.basins.refine`. This is a heuristic: a part of a
@@ -121,11 +128,26 @@ def map_basins(
         )
     checks.memory(size, POINT_NUMBERS, f"axes: {size:.3g} starts", "fewer")
     own = _checked_parameters(scene, parameters or {}, shape)
+    if own and keeps_moving(scene):
+        raise InputError("parameters: may differ between starts only with a stopping condition")
     collected = _Collected(size, len(names) // 2 if not isinstance(scene, System) else 2)
 
+    moving = keeps_moving(scene)
+    t_end = 60.0 if t_end is None and not moving else t_end
+    attractors: Attractors | None = None
+
     def compute(points: NDArray[np.intp], tell: Progress | None) -> NDArray[np.int64]:
+        nonlocal attractors
         starts = grid_starts(values, held, names, points)
-        if not isinstance(scene, System):
+        if moving and attractors is None:
+            attractors = find_attractors(
+                scene, starts, t_end=t_end, method=method or "dop853", threads=threads, progress=tell
+            )
+            found = attractors
+            part = of_attractors(found, Ends(found.label, found.status, found.time, starts, found.steps))
+        elif moving:
+            part = of_attractors(attractors, attractors.labels_of(starts, tell))
+        elif not isinstance(scene, System):
             part = label_starts(scene, starts, t_end, How(dt, method, settle_radius, threads), tell)
         else:
             part = system_labels_of(
@@ -169,7 +191,7 @@ def map_basins(
         settle_time=None if settle is None else settle.reshape(shape),
         status=collected.status[source].reshape(shape),
         computed=computed.reshape(shape),
-        t_end=t_end,
+        t_end=attractors.t_end if attractors is not None else t_end,
         steps=collected.steps,
     )
 

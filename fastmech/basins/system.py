@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.basins.label import Labels, pieces_of
+from fastmech.basins.labels import Labels, pieces_of
 from fastmech.basins.ladder import SUBSTEPS
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate

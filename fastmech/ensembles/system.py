@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import inspect
 import types
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -141,6 +142,18 @@ class System:
             known = {**self.parameters, **values}
             period = period(**{name: known[name] for name in names})
         return None if period is None else checks.number("period", period, "s", above=0.0)
+
+    def with_parameters(self, values: Mapping[str, float]) -> System:
+        """The same, compiled once for both, with other values of some parameters.
+
+        Raises:
+            InputError: a name is unknown.
+        """
+        for name in set(values) - set(self.parameters):
+            raise InputError(f"parameters.{name}: is no parameter of the system")
+        made = copy.copy(self)
+        object.__setattr__(made, "parameters", {**self.parameters, **values})
+        return made
 
     @property
     def observation(self) -> Observation:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from sympy import cos, sin, sqrt, symbols
 
 from fastmech.loads import Decaying, Load
@@ -17,13 +19,18 @@ TABLE_1 = {
 }  # fmt: skip
 
 
-def slider_pendulum(load: Load | None = None) -> Mechanism:
+def slider_pendulum(
+    load: Load | None = None, parameters: Mapping[str, tuple[float, str]] | None = None
+) -> Mechanism:
     """The mechanism of :class:`fastmech.Scene`, through the general way.
 
-    ``load`` acts on M2 along +x in place of F0 exp(-alpha t), any of :mod:`fastmech.loads` [N].
+    ``load`` acts on M2 along +x in place of F0 exp(-alpha t), any of :mod:`fastmech.loads` [N]; where it has
+    symbols, ``parameters`` are their values with units: ``Harmonic(F0, omega)`` with
+    ``{"F0": (80.0, "N"), "omega": (4.0, "rad/s")}``.
     """
     phi, theta = angles("phi theta")
     values = {name: TABLE_1[name] for name in TABLE_1 if load is None or name not in ("F0", "alpha")}
+    values |= parameters or {}
     m1, m2, m3, l, c1, c2, beta, g, F0, alpha = symbols(list(TABLE_1))
     x1, y1 = l * cos(phi), l * sin(phi)
     return Mechanism(

@@ -27,7 +27,16 @@ from fastmech.tiles.tile_file import Tile, make_tile
 TILE_SCHEMA = 1
 
 #: Sources besides the compiled ones that decide a section's values.
-_SOURCES = (*COMPILED, "mechanisms", "basins", "scene.py", "results.py", "scan_types")
+_SOURCES = (
+    *COMPILED,
+    "mechanisms",
+    "samplers.py",
+    "attractors",
+    "basins",
+    "scene.py",
+    "results.py",
+    "scan_types",
+)
 
 _LIBRARIES = ("numba", "llvmlite", "numpy", "scipy", "sympy")
 

@@ -1,0 +1,427 @@
+"""``fm.frequency_response``: branches of periodic motion over a parameter, stable and unstable.
+
+A motion of period p T is a fixed point x of the map over p periods: G(x, lambda) = Phi(x, lambda) - x = 0, where
+the period T may depend on the parameter. Branches are followed by pseudo-arclength continuation (Keller; Allgower
+and Georg, *Numerical Continuation Methods*, chapter 10), with derivatives by differences: all of them run side
+by side on lanes, each in its own time over its own period. On the way multipliers tell stability: +1 at a
+fold, -1 where the period doubles, a pair on the unit circle at a Neimark-Sacker point (Guckenheimer, Holmes,
+section 3.5). Branches begin at what Newton's method finds at several values of the parameter from many starts,
+so that isolated ones are found where a start comes near.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
+
+from fastmech.attractors.find import starts_of
+from fastmech.attractors.flow import DIFFERENCE, FINER, Floats, Flow, flow_of, period_of
+from fastmech.attractors.orbits import RESIDUAL, newton
+from fastmech.ensembles import checks
+from fastmech.ensembles.lanes import Parameters
+from fastmech.ensembles.problem import Case, Problem, system_of
+from fastmech.ensembles.solve import Settings, solve
+from fastmech.ensembles.system import System
+from fastmech.errors import InputError, shown
+from fastmech.jit import FLAGS
+from fastmech.models.mechanism import Mechanism
+from fastmech.samplers import Sampler
+from fastmech.scene import nearest
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Flags = NDArray[np.bool_]
+
+#: Values of the parameter at which branches are looked for, and starts at each; periods that they run first.
+VALUES, STARTS, RUN_IN = 9, 64, 48
+
+#: Lengths of continuation steps: first, shortest and longest, in scales of state and range of the parameter.
+FIRST, SHORTEST, LONGEST = 0.01, 1e-7, 0.03
+
+#: Newton's iterations of a step, and points of a branch, at most; cosine between tangents at least.
+CORRECTIONS, POINTS, BEND = 6, 1000, 0.95
+
+#: Outputs over a period for amplitudes.
+OUTPUTS = 256
+
+
+class Special(NamedTuple):
+    """A point where the stability of a branch may change."""
+
+    kind: str  #: "fold", "period doubling" or "Neimark-Sacker"
+    value: float  #: of the parameter
+    place: Floats  #: state at the begin of a period (dim,)
+    amplitude: Floats  #: of each state (dim,)
+
+
+@dataclass(frozen=True)
+class Branch:
+    """Periodic motions along a branch."""
+
+    values: Floats  #: of the parameter (m,)
+    places: Floats  #: states at the begin of a period (m, dim)
+    multipliers: NDArray[np.complex128]  #: (m, dim)
+    amplitudes: Floats  #: half of the range of each state over the period (m, dim)
+    special: tuple[Special, ...]
+    closed: bool  #: whether it comes back to where it began: an isola
+    cut: bool  #: whether it goes on inside the range beyond an end: it is too long, or turns too sharply
+
+    @property
+    def stable(self) -> Flags:
+        """Whether all multipliers lie inside the unit circle (m,)."""
+        return np.asarray((np.abs(self.multipliers) < 1.0).all(axis=1))
+
+
+@dataclass(frozen=True, repr=False)
+class FrequencyResponse:
+    """Branches of periodic motion over a parameter; printed, where stability changes."""
+
+    parameter: str
+    names: tuple[str, ...]  #: of the states
+    units: Mapping[str, str]  #: of states and the parameter, where they are known
+    periods: int  #: of the forcing, that a motion takes
+    branches: tuple[Branch, ...]
+
+    @property
+    def special(self) -> list[Special]:
+        """Folds, period doublings and Neimark-Sacker points of all branches, by the parameter."""
+        return sorted((s for branch in self.branches for s in branch.special), key=lambda s: s.value)
+
+    def __repr__(self) -> str:
+        closed, cut = (sum(getattr(b, how) for b in self.branches) for how in ("closed", "cut"))
+        lines = [
+            f"{len(self.branches)} branches of period {self.periods} over {self.parameter}"
+            + (f", {closed} closed" if closed else "")
+            + (f", {cut} cut off" if cut else "")
+        ]
+        for kind in ("fold", "period doubling", "Neimark-Sacker"):
+            values = [f"{s.value:.6g}" for s in self.special if s.kind == kind]
+            more = f" and {len(values) - 6} more" if len(values) > 6 else ""
+            if values:
+                lines.append(f"  {kind} at {self.parameter} = {', '.join(values[:6])}{more}")
+        return "\n".join(lines)
+
+    def plot(self, state: str | None = None, ax: Axes | None = None) -> Axes:
+        """Amplitude of a state, the first by default, over the parameter: stable solid, unstable dashed."""
+        from fastmech.plots.response import draw_response
+
+        return draw_response(self, self.names[0] if state is None else state, ax)
+
+
+def frequency_response(
+    system: System | Mechanism,
+    parameter: str,
+    between: tuple[float, float],
+    starts: Sampler | Mapping[str, ArrayLike] | ArrayLike,
+    *,
+    periods: int = 1,
+    seed: int = 0,
+    threads: int | None = None,
+) -> FrequencyResponse:
+    """Periodic motions over a range of a parameter, such as the frequency or amplitude of a load.
+
+    Args:
+        system: a system of your own with a ``period``, or a mechanism under loads that repeat.
+        parameter: its name.
+        between: least and greatest value.
+        starts: ranges by name, a sampler or states (n, dim), as for :func:`fastmech.find_attractors`: Newton's
+            method begins at 64 of them, and at where these are after 48 periods, at nine values.
+        periods: how many periods of the forcing a motion takes.
+        seed: of the sampler.
+        threads: threads to use, all processors by default.
+
+    Returns:
+        branches with multipliers, amplitudes, and folds, period doublings and Neimark-Sacker points located to
+        rounding of the map. A branch that no start leads to is not found.
+
+    Raises:
+        InputError: an argument is wrong, or the system does not depend on the time.
+    """
+    if not isinstance(system, System | Mechanism):
+        raise InputError(f"system = {shown(system)}: must be a System or a Mechanism")
+    if parameter not in system.parameters:
+        raise InputError(f"parameter: {nearest(str(parameter), list(system.parameters))}")
+    low, high = (checks.number("between", value, "") for value in between)
+    if not low < high:
+        raise InputError(f"between = {shown(between)}: must rise")
+    periods = checks.whole_number("periods", periods, least=1, most=1024)
+    y = starts_of(starts, system.state, STARTS, seed)
+    family = Family(system, parameter, (low, high), y, periods, threads)
+    branches: list[Branch] = []
+    for value, flow in family.flows.items():
+        guesses = np.concatenate([y, flow.after(y, RUN_IN)])
+        guesses = guesses[np.isfinite(guesses).all(axis=1) & ~flow.is_far(guesses)]
+        places, residual, _ = newton(flow, guesses, periods)
+        known = [place for branch in branches for place in _at(family, branch, value)]
+        for place in places[residual < RESIDUAL]:
+            if all(family.distance(place, other) > 1e-4 for other in known):
+                branch = _branch(family, place, value)
+                branches.append(branch)
+                known += [place, *_at(family, branch, value)]
+    return FrequencyResponse(parameter, tuple(system.state), _units(system), periods, tuple(branches))
+
+
+def _units(system: System | Mechanism) -> dict[str, str]:
+    if isinstance(system, System):
+        return {}
+    units = ["rad" if q.periodic or q.unit == "rad" else "m" for q in system.coordinates]
+    return dict(zip(system.state, [*units, *(f"{u}/s" for u in units)], strict=True)) | dict(system.units)
+
+
+class Family:
+    """The map over some periods and its derivatives, for any value of a parameter."""
+
+    def __init__(
+        self,
+        scene: System | Mechanism,
+        parameter: str,
+        between: tuple[float, float],
+        starts: Floats,
+        periods: int,
+        threads: int | None,
+    ) -> None:
+        self.scene, self.parameter, self.between, self.periods = scene, parameter, between, periods
+        self.threads = threads
+        #: Values at which branches begin, inside the range.
+        inside = np.linspace(*between, VALUES + 2)[1:-1]
+        self.flows = {
+            float(v): flow_of(scene, starts, {parameter: float(v)}, threads=threads) for v in inside
+        }
+        first: Flow = next(iter(self.flows.values()))
+        if not first.forced:
+            raise InputError("system: does not depend on the time; give it a period, or a load that repeats")
+        self.angles, self.away = first.angles, first.away
+        self.scale = np.max([flow.scale for flow in self.flows.values()], axis=0)
+        self.method = first.method
+        self.steps = FINER * periods * max(flow.steps for flow in self.flows.values())
+        self.dim = len(self.scale)
+
+    def distance(self, a: Floats, b: Floats) -> float:
+        """Largest component of a - b over the scale."""
+        return float(np.abs(self.away(a, b) / self.scale).max())
+
+    @cached_property
+    def _of_period(self) -> tuple[System, Callable[[float], tuple[float, list[float]]]]:
+        """The system in which a period is a unit of time, and period and parameters for a value."""
+        if isinstance(self.scene, Mechanism):
+            mechanism = self.scene.with_terms({self.parameter})
+            own = system_of(mechanism, "lagrange")
+            values_at = mechanism.coefficients
+        else:
+            own = self.scene
+            values_at = own.parameters.__or__
+
+        def known(value: float) -> tuple[float, list[float]]:
+            found = values_at({self.parameter: value})
+            period = period_of(self.scene, {self.parameter: value})
+            if period is None:
+                raise InputError(f"parameter: at {self.parameter} = {value:g} the system has no period")
+            return period * self.periods, [float(found[name]) for name in own.parameters]
+
+        return _in_periods(own), known
+
+    def run(self, y: Floats, values: Floats, times: Floats) -> Floats:
+        """States (outputs, n, dim) at times in units of the orbits' periods, each with its own value (n,)."""
+        system, known = self._of_period
+        each = {value: known(value) for value in np.unique(values).tolist()}
+        rows = np.array([[*each[v][1], each[v][0]] for v in values.tolist()])
+        problem = Problem(
+            system.kernel, Parameters(tuple(np.ascontiguousarray(c) for c in rows.T)), system=system
+        )
+        settings = Settings(self.method, (1.0 + 1e-12) / self.steps)
+        return solve(Case(problem, y, times, self.threads), settings).y
+
+    def derivative(self, x: Floats, value: float) -> tuple[Floats, Floats, Floats]:
+        """G (dim,), its derivative by the state (dim, dim) and by the parameter over the range (dim,)."""
+        h, range_ = DIFFERENCE * self.scale, self.between[1] - self.between[0]
+        hv = DIFFERENCE * range_
+        shifts = np.concatenate([np.zeros((1, self.dim)), np.diag(h), np.diag(-h), np.zeros((2, self.dim))])
+        values = np.full(len(shifts), value)
+        values[-2:] += hv, -hv
+        image = self.run(x + shifts, values, np.ones(1))[0]
+        d = self.dim
+        J = (self.away(image[1 : 1 + d], image[1 + d : 1 + 2 * d]) / (2.0 * h[:, None])).T
+        by_value = self.away(image[-2], image[-1]) / (2.0 * DIFFERENCE)
+        return self.away(image[0], x), J, by_value
+
+
+def _in_periods(system: System) -> System:
+    """The same with its period, the last parameter, as the unit of time."""
+    if system.vector:
+        raise InputError("system: branches are followed of systems whose rhs gives a tuple, not of arrays")
+    names = [*system.state, *system.parameter_order]
+    rates = ", ".join(f"period_ * rate{k}" for k in range(len(system.state)))
+    found = ", ".join(f"rate{k}" for k in range(len(system.state)))
+    text = (
+        f"def in_periods(t, {', '.join(names)}, period_):\n"
+        f"    {found}, = rhs(t * period_, {', '.join(names)})\n"
+        f"    return {rates},\n"
+    )
+    place: dict[str, Any] = {"rhs": numba.njit(**FLAGS)(system.rhs)}
+    exec(text, place)
+    function = place["in_periods"]
+    assert list(inspect.signature(function).parameters)[1:-1] == names
+    return System(function, list(system.state), {**dict.fromkeys(system.parameters, 0.0), "period_": 1.0})
+
+
+class _Point(NamedTuple):
+    """A point of a branch, in scales of state and range of the parameter."""
+
+    u: Floats  #: (dim + 1,)
+    tangent: Floats
+    J: Floats
+
+
+def _correct(family: Family, guess: Floats, tangent: Floats) -> _Point | None:
+    """The branch's point in the plane through a guess across a direction."""
+    u, size, low = guess.copy(), np.inf, family.between[0]
+    range_ = family.between[1] - low
+    for _ in range(CORRECTIONS):
+        G, J, by_value = family.derivative(u[:-1] * family.scale, low + u[-1] * range_)
+        if not (np.isfinite(G).all() and np.isfinite(J).all()):
+            return None
+        A = np.zeros((len(u), len(u)))
+        A[:-1, :-1] = (J - np.eye(family.dim)) * family.scale / family.scale[:, None]
+        A[:-1, -1] = by_value / family.scale
+        A[-1] = tangent
+        right = np.append(G / family.scale, tangent @ (u - guess))
+        before, size = size, float(np.abs(right).max())
+        try:
+            if size < RESIDUAL:
+                own = np.linalg.solve(A, np.eye(len(u))[-1])
+                return _Point(u, own / np.linalg.norm(own), J)
+            if size > 2.0 * before:
+                return None
+            u = u - np.linalg.solve(A, right)
+        except np.linalg.LinAlgError:
+            return None
+    return None
+
+
+def _branch(family: Family, place: Floats, value: float) -> Branch:
+    """The whole branch through a periodic motion."""
+    u = np.append(place / family.scale, (value - family.between[0]) / (family.between[1] - family.between[0]))
+    start = _correct(family, u, np.eye(len(u))[-1])
+    if start is None:  # too near to a fold for the plane of constant parameter
+        start = _Point(u, np.eye(len(u))[-1], family.derivative(place, value)[1])
+    forth, end = _follow(family, start)
+    back: list[_Point] = []
+    begin = end
+    if end != "closed":
+        back, begin = _follow(family, start._replace(tangent=-start.tangent))
+    points = [p._replace(tangent=-p.tangent) for p in back[::-1]] + [start, *forth]
+    special = []
+    for one, two in zip(points, points[1:], strict=False):
+        special += _between(family, one, two)
+    us = np.array([p.u for p in points])
+    values = family.between[0] + us[:, -1] * (family.between[1] - family.between[0])
+    places = us[:, :-1] * family.scale
+    return Branch(
+        values,
+        places,
+        np.array([np.linalg.eigvals(p.J) for p in points]),
+        _amplitudes(family, places, values),
+        tuple(special),
+        end == "closed",
+        "cut" in (begin, end),
+    )
+
+
+def _follow(family: Family, start: _Point) -> tuple[list[_Point], str]:
+    """Points along a branch, and how it ends: at the end of the range, "closed" where it began, or "cut"."""
+    points, last, length = [], start, FIRST
+    while len(points) < POINTS and length > SHORTEST:
+        new = _correct(family, last.u + length * last.tangent, last.tangent)
+        if new is None or new.tangent @ last.tangent < BEND:
+            length *= 0.5
+            continue
+        if not 0.0 <= new.u[-1] <= 1.0:
+            bound = 0.0 if new.u[-1] < 0.0 else 1.0
+            share = (bound - last.u[-1]) / (new.u[-1] - last.u[-1])
+            edge = last.u + share * (new.u - last.u)
+            edge[-1] = bound
+            end = _correct(family, edge, np.eye(len(edge))[-1])
+            if end is not None:
+                sign = 1.0 if end.tangent @ last.tangent > 0.0 else -1.0
+                points.append(end._replace(tangent=sign * end.tangent))
+            return points, "range"
+        points.append(new)
+        gap = new.u - start.u
+        gap[:-1] = family.away(gap[:-1] * family.scale, np.zeros(family.dim)) / family.scale
+        if len(points) > 8 and np.linalg.norm(gap) < 1.5 * length and new.tangent @ start.tangent > 0.5:
+            points.append(start)
+            return points, "closed"
+        last, length = new, min(1.4 * length, LONGEST)
+    return points, "cut"
+
+
+def _tests(p: _Point) -> Floats:
+    """What changes its sign at a fold, a period doubling, a Neimark-Sacker point or a neutral saddle."""
+    values = np.linalg.eigvals(p.J)
+    pairs = [values[i] * values[j] - 1.0 for i in range(len(values)) for j in range(i)]
+    doubling = np.linalg.det(p.J + np.eye(len(p.J)))
+    return np.array([p.tangent[-1], doubling, np.prod(pairs).real if pairs else 1.0])
+
+
+def _between(family: Family, one: _Point, two: _Point) -> list[Special]:
+    """Special points between neighbours of a branch."""
+    found = []
+    direction = two.u - one.u
+    gap = float(np.linalg.norm(direction))
+    before, after = _tests(one), _tests(two)
+    for kind, k in (("fold", 0), ("period doubling", 1), ("Neimark-Sacker", 2)):
+        if not before[k] * after[k] < 0.0 or not gap:
+            continue
+
+        def point(share: float) -> _Point | None:
+            return _correct(family, one.u + share * direction, direction / gap)
+
+        def test(share: float, k: int = k) -> float:
+            p = one if share == 0.0 else two if share == 1.0 else point(share)
+            return float(before[k] + share * (after[k] - before[k])) if p is None else float(_tests(p)[k])
+
+        share = brentq(test, 0.0, 1.0, xtol=1e-9)
+        p = point(share) or one
+        values = np.linalg.eigvals(p.J)
+        if k == 2 and np.abs(values[np.argmin(np.abs(np.abs(values) - 1.0))].imag) < 1e-4:
+            continue  # two real multipliers with the product 1: a neutral saddle
+        value = family.between[0] + p.u[-1] * (family.between[1] - family.between[0])
+        place = p.u[:-1] * family.scale
+        found.append(Special(kind, value, place, _amplitudes(family, place[None], np.array([value]))[0]))
+    return found
+
+
+def _amplitudes(family: Family, places: Floats, values: Floats) -> Floats:
+    """Half of the range of each state over a period (m, dim), between outputs by parabolas."""
+    path = family.run(places, values, np.arange(1.0, OUTPUTS + 1.0) / OUTPUTS)
+    ends = []
+    for sign in (1.0, -1.0):
+        y = sign * path
+        k = np.argmax(y, axis=0)[None]
+        low, top, high = (np.take_along_axis(y, (k + s) % OUTPUTS, axis=0)[0] for s in (-1, 0, 1))
+        bend = low - 2.0 * top + high
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ends.append(np.where(bend < 0.0, top - (high - low) ** 2 / (8.0 * bend), top))
+    return np.asarray(0.5 * (ends[0] + ends[1]))
+
+
+def _at(family: Family, branch: Branch, value: float) -> list[Floats]:
+    """Where a branch passes a value of the parameter (dim,)."""
+    found = []
+    crossing = np.flatnonzero((branch.values[1:] - value) * (branch.values[:-1] - value) <= 0.0)
+    for k in crossing:
+        rise = branch.values[k + 1] - branch.values[k]
+        share = (value - branch.values[k]) / rise if rise else 0.0
+        guess = branch.places[k] + share * (branch.places[k + 1] - branch.places[k])
+        place, residual, _ = newton(family.flows[value], guess[None], family.periods)
+        found.append(place[0] if residual[0] < RESIDUAL else guess)
+    return found

@@ -1,0 +1,82 @@
+"""Labels: where starts end, when, and how they are told."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.attractors.find import Attractors
+from fastmech.attractors.settle import Ends
+from fastmech.ensembles.status import LABELS, counts
+
+Floats = NDArray[np.float64]
+
+#: Starts that are followed together, at most; and so many pieces, if they are not smaller than the least.
+#: Every piece takes something of everywhere, so that all take about as long and progress tells the time left.
+BATCH, PIECES, LEAST = 1 << 16, 16, 1 << 11
+
+#: Wells that have a line of their own where ends are printed.
+MOST_LINES = 3
+
+
+@dataclass(frozen=True, repr=False)
+class Labels:
+    """Where n starts end; printed, how many end where, and when."""
+
+    tree: Any  #: wells, barriers and equilibria; of what keeps moving :class:`~.find.Attractors`
+    well: NDArray[np.int8]  #: index of the well among the equilibria or attractors, -1: no label; shape (n,)
+    turns: NDArray[np.int32]  #: full turns of each coordinate of that well from its listed place, (n, coords)
+    time: Floats  #: of capture [s], NaN: not captured; the end of a step; (n,)
+    settle_time: Floats | None  #: s, from then on within the settling ball; NaN: not by t_end; (n,)
+    status: NDArray[np.int8]  #: :class:`Status`, (n,)
+    steps: int  #: integration steps of all computations of all starts
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many starts have each status."""
+        return counts(self.status, LABELS)
+
+    def __repr__(self) -> str:
+        return told_ends(f"{self.status.size:,} starts", self)
+
+
+def told_ends(what: str, found: Any) -> str:
+    """At most six lines on ``what`` has the wells, statuses and times of :class:`Labels`, and its tree."""
+    n, well = found.status.size, found.well.ravel()
+    known, number = np.unique(well[well >= 0], return_counts=True)
+    order = np.argsort(-number, kind="stable")
+    statuses = ", ".join(f"{count:,} {name}" for name, count in found.counts.items() if count)
+    lines = [f"{what}: {statuses}"]
+    for k in order[:MOST_LINES]:
+        lines.append(f"  {_named(found.tree, int(known[k]))}: {number[k]:,} ({number[k] / n:.1%})")
+    if order.size > MOST_LINES:
+        lines.append(f"  {order.size - MOST_LINES} more: {number[order[MOST_LINES:]].sum():,}")
+    times = found.time[np.isfinite(found.time)]
+    if times.size:
+        lines.append(f"  after {np.median(times):.3g} s (median), {times.max():.3g} s at most")
+    return "\n".join(lines)
+
+
+def _named(tree: Any, k: int) -> str:
+    """What one ends at: a stop's code, an attractor, a well."""
+    if tree is None:
+        return f"code {k}"
+    return tree[k].name if isinstance(tree, Attractors) else f"well {k} at {tree.equilibria.place(k)}"
+
+
+def of_attractors(found: Attractors, ends: Ends) -> Labels:
+    """Labels of starts by attractors."""
+    n = len(ends.label)
+    turns = np.zeros((n, len(found.names) // 2), dtype=np.int32)
+    return Labels(found, ends.label.astype(np.int8), turns, ends.time, None, ends.status, ends.steps)
+
+
+def pieces_of(n: int) -> Iterator[NDArray[np.intp]]:
+    """Indices of n starts, piece by piece."""
+    pieces = max(-(-n // BATCH), min(PIECES, n // LEAST), 1)
+    for piece in range(pieces):
+        yield np.arange(piece, n, pieces)
