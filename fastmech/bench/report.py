@@ -12,6 +12,7 @@ import numpy as np
 
 from fastmech.bench import peers, tables
 from fastmech.bench.atlas import atlas_study
+from fastmech.bench.attractors import attractors_study
 from fastmech.bench.basins import basins_study
 from fastmech.bench.fused import METHODS
 from fastmech.bench.machine import costs, throughputs
@@ -47,6 +48,7 @@ LIBRARIES = ("numba", "scipy", "heyoka", "torch", "jax", "diffrax", "numbalsoda"
 #: Studies with a file of their own, by name: from `quick` and a stage to the lines of Markdown.
 STUDIES: dict[str, Callable[..., list[str]]] = {
     "atlas": atlas_study,
+    "attractors": attractors_study,
     "basins": basins_study,
     "proofs": proofs_study,
     "stiff": stiff_study,

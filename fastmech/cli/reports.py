@@ -51,12 +51,20 @@ def hardcases(out: Path, quick: bool, quiet: bool, as_json: bool) -> None:
             raise click.exceptions.Exit(1)
 
 
+#: Studies by name, see :data:`fastmech.bench.report.STUDIES`.
+STUDIES = (
+    "atlas", "attractors", "basins", "proofs", "stiff", "systems", "threads", "tolerances", "vectors",
+)  # fmt: skip
+
+
 @click.command(name="bench")
 @out_option("Folder for the report.", "results/bench")
 @click.option("--quick", is_flag=True, help="Fewer trajectories and methods.")
 @click.option(
     "--only",
-    type=click.Choice(["atlas", "basins", "proofs", "stiff", "systems", "threads", "tolerances", "vectors"]),
+    type=click.Choice(
+        ["atlas", "attractors", "basins", "proofs", "stiff", "systems", "threads", "tolerances", "vectors"]
+    ),
     help="One study alone.",
 )
 @click.option(
