@@ -69,7 +69,9 @@ def balls(flow: Flow, orbit: Orbit) -> Balls:
             forms[j, dim] = along / (along @ slopes[j])
         J = keep @ orbit.jacobians[j] @ keep
         J *= min(1.0, ATTRACTS / max(float(np.abs(np.linalg.eigvals(J)).max()), 1e-300))
-        P = solve_discrete_lyapunov(J.T, np.diag(flow.scale**-2.0))
+        # In units of the scale: states of very different sizes would lose digits.
+        J = J * flow.scale / flow.scale[:, None]
+        P = solve_discrete_lyapunov(J.T, np.eye(dim), method="bilinear") / np.outer(flow.scale, flow.scale)
         squares, axes = np.linalg.eigh(0.5 * (P + P.T))
         forms[j, :dim] = np.sqrt(np.maximum(squares, ROUNDING * squares[-1]))[:, None] * axes.T @ keep
     own = Balls(places, forms, slopes, 0.0)
@@ -113,6 +115,9 @@ class Cloud(NamedTuple):
 
     points: Floats  #: (m, dim)
     size: Floats  #: of a cell (dim,)
+    still: bool = (
+        False  #: whether each motion stays in one cell: it comes to rest more slowly than any exponent
+    )
     exponent: float = 0.0  #: largest Lyapunov exponent [1/s]
     error: float = 0.0  #: its standard error, and what a linear growth of disturbances would give
 

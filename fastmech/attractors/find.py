@@ -28,6 +28,9 @@ Integers = NDArray[np.int64]
 #: Starts by default, those of a sample that is searched, and searches of what arrives nowhere.
 STARTS, SAMPLE, ROUNDS = 10_000, 256, 4
 
+#: States at which the map over a period is looked at, whether it preserves volume.
+PRESERVING = 16
+
 #: Periods that motions have to arrive: so many times those of the sample's last, and at least and at most.
 LATER, FEWEST, MOST = 8, 256, 1 << 14
 
@@ -166,13 +169,19 @@ def search_of(
     """Attractors that a sample of starts (n, dim) comes to.
 
     Raises:
-        InputError: there are no two finite starts, or the system depends on the time and has no period.
+        InputError: there are no two finite starts, the system depends on the time and has no period, or it
+            preserves volume.
     """
     usable = np.flatnonzero(np.isfinite(starts).all(axis=1))
     if usable.size < 2:
         raise InputError("starts: must be two or more finite states")
     sample = starts[usable[np.unique(np.linspace(0, usable.size - 1, SAMPLE).astype(np.int64))]]
-    search = Search(flow_of(system, sample, {}, method, threads))
+    flow = flow_of(system, sample, {}, method, threads)
+    _, jacobians = flow.derivative(sample[:PRESERVING], 1.0)
+    jacobians = jacobians[np.isfinite(jacobians).all(axis=(1, 2))]
+    if len(jacobians) and np.median(np.abs(np.linalg.det(jacobians) - 1.0)) < 1e-6:
+        raise InputError("system: preserves volume, so that nothing attracts; give it some damping")
+    search = Search(flow)
     search.look(sample)
     return search
 
@@ -208,7 +217,7 @@ def labelled(
         if search.count == before:
             break
     every = [_of_orbit(flow, orbit, ball.radius) for orbit, ball in search.orbits]
-    every += [_of_cloud(cloud) for cloud in search.clouds]
+    every += [_of_cloud(cloud, flow.forced) for cloud in search.clouds]
     found = np.bincount(ends.label[ends.label >= 0], minlength=len(every))
     order = np.argsort(-found, kind="stable")
     rank = np.empty(len(every) + 1, dtype=np.int64)
@@ -230,8 +239,10 @@ def labelled(
     )
 
 
-def _of_cloud(cloud: Cloud) -> Attractor:
+def _of_cloud(cloud: Cloud, forced: bool) -> Attractor:
     kind = "chaos" if cloud.exponent > 3.0 * cloud.error else "torus"
+    if cloud.still:
+        kind = "periodic" if forced else "fixed point"
     return Attractor(
         kind, cloud.points, None, None, None, cloud.exponent, cloud.error, residual=None, radius=None, found=0
     )
@@ -241,9 +252,9 @@ def _of_orbit(flow: Flow, orbit: Orbit, radius: float) -> Attractor:
     rest = orbit.periods == 0.0
     over = flow.period * (orbit.periods or 1.0)
     largest = float(np.abs(orbit.multipliers).max()) if orbit.multipliers.size else 0.0
-    # Differences give multipliers to about 1e-9; along a cycle nothing grows or falls.
+    # Differences give multipliers to about 1e-8; along a cycle nothing grows or falls.
     exponent = 0.0 if orbit.cycle else math.log(max(largest, 1e-300)) / over
-    error = 1e-9 / (over * max(largest, 1e-300))
+    error = 1e-8 / (over * max(largest, 1e-300))
     points = orbit.points.copy()
     points[:, flow.angles] = flow.away(points, np.zeros_like(points))[:, flow.angles]
     return Attractor(

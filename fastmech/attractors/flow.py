@@ -25,8 +25,9 @@ from fastmech.models.mechanism import Mechanism
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-#: Steps of a period at least and at most, and the share of the scale that a period's error may have.
-FEWEST, MOST, ERROR = 8, 1 << 14, 1e-6
+#: Steps of a period at least and at most, and the share of the scale that a period's error may have; above
+#: so many steps it grows with their number, as right-hand sides that ask for them have kinks.
+FEWEST, MOST, ERROR, ROUGH = 8, 1 << 14, 1e-6, 128
 
 #: Steps of a period for orbits, times those of motions: the eighth power is below rounding of differences.
 FINER = 4
@@ -37,8 +38,11 @@ COARSER = 2.0 / 3.0
 #: States of a sample that choose steps, and the share of them that must keep the error.
 CHOOSING, MOSTLY = 64, 0.9
 
-#: Differences for derivatives, as a share of the scale: the third root of a run's rounding.
-DIFFERENCE = 1e-5
+#: Differences for derivatives, as a share of the scale: truncation and rounding are alike, about 1e-9.
+DIFFERENCE = 2e-6
+
+#: By how much looks at motions of a system without time may be further apart than their starts suggest.
+SLOWER = 8.0
 
 #: Loads' periods that fit into a common one at most so often.
 MULTIPLES = 64
@@ -158,9 +162,7 @@ def flow_of(
                 "period: missing; the right-hand side depends on the time, System(period=...) tells after "
                 "how many seconds it repeats"
             )
-        speed = np.abs(flow.rates(few) / scale).max(axis=1)
-        speed = speed[np.isfinite(speed) & (speed > 0.0)]
-        flow = replace(flow, period=2.0 * math.pi / float(np.median(speed)) if speed.size else 1.0)
+        flow = replace(flow, period=_time_of_change(flow, few))
     return _settled(_with_steps(flow, sample[:CHOOSING]), sample[:CHOOSING])
 
 
@@ -177,18 +179,31 @@ def _spread(sample: Floats, angles: Flags) -> Floats:
 
 def _settled(flow: Flow, sample: Floats) -> Flow:
     """The same with the scale of where the sample's motions are after some periods, if they are there."""
-    y = flow.after(sample, 8.0)
+    paths = flow.run(sample, SLOWER * np.arange(1.0, 33.0) / 32.0).y
+    y = paths[-1]
     kept = np.isfinite(y).all(axis=1) & ~flow.is_far(y)
     if np.count_nonzero(kept) < 2:
         return flow
-    both = np.concatenate([sample, y[kept]])
+    both = np.concatenate([sample, paths[:, kept].reshape(-1, sample.shape[1])])
     low, high = np.quantile(both, [0.02, 0.98], axis=0)
     scale = np.where(flow.angles, np.pi, np.maximum(0.5 * (high - low), 1e-6 * flow.scale))
-    return _with_steps(replace(flow, scale=scale, middle=0.5 * (low + high)), y[kept])
+    now = replace(flow, scale=scale, middle=0.5 * (low + high))
+    if not flow.forced:  # at least as long as motions took to get there
+        now = replace(now, period=max(flow.period, min(_time_of_change(now, y[kept]), SLOWER * flow.period)))
+    return _with_steps(now, np.concatenate([sample[kept], y[kept]]), np.count_nonzero(kept))
 
 
-def _with_steps(flow: Flow, sample: Floats) -> Flow:
+def _time_of_change(flow: Flow, states: Floats) -> float:
+    """In which most states (n, dim) change by about their size [s]: 2 pi times size over rate."""
+    speed = np.abs(flow.rates(states) / flow.scale).max(axis=1)
+    speed = speed[np.isfinite(speed) & (speed > 0.0)]
+    return 2.0 * math.pi / float(np.median(speed)) if speed.size else flow.period
+
+
+def _with_steps(flow: Flow, sample: Floats, stay: int = 0) -> Flow:
     """The same with as many steps of a period as keep :data:`ERROR` for nearly all of a sample.
+
+    The first ``stay`` states are known to stay finite.
 
     Raises:
         InputError: no number of steps does.
@@ -198,8 +213,10 @@ def _with_steps(flow: Flow, sample: Floats) -> Flow:
         finer = replace(flow, steps=2 * flow.steps)
         now = finer.after(sample)
         usable = np.isfinite(now).all(axis=1) & ~flow.is_far(now)
+        settled = usable[:stay].all() and np.array_equal(usable, np.isfinite(before).all(axis=1) & usable)
         error = np.sort(np.nan_to_num(flow.distance(before[usable], now[usable]), nan=np.inf))
-        if not error.size or error[int(MOSTLY * (error.size - 1))] <= ERROR:
+        allowed = ERROR * max(1.0, flow.steps / ROUGH)
+        if settled and (not error.size or error[int(MOSTLY * (error.size - 1))] <= allowed):
             return flow
         flow, before = finer, now
     raise InputError(

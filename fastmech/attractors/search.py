@@ -50,6 +50,9 @@ SIZES = (1 / 128, 1 / 64, 1 / 32, 1 / 16, 1 / 8)
 #: of cells in common of two motions on the same attractor.
 FILLED, SHARED = 0.95, 0.3
 
+#: Points of an attractor's cells that are kept.
+MOST_POINTS = 1 << 18
+
 #: Motions of one attractor that are followed for its exponent, and periods.
 FOLLOWED, EXPONENT_PERIODS = 8, 512
 
@@ -98,7 +101,7 @@ class Search:
             self._find_orbits(paths)
             paths = self._leave_out(paths, passed)
             if number >= WINDOWS and paths.shape[1]:
-                self._find_clouds(paths[dense - 1 :: dense])
+                self._find_clouds(paths, dense)
                 paths = self._leave_out(paths, passed)
             y, window = paths[-1], 2 * window
 
@@ -171,12 +174,12 @@ class Search:
                 break
             self.flow = replace(self.flow, steps=2 * self.flow.steps)
 
-    def _find_clouds(self, strobes: Floats) -> None:
-        """Look for cells that strobes (k, n, dim) fill."""
-        flow, half = self.flow, len(strobes) // 2
+    def _find_clouds(self, paths: Floats, dense: int) -> None:
+        """Look for cells that paths (k, n, dim) fill: the later halves find what the earlier ones have."""
+        flow, half = self.flow, len(paths) // 2
         for share in SIZES:
             size = share * flow.scale
-            keys = keys_of(flow, size, strobes)
+            keys = keys_of(flow, size, paths)
             again = [np.isin(own[half:], own[:half]).mean() for own in keys.T]
             filling = np.flatnonzero(np.array(again) > FILLED)
             if 2 * filling.size >= keys.shape[1]:
@@ -185,19 +188,23 @@ class Search:
             return
         for group in _groups([np.unique(own) for own in keys[:, filling].T]):
             members = filling[group]
-            stays = flow.run(strobes[-1, members[:16]], np.arange(1.0, STAYS + 1.0)).y
-            points = np.concatenate([strobes[:, members].reshape(-1, stays.shape[2])[: 1 << 16],
-                                     stays.reshape(-1, stays.shape[2])])  # fmt: skip
+            stays = flow.run(paths[-1, members[:16]], np.arange(1, STAYS * dense + 1) / dense).y
+            dim = paths.shape[2]
+            points = np.concatenate([paths[half:, members].reshape(-1, dim), stays.reshape(-1, dim)])
+            points = points[:: -(-len(points) // MOST_POINTS)]
             left = ~np.isin(keys_of(flow, size, stays), np.unique(keys[:, members]))
             if np.isfinite(stays).all() and left.mean() < 0.2 and (self.arrived(stays[-1]) < 0).all():
-                self._add_cloud(Cloud(points, size), stays[-1])
+                still = bool((np.ptp(stays, axis=0) < size).all())
+                self._add_cloud(Cloud(points, size, still), stays[-1])
 
     def _add_cloud(self, new: Cloud, last: Floats) -> None:
         """Add a cloud, or its points to the one with which it has many cells in common."""
         cells = np.unique(keys_of(self.flow, new.size, new.points))
         for k, cloud in enumerate(self.clouds):
             own = np.unique(keys_of(self.flow, new.size, cloud.points))
-            if np.isin(cells, own).sum() > SHARED * min(cells.size, own.size):
+            gap = np.abs(self.flow.away(new.points[-1], cloud.points[-1]) / new.size).max()
+            near = new.still and cloud.still and gap < 2.0
+            if near or np.isin(cells, own).sum() > SHARED * min(cells.size, own.size):
                 points = np.concatenate([cloud.points, new.points])
                 self.clouds[k] = cloud._replace(points=points, size=np.maximum(cloud.size, new.size))
                 return

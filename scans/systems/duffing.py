@@ -1,8 +1,8 @@
 """The Duffing oscillator with five periodic attractors, found without being told what to look for.
 
-x'' = -delta x' - x^3 + A cos t with delta = 0.08, A = 0.2; starts uniform in [-1, 1] x [-0.5, 1]. Published shares
-at 4,000 starts: bSTAB (Stender and Hoffmann, Nonlinear Dynamics 107 (2022), case 2) as pybasin's tests expect them
-(github.com/adrianwix/pybasin, tests/integration/duffing).
+x'' = -delta x' - x^3 + A cos t with delta = 0.08, A = 0.2; starts uniform in [-1, 1] x [-0.5, 1]. Published
+shares at 4,000 starts: bSTAB (Stender and Hoffmann, Nonlinear Dynamics 107 (2022), case 2) as pybasin's tests
+expect them (github.com/adrianwix/pybasin, tests/integration/duffing).
 """
 
 import math

@@ -1,8 +1,8 @@
 """The Lorenz system with two chaotic attractors and escape.
 
-sigma = 0.12, r = 0, b = -0.6; starts uniform in [-10, 10] x [-20, 20] x {0}. Published shares at 4,000 starts:
-0.093 and 0.087 at the two attractors, 0.820 escaped (bSTAB, Stender and Hoffmann, Nonlinear Dynamics 107 (2022),
-case 3).
+sigma = 0.12, r = 0, b = -0.6; starts uniform in [-10, 10] x [-20, 20] x {0}. Published shares of 4,000
+starts: 0.093 and 0.087 at the two attractors, 0.820 escaped (bSTAB, Stender and Hoffmann, Nonlinear Dynamics
+107 (2022), case 3).
 """
 
 import fastmech as fm

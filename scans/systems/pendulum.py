@@ -1,8 +1,8 @@
 """Driven damped pendulum: how many starts come to rest, and how many keep turning.
 
 x'' = -alpha x' + T - K sin x with alpha = 0.1, T = 0.5, K = 1; starts uniform in
-[-pi + asin(T/K), pi + asin(T/K)] x [-10, 10]. Published share at rest, 10,000 starts: 0.152 (bSTAB, Stender and
-Hoffmann, Nonlinear Dynamics 107 (2022), case 1, as computed by pybasin).
+[-pi + asin(T/K), pi + asin(T/K)] x [-10, 10]. Published share at rest, 10,000 starts: 0.152 (bSTAB, Stender
+and Hoffmann, Nonlinear Dynamics 107 (2022), case 1, as computed by pybasin).
 """
 
 import math

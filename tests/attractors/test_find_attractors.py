@@ -243,3 +243,29 @@ def test_wrong_systems_get_one_line(change: dict[str, object], message: str) -> 
 def test_wrong_starts_get_one_line(starts: object, message: str) -> None:
     with pytest.raises(fm.InputError, match=message):
         fm.find_attractors(DUFFING, starts)  # type: ignore[arg-type]
+
+
+def test_chaos_that_fills_cells_slowly_is_found() -> None:
+    """Lorenz's attractor of 1963 has the largest exponent 0.9056 (Sprott 2003)."""
+
+    def classic(t, x, y, z):  # type: ignore[no-untyped-def]
+        return 10.0 * (y - x), x * (28.0 - z) - y, x * y - 8.0 / 3.0 * z
+
+    system = fm.System(classic, ["x", "y", "z"], {})
+    found = fm.find_attractors(system, {"x": (-15.0, 15.0), "y": (-15.0, 15.0), "z": (5.0, 40.0)}, 300)
+    assert [one.kind for one in found] == ["chaos"]
+    assert abs(found[0].exponent - 0.9056) < 3.0 * found[0].exponent_error
+
+
+def test_what_nothing_attracts_is_refused() -> None:
+    swing = fm.System(lambda t, x, v: (v, -fm.sin(x)), ["x", "v"], {}, angles=["x"])
+    with pytest.raises(fm.InputError, match="preserves volume"):
+        fm.find_attractors(swing, {"x": (-3.0, 3.0), "v": (-1.0, 1.0)}, 50)
+
+
+def test_a_place_that_is_approached_ever_more_slowly_is_a_fixed_point() -> None:
+    """x' = -x^3 comes to rest like t^(-1/2)."""
+    slow = fm.System(lambda t, x: (-x * x * x,), ["x"], {})
+    found = fm.find_attractors(slow, {"x": (-3.0, 3.0)}, 200)
+    assert [one.kind for one in found] == ["fixed point"]
+    assert found.counts["captured"] == 200
