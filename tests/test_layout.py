@@ -54,6 +54,7 @@ LAYERS = (
     "hardcases",
     "bench",
     "faults",
+    "explore",
     "cli",
     "__main__",
 )

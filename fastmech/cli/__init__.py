@@ -24,6 +24,7 @@ COMMANDS = (
     "info",
     "export",
     "plot",
+    "explore",
     "equilibria",
     "paper",
     "hardcases",
