@@ -37,7 +37,7 @@ class EquilibriaMessage(Message):
     kind: Literal["equilibria"]
     axes: Ranges
     fixed: Annotated[dict[str, float], Field(max_length=8)] = {}
-    num: Annotated[int, Field(ge=2, le=201)] = 61
+    num: Annotated[int, Field(ge=2, le=201)] = 101
 
 
 class MotionMessage(Message):

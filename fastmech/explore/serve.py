@@ -219,7 +219,7 @@ def serve(device: Device, port: int, ready: Callable[[str], None]) -> None:
         raise InputError(f"--port {port}: cannot be used: {error.strerror}") from None
     port = own.getsockname()[1]
     config = uvicorn.Config(
-        application(device, port), log_level="error", ws="websockets-sansio", ws_max_size=LONGEST * 4,
+        application(device, port), log_level="critical", ws="websockets-sansio", ws_max_size=LONGEST * 4,
         timeout_graceful_shutdown=0,
     )  # fmt: skip
     server = uvicorn.Server(config)

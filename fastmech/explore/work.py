@@ -120,11 +120,13 @@ def _basins(device: Device, message: Any, tell: Progress) -> Iterator[bytes]:
         for begin in range(0, len(missing), TILE):
             tell(0)
             i, j = missing[begin : begin + TILE].T
-            labels = labels_of(system, states[i, j], message.t_end, progress=tell)
+            labels: Any = labels_of(system, states[i, j], message.t_end, progress=tell)
+            wells = [int(one) for one in labels.tree.wells]
             well[i, j], time[i, j] = labels.well, labels.time
             turns[i, j] = np.clip(labels.turns, -127, 127)
             done = int(i[-1]) if begin + TILE < len(missing) else shape[0]
             header = {"kind": "basins", "id": message.id, "axes": message.axes, "divisions": divisions}
+            header |= {"wells": wells}
             first = int(i[0])
             header |= {
                 "from": first,

@@ -125,15 +125,18 @@ export class Basins extends Field {
     this.starts();
     this.colors = new Map();
   }
-  reset() { this.colors.clear(); this.grid = null; }
   color(well, turns) {
-    const name = `${well}:${turns.join(",")}`;
-    if (!this.colors.has(name)) this.colors.set(name, { color: rgb(COLORS[this.colors.size % COLORS.length]), well, turns });
+    const name = `${well}:${turns.join(",")}`, plain = !turns.some((t) => t);
+    if (!this.colors.has(name)) {
+      // Unturned wells have the first colours, whatever else is in the picture.
+      const place = plain ? this.wells.indexOf(well) : this.wells.length + this.turned++;
+      this.colors.set(name, { color: rgb(COLORS[place % COLORS.length]), well, turns });
+    }
     return this.colors.get(name).color;
   }
   take(header, arrays) {
     const n = header.divisions + 1, rows = arrays.well.shape[0], q = arrays.turns.shape[2];
-    if (this.shownId !== header.id) { this.colors.clear(); this.shownId = header.id; this.grid = null; }
+    if (this.shownId !== header.id) { this.colors.clear(); this.turned = 0; this.wells = header.wells; this.shownId = header.id; this.grid = null; }
     this.shown = header.axes;
     if (!this.grid || this.grid.n !== n) {
       const before = this.grid;
@@ -189,7 +192,7 @@ export class Atlas extends Field {
     this.image = picture(nx, ny, color);
     this.legend = kinds.map((k, index) => [COLORS[index % COLORS.length], `${seen.get(k)[0]} equilibria, ${seen.get(k)[1]} stable`]);
     this.curves = header.curves.map((kind, k) => ({ kind, xy: arrays[`curve${k}`] }));
-    this.note.textContent = `${nx} x ${ny} points.${this.curves.length ? ` ${this.curves.length} curves on which equilibria appear${header.curves_complete ? ": proved to be all" : ""}.` : ""} The cross is the present point.`;
+    this.note.textContent = `${nx} x ${ny} points.${this.curves.length ? ` ${this.curves.length} curves on which equilibria appear${header.curves_complete ? ": proved to be all" : ""}.` : ""} The cross is the present point.${this.app.held() ? " The force is held at its first value." : ""}`;
     this.canvas.dataset.divisions = header.divisions;
     this.plane.later();
   }

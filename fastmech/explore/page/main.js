@@ -107,7 +107,7 @@ class App {
     this.landscape.set();
     this.talk.ask("equilibria", { parameters: this.state.parameters, axes: this.landscape.axes() });
     clearTimeout(this.mapping);
-    this.mapping = setTimeout(() => this.askBasins(), 60);
+    this.mapping = setTimeout(() => this.askBasins(), 120);
   }
   free() {
     this.busy = false;
@@ -120,8 +120,10 @@ class App {
   askAtlas() {
     if (!this.atlas) return;
     this.atlas.set();
-    this.talk.ask("atlas", { parameters: this.state.parameters, axes: this.atlas.axes() });
+    this.talk.ask("atlas", { parameters: this.held() ? { ...this.state.parameters, alpha: 0 } : this.state.parameters, axes: this.atlas.axes() });
   }
+  // Over the force of a scene the atlas is of one that stays: of one that fades nothing is left at rest.
+  held() { return this.about.scene && this.state.parameters.alpha > 0 && this.state.atlas.includes("F0"); }
   askMotion() {
     if (this.moving) { this.movingAgain = true; return; }
     this.moving = true;

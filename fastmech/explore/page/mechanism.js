@@ -13,7 +13,7 @@ export class MechanismView {
     this.plane.labels = ["x [m]", "y [m]"];
     this.panel = panel("mechanism", "Mechanism", { planes: () => [this.plane], lines: false });
     this.play = element("button", { onclick: () => this.toggle() }, "play");
-    this.scrub = element("input", { type: "range", min: 0, max: 1, value: 0, "aria-label": "time", style: null });
+    this.scrub = element("input", { type: "range", min: 0, max: 1, value: 0, "aria-label": "time" });
     this.scrub.addEventListener("input", () => { this.pause(); this.frame = Number(this.scrub.value); this.moved(); });
     this.speed = element("select", { "aria-label": "speed" }, ...[0.1, 0.25, 0.5, 1, 2, 4].map((s) => element("option", { value: s }, `${s}×`)));
     this.speed.value = 1;
@@ -112,7 +112,11 @@ export class MechanismView {
       }
       if (kind === LOAD) this.arrow(a, [a[0] + 0.17 * unit * ax[0] / length, a[1] + 0.17 * unit * ax[1] / length], css("vermillion"));
     }
-    of.names.forEach((name, k) => { if (name) ink.text(...X(of.at[k][0]).map((v, j) => v + (j ? -15 : 13)), name, { color: css("ink") }); });
+    of.names.forEach((name, k) => {
+      // Names of fixed points stand below them on the left, of others above on the right: both can be read where they meet.
+      const fixed = of.elements[k] === FIXED, [x, y] = X(of.at[k][0]);
+      if (name) ink.text(x + (fixed ? -15 : 15), y + (fixed ? 16 : -16), name, { color: css("ink"), size: 13 });
+    });
     const { coordinates } = this.app.about;
     const y = this.position();
     if (y) ink.text(this.plane.box.left + 6, this.plane.box.top + 10, coordinates.map((n, k) => `${n} = ${y[k].toFixed(3)} ${this.app.about.states[n].unit}`).join("   "), { color: css("ink"), align: "left" });
