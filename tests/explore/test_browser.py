@@ -1,4 +1,4 @@
-"""The explorer's page in Debian's chromium: numbers on it are those of the library, and it is quick enough."""
+"""The explorer's page in Debian's chromium: its numbers are the library's, and it is quick."""
 
 from __future__ import annotations
 
@@ -166,9 +166,8 @@ def test_random_actions_leave_no_error_and_no_request_leaves_the_machine(opened:
                 opened.page.evaluate(f"explorer.choose({random_.randrange(4)} % explorer.rows.length)")
             case 4:
                 select = opened.page.locator("select[aria-label*=axis]").nth(random_.randrange(6))
-                select.evaluate(
-                    f"e => {{ e.selectedIndex = {random_.randrange(4)}; e.dispatchEvent(new Event('change')); }}"
-                )
+                change = "e.dispatchEvent(new Event('change'))"
+                select.evaluate(f"e => {{ e.selectedIndex = {random_.randrange(4)}; {change}; }}")
         opened.page.wait_for_timeout(10)
     opened.page.wait_for_timeout(1000)
     assert opened.said == []
