@@ -39,7 +39,7 @@ def replies(device: Device, message: Any, tell: Progress) -> Iterator[bytes]:
     yield from _WORK[message.kind](device, message, tell)
 
 
-def _header(device: Device, message: Any, divisions: int, **more: Any) -> dict[str, Any]:
+def _header(device: Device, message: Any, divisions: int, /, **more: Any) -> dict[str, Any]:
     return {
         "kind": message.kind,
         "id": message.id,

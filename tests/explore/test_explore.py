@@ -24,6 +24,7 @@ import fastmech as fm
 from fastmech.errors import InputError
 from fastmech.explore.device import open_device
 from fastmech.explore.messages import frame, read_message
+from fastmech.explore.work import replies
 from fastmech.runner import run_request
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import request_of_text
@@ -131,6 +132,21 @@ def test_basins_refine_and_their_request_gives_the_same(server: tuple[str, int],
     run_request(tmp_path / "request.toml", tmp_path / "result.h5")
     with fm.open_results(tmp_path / "result.h5") as results:
         np.testing.assert_array_equal(known, results["basins"]["well"].data)
+
+
+@pytest.mark.parametrize("what", [None, "von_mises_truss"])
+def test_an_atlas_is_the_library_s_with_its_curves(what: str | None) -> None:
+    device = open_device(what)
+    ranges = {"P": [0.0, 120.0], "rise": [0.2, 0.8]} if what else {"F0": [-200.0, 200.0], "c2": [0.0, 400.0]}
+    parameters = {} if what else {"alpha": 0.0}
+    told = {"kind": "atlas", "id": 1, "axes": ranges, "halvings": 0, "parameters": parameters}
+    *_, last = replies(device, read_message(json.dumps(told)), lambda finished: None)
+    header, arrays = numbers(last)
+    names: dict[str, Any] = {}
+    exec(header["python"], names)
+    np.testing.assert_array_equal(arrays["count"], names["found"].count)
+    assert len(header["curves"]) == len(names["curves"].curves) > 0
+    np.testing.assert_array_equal(arrays["curve0"][0], names["curves"].curves[0].x.astype(np.float32))
 
 
 @pytest.mark.parametrize("what", [None, "von_mises_truss"])
