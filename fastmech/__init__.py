@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from fastmech import samplers as samplers
     from fastmech.atlas.critical import critical_values
     from fastmech.atlas.critical_curves import critical_curves
-    from fastmech.atlas.fold_points import find_folds
-    from fastmech.atlas.folds import trace_folds
+    from fastmech.atlas.folds import find_folds, trace_folds
     from fastmech.atlas.map import map_equilibria
     from fastmech.atlas.snap import find_snap
     from fastmech.attractors.branches import frequency_response
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
     from fastmech.basins.erosion import erosion
     from fastmech.basins.label import labels_of
     from fastmech.basins.map import map_basins
-    from fastmech.basins.measures.dimension import boundary_dimension
     from fastmech.basins.measures.entropy import basin_entropy, fractal_boundary_test
     from fastmech.basins.measures.fractions import (
         basin_fractions,
@@ -40,7 +38,7 @@ if TYPE_CHECKING:
     from fastmech.basins.measures.integrity import integrity
     from fastmech.basins.measures.labels import number_turns
     from fastmech.basins.measures.norm import kinetic_norm
-    from fastmech.basins.measures.uncertainty import uncertainty_exponent
+    from fastmech.basins.measures.slopes import boundary_dimension, uncertainty_exponent
     from fastmech.basins.measures.wada import wada_merge_test
     from fastmech.basins.shock import brute_force_shock, minimal_shock
     from fastmech.basins.shock_limit import impulse_start, shock_limit
@@ -48,14 +46,13 @@ if TYPE_CHECKING:
     from fastmech.bench.frontier import work_precision
     from fastmech.capture.barriers import barrier_tree
     from fastmech.capture.select import trapped
-    from fastmech.disturbance.linear_range import linear_range
-    from fastmech.disturbance.motion import disturbed_motion
+    from fastmech.disturbance.motion import disturbed_motion, linear_range
     from fastmech.ensembles.integrate import integrate
     from fastmech.ensembles.status import Status
     from fastmech.ensembles.system import System
     from fastmech.errors import InputError
     from fastmech.kernels.sincos import cos, sin
-    from fastmech.mechanism.reactions import reactions
+    from fastmech.mechanism.geometry import reactions
     from fastmech.models.coordinates import angles, lengths
     from fastmech.models.elements import (
         Body,
@@ -75,8 +72,7 @@ if TYPE_CHECKING:
     from fastmech.step_limits.warning import step_warning
     from fastmech.store.read import open_results
     from fastmech.system_info import system_info
-    from fastmech.transients.growth import transient_growth
-    from fastmech.transients.lyapunov import largest_lyapunov
+    from fastmech.transients.lyapunov import largest_lyapunov, transient_growth
 
 try:
     __version__ = metadata.version("fastmech")
@@ -103,7 +99,7 @@ _MODULES = {
     "basin_entropy": "fastmech.basins.measures.entropy",
     "basin_fractions": "fastmech.basins.measures.fractions",
     "basin_stability": "fastmech.basins.measures.fractions",
-    "boundary_dimension": "fastmech.basins.measures.dimension",
+    "boundary_dimension": "fastmech.basins.measures.slopes",
     "brute_force_shock": "fastmech.basins.shock",
     "classify": "fastmech.models.stability",
     "copy_labels": "fastmech.basins.copies",
@@ -117,8 +113,8 @@ _MODULES = {
     "erosion": "fastmech.basins.erosion",
     "find_attractors": "fastmech.attractors.find",
     "find_equilibria": "fastmech.models.equilibria",
+    "find_folds": "fastmech.atlas.folds",
     "follow_basins": "fastmech.attractors.follow",
-    "find_folds": "fastmech.atlas.fold_points",
     "find_snap": "fastmech.atlas.snap",
     "finite_time_basin_stability": "fastmech.basins.measures.fractions",
     "frequency_response": "fastmech.attractors.branches",
@@ -131,14 +127,14 @@ _MODULES = {
     "largest_lyapunov": "fastmech.transients.lyapunov",
     "largest_stable_step": "fastmech.step_limits.predict",
     "lengths": "fastmech.models.coordinates",
-    "linear_range": "fastmech.disturbance.linear_range",
+    "linear_range": "fastmech.disturbance.motion",
     "map_basins": "fastmech.basins.map",
     "map_equilibria": "fastmech.atlas.map",
     "map_snapping": "fastmech.basins.snapping",
     "minimal_shock": "fastmech.basins.shock",
     "number_turns": "fastmech.basins.measures.labels",
     "open_results": "fastmech.store.read",
-    "reactions": "fastmech.mechanism.reactions",
+    "reactions": "fastmech.mechanism.geometry",
     "saddle_at": "fastmech.basins.edge",
     "shock_limit": "fastmech.basins.shock_limit",
     "sin": "fastmech.kernels.sincos",
@@ -148,9 +144,9 @@ _MODULES = {
     "trace_folds": "fastmech.atlas.folds",
     "trace_unreached": "fastmech.atlas.damping",
     "track_edge": "fastmech.basins.edge",
-    "transient_growth": "fastmech.transients.growth",
+    "transient_growth": "fastmech.transients.lyapunov",
     "trapped": "fastmech.capture.select",
-    "uncertainty_exponent": "fastmech.basins.measures.uncertainty",
+    "uncertainty_exponent": "fastmech.basins.measures.slopes",
     "wada_merge_test": "fastmech.basins.measures.wada",
     "wilson": "fastmech.basins.measures.fractions",
     "work_precision": "fastmech.bench.frontier",

@@ -106,3 +106,11 @@ def _unraisable(lost: sys.UnraisableHookArgs) -> None:
         _noted.told = False
     else:
         sys.__unraisablehook__(lost)
+
+
+class Stopped(Interrupt):
+    """A scan was stopped by Ctrl-C or by SIGTERM; the message says what is kept."""
+
+
+class CrashedTilesError(Exception):
+    """Some tiles could not be computed; the message names the first and says how to compute it alone."""

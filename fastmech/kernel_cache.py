@@ -27,6 +27,7 @@ PACKAGE = Path(__file__).resolve().parent
 #: Modules and sub-packages that hold compiled code or decide its flags. No kernel reaches another source of
 #: the package (``tests/test_layout.py`` keeps it so), hence these decide every kernel.
 COMPILED = (
+    "arrays.py",
     "callee.py",
     "jit.py",
     "generated.py",

@@ -12,10 +12,8 @@ from fastmech.models.mechanism import Mechanism
 from fastmech.plots.style import save
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import RunContext, read_request
-from fastmech.store.older import as_today
-from fastmech.store.read import open_results
-from fastmech.tiles.report import RunReport
-from fastmech.tiles.run import ScanRun, default_output
+from fastmech.store.read import as_today, open_results
+from fastmech.tiles.run import RunReport, ScanRun, default_output
 from fastmech.tiles.work import Hiring, ThreadHiring
 
 

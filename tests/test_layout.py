@@ -11,12 +11,13 @@ from pathlib import Path
 import pytest
 
 from fastmech.kernel_cache import COMPILED, PACKAGE, compiled_sources
-from fastmech.tiles.identity import _SOURCES
+from fastmech.tiles.section import _SOURCES
 
 pytestmark = pytest.mark.nojit
 
 #: Each layer may import itself and the ones before it.
 LAYERS = (
+    "arrays",
     "errors",
     "interrupts",
     "kernel_cache",

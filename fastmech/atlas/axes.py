@@ -1,4 +1,4 @@
-"""The axes of a map: checked, and the reduced coefficients at their points."""
+"""The axes of a map, checked, with the reduced coefficients and the margin to the fold at their points."""
 
 from __future__ import annotations
 
@@ -7,15 +7,17 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numba import types
+from numpy.typing import ArrayLike
 
+from fastmech.arrays import Floats
 from fastmech.ensembles.checks import one_way
+from fastmech.equilibria.search import HALF_PI, angles, normal_form, pulls, vanishing, wrap
 from fastmech.errors import InputError, shown, shown_name
+from fastmech.jit import MATRIX, VECTOR, kernel
 from fastmech.mechanism.coefficients import reduce
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene, nearest, require_scene
-
-Floats = NDArray[np.float64]
 
 
 def check_axes(scene: Scene, axes: Mapping[str, ArrayLike], most: int = 3) -> dict[str, Floats]:
@@ -134,3 +136,50 @@ def grid_coefficients(scene: Scene, axes: Mapping[str, Floats]) -> tuple[Floats,
         full((fields["c1"] + fields["c2"]) * fields["l"] ** 2),
         full(fields["m2"]),
     )
+
+
+def check_pair(x: Any, y: Any) -> None:
+    """Refuse what are no two parameters' names with their values.
+
+    Raises:
+        InputError: they are not.
+    """
+    for name, given in (("x", x), ("y", y)):
+        if not isinstance(given, tuple | list) or len(given) != 2 or not isinstance(given[0], str):
+            raise InputError(f"{name} = {shown(given)}: must be a parameter's name and its values")
+    if x[0] == y[0]:
+        raise InputError(f"axes: {x[0]} is given twice; two different parameters are needed")
+
+
+@kernel(types.void(MATRIX, VECTOR, VECTOR, VECTOR, VECTOR))
+def fold_margins(coefficients: Floats, margin: Floats, symmetry: Floats, phi: Floats, theta: Floats) -> None:
+    """Margin to the fold, and the place that becomes an equilibrium where it vanishes.
+
+    Args:
+        coefficients: (n, 8) rows of ``fastmech.mechanism.coefficients.Coefficients``, the force frozen.
+        margin: (n,) [rad], positive with six equilibria (see ``balance``); NaN if degenerate; written.
+        symmetry: (n,) |cos D|, zero where the scene is its own mirror image; written.
+        phi, theta: (n,) [rad]: where two equilibria merge once the margin is zero; written.
+    """
+    for row in range(coefficients.shape[0]):
+        mass, _, lift, spring, gravity, force, _, _ = coefficients[row]
+        p = pulls(mass, lift, spring, gravity, force)
+        if vanishing(p) >= 2:
+            margin[row], symmetry[row], phi[row], theta[row] = np.nan, np.nan, np.nan, np.nan
+            continue
+        n = normal_form(p)
+        margin[row] = n.peak - n.distance
+        symmetry[row] = np.sin(n.distance)
+        sign = 1.0 if abs(wrap(n.turn - HALF_PI)) <= abs(wrap(n.turn + HALF_PI)) else -1.0
+        target = wrap(n.turn - sign * HALF_PI)
+        d = -n.corner if target > 0.0 else n.corner
+        if sign < 0.0:
+            d += np.pi
+        phi[row], theta[row] = angles(p, n, d, sign, sign)
+
+
+def margins(coefficients: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Margin, symmetry, phi and theta of rows of reduced coefficients; see ``fold_margins``."""
+    out = np.empty((4, len(coefficients)))
+    fold_margins(coefficients, *out)
+    return out[0], out[1], out[2], out[3]

@@ -10,9 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from fastmech.arrays import Floats
 
 #: Gives values F(z) and Jacobian.
 Equations = Callable[[Floats], tuple[Floats, Floats]]
@@ -93,7 +92,6 @@ def trace(
     inside: Callable[[Floats], bool],
     finish: Callable[[Floats, Floats], Floats],
     apart: Callable[[Floats, Floats], Floats],
-    longest: float = LONGEST,
 ) -> Curve:
     """The curve through ``start``, in both directions until it leaves ``inside`` or closes.
 
@@ -103,13 +101,12 @@ def trace(
         inside: where it is wanted.
         finish: given the last point inside and the first one outside, the curve's end between them.
         apart: difference of two points, angles counted the short way.
-        longest: longest step.
     """
     tangent = tangent_at(system, start)
-    points, tangents, end = _march(system, start, tangent, inside, finish, apart, longest)
+    points, tangents, end = _march(system, start, tangent, inside, finish, apart)
     ends = [end]
     if end != CLOSED:
-        back, back_tangents, end = _march(system, start, -tangent, inside, finish, apart, longest)
+        back, back_tangents, end = _march(system, start, -tangent, inside, finish, apart)
         points = back[:0:-1] + points
         tangents = [-t for t in back_tangents[:0:-1]] + tangents
         ends.append(end)
@@ -123,10 +120,9 @@ def _march(
     inside: Callable[[Floats], bool],
     finish: Callable[[Floats, Floats], Floats],
     apart: Callable[[Floats, Floats], Floats],
-    longest: float,
 ) -> tuple[list[Floats], list[Floats], str]:
     points, tangents = [start], [tangent]
-    step = 0.25 * longest
+    step = 0.25 * LONGEST
     while step >= SHORTEST and len(points) < MOST_STEPS:
         z, t = points[-1], tangents[-1]
         there = newton(system, z + step * t, 0.5 * step, t)
@@ -148,7 +144,7 @@ def _march(
             return points, tangents, LEFT
         points.append(there)
         tangents.append(ahead)
-        step = min(longest, 1.5 * step)
+        step = min(LONGEST, 1.5 * step)
     return points, tangents, CUT_SHORT
 
 

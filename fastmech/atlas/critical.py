@@ -13,15 +13,14 @@ from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fastmech.arrays import Floats
 from fastmech.atlas.resting_map import RestingMap, map_resting_places, resting_places_at
-from fastmech.equilibria.outcome import Outcome
+from fastmech.equilibria.certificate import Outcome
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import VERDICTS
-
-Floats = NDArray[np.float64]
 
 #: Relative width at which a value is located, and halvings at most.
 WIDTH, HALVINGS = 4.0 * 2.0**-52, 120

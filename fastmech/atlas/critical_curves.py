@@ -13,19 +13,19 @@ from dataclasses import dataclass
 from typing import Any, Literal, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
+from fastmech.arrays import Floats
+from fastmech.atlas.axes import check_pair
 from fastmech.atlas.continuation import LONGEST, Curve, Equations, distance, newton, trace
 from fastmech.atlas.critical import Known, Pairs, changes, named, narrowed
 from fastmech.atlas.defining import Balance
 from fastmech.atlas.folds import finish_on_edge
 from fastmech.atlas.resting_map import map_resting_places
-from fastmech.equilibria.outcome import Outcome
+from fastmech.equilibria.certificate import Outcome
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
-
-Floats = NDArray[np.float64]
 
 #: Halvings of an edge of the grid before Newton's method is tried.
 HALVINGS = 10
@@ -103,11 +103,7 @@ def critical_curves(
         raise InputError(
             f"mechanism = {shown(mechanism)}: must be a Mechanism; fm.trace_folds is for a Scene"
         )
-    for name, given in (("x", x), ("y", y)):
-        if not isinstance(given, tuple | list) or len(given) != 2 or not isinstance(given[0], str):
-            raise InputError(f"{name} = {shown(given)}: must be a parameter's name and its values")
-    if x[0] == y[0]:
-        raise InputError(f"axes: {x[0]} is given twice; two different parameters are needed")
+    check_pair(x, y)
     found = map_resting_places(mechanism, dict((x, y)), threads=threads, progress=progress)
     for name, values in found.axes.items():
         if values.size < 2 or values[-1] < values[0]:

@@ -15,12 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.atlas.continuation import newton
 from fastmech.models.mechanism import Linear, Mechanism
 from fastmech.models.stability import spectra
-
-Floats = NDArray[np.float64]
-
 
 #: How far Newton's method may go to where flutter begins.
 NEAR = 0.01

@@ -1,24 +1,20 @@
-"""Fold curves, pitchfork curves and cusps over two parameters, all of them, with the proof."""
+"""Folds over one parameter; fold curves, pitchfork curves and cusps over two: all of them, with the proof."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from fastmech.atlas.axes import check_axis, coefficient_columns, grid_coefficients
+from fastmech.arrays import Floats
+from fastmech.atlas.axes import check_axis, check_pair, coefficient_columns, grid_coefficients, margins
 from fastmech.atlas.continuation import LONGEST, Curve, newton, trace
-from fastmech.atlas.cover import TURNS, Found, apart, solutions, wrapped
-from fastmech.atlas.enclosure import System
-from fastmech.atlas.margin import margins
-from fastmech.atlas.systems import Plane, Point, cusp, families, point_at, suited
-from fastmech.errors import InputError, shown
+from fastmech.atlas.cover import TURNS, Found, System, apart, solutions, wrapped
+from fastmech.atlas.systems import Plane, Point, cusp, families, point_at, rest, suited
 from fastmech.scene import Scene
-
-Floats = NDArray[np.float64]
 
 #: Points after which no further curve is begun.
 MOST_POINTS = 40_000
@@ -144,11 +140,7 @@ def checked_plane(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLik
     Raises:
         InputError: see ``trace_folds``.
     """
-    for name, given in (("x", x), ("y", y)):
-        if not isinstance(given, tuple | list) or len(given) != 2 or not isinstance(given[0], str):
-            raise InputError(f"{name} = {shown(given)}: must be a parameter's name and its values")
-    if x[0] == y[0]:
-        raise InputError(f"axes: {x[0]} is given twice; two different parameters are needed")
+    check_pair(x, y)
     return {name: check_axis(scene, name, values) for name, values in (x, y)}
 
 
@@ -336,3 +328,99 @@ def _margins_at(plane: Plane, values: Floats) -> tuple[Floats, Floats, Floats, F
     columns = coefficient_columns(plane.scene, dict(zip(plane.names, values.T, strict=True)))
     rows = [np.broadcast_to(np.asarray(column, dtype=np.float64), len(values)) for column in columns]
     return margins(np.ascontiguousarray(np.stack(rows, axis=1)))
+
+
+#: Places this near to one another [rad and parts] that the search could not tell apart count as one.
+TOGETHER = 1e-3
+
+#: Third derivative, and derivative by the parameter, over the loads, that count as zero at such a place.
+FLAT = 1e-3
+
+
+@dataclass(frozen=True)
+class FoldPoint:
+    """A value of a parameter at which equilibria merge."""
+
+    value: float
+    phi: float  #: where they merge [rad]
+    theta: float
+    merges: str  #: what merges with a saddle: ``minimum`` or ``maximum``
+    kind: str
+    """``fold``: two vanish; ``pitchfork``: by symmetry one splits into three. Only where another parameter is
+    right to rounding: ``cusp``: three merge into one; ``transcritical``: two meet and part again."""
+    residual: float  #: scaled residual of gradient and Hessian's determinant
+
+
+class FoldPoints(tuple[FoldPoint, ...]):
+    """The folds of a range, in rising order."""
+
+    complete: bool  #: it is proved that the range holds no other one
+    reason: str  #: why it is not; empty if it is
+
+    def __new__(cls, points: Iterable[FoldPoint], reason: str) -> FoldPoints:
+        """The points and why they may not be all."""
+        self = super().__new__(cls, points)
+        self.complete, self.reason = not reason, reason
+        return self
+
+
+def find_folds(scene: Scene, name: str, values: ArrayLike) -> FoldPoints:
+    """All folds of ``scene`` over a range of one parameter, in rising order.
+
+    They are found by branch and prune (``fastmech.atlas.cover``), which proves that none is missing.
+
+    Args:
+        scene: gives every other parameter.
+        name: the parameter.
+        values: rising or falling; the first and the last one are the ends of the range.
+
+    Raises:
+        InputError: an unknown name, values that neither rise nor fall or that the scene refuses.
+    """
+    axis = check_axis(scene, name, values)
+    plane = suited(Plane(scene, (name,), (float(axis[0]),), (float(axis[-1]),)))
+    points, reasons = [], []
+    for family in families(plane):
+        found = solutions(family.system, _alone(family.system))
+        folds, doubts = sifted(plane, found)
+        points += [_point(plane, curve.points[0], family.kind) for curve in folds]
+        points += [point for z in _together(found.open) if (point := _singular(plane, z)).residual < RESIDUAL]
+        reasons += doubts
+    return FoldPoints(sorted(points, key=lambda point: point.value), "; ".join(reasons))
+
+
+def _alone(system: System) -> Callable[[Floats], Curve | None]:
+    def follow(z: Floats) -> Curve | None:
+        there = newton(system, z, reach=1e-3)
+        return None if there is None else Curve(there[None], np.zeros((1, z.size)), False)
+
+    return follow
+
+
+def _point(plane: Plane, z: Floats, kind: str) -> FoldPoint:
+    p = point_at(plane, z)
+    phi, theta = (float(np.mod(angle + np.pi, 2.0 * np.pi) - np.pi) for angle in (p.phi, p.theta))
+    value = float(plane.values(z[2:])[plane.names[0]])
+    return FoldPoint(value, phi, theta, merging(p), kind, p.residual)
+
+
+def _together(places: Floats) -> list[Floats]:
+    """Middles of places (n, 3) that lie together."""
+    middles = []
+    while len(places):
+        near = np.linalg.norm(apart(places, places[0]), axis=1) < TOGETHER
+        middles.append(places[0] + apart(places[near], places[0]).mean(axis=0))
+        places = places[~near]
+    return middles
+
+
+def _singular(plane: Plane, z: Floats) -> FoldPoint:
+    """The merging where the equations of a fold are singular, by its normal form."""
+    p = point_at(plane, z)
+    moved = rest(plane)(z)[1][:, 2]  # of the gradient
+    h11, h12, h22 = p.hessian
+    null = np.array([h12, -h11]) if abs(h11) > abs(h22) else np.array([h22, -h12])
+    along = abs(moved @ null) / (np.linalg.norm(null) * np.linalg.norm(moved))
+    flat = abs(p.third) < FLAT * p.size
+    kind = ("cusp" if flat else "fold") if along > FLAT else ("pitchfork" if flat else "transcritical")
+    return _point(plane, z, kind)

@@ -1,4 +1,8 @@
-"""Equilibria, their stability, their certificates and their sheets over grids of one to three parameters."""
+"""Equilibria, their stability, their certificates and their sheets over grids of one to three parameters.
+
+How deep each well is: the energy at which its sublevel set first meets another minimum. Angles count their
+turns here: a copy of the same minimum one turn further is another minimum.
+"""
 
 from __future__ import annotations
 
@@ -6,25 +10,211 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, fields
-from typing import Any
+from enum import IntEnum
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba import types
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.atlas.assess import Assessed, assess
-from fastmech.atlas.axes import Floats, check_axes, grid_coefficients
-from fastmech.atlas.coincidence import coincidences
+from fastmech.arrays import Codes, Floats
+from fastmech.atlas.axes import check_axes, grid_coefficients
 from fastmech.atlas.resting_map import map_resting_places
 from fastmech.atlas.sheets import SheetBuilder
-from fastmech.atlas.wells import barriers, least_impulses
 from fastmech.ensembles import checks
 from fastmech.ensembles.threads import thread_count
-from fastmech.equilibria.search import MOST
-from fastmech.equilibria.solve import Solution, solve
+from fastmech.equilibria.certificate import Outcome
+from fastmech.equilibria.descent import convex_radius, descend, step_off
+from fastmech.equilibria.search import MOST, wrap
+from fastmech.equilibria.solve import INDICES, MERGE, SINGULAR, SOLUTION, Solution, solve
 from fastmech.errors import InputError
-from fastmech.mechanism.impulse import POINTS
+from fastmech.jit import CUBE, MATRIX, STATUSES, kernel, named_tuple
+from fastmech.mechanism.impulse import POINTS, impulse_for, mobility
+from fastmech.mechanism.reduced import potential_hessian
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
+from fastmech.stability.classify import assess_one
+
+
+class Coincidence(IntEnum):
+    """What is special about a point of a map within rounding."""
+
+    NONE = 0
+    FOLD = 1
+    """Two equilibria merge; the outcome of the proof is ``AT_FOLD``."""
+
+    CUSP = 2
+    """Three equilibria merge (two folds meet); the outcome of the proof is ``AT_FOLD``."""
+
+    DOUBLE_PROJECTION = 3
+    """Two equilibria share phi, a double root of the degree-6 polynomial, and are proved to differ."""
+
+
+NONE, FOLD, CUSP, DOUBLE_PROJECTION = (int(code) for code in Coincidence)
+AT_FOLD = int(Outcome.AT_FOLD)
+COMPLETE = int(Outcome.COMPLETE)
+
+
+@kernel(types.void(MATRIX, MATRIX, MATRIX, MATRIX, INDICES, STATUSES, STATUSES, STATUSES))
+def coincidences(
+    coefficients: Floats,
+    phi: Floats,
+    theta: Floats,
+    radius: Floats,
+    index: Codes,
+    count: Codes,
+    outcome: Codes,
+    special: Codes,
+) -> None:
+    """Write the ``Coincidence`` of every row into ``special``; arguments as in ``solve``.
+
+    At a fold with null direction v of the Hessian the third derivative of U along v is 3 P v1 v2 (v1 + v2),
+    where P is the common pull of paper (17); it vanishes at a cusp. Rounding leaves the merged equilibrium's
+    place uncertain by ``MERGE`` rad, hence the third derivative by as much of the loads.
+    """
+    for row in range(coefficients.shape[0]):
+        special[row] = NONE
+        _, _, lift, spring, gravity, force, _, _ = coefficients[row]
+        if outcome[row] == AT_FOLD:
+            special[row] = FOLD
+            for i in range(count[row]):
+                if index[row, i] != SINGULAR:
+                    continue
+                s1, c1, s2, c2 = (
+                    np.sin(phi[row, i]),
+                    np.cos(phi[row, i]),
+                    np.sin(theta[row, i]),
+                    np.cos(theta[row, i]),
+                )
+                s12, c12 = s1 * c2 + c1 * s2, c1 * c2 - s1 * s2
+                h11, h12, h22 = potential_hessian(s1, c1, s2, c2, s12, lift, spring, gravity, force)
+                v1, v2 = (h12, -h11) if abs(h11) > abs(h22) else (h22, -h12)
+                size = np.hypot(v1, v2)
+                third = 3.0 * spring * c12 * v1 * v2 * (v1 + v2)
+                loads = abs(lift) + gravity + 2.0 * spring + 2.0 * abs(force)
+                if abs(third) <= MERGE * loads * size**3:
+                    special[row] = CUSP
+        elif outcome[row] == COMPLETE:
+            for i in range(count[row]):
+                for j in range(i):
+                    if abs(wrap(phi[row, i] - phi[row, j])) <= radius[row, i] + radius[row, j]:
+                        special[row] = DOUBLE_PROJECTION
+
+
+ROOTS = types.Array(types.complex128, 3, "C")
+VERDICTS = types.Array(types.int8, 3, "C")
+
+
+class Assessed(NamedTuple):
+    """What :func:`assess` writes for n scenes; slots without an equilibrium hold NaN and -1."""
+
+    hessian: Floats  #: (n, slots, 3) derivatives of U over m2 l^2 (phi phi, phi theta, theta theta)
+    eigenvalues: NDArray[np.complex128]  #: (n, slots, 4) [1/s], largest real part first
+    frequency: Floats  #: (n, slots) lowest undamped natural frequency [rad/s], NaN where U falls
+    decay: Floats  #: (n, slots) decay rate of the slowest mode [1/s], NaN unless U has a minimum
+    verdict: Codes  #: (n, slots, 4) Sylvester's, Hurwitz's, the eigenvalues' and the joint ``Verdict``
+
+
+ASSESSED: Any = named_tuple([CUBE, ROOTS, MATRIX, MATRIX, VERDICTS], Assessed)
+
+
+@kernel(types.void(MATRIX, SOLUTION, ASSESSED))
+def assess(coefficients: Floats, found: Solution, out: Assessed) -> None:
+    """Stability of the equilibria of every row of (n, 8) reduced coefficients, the force frozen."""
+    hessian, eigenvalues, verdict = out.hessian, out.eigenvalues, out.verdict
+    frequency, decay = out.frequency, out.decay
+    for row in range(coefficients.shape[0]):
+        for i in range(found.phi.shape[1]):
+            if i >= found.count[row]:
+                frequency[row, i], decay[row, i] = np.nan, np.nan
+                for k in range(3):
+                    hessian[row, i, k] = np.nan
+                for k in range(4):
+                    eigenvalues[row, i, k], verdict[row, i, k] = complex(np.nan, np.nan), -1
+                continue
+            place = (found.phi[row, i], found.theta[row, i], found.radius[row, i], int(found.index[row, i]))
+            a = assess_one(coefficients[row], place, eigenvalues[row, i])
+            hessian[row, i, 0], hessian[row, i, 1], hessian[row, i, 2] = a.s.k11, a.s.k12, a.s.k22
+            low = a.squares[0]
+            frequency[row, i] = np.sqrt(low) if low >= 0.0 else np.nan
+            decay[row, i] = a.decay
+            verdict[row, i, 0], verdict[row, i, 1] = a.sylvester, a.hurwitz
+            verdict[row, i, 2], verdict[row, i, 3] = a.spectrum, a.joint
+
+
+#: Share of the potential's amplitudes by which what is proved lies below the barriers: far above rounding.
+ROUNDING = 1e-12
+
+
+@kernel(types.void(MATRIX, MATRIX, MATRIX, MATRIX, INDICES, STATUSES, STATUSES, MATRIX))
+def barriers(
+    coefficients: Floats,
+    phi: Floats,
+    theta: Floats,
+    energy: Floats,
+    index: Codes,
+    count: Codes,
+    outcome: Codes,
+    barrier: Floats,
+) -> None:
+    """Write the energy of the lowest way out of every minimum into ``barrier`` (n, 6), NaN elsewhere.
+
+    Equilibria come deepest first, and energies and barriers are in the same unit; other arguments as in
+    ``solve``. Saddles are taken in rising order. One whose two sides lead down to different minima (or to
+    copies of one minimum, some turns apart) opens both wells. With four equilibria each saddle does: the
+    torus has two independent turns, and two saddles for them.
+    """
+    phis, thetas, radii, slot = np.empty(6), np.empty(6), np.empty(6), np.empty(6, dtype=np.int64)
+    for row in range(coefficients.shape[0]):
+        barrier[row] = np.nan
+        if outcome[row] != COMPLETE:
+            continue
+        n, minima = int(count[row]), 0
+        for i in range(n):
+            if index[row, i] == 0:
+                phis[minima], thetas[minima], slot[minima] = phi[row, i], theta[row, i], i
+                radii[minima] = convex_radius(coefficients[row], phi[row, i], theta[row, i])
+                minima += 1
+        for i in range(n):
+            if index[row, i] != 1:
+                continue
+            if n == 4:
+                barrier[row, 0] = energy[row, i]
+                break
+            c = coefficients[row]
+            p1, t1 = step_off(c, phi[row, i], theta[row, i], 1.0)
+            p2, t2 = step_off(c, phi[row, i], theta[row, i], -1.0)
+            first, a1, a2 = descend(c, p1, t1, phis, thetas, radii, minima)
+            second, b1, b2 = descend(c, p2, t2, phis, thetas, radii, minima)
+            if first < 0 or second < 0:
+                break  # a way out that is not known may be lower than those that follow
+            if first != second or a1 != b1 or a2 != b2:
+                for well in (first, second):
+                    if np.isnan(barrier[row, slot[well]]):
+                        barrier[row, slot[well]] = energy[row, i]
+
+
+def least_impulses(
+    coefficients: Floats, phi: Floats, theta: Floats, depth: Floats, masses: tuple[Floats, Floats], on: str
+) -> Floats:
+    """Impulse on a point [N s] below which no blow on the resting mechanism leaves its well, (n,).
+
+    Energy does not grow under a constant force. So no blow that gives less than the well's depth leaves, and
+    none gives more than along the direction in which the point moves most easily. What rounding may make of
+    the depth is taken off. NaN for M3 at its dead centres.
+
+    Args:
+        coefficients: (n, 8) rows as ``solve`` takes them.
+        phi, theta: minima (n,) [rad].
+        depth: (n,), over m2 l^2 [1/s^2].
+        masses: m2 [kg] and m2 l^2 [kg m2], (n,).
+        on: one of :data:`fastmech.mechanism.impulse.POINTS`.
+    """
+    mass, slider, lift, spring, gravity, force, *_ = coefficients.T
+    rounding = ROUNDING * (np.abs(lift) + spring + gravity + 2.0 * np.abs(force))
+    easiest = mobility(masses[0], mass, slider, phi, theta, on).greatest
+    return impulse_for(np.maximum(depth - rounding, 0.0) * masses[1], easiest)
+
 
 #: Points that one task solves; each but the first of them starts from the one before.
 BLOCK = 4096
@@ -34,8 +224,6 @@ SLAB = 65536
 
 #: Numbers of 8 bytes that a map holds of every point, its sheets joined.
 POINT_NUMBERS = 132
-
-Codes = NDArray[np.int8]
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Equilibria of any mechanism over a grid of parameters, each point proved, with their stability."""
+"""Equilibria of any mechanism over a grid of parameters, each point proved; its wells along a parameter."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.arrays import Codes, Floats
+from fastmech.atlas.continuation import newton
+from fastmech.atlas.defining import Balance
 from fastmech.ensembles import checks
 from fastmech.ensembles.threads import in_parts
-from fastmech.equilibria.outcome import Outcome
+from fastmech.equilibria.certificate import Outcome
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.intervals.search import Found
 from fastmech.models.equilibria import DIGITS, alike, outcome_of_row, search_rows, wrapped
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import VERDICTS, spectra, verdicts
 from fastmech.scene import nearest
-
-Floats = NDArray[np.float64]
-Codes = NDArray[np.int8]
 
 #: Points that a thread proves at a time, and the numbers of 8 bytes that each takes meanwhile.
 BLOCK, POINT_NUMBERS = 64, 1200
@@ -37,7 +37,7 @@ class RestingMap:
     axes: dict[str, Floats]
     names: tuple[str, ...]  #: of the coordinates
     count: NDArray[np.int16]  #: equilibria, proved each
-    outcome: Codes  #: :class:`fastmech.equilibria.outcome.Outcome`: COMPLETE where there are no others
+    outcome: Codes  #: :class:`fastmech.equilibria.certificate.Outcome`: COMPLETE where there are no others
     position: Floats  #: [rad or m], (..., slots, n); angles in (-pi, pi]
     radius: Floats  #: each is proved to be within so many rad or m
     energy: Floats  #: U [J], loads at their means; NaN where forces are not known to have a potential
@@ -206,3 +206,70 @@ def _joined(
     outcome = np.concatenate([block.outcome for block in blocks])
     names = mechanism.state[: len(mechanism.coordinates)]
     return RestingMap(axes, names, count.reshape(grid), outcome.reshape(grid), **arrays)
+
+
+#: Longest and shortest step of a position [rad, lengths over their ranges by 2 pi].
+LONGEST, SHORTEST = 0.05, 1e-9
+
+#: Part of a step by which Newton's method may correct where its tangent leads.
+CORRECTION = 0.3
+
+#: A followed position is that of a proved list's well within so much.
+SAME = 1e-6
+
+
+def follow_wells(mechanism: Mechanism, parameter: str, values: Floats) -> Floats:
+    """Where each well is [rad or m] (values, wells, n), NaN where it is not.
+
+    A well is followed from each value to the next by small steps; where it disappears in between, one that is
+    there afterwards is another.
+    """
+    found = map_resting_places(mechanism, {parameter: values})
+    lists = [found.position[k][found.morse_index[k] == 0] for k in range(values.size)]
+    wells: list[dict[int, Floats]] = [{0: place} for place in lists[0]]
+    if values.size > 1:
+        balance = Balance(mechanism, {parameter: float(values[0])}, {parameter: float(values[-1])})
+    for k in range(1, values.size):
+        left = list(range(len(lists[k])))
+        for well in wells:
+            if k - 1 in well:
+                end = _carried(balance, well[k - 1], values[k - 1], values[k])
+                if end is None:
+                    continue
+                for j in left:
+                    away = balance.apart(end, balance.point(lists[k][j], values[k : k + 1]))
+                    if np.abs(away).max() < SAME:
+                        well[k] = lists[k][j]
+                        left.remove(j)
+                        break
+        wells += [{k: lists[k][j]} for j in left]
+    places = np.full((values.size, len(wells), len(mechanism.coordinates)), np.nan)
+    for w, well in enumerate(wells):
+        for k, place in well.items():
+            places[k, w] = place
+    return places
+
+
+def _carried(balance: Balance, position: Floats, start: float, end: float) -> Floats | None:
+    """The point to which an equilibrium moves as the parameter changes; None where it disappears."""
+    z = balance.point(position, np.array([start]))
+    last = balance.point(position, np.array([end]))[-1]
+    balance.rescale(z)
+    side, along = np.sign(balance.determinant(z)), np.eye(z.size)[-1]
+    part = last - z[-1]
+    while abs(last - z[-1]) > 0.0:
+        part = np.clip(part, -abs(last - z[-1]), abs(last - z[-1]))
+        slopes = balance.forces(z)[1]
+        move = np.append(-np.linalg.solve(slopes[:, :-1], slopes[:, -1]), 1.0) * part
+        size = float(np.linalg.norm(move))
+        guess = z + move
+        guess[-1] = last if abs(part) == abs(last - z[-1]) else guess[-1]
+        there = newton(balance.rest, guess, CORRECTION * size, along) if size <= LONGEST else None
+        if there is not None and side * balance.determinant(there) > 0.0:
+            there[-1] = guess[-1]
+            z, part = there, 2.0 * part
+        elif size < SHORTEST:
+            return None
+        else:
+            part *= 0.5
+    return z

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.atlas.continuation import Equations, newton, tangent_at
 from fastmech.atlas.defining import Balance
 from fastmech.atlas.systems import Plane, fold, point_at, rest
@@ -20,8 +20,6 @@ from fastmech.models.equilibria import find_equilibria as resting_places
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import assess
 from fastmech.scene import Scene, nearest, require_scene
-
-Floats = NDArray[np.float64]
 
 #: Longest step along the branch [rad, and parts of the range], and the shortest.
 STEP, SHORTEST = 0.02, 1e-9
@@ -226,7 +224,7 @@ def _snap(
 def fold_free(scene: Scene, parameter: str) -> tuple[float, float]:
     """Values of a parameter beyond which, on either side, the scene has no fold; the force is constant.
 
-    With the amplitudes of ``fastmech.equilibria.balance`` over m2 l, B1 = |((m1 + m2) g - c2 l, F)|,
+    With the amplitudes of ``fastmech.equilibria.search`` over m2 l, B1 = |((m1 + m2) g - c2 l, F)|,
     B2 = |(m2 g, F)| and B3 = c1 l, there is none where one of 1/B1, 1/B2, 1/B3 is at least the sum of the
     others. The lower value is 0 where the parameter may be 0, and more than 0 where it may not: what is
     between is for the search.

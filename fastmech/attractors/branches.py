@@ -27,9 +27,8 @@ from fastmech.attractors.find import starts_of
 from fastmech.attractors.flow import DIFFERENCE, FINER, Floats, Flow, flow_of, period_of
 from fastmech.attractors.orbits import RESIDUAL, newton
 from fastmech.ensembles import checks
-from fastmech.ensembles.derived import system_of
-from fastmech.ensembles.parameters import Parameters
-from fastmech.ensembles.problem import Case, Problem
+from fastmech.ensembles.lanes import Parameters
+from fastmech.ensembles.problem import Case, Problem, system_of
 from fastmech.ensembles.solve import Settings, solve
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown

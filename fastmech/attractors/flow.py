@@ -19,8 +19,7 @@ from fastmech.ensembles.solve import Settings, solve
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError
-from fastmech.integrators.method import Method
-from fastmech.integrators.methods import find_method
+from fastmech.integrators.methods import Method, find_method
 from fastmech.models.mechanism import Mechanism
 
 Floats = NDArray[np.float64]

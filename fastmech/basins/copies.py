@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fastmech.arrays import Floats, Integers
 from fastmech.basins.label import How, label_starts
 from fastmech.basins.labels import Labels
-from fastmech.basins.measures.labels import Floats, Integers, LabelOf, check_point
+from fastmech.basins.measures.labels import LabelOf, check_point
 from fastmech.basins.measures.norm import kinetic_norm
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.ensembles import checks
@@ -40,7 +41,7 @@ def copy_labels(scene: Scene | Mechanism, t_end: float = 60.0, *, threads: int |
     """A function that labels starts (n, states) with a number for each copy of each well, -1: not proved.
 
     It is what :func:`fastmech.basins.shock.minimal_shock`, :func:`fastmech.basins.edge.track_edge` and
-    :func:`fastmech.basins.measures.uncertainty.uncertainty_exponent` ask; :func:`copy_of_label` reads its
+    :func:`fastmech.basins.measures.slopes.uncertainty_exponent` ask; :func:`copy_of_label` reads its
     numbers.
 
     Args:

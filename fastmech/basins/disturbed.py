@@ -14,25 +14,32 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Floats, Integers
 from fastmech.basins.label import How, label_starts
 from fastmech.basins.measures.fractions import Shares, basin_stability
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.capture.steps import MOST_OCTAVES, TURNING
-from fastmech.disturbance.motion import equilibria_to_disturb
-from fastmech.disturbance.observe import EXCURSION, LAST_OUTSIDE, SWUNG, observe_departure
-from fastmech.disturbance.size import Size, confining_energy, excess_energy, size_of, uniform_ball
+from fastmech.disturbance.motion import (
+    EXCURSION,
+    LAST_OUTSIDE,
+    SWUNG,
+    Size,
+    confining_energy,
+    equilibria_to_disturb,
+    excess_energy,
+    observe_departure,
+    size_of,
+    uniform_ball,
+)
 from fastmech.ensembles import checks
+from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.run import Ensemble, Observation, Progress, run_ensemble
-from fastmech.ensembles.spans import output_steps
 from fastmech.ensembles.status import ENDS, FAILURES, Status, failure_counts, failure_line
 from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError, StepWarning
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 #: By how much excursions by two steps may differ, over the larger coordinate's.
 AGREED = 0.01
@@ -68,7 +75,7 @@ class DisturbedEnsemble:
     failed: Floats  #: time of the last finite state of those that failed on the way [s], else NaN; shape (n,)
     outcome: NDArray[np.int8]  #: :class:`fastmech.ensembles.status.Status`, one of its ``ENDS``, shape (n,)
     end_index: NDArray[np.int8]  #: the stable equilibrium at which it is proved to end, -1: none; shape (n,)
-    turns: NDArray[np.int64]  #: full turns of each coordinate on the way there, 0 where none; (n, coords)
+    turns: Integers  #: full turns of each coordinate on the way there, 0 where none; (n, coords)
     time_to_return: Floats  #: s, first step from which on it was in the ball; NaN: not by t_end; (n,)
     excursion: Floats
     """Largest departures of coordinates [rad or m], at and between steps; NaN of those that failed or, by
@@ -137,7 +144,7 @@ def disturb(
     """Disturb an equilibrium at random and follow every disturbance.
 
     Starts are uniform in the ball of the given ``radius`` about the equilibrium, in the norm of
-    :class:`fastmech.disturbance.size.Size`; the k-th 65,536 of them (k = 0, 1, ...) are drawn by NumPy's
+    :class:`fastmech.disturbance.motion.Size`; the k-th 65,536 of them (k = 0, 1, ...) are drawn by NumPy's
     ``default_rng([seed, index, 0, k])``, so any part of an ensemble can be had without the rest. Where they
     end is proved by capture, see :func:`fastmech.basins.label.labels_of`; a trajectory that has returned may
     need longer than ``t_end`` to come to rest. It is back when it is within ``return_radius``, in the

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fastmech.arrays import Floats
 from fastmech.basins.copies import copy_labels, label_name
-from fastmech.basins.measures.labels import Floats, LabelOf, ask, check_point
+from fastmech.basins.measures.labels import LabelOf, ask, check_point
 from fastmech.basins.measures.norm import norm_on
 from fastmech.capture.select import certificate_of
 from fastmech.disturbance.motion import equilibria_to_disturb

@@ -15,12 +15,13 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.atlas.following import follow_wells
+from fastmech.arrays import Floats, Integers
 from fastmech.atlas.map import map_equilibria
+from fastmech.atlas.resting_map import follow_wells
 from fastmech.basins.label import label_starts
 from fastmech.basins.measures.fractions import basin_stability
 from fastmech.basins.measures.integrity import integrity
-from fastmech.basins.measures.labels import Floats, Integers, check_axes, check_point
+from fastmech.basins.measures.labels import check_axes, check_point
 from fastmech.basins.measures.norm import (
     angles_of,
     check_angles,

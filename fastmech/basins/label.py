@@ -37,8 +37,7 @@ from fastmech.ensembles.status import FAILURES, Status
 from fastmech.ensembles.system import System
 from fastmech.ensembles.threads import thread_count
 from fastmech.errors import StepWarning
-from fastmech.integrators.method import Method
-from fastmech.integrators.methods import find_method
+from fastmech.integrators.methods import Method, find_method
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
 

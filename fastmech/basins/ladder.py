@@ -10,6 +10,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.basins.runs import Paths
 from fastmech.capture.certificate import OUT, Certificate
 from fastmech.ensembles.integrate import integrate
@@ -17,7 +18,6 @@ from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.status import Status
 from fastmech.errors import StepWarning
 
-Floats = NDArray[np.float64]
 Indices: TypeAlias = NDArray[np.intp]
 
 #: Steps a round of one computation after the other, a round being two of the coarsest steps. With the default

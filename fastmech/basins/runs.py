@@ -7,15 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.capture.certificate import Certificate
 from fastmech.ensembles.ends import STOP_TIME
-from fastmech.ensembles.lanes import finite_rows
+from fastmech.ensembles.lanes import MOST_STEPS, finite_rows
 from fastmech.ensembles.run import run_ensemble
-from fastmech.ensembles.spans import MOST_STEPS
 from fastmech.errors import InputError
-from fastmech.integrators.method import Method
-
-Floats = NDArray[np.float64]
+from fastmech.integrators.methods import Method
 
 #: Stages: rounds after which the lanes still running are packed anew, rounds a call, and rounds between stops
 #: until then. Most lanes of a dissipative scene are captured early, and blocks should not run on for a few;

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fastmech.arrays import Floats, Integers
 from fastmech.basins.copies import with_defaults
-from fastmech.basins.measures.labels import Floats, Integers, LabelOf, ask
+from fastmech.basins.measures.labels import LabelOf, ask
 from fastmech.basins.measures.norm import norm_on
 from fastmech.ensembles import checks
 from fastmech.equilibria.find import Equilibrium

@@ -16,11 +16,11 @@ from itertools import count
 
 import numpy as np
 
-from fastmech.atlas.wells import ROUNDING
+from fastmech.arrays import Floats, Integers
+from fastmech.atlas.map import ROUNDING
 from fastmech.basins.copies import copy_numbers, copy_of_label
 from fastmech.basins.label import How, label_starts
 from fastmech.basins.ladder import SUBSTEPS
-from fastmech.basins.measures.labels import Floats, Integers
 from fastmech.capture.certificate import Certificate
 from fastmech.capture.select import certificate_of
 from fastmech.disturbance.motion import equilibria_to_disturb, require_constant_force, state_jacobian
@@ -33,7 +33,7 @@ from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import require_own
 from fastmech.scene import Scene
-from fastmech.stability.arguments import require_rest
+from fastmech.stability.linearize import require_rest
 
 #: The first grid: directions all around, and by how much an impulse is larger than the one before, where
 #: directions are searched and where there is one alone. Each further grid is twice as fine, or four times.

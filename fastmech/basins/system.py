@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.basins.labels import Labels, pieces_of
 from fastmech.basins.ladder import SUBSTEPS
 from fastmech.ensembles import checks
@@ -15,8 +16,6 @@ from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError
-
-Floats = NDArray[np.float64]
 
 
 def system_labels_of(

@@ -12,12 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from fastmech.arrays import Floats
 from fastmech.basins.label import labels_of
 from fastmech.bench.plain import scalar_rhs
-from fastmech.disturbance.size import confining_energy, excess_energy
+from fastmech.disturbance.motion import confining_energy, excess_energy
 from fastmech.ensembles.threads import thread_count
 from fastmech.equilibria.find import find_equilibria
 from fastmech.jit import FLAGS
@@ -26,8 +26,6 @@ from fastmech.mechanism.lagrange import unit
 from fastmech.mechanism.reduced import metric_11, potential, slider_ratio
 from fastmech.reports import Stage, in_turns, table
 from fastmech.scene import Scene
-
-Floats = NDArray[np.float64]
 
 SCENE = Scene(alpha=0.0)
 REST, T_END, REPEATS = 1e-3, 300.0, 3

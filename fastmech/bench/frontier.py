@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import problem_of
-from fastmech.ensembles.interpolation import solve_at
 from fastmech.ensembles.problem import Case
 from fastmech.ensembles.run import Progress
+from fastmech.ensembles.solve import solve_at
 from fastmech.ensembles.system import System
 from fastmech.ensembles.tolerance import SAMPLE, evenly, usable_starts
 from fastmech.ensembles.work_precision import (
@@ -26,8 +26,7 @@ from fastmech.ensembles.work_precision import (
     times_to_fit,
 )
 from fastmech.errors import InputError, called_here, shown
-from fastmech.integrators.method import ImplicitRungeKutta, Method
-from fastmech.integrators.methods import METHODS, find_method
+from fastmech.integrators.methods import METHODS, ImplicitRungeKutta, Method, find_method
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots.style import LINES, new_figure, style
 from fastmech.scene import Scene

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from fastmech.arrays import Floats
+from fastmech.bench.measure import Problem, Series, Solve
 from fastmech.bench.package import STEPS
-from fastmech.bench.problem import Floats, Problem, Series, Solve
 from fastmech.integrators.tableau import Tableau
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import FLAGS

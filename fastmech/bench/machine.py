@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from fastmech.bench.problem import Problem
+from fastmech.bench.measure import Problem
 from fastmech.ensembles.integrate import integrate
 from fastmech.integrators.methods import find_method
 from fastmech.jit import FLAGS

@@ -14,13 +14,11 @@ from typing import Any
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.ensembles.system import System
 from fastmech.jit import FLAGS
 from fastmech.kernels.sincos import cos, sin
-
-Floats = NDArray[np.float64]
 
 #: Starts of each system.
 STARTS = 16_384

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fastmech.bench.problem import Entrant, Prepare, Problem, Solve
+from fastmech.bench.measure import Entrant, Prepare, Problem, Solve
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import Status
 from fastmech.errors import StepWarning

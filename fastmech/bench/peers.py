@@ -20,11 +20,12 @@ import numpy as np
 import sympy
 from numba import carray, cfunc, njit, types  # type: ignore[attr-defined]
 
+from fastmech.arrays import Floats
 from fastmech.bench import fused, package, plain
 from fastmech.bench.devices import explicit
+from fastmech.bench.measure import Entrant, Problem, Series, Solve
 from fastmech.bench.own_systems import spoken
 from fastmech.bench.plain import accelerations, scalar_rhs
-from fastmech.bench.problem import Entrant, Floats, Problem, Series, Solve
 from fastmech.ensembles.system import System
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import FLAGS

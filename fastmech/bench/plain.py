@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from fastmech.bench.problem import Floats, Problem, Series, Solve
+from fastmech.arrays import Floats
+from fastmech.bench.measure import Problem, Series, Solve
 from fastmech.jit import FLAGS
 
 #: Steps [s], those of the package's RK4 among them.

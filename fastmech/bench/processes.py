@@ -27,7 +27,7 @@ library, names, most = json.loads(sys.argv[1])
 __import__(library)
 import numpy as np
 from fastmech.bench.peers import entrants_of
-from fastmech.bench.problem import rest_starts
+from fastmech.bench.measure import rest_starts
 problem = rest_starts()
 everyone = {(e.family, e.setting): e for e in entrants_of(library, problem)}
 found = []

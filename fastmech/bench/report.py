@@ -12,17 +12,17 @@ import numpy as np
 
 from fastmech.bench import peers, tables
 from fastmech.bench.atlas import atlas_study
+from fastmech.bench.attractors import attractors_study
 from fastmech.bench.basins import basins_study
 from fastmech.bench.fused import METHODS
 from fastmech.bench.machine import costs, throughputs
-from fastmech.bench.measure import BUDGET, Row, measure
+from fastmech.bench.measure import BUDGET, PROBLEMS, Entrant, Problem, Row, measure
 from fastmech.bench.peers import entrants
-from fastmech.bench.picture import draw_bench
-from fastmech.bench.problem import PROBLEMS, Entrant, Problem
 from fastmech.bench.processes import footprints, started, vectors_study
 from fastmech.bench.proofs import proofs_study
 from fastmech.bench.stiff import stiff_study
 from fastmech.bench.systems import systems_study
+from fastmech.bench.tables import draw_bench
 from fastmech.bench.threads import threads_study
 from fastmech.bench.tolerances import tolerances_study
 from fastmech.ensembles.run import Progress
@@ -48,6 +48,7 @@ LIBRARIES = ("numba", "scipy", "heyoka", "torch", "jax", "diffrax", "numbalsoda"
 #: Studies with a file of their own, by name: from `quick` and a stage to the lines of Markdown.
 STUDIES: dict[str, Callable[..., list[str]]] = {
     "atlas": atlas_study,
+    "attractors": attractors_study,
     "basins": basins_study,
     "proofs": proofs_study,
     "stiff": stiff_study,

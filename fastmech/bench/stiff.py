@@ -8,17 +8,15 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from fastmech.arrays import Floats
+from fastmech.bench.measure import rest_starts
 from fastmech.bench.plain import scalar_rhs
-from fastmech.bench.problem import rest_starts
 from fastmech.ensembles.integrate import integrate
 from fastmech.mechanism.coefficients import reduce
 from fastmech.reports import Stage, in_turns, table
 from fastmech.scene import Scene
-
-Floats = NDArray[np.float64]
 
 BETAS, T_END = (1e4, 1e6), 2.0
 

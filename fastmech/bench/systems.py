@@ -1,7 +1,7 @@
 """Own systems and the mechanism: fixed steps and ``tol`` beside heyoka, at equal errors of all and of 99 %.
 
 Systems, starts and ends are those of :mod:`fastmech.bench.own_systems`. The truth is that of
-:mod:`fastmech.bench.extended`. heyoka has the rate of the setting with the error asked for, in hindsight.
+:mod:`fastmech.bench.tolerances`. heyoka has the rate of the setting with the error asked for, in hindsight.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import sympy
 
+from fastmech.arrays import Floats
 from fastmech.bench.devices import KINDS, explicit
-from fastmech.bench.extended import ROUNDINGS, extended, scene_rates
 from fastmech.bench.frontier import work_precision
-from fastmech.bench.measure import Row, measure, rate_at
+from fastmech.bench.measure import Entrant, Prepare, Problem, Row, Solve, measure, rate_at
 from fastmech.bench.own_systems import STARTS, SYSTEMS, OwnSystem, spoken
 from fastmech.bench.package import prepared
 from fastmech.bench.peers import heyoka, installed
-from fastmech.bench.problem import Entrant, Floats, Prepare, Problem, Solve
+from fastmech.bench.tolerances import ROUNDINGS, extended, scene_rates
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.work_precision import order_statistic
 from fastmech.integrators.methods import find_method

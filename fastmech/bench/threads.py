@@ -15,8 +15,8 @@ from functools import partial
 import numpy as np
 
 from fastmech.bench.machine import LANES, multiply_adds
+from fastmech.bench.measure import Problem, fast_starts, rest_starts
 from fastmech.bench.package import AGAIN, prepared
-from fastmech.bench.problem import Problem, fast_starts, rest_starts
 from fastmech.ensembles.threads import thread_count
 from fastmech.reports import TURNS, Stage, in_turns, table
 

@@ -12,15 +12,14 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.equilibria.descent import convex_radius, descend, step_off
 from fastmech.equilibria.find import Equilibria, find_equilibria
 from fastmech.errors import InputError
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 
-Floats = NDArray[np.float64]
 Turns = tuple[int, int]
 
 

@@ -13,8 +13,7 @@ import numpy as np
 from numba import types
 
 from fastmech.intervals.arithmetic import mul, sub
-from fastmech.intervals.matrices import positive_eigenvalues
-from fastmech.intervals.search import ENERGY, FORCES
+from fastmech.intervals.search import ENERGY, FORCES, positive_eigenvalues
 from fastmech.jit import CUBE, EXACT, INTEGERS, MATRIX, VECTOR, called, kernel
 
 #: Turns of a coordinate, either way, that a cell's number can hold, and numbers of wells before them.

@@ -15,11 +15,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.disturbance.size import Size
+from fastmech.arrays import Floats
+from fastmech.disturbance.motion import Size
 from fastmech.ensembles.run import CALL_STEPS_WITH_STOPS, Observation
-from fastmech.integrators.method import Method
-
-Floats = NDArray[np.float64]
+from fastmech.integrators.methods import Method
 
 #: Code of a motion that has left the range of a coordinate, beside wells' numbers from 1.
 OUT = 127

@@ -3,22 +3,155 @@
 Energy is looked at for all lanes at once; the position only for lanes whose energy has fallen below the
 highest level at which any well captures, which happens about once a lane. A captured lane runs on to the next
 multiple of an interval, so that computations with different steps stop it at the same time.
+
+What observers of any mechanism share: positions to wells, capture, ranges, stops. ``params`` are the energy's
+coefficients, then from ``first`` on: time between stops [s], coordinates, wells, time [s] by which loads have
+faded, number of works, time of the run's begin [s]; by coordinate the domain's low end, cells by unit, number
+of cells, period, high end; by well places, half widths of convex boxes (both wells x coordinates), levels;
+works [J]; cells.
+
+Which well a position belongs to: a table of proved cells, and the proved way down where that is silent.
+Everything an observer needs lies in one vector, because observers take one: see ``pack``.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numba import types
 
-from fastmech.capture.locate import AMPLITUDE, FIRST_WELL, INTERVAL, RATE, WELLS, locate
+from fastmech.arrays import Floats
+from fastmech.capture.cells import MOST_TURNS, WELL_DIGITS
+from fastmech.capture.certificate import OUT
 from fastmech.ensembles.ends import STOP_CODE, note_stop
-from fastmech.jit import OBSERVER_SIGNATURE, inlined, kernel
+from fastmech.equilibria.descent import (
+    MOST_STEPS,
+    TURN,
+    curvature_bound,
+    minimum_at,
+    slope,
+    step_down,
+    third_bound,
+)
+from fastmech.jit import OBSERVER_SIGNATURE, VECTOR, called, inlined, kernel
 from fastmech.kernels.sincos import REDUCTION_LIMIT, sincos
 from fastmech.mechanism.reduced import metric_11, potential, slider_ratio
 
-Floats = NDArray[np.float64]
+#: Places in the vector: reduced coefficients of the potential, amplitude and rate of the decaying force,
+#: time between stops [s], number of wells, cells along a turn; then four numbers a well; then the cells.
+AMPLITUDE, RATE, INTERVAL, WELLS, CELLS, FIRST_WELL = 8, 9, 10, 11, 12, 13
+
+#: Cells along one turn: a table of 16,384 numbers stays in the second-level cache.
+SIDE = 128
+
+#: What a cell's number holds: 0 nothing is proved, else 1 + well + 8 (turns of phi + 4) + 64 (turns of theta
+#: + 4), the turns being those of the well that the cell with both angles in [-pi, pi) belongs to.
+PHI_DIGIT, THETA_DIGIT, TABLED_TURNS = 8, 64, 3
+
+#: Cells are taken this much larger than they are: positions are assigned to them with rounding.
+ENLARGED = 1.0 + 1e-9
+
+
+def pack(
+    coefficients: Floats,
+    amplitude: float,
+    rate: float,
+    phi: Floats,
+    theta: Floats,
+    radius: Floats,
+    level: Floats,
+) -> Floats:
+    """The vector of an observer; its interval and its cells are still empty.
+
+    Args:
+        coefficients: of the potential that holds the wells (8,), its constant force among them.
+        amplitude, rate: of the decaying force over m2 l [1/s^2] and [1/s], 0 where there is none.
+        phi, theta, radius: of every minimum [rad], with its radius of convexity.
+        level: energy over m2 l^2 below which a motion in a well's component is captured by it [1/s^2].
+    """
+    head = [amplitude, rate, 0.0, float(len(phi)), float(SIDE)]
+    return np.concatenate([coefficients, head, phi, theta, radius, level, np.zeros(SIDE * SIDE)])
+
+
+@inlined
+def cell_of(params: Floats, phi: float, theta: float) -> tuple[int, float, float]:
+    """Index in the vector of the cell of a position, and the turns of its angles from [-pi, pi)."""
+    wells, side = int(params[WELLS]), int(params[CELLS])
+    turns1, turns2 = np.floor((phi + np.pi) / TURN), np.floor((theta + np.pi) / TURN)
+    row = min(max(int((phi - turns1 * TURN + np.pi) / TURN * side), 0), side - 1)
+    column = min(max(int((theta - turns2 * TURN + np.pi) / TURN * side), 0), side - 1)
+    return FIRST_WELL + 4 * wells + row * side + column, turns1, turns2
+
+
+@inlined
+def locate(params: Floats, phi: float, theta: float) -> tuple[int, float, float]:
+    """The well to which a falling path leads from a position, and the well's turns; -1: none is proved.
+
+    A path ends where a cell of the table is entered, too: all of such a cell lies in its well's component.
+    """
+    wells = int(params[WELLS])
+    a, b = FIRST_WELL, FIRST_WELL + wells
+    phis, thetas, radii = params[a:b], params[b : b + wells], params[b + wells : b + 2 * wells]
+    third = third_bound(params)
+    for _ in range(MOST_STEPS):
+        cell, turns1, turns2 = cell_of(params, phi, theta)
+        code = int(params[cell])
+        if code > 0:
+            code -= 1
+            turns1 += code // PHI_DIGIT % PHI_DIGIT - 4
+            turns2 += code // THETA_DIGIT - 4
+            return code % PHI_DIGIT, turns1, turns2
+        well, turns1, turns2 = minimum_at(phi, theta, phis, thetas, radii, wells)
+        if well >= 0:
+            return well, turns1, turns2
+        phi, theta, length = step_down(params, third, phi, theta)
+        if length == 0.0:
+            break
+    return -1, 0.0, 0.0
+
+
+@kernel(types.void(VECTOR))
+def fill_cells(params: Floats) -> None:
+    """Prove what can be proved of every cell and write it into the table.
+
+    A cell is a disc's part of a convex set: if U < B(w) all over it and the way down from its centre ends in
+    w, the whole cell lies in w's component of {U < B(w)}. U at distance r is at most U + |g| r + L r^2/2.
+    """
+    wells, side = int(params[WELLS]), int(params[CELLS])
+    first = FIRST_WELL + 3 * wells
+    highest = -np.inf
+    for w in range(wells):
+        highest = max(highest, params[first + w])
+    bound = curvature_bound(params)
+    width = TURN / side
+    reach = ENLARGED * width / math.sqrt(2.0)
+    for row in range(side):
+        for column in range(side):
+            phi, theta = -np.pi + (row + 0.5) * width, -np.pi + (column + 0.5) * width
+            g1, g2, _, _, _ = slope(params, phi, theta)
+            s1, s2 = np.sin(phi), np.sin(theta)
+            u = potential(
+                s1,
+                np.cos(phi),
+                s2,
+                np.cos(theta),
+                np.sin(phi + theta),
+                params[2],
+                params[3],
+                params[4],
+                params[5],
+            )
+            top = u + np.hypot(g1, g2) * reach + 0.5 * bound * reach * reach
+            if not top < highest:
+                continue
+            well, turns1, turns2 = locate(params, phi, theta)
+            if well < 0 or not top < params[first + well] or max(abs(turns1), abs(turns2)) > TABLED_TURNS:
+                continue
+            code = 1 + well + PHI_DIGIT * (turns1 + 4) + THETA_DIGIT * (turns2 + 4)
+            params[FIRST_WELL + 4 * wells + row * side + column] = code
+
 
 #: Rows of the record behind those of ``stopping`` (code: the well's number, from 1; time; state): the energy
 #: below which the lane's position is looked at next (minus infinity once captured), its energy at the last
@@ -114,3 +247,102 @@ def observe_capture(t: float, Y: Floats, params: Floats, record: Floats) -> None
 def observe_capture_decaying(t: float, Y: Floats, params: Floats, record: Floats) -> None:
     """Capture while the force decays."""
     look(t, Y, params, record, params[AMPLITUDE] * math.exp(-params[RATE] * t))
+
+
+#: Numbers behind the coefficients, before those of coordinates.
+HEAD = 6
+
+#: Rows of numbers, one a coordinate, in front of the wells'.
+TABLE_ROWS = 5
+
+#: Rows of the record behind code, time and state of a stop: the energy below which the position is looked at
+#: next, the energy; of a captured lane the well's number, the time, and the energy where it stops; its turns.
+RECORD = 5
+
+
+@called
+def work_left(t: float, params: Any, first: int) -> float:
+    """The most work that loads can still do at a time."""
+    count = int(params[first + 4])
+    k = int(t / params[first + 3] * (count - 1)) if t < params[first + 3] else count - 1
+    begin = first + HEAD + TABLE_ROWS * int(params[first + 1])
+    begin += int(params[first + 2]) * (2 * int(params[first + 1]) + 1)
+    return float(params[begin + min(max(k, 0), count - 1)])
+
+
+@called
+def finish(t: float, Y: Any, params: Any, record: Any, first: int, low: int) -> None:
+    """Mark lanes that are captured or out of range, and at times of stopping stop those marked."""
+    n, row, at = int(params[first + 1]), first + HEAD, t - params[first + 5]
+    level, energy, well = 2 + 2 * n, 3 + 2 * n, 4 + 2 * n
+    if low:
+        for i in range(Y.shape[1]):
+            if record[energy, i] < record[level, i]:
+                _capture(at, Y, params, record, first, i)
+    for j in range(n):
+        if params[row + 3 * n + j] == 0.0:
+            for i in range(Y.shape[1]):
+                beyond = Y[j, i] < params[row + j] or Y[j, i] > params[row + 4 * n + j]
+                if beyond and record[well, i] == 0.0:
+                    record[well, i], record[well + 1, i], record[level, i] = OUT, at, -np.inf
+    if is_stop(at, params[first]):
+        for i in range(Y.shape[1]):
+            if record[well, i] != 0.0 and record[STOP_CODE, i] == 0.0:
+                record[well + 2, i] = record[energy, i]
+                note_stop(record[well, i], t, Y, record, i)
+
+
+@called
+def _capture(t: float, Y: Any, params: Any, record: Any, first: int, i: int) -> None:
+    """Mark lane ``i`` if it is below its well's level, else set the energy of its next look.
+
+    Above the level of the well w that its position leads to, a lane is in a component that holds other
+    minima with w, and only wells of that component whose level is no higher can still take it.
+    """
+    n, wells = int(params[first + 1]), int(params[first + 2])
+    row, turns = first + HEAD, 2 + 2 * n + RECORD
+    places = row + TABLE_ROWS * n
+    levels = places + 2 * wells * n
+    table = levels + wells + int(params[first + 4])
+    cell = 0
+    for j in range(n):
+        period, turned = params[row + 3 * n + j], 0.0
+        if period > 0.0:
+            turned = np.floor((Y[j, i] - params[row + j]) / period)
+        k = np.floor((Y[j, i] - turned * period - params[row + j]) * params[row + n + j])
+        count = params[row + 2 * n + j]
+        if not (k >= 0.0 and k < count):
+            if period == 0.0 or not abs(turned) < 1e9:
+                return
+            k = min(max(k, 0.0), count - 1.0)
+        cell = cell * int(count) + int(k)
+        record[turns + j, i] = turned
+    code, found = int(params[table + cell]), -1
+    if code > 0:
+        found, code = (code - 1) % WELL_DIGITS, (code - 1) // WELL_DIGITS
+        for j in range(n - 1, -1, -1):
+            record[turns + j, i] += code % (2 * MOST_TURNS + 1) - MOST_TURNS
+            code //= 2 * MOST_TURNS + 1
+    else:
+        for w in range(wells):
+            inside = True
+            for j in range(n):
+                period, away = params[row + 3 * n + j], Y[j, i] - params[places + w * n + j]
+                turned = np.floor(away / period + 0.5) if period > 0.0 else 0.0
+                inside &= abs(away - turned * period) < params[places + (wells + w) * n + j]
+            if inside:
+                found = w
+                for j in range(n):
+                    period, away = params[row + 3 * n + j], Y[j, i] - params[places + w * n + j]
+                    record[turns + j, i] = np.floor(away / period + 0.5) if period > 0.0 else 0.0
+                break
+    if found < 0:
+        return
+    energy, following = record[3 + 2 * n, i], -np.inf
+    if energy < params[levels + found]:
+        record[4 + 2 * n, i], record[5 + 2 * n, i] = found + 1.0, t
+    else:
+        for w in range(wells):
+            if params[levels + w] <= energy:
+                following = max(following, params[levels + w])
+    record[2 + 2 * n, i] = following

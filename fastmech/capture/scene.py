@@ -9,19 +9,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.atlas.wells import ROUNDING
+from fastmech.arrays import Floats
+from fastmech.atlas.map import ROUNDING
 from fastmech.capture.barriers import BarrierTree, barrier_tree, frozen_coefficients
 from fastmech.capture.certificate import Certificate, Early, Noted
-from fastmech.capture.locate import FIRST_WELL, INTERVAL, fill_cells, pack
 from fastmech.capture.observe import (
     CAPTURE_TIME,
+    FIRST_WELL,
+    INTERVAL,
     LEVEL,
     ROWS,
     STOP_ENERGY,
     TURNS_PHI,
     TURNS_THETA,
+    fill_cells,
     observe_capture,
     observe_capture_decaying,
+    pack,
 )
 from fastmech.capture.steps import (
     FINEST,
@@ -34,13 +38,11 @@ from fastmech.capture.steps import (
     shortest_step,
     step_of_fading,
 )
-from fastmech.disturbance.motion import damped_times
-from fastmech.disturbance.size import Size, confining_energy, size_of
+from fastmech.disturbance.motion import Size, confining_energy, damped_times, size_of
 from fastmech.ensembles.ends import STOP_CODE
-from fastmech.ensembles.energy_bounds import breaks_energy_bounds
+from fastmech.ensembles.fitting import breaks_energy_bounds
 from fastmech.ensembles.run import CALL_STEPS_WITH_STOPS, Observation
-from fastmech.integrators.method import ImplicitRungeKutta, Method, with_jacobian
-from fastmech.integrators.methods import find_method
+from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method, with_jacobian
 from fastmech.kernels.jacobians import lagrange_inverse, lagrange_jacobian
 from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import Coefficients, reduce
@@ -48,8 +50,6 @@ from fastmech.mechanism.lagrange import unit
 from fastmech.mechanism.reduced import metric_11, slider_ratio
 from fastmech.scene import STATE, Scene
 from fastmech.step_limits.warning import drives_rest, is_beyond, step_limit, warn_of_step
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -190,7 +190,7 @@ class SceneCertificate(Certificate):
         return energy_change(c, np.abs(most), states, apart)
 
     def size(self, equilibrium: int) -> Size:
-        """See :func:`fastmech.disturbance.size.size_at`."""
+        """See :func:`fastmech.disturbance.motion.size_at`."""
         e = self.tree.equilibria[equilibrium]
         return size_of(self.held, e)
 

@@ -5,15 +5,13 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.disturbance.motion import default_method
-from fastmech.ensembles.energy_bounds import energies
+from fastmech.ensembles.fitting import energies
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.mechanism.reduced import metric_11, metric_determinant, potential_hessian, slider_ratio
 from fastmech.scene import Scene
-
-Floats = NDArray[np.float64]
 
 #: Coarse step times the highest frequency [rad], and times the fastest turning that the energy allows. With
 #: ``dop853`` the error of such a step is some 1e-3 by the time of capture; half of it makes that 1e-5.

@@ -1,8 +1,8 @@
-"""The command ``fastmech``: one module a command, loaded when it is asked for.
+"""The command ``fastmech``: modules of a few commands each, loaded when one is asked for.
 
-To add a command, write a module ``NAME.py`` here with a click command ``command`` and name it in
-``COMMANDS``. Its imports at module level must stay as light as click: numerical libraries are imported inside
-of the command, so that ``fastmech --help`` answers at once.
+To add a command, write a click command in a module here, under its own name, and name both in ``COMMANDS``.
+Imports at module level must stay as light as click: numerical libraries are imported inside of the command,
+so that ``fastmech --help`` answers at once.
 """
 
 from __future__ import annotations
@@ -14,24 +14,25 @@ from typing import Any
 import click
 
 from fastmech import __version__
-from fastmech.cli.failure import SUMMARY, Failure, told_in_one_line
+from fastmech.cli.reporting import SUMMARY, Failure, told_in_one_line
 from fastmech.errors import shown
 from fastmech.interrupts import listen
 
-COMMANDS = (
-    "run",
-    "status",
-    "info",
-    "export",
-    "plot",
-    "explore",
-    "equilibria",
-    "paper",
-    "hardcases",
-    "bench",
-    "warmup",
-    "faults",
-)
+#: Every command, and the module that has it.
+COMMANDS = {
+    "run": "run",
+    "status": "results",
+    "info": "results",
+    "export": "results",
+    "plot": "results",
+    "explore": "explore",
+    "equilibria": "equilibria",
+    "paper": "reports",
+    "hardcases": "reports",
+    "bench": "reports",
+    "warmup": "warmup",
+    "faults": "reports",
+}
 
 
 class _Commands(click.Group):
@@ -43,7 +44,7 @@ class _Commands(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
             return None
-        command: click.Command = import_module(f"{__name__}.{cmd_name}").command
+        command: click.Command = getattr(import_module(f"{__name__}.{COMMANDS[cmd_name]}"), cmd_name)
         return command
 
     def resolve_command(

@@ -74,7 +74,7 @@ class _SceneCommand(click.Command):
     help="Only for the stable position that is about here [rad; default: for all].",
 )
 @reporting_options
-def command(
+def equilibria(
     scene_file: Path | None,
     at: float,
     vary: str,

@@ -13,7 +13,7 @@ from fastmech.errors import InputError
     "--port", metavar="N", type=click.IntRange(0, 65535), default=0, help="Port [default: a free one]."
 )
 @click.option("--no-browser", is_flag=True, help="Only print the page's address.")
-def command(what: str | None, port: int, no_browser: bool) -> None:
+def explore(what: str | None, port: int, no_browser: bool) -> None:
     """Explore a mechanism live, on a page in the browser.
 
     MECHANISM is the name of a shipped one, or FILE.py:NAME; by default it is the paper's with Table 1. The

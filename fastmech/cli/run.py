@@ -15,7 +15,7 @@ from fastmech.cli.reporting import Account, account, reporting_options
 if TYPE_CHECKING:
     from fastmech.models.mechanism import Mechanism
     from fastmech.scan_types.request import RunContext
-    from fastmech.tiles.report import RunReport
+    from fastmech.tiles.run import RunReport
     from fastmech.tiles.work import Hiring
 
 
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     "--keep", metavar="FILE.h5", type=click.Path(dir_okay=False, path_type=Path), help="Keep that tile here."
 )
 @reporting_options
-def command(
+def run(
     request_file: Path | None,
     source: Path | None,
     out: Path | None,
@@ -130,7 +130,7 @@ def _mechanism_named(where: str) -> Mechanism:
 def _asked_in(source: Path) -> tuple[Path, str, str | None]:
     """Name and text of the request that a result was made from, and all that decided its values."""
     from fastmech.store.read import open_results
-    from fastmech.tiles.identity import asked_of_result
+    from fastmech.tiles.section import asked_of_result
 
     with open_results(source) as results:
         name = Path(str(results.attrs.get("request_file", ""))).name
@@ -140,7 +140,7 @@ def _asked_in(source: Path) -> tuple[Path, str, str | None]:
 
 def _compare(told: Account, before: str, target: Path) -> None:
     """Say what else than the request decides the values, and differs."""
-    from fastmech.tiles.identity import asked_of_result, differences
+    from fastmech.tiles.section import asked_of_result, differences
 
     now = asked_of_result(target)
     if now is not None and now != before:
@@ -170,7 +170,7 @@ def _run_tile(
     mechanism: Mechanism | None,
 ) -> None:
     from fastmech.store.write import check_writable
-    from fastmech.tiles.alone import compute_alone
+    from fastmech.tiles.look import compute_alone
 
     if keep is not None:
         check_writable(keep)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import click
 
-from fastmech.cli.failure import Failure
-from fastmech.cli.reporting import account, reporting_options
+from fastmech.cli.reporting import Failure, account, reporting_options
 
 
 @click.command(name="warmup")
@@ -18,7 +17,7 @@ from fastmech.cli.reporting import account, reporting_options
     help="What to compile.",
 )
 @reporting_options
-def command(purpose: str, quiet: bool, as_json: bool) -> None:
+def warmup(purpose: str, quiet: bool, as_json: bool) -> None:
     """Compile beforehand what computations need, on all cores, and keep it on disk."""
     with account("warmup", quiet, as_json) as told:
         with told.bars.preparing():

@@ -1,30 +1,159 @@
-"""One disturbance of an equilibrium: the nonlinear motion and the linearized one side by side."""
+"""Disturbances of an equilibrium: their size, motions beside the linearized ones, how far both agree."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import scipy.linalg
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.disturbance.size import size_of
+from fastmech.arrays import Floats
 from fastmech.ensembles import checks
 from fastmech.ensembles.fitting import damping_rate
 from fastmech.ensembles.integrate import integrate
-from fastmech.equilibria.balance import pulls, vanishing
 from fastmech.equilibria.find import Equilibrium, degenerate_sentence
+from fastmech.equilibria.search import pulls, vanishing
 from fastmech.errors import InputError
-from fastmech.integrators.method import ImplicitRungeKutta
-from fastmech.integrators.methods import find_method
+from fastmech.integrators.methods import ImplicitRungeKutta, find_method
+from fastmech.jit import OBSERVER_SIGNATURE, kernel
 from fastmech.mechanism.coefficients import reduce
+from fastmech.mechanism.lagrange import kinetic_energy, metric, potential_energy, potential_hessian, unit
 from fastmech.models.equilibria import RestingPlace, find_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene, require_scene
 from fastmech.stability.linearize import jacobian
 
-Floats = NDArray[np.float64]
+#: Rows of the record, which begins with zeros and ends with the state that the step began with; the
+#: excursions' rows go on with the other coordinates, and SWUNG is when the last of them was reached.
+LAST_OUTSIDE, BEGUN, SWUNG, EXCURSION = range(4)
+
+
+@kernel(OBSERVER_SIGNATURE)
+def observe_departure(t: float, Y: Floats, params: Floats, record: Floats) -> None:
+    """Keep the last time outside the ball of return and the largest departures of the coordinates.
+
+    A coordinate that turns round within a step departs there by Hermite's cubic through both ends.
+    ``params``: place of the equilibrium (n,); the norm's metric (n, n); 1/omega^2; square of the ball's
+    radius (see :class:`fastmech.disturbance.motion.Size`).
+    """
+    n = Y.shape[0] // 2
+    before = EXCURSION + n
+    inverse_square, radius_square = params[n + n * n], params[n + n * n + 1]
+    for i in range(Y.shape[1]):
+        square, h = 0.0, t - record[BEGUN, i]
+        for j in range(n):
+            away = Y[j, i] - params[j]
+            for k in range(n):
+                a = params[n + n * j + k]
+                square += a * (away * (Y[k, i] - params[k]) + inverse_square * Y[n + j, i] * Y[n + k, i])
+            most = max(abs(away), record[EXCURSION + j, i])
+            first, last = h * record[before + n + j, i], h * Y[n + j, i]
+            # The cubic's slope is first + b s + (last - first - b) s^2, s from 0 to 1.
+            if first * last < 0.0:
+                moved = Y[j, i] - record[before + j, i]
+                b = 6.0 * moved - 4.0 * first - 2.0 * last
+                root = math.sqrt(b * b - 4.0 * first * (last - first - b))
+                s = 2.0 * first / (-b + math.copysign(root, first))
+                turned = away - moved + s * (first + s * (0.5 * b + s * (last - first - b) / 3.0))
+                most = max(most, abs(turned))
+            record[SWUNG, i] = t if most > record[EXCURSION + j, i] else record[SWUNG, i]
+            record[EXCURSION + j, i] = most
+        record[LAST_OUTSIDE, i] = t if square > radius_square else record[LAST_OUTSIDE, i]
+        record[BEGUN, i] = t
+    for d in range(2 * n):
+        for i in range(Y.shape[1]):
+            record[before + d, i] = Y[d, i]
+
+
+@dataclass(frozen=True)
+class Size:
+    """The kinetic-energy norm at an equilibrium, in radians of theta, or in the last coordinate's unit.
+
+    ``size(xi, eta)^2 = (xi' a xi + eta' a eta / omega^2) / (m2 l^2)`` with the metric ``a`` at the
+    equilibrium, the departures ``xi`` [rad] and ``eta`` [rad/s], and ``omega`` [rad/s] the square root of
+    the largest generalized eigenvalue, in magnitude, of the Hessian and the metric: the highest natural
+    frequency at a minimum. A departure of theta alone has its own angle as its size;
+    ``size^2 omega^2 m2 l^2 / 2`` is the kinetic energy of the disturbance once its angles have turned to
+    rates. Of a ``Mechanism`` the metric's last entry takes the place of m2 l^2, which it is for the paper's.
+    """
+
+    metric: Floats  #: a / (m2 l^2), shape (n, n)
+    omega: float  #: rad/s
+
+    @cached_property
+    def to_ball(self) -> Floats:
+        """Matrix (2 n, 2 n): ``disturbance @ to_ball`` is a point whose length is the disturbance's size."""
+        lower = np.linalg.cholesky(self.metric)
+        return scipy.linalg.block_diag(lower, lower / self.omega)
+
+    def __call__(self, disturbance: Floats) -> Floats:
+        """Sizes [rad] of disturbances (..., 2 n)."""
+        with np.errstate(invalid="ignore", over="ignore"):  # what is not finite has no finite size
+            return np.asarray(np.linalg.norm(disturbance @ self.to_ball, axis=-1))
+
+    def from_ball(self, points: Floats) -> Floats:
+        """Disturbances (..., 2 n) whose sizes are the lengths of ``points`` (..., 2 n)."""
+        return np.asarray(points @ np.linalg.inv(self.to_ball))
+
+
+def size_at(scene: Scene, phi: float, theta: float) -> Size:
+    """The norm at the equilibrium (phi, theta) [rad] of a scene with a constant force."""
+    q = (phi, theta)
+    return _size(metric(scene, q), potential_hessian(scene, q, scene.F0), unit(scene))
+
+
+def _size(a: Floats, hessian: Floats, inertia: float) -> Size:
+    curvature = np.max(np.abs(scipy.linalg.eigvalsh(hessian, a)))
+    # Without any stiffness (all curvature gone) there is no frequency; 1 rad/s keeps the norm defined.
+    return Size(a / inertia, float(np.sqrt(curvature)) or 1.0)
+
+
+def size_of(system: Scene | Mechanism, e: Equilibrium | RestingPlace) -> Size:
+    """The norm at an equilibrium of a scene with a constant force, or of a mechanism."""
+    if isinstance(system, Scene):
+        return size_at(system, *e.position)
+    linear = system.linear(e.position)
+    return _size(linear.mass, 0.5 * (linear.stiffness + linear.stiffness.T), linear.mass[-1, -1])
+
+
+def excess_energy(system: Scene | Mechanism, e: Equilibrium | RestingPlace, y: Floats) -> Floats:
+    """T + U of states (n, states) above U at an equilibrium [J], loads at what they come to."""
+    with np.errstate(all="ignore"):  # states that are not finite are nowhere at rest
+        if isinstance(system, Mechanism):
+            return np.asarray(system.evaluate("bounding", y.T)[0] - e.energy)
+        return kinetic_energy(system, y) + potential_energy(system, y[:, :2], system.F0) - e.energy
+
+
+def confining_energy(system: Scene | Mechanism, e: Equilibrium | RestingPlace, radius: float) -> float:
+    """Energy [J] with which a motion about a minimum stays in the ball of the given radius [rad].
+
+    With the lowest squared frequency s the energy is at least s m2 l^2 size^2 / 2 (the norm's omega is the
+    highest frequency), to second order.
+    """
+    if isinstance(e, RestingPlace):
+        assert isinstance(system, Mechanism)
+        a = system.metric(e.position)
+        stiffness, inertia = 0.5 * (e.stiffness + e.stiffness.T), float(a[-1, -1])
+    else:
+        assert isinstance(system, Scene)
+        a, stiffness, inertia = metric(system, (e.phi, e.theta)), e.hessian, unit(system)
+    return 0.5 * float(scipy.linalg.eigvalsh(stiffness, a)[0]) * inertia * radius * radius
+
+
+def uniform_ball(rng: np.random.Generator, n: int, dim: int = 4) -> Floats:
+    """Points uniform in the unit ball of ``dim`` dimensions, shape (n, dim)."""
+    directions = unit_directions(rng, n, dim)
+    return directions * rng.random((n, 1)) ** (1.0 / dim)
+
+
+def unit_directions(rng: np.random.Generator, n: int, dim: int = 4) -> Floats:
+    """Points uniform on the unit sphere of ``dim`` dimensions, shape (n, dim)."""
+    normal = rng.standard_normal((n, dim))
+    return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
 
 
 #: Default step times the highest frequency [rad].
@@ -178,3 +307,75 @@ def propagators(matrix: Floats, times: Floats) -> Floats:
         return np.asarray(scipy.linalg.expm(times[:, None, None] * matrix))
     growth = np.exp(times[:, None] * values)
     return np.asarray((vectors * growth[:, None, :] @ np.linalg.inv(vectors)).real)
+
+
+SMALLEST, LARGEST, GRID = 1e-6, np.pi, 24
+BISECTIONS = 13
+OUTPUTS = 200
+
+
+@dataclass(frozen=True)
+class LinearRange:
+    """Largest sizes at which the linearized motion is within the tolerance, direction by direction."""
+
+    directions: Floats  #: disturbances of size 1 rad, shape (directions, states)
+    limit: Floats  #: rad, shape (directions,); 0: not even the smallest size tried, inf: every one
+    size: Size  #: the norm
+    horizon: float  #: s
+    tolerance: float
+
+
+def linear_range(
+    scene: Scene | Mechanism,
+    equilibrium: Equilibrium | RestingPlace,
+    *,
+    horizon: float = 1.0,
+    tolerance: float = 0.05,
+    directions: int = 256,
+    seed: int = 0,
+    dt: float | None = None,
+    part: slice | None = None,
+    threads: int | None = None,
+) -> LinearRange:
+    """Size of disturbance up to which the linearized motion stays within ``tolerance`` of the nonlinear one.
+
+    The deviation of a disturbance is the maximum of size(nonlinear - linearized) divided by that of
+    size(nonlinear), both over 201 evenly spaced times of [0, horizon], in the norm of
+    :class:`fastmech.disturbance.motion.Size`. Along every direction (uniform on the sphere) sizes from
+    1e-6 rad to pi rad are tried upwards, and the first crossing of the tolerance is refined by bisection to
+    one part in 10,000. ``dt`` is the longest step [s], by default that of
+    :func:`fastmech.disturbance.motion.disturbed_motion`. ``part`` says which of the directions to try, all by
+    default.
+
+    Raises:
+        InputError: an argument is wrong, the scene's force decays, or the equilibrium is not the scene's.
+    """
+    horizon = checks.number("horizon", horizon, "s", above=0.0)
+    tolerance = checks.number("tolerance", tolerance, "", above=0.0)
+    count = checks.whole_number("directions", directions, least=1)
+    seed = checks.whole_number("seed", seed, least=0)
+    index = equilibria_to_disturb(scene).index_of(equilibrium)
+    size, dim = size_of(scene, equilibrium), 2 * len(equilibrium.position)
+    rng = np.random.default_rng([seed, index, 1])
+    rays = size.from_ball(unit_directions(rng, count, dim))[part or slice(None)]
+    times = np.linspace(0.0, horizon, OUTPUTS + 1)
+
+    def deviation(sizes: Floats) -> Floats:
+        """Deviations at sizes (directions, k), one ray a row."""
+        starts = (sizes[..., None] * rays[:, None, :]).reshape(-1, dim)
+        motion = disturbed_motion(scene, equilibrium, starts, times, dt=dt, threads=threads)
+        apart = size(motion.nonlinear - motion.linearized).max(axis=0)
+        with np.errstate(invalid="ignore"):
+            return np.asarray((apart / size(motion.nonlinear).max(axis=0)).reshape(sizes.shape))
+
+    grid = np.geomspace(SMALLEST, LARGEST, GRID)
+    # What is not finite deviates: the comparison is written so that NaN counts as exceeding.
+    exceeded = ~(deviation(np.broadcast_to(grid, (len(rays), GRID))) <= tolerance)
+    first = np.argmax(exceeded, axis=1)
+    low, high = grid[np.maximum(first - 1, 0)], grid[first]
+    for _ in range(BISECTIONS):
+        middle = np.sqrt(low * high)
+        above = ~(deviation(middle[:, None])[:, 0] <= tolerance)
+        low, high = np.where(above, low, middle), np.where(above, middle, high)
+    limit = np.where(exceeded.any(axis=1), low, np.inf)
+    return LinearRange(rays, np.where(exceeded[:, 0], 0.0, limit), size, horizon, tolerance)

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.optimize
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fastmech.arrays import Floats
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import run_ensemble
 from fastmech.errors import InputError
@@ -15,8 +16,6 @@ from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import kinetic_energy, potential_energy, potential_gradient, unit
 from fastmech.scene import Scene
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

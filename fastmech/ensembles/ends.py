@@ -17,20 +17,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
+from fastmech.arrays import Floats, Integers
 from fastmech.callee import callee
-from fastmech.ensembles.lanes import Lanes
-from fastmech.ensembles.spans import Span
-from fastmech.integrators.batch import PHASE, Batch
-from fastmech.integrators.explicit import WEIGHTS, Moment, Stepped, step_by_stages, weights_of
+from fastmech.ensembles.lanes import Lanes, Span
+from fastmech.integrators.explicit import PHASE, WEIGHTS, Batch, Moment, Stepped, step_by_stages, weights_of
 from fastmech.integrators.implicit import CALLS, SCHEME, Calls, drive_implicit, inverse_by_elimination
-from fastmech.integrators.method import Adams, ImplicitRungeKutta, Method
+from fastmech.integrators.methods import Adams, ImplicitRungeKutta, Method
 from fastmech.jit import MATRIX, OBSERVER, OBSERVER_SIGNATURE, RHS, VECTOR, inlined, kernel, named_tuple
 from fastmech.kernels.blocks import observer_in_single
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 #: Rows of the record of a stopping condition: the stop's code (0: runs on), its time [s], then the state.
 STOP_CODE, STOP_TIME, STOP_STATE = 0, 1, 2
@@ -46,7 +41,7 @@ TOGETHER = 256
 
 
 @inlined
-def note_stop(code: float, t: float, Y: NDArray[np.float64], record: NDArray[np.float64], i: int) -> None:
+def note_stop(code: float, t: float, Y: Floats, record: Floats, i: int) -> None:
     """Keep code, time and state of lane ``i`` when its code is not zero for the first time.
 
     A state that is not finite stops nothing, whatever its code: the trajectory has failed before.

@@ -20,14 +20,12 @@ from fastmech.ensembles.problem import (
     system_problem,
 )
 from fastmech.ensembles.run import Progress
-from fastmech.ensembles.solve import Precision, Settings, Solution, solve
+from fastmech.ensembles.solve import Precision, Settings, Solution, counted_turns, solve, watched
 from fastmech.ensembles.status import Status, failure_counts, failure_line
 from fastmech.ensembles.system import System, stop_codes
 from fastmech.ensembles.tolerance import solve_to_tolerance
-from fastmech.ensembles.turning import counted_turns, watched
 from fastmech.errors import InputError, called_here, shown
-from fastmech.integrators.method import ImplicitRungeKutta, Method
-from fastmech.integrators.methods import find_method
+from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method
 from fastmech.kernels.select import FORMULATIONS
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import STATE, Scene, nearest

@@ -24,6 +24,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.callee import callee
 from fastmech.ensembles.ends import STOP_CODE
 from fastmech.ensembles.lanes import finite_rows
@@ -36,8 +37,6 @@ from fastmech.ensembles.threads import in_threads, thread_count
 from fastmech.integrators.methods import find_method
 from fastmech.interrupts import check
 from fastmech.jit import CUBE, INTEGERS, MATRIX, OBSERVER, RHS, VECTOR, inlined, kernel
-
-Floats = NDArray[np.float64]
 
 #: What becomes of a trajectory.
 ENDED, SLIDES, GRAZES, COSTS, SINGULAR, UNCLEAR = range(6)

@@ -1,4 +1,4 @@
-"""What an ensemble integrates: a scene in one of two formulations, or a system of the user's own.
+"""What an ensemble integrates: a scene or a mechanism in one of two formulations, or a user's own system.
 
 Either is a block right-hand side, the parameters of every trajectory, and how public states turn into the
 integrated ones and back.
@@ -8,29 +8,109 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.arrays import Floats
 from fastmech.ensembles import checks
-from fastmech.ensembles.derived import system_of
 from fastmech.ensembles.fitting import damping_rate, vibration_frequency
-from fastmech.ensembles.parameters import Parameters
+from fastmech.ensembles.lanes import Parameters
 from fastmech.ensembles.run import NOTHING, Observation
-from fastmech.ensembles.system import System
+from fastmech.ensembles.system import System, numbers
 from fastmech.errors import InputError, shown
-from fastmech.integrators.method import Method, with_jacobian
+from fastmech.generated import new_module, run_module
+from fastmech.integrators.methods import Method, with_jacobian
+from fastmech.jit import inlined, rounded_to
+from fastmech.kernels.blocks import Rates
+from fastmech.kernels.exponential import exp
 from fastmech.kernels.jacobians import canonical_jacobian, lagrange_inverse, lagrange_jacobian
+from fastmech.kernels.rebuilding import rebuilt
 from fastmech.kernels.select import right_hand_side
+from fastmech.kernels.sincos import cos, reduction_limit, sin, sincos, turned
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.mechanism.equations import momenta_from_rates, rates_from_momenta
 from fastmech.mechanism.reduced import metric_determinant, slider_ratio
-from fastmech.models.mechanism import Mechanism
+from fastmech.models.mechanism import Mechanism, in_precision
 from fastmech.scene import Scene, nearest
 
-Floats = NDArray[np.float64]
+#: What the text of a right-hand side calls.
+_CALLED = {
+    "np": np, "sin": sin, "cos": cos, "exp": exp, "sincos": sincos, "turned": turned,
+    "reduction_limit": reduction_limit, "rounded_to": rounded_to, "float32": np.float32,
+}  # fmt: skip
+
+
+class MechanismSystem(System):
+    """Equations of motion; parameters are their coefficients, whose values are a problem's matter."""
+
+    _texts: dict[str, str]  #: functions of :class:`Rates` by name
+    _of_time: dict[str, Any]  #: loads that are functions
+    _name: str
+    _prints: str
+
+    def __init__(self, mechanism: Mechanism, formulation: str) -> None:
+        begin, found = f"{formulation}_", mechanism.derived.functions.items()
+        object.__setattr__(self, "_name", f"{mechanism.name}_{formulation}")
+        object.__setattr__(self, "_of_time", mechanism.functions_of_time())
+        object.__setattr__(self, "_prints", mechanism.prints)
+        texts = {name.removeprefix(begin): text for name, text in found if name.startswith(begin)}
+        object.__setattr__(
+            self, "_texts", {name: text.replace(begin, "") for name, (_, text) in texts.items()}
+        )
+        # The right-hand side as a user would have written it, for what looks into it.
+        text = in_precision(self._texts["rates"], "float64")
+        module = new_module("mechanism", text, [mechanism.prints])
+        vars(module).update(self._called(module.__name__, "float64") | {"exp": np.exp})
+        own = dict.fromkeys(texts["rates"][0], 0.0)
+        super().__init__(run_module(module, text).rates, mechanism.state, own)
+
+    def __post_init__(self) -> None:
+        """Nothing is left to check."""
+
+    def _called(self, module: str, precision: str) -> dict[str, Any]:
+        loads = {k: inlined(rebuilt(f, module, numbers(precision))) for k, f in self._of_time.items()}
+        return _CALLED | loads | {"__name__": module}
+
+    def _functions(self, module: str, precision: str) -> dict[str, Any]:
+        place = self._called(module, precision)
+        for text in self._texts.values():
+            exec(in_precision(text, precision), place)
+        return {name: inlined(place[name]) for name in self._texts}
+
+    @property
+    def parameter_order(self) -> list[str]:
+        """As they are given."""
+        return list(self.parameters)
+
+    @cached_property
+    def rates(self) -> Rates:
+        """What the engine's loops are made from."""
+        packed, n = "rates_within" in self._texts, len(self.state)
+        return Rates(
+            self._name,
+            n,
+            tuple(range(len(self.parameters))),
+            self._functions,
+            (self._prints, *self._texts.values()),
+            ranged=packed,
+            near=packed,
+            looked_at=n // 2,
+        )
+
+
+_systems: dict[tuple[str, str, str], MechanismSystem] = {}
+
+
+def system_of(mechanism: Mechanism, formulation: str) -> MechanismSystem:
+    """The system of a mechanism, the same for other values of its parameters."""
+    key = mechanism.name, mechanism.prints, formulation
+    if key not in _systems:
+        _systems[key] = MechanismSystem(mechanism, formulation)
+    return _systems[key]
 
 
 @dataclass(frozen=True)

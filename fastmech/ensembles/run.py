@@ -19,18 +19,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.arrays import Floats
 from fastmech.ensembles.ends import STOP_CODE, STOP_STATE, STOP_TIME, Resumption, last_finite_observer
-from fastmech.ensembles.lanes import Lanes, finite_rows, rows_at
-from fastmech.ensembles.parameters import Parameters
-from fastmech.ensembles.spans import Span, Task, block_width, task_lanes, tasks_of, way
+from fastmech.ensembles.lanes import (
+    Lanes,
+    Parameters,
+    Span,
+    Task,
+    block_width,
+    finite_rows,
+    rows_at,
+    task_lanes,
+    tasks_of,
+    way,
+)
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.threads import in_threads, thread_count
-from fastmech.integrators.batch import Batch, observe_nothing
-from fastmech.integrators.method import Adams, Explicit, Method
+from fastmech.integrators.explicit import Batch, observe_nothing
+from fastmech.integrators.methods import Adams, Explicit, Method
 from fastmech.interrupts import check
 from fastmech.kernels.blocks import VECTOR_LANES, observer_in_single
 
-Floats = NDArray[np.float64]
 Progress = Callable[[int], None]
 
 #: Steps a call at most: between calls an interrupt is heard, and who has stopped or failed makes room. Most

@@ -1,24 +1,94 @@
-"""One run of a problem with given settings: a method, a step that may fit each trajectory, a precision."""
+"""One run of a problem with given settings; how far bodies turn in its steps; states between the steps.
+
+Outputs that are closer than steps: states between them by Hermite's interpolation. Where a tolerance allows
+steps longer than the intervals between outputs, the run takes equal steps over its whole time. A polynomial
+through the states and their derivatives at ``k`` neighbouring steps, of degree 2 k - 1 (Stoer, Bulirsch,
+*Introduction to Numerical Analysis*, section 2.1.5), gives the outputs; k is such that its error is far below
+the method's.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Flags, Floats
 from fastmech.ensembles.ends import STOP_CODE
-from fastmech.ensembles.energy_bounds import breaks_energy_bounds
-from fastmech.ensembles.fitting import EXPONENT_AGAIN, EXPONENT_ONCE, fit_steps, fitted_steps
+from fastmech.ensembles.fitting import (
+    EXPONENT_AGAIN,
+    EXPONENT_ONCE,
+    breaks_energy_bounds,
+    fit_steps,
+    fitted_steps,
+    speed_bound,
+)
+from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.problem import Case, Problem
-from fastmech.ensembles.run import Ensemble, Progress, run_ensemble
-from fastmech.ensembles.spans import output_steps
+from fastmech.ensembles.run import Ensemble, Observation, Progress, run_ensemble
 from fastmech.ensembles.status import Status
-from fastmech.ensembles.turning import TURNED, TURNS
-from fastmech.integrators.method import Method
+from fastmech.integrators.methods import Method
+from fastmech.jit import OBSERVER_SIGNATURE, kernel
+from fastmech.mechanism.coefficients import Coefficients
+from fastmech.step_limits.warning import TURN
 
-Floats = NDArray[np.float64]
+#: By how much rounding may make a step longer than the dt that it was to be.
+ROUNDED = 1e-6
+
+#: Rows of the record: the greatest turn of an angle in a step [rad], and the angles that the step began with.
+TURNED, BEFORE = 0, 1
+
+
+@kernel(OBSERVER_SIGNATURE)
+def observe_turns(t: float, Y: Floats, params: Floats, record: Floats) -> None:
+    """Keep the greatest turn of every lane."""
+    for angle in range(2):
+        for i in range(Y.shape[1]):
+            turned = abs(Y[angle, i] - record[BEFORE + angle, i])
+            record[TURNED, i] = turned if turned > record[TURNED, i] else record[TURNED, i]
+            record[BEFORE + angle, i] = Y[angle, i]
+
+
+TURNS = Observation(observe_turns, np.zeros(0), np.zeros(3), states=2)
+
+
+def may_turn(c: Coefficients, starts: Floats, dt: float | Floats, threads: int | None = None) -> Flags:
+    """Whether a body may turn by more than :data:`TURN` in a step of ``dt`` [s], by its energy; shape (n,).
+
+    Of rates whose kinetic-energy norm is 1 none is greater than sqrt((mass + 1) / mass): the inverse of
+    the mass matrix has no greater diagonal entry in any configuration.
+    """
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        turn = speed_bound(c, starts, threads)
+        turn *= np.sqrt((c.mass + 1.0) / c.mass)
+        turn *= dt
+        return np.asarray(turn > TURN)
+
+
+def watched(problem: Problem, starts: Floats, dt: float, threads: int | None = None) -> Problem:
+    """The problem, with turns observed where the steps of ``dt`` [s] are long enough for them."""
+    c = problem.coefficients
+    some = c is not None and may_turn(c, starts, (1.0 + ROUNDED) * dt, threads).any()
+    return replace(problem, observation=TURNS) if some else problem
+
+
+def counted_turns(
+    problem: Problem, starts: Floats, dt: Floats, records: Floats, threads: int | None = None
+) -> Floats | None:
+    """The turns (n,) in the records of a watched problem with steps of at most ``dt`` (n,) [s].
+
+    Only those count that the energy allows in a trajectory's own steps, else they are 0: they do not depend
+    on whether its companions' were a reason to watch. ``None``: nobody is watched.
+    """
+    c = problem.coefficients
+    if c is None or problem.observation is not TURNS:
+        return None
+    return np.where(may_turn(c, starts, dt, threads), records[TURNED], 0.0)
+
+
 Precision = type[np.floating[Any]]
 
 
@@ -56,7 +126,7 @@ def nothing(problem: Problem, outputs: int, n: int, dim: int) -> Solution:
     return Solution(y, records, np.zeros(n, dtype=np.int8), number, dt, failed, None, term)
 
 
-def part_of(solution: Solution, who: NDArray[np.int64] | NDArray[np.bool_]) -> Solution:
+def part_of(solution: Solution, who: NDArray[np.int64] | Flags) -> Solution:
     """Some of a solution's trajectories."""
     s = solution
     last = None if s.last is None else s.last[who]
@@ -142,7 +212,7 @@ def solve(case: Case, settings: Settings, progress: Progress | None = None) -> S
     return solution
 
 
-def tell_aside(solution: Solution, starts: Floats, outputs: Floats, aside: NDArray[np.bool_]) -> None:
+def tell_aside(solution: Solution, starts: Floats, outputs: Floats, aside: Flags) -> None:
     """What is told of trajectories (n,) that did not run because no steps can follow them."""
     solution.status[aside] = Status.STEP_TOO_LARGE
     solution.y[: 1 if outputs[0] == 0.0 else 0, aside] = starts[aside]
@@ -214,3 +284,87 @@ def _steps_taken(times: Floats, dt: Floats, n: int) -> tuple[NDArray[np.int64], 
         return np.full(n, total[0]), np.full(n, longest[0])
     of = np.searchsorted(lengths, dt)  # in these few it is quicker than their inverse
     return total[of], longest[of]
+
+
+#: Steps between outputs, on average, from which on steps end at the outputs. With fewer, two runs with steps
+#: that differ by sqrt(2) could have the same ones: 2.13 are enough for one step more.
+STEPS_BETWEEN = 2.2
+
+
+def solve_at(case: Case, settings: Settings, progress: Progress | None = None) -> Solution:
+    """Integrate from t = 0; states are interpolated where output times [s] are closer than steps.
+
+    Not so with a stopping condition, or where steps are shorter at first than later.
+    """
+    problem, starts, outputs, threads = case
+    until = float(outputs[-1])
+    few = outputs.size * STEPS_BETWEEN * np.asarray(settings.dt) <= until
+    if problem.observation.stops or settings.early or until == 0.0 or np.all(few):
+        return solve(case, settings, progress)
+    steps: Any = np.broadcast_to(np.asarray(settings.dt, dtype=np.float64), len(starts))
+    if settings.fit and problem.coefficients is not None:
+        fitted = fit_steps(problem.coefficients, starts, 1.0, until, EXPONENT_ONCE, threads=threads)
+        steps = steps * fitted.shares
+    found: Solution | None = None
+    for length in np.unique(steps):
+        who = np.flatnonzero(steps == length)
+        own = replace(settings, dt=float(length), fit=())
+        part = case.part(who)
+        if outputs.size * STEPS_BETWEEN * length <= until:
+            run = solve(part, own, progress)
+        else:
+            run = _interpolated(part, own, progress)
+        if found is None:
+            if who.size == len(starts):
+                return run
+            found = nothing(problem, outputs.size, *starts.shape)
+        put_into(found, who, run)
+    return solve(case, settings, progress) if found is None else found
+
+
+def _interpolated(case: Case, settings: Settings, progress: Progress | None) -> Solution:
+    """The same with equal steps of all trajectories, over the whole run."""
+    problem, starts, outputs, _ = case
+    until, nodes = float(outputs[-1]), (settings.method.order + 5) // 2
+    number = max(math.ceil(until / float(settings.dt) * (1.0 - 1e-12)), nodes - 1)
+    grid = until / number * np.arange(number + 1.0)
+    grid[-1] = until
+    run = solve(case._replace(outputs=grid), settings, progress)
+    rates = _rates(problem, grid, run.y)
+    y = np.empty((outputs.size, *starts.shape))
+    for state, t in zip(y, outputs, strict=True):
+        first, values, slopes = _weights(t / until * number, number, nodes)
+        state[...] = 0.0
+        for node, value, slope in zip(range(first, first + nodes), values, slopes, strict=True):
+            # Not by a product of matrices, whose sums' order depends on how many trajectories there are.
+            state += value * run.y[node]
+            state += (until / number * slope) * rates[node]
+    return replace(run, y=y)
+
+
+def _weights(place: float, last: int, nodes: int) -> tuple[int, Floats, Floats]:
+    """Weights of values and of slopes at the ``nodes`` around a place on the grid 0, 1, ..., ``last``.
+
+    The first of the nodes comes before them.
+    """
+    first = min(max(math.floor(place) - (nodes - 1) // 2, 0), last + 1 - nodes)
+    x, k = place - first, np.arange(float(nodes))
+    apart = k[:, None] - k
+    np.fill_diagonal(apart, 1.0)
+    factors = np.broadcast_to(x - k, apart.shape).copy()
+    np.fill_diagonal(factors, 1.0)
+    square = np.prod(factors / apart, axis=1) ** 2
+    np.fill_diagonal(apart, np.inf)
+    slope = (1.0 / apart).sum(axis=1)  # of Lagrange's polynomials at their own nodes
+    return first, (1.0 - 2.0 * (x - k) * slope) * square, (x - k) * square
+
+
+def _rates(problem: Problem, times: Floats, y: Floats) -> Floats:
+    """Derivatives of public states (times, n, dim)."""
+    problem = problem.public
+    rates, params = np.empty_like(y), problem.params.block(y.shape[1])
+    into = np.empty((y.shape[2], y.shape[1]))
+    for t, states, found in zip(times, y, rates, strict=True):
+        problem.rhs(float(t), np.ascontiguousarray(states.T), into, params)
+        found[...] = into.T
+    return rates

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Flags = NDArray[np.bool_]
+from fastmech.arrays import Flags
 
 
 class Status(IntEnum):

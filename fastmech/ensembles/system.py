@@ -26,8 +26,15 @@ from fastmech.generated import new_module, run_module
 from fastmech.jit import VECTOR, called, inlined
 from fastmech.kernels.attempt import attempted
 from fastmech.kernels.blocks import Rates, block_kernel
-from fastmech.kernels.fingerprint import fingerprint
-from fastmech.kernels.rebuilding import Swaps, compiled_callees, raises, reaches, rebuilt, returns
+from fastmech.kernels.rebuilding import (
+    Swaps,
+    compiled_callees,
+    fingerprint,
+    raises,
+    reaches,
+    rebuilt,
+    returns,
+)
 from fastmech.kernels.sincos import WITHIN
 
 #: States of a family at most: a block of an implicit method has the square of it.

@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Flags, Floats
 from fastmech.ensembles.fitting import EXPONENT_ONCE, fit_steps, speed_bound, vibration_frequency
-from fastmech.ensembles.interpolation import solve_at
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.piecewise import METHOD, follow_to_tolerance
 from fastmech.ensembles.problem import Case, Problem
@@ -32,6 +32,7 @@ from fastmech.ensembles.solve import (
     part_of,
     put_into,
     solve,
+    solve_at,
     tell_aside,
 )
 from fastmech.ensembles.status import missed_line
@@ -46,11 +47,8 @@ from fastmech.ensembles.work_precision import (
     error_of_finer,
     order_statistic,
 )
-from fastmech.integrators.method import ImplicitRungeKutta
-from fastmech.integrators.methods import find_method
+from fastmech.integrators.methods import ImplicitRungeKutta, find_method
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 Members = NDArray[np.int64]
 
 #: Trajectories of the sample: so many, fewer where all are few; and neighbours in speed that it takes

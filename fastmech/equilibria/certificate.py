@@ -6,12 +6,30 @@ of the reduced coefficients and of every evaluation is inside the bounds.
 
 from __future__ import annotations
 
+from enum import IntEnum
+
 import numpy as np
 
-from fastmech.equilibria.balance import EPS, Normal, Pulls, expected_count, wrap
-from fastmech.equilibria.outcome import Outcome
-from fastmech.equilibria.search import FloatArray, gradient, hessian
+from fastmech.arrays import Floats
+from fastmech.equilibria.search import EPS, Normal, Pulls, expected_count, gradient, hessian, wrap
 from fastmech.jit import inlined
+
+
+class Outcome(IntEnum):
+    """How far the list of equilibria is proved; kernels write it as int8."""
+
+    COMPLETE = 0
+    """Every listed equilibrium is proved to exist, and their number is the number that there are."""
+
+    AT_FOLD = 1
+    """Equilibria merge here within rounding: the merged one is listed once, as degenerate."""
+
+    DEGENERATE = 2
+    """Equilibria are not isolated (exactly, or not to be told from that within rounding); none is listed."""
+
+    UNPROVED = 3
+    """Nothing is proved; the certificate's sentence says why."""
+
 
 COMPLETE = int(Outcome.COMPLETE)
 AT_FOLD = int(Outcome.AT_FOLD)
@@ -102,7 +120,7 @@ def apart(phi1: float, theta1: float, phi2: float, theta2: float) -> float:
 
 
 @inlined
-def certify(p: Pulls, n: Normal, count: int, phi: FloatArray, theta: FloatArray, radius: FloatArray) -> int:
+def certify(p: Pulls, n: Normal, count: int, phi: Floats, theta: Floats, radius: Floats) -> int:
     """Outcome for a list of ``count`` equilibria; writes the existence radius [rad] of each into ``radius``.
 
     COMPLETE needs all three: every entry proved, the balls disjoint (so all are different), and as many as

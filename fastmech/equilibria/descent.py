@@ -9,12 +9,10 @@ start lies in that minimum's component of the sublevel set, and the minimum's tu
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.jit import inlined
 from fastmech.mechanism.reduced import potential_gradient, potential_hessian
-
-Floats = NDArray[np.float64]
 
 TURN = 2.0 * np.pi
 

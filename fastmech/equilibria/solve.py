@@ -8,11 +8,23 @@ import numpy as np
 from numba import boolean, types
 from numpy.typing import NDArray
 
-from fastmech.equilibria.balance import EPS, Pulls, expected_count, normal_form, pulls, vanishing, wrap
-from fastmech.equilibria.certificate import AT_FOLD, COMPLETE, UNPROVED, apart, certify, unbalance
-from fastmech.equilibria.outcome import Outcome
-from fastmech.equilibria.search import LAPS, MOST, FloatArray, candidates, hessian, polish
-from fastmech.jit import MATRIX, STATUSES, VECTOR, inlined, kernel, named_tuple
+from fastmech.arrays import Floats
+from fastmech.equilibria.certificate import AT_FOLD, COMPLETE, UNPROVED, Outcome, apart, certify, unbalance
+from fastmech.equilibria.search import (
+    EPS,
+    LAPS,
+    MOST,
+    Pulls,
+    candidates,
+    expected_count,
+    hessian,
+    normal_form,
+    polish,
+    pulls,
+    vanishing,
+    wrap,
+)
+from fastmech.jit import MATRIX, STATUSES, VECTOR, inlined, interpreted, kernel, named_tuple
 from fastmech.mechanism.reduced import potential
 
 DEGENERATE = int(Outcome.DEGENERATE)
@@ -35,24 +47,22 @@ INDICES = types.Array(types.int8, 2, "C")
 class Solution(NamedTuple):
     """What :func:`solve` writes for n scenes; slots without an equilibrium hold NaN."""
 
-    phi: FloatArray  #: (n, 6) [rad] in (-pi, pi]
-    theta: FloatArray  #: the same
-    energy: FloatArray  #: (n, 6) U over m2 l^2 less the springs' constant [1/s^2]
-    radius: FloatArray  #: (n, 6) distance [rad] within which the true equilibrium is; infinite: not proved
+    phi: Floats  #: (n, 6) [rad] in (-pi, pi]
+    theta: Floats  #: the same
+    energy: Floats  #: (n, 6) U over m2 l^2 less the springs' constant [1/s^2]
+    radius: Floats  #: (n, 6) distance [rad] within which the true equilibrium is; infinite: not proved
     index: SmallIntegers  # type: ignore[assignment]  #: (n, 6) Morse index, ``SINGULAR`` or ``NO_EQUILIBRIUM``
     count: SmallIntegers  # type: ignore[assignment]  #: (n,) number found
     expected: SmallIntegers  #: (n,) number by the counting theorem, 0 where rounding hides it
     outcome: SmallIntegers  #: (n,) ``Outcome``
-    margin: FloatArray  #: (n,) distance to the fold [rad], positive with six equilibria; NaN if undefined
+    margin: Floats  #: (n,) distance to the fold [rad], positive with six equilibria; NaN if undefined
 
 
 SOLUTION: Any = named_tuple([*[MATRIX] * 4, INDICES, *[STATUSES] * 3, VECTOR], Solution)
 
 
 @inlined
-def merge_singular(
-    p: Pulls, error: float, count: int, phi: FloatArray, theta: FloatArray, radius: FloatArray
-) -> int:
+def merge_singular(p: Pulls, error: float, count: int, phi: Floats, theta: Floats, radius: Floats) -> int:
     """Of unproved entries that are the same one, displaced by rounding, keep the one that balances best.
 
     The margin to the fold is uncertain by ``error`` rad, a position at a cusp by the cube root of that.
@@ -96,7 +106,7 @@ def morse_index(p: Pulls, phi: float, theta: float, radius: float) -> int:
 
 
 @inlined
-def is_before(energy: FloatArray, phi: FloatArray, theta: FloatArray, i: int, j: int) -> bool:
+def is_before(energy: Floats, phi: Floats, theta: Floats, i: int, j: int) -> bool:
     """Whether entry i is listed before j: the deeper one; of mirror images the one with the smaller theta."""
     if abs(energy[i] - energy[j]) > EVEN:
         return bool(energy[i] < energy[j])
@@ -106,9 +116,7 @@ def is_before(energy: FloatArray, phi: FloatArray, theta: FloatArray, i: int, j:
 
 
 @inlined
-def sort_by_energy(
-    count: int, energy: FloatArray, phi: FloatArray, theta: FloatArray, radius: FloatArray
-) -> None:
+def sort_by_energy(count: int, energy: Floats, phi: Floats, theta: Floats, radius: Floats) -> None:
     """Deepest first; where a scene is its own mirror image rounding does not decide."""
     for i in range(1, count):
         for j in range(i, 0, -1):
@@ -121,7 +129,7 @@ def sort_by_energy(
 
 
 @kernel(types.void(MATRIX, boolean, SOLUTION))
-def solve(coefficients: FloatArray, inherit: bool, out: Solution) -> None:
+def solve(coefficients: Floats, inherit: bool, out: Solution) -> None:
     """Equilibria of every row of ``coefficients``, deepest first, with the outcome of the proof.
 
     Args:
@@ -169,3 +177,39 @@ def solve(coefficients: FloatArray, inherit: bool, out: Solution) -> None:
             energy[row, i] *= scale
             index[row, i] = morse_index(p, phi[row, i], theta[row, i], radius[row, i])
         count[row] = found
+
+
+def solve_rows(coefficients: Floats, compiled: bool = True) -> Solution:
+    """Equilibria of n scenes from their (n, 8) reduced coefficients, contiguous, the force frozen.
+
+    Without ``compiled`` plain Python does the same, up to rounding: in milliseconds a scene, with nothing to
+    compile.
+    """
+    n = len(coefficients)
+    result = Solution(
+        phi=np.empty((n, MOST)),
+        theta=np.empty((n, MOST)),
+        energy=np.empty((n, MOST)),
+        radius=np.empty((n, MOST)),
+        index=np.empty((n, MOST), dtype=np.int8),
+        count=np.empty(n, dtype=np.int8),
+        expected=np.empty(n, dtype=np.int8),
+        outcome=np.empty(n, dtype=np.int8),
+        margin=np.empty(n),
+    )
+    with np.errstate(all="ignore"):
+        (solve if compiled else interpreted(solve))(coefficients, False, result)
+    return result
+
+
+def explain(outcome: Outcome, count: int, expected: int, margin: float) -> str:
+    """One sentence for a certificate; a degenerate scene's is made from its parameters instead."""
+    if outcome is Outcome.COMPLETE:
+        change = "two of them merge" if margin > 0.0 else "two more appear"
+        return f"all {count} are proved to exist and to be all; {abs(margin):.3g} rad from where {change}"
+    if outcome is Outcome.AT_FOLD:
+        there = f"{expected} exist" if expected else "how many exist is hidden"
+        return f"at a fold within rounding: {there}, {count} are told apart, the merging ones as degenerate"
+    if np.isnan(margin):
+        return "not proved: the reduced coefficients are not finite"
+    return f"not proved: {count} equilibria listed, {expected or 'four to six'} must exist"

@@ -16,10 +16,9 @@ from fastmech.runner import run_request
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import RunContext, read_request
 from fastmech.store.provenance import provenance
-from fastmech.tiles.assemble import assembled, write_assembled
+from fastmech.store.write import write_results
 from fastmech.tiles.cluster import cluster
-from fastmech.tiles.identity import asked_for, identity_of
-from fastmech.tiles.section import TiledSection, sections_of
+from fastmech.tiles.section import TiledSection, asked_for, assembled, identity_of, sections_of
 
 #: Threads, and workers of the cluster.
 WORKERS = 2
@@ -87,10 +86,10 @@ def _in_memory(path: Path, out: Path) -> None:
         with ThreadPoolExecutor(WORKERS) as pool:
             tiles = list(pool.map(compute, range(section.tiling.count)))
         sections[section.name] = assembled(section, tiles.__getitem__, 0.0)
-    write_assembled(
+    write_results(
         out,
-        sections,
-        parameters=request.parameters,
+        scene_parameters=request.parameters,
+        sections=sections,
         attrs=lambda: {**provenance(WORKERS), "title": request.title},
         replace=True,
         threads=WORKERS,

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from fastmech.scan_types import basins, disturbed_tiling, equilibrium_map, snapping
+from fastmech.scan_types import basins, disturbed, equilibrium_map, snapping
 
 #: What decides the size of tiles, and what it is while they are to be small.
 SIZES = (
     (equilibrium_map, "TILE_POINTS", 20),
     (basins, "TILE_POINTS", 20),
-    (disturbed_tiling, "EVALUATIONS", 1),
-    (disturbed_tiling, "DIRECTIONS", 3),
+    (disturbed, "EVALUATIONS", 1),
+    (disturbed, "DIRECTIONS", 3),
     (snapping, "TILE_POINTS", 6),
 )
 

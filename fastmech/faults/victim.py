@@ -17,7 +17,7 @@ from fastmech.runner import run_request
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import RunContext
 from fastmech.store.read import open_results
-from fastmech.tiles.identity import code_in_use
+from fastmech.tiles.section import code_in_use
 from fastmech.tiles.tile_file import Tile
 from fastmech.tiles.work import Task, ThreadHiring, ThreadWorkers
 

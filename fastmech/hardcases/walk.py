@@ -9,25 +9,160 @@ far too long.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import tomllib
+from collections.abc import Callable, Sequence
+from functools import cache
+from importlib import resources
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fastmech.arrays import Floats
+from fastmech.basins.labels import Labels
 from fastmech.ensembles.integrate import Trajectories, integrate
+from fastmech.ensembles.status import Status
 from fastmech.errors import InputError
-from fastmech.hardcases.case import REFUSED, Row, row_of, worst
-from fastmech.hardcases.references import Floats, Goal
-from fastmech.integrators.batch import Batch, observe_nothing
-from fastmech.integrators.method import Adams, ImplicitRungeKutta
-from fastmech.integrators.methods import METHODS, find_method
+from fastmech.integrators.explicit import Batch, observe_nothing
+from fastmech.integrators.methods import METHODS, Adams, ImplicitRungeKutta, find_method
 from fastmech.integrators.tableaus.implicit import IMPLICIT_TABLEAUS
-from fastmech.kernels.counting import CALLS, JACOBIANS, counting_jacobian, counting_lagrange
 from fastmech.kernels.jacobians import lagrange_inverse, lagrange_jacobian
+from fastmech.kernels.work import CALLS, JACOBIANS, counting_jacobian, counting_lagrange
 from fastmech.mechanism.coefficients import reduce
+from fastmech.mechanism.lagrange import kinetic_energy, potential_energy
 from fastmech.scene import Scene
 from fastmech.step_limits.predict import stable_step
 from fastmech.step_limits.warning import step_limit, step_warning
+
+#: Why a method claims nothing of an undamped motion.
+DRIVEN = "undamped motions grow with every step"
+
+#: In place of a status: the request was refused before the run.
+REFUSED = "refused"
+
+
+class Row(NamedTuple):
+    """What one method did in a case.
+
+    A method claims a case to an error, at a step; one that claims nothing must end with a status (or be
+    refused), not with a number.
+    """
+
+    method: str
+    dt: float  #: step [s]
+    steps: int
+    error: float  #: against the oracle, see the case; NaN where there is none
+    allowed: float  #: error to which the method claims the case; NaN where it does not
+    drift: float  #: largest change of energy over the energy above the lowest; NaN where energy is not kept
+    status: str  #: worst status of the trajectories, or REFUSED
+    claimed: bool  #: whether the method claims the case
+    remark: str = ""
+    why: str = ""  #: why it claims the case so far and no further, or not
+
+    @property
+    def passed(self) -> bool:
+        """A claimed case within its error and without failures; a case not claimed with a status."""
+        fine = self.status == Status.OK.name.lower()
+        return fine and self.error <= self.allowed if self.claimed else not fine
+
+    @property
+    def verdict(self) -> str:
+        """What a reader must know: whether the number may be taken, and to how many digits."""
+        if self.claimed:
+            return "passed" if self.passed else f"FAILED: claimed to {self.allowed:.0e}"
+        return "a status, as it must" if self.passed else f"FAILED: not claimed, error {self.error:.1e}"
+
+
+class HardCase(NamedTuple):
+    """A case of the gallery; ``run(quick)`` gives its rows, ``quick`` in about a second."""
+
+    name: str
+    hard: str  #: what makes it hard
+    oracle: str  #: where the expected value comes from, and what the error is
+    must: str  #: what must happen
+    run: Callable[[bool], Sequence[Row]]
+
+
+def worst(status: ArrayLike) -> str:
+    """Name of the gravest status among trajectories: any failure before OK."""
+    values = np.unique(np.asarray(status))
+    return Status(int(values.max())).name.lower()
+
+
+def energy(scene: Scene, y: Floats) -> Floats:
+    """T + U [J] of states (..., 4) under a constant force, or none."""
+    force = scene.F0 if scene.alpha == 0.0 else 0.0
+    return kinetic_energy(scene, y) + potential_energy(scene, y[..., :2], force)
+
+
+def row_of(
+    run: Trajectories,
+    error: float,
+    allowed: float,
+    drift: float = np.nan,
+    *,
+    claimed: bool = True,
+    remark: str = "",
+    why: str = "",
+) -> Row:
+    """A row of what ``integrate`` gave."""
+    return Row(run.method, run.dt, run.steps, error, allowed, drift, worst(run.status), claimed, remark, why)
+
+
+def labels_row(method: str, found: Labels, wrong: int, told: str = "") -> Row:
+    """A row of what ``fm.labels_of`` gave: the error is how many are wrong, and none may be."""
+    remark = "labels: " + ", ".join(f"{n} {name}" for name, n in found.counts.items() if n) + told
+    nan, why = float("nan"), "fm.labels_of"
+    return Row(method, nan, found.steps, float(wrong), 0.0, nan, "ok", True, remark, why)
+
+
+#: Relative error that rounding explains, of motions that are not chaotic.
+ROUNDED = 1e-10
+
+
+class Goal(NamedTuple):
+    """A motion whose end is known, of a reference to better than double precision."""
+
+    scene: Scene
+    start: Floats  #: (4,): rad, rad/s
+    t_end: float  #: s
+    expected: Floats  #: (4,), state at that time
+    rounded: float = ROUNDED  #: error that rounding explains, of the largest entry
+
+    def error(self, state: Floats) -> float:
+        """Largest difference from the known end, relative to its largest entry, 1 at least."""
+        return float(np.abs(state - self.expected).max() / max(1.0, np.abs(self.expected).max()))
+
+
+@cache
+def _content() -> dict[str, Any]:
+    return tomllib.loads(resources.files(__package__).joinpath("references.toml").read_text(encoding="utf-8"))
+
+
+def motion(name: str, rounded: float = ROUNDED) -> Goal:
+    """The reference of this name; its scene is the paper's with a few changes."""
+    entry = _content()[name]
+    end = np.array([float(x) for x in entry["state"]])
+    return Goal(
+        Scene(c2=1100 / 3).replace(**entry["scene"]), np.array(entry["start"]), entry["t"], end, rounded
+    )
+
+
+class Boundary(NamedTuple):
+    """Where a line of starts at rest, theta = 0, crosses a basin boundary, and where motions end."""
+
+    scene: Scene
+    phi: float  #: rad, rounded; to 1e-16
+    below: Floats  #: phi, theta [rad] at the end of motions that start at smaller phi, (2,)
+    above: Floats  #: the same for greater phi
+
+
+def boundary() -> Boundary:
+    """The crossing found by bisection in extended precision."""
+    entry = _content()["boundary"]
+    below, above = (np.array(end) for end in entry["ends"])
+    return Boundary(Scene(c2=1100 / 3).replace(**entry["scene"]), float(entry["phi"]), below, above)
+
 
 #: One method of each family: what quick versions walk.
 FAMILIES = ("euler", "rk4", "dop853", "abm8", "gauss6", "radau5", "sdirk4")

@@ -20,7 +20,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from fastmech.integrators.batch import ROUNDED_TIME, Batch, BlockRHS, Floats, Integers, Observer, batch_type
+from fastmech.arrays import Floats, Integers
+from fastmech.integrators.explicit import ROUNDED_TIME, Batch, BlockRHS, Observer, batch_type
 from fastmech.integrators.tableau import Scheme
 from fastmech.jit import (
     INVERSE,

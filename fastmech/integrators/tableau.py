@@ -9,7 +9,8 @@ from itertools import combinations_with_replacement
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from fastmech.arrays import Floats
 
 #: A rooted tree as the sorted tuple of its root's sub-trees; ``()`` is a single node.
 Tree = tuple["Tree", ...]
@@ -98,14 +99,14 @@ class Tableau:
         return len(self.b)
 
     @cached_property
-    def matrix(self) -> NDArray[np.float64]:
+    def matrix(self) -> Floats:
         """Coefficients as a full square matrix, shape (stages, stages)."""
         full = np.zeros((self.stages, self.stages))
         for i, row in enumerate(self.a):
             full[i, : len(row)] = row
         return full
 
-    def order_residuals(self, order: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def order_residuals(self, order: int) -> tuple[Floats, Floats]:
         """Residuals of the conditions of exactly this order, and what rounding explains of each.
 
         One condition a tree: b . Phi(tree) = 1/density(tree).
@@ -117,25 +118,22 @@ class Tableau:
         return np.abs(sums - exact), ROUNDING * magnitudes
 
     @cached_property
-    def _branches(self) -> dict[Tree, NDArray[np.float64]]:
+    def _branches(self) -> dict[Tree, Floats]:
         return {}
 
-    def _branch(self, tree: Tree) -> NDArray[np.float64]:
+    def _branch(self, tree: Tree) -> Floats:
         """A Phi(tree), and the same with the magnitudes of all terms: shape (2, stages)."""
         if tree not in self._branches:
             signed, magnitudes = self._elementary_weights(tree)
             self._branches[tree] = np.array([self.matrix @ signed, np.abs(self.matrix) @ magnitudes])
         return self._branches[tree]
 
-    def _elementary_weights(self, tree: Tree) -> NDArray[np.float64]:
+    def _elementary_weights(self, tree: Tree) -> Floats:
         """Phi(tree) of every stage, and the same with the magnitudes of all terms: shape (2, stages)."""
         weights = np.ones((2, self.stages))
         for child in tree:
             weights *= self._branch(child)
         return weights
-
-
-Floats = NDArray[np.float64]
 
 
 #: What Newton's iteration may leave of the equations, relative to the states, in methods that forget errors

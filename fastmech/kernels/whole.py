@@ -28,11 +28,10 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.callee import CalleeType
 from fastmech.jit import lanes, named_tuple
 from fastmech.kernels.blocks import VECTOR_LANES, Rates, identifier, loops
-
-Floats = NDArray[np.float64]
 
 
 class Lanes(NamedTuple):

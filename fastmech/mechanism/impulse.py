@@ -9,14 +9,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fastmech.arrays import Floats
 from fastmech.mechanism.geometry import velocities
 from fastmech.mechanism.lagrange import metric
 from fastmech.mechanism.reduced import metric_determinant, slider_ratio
 from fastmech.scene import Scene
-
-Array = NDArray[np.float64]
 
 #: Points that can be struck.
 POINTS = ("M1", "M2", "M3")
@@ -28,17 +27,17 @@ ROUNDING = 1e-12
 class Mobility(NamedTuple):
     """W of a point by its eigenvalues [1/kg] and the direction of the greatest [rad]."""
 
-    greatest: Array
-    least: Array
-    direction: Array
+    greatest: Floats
+    least: Floats
+    direction: Floats
 
-    def along(self, angle: ArrayLike) -> Array:
+    def along(self, angle: ArrayLike) -> Floats:
         """u.W u [1/kg] for the unit vector u at an angle [rad]; 0 where rounding leaves nothing of it."""
         away = np.asarray(angle) - self.direction
         value = self.greatest * np.cos(away) ** 2 + self.least * np.sin(away) ** 2
         return np.where(value > ROUNDING**2 * self.greatest, value, 0.0)
 
-    def speed(self, angle: ArrayLike) -> Array:
+    def speed(self, angle: ArrayLike) -> Floats:
         """|W u| [1/kg]: the speed that an impulse of 1 N s at an angle [rad] gives the point."""
         away = np.asarray(angle) - self.direction
         return np.hypot(self.greatest * np.cos(away), self.least * np.sin(away))
@@ -70,14 +69,14 @@ def mobility(
     return Mobility(np.where(np.abs(k) > ROUNDING, k * k, 0.0) / inertia, none, none)
 
 
-def impulse_for(energy: ArrayLike, mobility: ArrayLike) -> Array:
+def impulse_for(energy: ArrayLike, mobility: ArrayLike) -> Floats:
     """Impulse [N s] that gives an energy [J] where u.W u is ``mobility`` [1/kg]; NaN where that is 0."""
     given, eased = np.asarray(energy), np.asarray(mobility)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(eased > 0.0, np.sqrt(2.0 * given / eased), np.nan)
 
 
-def rates_after(scene: Scene, q: ArrayLike, on: str, impulse: ArrayLike) -> Array:
+def rates_after(scene: Scene, q: ArrayLike, on: str, impulse: ArrayLike) -> Floats:
     """Rates a^-1 B^T J [rad/s] (..., 2) that impulses J (..., 2) [N s] give the resting mechanism.
 
     Args:

@@ -8,15 +8,14 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
 from fastmech.loads import Load
 
 if TYPE_CHECKING:
     from fastmech.models.mechanism import Mechanism
 
-Floats = NDArray[np.float64]
 
 #: States that are tried, and relative rounding of what is compared there.
 TRIED, ROUNDING = 256, 1e-6

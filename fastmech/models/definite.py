@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import sympy
-from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.errors import InputError
 from fastmech.generated import kept_text
 from fastmech.models.balance import enclosing, enclosures
@@ -20,7 +20,6 @@ from fastmech.models.balance import enclosing, enclosures
 if TYPE_CHECKING:
     from fastmech.models.mechanism import Mechanism
 
-Floats = NDArray[np.float64]
 
 #: Operations of the longest determinant: to write it as a sum takes minutes for much longer ones.
 LONGEST = 400

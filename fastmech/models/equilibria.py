@@ -11,17 +11,16 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.callee import callee
 from fastmech.equilibria import find
-from fastmech.equilibria.outcome import Outcome
+from fastmech.equilibria.certificate import Outcome
 from fastmech.errors import InputError, shown
 from fastmech.intervals.search import AT_END, LIMIT, TWO_PI, UNCLEAR, UNDEFINED, Found, search, work
 from fastmech.loads import Constant
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.statics import Statics
 from fastmech.scene import Scene
-
-Floats = NDArray[np.float64]
 
 #: Boxes that are treated at most, by the number of coordinates; a chain of four pendulums takes 9,600.
 LIMITS = {1: 10_000, 2: 50_000, 3: 300_000, 4: 1_000_000}

@@ -13,11 +13,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
 from fastmech.generated import kept_text
-from fastmech.kernels.fingerprint import fingerprint
+from fastmech.kernels.rebuilding import fingerprint
 from fastmech.loads import BEFORE, Function, Load, Sampled
 from fastmech.models.checks import check
 from fastmech.models.statics import Coordinate, Statics
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
     from fastmech.models.derivation import Derived, Equations
     from fastmech.models.elements import Acting
 
-Floats = NDArray[np.float64]
 
 #: Coordinates at most.
 MOST_COORDINATES = 4

@@ -9,9 +9,10 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
 from fastmech.intervals.arithmetic import Interval, add, div, mul, sub
-from fastmech.models.equilibria import Floats, RestingPlace
+from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Linear, Mechanism
 from fastmech.stability import classify as of_scene
 from fastmech.stability.classify import Finding

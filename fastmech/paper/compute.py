@@ -5,19 +5,33 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fastmech.disturbance.motion import DisturbedMotion, disturbed_motion
-from fastmech.disturbance.size import size_at
+from fastmech.arrays import Floats
+from fastmech.disturbance.motion import DisturbedMotion, disturbed_motion, size_at
 from fastmech.ensembles.balance import EnergyBalance, energy_balance
 from fastmech.ensembles.integrate import integrate
 from fastmech.equilibria.find import Certificate, Equilibria, Equilibrium, find_equilibria
-from fastmech.mechanism.hamilton import momenta
+from fastmech.mechanism.lagrange import momenta
 from fastmech.paper.compare import CASES, Printed
-from fastmech.paper.scene import DISTURBANCE, PAPER_SCENE, START, STATIC_SCENE
+from fastmech.scene import Scene
 from fastmech.stability.classify import Classification, classify
 
-Floats = NDArray[np.float64]
+PAPER_SCENE = Scene(c2=1100.0 / 3.0)
+"""Table 1 with the stiffness c2 = 1100/3 N/m, of which the table prints the rounding 366.67 N/m.
+
+The paper computed with the unrounded value: with it all eight angles of Table 2 and the coefficients of (16)
+and (20) come out to the printed digit; with 366.67 N/m five of the eight angles miss their last digit.
+"""
+
+STATIC_SCENE = PAPER_SCENE.replace(alpha=0.0)
+"""The same under the constant force of 100 N: Tables 2 to 4 and Figures 6 to 11."""
+
+START = (4.0 * np.pi / 13.0, np.pi / 7.0, 0.0, 0.0)
+"""Table 1: phi, theta [rad], phi', theta' [rad/s] at t = 0."""
+
+DISTURBANCE = (0.1, 0.0, 0.1, 0.0)
+"""Figures 7 to 11: xi_1, xi_2 [rad], eta_1, eta_2 [rad/s]."""
+
 
 #: Motion of Figures 2 to 5 and disturbed motion of Figures 7 to 11 [s]; the paper does not print its spans.
 MOTION_SPAN, DISTURBED_SPAN, OUTPUT = 20.0, 30.0, 0.01

@@ -11,7 +11,7 @@ import numpy as np
 
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
-from fastmech.plots.mechanism import draw_mechanism, drawing_of
+from fastmech.plots.equilibria import draw_mechanism, drawing_of
 from fastmech.plots.style import new_figure, style
 from fastmech.scene import Scene
 

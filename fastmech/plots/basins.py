@@ -1,17 +1,31 @@
-"""Basin maps: who ends where, with what decides it drawn on top, and how long that takes."""
+"""Basin maps and dynamic snapping: who ends where, with what decides it on top, and how long that takes."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.plots.basin_colors import FURTHER, basin_color, basin_name
-from fastmech.plots.basin_marks import Slice, decisive, mark
-from fastmech.plots.labels import Codes, flag_codes, quantity, setting_of, symbol
-from fastmech.plots.style import FIELD, new_figure, style
+from fastmech.arrays import Floats
+from fastmech.mechanism.lagrange import kinetic_energy, potential_energy
+from fastmech.plots.style import (
+    ANGLES,
+    FIELD,
+    PALETTE,
+    Codes,
+    coordinates_of,
+    entry,
+    flag_codes,
+    in_fifths,
+    new_figure,
+    quantity,
+    setting_of,
+    style,
+    symbol,
+)
 from fastmech.results import Dataset
 from fastmech.scene import Scene
 
@@ -19,6 +33,190 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+#: Wells and turns of each angle, either way, whose basins have a colour of their own.
+WELLS, TURNS = 2, 2
+
+#: Colours of further wells, from the end of the list.
+OTHERS = 8
+
+#: Colours by how usual a label is. After Okabe and Ito's each next one was chosen as far as possible from all
+#: before it in OKLab (Ottosson 2020), and from white, black and the greys of :mod:`fastmech.plots.basins`, as
+#: seen by normal, protanopic and deuteranopic eyes (Machado, Oliveira, Fernandes, IEEE Trans. Visualization
+#: and Computer Graphics 15 (2009) 1291); none too dark for black marks on top.
+COLORS = [PALETTE[name] for name in ("sky", "orange", "green", "yellow", "purple", "blue", "vermillion")]
+COLORS += [
+    "#a7d8ba", "#6200ff", "#4e89ff", "#3b766c", "#a7ffb1", "#62d8ff", "#a7450a", "#76c480", "#ce00a7",
+    "#c4d880", "#62c4c4", "#4e6ce2", "#009dd8", "#baebeb", "#ebc400", "#eb763b", "#6c5889", "#ce3b45",
+    "#c414ce", "#62b16c", "#00a7ff", "#3b8980", "#3b804e", "#ffb1eb", "#eb9db1", "#ceeb80", "#e258ce",
+    "#b16c9d", "#b1ebc4", "#ebb14e", "#00a74e", "#d8ff80", "#76ba9d", "#4ed8d8", "#624eff", "#b1ffd8",
+    "#9300c4", "#b1ce93", "#a79dc4", "#586c31", "#d831ba", "#e2ff00", "#89ce6c",
+]  # fmt: skip
+
+#: Colour of all other basins.
+FURTHER = "#9a9a9a"
+
+
+def _how_usual(label: tuple[int, int, int]) -> tuple[int, ...]:
+    """Smaller: more usual. A turn of phi mostly comes with one back of theta: the second rod turns little."""
+    well, phi, theta = label
+    return abs(phi) + abs(theta) + abs(phi + theta), well, abs(phi), phi, theta
+
+
+_LABELS = sorted(product(range(WELLS), range(-TURNS, TURNS + 1), range(-TURNS, TURNS + 1)), key=_how_usual)
+_COLOR_OF = dict(zip(_LABELS, COLORS, strict=True))
+
+
+def well_number(dataset: Dataset, well: int) -> int:
+    """Place from 0 of a well among the wells; ``well`` is an index among the dataset's equilibria."""
+    wells = np.flatnonzero(dataset["equilibrium_morse_index"].data == 0)
+    return int(np.flatnonzero(wells == well)[0])
+
+
+def basin_color(dataset: Dataset, well: int, turns: tuple[int, ...]) -> str:
+    """Colour of a copy of a well; ``well`` is an index among the dataset's equilibria."""
+    number = well_number(dataset, well)
+    if number >= WELLS and not any(turns):
+        return COLORS[-1 - (number - WELLS) % OTHERS]
+    first, second = (*turns, 0)[:2]
+    return FURTHER if any(turns[2:]) else _COLOR_OF.get((number, first, second), FURTHER)
+
+
+def basin_name(dataset: Dataset, well: int, turns: tuple[int, ...]) -> str:
+    """Name of a copy of a well; ``well`` is an index among the dataset's equilibria."""
+    wells = int(np.count_nonzero(dataset["equilibrium_morse_index"].data == 0))
+    text = f"well {well_number(dataset, well) + 1}" if wells > 1 else "the well"
+    names = map(symbol, coordinates_of(dataset))
+    made = [f"{t:+d} {name}" for t, name in zip(turns, names, strict=True) if t]
+    return f"{text}, {', '.join(made)} turn{'s' * (len(made) > 1 or abs(sum(turns)) > 1)}" if made else text
+
+
+#: Points along each side on which energies are evaluated for their contours.
+GRID = 401
+
+#: An equilibrium so near to the slice [rad, rad/s] counts as in it: held values are typed with some digits.
+IN_SLICE = 1e-3
+
+MARKERS = {0: ("o", "well"), 1: ("D", "saddle"), 2: ("^", "maximum")}
+DASHES = ["-", "--", ":"]
+
+
+class Slice:
+    """The first two axes that vary; further ones are held at their middle value."""
+
+    def __init__(self, dataset: Dataset, scene: Scene | None) -> None:
+        self.dataset, self.scene = dataset, scene
+        self.coordinates = coordinates_of(dataset)
+        self.turning = ANGLES if scene is not None else tuple(dataset.attrs.get("turning_names", ()))
+        self.states = (*self.coordinates, *(f"{name}_dot" for name in self.coordinates))
+        names = tuple(dataset.attrs["axes"])
+        self.axes = (*[n for n in names if dataset.sizes[n] > 1], *names)[:2]
+        if self.axes[0] == self.axes[1]:
+            self.axes = (self.axes[0], next(n for n in names if n != self.axes[0]))
+        self.index = tuple(slice(None) if n in self.axes else dataset.sizes[n] // 2 for n in names)
+        self.swapped = names.index(self.axes[0]) > names.index(self.axes[1])
+        self.held = {
+            name: float(dataset.attrs[f"fixed_{name}"])
+            for name in self.states
+            if f"fixed_{name}" in dataset.attrs
+        }
+        self.held |= {
+            n: float(dataset[n].data[i]) for n, i in zip(names, self.index, strict=True) if n not in self.axes
+        }
+
+    def data(self, name: str) -> NDArray[np.generic]:
+        """A variable over the two axes, the first one first."""
+        values = np.asarray(self.dataset[name].data[self.index])
+        return values.T if self.swapped else values
+
+    def axis(self, number: int) -> Floats:
+        """Values along one of the two axes."""
+        return np.asarray(self.dataset[self.axes[number]].data, dtype=np.float64)
+
+    def energy(self, scene: Scene) -> tuple[Floats, Floats, Floats]:
+        """Values along both axes and T + U over them [J], U with the force that the wells hold for."""
+        x, y = (np.linspace(self.axis(k)[0], self.axis(k)[-1], GRID) for k in (0, 1))
+        grids = dict(zip(self.axes, np.meshgrid(x, y, indexing="ij"), strict=True))
+        states = np.stack(
+            [grids[n] if n in grids else np.full((GRID, GRID), self.held[n]) for n in self.states], axis=-1
+        )
+        force = float(self.dataset["force"].data)
+        return x, y, kinetic_energy(scene, states) + potential_energy(scene, states[..., :2], force)
+
+
+def mark(marker: str, text: str, face: str = "white") -> Artist:
+    """What a marker in a legend means."""
+    return entry(text, marker=marker, mfc=face, ms=8, ls="none")
+
+
+def decisive(axes: Axes, view: Slice) -> list[Artist]:
+    """Equilibria in the slice, and where the energy is that of each well's barrier."""
+    handles: list[Artist] = []
+    data = view.dataset
+    wells = np.flatnonzero(data["equilibrium_morse_index"].data == 0)
+    barriers = data["barrier"].data[wells]
+    levels = np.unique(barriers[: None if view.scene is not None else 0])
+    x, y, energy = view.energy(view.scene) if view.scene is not None else (np.zeros(0),) * 3
+    for number, level in enumerate(levels):
+        if energy.min() < level < energy.max():
+            look = DASHES[number % len(DASHES)]
+            axes.contour(x, y, energy.T, levels=[level], colors="black", linewidths=1.6, linestyles=look)
+            which = " and ".join(str(i + 1) for i in np.flatnonzero(barriers == level))
+            of = f" of well{'s' * (' ' in which)} {which}" if wells.size > 1 else ""
+            handles.append(entry(f"barrier energy{of}, {level:.4g} J", lw=1.6, ls=look))
+    for index, (marker, name) in MARKERS.items():
+        for inside in (True, False):
+            places = _places(view, index, inside)
+            if len(places):
+                face = "white" if inside else "none"
+                axes.plot(*places.T, marker, mfc=face, mec="black", mew=1.4, ms=8, ls="none", zorder=5)
+                text = name if inside else f"{name}, outside of this slice"
+                handles.append(mark(marker, text, face))
+    if wells.size > 1:
+        for number, well in enumerate(wells):
+            for place in _places(view, 0, True, int(well)):
+                axes.annotate(
+                    str(number + 1), place, xytext=(6, 5), textcoords="offset points", weight="bold", zorder=6
+                )
+    return handles
+
+
+def _places(view: Slice, index: int, inside: bool, only: int | None = None) -> Floats:
+    """Copies of equilibria of a Morse index within the picture (n, 2): those in the slice, or those outside.
+
+    Those outside are seen along the held coordinates, if an angle is an axis; over two rates they would all
+    lie at the origin.
+    """
+    data, found = view.dataset, []
+    if not inside and not set(view.coordinates) & set(view.axes):
+        return np.zeros((0, 2))
+    reach = [(view.axis(k)[0], view.axis(k)[-1]) for k in (0, 1)]
+    for i in np.flatnonzero(data["equilibrium_morse_index"].data == index):
+        if only is not None and i != only:
+            continue
+        place = {name: data[f"equilibrium_{name}"].data[i] for name in view.coordinates}
+        away = [
+            (held - place[n] + np.pi) % (2.0 * np.pi) - np.pi
+            if n in view.turning
+            else held - place.get(n, 0.0)
+            for n, held in view.held.items()
+        ]
+        if bool(np.abs(away).max(initial=0.0) <= IN_SLICE) != inside:
+            continue
+        copies = []
+        for name, (low, high) in zip(view.axes, reach, strict=True):
+            at = place.get(name, 0.0)
+            turns = np.arange(
+                np.ceil((low - at) / (2.0 * np.pi)), np.floor((high - at) / (2.0 * np.pi)) + 1.0
+            )
+            copies.append(
+                at + 2.0 * np.pi * turns
+                if name in view.turning
+                else np.array([at] if low <= at <= high else [])
+            )
+        found += [(a, b) for a in copies[0] for b in copies[1]]
+    return np.array(found).reshape(-1, 2)
+
 
 #: Basins that a legend names, the largest ones.
 NAMED = 10
@@ -142,7 +340,6 @@ def _share(where: NDArray[np.bool_]) -> str:
 def _times(view: Slice, name: str, title: str) -> Figure:
     from matplotlib.colors import ListedColormap, LogNorm, Normalize
     from matplotlib.patches import Patch
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     figure = new_figure(8.2, 7.0)
     axes = figure.subplots()
@@ -174,9 +371,7 @@ def _times(view: Slice, name: str, title: str) -> Figure:
     )
     bar = figure.colorbar(mesh, ax=axes, label=f"{name.replace('_', ' ')} [s]")
     if isinstance(norm, LogNorm):
-        bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        bar.ax.yaxis.set_minor_formatter(NullFormatter())
+        in_fifths(bar.ax.yaxis)
     handles = decisive(axes, view)
     meanings = {"white": WITHOUT_TIME[name], SKIPPED: "not computed: filled in between equal labels"}
     handles[:0] = [
@@ -210,3 +405,123 @@ def _describe(axes: Axes, view: Slice, parameters: Mapping[str, float]) -> None:
 def _held(view: Slice) -> str:
     each = ", ".join(f"{symbol(name)} = {value:.4g}" for name, value in view.held.items())
     return f"starts with {each}" if each else ""
+
+
+#: Where the mechanism comes back to its well.
+BACK = "#e6e6e6"
+
+
+def draw_snapping(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
+    """Picture of a dataset of the scan type ``snapping`` about the scene with these parameters."""
+    from matplotlib.colors import ListedColormap
+
+    with style():
+        figure = new_figure(8.2, 6.6)
+        axes = figure.subplots()
+        picture, colors, handles = _ends(dataset)
+        force, alpha = dataset["F0"].data, dataset["alpha"].data
+        axes.pcolormesh(
+            _edges(np.log(alpha), exponential=True),
+            _edges(force),
+            picture.T,
+            cmap=ListedColormap(colors),
+            vmin=-0.5,
+            vmax=len(colors) - 0.5,
+            rasterized=True,
+        )
+        axes.set_xscale("log")
+        handles += _unlabelled(axes, dataset) + _curves(axes, dataset)
+        axes.set_xlim(*_edges(np.log(alpha), exponential=True)[[0, -1]])
+        axes.set_ylim(*_edges(force)[[0, -1]])
+        in_fifths(axes.xaxis)
+        axes.set_xlabel("rate α at which the force decays [1/s]")
+        axes.set_ylabel("force F0 when it is switched on [N]")
+        axes.set_title(
+            "Where the mechanism ends that rests until F0 exp(-α t) is switched on\n"
+            f"c1 = {scene['c1']:g} N/m, c2 = {scene['c2']:g} N/m"
+        )
+        axes.grid(visible=False)
+        figure.legend(handles=handles, loc="outside lower center", ncols=2)
+        return {"map": figure}
+
+
+def _ends(dataset: Dataset) -> tuple[np.ndarray, list[str], list[Artist]]:
+    """Numbers of colours over (alpha, F0), the colours, and what they mean; what stays comes first."""
+    from matplotlib.patches import Patch
+
+    well, left = dataset["well"].data, dataset["left"].data.astype(np.bool_)
+    ends = np.stack([well, dataset["turns_phi"].data, dataset["turns_theta"].data], axis=-1)
+    gone, inverse, number = np.unique(ends[left], axis=0, return_inverse=True, return_counts=True)
+    order = np.argsort(-number, kind="stable")
+    picture = np.full(well.shape, -1)
+    picture[(well >= 0) & ~left] = 0
+    colors = [BACK]
+    back = np.mean((well >= 0) & ~left)
+    handles: list[Artist] = [Patch(facecolor=BACK, label=f"comes back to its well: {100.0 * back:.3g} %")]
+    flat = picture[left]
+    named, others, other_share = 0, 0, 0.0
+    for end in order:
+        copy = int(gone[end, 0]), (int(gone[end, 1]), int(gone[end, 2]))
+        color, share = basin_color(dataset, *copy), 100.0 * number[end] / well.size
+        flat[inverse.ravel() == end] = len(colors)
+        colors.append(color)
+        if color != FURTHER and named < NAMED:
+            named += 1
+            handles.append(
+                Patch(facecolor=color, label=f"leaves to {basin_name(dataset, *copy)}: {share:.3g} %")
+            )
+        else:
+            others, other_share = others + 1, other_share + share
+    if others:
+        text = f"leaves elsewhere, grey or small ({others} ends): {other_share:.3g} %"
+        handles.append(Patch(facecolor=FURTHER, label=text))
+    picture[left] = flat
+    if (well < 0).any():
+        picture[well < 0] = len(colors)
+        colors.append("#ffffff")
+    return picture, colors, handles
+
+
+def _unlabelled(axes: Axes, dataset: Dataset) -> list[Artist]:
+    """Motions without a label, each marked where they are few."""
+    from matplotlib.patches import Patch
+
+    status, codes = dataset["status"].data, flag_codes(dataset["status"])
+    handles: list[Artist] = []
+    for name, (_, marker, meaning) in unlabelled(codes).items():
+        where = status == codes[name]
+        number = int(np.count_nonzero(where))
+        if not number:
+            continue
+        text = f"{meaning}: {number}"
+        if number > FEW:
+            handles.append(Patch(facecolor="white", edgecolor="black", label=text))
+            continue
+        k, j = np.nonzero(where)
+        axes.plot(
+            dataset["alpha"].data[k], dataset["F0"].data[j], marker, color="black", ms=5, ls="none", zorder=4
+        )
+        handles.append(entry(text, marker=marker, ms=6, ls="none"))
+    return handles
+
+
+def _curves(axes: Axes, dataset: Dataset) -> list[Artist]:
+    """The critical curve, and its limit for fast decay."""
+    alpha, critical = dataset["alpha"].data, dataset["critical_F0"].data
+    handles: list[Artist] = []
+    if np.isfinite(critical).any():
+        line = axes.plot(alpha, critical, color="black", lw=1.6, marker="o", ms=2.5, zorder=5)
+        line[0].set_label("smallest force that leaves")
+        handles += line
+    limit = float(dataset["critical_impulse"].data)
+    if np.isfinite(limit):
+        text = f"its limit for fast decay: F0/α = {limit:.4g} N s"
+        handles += axes.plot(alpha, limit * alpha, color="black", lw=1.4, ls="--", zorder=5, label=text)
+    return handles
+
+
+def _edges(middles: np.ndarray, exponential: bool = False) -> np.ndarray:
+    """Edges of cells about evenly spaced middles."""
+    half = 0.5 * (middles[1] - middles[0]) if middles.size > 1 else 0.5 * max(abs(float(middles[0])), 1e-3)
+    edges = np.append(middles - half, middles[-1] + half)
+    return np.exp(edges) if exponential else edges

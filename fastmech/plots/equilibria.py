@@ -1,23 +1,180 @@
-"""Equilibria on the potential's map, drawn to scale, and their eigenvalues in the complex plane."""
+"""Equilibria on the potential's map, mechanisms drawn to scale, and eigenvalues in the complex plane."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from fastmech.mechanism.lagrange import potential_energy
-from fastmech.models.drawing import Drawing
-from fastmech.plots.labels import PI_TICKS, equilibrium_names, flag_codes, setting_of
-from fastmech.plots.mechanism import draw_mechanism, drawing_of, legend_handles
-from fastmech.plots.style import LINES, legend_below, new_figure, style
+from fastmech.models.drawing import Drawing, Element, drawing
+from fastmech.models.mechanism import Mechanism
+from fastmech.plots.style import (
+    LINES,
+    PALETTE,
+    PI_TICKS,
+    equilibrium_names,
+    flag_codes,
+    legend_below,
+    new_figure,
+    setting_of,
+    style,
+)
 from fastmech.results import Dataset
 from fastmech.scene import Scene
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+Points = NDArray[np.float64]
+
+ROD, SPRING, DAMPER, FORCE = PALETTE["black"], PALETTE["green"], PALETTE["purple"], PALETTE["vermillion"]
+MASS, GROUND, INK = PALETTE["blue"], "#8c8c8c", "#404040"
+
+#: Sizes over the extent of all that is drawn.
+LARGEST_MASS, ARROW, COIL, HOUSING, MARGIN, TURNS = 0.035, 0.17, 0.014, 0.02, 0.12, 9
+
+
+def drawing_of(system: Scene | Mechanism | Dataset, q: ArrayLike = (), force: float = 0.0) -> Drawing:
+    """What is drawn of a mechanism at positions (m, n), or what a section of a file holds.
+
+    A scene's mechanism is the shipped one of its parameters under the constant ``force`` [N].
+    """
+    if isinstance(system, Dataset):
+        ends = np.stack([system[f"element_{axis}"].data for axis in "xy"], axis=-1)
+        names = tuple(map(str, system["element_name"].data))
+        return Drawing(system["element_kind"].data, names, system["element_mass"].data, ends)
+    if isinstance(system, Scene):
+        from fastmech.mechanisms.slider_pendulum import slider_pendulum
+
+        values = {name: value for name, (value, *_) in system.described().items()}
+        system = slider_pendulum().replace(**values | {"F0": force, "alpha": 0.0})
+    return drawing(system, q)
+
+
+def draw_mechanism(axes: Axes, drawn: Drawing, which: int = 0) -> None:
+    """Draw one of the positions of a mechanism.
+
+    Lengths are to scale; masses have areas in proportion to them; an arrow has one length for every load.
+    The axes cover all positions, so that drawings of one mechanism can be compared.
+    """
+    tied = ~np.isin(drawn.kind, (Element.GUIDE, Element.LOAD))
+    corners = drawn.ends[:, tied].reshape(-1, 2)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    size = max(float((high - low).max()), 1e-12)
+    edge = (MARGIN + ARROW * bool((drawn.kind == Element.LOAD).any())) * size
+    axes.set_aspect("equal")
+    axes.set(xlim=(low[0] - edge, high[0] + edge), ylim=(low[1] - edge, high[1] + edge))
+    axes.set(xlabel="x [m]", ylabel="y [m]")
+    ends = drawn.ends[which]
+    heaviest = np.nanmax(drawn.mass, initial=0.0)
+    ties: list[tuple[Points, Points]] = []
+    for kind, mass, (a, b) in zip(drawn.kind, drawn.mass, ends, strict=True):
+        if kind == Element.GUIDE:
+            axes.axline(tuple(a), tuple(b), color=GROUND, lw=0.9, ls=(0, (6, 3)), zorder=1)
+        elif kind == Element.FIXED:
+            axes.plot(*a, ls="none", marker="s", ms=7, color=GROUND, zorder=4)
+        elif kind == Element.MASS:
+            _mass(axes, a, LARGEST_MASS * size * np.sqrt(mass / heaviest))
+        elif kind == Element.LOAD:
+            b = a + ARROW * size * (b - a)
+            arrow = {
+                "arrowstyle": "-|>",
+                "color": FORCE,
+                "lw": 2.4,
+                "mutation_scale": 14,
+                "shrinkA": 0,
+                "shrinkB": 0,
+            }
+            axes.annotate("", xy=tuple(b), xytext=tuple(a), arrowprops=arrow, zorder=6)
+        elif kind == Element.ROD:
+            axes.plot(*np.transpose([a, b]), color=ROD, lw=2.6, solid_capstyle="round", zorder=3)
+        elif kind == Element.SPRING:
+            axes.plot(*_zigzag(a, b, COIL * size), color=SPRING, lw=1.1, zorder=2)
+        elif kind == Element.DAMPER:
+            _damper(axes, b, a, HOUSING * size)
+        ties += [(a, b), (b, a)] * (kind in (Element.ROD, Element.SPRING, Element.DAMPER, Element.LOAD))
+    for kind, name, (place, _) in zip(drawn.kind, drawn.name, ends, strict=True):
+        if name:
+            others = [other - at for at, other in ties if np.allclose(at, place)]
+            colour = INK if kind == Element.FIXED else MASS
+            _label(axes, name, place, np.array(others).reshape(-1, 2), 1.4 * LARGEST_MASS * size, colour)
+
+
+def _label(axes: Axes, name: str, place: Points, ties: Points, distance: float, colour: str) -> None:
+    """Name a point on the side where nothing is tied to it, above where nothing is."""
+    lengths = np.hypot(*ties.T)
+    tied = lengths > 1e-9
+    ties = ties[tied] / lengths[tied, None] if tied.any() else np.array([[0.0, -1.0]])
+    # The free direction is the one farthest from every tie.
+    angles = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
+    directions = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    away = directions[np.argmin(np.max(directions @ ties.T, axis=1))]
+    x, y = place + distance * away
+    text = re.sub(r"^([A-Za-z])(\d+)$", r"$\1_{\2}$", name)
+    sides = [("center", "left", "right")[int(np.sign(np.round(part)))] for part in away]
+    ha, va = sides[0], {"left": "bottom", "right": "top"}.get(sides[1], "center")
+    axes.text(x, y, text, ha=ha, va=va, color=colour, fontsize=10, zorder=7)
+
+
+def _mass(axes: Axes, center: Points, radius: float) -> None:
+    from matplotlib.patches import Circle
+
+    axes.add_patch(Circle(tuple(center), radius, color=MASS, zorder=5))
+
+
+def _zigzag(start: Points, end: Points, width: float) -> tuple[Points, Points]:
+    """Coordinates of a spring's line between two points."""
+    along = end - start
+    length = float(np.hypot(*along))
+    across = np.array([-along[1], along[0]]) / max(length, 1e-12)
+    place = np.concatenate([[0.0], np.linspace(0.12, 0.88, 2 * TURNS + 1), [1.0]])
+    side = np.zeros(place.size)
+    side[2:-2] = np.where(np.arange(2 * TURNS - 1) % 2, -width, width)
+    line = start + place[:, None] * along + side[:, None] * across
+    return line[:, 0], line[:, 1]
+
+
+def _damper(axes: Axes, start: Points, end: Points, half: float) -> None:
+    """Piston rod from the start into a housing that is tied to the end."""
+    along = end - start
+    across = half * np.array([-along[1], along[0]]) / max(float(np.hypot(*along)), 1e-12)
+
+    def line(width: float, *places: tuple[float, float]) -> None:
+        where = np.array([start + s * along + t * across for s, t in places])
+        axes.plot(*where.T, color=DAMPER, lw=width, zorder=2)
+
+    line(1.6, (0.0, 0.0), (0.55, 0.0))
+    line(2.6, (0.55, -0.8), (0.55, 0.8))
+    line(1.6, (0.28, 1.0), (0.82, 1.0), (0.82, -1.0), (0.28, -1.0))
+    line(1.6, (0.82, 0.0), (1.0, 0.0))
+
+
+def legend_handles(drawn: Drawing, load: str = "load") -> list[Any]:
+    """What a drawing's colours mean, for a legend; ``load`` says which one it is."""
+    from matplotlib.lines import Line2D
+
+    looks: dict[Element, dict[str, Any]] = {
+        Element.ROD: {"color": ROD, "lw": 2.6, "label": "rod"},
+        Element.MASS: {
+            "color": MASS,
+            "marker": "o",
+            "ms": 9,
+            "ls": "none",
+            "label": "mass, its area in proportion",
+        },
+        Element.SPRING: {"color": SPRING, "lw": 1.4, "label": "spring"},
+        Element.DAMPER: {"color": DAMPER, "lw": 1.8, "label": "damper"},
+        Element.LOAD: {"color": FORCE, "marker": ">", "lw": 2.4, "label": load},
+        Element.FIXED: {"color": GROUND, "marker": "s", "ls": "none", "label": "fixed point"},
+        Element.GUIDE: {"color": GROUND, "lw": 1.2, "ls": "--", "label": "guide"},
+    }
+    return [Line2D([], [], **look) for kind, look in looks.items() if kind in drawn.kind]
+
 
 MARKERS = {"minimum": "o", "saddle": "D", "maximum": "^", "degenerate": "X"}
 SHAPES = ["o", "s", "^", "D", "v", "P"]

@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fastmech.plots.style import LINES, new_figure, style
-from fastmech.results import Dataset
+from fastmech.plots.style import LINES, entry, new_figure, style, symbol
+from fastmech.results import STATE_UNITS, Dataset
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_UNITS = {"phi": "rad", "theta": "rad", "phi_dot": "rad/s", "theta_dot": "rad/s"}
-_SYMBOLS = {"phi": "φ", "theta": "θ", "phi_dot": "φ'", "theta_dot": "θ'"}
-
 
 def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
     """Picture of a dataset of the scan type ``erosion`` about the scene with these parameters."""
-    from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
     name = str(dataset.attrs["along"])
@@ -34,44 +30,19 @@ def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figu
             _stability(panels[0], dataset, well, color)
             _lines(panels[1], dataset, well, color, {"lim": ("-", "o"), "factor": ("--", "s")})
             _lines(panels[2], dataset, well, color, {"shock": ("-", "o"), "kick": ("--", "s")})
-            handles.append(Line2D([], [], color=color, lw=3.0, label=_name(dataset, well)))
+            handles.append(entry(_name(dataset, well), color=color, lw=3.0))
         _axes(panels, dataset, name)
         handles += [
             Patch(facecolor="#bdbdbd", label="95 % Wilson interval, undecided starts as none or all"),
-            Line2D([], [], color="black", lw=1.0, ls=":", label="if all undecided starts ended there"),
-            Line2D(
-                [], [], color="black", marker="o", ms=5, label="about the well: LIM; shock of all four states"
-            ),
-            Line2D(
-                [],
-                [],
-                color="black",
-                ls="--",
-                marker="s",
-                ms=5,
-                label="anywhere: IF; kick of the rates alone",
-            ),
-            Line2D(
-                [], [], color="black", marker="o", mfc="white", ms=5, ls="none", label="limited by the window"
-            ),
-            Line2D(
-                [], [], color="black", marker="x", ms=6, ls="none", label="smaller one tried is undecided"
-            ),
+            entry("if all undecided starts ended there", lw=1.0, ls=":"),
+            entry("about the well: LIM; shock of all four states", marker="o", ms=5),
+            entry("anywhere: IF; kick of the rates alone", ls="--", marker="s", ms=5),
+            entry("limited by the window", marker="o", mfc="white", ms=5, ls="none"),
+            entry("smaller one tried is undecided", marker="x", ms=6, ls="none"),
         ]
         if _limited(dataset):
-            handles.append(
-                Line2D(
-                    [],
-                    [],
-                    color="black",
-                    marker="^",
-                    mfc="white",
-                    ms=6,
-                    lw=1.0,
-                    ls=":",
-                    label="radius, if all undecided starts ended there",
-                )
-            )
+            look: dict[str, Any] = {"marker": "^", "mfc": "white", "ms": 6, "lw": 1.0, "ls": ":"}
+            handles.append(entry("radius, if all undecided starts ended there", **look))
         figure.legend(handles=handles, loc="outside lower center", ncols=2)
         figure.suptitle(_title(dataset, scene, name))
         return {"profile": figure}
@@ -138,8 +109,8 @@ def _axes(panels: np.ndarray, dataset: Dataset, name: str) -> None:
         axes.set_title(title)
         axes.set_ylim(bottom=0.0)
     panels[0].set_ylim(0.0, 102.0)
-    symbol = {"alpha": "α", "beta": "β"}.get(name, name)
-    panels[-1].set_xlabel(f"{dataset[name].long_name}, {symbol} [{dataset[name].units}]")
+    greek = {"alpha": "α", "beta": "β"}.get(name, name)
+    panels[-1].set_xlabel(f"{dataset[name].long_name}, {greek} [{dataset[name].units}]")
 
 
 def _title(dataset: Dataset, scene: Mapping[str, float], name: str) -> str:
@@ -148,6 +119,6 @@ def _title(dataset: Dataset, scene: Mapping[str, float], name: str) -> str:
     spans = []
     for axis in dataset.attrs["axes"]:
         low, high = dataset.attrs[f"window_{axis}"]
-        spans.append(f"{_SYMBOLS[axis]} from {low:.3g} to {high:.3g} {_UNITS[axis]}")
+        spans.append(f"{symbol(axis)} from {low:.3g} to {high:.3g} {STATE_UNITS[axis]}")
     window = f"window: {', '.join(spans)}; runs to {dataset.attrs['t_end']:g} s"
     return f"Erosion of the wells along {name}; {held}\n{window}"

@@ -5,17 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fastmech.plots.labels import coordinates_of, logarithmic, symbol
-from fastmech.plots.style import new_figure, style
+from fastmech.arrays import Floats
+from fastmech.plots.style import coordinates_of, logarithmic, new_figure, style, symbol
 from fastmech.results import Dataset
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Floats = NDArray[np.float64]
 
 TIME = "time t [s]"
 KINDS = {"rad": "angle", "m": "position"}

@@ -23,17 +23,22 @@ from fastmech.ensembles.status import FAILURES, LABELS, Status
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers
-from fastmech.scan_types.axis import (
+from fastmech.scan_types.request import (
     Axis,
+    Planes,
+    RunContext,
+    Scan,
+    Tiles,
+    Tiling,
+    UsualMethod,
     arrays,
     check_duration,
     check_rising,
     check_size,
     check_starts,
+    failures,
     told,
 )
-from fastmech.scan_types.request import Scan, UsualMethod, failures
-from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
 from fastmech.scene import STATE, Number, Scene, nearest
 from fastmech.step_limits.warning import step_warning
 
@@ -121,7 +126,7 @@ class Basins(Scan):
         return draw_basins(dataset.merged, scene)
 
 
-class BasinTiling(Tiling):
+class BasinTiling(Planes):
     """Every tile holds some planes of the first axis, each so many apart.
 
     Args:
@@ -135,19 +140,10 @@ class BasinTiling(Tiling):
     def __init__(
         self, request: Basins, scene: Scene | Mechanism, axes: dict[str, NDArray[np.float64]]
     ) -> None:
-        self.request, self.scene, self.axes, self.names = request, scene, axes, _states(scene)
-        self.first, *others = axes
-        self.others = tuple(len(axes[other]) for other in others)
-        length = len(axes[self.first])
-        points = int(TILE_POINTS * min(1.0, USUAL_END / request.t_end))
-        planes = max(1, points // math.prod(self.others)) if request.refine is None else length
-        self.count = -(-length // planes)
-        # Planes from all over: tiles take about as long as each other, so that progress tells the time left.
-        self.parts = [slice(k, length, self.count) for k in range(self.count)]
-
-    def items(self, index: int) -> int:
-        """Starts."""
-        return math.prod(self._grid(index))
+        self.request, self.scene, self.names = request, scene, _states(scene)
+        usual = int(TILE_POINTS * min(1.0, USUAL_END / request.t_end))
+        points = usual if request.refine is None else math.prod(map(len, axes.values()))
+        super().__init__(axes, points, spread=True)
 
     def compute(self, index: int, context: RunContext) -> Dataset:
         """Label some planes."""
@@ -160,7 +156,7 @@ class BasinTiling(Tiling):
 
         found = map_basins(
             self.scene,
-            {**self.axes, self.first: self.axes[self.first][self.parts[index]]},
+            self.axes_of(index),
             self.request.t_end,
             fixed=self.request.fixed,
             refine=self.request.refine,
@@ -182,7 +178,7 @@ class BasinTiling(Tiling):
             tree=certificate.tree,
             t_end=self.request.t_end,
             steps=sum(int(part.attrs["steps"]) for part in tiles),
-            **{name: self._joined(tiles, name) for name in _ARRAYS},
+            **{name: self._known(tiles, name) for name in _ARRAYS},
         )
         attrs: dict[str, Any] = {
             "axes": tuple(self.axes),
@@ -206,7 +202,7 @@ class BasinTiling(Tiling):
 
     def missing(self, index: int) -> Dataset:
         """Starts that have not been computed."""
-        grid = self._grid(index)
+        grid = self.grid(index)
         nothing = np.full(grid, np.nan)
         arrays: dict[str, NDArray[Any] | None] = {
             "well": np.full(grid, -1, dtype=np.int8),
@@ -218,20 +214,10 @@ class BasinTiling(Tiling):
         }
         return self._tile(arrays, 0)
 
-    def _grid(self, index: int) -> tuple[int, ...]:
-        part = self.parts[index]
-        return (len(range(part.start, part.stop, part.step)), *self.others)
-
-    def _joined(self, tiles: list[Dataset], name: str) -> Any:
-        """An array of all tiles, every plane in its place; None where they have none."""
-        if name not in tiles[0]:
-            return None
-        first = tiles[0][name].data
-        length = len(self.axes[self.first])
-        array = np.empty((length, *first.shape[1:]), np.bool_ if name == "computed" else first.dtype)
-        for part, tile in zip(self.parts, tiles, strict=True):
-            array[part] = tile[name].data
-        return array
+    def _known(self, tiles: list[Dataset], name: str) -> Any:
+        """An array of all tiles; None where they have none."""
+        array = self.joined(tiles, name) if name in tiles[0] else None
+        return array.astype(np.bool_) if array is not None and name == "computed" else array
 
     def _tile(self, arrays: dict[str, NDArray[Any] | None], steps: int) -> Dataset:
         dims = (*self.axes, TURNED)

@@ -1,43 +1,595 @@
-"""Thousands of random disturbances of every equilibrium, and how far the linearized motion can be trusted."""
+"""Thousands of random disturbances of every equilibrium, and how far the linearized motion can be trusted.
+
+Disturbed ensembles in tiles: blocks of directions and blocks of trajectories, of every equilibrium. A table
+of the section has a row for each trajectory of each equilibrium; what has other dimensions is in the groups
+``linear``, ``quantiles`` and ``halving``.
+
+Disturbed ensembles of every equilibrium at every point of a grid of parameters, one tile an equilibrium.
+Layout: arrays over the grid and ``sheet``, NaN where the sheet has no equilibrium; a sheet is one
+equilibrium, continued, as the atlas of these axes numbers them (:mod:`fastmech.atlas.sheets`). Each ensemble
+is that of ``fm.disturb`` with the scene of its point. The group ``quantiles`` holds those of times to return.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import product
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
-from fastmech.basins.disturbed import MOST_RADIUS, DisturbedEnsemble, disturb
-from fastmech.capture.select import require_damper
+from fastmech.arrays import Floats
+from fastmech.atlas.map import map_equilibria
+from fastmech.basins.disturbed import (
+    MOST_RADIUS,
+    STREAM,
+    DisturbedEnsemble,
+    disturb,
+    refuse_meeting_balls,
+)
+from fastmech.basins.measures.fractions import wilson
+from fastmech.capture.select import certificate_of, require_damper
 from fastmech.capture.steps import method_for, shortest_step
-from fastmech.disturbance.motion import require_constant_force, require_isolated
+from fastmech.disturbance.motion import (
+    damped_times,
+    equilibria_to_disturb,
+    linear_range,
+    require_constant_force,
+    require_isolated,
+    size_of,
+)
+from fastmech.ensembles.integrate import integrate
+from fastmech.ensembles.lanes import output_steps
+from fastmech.ensembles.status import ENDS, FAILURES, failure_counts
+from fastmech.equilibria.find import Equilibrium, find_equilibria
 from fastmech.errors import InputError, shown
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
 from fastmech.models.mechanism import Mechanism
-from fastmech.results import Dataset
-from fastmech.scan_types.axis import (
+from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers, parts
+from fastmech.scan_types.map_layout import about_of, one_of
+from fastmech.scan_types.request import (
+    HALVING,
     Axis,
+    RunContext,
+    Scan,
+    Seed,
+    Tiles,
+    Tiling,
+    UsualMethod,
     arrays,
+    axis_variables,
     check_duration,
     check_parameters,
     check_size,
     check_steps,
+    coordinate_units,
+    counted_failures,
     known_parameters,
+    state_units,
+    told,
 )
-from fastmech.scan_types.disturbed_map import MOST_POINTS, MOST_TRAJECTORIES, DisturbedMap
-from fastmech.scan_types.disturbed_tiling import ABOUT_SHARES, TRAJECTORY_VARIABLES, DisturbedTiling
-from fastmech.scan_types.request import Scan, Seed, UsualMethod
-from fastmech.scan_types.tiling import RunContext, Tiling
 from fastmech.scene import Scene, nearest
 from fastmech.step_limits.warning import step_warning
+from fastmech.store.write import Piece, Stream
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fastmech.store.read import Section
+
+
+_ENDED = "ended_"
+
+
+@dataclass
+class Tally:
+    """How many trajectories end where, and when they were back: times are ends of steps, so few differ.
+
+    Attributes:
+        ended: trajectories by the name of their outcome.
+        times, counts: the times to return that occur [s], rising, and how often. Who returns later than the
+            end of the run is not among them.
+    """
+
+    ended: Counter[str] = field(default_factory=Counter)
+    times: Floats = field(default_factory=lambda: np.zeros(0))
+    counts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    @classmethod
+    def of(cls, outcome: NDArray[np.int8], time_to_return: Floats) -> Tally:
+        """The tally of a block; NaN stands for no return by the end of the run."""
+        times, counts = np.unique(time_to_return[np.isfinite(time_to_return)], return_counts=True)
+        return cls(Counter(failure_counts(outcome, ENDS)), times, counts.astype(np.int64))
+
+    def variables(self) -> dict[str, Variable]:
+        """The times and counts as a tile keeps them."""
+        each = ("returned",)
+        return {"returned_time": Variable(each, self.times), "returned_count": Variable(each, self.counts)}
+
+    def attrs(self) -> dict[str, int]:
+        """The rest of what a tile keeps."""
+        return {f"{_ENDED}{name}": count for name, count in self.ended.items()}
+
+    def add(self, tile: Dataset) -> None:
+        """Count a tile's trajectories too."""
+        for name, count in tile.attrs.items():
+            if name.startswith(_ENDED):
+                self.ended[name.removeprefix(_ENDED)] += int(count)
+        both = np.concatenate([self.times, tile["returned_time"].data])
+        counts = np.concatenate([self.counts, tile["returned_count"].data])
+        self.times, place = np.unique(both, return_inverse=True)
+        self.counts = np.bincount(place, counts, self.times.size).astype(np.int64)
+
+    def shares(self) -> dict[str, float]:
+        """Share that returned, if all not known did, and the 95 % Wilson interval of both; NaN of none."""
+        n, returned = self.ended.total(), self.ended["returned"]
+        if not n:
+            return dict.fromkeys(SHARES, float("nan"))
+        most = n - self.ended["elsewhere"]
+        lower, upper = wilson(returned, n)[0], wilson(most, n)[1]
+        return dict(zip(SHARES, (returned / n, most / n, float(lower), float(upper)), strict=True))
+
+    def quantiles(self, wanted: Sequence[float]) -> Floats:
+        """Quantiles of the time to return [s], linear between neighbours; NaN where none returned.
+
+        Infinite where they are among those that return later than the end of the run.
+        """
+        returned = self.ended["returned"]
+        if not returned:
+            return np.full(len(wanted), np.nan)
+        times = np.append(self.times, np.inf)
+        upto = np.cumsum(np.append(self.counts, returned - self.counts.sum()))
+        place = np.asarray(wanted) * (returned - 1)
+        low = np.floor(place)
+        at_low, at_high = (times[np.searchsorted(upto, k, side="right")] for k in (low, np.ceil(place)))
+        with np.errstate(invalid="ignore"):  # infinite less infinite is not used
+            return np.where(at_low == at_high, at_low, at_low + (place - low) * (at_high - at_low))
+
+
+#: Names of the shares: of what is proved, if all that is not known returned, the interval of both.
+SHARES = ("share_returned", "share_returned_at_most", "share_returned_lower", "share_returned_upper")
+
+
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
+QUANTILE = Variable(("quantile",), np.array(QUANTILES), "1", "quantile")
+
+ABOUT_SHARES = {
+    "share_returned": "share that is proved to return",
+    "share_returned_at_most": "share that returned, if all whose end is not known did",
+    "share_returned_lower": "lower end of the 95 % Wilson interval, none of those returning",
+    "share_returned_upper": "upper end of the 95 % Wilson interval, all of those returning",
+}
+ABOUT_QUANTILES = "quantiles of the time to return over those that return, inf: later than the end of the run"
+
+_EACH, _EVERY = ("equilibrium",), ("equilibrium", "trajectory")
+
+Units = Callable[[Scene | Mechanism], Mapping[str, str]]
+
+
+def _turns(system: Scene | Mechanism) -> dict[str, str]:
+    return dict.fromkeys(coordinate_units(system), "1")
+
+
+#: What is known of every trajectory: type, what stands for one that is not computed yet, unit, meaning. What
+#: has several units is a variable for each of them.
+_TRAJECTORY: dict[str, tuple[str, float, str | Units, str]] = {
+    "start": ("f8", np.nan, state_units, "{} at the start"),
+    "final": ("f8", np.nan, state_units, "{} at the end, or of the last finite state"),
+    "failed": ("f8", np.nan, "s", "time of the last finite state where it failed on the way"),
+    "outcome": ("i1", -1, "1", "where it ends"),
+    "end_equilibrium": ("i1", -1, "1", "stable equilibrium at which it is proved to end"),
+    "turns": ("i8", 0, _turns, "full turns of {} made on the way there"),
+    "time_to_return": (
+        "f8",
+        np.nan,
+        "s",
+        "end of the first step from which on every step ended in the ball of return, NaN: none by t_end",
+    ),
+    "excursion": (
+        "f8",
+        np.nan,
+        coordinate_units,
+        "largest departure of {} at the ends of steps, NaN: not followed to its end",
+    ),
+}
+
+#: Names of what is known of every trajectory.
+TRAJECTORY_VARIABLES = tuple(_TRAJECTORY)
+
+
+def empty_trajectories(system: Scene | Mechanism, names: list[str], count: int) -> dict[str, NDArray[Any]]:
+    """Arrays of so many trajectories that have not been computed."""
+    found = {}
+    for name in names:
+        dtype, nothing, unit, _ = _TRAJECTORY[name]
+        entries = () if isinstance(unit, str) else (len(unit(system)),)
+        found[name] = np.full((count, *entries), nothing, dtype)
+    return found
+
+
+def trajectory_variables(
+    system: Scene | Mechanism, arrays: Mapping[str, NDArray[Any]]
+) -> dict[str, Variable]:
+    """Arrays over (equilibrium, trajectory, ...) as variables."""
+    codes: dict[str, Any] = {"outcome": flags(ENDS, fill=-1), "end_equilibrium": NO_CODE}
+    found: dict[str, Variable] = {}
+    for name, (_, _, unit, about) in _TRAJECTORY.items():
+        if name not in arrays:
+            continue
+        if isinstance(unit, str):
+            found[name] = Variable(_EVERY, arrays[name], unit, about, codes.get(name, {}))
+        else:
+            found |= parts(name, _EVERY, arrays[name], unit(system), about)
+    return found
+
+
+def share_variables(shares: Mapping[str, Floats]) -> dict[str, Variable]:
+    """The shares of a tally of each equilibrium."""
+    return {name: Variable(_EACH, shares[name], "1", about) for name, about in ABOUT_SHARES.items()}
+
+
+def quantile_variables(quantiles: Floats) -> dict[str, Variable]:
+    """Quantiles of the times to return to each equilibrium."""
+    dims = ("equilibrium", "quantile")
+    return {"quantile": QUANTILE, "time_to_return_quantile": Variable(dims, quantiles, "s", ABOUT_QUANTILES)}
+
+
+def halving_variables(errors: Floats, units: Mapping[str, str]) -> dict[str, Variable]:
+    """How far final states of some trajectories are from those of half the step."""
+    unit = one_of(units.values())
+    what = "angle" if unit == "rad" else "position"
+    return parts(
+        "halving_difference",
+        ("equilibrium", "sample"),
+        errors,
+        {what: unit, "rate": f"{unit}/s" * (unit != "1") or "1"},
+        "largest difference of a final {} from that with half the step, first trajectories; NaN: failed",
+    )
+
+
+def linear_variables(system: Scene | Mechanism, directions: Floats, limit: Floats) -> dict[str, Variable]:
+    """How far the linearized motion can be trusted."""
+    *_, unit = coordinate_units(system).values()
+    return {
+        **parts(
+            "linear_direction",
+            ("equilibrium", "direction"),
+            directions,
+            state_units(system),
+            f"{{}} of a disturbance of size 1 {unit}",
+        ),
+        "linear_limit": Variable(
+            ("equilibrium", "direction"),
+            limit,
+            unit,
+            "size up to which the linearized motion keeps the tolerance, inf: beyond all tried, 0: below",
+        ),
+    }
+
+
+#: Trajectories of each ensemble that are integrated again with half the step.
+SAMPLE = 256
+
+#: Right-hand sides that a tile evaluates, about: a second of one thread.
+EVALUATIONS = 1 << 27
+
+#: Directions of a tile: 37 short motions each.
+DIRECTIONS = 256
+
+#: Bytes of what is joined before it is written.
+PIECE_BYTES = 1 << 25
+
+
+class DisturbedTiling(Tiling):
+    """First blocks of directions for the linearized motion, then blocks of trajectories.
+
+    Equilibria alternate, so that a partial result knows something of each.
+
+    Args:
+        request: how to compute and what to keep.
+        scene: the mechanism.
+    """
+
+    what = "disturbed trajectories"
+
+    def __init__(self, request: Disturbed, scene: Scene | Mechanism) -> None:
+        self.request, self.scene = request, scene
+        self.equilibria = equilibria_to_disturb(scene)
+        refuse_meeting_balls(scene, self.equilibria, request.return_radius, range(len(self.equilibria)))
+        certificate = certificate_of(scene)
+        self.method = certificate.method(request.method)
+        self.rays = _blocks(request.linear_directions, DIRECTIONS)
+        places = self.equilibria.position
+        rest = np.concatenate([places, np.zeros_like(places)], axis=1)
+        step = request.dt or float(certificate.measuring_steps(rest, self.method).min())
+        self.parts = _blocks(request.trajectories, self._tile_length(step))
+        self.count = len(self.equilibria) * (len(self.rays) + len(self.parts))
+
+    def items(self, index: int) -> int:
+        """Trajectories; none for directions."""
+        part = self._part(index)
+        return 0 if part is None else part.stop - part.start
+
+    def compute(self, index: int, context: RunContext) -> Dataset:
+        """Try some directions, or follow some trajectories, of one equilibrium."""
+        part, request = self._part(index), self.request
+        equilibrium = self.equilibria[index % len(self.equilibria)]
+        if part is None:
+            found = linear_range(
+                self.scene,
+                equilibrium,
+                horizon=request.linear_horizon,
+                tolerance=request.linear_tolerance,
+                directions=request.linear_directions,
+                seed=request.seed,
+                part=self.rays[index // len(self.equilibria)],
+                threads=context.threads,
+            )
+            rays = {"directions": Variable(("ray", "component"), found.directions)}
+            return Dataset(rays | {"limit": Variable(("ray",), found.limit)})
+        ensemble = request.ensemble(self.scene, equilibrium, context, part)
+        errors = _sampled_errors(self.scene, ensemble, self.method) if part.start == 0 else np.zeros((0, 2))
+        arrays = {name: getattr(ensemble, _FIELDS.get(name, name)) for name in request.kept}
+        tally = Tally.of(ensemble.outcome, ensemble.time_to_return)
+        return self._tile(arrays, errors, tally, [ensemble.dt.min(), ensemble.dt.max()])
+
+    def assemble(self, tile: Tiles) -> Stream:
+        """Join the blocks and count."""
+        each = list(self.equilibria)
+        omega = np.array([size_of(self.scene, e).omega for e in each])
+        fixed = numbers("equilibrium", len(each), "number of the equilibrium")
+        for k, (name, unit) in enumerate(coordinate_units(self.scene).items()):
+            about = f"{about_of(unit)} {name} of the disturbed equilibrium"
+            fixed[name] = Variable(_EACH, self.equilibria.position[:, k], unit, about)
+        fixed["omega"] = Variable(_EACH, omega, "rad/s", "frequency in the norm")
+        fixed |= numbers("trajectory", self.request.trajectories, "number of the trajectory")
+        count, request = len(each), self.request
+        nothing = empty_trajectories(self.scene, request.kept, 1)
+        arrays = {n: np.broadcast_to(a, (1, request.trajectories, *a.shape[1:])) for n, a in nothing.items()}
+        plane = trajectory_variables(self.scene, arrays) | share_variables(dict.fromkeys(SHARES, np.zeros(1)))
+        attrs = {
+            **told(self.scene),
+            **request.settings,
+            "method": self.method,
+            "distribution": "uniform in the ball of the given radius, kinetic-energy norm at the equilibrium",
+        }
+        return Stream(Dataset(fixed, attrs), plane, "equilibrium", lambda: self._pieces(tile, count))
+
+    def missing(self, index: int) -> Dataset:
+        """Trajectories and directions that have not been computed."""
+        part = self._part(index)
+        if part is None:
+            block = self.rays[index // len(self.equilibria)]
+            rays = block.stop - block.start
+            arrays = {
+                "directions": Variable(
+                    ("ray", "component"), np.full((rays, 2 * self.equilibria.position.shape[1]), np.nan)
+                )
+            }
+            return Dataset(arrays | {"limit": Variable(("ray",), np.full(rays, np.nan))})
+        sample = min(SAMPLE, self.request.trajectories) if part.start == 0 else 0
+        nothing = empty_trajectories(self.scene, self.request.kept, self.items(index))
+        return self._tile(nothing, np.full((sample, 2), np.nan), Tally())
+
+    def _tile_length(self, dt: float) -> int:
+        """Trajectories of a tile, by their cost: a power of two, which divides a stream of random numbers."""
+        steps = int(output_steps(np.array([0.0, self.request.t_end]), dt).sum())
+        affordable = EVALUATIONS // find_method(self.method).evaluations(steps)
+        return int(min(STREAM, max(SAMPLE, 1 << max(0, affordable.bit_length() - 1))))
+
+    def _part(self, index: int) -> slice | None:
+        """The trajectories of a tile; None for a tile of directions."""
+        block = index // len(self.equilibria) - len(self.rays)
+        return None if block < 0 else self.parts[block]
+
+    def _tile(
+        self, arrays: dict[str, NDArray[Any]], errors: Floats, tally: Tally, steps: list[float] | None = None
+    ) -> Dataset:
+        columns = {
+            name: Variable(("trajectory", *(f"{name}_entry" for _ in a.shape[1:])), a)
+            for name, a in arrays.items()
+        }
+        columns |= {
+            "error": Variable(("sample", "error_entry"), errors),
+            "step": Variable(("step_end",), np.array(steps or [])),
+        }
+        return Dataset(columns | tally.variables(), tally.attrs())
+
+    def _pieces(self, tile: Tiles, count: int) -> Iterator[Piece]:
+        limits = [[tile(number * count + e) for number in range(len(self.rays))] for e in range(count)]
+        directions, limit = (
+            np.stack([np.concatenate([f[name].data for f in found]) for found in limits])
+            for name in ("directions", "limit")
+        )
+        first = count * len(self.rays)
+        tallies, errors, steps = [Tally() for _ in range(count)], [], []
+        held: list[dict[str, NDArray[Any]]] = []
+        begun = 0
+        for number, part in enumerate(self.parts):
+            found = [tile(first + number * count + e) for e in range(count)]
+            for e, one in enumerate(found):
+                tallies[e].add(one)
+                steps += one["step"].data.tolist()
+            if number == 0:
+                errors = [one["error"].data for one in found]
+            held.append({n: np.stack([one[n].data for one in found]) for n in self.request.kept})
+            if part is self.parts[-1] or sum(a.nbytes for h in held for a in h.values()) >= PIECE_BYTES:
+                joined = {n: np.concatenate([h[n] for h in held], axis=1) for n in self.request.kept}
+                yield (
+                    (slice(0, count), slice(begun, part.stop)),
+                    _data(trajectory_variables(self.scene, joined)),
+                )
+                begun, held = part.stop, []
+        each = [t.shares() for t in tallies]
+        shares = {name: np.array([share[name] for share in each]) for name in SHARES}
+        quantiles = np.array([t.quantiles(QUANTILES) for t in tallies])
+        each_one = numbers("equilibrium", count, "number of the equilibrium")
+        groups = {
+            "linear": Dataset(each_one | linear_variables(self.scene, directions, limit)),
+            "quantiles": Dataset(each_one | quantile_variables(quantiles)),
+            "halving": Dataset(each_one | halving_variables(np.stack(errors), coordinate_units(self.scene))),
+        }
+        attrs: dict[str, Any] = {
+            "error_estimate": float(np.max(errors)),
+            "error_estimate_median": float(np.median(errors)),
+            "error_estimate_is": f"{HALVING}; final states of the first {len(errors[0])} of each",
+        }
+        attrs |= {"shortest_step": min(steps), "longest_step": max(steps)} if steps else {}
+        ended = sum((t.ended for t in tallies), Counter[str]())
+        failed = {k.name.lower(): ended[k.name.lower()] for k in FAILURES if ended[k.name.lower()]}
+        yield slice(0, count), _data(share_variables(shares))
+        yield Dataset({}, attrs | counted_failures(failed, ended.total()), groups)
+
+
+#: Names of variables in `fastmech.basins.disturbed.DisturbedEnsemble`, where they are others.
+_FIELDS = {"start": "starts", "end_equilibrium": "end_index"}
+
+
+def _data(variables: dict[str, Variable]) -> dict[str, NDArray[Any]]:
+    return {name: variable.data for name, variable in variables.items()}
+
+
+def _blocks(total: int, length: int) -> list[slice]:
+    return [slice(k, min(k + length, total)) for k in range(0, total, length)]
+
+
+def _sampled_errors(scene: Scene | Mechanism, e: DisturbedEnsemble, method: str) -> Floats:
+    """Largest differences of first final coordinates and rates from those of half the step (sample, 2)."""
+    final, dt = e.final[:SAMPLE], e.dt[:SAMPLE]
+    finer = np.empty_like(final)
+    for step in np.unique(dt):
+        some = np.flatnonzero(dt == step)
+        half = 0.5 * float(step)
+        times = np.append(damped_times(scene, method, min(half, e.t_end)), e.t_end)
+        finer[some] = integrate(scene, e.starts[some], dt=half, method=method, t_eval=times).y[-1]
+    difference = np.abs(finer - final).reshape(len(final), 2, -1).max(axis=2)
+    return np.where(np.isnan(e.failed[:SAMPLE])[:, None], difference, np.nan)
+
+
+#: Points of the largest map, and trajectories of each equilibrium there at most: a tile takes seconds.
+MOST_POINTS, MOST_TRAJECTORIES = 100_000, 65_536
+
+#: What a tile holds: length, unit and meaning. What has not been computed is NaN.
+_MEASURED: dict[str, tuple[tuple[str, ...], str, str]] = {
+    **{name: ((), "1", about) for name, about in ABOUT_SHARES.items()},
+    "time_to_return_quantile": (("quantile",), "s", ABOUT_QUANTILES),
+    "largest_excursion_phi": ((), "rad", "largest departure of phi of all trajectories"),
+    "largest_excursion_theta": ((), "rad", "largest departure of theta of all trajectories"),
+    "share_failed": ((), "1", "share whose motion could not be computed"),
+}
+_LENGTHS = {"quantile": len(QUANTILES)}
+
+
+class DisturbedMap(Tiling):
+    """A tile is one equilibrium at one point; those of a point follow each other.
+
+    Args:
+        request: how to compute.
+        scene: gives every parameter that is no axis.
+        axes: parameter names with their values.
+    """
+
+    what = "disturbed trajectories"
+
+    def __init__(self, request: Disturbed, scene: Scene, axes: Mapping[str, Floats]) -> None:
+        self.request, self.scene, self.axes = request, scene, dict(axes)
+        self.atlas = map_equilibria(scene, axes)
+        self.entries = np.argwhere(self.atlas.sheet >= 0)
+        self.count = len(self.entries)
+
+    def items(self, index: int) -> int:
+        """Trajectories."""
+        return self.request.trajectories
+
+    def compute(self, index: int, context: RunContext) -> Dataset:
+        """Disturb one equilibrium; where its scene is refused, all that is kept is the reason."""
+        request, (scene, equilibrium) = self.request, self._place(index)
+        try:
+            found = request.ensemble(scene, equilibrium, context)
+        except InputError as refused:
+            return self._tile({}, {"refused": str(refused)})
+        tally, failed = Tally.of(found.outcome, found.time_to_return), np.isin(found.outcome, FAILURES)
+        farthest = np.full(2, np.nan) if failed.all() else found.excursion[~failed].max(axis=0)
+        measured: dict[str, Any] = {
+            **tally.shares(),
+            "time_to_return_quantile": tally.quantiles(QUANTILES),
+            "largest_excursion_phi": farthest[0],
+            "largest_excursion_theta": farthest[1],
+            "share_failed": failed.mean(),
+        }
+        return self._tile(measured, failure_counts(found.outcome, FAILURES))
+
+    def assemble(self, tile: Tiles) -> Dataset:
+        """Put every equilibrium in its sheet's place."""
+        atlas, names = self.atlas, tuple(self.axes)
+        grid = (*atlas.sheet.shape[:-1], atlas.sheet_morse_index.size)
+        at = tuple(self.entries[:, :-1].T)
+        slot = (*at, self.entries[:, -1])
+        place = (*at, atlas.sheet[slot])
+        tiles = [tile(index) for index in range(self.count)]
+
+        def over_map(values: Any, dims: tuple[str, ...], unit: str, about: str) -> Variable:
+            array = np.full((*grid, *(_LENGTHS[dim] for dim in dims)), np.nan)
+            array[place] = values
+            return Variable((*names, "sheet", *dims), array, unit, about)
+
+        variables = axis_variables(self.scene, self.axes)
+        about = "equilibrium, continued, as the atlas of these axes numbers them"
+        variables |= numbers("sheet", grid[-1], about)
+        about = "negative eigenvalues of the Hessian all over a sheet, 0: stable"
+        sheet_index = Variable(("sheet",), atlas.sheet_morse_index, "1", about)
+        quantiles = {**variables, "quantile": QUANTILE}
+        variables["sheet_morse_index"] = sheet_index
+        for angle in ("phi", "theta"):
+            about = f"angle {angle} of the disturbed equilibrium"
+            variables[angle] = over_map(getattr(atlas, angle)[slot], (), "rad", about)
+        for name, (dims, unit, about) in _MEASURED.items():
+            values = np.array([one[name].data for one in tiles]).reshape(len(tiles), *map(_LENGTHS.get, dims))
+            (quantiles if dims else variables)[name] = over_map(values, dims, unit, about)
+        refused = [str(one.attrs["refused"]) for one in tiles if "refused" in one.attrs]
+        counts = {
+            k.name.lower(): sum(int(one.attrs.get(k.name.lower(), 0)) for one in tiles) for k in FAILURES
+        }
+        attrs = {**self.request.settings, "axes": names, "refused": len(refused)}
+        attrs |= {"refused_first": refused[0]} if refused else {}
+        followed = self.request.trajectories * (len(tiles) - len(refused))
+        attrs |= counted_failures({k: n for k, n in counts.items() if n}, followed)
+        return Dataset(variables, attrs, {"quantiles": Dataset(quantiles)})
+
+    def missing(self, index: int) -> Dataset:
+        """An equilibrium that has not been disturbed."""
+        return self._tile({}, {})
+
+    def _place(self, index: int) -> tuple[Scene, Equilibrium]:
+        """The scene of a tile's point, and which of its equilibria is the tile's."""
+        *at, _ = entry = tuple(self.entries[index])
+        values = {name: float(line[k]) for (name, line), k in zip(self.axes.items(), at, strict=True)}
+        scene = self.scene.replace(**values)
+        equilibria = find_equilibria(scene)
+        apart = np.hypot(
+            np.sin(0.5 * (equilibria.phi - self.atlas.phi[entry])),
+            np.sin(0.5 * (equilibria.theta - self.atlas.theta[entry])),
+        )
+        return scene, equilibria[int(apart.argmin())]
+
+    @staticmethod
+    def _tile(measured: Mapping[str, Any], attrs: Mapping[str, Any]) -> Dataset:
+        return Dataset(
+            {
+                name: Variable(
+                    dims, np.broadcast_to(measured.get(name, np.nan), [_LENGTHS[dim] for dim in dims])
+                )
+                for name, (dims, _, _) in _MEASURED.items()
+            },
+            attrs,
+        )
+
 
 #: Right-hand sides of the largest ensemble: a year of a hundred cores.
 MOST_WORK = 1e17
@@ -194,7 +746,7 @@ class Disturbed(Scan):
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
         """Outcomes, times to return, excursions and the linearized motion's range; those of a map over it."""
         if "axes" in dataset.attrs:
-            from fastmech.plots.disturbed_map import draw_disturbed_map
+            from fastmech.plots.disturbed import draw_disturbed_map
 
             return draw_disturbed_map(dataset.merged, scene)
         from fastmech.plots.disturbed import draw_disturbed

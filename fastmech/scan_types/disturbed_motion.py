@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from fastmech.arrays import Floats
 from fastmech.basins.disturbed import MOST_RADIUS
 from fastmech.capture.steps import highest_frequency
 from fastmech.disturbance.motion import (
@@ -20,22 +20,18 @@ from fastmech.disturbance.motion import (
     require_isolated,
 )
 from fastmech.ensembles import checks
-from fastmech.ensembles.spans import output_steps
+from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.status import FAILURES
 from fastmech.equilibria.find import Equilibria, Equilibrium
 from fastmech.equilibria.search import MOST
 from fastmech.mechanism.coefficients import reduce
 from fastmech.results import STATE_UNITS, Dataset, Variable, numbers, parts
-from fastmech.scan_types.axis import check_steps
-from fastmech.scan_types.request import HALVING, Scan, UsualMethod, failures
-from fastmech.scan_types.tiling import Each, Tiling
+from fastmech.scan_types.request import HALVING, Each, Scan, Tiling, UsualMethod, check_steps, failures
 from fastmech.scene import Scene
 from fastmech.step_limits.warning import step_warning
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Floats = NDArray[np.float64]
 
 
 Size = Annotated[float, Field(ge=-MOST_RADIUS, le=MOST_RADIUS)]
@@ -133,6 +129,6 @@ class DisturbedMotionScan(Scan):
     @staticmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
         """Nonlinear and linearized disturbances of every equilibrium over time."""
-        from fastmech.plots.disturbed_motion import draw_disturbed_motion
+        from fastmech.plots.disturbed import draw_disturbed_motion
 
         return draw_disturbed_motion(dataset)

@@ -14,11 +14,10 @@ from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import classify
 from fastmech.results import Dataset, Variable, flags, numbers, parts
-from fastmech.scan_types.axis import coordinate_units, told
 from fastmech.scan_types.map_layout import HESSIAN, about_of, drawing_group, eigenvalue_variables
-from fastmech.scan_types.request import Scan
-from fastmech.scan_types.tiling import Each, Tiling
+from fastmech.scan_types.request import Each, Scan, Tiling, coordinate_units, told
 from fastmech.scene import Scene
+from fastmech.stability.classify import Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,15 +32,6 @@ class Kind(IntEnum):
     DEGENERATE = 3
     POSITIVE = 4
     NEGATIVE = 5
-
-
-class StabilityVerdict(IntEnum):
-    """Verdict of a criterion of stability."""
-
-    ASYMPTOTICALLY_STABLE = 0
-    STABLE = 1
-    UNSTABLE = 2
-    CRITICAL = 3
 
 
 class EquilibriaScan(Scan):
@@ -78,9 +68,9 @@ class EquilibriaScan(Scan):
             return parts(name, each, columns, entries, about)
 
         def verdicts(values: list[str], criterion: str) -> Variable:
-            codes = [StabilityVerdict[value.upper().replace(" ", "_")] for value in values]
+            codes = [Verdict[value.upper().replace(" ", "_")] for value in values]
             return Variable(
-                each, np.array(codes, dtype=np.int8), "1", f"verdict: {criterion}", flags(StabilityVerdict)
+                each, np.array(codes, dtype=np.int8), "1", f"verdict: {criterion}", flags(list(Verdict)[1:])
             )
 
         kinds = np.array([Kind[name.upper()] for name in equilibria.kind], dtype=np.int8)

@@ -23,41 +23,45 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from fastmech.arrays import Floats
 from fastmech.atlas.axes import grid_coefficients, refuse_decaying_load
 from fastmech.atlas.map import BLOCK, Slab, solve_block
 from fastmech.atlas.resting_map import RestingMap, map_resting_places
 from fastmech.atlas.sheets import SheetBuilder
 from fastmech.ensembles.threads import thread_count
-from fastmech.equilibria.outcome import Outcome
+from fastmech.equilibria.certificate import Outcome
 from fastmech.equilibria.search import MOST
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import Dataset, Variable, numbers
-from fastmech.scan_types.axis import (
+from fastmech.scan_types.map_layout import (
+    RESTING,
+    TOGETHER,
+    curve_variables,
+    point_variables,
+    resting_variables,
+    sheet_table,
+    sheet_variables,
+)
+from fastmech.scan_types.request import (
     Axis,
+    Planes,
+    RunContext,
+    Scan,
+    Tiles,
+    Tiling,
     arrays,
+    axis_variables,
     check_parameters,
     check_size,
     coordinate_units,
     known_parameters,
     told,
 )
-from fastmech.scan_types.map_curves import curve_variables
-from fastmech.scan_types.map_layout import (
-    RESTING,
-    TOGETHER,
-    point_variables,
-    resting_variables,
-    sheet_table,
-    sheet_variables,
-)
-from fastmech.scan_types.request import Scan
-from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
 from fastmech.scene import Scene, nearest
-from fastmech.store.stream import Piece, Stream
+from fastmech.store.write import Piece, Stream
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -147,7 +151,7 @@ TILE_POINTS = 1 << 15
 _FOR_SHEETS = ("phi", "theta", "morse_index", "count")
 
 
-class MapTiling(Tiling):
+class MapTiling(Planes):
     """Tile 0 holds the curves, every other some planes of the first axis.
 
     Args:
@@ -158,21 +162,14 @@ class MapTiling(Tiling):
 
     what = "points of the map"
 
-    def __init__(self, request: EquilibriumMap, scene: Scene, axes: dict[str, NDArray[np.float64]]) -> None:
-        self.request, self.scene, self.axes = request, scene, axes
-        self.first, *others = axes
-        self.plane = math.prod(len(axes[other]) for other in others)
-        self.others = tuple(len(axes[other]) for other in others)
-        planes, length = max(1, TILE_POINTS // self.plane), len(axes[self.first])
-        self.parts = [slice(k, min(k + planes, length)) for k in range(0, length, planes)]
-        self.count = 1 + len(self.parts)
+    def __init__(self, request: EquilibriumMap, scene: Scene, axes: dict[str, Floats]) -> None:
+        super().__init__(axes, TILE_POINTS)
+        self.request, self.scene, self.plane = request, scene, math.prod(self.others)
+        self.count += 1
 
     def items(self, index: int) -> int:
         """Points."""
-        if index == 0:
-            return 0
-        part = self.parts[index - 1]
-        return (part.stop - part.start) * self.plane
+        return super().items(index - 1) if index else 0
 
     def compute(self, index: int, context: RunContext) -> Dataset:
         """Solve some planes, or trace the curves."""
@@ -199,10 +196,7 @@ class MapTiling(Tiling):
 
     def assemble(self, tile: Tiles) -> Stream:
         """Join the planes and find which equilibria of different points are one, continued."""
-        about = {
-            name: Variable((name,), values, *self.scene.described()[name][1:])
-            for name, values in self.axes.items()
-        }
+        about = axis_variables(self.scene, self.axes)
         attrs = {
             "axes": tuple(self.axes),
             "layout": "six slots along root, the deepest first; beyond count NaN, codes _FillValue",
@@ -247,9 +241,8 @@ class MapTiling(Tiling):
         table = sheet_table(sheets.morse_index, sheets.branch, sheets.breaks)
         yield Dataset({}, groups={"sheets": Dataset(table)})
 
-    def _coefficients(self, index: int) -> tuple[NDArray[np.float64], ...]:
-        values = self.axes[self.first][self.parts[index - 1]]
-        return grid_coefficients(self.scene, {**self.axes, self.first: values})
+    def _coefficients(self, index: int) -> tuple[Floats, ...]:
+        return grid_coefficients(self.scene, self.axes_of(index - 1))
 
     def _shaped(self, slab: Slab, for_sheets: bool = False) -> dict[str, Variable]:
         arrays = {name: a.reshape(-1, *self.others, *a.shape[1:]) for name, a in vars(slab).items()}
@@ -258,7 +251,7 @@ class MapTiling(Tiling):
         return kept | {name: variables[name] for name in _FOR_SHEETS} if for_sheets else kept
 
 
-class RestingTiling(Tiling):
+class RestingTiling(Planes):
     """Some planes of the first axis of a mechanism's map; slots are as many as the most equilibria.
 
     Args:
@@ -269,34 +262,23 @@ class RestingTiling(Tiling):
 
     what = "points of the map"
 
-    def __init__(
-        self, request: EquilibriumMap, scene: Mechanism, axes: dict[str, NDArray[np.float64]]
-    ) -> None:
-        self.request, self.scene, self.axes = request, scene, axes
-        self.first, *others = axes
-        self.others = tuple(len(axes[other]) for other in others)
-        length = len(axes[self.first])
-        planes = max(1, RESTING_POINTS // math.prod(self.others))
-        self.parts = [slice(k, min(k + planes, length)) for k in range(0, length, planes)]
-        self.count = len(self.parts)
-
-    def items(self, index: int) -> int:
-        """Points."""
-        return (self.parts[index].stop - self.parts[index].start) * math.prod(self.others)
+    def __init__(self, request: EquilibriumMap, scene: Mechanism, axes: dict[str, Floats]) -> None:
+        super().__init__(axes, RESTING_POINTS)
+        self.request, self.scene = request, scene
 
     def compute(self, index: int, context: RunContext) -> Dataset:
         """Prove some planes."""
-        axes = {**self.axes, self.first: self.axes[self.first][self.parts[index]]}
         return self._tile(
-            map_resting_places(self.scene, axes, threads=context.threads, progress=lambda _: context.check())
+            map_resting_places(
+                self.scene, self.axes_of(index), threads=context.threads, progress=lambda _: context.check()
+            )
         )
 
     def assemble(self, tile: Tiles) -> Dataset:
         """Join the planes."""
         tiles = [dict(tile(index).variables) for index in range(self.count)]
         slots = max(one["count"].data.max(initial=0) for one in tiles)
-        described = self.scene.described()
-        variables = {name: Variable((name,), v, *described[name][1:]) for name, v in self.axes.items()}
+        variables = axis_variables(self.scene, self.axes)
         variables |= numbers("root", int(slots), "rank of the equilibrium by energy")
         for name, like in self.request.kept(tiles[0]).items():
             arrays = []
@@ -314,11 +296,7 @@ class RestingTiling(Tiling):
 
     def missing(self, index: int) -> Dataset:
         """No equilibria at the points."""
-        grid = (self.items(index) // math.prod(self.others), *self.others)
-        n, axes = (
-            len(self.scene.coordinates),
-            {**self.axes, self.first: self.axes[self.first][self.parts[index]]},
-        )
+        grid, n, axes = self.grid(index), len(self.scene.coordinates), self.axes_of(index)
         real, code = np.zeros((*grid, 0)), np.zeros((*grid, 0), dtype=np.int8)
         none = np.zeros(grid, dtype=np.int16)
         position, roots = np.zeros((*grid, 0, n)), np.zeros((*grid, 0, 2 * n), dtype=np.complex128)

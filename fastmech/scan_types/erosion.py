@@ -20,8 +20,13 @@ from fastmech.capture.select import require_damper
 from fastmech.disturbance.motion import require_constant_force
 from fastmech.errors import InputError, shown
 from fastmech.results import Dataset, Variable
-from fastmech.scan_types.axis import (
+from fastmech.scan_types.request import (
     Axis,
+    RunContext,
+    Scan,
+    Seed,
+    Tiles,
+    Tiling,
     arrays,
     check_duration,
     check_parameters,
@@ -29,8 +34,6 @@ from fastmech.scan_types.axis import (
     check_size,
     check_starts,
 )
-from fastmech.scan_types.request import Scan, Seed
-from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
 from fastmech.scene import STATE, Scene, nearest
 
 if TYPE_CHECKING:

@@ -6,31 +6,37 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from fastmech.arrays import Floats
 from fastmech.ensembles import checks
 from fastmech.ensembles.balance import energy_balance
 from fastmech.ensembles.integrate import integrate
-from fastmech.ensembles.spans import output_steps
+from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.status import FAILURES
 from fastmech.errors import InputError, shown
 from fastmech.mechanism.coefficients import force
-from fastmech.mechanism.geometry import constraints, positions
-from fastmech.mechanism.hamilton import momenta
-from fastmech.mechanism.reactions import reactions
+from fastmech.mechanism.geometry import constraints, positions, reactions
+from fastmech.mechanism.lagrange import momenta
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import Dataset, Variable, parts
-from fastmech.scan_types.axis import check_steps, state_units, told
-from fastmech.scan_types.request import HALVING, MethodName, Scan, failures
-from fastmech.scan_types.tiling import Each, Tiling
+from fastmech.scan_types.request import (
+    HALVING,
+    Each,
+    MethodName,
+    Scan,
+    Tiling,
+    check_steps,
+    failures,
+    state_units,
+    told,
+)
 from fastmech.scene import Scene, nearest
 from fastmech.step_limits.warning import step_warning
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Floats = NDArray[np.float64]
 
 #: Numbers of a section for every output.
 OUTPUT_NUMBERS = 30
@@ -107,7 +113,7 @@ class Motion(Scan):
         return [self.start.get(name, 0.0) for name in scene.state]
 
     @property
-    def _times(self) -> NDArray[np.float64]:
+    def _times(self) -> Floats:
         return np.linspace(0.0, self.t_end, self.outputs)
 
     def _lagrangian(self, scene: Scene | Mechanism) -> Dataset:
@@ -218,6 +224,6 @@ def _of_mechanism(mechanism: Mechanism, t: Floats, y: Floats) -> dict[str, Varia
     return variables
 
 
-def _states(y: NDArray[np.float64]) -> dict[str, Variable]:
+def _states(y: Floats) -> dict[str, Variable]:
     """States of one motion (time, 1, states) as a tile keeps them."""
     return {"y": Variable(("time", "component"), y[:, 0])}

@@ -12,8 +12,7 @@ from fastmech.atlas.snap import MOVING, find_snap, stable_at
 from fastmech.equilibria.find import Equilibrium, find_equilibria
 from fastmech.errors import InputError
 from fastmech.results import Dataset, Variable
-from fastmech.scan_types.request import Scan
-from fastmech.scan_types.tiling import Each, Tiling
+from fastmech.scan_types.request import Each, Scan, Tiling
 from fastmech.scene import Number, Scene, nearest
 
 if TYPE_CHECKING:

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from fastmech.basins.shock_limit import shock_limit
@@ -20,9 +21,20 @@ from fastmech.capture.steps import method_for
 from fastmech.ensembles.status import FAILURES, LABELS, Status
 from fastmech.errors import InputError
 from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers
-from fastmech.scan_types.axis import Axis, check_duration, check_parameters, check_rising, check_size
-from fastmech.scan_types.request import Scan, UsualMethod, failures
-from fastmech.scan_types.tiling import RunContext, Tiles, Tiling
+from fastmech.scan_types.request import (
+    Axis,
+    Planes,
+    RunContext,
+    Scan,
+    Tiles,
+    Tiling,
+    UsualMethod,
+    check_duration,
+    check_parameters,
+    check_rising,
+    check_size,
+    failures,
+)
 from fastmech.scene import Scene
 
 if TYPE_CHECKING:
@@ -97,12 +109,12 @@ class Snapping(Scan):
     @staticmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
         """The map with the critical curve."""
-        from fastmech.plots.snapping import draw_snapping
+        from fastmech.plots.basins import draw_snapping
 
         return draw_snapping(dataset.merged, scene)
 
 
-class SnappingTiling(Tiling):
+class SnappingTiling(Planes):
     """Every tile holds some decay rates with all their forces."""
 
     what = "motions under a fading force"
@@ -110,14 +122,7 @@ class SnappingTiling(Tiling):
     def __init__(self, request: Snapping, scene: Scene) -> None:
         self.request, self.scene = request, scene
         self.forces, self.rates = request.forces, request.rates
-        rows = max(1, TILE_POINTS // self.forces.size)
-        self.count = -(-self.rates.size // rows)
-        # Slow decay takes longer: each tile has rates from all over.
-        self.parts = [np.arange(k, self.rates.size, self.count) for k in range(self.count)]
-
-    def items(self, index: int) -> int:
-        """Motions."""
-        return self.parts[index].size * self.forces.size
+        super().__init__({"alpha": self.rates, "F0": self.forces}, TILE_POINTS, spread=True)
 
     def compute(self, index: int, context: RunContext) -> Dataset:
         """Ends and critical forces of some rates."""
@@ -133,33 +138,15 @@ class SnappingTiling(Tiling):
         critical = critical_forces(
             found, self.scene, tolerance=self.request.tolerance, threads=context.threads, **settings
         )
-        grid = ("alpha", "F0")
-        return Dataset(
-            {
-                "label": Variable(grid, found.label),
-                "turns": Variable((*grid, "angle"), found.turns),
-                "time": Variable(grid, found.time),
-                "status": Variable(grid, found.status),
-                "critical": Variable(("alpha",), critical),
-            }
-        )
+        return _tile(found.label, found.turns, found.time, found.status, critical)
 
     def assemble(self, tile: Tiles) -> Dataset:
         """Join the rates, in their order."""
         tiles = [tile(index) for index in range(self.count)]
-        order = np.argsort(np.concatenate(self.parts), kind="stable")
-        joined = {name: np.concatenate([part[name].data for part in tiles])[order] for name in tiles[0]}
+        joined = {name: self.joined(tiles, name) for name in tiles[0]}
         free, equilibria, start = force_free(self.scene, None)
-        found = SnappingMap(
-            self.forces,
-            self.rates,
-            equilibria,
-            start,
-            joined["label"],
-            joined["turns"],
-            joined["time"],
-            joined["status"],
-        )
+        ends = (joined[name] for name in ("label", "turns", "time", "status"))
+        found = SnappingMap(self.forces, self.rates, equilibria, start, *ends)
         side = 0.0 if self.forces[0] > 0.0 else np.pi
         limit = np.cos(side) * shock_limit(free, equilibria[start], "M2", side).found.impulse
         variables = _ends(found)
@@ -182,17 +169,17 @@ class SnappingTiling(Tiling):
 
     def missing(self, index: int) -> Dataset:
         """Rates that have not been computed."""
-        shape = (self.parts[index].size, self.forces.size)
-        grid = ("alpha", "F0")
-        return Dataset(
-            {
-                "label": Variable(grid, np.full(shape, -1)),
-                "turns": Variable((*grid, "angle"), np.zeros((*shape, 2), dtype=np.int64)),
-                "time": Variable(grid, np.full(shape, np.nan)),
-                "status": Variable(grid, np.full(shape, Status.UNDECIDED, dtype=np.int8)),
-                "critical": Variable(("alpha",), np.full(shape[0], np.nan)),
-            }
-        )
+        shape = self.grid(index)
+        nothing, undecided = np.full(shape, np.nan), np.full(shape, Status.UNDECIDED, dtype=np.int8)
+        turns = np.zeros((*shape, 2), dtype=np.int64)
+        return _tile(np.full(shape, -1), turns, nothing, undecided, nothing[:, 0])
+
+
+def _tile(*arrays: NDArray[Any]) -> Dataset:
+    """Labels, turns, times and statuses over (alpha, F0), and critical forces."""
+    dims = ("alpha", "F0", "angle")
+    names = ("label", "turns", "time", "status", "critical")
+    return Dataset({n: Variable(dims[: a.ndim], a) for n, a in zip(names, arrays, strict=True)})
 
 
 def _ends(found: SnappingMap) -> dict[str, Variable]:

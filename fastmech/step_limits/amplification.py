@@ -1,4 +1,4 @@
-"""What one step does to y' = lambda y: the stability function of every method, from its own coefficients.
+"""What one step does to y' = lambda y: every method's stability function, and its limits on the axes.
 
 Runge-Kutta methods multiply y by R(z), z = h lambda, R(z) = 1 + z b (I - z A)^-1 1 (Hairer, Wanner, *Solving
 ODEs II*, section IV.3), a polynomial for an explicit one. An Adams method maps its history; the roots of its
@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from fractions import Fraction
 from functools import cache
+from math import factorial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.integrators.method import Adams, ImplicitRungeKutta, Method, RungeKutta
-
-Floats = NDArray[np.float64]
+from fastmech.arrays import Flags, Floats
+from fastmech.integrators.methods import Adams, ImplicitRungeKutta, Method, RungeKutta, bashforth, moulton
 
 #: Ratio of neighbouring places of the search: finer than any lobe of a stability region.
 RATIO = 1.03
@@ -89,7 +89,7 @@ def amplification(method: Method, z: ArrayLike) -> Floats:
     return np.asarray(np.abs(np.linalg.eigvals(companion(method, z))).max(axis=-1))
 
 
-def amplifies(method: Method, z: ArrayLike, factor: ArrayLike) -> NDArray[np.bool_]:
+def amplifies(method: Method, z: ArrayLike, factor: ArrayLike) -> Flags:
     """Whether a step multiplies small motions by more than ``factor`` > 0: quicker to tell than by how much.
 
     For an Adams method whether a root of the characteristic polynomial lies outside a circle of that radius.
@@ -101,7 +101,7 @@ def amplifies(method: Method, z: ArrayLike, factor: ArrayLike) -> NDArray[np.boo
     return _outside(history_row(method, points) * radius ** -np.arange(1.0, method.predictor.size + 1.0))
 
 
-def _outside(weights: NDArray[np.complex128]) -> NDArray[np.bool_]:
+def _outside(weights: NDArray[np.complex128]) -> Flags:
     """Whether x^k - w_1 x^(k-1) - ... - w_k, of weights (..., k), has a root outside the unit circle.
 
     By Schur's recursion (Henrici, *Applied and Computational Complex Analysis I*, section 6.8): all roots lie
@@ -119,12 +119,10 @@ def _outside(weights: NDArray[np.complex128]) -> NDArray[np.bool_]:
     return outside
 
 
-def first_crossing(
-    beyond: Callable[[Floats], NDArray[np.bool_]], start: float, stop: float, divisions: int = DIVISIONS
-) -> float:
+def first_crossing(beyond: Callable[[Floats], Flags], start: float, stop: float) -> float:
     """Least x at which ``beyond`` turns true; 0.0 if so at ``start``, inf if not up to ``stop``.
 
-    From places that grow by :data:`RATIO` it is narrowed down by so many divisions. ``beyond`` is asked of
+    From places that grow by :data:`RATIO` it is narrowed down to rounding. ``beyond`` is asked of
     many places (m,) in one call: it pays to compute with arrays.
     """
     last = max(int(np.ceil(np.log(stop / start) / np.log(RATIO))), 0)
@@ -133,21 +131,90 @@ def first_crossing(
         found = np.flatnonzero(beyond(places))
         if found.size:
             at = float(places[found[0]])
-            return 0.0 if first + found[0] == 0 else _narrowed(beyond, at / RATIO, at, divisions)
+            return 0.0 if first + found[0] == 0 else _narrowed(beyond, at / RATIO, at)
     return float("inf")
 
 
-def _narrowed(
-    beyond: Callable[[Floats], NDArray[np.bool_]], below: float, above: float, divisions: int
-) -> float:
+def _narrowed(beyond: Callable[[Floats], Flags], below: float, above: float) -> float:
     """Where it turns true between two places: in the first part whose end is beyond, again and again.
 
     Importing SciPy's root finders takes longer than a first run, and every run asks for a step limit.
     """
-    for _ in range(divisions):
+    for _ in range(DIVISIONS):
         places = below + (above - below) * np.arange(1, PARTS) / PARTS
         found = np.flatnonzero(beyond(places))
         first = int(found[0]) if found.size else places.size
         ends = [below, *places.tolist(), above]
         below, above = ends[first], ends[first + 1]
     return below
+
+
+#: Growth a step that rounding explains.
+ROUNDED = 1e-11
+
+#: Where the search begins and ends: a method that is stable to the end has no limit.
+NEAREST, FARTHEST = 1e-3, 1e8
+
+
+def real_limit(method: Method) -> float:
+    """Largest x such that the method is stable at every -x' with 0 < x' <= x; inf if A-stable there."""
+    return first_crossing(lambda x: amplifies(method, -x, 1.0 + ROUNDED), NEAREST, FARTHEST)
+
+
+def imaginary_limit(method: Method) -> float:
+    """Largest y such that the method is stable at every i y', 0 < y' <= y; 0 if growth begins at once."""
+    if isinstance(method, RungeKutta):
+        return _explicit_imaginary(method)
+    if isinstance(method, Adams) and _first_growth(method) > 0:
+        return 0.0
+    return first_crossing(lambda y: amplifies(method, 1j * y, 1.0 + ROUNDED), NEAREST, FARTHEST)
+
+
+def _first_growth(method: Adams) -> Fraction:
+    """Leading coefficient of log|zeta| at z = iy by powers of y, of the root zeta near exp(z), exactly.
+
+    Rounding hides it where it is small. The root solves zeta = sum_a row_a(z) zeta^-a with rows of powers of
+    z; exp(z) misses that by r(z), which begins with the power ``order + 1``, so that log zeta is
+    z - r / (1 + D z + ...).
+    """
+    past = bashforth(method.start_steps + 1)
+    rows = [[Fraction(int(age == 0)), weight, Fraction(0)] for age, weight in enumerate(past)]
+    if method.corrects:
+        last, *others = moulton(method.order)
+        rows = [
+            [Fraction(int(age == 0)), weight + last * int(age == 0), last * row[1]]
+            for age, (weight, row) in enumerate(zip(others, rows, strict=True))
+        ]
+    first = method.order + 1
+    missed = [
+        Fraction(1, factorial(n))
+        - sum(
+            c * Fraction(-age) ** (n - power) / factorial(n - power)
+            for age, row in enumerate(rows)
+            for power, c in enumerate(row)
+            if n >= power
+        )
+        for n in (first, first + 1)
+    ]
+    slope = 1 + sum(age * row[1] for age, row in enumerate(rows))
+    coefficient = -missed[0] if first % 2 == 0 else -(missed[1] - slope * missed[0])
+    return coefficient * (-1) ** ((first + 1) // 2)
+
+
+def _explicit_imaginary(method: RungeKutta) -> float:
+    """From |R(iy)|^2 - 1, a polynomial in y^2 whose powers up to the order vanish."""
+    r = stability_polynomial(method)
+    powers = np.arange(r.size)
+    even, odd = np.zeros(r.size), np.zeros(r.size)
+    even[::2] = (r * (-1.0) ** (powers // 2))[::2]
+    odd[1::2] = (r * (-1.0) ** (powers // 2))[1::2]
+    growth = np.convolve(even, even) + np.convolve(odd, odd)  # coefficients by rising powers of y
+    growth[: method.order + 1] = 0.0
+    magnitude = np.convolve(np.abs(even), np.abs(even)) + np.convolve(np.abs(odd), np.abs(odd))
+    growth[np.abs(growth) < 1e-13 * magnitude] = 0.0
+    present = np.flatnonzero(growth)
+    if not present.size or growth[present[0]] > 0.0:
+        return 0.0
+    roots = np.roots(growth[present[0] : present[-1] + 1][::-1])
+    real = roots.real[(np.abs(roots.imag) < 1e-9 * np.abs(roots)) & (roots.real > 0.0)]
+    return float(real.min())

@@ -13,17 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.integrators.batch import Batch, observe_nothing
-from fastmech.integrators.method import Adams, Method, with_jacobian
-from fastmech.integrators.methods import find_method
+from fastmech.arrays import Floats
+from fastmech.integrators.explicit import Batch, observe_nothing
+from fastmech.integrators.methods import Adams, Method, find_method, with_jacobian
 from fastmech.kernels.jacobians import lagrange_inverse, lagrange_jacobian
 from fastmech.kernels.select import right_hand_side
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 from fastmech.stability.linearize import Rest, jacobian
 from fastmech.step_limits.amplification import first_crossing
-
-Floats = NDArray[np.float64]
 
 #: Half width of the differences [rad, rad/s]: its square and the rounding over it are both near 1e-11.
 WIDTH = 1e-5

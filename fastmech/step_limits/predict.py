@@ -7,14 +7,13 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.integrators.method import ImplicitRungeKutta, Method
-from fastmech.integrators.methods import find_method
+from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import require_own, spectra
 from fastmech.scene import Scene
 from fastmech.stability.linearize import Rest, jacobian
-from fastmech.step_limits.amplification import DIVISIONS, amplifies, first_crossing
+from fastmech.step_limits.amplification import amplifies, first_crossing
 
 #: Error of a mode's growth, a radian, that is let pass. A mode without damping sits on the edge of every
 #: region of stability; one that decays by less than this a radian is as good as undamped.
@@ -30,13 +29,11 @@ NEAREST, FARTHEST = 1e-3, 1e6
 SHORTER = 0.8 ** np.arange(8.0)
 
 
-def stable_step(
-    method: Method, eigenvalues: ArrayLike, growth: float = 0.0, divisions: int = DIVISIONS
-) -> float:
+def stable_step(method: Method, eigenvalues: ArrayLike, growth: float = 0.0) -> float:
     """Largest step [s] up to which no decaying mode grows by more than ``growth``; inf if A-stable.
 
     Growing modes set no limit. A mode that decays by less than :data:`GROWTH_PER_RADIAN` a radian may miss
-    its decay by that much, as one without damping may. It is found to rounding, or with fewer ``divisions``.
+    its decay by that much, as one without damping may.
     """
     values, slack = _decaying(eigenvalues)
     if not values.size or isinstance(method, ImplicitRungeKutta):
@@ -47,7 +44,7 @@ def stable_step(
         factor = 1.0 + growth + h[:, None] * slack
         return np.asarray(amplifies(method, h[:, None] * values, factor).any(axis=1))
 
-    return first_crossing(grow, NEAREST / fastest, FARTHEST / fastest, divisions)
+    return first_crossing(grow, NEAREST / fastest, FARTHEST / fastest)
 
 
 def is_stable(method: Method, eigenvalues: ArrayLike, h: float, growth: float = 0.0) -> bool:

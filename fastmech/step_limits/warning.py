@@ -20,17 +20,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.arrays import Floats
 from fastmech.errors import InputError, StepWarning, shown
-from fastmech.integrators.method import Adams, ImplicitRungeKutta, Method, RungeKutta
-from fastmech.integrators.methods import METHODS, find_method
+from fastmech.integrators.methods import METHODS, Adams, ImplicitRungeKutta, Method, RungeKutta, find_method
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.mechanism.lagrange import potential_energy, potential_gradient, potential_hessian
 from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import assess
 from fastmech.scene import Scene
-from fastmech.stability.arguments import require_scene
-from fastmech.stability.linearize import fill_state_matrix, small_motion
+from fastmech.stability.linearize import fill_state_matrix, require_scene, small_motion
 from fastmech.step_limits.amplification import amplifies, first_crossing
 from fastmech.step_limits.predict import (
     GROWTH_PER_RADIAN,
@@ -39,8 +38,6 @@ from fastmech.step_limits.predict import (
     small_eigenvalues,
     stable_step,
 )
-
-Floats = NDArray[np.float64]
 
 #: Configurations a side of the grid over both angles at which the small motion is looked at.
 SIDE = 24

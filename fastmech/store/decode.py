@@ -1,4 +1,4 @@
-"""HDF5 groups back into labelled data; the counterpart of `fastmech.store.encode`.
+"""HDF5 groups back into labelled data; the counterpart of `fastmech.store.write`.
 
 A file may come from anywhere, so nothing in it is trusted: only what the store itself writes is followed.
 That leaves out links to other files, data kept in other files, filters that HDF5 would load as plugins, texts

@@ -22,9 +22,8 @@ import numpy as np
 from fastmech.errors import InputError, printable
 from fastmech.results import FILL, Dataset, Variable
 from fastmech.store.provenance import history_line
-from fastmech.store.read import Results, open_results
+from fastmech.store.read import Results, choose, open_results, parse_selections, take
 from fastmech.store.schema import CHANGE, CONVENTIONS, OWN_ATTRS
-from fastmech.store.select import choose, parse_selections, take
 from fastmech.store.write import _aside, _readable_reasons
 
 #: Announces a piece of work with its items and gives who is told of finished ones.

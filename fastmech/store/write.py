@@ -1,4 +1,14 @@
-"""Writing a result file: whole under its final name, or not at all."""
+"""Writing a result file: whole under its final name, or not at all.
+
+A file for HDF5 on a disk that may fill up. HDF5 may crash the process when a write fails, at the latest when
+it closes the file. So it never learns of it: after the first failure nothing is written any more, and whoever
+writes asks for the failure.
+
+Chunks of streamed variables, packed in threads and written in order. HDF5 packs one chunk at a time, and that
+takes most of the time of writing a large result. Here its filters are applied outside of it: byte shuffling,
+deflate and the Fletcher-32 checksum, as HDF5's file format specification (sections "Shuffle filter", "Deflate
+filter", "Fletcher32 filter") lays them out. The bytes do not depend on the number of threads.
+"""
 
 from __future__ import annotations
 
@@ -7,23 +17,162 @@ import io
 import itertools
 import os
 import secrets
-from collections.abc import Iterator, Mapping
+import zlib
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import IO, Any, TypeAlias
 
 import h5py
+import numpy as np
+import numpy.typing as npt
+from numpy.typing import NDArray
 
 from fastmech.errors import InputError
-from fastmech.results import Dataset, Variable, check_name, checked_attrs
-from fastmech.store.encode import put_attrs, put_dataset
+from fastmech.results import Dataset, Variable, cf_attrs, check_name, checked_attrs
 from fastmech.store.schema import (
+    CHARACTERS,
+    COMPACT_BYTES,
     CONVENTIONS,
+    DIM_NUMBER,
+    DIM_NUMBERS,
+    DIMENSION_ONLY,
+    ENCODING,
     FORMAT,
     LIBRARY_VERSIONS,
     OWN_ATTRS,
     REQUIRED_ATTRS,
     SCHEMA_VERSION,
 )
+
+
+def put_dataset(group: h5py.Group, dataset: Dataset, numbers: Iterator[int]) -> None:
+    """Write a dataset with its groups into an empty group.
+
+    Its dimensions come first, so that all variables can refer to them.
+
+    Args:
+        group: where to.
+        dataset: what.
+        numbers: gives a number to each dimension, unique in the file.
+    """
+    variables = {name: _characters(variable) for name, variable in dataset.variables.items()}
+    sizes = {dim: size for variable in variables.values() for dim, size in variable.sizes.items()}
+    dim_numbers = {dim: np.int32(next(numbers)) for dim in sizes}
+    scales = {dim: put_scale(group, dim, size, variables) for dim, size in sizes.items()}
+    for dim, scale in scales.items():
+        scale.attrs[DIM_NUMBER] = dim_numbers[dim]
+    for name, variable in variables.items():
+        if name in scales:
+            stored = scales[name]
+        else:
+            stored = _put_variable(group, name, variable)
+            for axis, dim in enumerate(variable.dims):
+                stored.dims[axis].attach_scale(scales[dim])
+        if variable.dims:
+            stored.attrs[DIM_NUMBERS] = np.array([dim_numbers[dim] for dim in variable.dims])
+    put_attrs(group, dataset.attrs)
+    for name, inner in dataset.groups.items():
+        put_dataset(group.create_group(name, track_order=True), inner, numbers)
+
+
+def put_variable_attrs(stored: h5py.Dataset, variable: Variable | _Characters) -> None:
+    """Write what is said of a variable."""
+    put_attrs(stored, cf_attrs(variable.units, variable.long_name, variable.attrs, variable.data.dtype))
+
+
+def put_attrs(target: h5py.Group | h5py.Dataset, attrs: Mapping[str, Any]) -> None:
+    """Write attributes as `fastmech.results.checked_attrs` returns them."""
+    for name, value in attrs.items():
+        if isinstance(value, (str, tuple)):
+            encoded = _encoded(value)
+            value = encoded.astype(h5py.string_dtype("utf-8", encoded.dtype.itemsize))
+        target.attrs[name] = value
+
+
+def _encoded(texts: npt.ArrayLike) -> npt.NDArray[np.bytes_]:
+    """UTF-8, padded with null bytes, which reading drops, to the longest text."""
+    encoded = np.char.encode(np.asarray(texts, dtype=str), "utf-8")
+    return encoded.astype(f"S{max(1, encoded.dtype.itemsize)}")
+
+
+@dataclass(frozen=True)
+class _Characters:
+    """A variable of texts as its bytes, with one more dimension."""
+
+    dims: tuple[str, ...]
+    data: npt.NDArray[np.bytes_]
+    units: str
+    long_name: str
+    attrs: Mapping[str, Any]
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """Length of each dimension."""
+        return dict(zip(self.dims, self.data.shape, strict=True))
+
+
+def _characters(variable: Variable) -> Variable | _Characters:
+    """Texts as arrays of characters, which all netCDF readers decode alike; other variables as they are."""
+    if variable.data.dtype != object:
+        return variable
+    encoded = _encoded(variable.data)
+    length = encoded.dtype.itemsize
+    data = encoded.reshape(-1).view("S1").reshape(*encoded.shape, length)
+    dims = (*variable.dims, f"{CHARACTERS}{length}")
+    return _Characters(dims, data, variable.units, variable.long_name, variable.attrs)
+
+
+def put_scale(
+    group: h5py.Group, dim: str, size: int, variables: Mapping[str, Variable | _Characters]
+) -> h5py.Dataset:
+    """Make a dimension, of the variable of its name if there is one."""
+    if dim in variables:
+        scale = _put_variable(group, dim, variables[dim])
+        scale.make_scale(dim)
+    else:
+        # never written, so it takes no room: only its shape counts
+        scale = group.create_dataset(dim, shape=(size,), dtype=">f4")
+        scale.make_scale(f"{DIMENSION_ONLY}{size:10d}")
+    return scale
+
+
+def _put_variable(group: h5py.Group, name: str, variable: Variable | _Characters) -> h5py.Dataset:
+    data = variable.data
+    if data.nbytes <= COMPACT_BYTES:
+        stored = _create_compact(group, name, data.shape, data.dtype)
+    else:
+        stored = group.create_dataset(
+            name,
+            shape=data.shape,
+            dtype=data.dtype,
+            chunks=True,
+            compression="gzip",
+            compression_opts=4,
+            shuffle=True,
+            fletcher32=True,
+        )
+    if data.size:
+        stored[...] = data
+    if isinstance(variable, _Characters):
+        put_attrs(stored, {ENCODING: "utf-8"})
+    put_variable_attrs(stored, variable)
+    return stored
+
+
+def _create_compact(
+    group: h5py.Group, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]
+) -> h5py.Dataset:
+    # h5py's create_dataset drops the layout of scalars, hence the calls below it
+    properties = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    properties.set_layout(h5py.h5d.COMPACT)
+    properties.set_obj_track_times(False)
+    file_type = h5py.h5t.py_create(np.dtype(dtype), logical=True)
+    space = h5py.h5s.create_simple(shape)
+    return h5py.Dataset(h5py.h5d.create(group.id, name.encode(), file_type, space, dcpl=properties))
 
 
 def check_writable(path: str | Path, replace: bool = False) -> None:
@@ -47,60 +196,65 @@ def write_results(
     path: str | Path,
     *,
     scene_parameters: Mapping[str, Variable],
-    sections: Mapping[str, Dataset],
-    attrs: Mapping[str, Any],
+    sections: Mapping[str, Dataset | Stream],
+    attrs: Mapping[str, Any] | Callable[[], Mapping[str, Any]],
     replace: bool = False,
     aside: Path | None = None,
+    threads: int = 1,
+    deflate: bool = True,
 ) -> None:
     """Write a result file (see `fastmech.store.schema`); missing parent folders are made.
 
-    The file is composed in memory, written aside, flushed to the disk and then takes its final name at once:
-    under that name there is always a complete file, or the older one, or none.
+    The file is written aside, flushed to the disk and then takes its final name at once: under that name
+    there is always a complete file, or the older one, or none. Of streams a piece at a time is in memory.
 
     Args:
         path: the result file to be.
         scene_parameters: the scene's parameters, scalars with their units.
-        sections: one dataset for each section of the request.
-        attrs: attributes of the whole: at least those of `schema.REQUIRED_ATTRS`, most of which
-            `fastmech.store.provenance.provenance` gives.
+        sections: one dataset or stream for each section of the request.
+        attrs: attributes of the whole, or what gives them in the end: at least those of
+            `schema.REQUIRED_ATTRS`, most of which `fastmech.store.provenance.provenance` gives.
         replace: whether a file of that name may be replaced.
         aside: folder on the same file system in which it is written first, by default that of the file.
+        threads: threads that compress streams; the file does not depend on it.
+        deflate: whether streams are compressed, which takes most of the time.
 
     Raises:
         InputError: the folder is unwritable, the disk is full, the path is a folder, the file exists and
             `replace` is False, or the content does not fit the schema.
     """
-    image = _image(_checked_root(scene_parameters, sections), sections, _checked_root_attrs(attrs))
+    root = _checked_root(scene_parameters, sections)
     with _readable_reasons(path):
         target = _target(path, replace)
         temporary = _aside(aside / target.name if aside is not None else target)
         try:
-            with temporary.open("xb") as file:
-                file.write(image)
-                file.flush()
-                os.fsync(file.fileno())
+            with temporary.open("xb+", buffering=0) as disk, ThreadPoolExecutor(threads) as pool:
+                guarded = GuardedFile(disk)
+                try:
+                    with h5py.File(guarded, "w", libver=LIBRARY_VERSIONS, track_order=True) as file:
+                        numbers = itertools.count()
+                        put_dataset(file, root, numbers)
+                        for name, section in sections.items():
+                            group = file.create_group(name, track_order=True)
+                            if isinstance(section, Stream):
+                                chunks = ChunkWriter(pool, threads, deflate)
+                                _put_stream(group, section, numbers, guarded, chunks, deflate)
+                            else:
+                                put_dataset(group, section, numbers)
+                                guarded.check()
+                        put_attrs(file, _checked_root_attrs(attrs() if callable(attrs) else attrs))
+                except (RuntimeError, ValueError, OSError):
+                    guarded.check()  # HDF5's complaint follows from the disk's
+                    raise
+                guarded.check()
+                os.fsync(disk.fileno())
             _publish(temporary, target, replace)
         finally:
             with contextlib.suppress(OSError):
                 temporary.unlink(missing_ok=True)
 
 
-def _image(root: Dataset, sections: Mapping[str, Dataset], attrs: Mapping[str, Any]) -> memoryview:
-    """The file's bytes.
-
-    Built in memory, because HDF5 may crash the process when the disk is full; a plain write tells it.
-    """
-    buffer = io.BytesIO()
-    with h5py.File(buffer, "w", libver=LIBRARY_VERSIONS, track_order=True) as file:
-        put_attrs(file, attrs)
-        numbers = itertools.count()
-        put_dataset(file, root, numbers)
-        for name, dataset in sections.items():
-            put_dataset(file.create_group(name, track_order=True), dataset, numbers)
-    return buffer.getbuffer()
-
-
-def _checked_root(scene_parameters: Mapping[str, Variable], sections: Mapping[str, Dataset]) -> Dataset:
+def _checked_root(scene_parameters: Mapping[str, Variable], sections: Iterable[str]) -> Dataset:
     for name, parameter in scene_parameters.items():
         if parameter.dims or parameter.data.dtype != "float64":
             raise InputError(f"scene_parameters.{name}: must be a scalar of float64")
@@ -151,11 +305,11 @@ def _publish(temporary: Path, target: Path, replace: bool) -> None:
             if target.exists():
                 raise _already_exists(target) from None
             os.replace(temporary, target)
-    _flush_folder(target.parent)
+    flush_folder(target.parent)
 
 
-def _flush_folder(folder: Path) -> None:
-    # some systems cannot do it; the file itself is safe by now
+def flush_folder(folder: Path) -> None:
+    """Make new names in a folder durable, where the system can."""
     with contextlib.suppress(OSError):
         descriptor = os.open(folder, os.O_RDONLY)
         try:
@@ -175,3 +329,304 @@ def _readable_reasons(path: str | Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+class GuardedFile(io.RawIOBase):
+    """A binary file that keeps the first failure of the system to itself until `check` is called.
+
+    Args:
+        disk: the file, open for reading and writing without a buffer.
+    """
+
+    def __init__(self, disk: IO[bytes]) -> None:
+        self._disk = disk
+        self._failure: OSError | None = None
+
+    def check(self) -> None:
+        """Raise the failure, if there was one."""
+        if self._failure is not None:
+            raise self._failure
+
+    def write(self, data: object) -> int:
+        """Write all of the data, or nothing any more after a failure."""
+        view = memoryview(data).cast("B")  # type: ignore[arg-type]
+        done = 0
+        try:
+            while self._failure is None and done < len(view):
+                done += self._disk.write(view[done:])
+        except OSError as error:
+            self._failure = error
+        return len(view)
+
+    def readinto(self, buffer: object) -> int:
+        """Read as much as there is; what was never written reads as zeros."""
+        view = memoryview(buffer).cast("B")  # type: ignore[arg-type]
+        filled = 0
+        try:
+            while filled < len(view):
+                part = self._disk.read(len(view) - filled)
+                if not part:
+                    break
+                view[filled : filled + len(part)] = part
+                filled += len(part)
+        except OSError as error:
+            self._failure = self._failure or error
+        view[filled:] = bytes(len(view) - filled)
+        return len(view)
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        """Go to a place."""
+        return self._disk.seek(offset, whence)
+
+    def tell(self) -> int:
+        """The place."""
+        return self._disk.tell()
+
+    def truncate(self, size: int | None = None) -> int:
+        """Change the length."""
+        length = self._disk.tell() if size is None else size
+        try:
+            if self._failure is None:
+                self._disk.truncate(length)
+        except OSError as error:
+            self._failure = error
+        return length
+
+    def flush(self) -> None:
+        """Nothing waits here."""
+
+    def readable(self) -> bool:
+        """Yes."""
+        return True
+
+    def writable(self) -> bool:
+        """Yes."""
+        return True
+
+    def seekable(self) -> bool:
+        """Yes."""
+        return True
+
+
+#: Level of deflate: higher ones take many times as long for a few per cent.
+LEVEL = 1
+
+#: Chunks that wait to be written at most, for each thread.
+DEPTH = 4
+
+_CHECKSUM_BYTES = 4
+
+Corner: TypeAlias = "tuple[int, ...]"
+
+
+def packed(chunk: NDArray[Any], deflate: bool) -> bytes:
+    """A chunk as it lies in the file: shuffled and deflated, or as it is, with its checksum behind."""
+    if deflate:
+        parts = chunk.reshape(-1).view(np.uint8).reshape(-1, chunk.itemsize)
+        data = zlib.compress(np.ascontiguousarray(parts.T).data, LEVEL)
+    else:
+        data = chunk.tobytes()
+    return data + fletcher32(data).to_bytes(_CHECKSUM_BYTES, "little")
+
+
+def fletcher32(data: bytes) -> int:
+    """The checksum of HDF5's filter: sums of words of 16 bits, modulo 65535, which 0 stands for only in 0."""
+    even = data + b"\0" if len(data) % 2 else data
+    words = np.frombuffer(even, dtype=">u2").astype(np.uint64)
+    first = int(words.sum())
+    second = int(np.dot(words, np.arange(words.size, 0, -1, dtype=np.uint64)))
+    low, high = ((total - 1) % 65535 + 1 if total else 0 for total in (first, second))
+    return high << 16 | low
+
+
+class ChunkWriter:
+    """Writes parts of chunked variables.
+
+    Args:
+        pool: packs chunks.
+        threads: how many it has.
+        deflate: whether chunks are compressed.
+    """
+
+    def __init__(self, pool: Executor, threads: int, deflate: bool) -> None:
+        self._pool, self._most, self._deflate = pool, DEPTH * threads, deflate
+        self._open: dict[tuple[h5py.Dataset, Corner], tuple[NDArray[Any], int]] = {}
+        self._waiting: deque[tuple[h5py.Dataset, Corner, Future[bytes]]] = deque()
+
+    def write(self, stored: h5py.Dataset, place: tuple[slice, ...], array: NDArray[Any]) -> None:
+        """Write a part that is whole along all but the first dimensions, which ``place`` names.
+
+        A chunk is written when all of it has come; until then it is in memory.
+        """
+        starts = [piece.indices(size)[0] for piece, size in zip(place, stored.shape, strict=False)]
+        starts += [0] * (stored.ndim - len(starts))
+        for corner in _corners(starts, array.shape, stored.chunks):
+            ends = zip(corner, stored.chunks, stored.shape, strict=True)
+            whole = [(c, min(c + length, size)) for c, length, size in ends]
+            there = [
+                (max(low, start), min(high, start + size))
+                for (low, high), start, size in zip(whole, starts, array.shape, strict=True)
+            ]
+            source = array[tuple(slice(a - s, b - s) for (a, b), s in zip(there, starts, strict=True))]
+            target = tuple(slice(a - c, b - c) for (a, b), c in zip(there, corner, strict=True))
+            self._add(stored, corner, target, source, int(np.prod([b - a for a, b in whole])))
+
+    def finish(self) -> None:
+        """Write what waits."""
+        for (stored, corner), (chunk, _) in self._open.items():
+            self._submit(stored, corner, chunk)
+        self._open.clear()
+        while self._waiting:
+            self._write_first()
+
+    def _add(
+        self,
+        stored: h5py.Dataset,
+        corner: Corner,
+        target: tuple[slice, ...],
+        source: NDArray[Any],
+        needed: int,
+    ) -> None:
+        if source.shape == stored.chunks:
+            self._submit(stored, corner, np.ascontiguousarray(source))
+            return
+        chunk, filled = self._open.pop((stored, corner), (None, 0))
+        if chunk is None:
+            chunk = np.zeros(stored.chunks, dtype=stored.dtype)
+        chunk[target] = source
+        filled += source.size
+        if filled < needed:
+            self._open[stored, corner] = chunk, filled
+        else:
+            self._submit(stored, corner, chunk)
+
+    def _submit(self, stored: h5py.Dataset, corner: Corner, chunk: NDArray[Any]) -> None:
+        while len(self._waiting) >= self._most:
+            self._write_first()
+        self._waiting.append((stored, corner, self._pool.submit(packed, chunk, self._deflate)))
+
+    def _write_first(self) -> None:
+        stored, corner, future = self._waiting.popleft()
+        stored.id.write_direct_chunk(corner, future.result())
+
+
+def _corners(starts: list[int], shape: tuple[int, ...], chunks: tuple[int, ...]) -> Iterator[Corner]:
+    """First places of the chunks that a part touches."""
+    ranges = [
+        range(start // length * length, start + size, length)
+        for start, size, length in zip(starts, shape, chunks, strict=True)
+    ]
+    return product(*ranges)
+
+
+#: Where a part of the streamed variables lies: along the first dimension, or along several from the first on.
+Place: TypeAlias = "slice | tuple[slice, ...]"
+
+#: Part of the streamed variables, or small variables, groups and attributes that are known only then.
+Piece: TypeAlias = "tuple[Place, Mapping[str, NDArray[Any]]] | Dataset"
+
+#: Bytes of a chunk of a streamed variable, about: read as a whole, kept while it is filled.
+CHUNK_BYTES = 1 << 20
+
+
+@dataclass(frozen=True, eq=False)
+class Stream:
+    """A dataset that is computed while it is written.
+
+    Attributes:
+        fixed: its attributes and small variables, the coordinates among them.
+        plane: the streamed variables with one entry along their first dimension: types, units, meanings.
+        along: the streamed variables' first dimension, one of ``fixed``.
+        pieces: computes the content.
+        rows: entries along the first dimension that pieces have, about; a chunk has as many.
+    """
+
+    fixed: Dataset
+    plane: Mapping[str, Variable]
+    along: str
+    pieces: Callable[[], Iterator[Piece]]
+    rows: int = 8
+
+    @property
+    def nbytes(self) -> int:
+        """Size of the streamed variables in memory [bytes]."""
+        return sum(variable.data.nbytes for variable in self.plane.values()) * self.fixed.sizes[self.along]
+
+
+def in_memory(stream: Stream) -> Dataset:
+    """The dataset that a stream makes, whole."""
+    length = stream.fixed.sizes[stream.along]
+    arrays = {
+        name: np.empty((length, *variable.data.shape[1:]), variable.data.dtype)
+        for name, variable in stream.plane.items()
+    }
+    late: dict[str, Variable] = {}
+    attrs, groups = dict(stream.fixed.attrs), dict(stream.fixed.groups)
+    for piece in stream.pieces():
+        if isinstance(piece, Dataset):
+            late |= piece.variables
+            attrs |= piece.attrs
+            groups |= piece.groups
+            continue
+        place, parts = piece
+        for name, part in parts.items():
+            arrays[name][place] = part
+    streamed = {
+        name: Variable(about.dims, arrays[name], about.units, about.long_name, about.attrs)
+        for name, about in stream.plane.items()
+    }
+    return Dataset({**stream.fixed.variables, **streamed, **late}, attrs, groups)
+
+
+def _put_stream(
+    group: h5py.Group,
+    stream: Stream,
+    numbers: Iterator[int],
+    guarded: GuardedFile,
+    chunks: ChunkWriter,
+    deflate: bool,
+) -> None:
+    put_dataset(group, stream.fixed, numbers)
+    length = stream.fixed.sizes[stream.along]
+    for dim, size in Dataset(stream.plane).sizes.items():
+        if dim not in group:
+            put_scale(group, dim, size, {}).attrs[DIM_NUMBER] = np.int32(next(numbers))
+    rows = min(length, stream.rows)
+    stored = {name: _create(group, name, v, length, rows, deflate) for name, v in stream.plane.items()}
+    for piece in stream.pieces():
+        if isinstance(piece, Dataset):
+            put_dataset(group, piece, numbers)
+            continue
+        place, arrays = piece
+        for name, array in arrays.items():
+            chunks.write(stored[name], place if isinstance(place, tuple) else (place,), array)
+        guarded.check()
+    chunks.finish()
+    guarded.check()
+
+
+def _create(
+    group: h5py.Group, name: str, variable: Variable, length: int, rows: int, deflate: bool
+) -> h5py.Dataset:
+    data = variable.data
+    packing = {"compression": "gzip", "compression_opts": LEVEL, "shuffle": True} if deflate else {}
+    stored = group.create_dataset(
+        name,
+        shape=(length, *data.shape[1:]),
+        dtype=data.dtype,
+        chunks=_chunk(rows, data),
+        fletcher32=True,
+        **packing,
+    )
+    for axis, dim in enumerate(variable.dims):
+        stored.dims[axis].attach_scale(group[dim])
+    stored.attrs[DIM_NUMBERS] = np.array([group[dim].attrs[DIM_NUMBER] for dim in variable.dims])
+    put_variable_attrs(stored, variable)
+    return stored
+
+
+def _chunk(rows: int, plane: NDArray[Any]) -> tuple[int, ...]:
+    """Shape of chunks: a few rows of the first dimension by as much of the second as fits."""
+    second = plane.shape[1] if plane.ndim > 1 else 1
+    share = max(1, min(second, CHUNK_BYTES * second // max(1, rows * plane.nbytes)))
+    return (rows, *((share, *plane.shape[2:]) if plane.ndim > 1 else ()))

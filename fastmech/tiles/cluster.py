@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from fastmech.errors import InputError
 from fastmech.scan_types.request import RunContext
-from fastmech.tiles.identity import code_in_use
+from fastmech.tiles.section import code_in_use
 from fastmech.tiles.tile_file import Tile
 from fastmech.tiles.work import LOST, PERIOD, Task, Workers
 

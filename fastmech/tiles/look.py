@@ -1,24 +1,24 @@
-"""A look at a scan in progress: how far it is, and what there is of its result."""
+"""A look at a scan in progress, how far it is and what there is; one tile computed alone."""
 
 from __future__ import annotations
 
+import hashlib
 import time
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown, shown_name
+from fastmech.models.mechanism import Mechanism
 from fastmech.results import Dataset
 from fastmech.scan_types import scan_kinds
-from fastmech.scan_types.request import Request, request_of_text
-from fastmech.scan_types.tiling import Tiles
+from fastmech.scan_types.request import Request, RunContext, Tiles, read_request, request_of_text
 from fastmech.store.provenance import provenance
 from fastmech.store.read import open_results
-from fastmech.tiles.assemble import assembled, write_assembled
-from fastmech.tiles.identity import asked_for, identity_of
+from fastmech.store.write import write_results
 from fastmech.tiles.parts import Manifest, Parts
-from fastmech.tiles.section import TiledSection, sections_of
-from fastmech.tiles.tile_file import DamagedTileError
+from fastmech.tiles.section import TiledSection, asked_for, assembled, identity_of, sections_of
+from fastmech.tiles.tile_file import DamagedTileError, dataset_image, dataset_of_image
 
 
 @dataclass(frozen=True)
@@ -148,11 +148,11 @@ class ScanLook:
             "request": self.manifest.request,
             "partial": "a scan in progress",
         }
-        write_assembled(
+        write_results(
             out,
-            shown,
-            parameters=self.request.parameters,
-            attrs=lambda: {**provenance(1), **notes},
+            scene_parameters=self.request.parameters,
+            sections=shown,
+            attrs={**provenance(1), **notes},
             replace=replace,
             deflate=False,  # which takes minutes where the rest takes seconds
         )
@@ -177,3 +177,101 @@ class ScanLook:
                 return missing
 
         return tile
+
+
+@dataclass(frozen=True)
+class LoneTile:
+    """A tile that was computed alone.
+
+    Attributes:
+        request, section, index: which it is.
+        dataset: its content.
+        content: SHA-256 of the content, equal for equal bits.
+        seconds: wall time [s].
+        same: whether the tile that a run has kept has the same content; None: there is none.
+    """
+
+    request: Request
+    section: TiledSection
+    index: int
+    dataset: Dataset
+    content: str
+    seconds: float
+    same: bool | None
+
+    @property
+    def items(self) -> int:
+        """Items of work."""
+        return self.section.tiling.items(self.index)
+
+    @property
+    def what(self) -> str:
+        """What the items are."""
+        return self.section.tiling.what
+
+    def write(self, path: Path) -> None:
+        """Write it as a result file.
+
+        Raises:
+            InputError: it cannot be written or exists.
+        """
+        attrs = {"kind": self.section.scan.kind, "tile": self.index, **self.dataset.attrs}
+        write_results(
+            path,
+            scene_parameters=self.request.parameters,
+            sections={self.section.name: Dataset(self.dataset.variables, attrs)},
+            attrs={**provenance(1), "title": f"tile {self.index} of {self.section.name}"},
+        )
+
+
+def compute_alone(
+    path: Path,
+    tile: str,
+    context: RunContext,
+    target: Path,
+    text: str | None = None,
+    mechanism: Mechanism | None = None,
+) -> LoneTile:
+    """Compute one tile.
+
+    Args:
+        path: request file.
+        tile: ``SECTION:INDEX``.
+        context: threads to use.
+        target: the request's result file, whose finished tiles it is compared with.
+        text: of the request, by default that of the file.
+        mechanism: one of the user's own that the request is about.
+
+    Raises:
+        InputError: the request is wrong or has no such tile.
+    """
+    request = read_request(path, scan_kinds(), text, mechanism)
+    sections = {s.name: s for s in sections_of(request, identity_of(asked_for(request)))}
+    name, _, number = tile.partition(":")
+    where = f"--tile {shown_name(tile)}"
+    if name not in sections:
+        there = ", ".join(sections)
+        raise InputError(f"{where}: the request has no section {shown(name)}; it has {there}")
+    section = sections[name]
+    count = section.tiling.count
+    is_number = number.isascii() and number.isdigit() and len(number) <= len(str(count))
+    if not is_number or int(number) >= count:
+        raise InputError(f"{where}: {name} has the tiles 0 to {count - 1}")
+    index = int(number)
+    made = section.compute(index, context)
+    image = b"".join(chunk.data for chunk in made.image)
+    parts = Parts(target)
+    parts.look(list(sections.values()))
+    try:
+        kept = b"".join(chunk.data for chunk in dataset_image(parts.load(section, index)))
+    except DamagedTileError:
+        kept = None
+    return LoneTile(
+        request=request,
+        section=section,
+        index=index,
+        dataset=dataset_of_image(memoryview(image)),
+        content=hashlib.sha256(image).hexdigest(),
+        seconds=made.head.seconds,
+        same=None if kept is None else kept == image,
+    )

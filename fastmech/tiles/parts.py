@@ -31,9 +31,17 @@ from filelock import FileLock, Timeout
 
 from fastmech.errors import InputError
 from fastmech.results import Dataset
-from fastmech.tiles.durable import UNFINISHED, write_durably
 from fastmech.tiles.section import TiledSection
-from fastmech.tiles.tile_file import Bytes, DamagedTileError, Tile, TileHead, check_tile, tile_dataset
+from fastmech.tiles.tile_file import (
+    UNFINISHED,
+    Bytes,
+    DamagedTileError,
+    Tile,
+    TileHead,
+    check_tile,
+    tile_dataset,
+    write_durably,
+)
 
 #: Seconds to wait for a lock that `fastmech status` may hold for a moment.
 PATIENCE = 0.5
@@ -44,7 +52,7 @@ class Manifest:
     """What was asked for.
 
     Attributes:
-        asked: see `fastmech.tiles.identity.asked_for`.
+        asked: see `fastmech.tiles.section.asked_for`.
         request_file: name of the request file.
         request: its text.
         replace: whether the result may replace an older file.

@@ -8,25 +8,62 @@ import shlex
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError
-from fastmech.interrupts import signal_of
+from fastmech.interrupts import CrashedTilesError, Stopped, signal_of
 from fastmech.results import Dataset
-from fastmech.scan_types.request import Request, RunContext
-from fastmech.scan_types.tiling import Tiles
+from fastmech.scan_types.request import Request, RunContext, Tiles
 from fastmech.store.provenance import provenance
-from fastmech.tiles.assemble import assembled, write_assembled
-from fastmech.tiles.ends import CrashedTilesError, Stopped
-from fastmech.tiles.identity import asked_for, asked_of_result, differences, identity_of
+from fastmech.store.write import write_results
 from fastmech.tiles.parts import DamagedManifestError, Manifest, Parts
-from fastmech.tiles.report import RunReport
-from fastmech.tiles.section import TiledSection, sections_of
+from fastmech.tiles.section import (
+    TiledSection,
+    asked_for,
+    asked_of_result,
+    assembled,
+    differences,
+    identity_of,
+    sections_of,
+)
 from fastmech.tiles.tile_file import DamagedTileError, Tile
 from fastmech.tiles.work import Crash, Hiring, Task, compute_tiles, still_computing
+
+
+@dataclass
+class RunReport:
+    """What a run has done.
+
+    Attributes:
+        path: the result file.
+        tiles: tiles in all.
+        computed: tiles that this run has computed.
+        damaged: files of tiles that were found damaged and computed again.
+        was_complete: whether there was nothing to do.
+        seconds: wall time of this run [s].
+    """
+
+    path: Path
+    tiles: int = 0
+    computed: int = 0
+    damaged: list[Path] = field(default_factory=list)
+    was_complete: bool = False
+    seconds: float = 0.0
+
+    def summary(self) -> dict[str, str | int | bool | list[str]]:
+        """The same as plain values, for other programs."""
+        return {
+            "result": str(self.path),
+            "tiles": self.tiles,
+            "computed": self.computed,
+            "damaged": [str(path) for path in self.damaged],
+            "was_complete": self.was_complete,
+        }
+
 
 #: Seconds for tiles in hand to notice an interrupt before the user is told that they do not.
 PATIENCE = 0.3
@@ -277,10 +314,10 @@ class ScanRun:
             for section in self.sections:
                 seconds = sum(s for task, s in self.seconds.items() if task.section == section)
                 parts[section.name] = assembled(section, tiles(section), seconds)
-            write_assembled(
+            write_results(
                 self.parts.target,
-                parts,
-                parameters=self.request.parameters,
+                scene_parameters=self.request.parameters,
+                sections=parts,
                 attrs=self._attrs,
                 replace=self.replace,
                 aside=self.parts.folder,

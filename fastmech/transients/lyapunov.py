@@ -1,30 +1,125 @@
-"""``fm.largest_lyapunov``: the largest Lyapunov exponent along motions, by the tangent flow."""
+"""How small disturbances grow: ``fm.largest_lyapunov`` by the tangent flow, and growth before decay.
+
+Growth of small disturbances of an equilibrium before the eigenvalues rule, measured in energy. The norm of
+(xi, eta) is xi |K| xi + eta M eta with the small motion's matrices: twice the energy at a minimum; elsewhere
+the directions in which U falls count as if it rose, so that the norm stays one. Reactivity and amplification:
+Neubert, Caswell, Ecology 78 (1997); Trefethen, Embree, *Spectra and Pseudospectra*, chapter 14.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+import scipy.linalg
+from numba import types
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.arrays import Floats
 from fastmech.callee import callee
 from fastmech.ensembles import checks
-from fastmech.ensembles.energy_bounds import breaks_energy_bounds
+from fastmech.ensembles.fitting import breaks_energy_bounds
 from fastmech.ensembles.integrate import problem_of
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.problem import extreme_scenes
 from fastmech.ensembles.status import Status, failure_counts, failure_line
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError
+from fastmech.integrators.explicit import BlockRHS
+from fastmech.integrators.implicit import difference_jacobian
 from fastmech.integrators.methods import find_method
 from fastmech.integrators.tableaus import TABLEAUS
+from fastmech.jit import JACOBIAN, MATRIX, RHS, VECTOR, kernel, named_tuple
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
+from fastmech.stability.linearize import Rest, jacobian, linearized
 from fastmech.step_limits.warning import too_long, warn_of_step
-from fastmech.transients.tangent import Disturbed, Flow, Stages, advance_tangents
 
-Floats = NDArray[np.float64]
+
+class Flow(NamedTuple):
+    """Derivatives of the states and of their disturbances."""
+
+    rhs: BlockRHS
+    jacobian: BlockRHS
+    analytic: bool  #: else the Jacobian is taken from differences of ``rhs``
+
+
+class Stages(NamedTuple):
+    """An explicit Runge-Kutta method."""
+
+    a: Floats
+    b: Floats
+    c: Floats
+
+
+class Disturbed(NamedTuple):
+    """Trajectories and a disturbance of each, advanced in place."""
+
+    Y: Floats  #: states (dim, lanes)
+    D: Floats  #: disturbances (dim, lanes)
+    params: Floats  #: (count, lanes)
+    growth: Floats  #: (lanes,) is added the logarithm of what a disturbance has grown by
+
+
+FLOW = named_tuple([RHS, JACOBIAN, types.boolean], Flow)
+STAGES = named_tuple([MATRIX, VECTOR, VECTOR], Stages)
+DISTURBED = named_tuple([MATRIX, MATRIX, MATRIX, VECTOR], Disturbed)
+
+
+@kernel(types.void(FLOW, STAGES, DISTURBED, types.float64, types.float64, types.int64))
+def advance_tangents(
+    flow: Flow, method: Stages, lanes: Disturbed, begin: float, h: float, steps: int
+) -> None:
+    """Take states and disturbances so many steps of ``h`` on from time ``begin`` [s].
+
+    D' = J(y) D along the motion, by the same stages as y. After every step each disturbance is scaled to
+    length 1.
+    """
+    Y, D, stages = lanes.Y, lanes.D, method.b.shape[0]
+    dim, count = Y.shape
+    K, L = np.empty((stages, dim, count)), np.empty((stages, dim, count))
+    Z, W = np.empty((dim, count)), np.empty((dim, count))
+    J = np.empty((dim * dim, count))
+    for step in range(steps):
+        for s in range(stages):
+            t = begin + step * h + method.c[s] * h
+            for x in range(dim):
+                for i in range(count):
+                    Z[x, i], W[x, i] = Y[x, i], D[x, i]
+            for m in range(s):
+                weight = h * method.a[s, m]
+                for x in range(dim):
+                    for i in range(count):
+                        Z[x, i] += weight * K[m, x, i]
+                        W[x, i] += weight * L[m, x, i]
+            flow.rhs(t, Z, K[s], lanes.params)
+            if flow.analytic:
+                flow.jacobian(t, Z, J, lanes.params)
+            else:
+                difference_jacobian(flow.rhs, t, Z, J, lanes.params)
+            for x in range(dim):
+                for i in range(count):
+                    total = 0.0
+                    for y in range(dim):
+                        total += J[x * dim + y, i] * W[y, i]
+                    L[s, x, i] = total
+        for s in range(stages):
+            weight = h * method.b[s]
+            for x in range(dim):
+                for i in range(count):
+                    Y[x, i] += weight * K[s, x, i]
+                    D[x, i] += weight * L[s, x, i]
+        for i in range(count):
+            square = 0.0
+            for x in range(dim):
+                square += D[x, i] * D[x, i]
+            length = np.sqrt(square)
+            lanes.growth[i] += np.log(length)
+            for x in range(dim):
+                D[x, i] /= length
+
 
 #: Method of motion and tangents.
 METHOD = "dop853"
@@ -118,3 +213,50 @@ def largest_lyapunov(
         beyond |= breaks_energy_bounds(problem.coefficients, starts, Y.T)
         status[beyond & (status == Status.OK)] = Status.STEP_TOO_LARGE
     return LyapunovExponents(times[1:], exponents, status)
+
+
+#: Times looked at between 0 and the end.
+TIMES = 400
+
+
+class TransientGrowth(NamedTuple):
+    """What disturbances of an equilibrium do first."""
+
+    reactivity: float  #: largest initial growth rate of the norm [1/s]; 0 at a minimum: power only leaves
+    amplification: float  #: largest growth of the norm up to ``until``; 1 at a minimum
+    time: float  #: when that is reached [s]
+    until: float  #: [s]
+
+
+def transient_growth(scene: Scene, equilibrium: Rest, until: float = 10.0) -> TransientGrowth:
+    """Reactivity and largest amplification of small disturbances in the energy norm.
+
+    The force is the equilibrium's, frozen. At a saddle or maximum disturbances grow for ever, so that the
+    amplification is that at ``until`` [s].
+
+    Raises:
+        InputError: an argument is wrong.
+    """
+    until = checks.number("until", until, "s", above=0.0)
+    _, s = linearized(scene, equilibrium)
+    M = np.array([[s.m11, s.s12], [s.s12, 1.0]])
+    K = np.array([[s.k11, s.k12], [s.k12, s.k22]])
+    # |K| in the normal coordinates of M, where both are symmetric.
+    squares, modes = scipy.linalg.eigh(K, M)
+    back = modes.T @ M
+    norm = scipy.linalg.block_diag(back.T @ np.diag(np.abs(squares)) @ back, M)
+    root = np.linalg.cholesky(norm).T
+    A = root @ jacobian(scene, equilibrium) @ np.linalg.inv(root)
+    reactivity = float(np.linalg.eigvalsh((A + A.T) / 2.0)[-1])
+    times = np.linspace(0.0, until, TIMES + 1)
+    sizes, flow = [1.0], np.eye(4)
+    with np.errstate(over="ignore", invalid="ignore"):
+        step = scipy.linalg.expm(A * times[1])
+    for _ in times[1:]:
+        with np.errstate(over="ignore", invalid="ignore"):
+            flow = step @ flow
+        if not np.isfinite(flow).all():
+            raise InputError(f"until = {until:g} s: by then disturbances are beyond doubles")
+        sizes.append(float(np.linalg.norm(flow, 2)))
+    best = int(np.argmax(sizes))
+    return TransientGrowth(reactivity, sizes[best], float(times[best]), until)

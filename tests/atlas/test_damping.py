@@ -9,7 +9,7 @@ from fastmech.atlas.damping import trace_unreached
 from fastmech.equilibria.find import find_equilibria
 from fastmech.scene import Scene
 from fastmech.stability.classify import classify
-from fastmech.stability.modes import SIN_PHI, SIN_PSI, UNLOADED
+from fastmech.stability.linearize import SIN_PHI, SIN_PSI, UNLOADED
 
 #: The design's verified sets, otherwise Table 1: F0, c1, c2 and (phi, theta).
 VERIFIED = {

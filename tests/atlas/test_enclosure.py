@@ -7,8 +7,7 @@ import pytest
 
 from fastmech.atlas import cover
 from fastmech.atlas.continuation import trace
-from fastmech.atlas.cover import apart, solutions
-from fastmech.atlas.enclosure import System
+from fastmech.atlas.cover import System, apart, solutions
 from fastmech.atlas.folds import finish_on_edge, inside
 from fastmech.atlas.systems import Plane, fold
 from fastmech.scene import Scene

@@ -11,11 +11,9 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from fastmech.atlas.coincidence import Coincidence
-from fastmech.atlas.fold_points import find_folds
-from fastmech.atlas.folds import FoldSet, trace_folds
-from fastmech.atlas.map import map_equilibria
-from fastmech.equilibria.outcome import Outcome
+from fastmech.atlas.folds import FoldSet, find_folds, trace_folds
+from fastmech.atlas.map import Coincidence, map_equilibria
+from fastmech.equilibria.certificate import Outcome
 from fastmech.errors import InputError
 from fastmech.scene import Scene
 

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from fastmech.atlas.damping import trace_unreached
-from fastmech.atlas.fold_points import find_folds
-from fastmech.atlas.folds import trace_folds
+from fastmech.atlas.folds import find_folds, trace_folds
 from fastmech.atlas.map import EquilibriumMap, map_equilibria
 from fastmech.atlas.snap import find_snap
+from fastmech.equilibria.certificate import Outcome
 from fastmech.equilibria.find import find_equilibria
-from fastmech.equilibria.outcome import Outcome
 from fastmech.errors import InputError
 from fastmech.scan_types.equilibrium_map import EquilibriumMap as EquilibriumMapScan
 from fastmech.scene import Scene

@@ -8,12 +8,10 @@ from scenes import exact_unit_roots
 from test_folds import PAPER, PLANES, WEIGHT
 
 from fastmech.atlas.axes import coefficient_columns
-from fastmech.atlas.coincidence import Coincidence
 from fastmech.atlas.folds import trace_folds
-from fastmech.atlas.map import map_equilibria
-from fastmech.equilibria.outcome import Outcome
-from fastmech.equilibria.solution import solve_rows
-from fastmech.equilibria.solve import Solution
+from fastmech.atlas.map import Coincidence, map_equilibria
+from fastmech.equilibria.certificate import Outcome
+from fastmech.equilibria.solve import Solution, solve_rows
 from fastmech.scene import Scene
 
 Floats = np.typing.NDArray[np.float64]

@@ -9,9 +9,8 @@ import pytest
 from scenes import exact_unit_roots, loads, polynomial, random_scenes, roots
 
 from fastmech.atlas.axes import coefficient_columns
-from fastmech.equilibria.outcome import Outcome
-from fastmech.equilibria.solution import solve_rows
-from fastmech.equilibria.solve import Solution
+from fastmech.equilibria.certificate import Outcome
+from fastmech.equilibria.solve import Solution, solve_rows
 from fastmech.scene import Scene
 
 N = 10_000

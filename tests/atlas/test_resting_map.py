@@ -9,7 +9,7 @@ import pytest
 import sympy
 
 import fastmech as fm
-from fastmech.equilibria.outcome import Outcome
+from fastmech.equilibria.certificate import Outcome
 from fastmech.models.stability import VERDICTS
 
 

@@ -13,7 +13,7 @@ import pytest
 import sympy
 
 import fastmech as fm
-from fastmech.atlas.fold_points import find_folds
+from fastmech.atlas.folds import find_folds
 from fastmech.atlas.snap import find_snap, fold_free
 from fastmech.equilibria.find import find_equilibria
 from fastmech.errors import InputError

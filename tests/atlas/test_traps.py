@@ -8,9 +8,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from fastmech.atlas.coincidence import Coincidence
-from fastmech.atlas.map import map_equilibria
-from fastmech.equilibria.outcome import Outcome
+from fastmech.atlas.map import Coincidence, map_equilibria
+from fastmech.equilibria.certificate import Outcome
 from fastmech.scene import Scene
 
 PAPER = Scene(c2=1100 / 3, alpha=0.0)

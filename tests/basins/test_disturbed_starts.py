@@ -8,7 +8,7 @@ from disturbance.known import center, equilibria, known, oracle_size
 from scipy.stats import kstest
 
 from fastmech.basins.disturbed import disturb
-from fastmech.disturbance.size import uniform_ball, unit_directions
+from fastmech.disturbance.motion import uniform_ball, unit_directions
 from fastmech.ensembles.integrate import integrate
 
 SCENE = known("table_1")[0]

@@ -9,7 +9,7 @@ from disturbance.known import stiff_motion
 from scan_types.values import scipy_motion
 
 import fastmech as fm
-from fastmech.atlas.fold_points import find_folds
+from fastmech.atlas.folds import find_folds
 from fastmech.basins.copies import copy_labels, copy_of_label
 from fastmech.ensembles.status import Status
 from fastmech.mechanism.lagrange import metric

@@ -13,7 +13,7 @@ from scan_types.values import motion_rates, scipy_motion
 from scipy.integrate import solve_ivp
 
 import fastmech as fm
-from fastmech.atlas.fold_points import find_folds
+from fastmech.atlas.folds import find_folds
 from fastmech.basins.shock_limit import ShockLimit
 from fastmech.mechanism.geometry import positions
 from fastmech.mechanism.lagrange import kinetic_energy, metric, potential_energy

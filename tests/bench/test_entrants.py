@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from fastmech.bench import fused, package, peers
+from fastmech.bench.measure import STARTS, fast_starts, rest_starts
 from fastmech.bench.peers import entrants, entrants_of, installed
-from fastmech.bench.problem import STARTS, fast_starts, rest_starts
 from fastmech.integrators.methods import METHODS
 
 FEW = 12

@@ -11,8 +11,7 @@ import pytest
 from fastmech.bench import peers as everyone
 from fastmech.bench import report, tables
 from fastmech.bench.machine import multiply_adds
-from fastmech.bench.measure import Row, measure
-from fastmech.bench.problem import Entrant, rest_starts
+from fastmech.bench.measure import Entrant, Row, measure, rest_starts
 
 
 def exact(problem, threads):

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from fastmech.bench.extended import extended_truth, scene_rates
-from fastmech.bench.problem import fast_starts
-from fastmech.bench.tolerances import Estimate, estimates, random_case, report
+from fastmech.bench.measure import fast_starts
+from fastmech.bench.tolerances import Estimate, estimates, extended_truth, random_case, report, scene_rates
 from fastmech.mechanism.lagrange import angular_accelerations
 from fastmech.scene import Scene
 

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 import fastmech as fm
 from fastmech.basins.shock_limit import impulse_start, shock_limit
-from fastmech.capture.wells import prove_wells
+from fastmech.capture.mechanism import prove_wells
 
 TURN = 2.0 * np.pi
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from fastmech import open_results
-from fastmech.hardcases import containment, gallery, report
-from fastmech.hardcases.case import HardCase, Row
-from fastmech.hardcases.containment import CONTAINED, NUMBER, ONE_IN
+from fastmech.hardcases import report
+from fastmech.hardcases.report import CONTAINED, NUMBER, ONE_IN
+from fastmech.hardcases.walk import HardCase, Row
 from fastmech.integrators.methods import METHODS
 
 
@@ -21,7 +21,6 @@ def one_case(monkeypatch: pytest.MonkeyPatch):
     def gallery_of(error: float) -> None:
         row = Row("rk4", 0.1, 3, error, 1e-8, np.nan, "ok", True)
         cases = {"easy": HardCase("easy", "nothing", "a closed form", "pass", lambda quick: [row])}
-        monkeypatch.setattr(gallery, "CASES", cases)
         monkeypatch.setattr(report, "CASES", cases)
         monkeypatch.setattr(report, "METHODS", {name: METHODS[name] for name in ("rk4", "dop853", "gauss6")})
 
@@ -55,7 +54,7 @@ def test_table_result_file_and_pictures(invoke, one_case):
 
 def test_a_case_that_fails_ends_with_code_1(invoke, one_case, monkeypatch):
     one_case(1e-7)
-    monkeypatch.setattr(containment, "CONTAINED", {"rk4": 0.02})
+    monkeypatch.setattr(report, "CONTAINED", {"rk4": 0.02})
     result = invoke("hardcases", "--quick", "--out", "hard")
     assert result.exit_code == 1
     assert result.stdout.splitlines()[-1] == "1 of 1 cases failed: easy"
@@ -64,7 +63,7 @@ def test_a_case_that_fails_ends_with_code_1(invoke, one_case, monkeypatch):
 def test_neighbours_that_get_a_status_end_with_code_1(invoke, one_case, monkeypatch):
     """At 0.05 s the Adams method is beyond its limit: healthy trajectories have a status too."""
     one_case(1e-9)
-    monkeypatch.setattr(containment, "CONTAINED", {"ab6": 0.05})
+    monkeypatch.setattr(report, "CONTAINED", {"ab6": 0.05})
     result = invoke("hardcases", "--quick", "--out", "hard")
     assert result.exit_code == 1
     assert result.stdout.splitlines()[-1].endswith("failing trajectories are not contained")

@@ -113,7 +113,7 @@ def test_an_interrupt_is_json_with_what_was_done(invoke, tiny, monkeypatch):
     def interrupt(*arguments, **options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("fastmech.tiles.run.write_assembled", interrupt)
+    monkeypatch.setattr("fastmech.tiles.run.write_results", interrupt)
     result = invoke("run", tiny, "--out", "x.h5", "--json")
     assert result.exit_code == 130
     told = json.loads(result.stdout)

@@ -11,7 +11,7 @@ import pytest
 from cli.refusal import assert_refused
 
 from fastmech import Scene, open_results
-from fastmech.scan_types.disturbed_tiling import DisturbedTiling
+from fastmech.scan_types.disturbed import DisturbedTiling
 from fastmech.scan_types.motion import Motion
 
 MOTION = '[scan.a]\nkind = "motion"\noutputs = 3\nt_end = 0.1\n'
@@ -269,7 +269,7 @@ linear_directions = 2
 
 def test_the_command_of_a_crash_report_makes_that_tile(invoke, monkeypatch):
     """One tile of many crashes; the command in the message crashes too, and when it can, makes its bits."""
-    monkeypatch.setattr("fastmech.scan_types.disturbed_tiling.EVALUATIONS", 1)
+    monkeypatch.setattr("fastmech.scan_types.disturbed.EVALUATIONS", 1)
     request = Path("my scan.toml")
     request.write_text(MANY, encoding="utf-8")
     compute = DisturbedTiling.compute
@@ -288,7 +288,7 @@ def test_the_command_of_a_crash_report_makes_that_tile(invoke, monkeypatch):
     alone = invoke(*command[1:])
     assert alone.exit_code == 0
     with monkeypatch.context() as patched:
-        patched.setattr("fastmech.tiles.run.write_assembled", interrupt)
+        patched.setattr("fastmech.tiles.run.write_results", interrupt)
         assert invoke("run", request, "--out", "deep/x.h5").exit_code == 130
     again = invoke(*command[1:-2])
     assert "The tile kept beside the result is the same." in again.stdout

@@ -31,7 +31,7 @@ print(jit.compiled)
 ONE = """
 from fastmech import jit
 from fastmech.mechanism import coefficients
-from fastmech.atlas.regions import resolve_all
+from fastmech.atlas.sheets import resolve_all
 resolve_all.make()
 print(len(jit.compiled))
 """

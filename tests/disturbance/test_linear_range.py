@@ -8,7 +8,7 @@ import pytest
 import scipy.linalg
 from disturbance.known import center, equilibria, known, oracle_jacobian, oracle_size, scipy_motion
 
-from fastmech.disturbance.linear_range import linear_range
+from fastmech.disturbance.motion import linear_range
 from fastmech.errors import InputError
 
 SCENE = known("table_1")[0]

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fastmech.disturbance.observe import EXCURSION, LAST_OUTSIDE, SWUNG, observe_departure
+from fastmech.disturbance.motion import EXCURSION, LAST_OUTSIDE, SWUNG, observe_departure
 
 pytestmark = pytest.mark.nojit
 

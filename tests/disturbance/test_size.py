@@ -5,7 +5,7 @@ import pytest
 from disturbance.known import equilibria, known, oracle_size
 from oracles import oracle
 
-from fastmech.disturbance.size import size_at
+from fastmech.disturbance.motion import size_at
 from fastmech.scene import Scene
 
 pytestmark = pytest.mark.nojit

@@ -10,8 +10,7 @@ import pytest
 from ensembles.starts import Floats, random_starts
 
 from fastmech.ensembles import threads
-from fastmech.ensembles.energy_bounds import LANES, SLACK, breaks_energy_bounds, energies
-from fastmech.ensembles.fitting import speed_bound
+from fastmech.ensembles.fitting import LANES, SLACK, breaks_energy_bounds, energies, speed_bound
 from fastmech.kernels.sincos import REDUCTION_LIMIT
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.mechanism.geometry import positions, velocities

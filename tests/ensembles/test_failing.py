@@ -13,7 +13,7 @@ from fastmech.ensembles import run as running
 from fastmech.ensembles.ends import STOP_CODE, STOP_STATE, STOP_TIME
 from fastmech.ensembles.problem import system_problem
 from fastmech.ensembles.run import Ensemble, run_ensemble
-from fastmech.integrators.batch import Batch
+from fastmech.integrators.explicit import Batch
 from fastmech.integrators.methods import METHODS
 
 

@@ -9,7 +9,7 @@ import pytest
 from ensembles.starts import Floats, random_starts
 from numpy.typing import NDArray
 
-from fastmech.ensembles import run, spans
+from fastmech.ensembles import lanes, run
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.run import run_ensemble
 from fastmech.ensembles.status import Status
@@ -55,7 +55,7 @@ def test_calls_tasks_order_and_companions_do_not_matter(method: str, monkeypatch
         ).states
 
     right = through(np.arange(201), 1)
-    monkeypatch.setattr(spans, "TASK_BYTES", 2**12)
+    monkeypatch.setattr(lanes, "TASK_BYTES", 2**12)
     monkeypatch.setattr(run, "CALL_EVALUATIONS", 1)
     monkeypatch.setattr(run, "LANE_EVALUATIONS", 1)
     monkeypatch.setattr(run, "CALL_STEPS", 100)

@@ -10,9 +10,9 @@ import pytest
 from ensembles.starts import random_starts
 
 from fastmech.ensembles.integrate import integrate
+from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.problem import extreme_scenes, scene_problem
 from fastmech.ensembles.run import run_ensemble
-from fastmech.ensembles.spans import output_steps
 from fastmech.errors import InputError
 from fastmech.integrators.methods import METHODS
 from fastmech.kernels.select import right_hand_side

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fastmech.ensembles.parameters import Parameters
+from fastmech.ensembles.lanes import Parameters
 
 pytestmark = pytest.mark.nojit
 

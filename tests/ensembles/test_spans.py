@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from ensembles.starts import Floats
 
-from fastmech.ensembles.spans import MOST_PIECE_STEPS, PIECE_STEPS, PIECES, output_steps, way
+from fastmech.ensembles.lanes import MOST_PIECE_STEPS, PIECE_STEPS, PIECES, output_steps, way
 
 pytestmark = pytest.mark.nojit
 

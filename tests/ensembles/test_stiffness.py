@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 import fastmech as fm
 from fastmech.ensembles.fitting import damping_rate, stability_radius
-from fastmech.hardcases.references import motion
+from fastmech.hardcases.walk import motion
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import angular_accelerations
 from fastmech.scene import Scene

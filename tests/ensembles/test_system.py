@@ -363,26 +363,3 @@ def test_shipped_systems_move_as_scipy_says(name: str) -> None:
 
     right = solve_ivp(rhs, (0.0, 5.0), start, method="DOP853", rtol=1e-12, atol=1e-12).y[:, -1]
     np.testing.assert_allclose(fm.integrate(system, start, 5.0, 0.02, "dop853").y[0, 0], right, atol=1e-10)
-
-
-def test_published_shares_of_the_pendulum_and_the_lorenz_system() -> None:
-    """Within three standard errors of the published fraction, both samples' errors counted."""
-    pendulum, lorenz = shipped("pendulum"), shipped("lorenz")
-    rng = np.random.default_rng(5)
-    middle = np.arcsin(0.5)
-    starts = rng.uniform([middle - np.pi, -10.0], [middle + np.pi, 10.0], (2000, 2))
-    rest = np.abs(fm.integrate(pendulum.system, starts, 300.0, 0.1).y[0, :, 1]) < 1e-3
-    assert abs(rest.mean() - pendulum.PUBLISHED) < 3 * np.sqrt(0.152 * 0.848 * (1 / 2000 + 1 / 10_000))
-    starts = rng.uniform([-10.0, -20.0, 0.0], [10.0, 20.0, 0.0], (2000, 3))
-    escaped = fm.integrate(lorenz.system, starts, 300.0, 0.02).stop_code == 1
-    assert abs(escaped.mean() - 0.820) < 3 * np.sqrt(0.820 * 0.180 * (1 / 2000 + 1 / 4000))
-
-
-def test_published_shares_of_the_duffing_oscillator() -> None:
-    """All five within three standard errors, both samples' errors counted; the two smallest are alike."""
-    duffing = shipped("duffing")
-    n, published = 3000, np.array(duffing.PUBLISHED)
-    _, shares = duffing.attractors(np.random.default_rng(5).uniform([-1.0, -0.5], [1.0, 1.0], (n, 2)))
-    assert shares.shape == (5,)
-    error = np.sqrt(published * (1.0 - published) * (1 / n + 1 / 4000))
-    assert (np.abs(shares - published) < 3 * error).all()

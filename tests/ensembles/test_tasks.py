@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fastmech.ensembles.spans import SHARES, Task, tasks_of
+from fastmech.ensembles.lanes import SHARES, Task, tasks_of
 
 pytestmark = pytest.mark.nojit
 

@@ -9,7 +9,7 @@ import pytest
 from ensembles.references import rest_starts
 
 import fastmech as fm
-from fastmech.ensembles import interpolation
+from fastmech.ensembles import solve as module
 from fastmech.ensembles.solve import solve
 
 SCENE = fm.Scene(c2=1100 / 3, alpha=0.0)
@@ -46,7 +46,7 @@ def test_a_fast_start_costs_no_more_than_its_steps_ask_for(
         steps.append(int(solution.steps.max(initial=0)))
         return solution
 
-    monkeypatch.setattr(interpolation, "solve", counted)
+    monkeypatch.setattr(module, "solve", counted)
     starts = np.vstack([rest_starts(slow) * 0.5, [[0.3, 0.2, 1e3, 0.0]]])
     run = fm.integrate(SCENE, starts, 10.0, tol=1e-6)
     assert run.error is not None

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from oracles import oracle
 from scipy import optimize
 
-from fastmech.equilibria.balance import corner_cosine_squared, normal_form, pulls, wrap
+from fastmech.equilibria.search import corner_cosine_squared, normal_form, pulls, wrap
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 

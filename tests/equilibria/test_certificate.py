@@ -11,12 +11,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fastmech.equilibria.balance import EPS, expected_count, normal_form, pulls
-from fastmech.equilibria.certificate import certify, existence_radius
+from fastmech.equilibria.certificate import Outcome, certify, existence_radius
 from fastmech.equilibria.find import find_equilibria
-from fastmech.equilibria.outcome import Outcome
-from fastmech.equilibria.solution import solve_rows
-from fastmech.equilibria.solve import Solution
+from fastmech.equilibria.search import EPS, expected_count, normal_form, pulls
+from fastmech.equilibria.solve import Solution, solve_rows
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 

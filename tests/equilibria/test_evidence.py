@@ -10,10 +10,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from fastmech.equilibria.evidence import gather
-from fastmech.equilibria.find import find_equilibria
-from fastmech.equilibria.outcome import Outcome
-from fastmech.equilibria.polynomial import rest_polynomial
+from fastmech.equilibria.certificate import Outcome
+from fastmech.equilibria.find import find_equilibria, gather, rest_polynomial
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 

@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles import oracle
 
+from fastmech.equilibria.certificate import Outcome
 from fastmech.equilibria.find import Equilibria, find_equilibria
-from fastmech.equilibria.outcome import Outcome
 from fastmech.errors import InputError
 from fastmech.scene import Scene
 

@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 import fastmech as fm
-from fastmech.hardcases.case import Row
-from fastmech.hardcases.gallery import CASES, Result, gallery_dataset, gallery_markdown, verdict
-from fastmech.hardcases.references import motion
-from fastmech.hardcases.walk import counted, explicit_calls, path_eigenvalues
+from fastmech.hardcases.report import CASES, Result, gallery_dataset, gallery_markdown, verdict
+from fastmech.hardcases.walk import Row, counted, explicit_calls, motion, path_eigenvalues
 from fastmech.integrators.methods import METHODS
 from fastmech.step_limits.predict import stable_step
 

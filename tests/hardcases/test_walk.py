@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from fastmech.ensembles.integrate import integrate
-from fastmech.hardcases.case import REFUSED
-from fastmech.hardcases.references import ROUNDED, Goal
 from fastmech.hardcases.walk import (
     FAMILIES,
+    REFUSED,
+    ROUNDED,
+    Goal,
     admitted_step,
     claimed_row,
     status_row,
     walked,
 )
-from fastmech.integrators.method import Adams, ImplicitRungeKutta, RungeKutta
-from fastmech.integrators.methods import METHODS
+from fastmech.integrators.methods import METHODS, Adams, ImplicitRungeKutta, RungeKutta
 from fastmech.scene import Scene
 from fastmech.step_limits.warning import step_warning
 

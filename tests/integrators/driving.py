@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from integrators.systems import Floats
 
-from fastmech.integrators.batch import Batch, observe_nothing
+from fastmech.integrators.explicit import Batch, observe_nothing
 from fastmech.integrators.methods import METHODS
 from fastmech.jit import OBSERVER_SIGNATURE, RHS_SIGNATURE, kernel
 

@@ -8,8 +8,7 @@ from integrators.driving import A, W, drive, observe_times, polynomial, rotation
 from integrators.systems import LINEAR, Floats
 
 from fastmech.ensembles.run import run_ensemble
-from fastmech.integrators.method import Adams, RungeKutta
-from fastmech.integrators.methods import METHODS
+from fastmech.integrators.methods import METHODS, Adams, RungeKutta
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import RHS_SIGNATURE, interpreted, kernel
 from fastmech.kernels.select import with_terms

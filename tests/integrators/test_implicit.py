@@ -8,9 +8,8 @@ from integrators.driving import A, W, drive, one_block, polynomial, rotation
 from integrators.systems import Floats
 
 import fastmech as fm
-from fastmech.integrators.batch import observe_nothing
-from fastmech.integrators.method import ImplicitRungeKutta
-from fastmech.integrators.methods import METHODS
+from fastmech.integrators.explicit import observe_nothing
+from fastmech.integrators.methods import METHODS, ImplicitRungeKutta
 from fastmech.integrators.tableau import ImplicitTableau
 from fastmech.integrators.tableaus.implicit import IMPLICIT_TABLEAUS
 from fastmech.jit import RHS_SIGNATURE, kernel

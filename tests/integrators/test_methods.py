@@ -7,8 +7,7 @@ import pytest
 from integrators.driving import counting, drive
 
 from fastmech.errors import InputError
-from fastmech.integrators.method import ImplicitRungeKutta
-from fastmech.integrators.methods import METHODS, find_method
+from fastmech.integrators.methods import METHODS, ImplicitRungeKutta, find_method
 from fastmech.integrators.tableaus import TABLEAUS
 
 pytestmark = pytest.mark.nojit

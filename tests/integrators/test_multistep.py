@@ -10,8 +10,7 @@ import pytest
 from integrators.driving import A, W, counting, drive, observe_times, rotation
 from integrators.systems import Floats
 
-from fastmech.integrators.method import Adams, bashforth, moulton
-from fastmech.integrators.methods import METHODS
+from fastmech.integrators.methods import METHODS, Adams, bashforth, moulton
 from fastmech.jit import RHS_SIGNATURE, kernel
 
 ADAMS = {name: method for name, method in METHODS.items() if isinstance(method, Adams)}

@@ -16,10 +16,10 @@ from kernels.blocks_of_lanes import COMBINATIONS, kernel, lanes
 from numba import int64
 
 from fastmech import jit
-from fastmech.ensembles.energy_bounds import tell_energies
+from fastmech.ensembles.fitting import tell_energies
 from fastmech.integrators.explicit import WEIGHTS, add_rows
-from fastmech.integrators.method import Adams, RungeKutta
 from fastmech.integrators.methods import METHODS as REGISTRY
+from fastmech.integrators.methods import Adams, RungeKutta
 from fastmech.jit import MATRIX, VECTOR
 from fastmech.kernels.select import DAMPING, DECAY, FORCE, FORMULATIONS
 from fastmech.kernels.whole import whole_steps

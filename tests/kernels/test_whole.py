@@ -14,8 +14,7 @@ from scipy.integrate import solve_ivp
 import fastmech as fm
 from fastmech.ensembles.problem import scene_problem
 from fastmech.ensembles.run import Ensemble, run_ensemble
-from fastmech.integrators.method import Adams, RungeKutta, bashforth
-from fastmech.integrators.methods import METHODS
+from fastmech.integrators.methods import METHODS, Adams, RungeKutta, bashforth
 from fastmech.kernels.blocks import VECTOR_LANES, Rates
 from fastmech.kernels.sincos import REDUCTION_LIMIT
 from fastmech.kernels.whole import EVERY, MOST_STATES, Lanes, Steps, term_weights, whole_steps

@@ -11,8 +11,8 @@ from mechanism import draws
 from mechanism.draws import Draw, doubles
 from oracles import oracle
 
-from fastmech.mechanism import coefficients, geometry, hamilton, lagrange
-from fastmech.mechanism.reactions import reactions
+from fastmech.mechanism import coefficients, geometry, lagrange
+from fastmech.mechanism.geometry import reactions
 
 pytestmark = pytest.mark.nojit
 
@@ -138,17 +138,17 @@ QUANTITIES: dict[str, tuple[Callable[[Draw], Any], Callable[[Draw], Any], Callab
         draws.acceleration_scale,
     ),
     "momenta": (
-        lambda d: hamilton.momenta(d.scene, d.y),
+        lambda d: lagrange.momenta(d.scene, d.y),
         lambda d: oracle().momenta(d.params, d.q, d.rates),
         _momentum,
     ),
     "rates of momenta": (
-        lambda d: hamilton.rates(d.scene, d.q, d.p),
+        lambda d: lagrange.rates(d.scene, d.q, d.p),
         lambda d: oracle().hamilton_rhs(d.params, d.q, d.p, d.t)[:2],
         draws.rates_scale,
     ),
     "hamiltonian (15)": (
-        lambda d: hamilton.hamiltonian(d.scene, d.q, d.p),
+        lambda d: lagrange.hamiltonian(d.scene, d.q, d.p),
         lambda d: oracle().hamiltonian(d.params, d.q, d.p),
         draws.hamiltonian_scale,
     ),

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fastmech.mechanism.reactions import reactions
+from fastmech.mechanism.geometry import reactions
 from fastmech.scene import Scene
 
 pytestmark = pytest.mark.nojit

@@ -27,7 +27,7 @@ from devices import (
 
 import fastmech as fm
 from fastmech.bench.proofs import newton, unlisted
-from fastmech.equilibria.outcome import Outcome
+from fastmech.equilibria.certificate import Outcome
 from fastmech.errors import InputError
 from fastmech.models.equilibria import prove_equilibria, search_rows
 from fastmech.models.mechanism import Linear

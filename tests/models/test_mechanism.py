@@ -11,10 +11,10 @@ import sympy
 from oracles import TABLE_1, oracle
 
 import fastmech as fm
-from fastmech.mechanism.hamilton import momenta
 from fastmech.mechanism.lagrange import (
     angular_accelerations,
     kinetic_energy,
+    momenta,
     potential_energy,
     potential_gradient,
     potential_hessian,

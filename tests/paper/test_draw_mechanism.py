@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from oracles import TABLE_1, oracle
 
-from fastmech.paper.scene import STATIC_SCENE
-from fastmech.plots.mechanism import ROD, draw_mechanism, drawing_of
+from fastmech.paper.compute import STATIC_SCENE
+from fastmech.plots.equilibria import ROD, draw_mechanism, drawing_of
 from fastmech.plots.style import new_figure, png, style
 
 

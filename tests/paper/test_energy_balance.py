@@ -9,7 +9,7 @@ from oracles import TABLE_1, oracle
 
 from fastmech.ensembles.balance import energy_balance
 from fastmech.errors import InputError
-from fastmech.paper.scene import PAPER_SCENE, START
+from fastmech.paper.compute import PAPER_SCENE, START
 
 TIMES = [1.0, 2.0, 5.0, 10.0, 20.0]
 

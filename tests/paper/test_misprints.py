@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 from oracles import TABLE_1, oracle
 
-from fastmech.paper.coefficients import hamiltonian_16
 from fastmech.paper.compare import Verdict, evaluate
-from fastmech.paper.compute import Computed
-from fastmech.paper.misprints import Misprint, candidates
+from fastmech.paper.compute import PAPER_SCENE, Computed
+from fastmech.paper.misprints import Misprint, candidates, hamiltonian_16
 from fastmech.paper.rows import all_rows
-from fastmech.paper.scene import PAPER_SCENE
 
 KEYS = (
     "text_rod",

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from fastmech.plots.basin_colors import FURTHER, basin_color
+from fastmech.plots.basins import FURTHER, basin_color
 from fastmech.results import Dataset, Variable
 
 pytestmark = pytest.mark.nojit

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from plots.legibility import assert_legible, settings
 
-from fastmech.plots.labels import flag_codes
+from fastmech.plots.style import flag_codes
 from fastmech.results import Dataset
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import RunContext

@@ -14,9 +14,8 @@ from fastmech.capture.steps import coarse_steps, fastest_followed, shortest_step
 from fastmech.ensembles import checks
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scan_types import scan_kinds
-from fastmech.scan_types.axis import Axis
 from fastmech.scan_types.equilibrium_map import EquilibriumMap
-from fastmech.scan_types.request import RunContext, read_request
+from fastmech.scan_types.request import Axis, RunContext, read_request
 from fastmech.scan_types.snapping import Rates
 
 

@@ -356,8 +356,8 @@ def test_blocks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
     scan = Disturbed(trajectories=700, t_end=0.5, linear_directions=12)
     scene = deepest_first("table_1")[0]
     whole = scan.run(scene, RunContext(threads=2))
-    monkeypatch.setattr("fastmech.scan_types.disturbed_tiling.EVALUATIONS", 1)
-    monkeypatch.setattr("fastmech.scan_types.disturbed_tiling.DIRECTIONS", 5)
+    monkeypatch.setattr("fastmech.scan_types.disturbed.EVALUATIONS", 1)
+    monkeypatch.setattr("fastmech.scan_types.disturbed.DIRECTIONS", 5)
     assert scan.tiling(scene).count == len(whole["phi"].data) * 6
     small = scan.run(scene, RunContext(threads=1))
     for name in whole:

@@ -17,8 +17,7 @@ from fastmech.scan_types.snap import SnapScan
 from fastmech.scene import Scene
 from fastmech.store.provenance import provenance
 from fastmech.store.read import open_results
-from fastmech.store.stream import Stream, write_stream
-from fastmech.store.write import write_results
+from fastmech.store.write import Stream, write_results
 
 SCENE = Scene(c1=294.9, c2=92.85, F0=85.3, alpha=0.0)
 AXES = {
@@ -109,7 +108,7 @@ def test_tiles_agree_with_the_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert isinstance(result, Stream)
     path = tmp_path / "map.h5"
     attrs = {**provenance(1), "title": "map"}
-    write_stream(path, scene_parameters={}, sections={"map": result}, attrs=lambda: attrs)
+    write_results(path, scene_parameters={}, sections={"map": result}, attrs=lambda: attrs)
     with open_results(path) as results:
         streamed = results["map"].load()
     assert set(streamed) == set(whole)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from fastmech.ensembles.status import Status
 from fastmech.results import Dataset
-from fastmech.scan_types.tally import Tally
+from fastmech.scan_types.disturbed import Tally
 
 pytestmark = pytest.mark.nojit
 

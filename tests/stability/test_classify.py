@@ -18,8 +18,7 @@ from fastmech.equilibria.find import Equilibrium, find_equilibria
 from fastmech.errors import InputError
 from fastmech.scene import Scene
 from fastmech.stability.classify import Classification, classify
-from fastmech.stability.linearize import jacobian
-from fastmech.stability.modes import SIN_PHI, SIN_PSI, UNLOADED
+from fastmech.stability.linearize import SIN_PHI, SIN_PSI, UNLOADED, jacobian
 from fastmech.step_limits.measure import measured_stable_step
 
 PAPER = Scene(c2=1100 / 3, alpha=0.0)

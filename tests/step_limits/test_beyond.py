@@ -9,8 +9,7 @@ import pytest
 from ensembles.references import motions_of
 
 import fastmech as fm
-from fastmech.integrators.method import Adams
-from fastmech.integrators.methods import METHODS
+from fastmech.integrators.methods import METHODS, Adams
 from fastmech.step_limits.amplification import amplifies, companion, stability_function
 from fastmech.step_limits.predict import stable_step
 from fastmech.step_limits.warning import step_limit, step_warning

@@ -14,10 +14,14 @@ import fastmech as fm
 from fastmech.ensembles.status import Status
 from fastmech.equilibria.find import find_equilibria
 from fastmech.errors import InputError
-from fastmech.integrators.method import ImplicitRungeKutta, RungeKutta
-from fastmech.integrators.methods import METHODS
-from fastmech.step_limits.amplification import amplification, stability_function, stability_polynomial
-from fastmech.step_limits.axes import imaginary_limit, real_limit
+from fastmech.integrators.methods import METHODS, ImplicitRungeKutta, RungeKutta
+from fastmech.step_limits.amplification import (
+    amplification,
+    imaginary_limit,
+    real_limit,
+    stability_function,
+    stability_polynomial,
+)
 from fastmech.step_limits.measure import measured_stable_step
 from fastmech.step_limits.predict import largest_stable_step, stable_step
 from fastmech.step_limits.warning import impulse_limit, impulse_ratio, step_limit, step_warning

@@ -12,7 +12,7 @@ from ensembles.references import motions_of, rest_starts
 import fastmech as fm
 from fastmech.ensembles.problem import scene_problem
 from fastmech.ensembles.run import run_ensemble
-from fastmech.ensembles.turning import TURNED, TURNS, may_turn, watched
+from fastmech.ensembles.solve import TURNED, TURNS, may_turn, watched
 from fastmech.integrators.methods import METHODS
 
 TOO_LARGE = fm.Status.STEP_TOO_LARGE

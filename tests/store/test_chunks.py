@@ -13,10 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fastmech.results import Dataset, Variable
-from fastmech.store.chunks import packed
 from fastmech.store.provenance import provenance
 from fastmech.store.read import open_results
-from fastmech.store.stream import Piece, Stream, write_stream
+from fastmech.store.write import Piece, Stream, packed, write_results
 
 ROWS, COLUMNS = 23, 37
 VALUES = np.random.default_rng(3).normal(size=(ROWS, COLUMNS, 2))
@@ -64,13 +63,13 @@ def stream(rows: int, columns: int) -> Stream:
 def test_pieces_and_threads_do_not_show(
     deflate: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fastmech.store.stream.CHUNK_BYTES", 1000)
+    monkeypatch.setattr("fastmech.store.write.CHUNK_BYTES", 1000)
     images = []
     attrs = {**provenance(1), "title": "chunks"}
     for k, (rows, columns, threads) in enumerate([(5, COLUMNS, 1), (1, 1, 3), (ROWS, 4, 2), (7, 9, 2)]):
         path = tmp_path / f"{k}.h5"
         section = {"one": stream(rows, columns)}
-        write_stream(
+        write_results(
             path, scene_parameters={}, sections=section, attrs=lambda: attrs, threads=threads, deflate=deflate
         )
         with open_results(path) as results:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from fastmech.results import Dataset, Variable
-from fastmech.store.image import dataset_image, dataset_of_image
+from fastmech.tiles.tile_file import dataset_image, dataset_of_image
 
 pytestmark = pytest.mark.nojit
 

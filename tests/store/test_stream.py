@@ -15,7 +15,7 @@ from fastmech.errors import InputError
 from fastmech.results import Dataset, Variable
 from fastmech.store.provenance import provenance
 from fastmech.store.read import open_results
-from fastmech.store.stream import Piece, Stream, in_memory, write_stream
+from fastmech.store.write import Piece, Stream, in_memory, write_results
 
 VALUES = np.random.default_rng(1).normal(size=(50, 30, 6))
 
@@ -47,7 +47,7 @@ def test_pieces_come_back_as_one(tmp_path: Path) -> None:
     path = tmp_path / "stream.h5"
     other = Dataset({"z": Variable(("z",), np.arange(4.0), "s")})
     mass = {"m1": Variable((), np.array(2.0), "kg")}
-    write_stream(path, scene_parameters=mass, sections={"map": stream(whole), "small": other}, attrs=attrs)
+    write_results(path, scene_parameters=mass, sections={"map": stream(whole), "small": other}, attrs=attrs)
     with open_results(path) as results:
         section = results["map"]
         assert section.sizes == {"x": 50, "y": 30, "root": 6, "number": 3}
@@ -63,7 +63,7 @@ def test_pieces_come_back_as_one(tmp_path: Path) -> None:
 def test_xarray_opens_it(tmp_path: Path) -> None:
     xarray = pytest.importorskip("xarray")
     path = tmp_path / "stream.h5"
-    write_stream(path, scene_parameters={}, sections={"map": stream(whole)}, attrs=attrs)
+    write_results(path, scene_parameters={}, sections={"map": stream(whole)}, attrs=attrs)
     with xarray.open_dataset(path, group="map", engine="h5netcdf") as opened:
         assert dict(opened.sizes) == {"x": 50, "y": 30, "root": 6, "number": 3}
         assert opened["value"].dims == ("x", "y", "root")
@@ -77,7 +77,7 @@ def test_nothing_is_left_of_a_failure(tmp_path: Path) -> None:
         raise RuntimeError("stop")
 
     with pytest.raises(RuntimeError, match="stop"):
-        write_stream(
+        write_results(
             tmp_path / "stream.h5", scene_parameters={}, sections={"map": stream(failing)}, attrs=attrs
         )
     assert list(tmp_path.iterdir()) == []
@@ -87,7 +87,7 @@ def test_an_existing_file_is_kept(tmp_path: Path) -> None:
     path = tmp_path / "stream.h5"
     path.write_text("mine")
     with pytest.raises(InputError, match="exists already"):
-        write_stream(path, scene_parameters={}, sections={"map": stream(whole)}, attrs=attrs)
+        write_results(path, scene_parameters={}, sections={"map": stream(whole)}, attrs=attrs)
     assert path.read_text() == "mine"
 
 
@@ -101,11 +101,11 @@ from pathlib import Path
 sys.path.insert(0, {str(Path(__file__).parents[1])!r})
 from store.test_stream import attrs, stream, whole
 from fastmech.errors import InputError
-from fastmech.store.stream import write_stream
+from fastmech.store.write import write_results
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, ({room}, {room}))
 try:
-    write_stream(Path(sys.argv[1]), scene_parameters={{}}, sections={{"map": stream(whole)}}, attrs=attrs)
+    write_results(Path(sys.argv[1]), scene_parameters={{}}, sections={{"map": stream(whole)}}, attrs=attrs)
 except InputError as error:
     print(error)
 """
@@ -132,7 +132,7 @@ def test_pieces_may_lie_along_several_dimensions(tmp_path: Path) -> None:
                 yield (x, y), {"value": VALUES[x, y], "sum": VALUES[x, y].sum(axis=-1)}
 
     path = tmp_path / "stream.h5"
-    write_stream(path, scene_parameters={}, sections={"map": stream(blocks)}, attrs=attrs)
+    write_results(path, scene_parameters={}, sections={"map": stream(blocks)}, attrs=attrs)
     with open_results(path) as results:
         np.testing.assert_array_equal(results["map"]["value"].data, VALUES)
     np.testing.assert_array_equal(in_memory(stream(blocks))["sum"].data, VALUES.sum(axis=-1))

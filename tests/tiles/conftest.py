@@ -8,7 +8,7 @@ import pytest
 from fastmech.runner import run_request
 from fastmech.scan_types.request import RunContext
 from fastmech.store.read import open_results
-from fastmech.tiles.report import RunReport
+from fastmech.tiles.run import RunReport
 from fastmech.tiles.section import _tiling
 
 #: Eight tiles: a line's folds, six of its points, and a section that is not divided.

@@ -16,8 +16,8 @@ import pytest
 from tiles.conftest import Run, content
 
 from fastmech.errors import InputError
+from fastmech.interrupts import CrashedTilesError
 from fastmech.tiles.cluster import ClusterHiring, cluster
-from fastmech.tiles.ends import CrashedTilesError
 
 dask = pytest.importorskip("dask")
 distributed = pytest.importorskip("distributed")

@@ -8,9 +8,9 @@ import pytest
 from tiles.conftest import Run
 from tiles.test_run import stopped_after
 
+from fastmech.interrupts import Stopped
 from fastmech.scan_types.equilibrium_map import MapTiling
 from fastmech.scan_types.request import RunContext
-from fastmech.tiles.ends import Stopped
 
 TOLD = "this process ends with the tiles in hand"
 

@@ -11,9 +11,9 @@ from tiles.conftest import TILES, Run, content
 from tiles.test_run import stopped_after, tiles
 
 from fastmech.errors import InputError
+from fastmech.interrupts import Stopped
 from fastmech.runner import draw_results
 from fastmech.store.read import open_results
-from fastmech.tiles.ends import Stopped
 from fastmech.tiles.look import ScanLook
 
 

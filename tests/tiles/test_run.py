@@ -14,11 +14,11 @@ from filelock import FileLock
 from tiles.conftest import REQUEST, TILES, Run, content
 
 from fastmech.errors import InputError
+from fastmech.interrupts import CrashedTilesError, Stopped
 from fastmech.runner import run_request
 from fastmech.scan_types.equilibrium_map import MapTiling
 from fastmech.store.read import open_results
-from fastmech.tiles import identity
-from fastmech.tiles.ends import CrashedTilesError, Stopped
+from fastmech.tiles import section as identity
 from fastmech.tiles.look import ScanLook
 from fastmech.tiles.parts import Parts
 from fastmech.tiles.tile_file import DamagedTileError, check_tile
@@ -206,7 +206,7 @@ def test_an_interrupt_when_the_file_is_complete_says_so(
     assert run().was_complete
     assert not (tmp_path / "scan.h5.parts").exists()
     with monkeypatch.context() as patched:
-        patched.setattr("fastmech.tiles.run.write_assembled", interrupt)
+        patched.setattr("fastmech.tiles.run.write_results", interrupt)
         with pytest.raises(Stopped, match=rf"^interrupted; {TILES} of {TILES} tiles are kept"):
             run(fresh=True)
     assert content(tmp_path / "scan.h5") == whole

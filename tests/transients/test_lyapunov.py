@@ -11,8 +11,7 @@ import fastmech as fm
 from fastmech.equilibria.find import find_equilibria
 from fastmech.errors import InputError
 from fastmech.stability.linearize import jacobian
-from fastmech.transients.growth import transient_growth
-from fastmech.transients.lyapunov import largest_lyapunov
+from fastmech.transients.lyapunov import largest_lyapunov, transient_growth
 
 CONSERVATIVE = fm.Scene(c2=1100 / 3, beta=0.0, F0=0.0)
 

@@ -24,9 +24,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import entr
 
-from fastmech.basins.measures.dimension import BoundaryDimension, boundary_dimension
-from fastmech.basins.measures.labels import Floats, Integers, LabelsLike, check_map, check_point, known_labels
-from fastmech.basins.measures.slopes import PARTS, half_width, part_of
+from fastmech.arrays import Floats, Integers
+from fastmech.basins.measures.labels import LabelsLike, check_map, check_point, known_labels
+from fastmech.basins.measures.slopes import PARTS, BoundaryDimension, boundary_dimension, half_width, part_of
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
 
@@ -105,7 +105,7 @@ def fractal_boundary_test(
 
     Two witnesses are heard at several scales. The *share* of boxes that hold a boundary grows like e^1 where
     it is smooth and its pieces lie apart, and by one lesser power at all scales where it is fractal
-    (:func:`fastmech.basins.measures.dimension.boundary_dimension`). The *boundary basin entropy* over balls
+    (:func:`fastmech.basins.measures.slopes.boundary_dimension`). The *boundary basin entropy* over balls
     round random points, that of Puy et al., is the same for balls of all sizes where boundaries are similar
     to themselves, and changes with the size where they have a scale of their own.
 

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import binomtest
 
-from fastmech.basins.measures.labels import Floats, Integers, LabelsLike, check_labels, known_labels
+from fastmech.arrays import Floats, Integers
+from fastmech.basins.measures.labels import LabelsLike, check_labels, known_labels
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
 

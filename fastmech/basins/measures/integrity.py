@@ -23,7 +23,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import KDTree
 
-from fastmech.basins.measures.labels import Floats, LabelsLike, check_axes, check_map, check_point
+from fastmech.arrays import Floats
+from fastmech.basins.measures.labels import LabelsLike, check_axes, check_map, check_point
 from fastmech.basins.measures.norm import kinetic_norm, norm_on, state_index, states_of
 from fastmech.ensembles import checks
 from fastmech.equilibria.find import Equilibrium

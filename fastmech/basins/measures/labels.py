@@ -13,13 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import minimum_filter
 
+from fastmech.arrays import Floats, Integers
 from fastmech.errors import InputError
-
-Floats = NDArray[np.float64]
 
 #: Points by which a basin is wide where it is resolved: two on either side of one.
 WHOLE = 5
-Integers = NDArray[np.int64]
 
 
 class Labelled(Protocol):

@@ -1,8 +1,8 @@
 """The metric in which balls and shocks are measured: a matrix that turns departures into lengths.
 
 Angles [rad] and rates [rad/s] have no common length by themselves. For the mechanism it is given by the
-kinetic-energy norm at the equilibrium (:class:`fastmech.disturbance.size.Size`); for a system of your own it
-is a matrix that you state, the identity if all its states have one unit.
+kinetic-energy norm at the equilibrium (:class:`fastmech.disturbance.motion.Size`); for a system of your own
+it is a matrix that you state, the identity if all its states have one unit.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastmech.basins.measures.labels import Floats
-from fastmech.disturbance.size import size_of
+from fastmech.arrays import Floats
+from fastmech.disturbance.motion import size_of
 from fastmech.ensembles import checks
 from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError, shown, shown_name
@@ -21,7 +21,7 @@ from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import require_own
 from fastmech.scene import STATE, Scene, nearest
-from fastmech.stability.arguments import require_rest
+from fastmech.stability.linearize import require_rest
 
 #: Angles lie within so many turns of zero: what is beyond was meant in degrees.
 FEW_TURNS = 4

@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_cdt
 
-from fastmech.basins.measures.labels import Floats, Integers, LabelsLike, check_map, known_labels, too_thin
+from fastmech.arrays import Floats, Integers
+from fastmech.basins.measures.labels import LabelsLike, check_map, known_labels, too_thin
 from fastmech.ensembles import checks
 
 #: Strides with which a map is looked at, from coarse to fine.

@@ -7,12 +7,12 @@ from functools import partial
 
 import numpy as np
 
+from fastmech.arrays import Floats
 from fastmech.basins.label import labels_of
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.ensembles.status import Status
 from fastmech.equilibria.find import find_equilibria
-from fastmech.hardcases.case import Floats, HardCase, Row, energy, labels_row, row_of
-from fastmech.hardcases.walk import WITHIN, labellers, walked
+from fastmech.hardcases.walk import WITHIN, HardCase, Row, energy, labellers, labels_row, row_of, walked
 from fastmech.integrators.methods import find_method
 from fastmech.scene import Scene
 from fastmech.stability.linearize import jacobian

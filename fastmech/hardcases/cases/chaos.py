@@ -7,12 +7,23 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from fastmech.arrays import Floats
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
-from fastmech.hardcases.case import DRIVEN, Floats, HardCase, Row, energy, row_of
-from fastmech.hardcases.references import motion
-from fastmech.hardcases.walk import admitted_step, claimed_row, fixed_row, halving_tells, walked
+from fastmech.hardcases.walk import (
+    DRIVEN,
+    HardCase,
+    Row,
+    admitted_step,
+    claimed_row,
+    energy,
+    fixed_row,
+    halving_tells,
+    motion,
+    row_of,
+    walked,
+)
 from fastmech.scene import Scene
 from fastmech.transients.lyapunov import largest_lyapunov
 

@@ -7,10 +7,19 @@ from functools import partial
 
 import numpy as np
 
+from fastmech.arrays import Floats
 from fastmech.ensembles.balance import lowest_potential
 from fastmech.ensembles.integrate import Trajectories, integrate
-from fastmech.hardcases.case import DRIVEN, Floats, HardCase, Row, energy, row_of
-from fastmech.hardcases.walk import admitted_step, halving_tells, walked
+from fastmech.hardcases.walk import (
+    DRIVEN,
+    HardCase,
+    Row,
+    admitted_step,
+    energy,
+    halving_tells,
+    row_of,
+    walked,
+)
 from fastmech.scene import Scene
 
 SCENE = Scene(c2=1100 / 3, beta=0.0, F0=0.0)

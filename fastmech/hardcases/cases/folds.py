@@ -14,13 +14,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fastmech.atlas.fold_points import find_folds
+from fastmech.arrays import Floats
+from fastmech.atlas.folds import find_folds
 from fastmech.basins.label import labels_of
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import Status
 from fastmech.equilibria.find import Equilibria, find_equilibria
-from fastmech.hardcases.case import DRIVEN, Floats, HardCase, Row, labels_row, row_of
-from fastmech.hardcases.walk import admitted_step, labellers, walked
+from fastmech.hardcases.walk import (
+    DRIVEN,
+    HardCase,
+    Row,
+    admitted_step,
+    labellers,
+    labels_row,
+    row_of,
+    walked,
+)
 from fastmech.scene import Scene
 from fastmech.stability.linearize import jacobian
 

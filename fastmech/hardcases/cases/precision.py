@@ -8,13 +8,24 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.basins.label import labels_of
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import Status
 from fastmech.errors import InputError
-from fastmech.hardcases.case import REFUSED, Floats, HardCase, Row, labels_row, row_of
-from fastmech.hardcases.references import Boundary, boundary
-from fastmech.hardcases.walk import admitted_step, halving_tells, labellers, without_euler
+from fastmech.hardcases.walk import (
+    REFUSED,
+    Boundary,
+    HardCase,
+    Row,
+    admitted_step,
+    boundary,
+    halving_tells,
+    labellers,
+    labels_row,
+    row_of,
+    without_euler,
+)
 
 #: Distances from the boundary [rad], on both sides.
 DISTANCES = 10.0 ** -np.arange(3.0, 15.0)

@@ -8,11 +8,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fastmech.hardcases.case import HardCase, Row
-from fastmech.hardcases.references import ROUNDED, Goal, motion
-from fastmech.hardcases.walk import claimed_row, counted, explicit_calls, fixed_row, status_row, walked
-from fastmech.integrators.method import ImplicitRungeKutta
-from fastmech.integrators.methods import find_method
+from fastmech.hardcases.walk import (
+    ROUNDED,
+    Goal,
+    HardCase,
+    Row,
+    claimed_row,
+    counted,
+    explicit_calls,
+    fixed_row,
+    motion,
+    status_row,
+    walked,
+)
+from fastmech.integrators.methods import ImplicitRungeKutta, find_method
 from fastmech.step_limits.warning import step_warning
 
 ORACLE = "heyoka in 80-bit arithmetic; relative error of the final state"

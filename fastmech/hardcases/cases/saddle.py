@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.basins.label import labels_of
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.ensembles.status import Status
 from fastmech.equilibria.find import find_equilibria
-from fastmech.hardcases.case import Floats, HardCase, Row, labels_row, row_of
-from fastmech.hardcases.walk import admitted_step, labellers, without_euler
+from fastmech.hardcases.walk import HardCase, Row, admitted_step, labellers, labels_row, row_of, without_euler
 from fastmech.scene import Scene
 from fastmech.stability.linearize import jacobian
 

@@ -6,12 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fastmech.arrays import Floats
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import Status
 from fastmech.equilibria.find import find_equilibria
-from fastmech.hardcases.case import Floats, HardCase, Row, row_of, worst
-from fastmech.hardcases.references import motion
-from fastmech.hardcases.walk import claimed_row, walked
+from fastmech.hardcases.walk import HardCase, Row, claimed_row, motion, row_of, walked, worst
 from fastmech.integrators.methods import find_method
 from fastmech.scene import Scene
 from fastmech.step_limits.predict import largest_stable_step

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from analytic import ANGLES, along, cantor, gaps, koch, newton, rough, round_spots, smooth_map, stripes
 
-from fastmech.basins.measures.dimension import boundary_dimension
+from fastmech.basins.measures.slopes import boundary_dimension
 from fastmech.errors import InputError
 
 pytestmark = pytest.mark.nojit

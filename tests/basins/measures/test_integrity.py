@@ -6,7 +6,7 @@ from scipy.spatial.distance import cdist
 
 import fastmech as fm
 from fastmech.basins.measures.integrity import integrity
-from fastmech.disturbance.size import size_at
+from fastmech.disturbance.motion import size_at
 from fastmech.errors import InputError
 
 pytestmark = pytest.mark.nojit

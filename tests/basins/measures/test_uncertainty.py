@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from analytic import cantor, disc
 
-from fastmech.basins.measures.slopes import fit_counts
-from fastmech.basins.measures.uncertainty import uncertainty_exponent
+from fastmech.basins.measures.slopes import fit_counts, uncertainty_exponent
 from fastmech.errors import InputError
 
 pytestmark = pytest.mark.nojit

@@ -1,4 +1,4 @@
-"""Stability regions with a scene's eigenvalues, scaled by the largest stable step, one panel a method."""
+"""Pictures of the hard cases: stability regions with a scene's eigenvalues, and the drift of energies."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.integrators.method import Method
-from fastmech.plots.style import PALETTE, new_figure, style
+from fastmech.arrays import Floats
+from fastmech.integrators.methods import Method
+from fastmech.plots.style import PALETTE, entry, legend_below, new_figure, style
 from fastmech.results import Dataset
 from fastmech.step_limits.amplification import amplification
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -105,11 +107,10 @@ def _no_limit(value: float) -> str:
 
 
 def _legend(figure: Figure, bounded: bool) -> None:
-    from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    def mark(marker: str, color: str, label: str, face: str | None = None) -> Line2D:
-        return Line2D([], [], ls="", marker=marker, mfc=face or color, mec=color, ms=6, label=label)
+    def mark(marker: str, color: str, label: str, face: str | None = None) -> Artist:
+        return entry(label, ls="", marker=marker, mfc=face or color, mec=color, ms=6)
 
     stable = Patch(facecolor=PALETTE["sky"], edgecolor=PALETTE["blue"], alpha=0.5, label="no step amplifies")
     if bounded:
@@ -124,3 +125,25 @@ def _legend(figure: Figure, bounded: bool) -> None:
         label = f"h λ of the scene at h = {WITHOUT_LIMIT:g} s: no step is too long for stability"
         handles = [stable, mark("o", PALETTE["vermillion"], label)]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+
+
+#: Error that is drawn for zero, below the rounding of an energy.
+FLOOR = 1e-17
+
+
+def draw_energy_drift(histories: Mapping[str, tuple[Floats, Floats]], title: str, subtitle: str) -> Figure:
+    """``histories``: label -> (times [s], relative energy error), on two logarithmic axes.
+
+    ``title`` says whose error it is, ``subtitle`` start and step.
+    """
+    with style():
+        figure = new_figure(7.6, 4.6)
+        axes = figure.subplots()
+        for label, (times, error) in histories.items():
+            axes.loglog(times, np.maximum(np.abs(error), FLOOR), lw=1.1, label=label)
+        axes.set_xlabel("time t [s]")
+        axes.set_ylabel("|E − E(0)| / (E(0) − min U)")
+        axes.set_title(subtitle, loc="left", fontsize=9)
+        figure.suptitle(title, x=0.01, ha="left")
+        legend_below(figure, axes, 2)
+    return figure

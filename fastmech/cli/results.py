@@ -1,0 +1,176 @@
+"""``fastmech info``, ``export``, ``plot`` and ``status``: what a result file holds, and how far one is."""
+
+from __future__ import annotations
+
+import sys
+from datetime import timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from fastmech.cli.reporting import account, out_option, reporting_options, section_option
+
+if TYPE_CHECKING:
+    from fastmech.tiles.look import ScanProgress
+
+
+@click.command(name="info")
+@click.argument("file", metavar="[FILE]", required=False, type=click.Path(path_type=Path))
+@section_option("Only this section, or a group in it: SECTION/GROUP.")
+@click.option("--request", is_flag=True, help="Print the request that FILE was made from, as TOML.")
+@click.option("--system", is_flag=True, help="Show what fastmech runs on here: processor, vectors, caches.")
+def info(file: Path | None, section: str | None, request: bool, system: bool) -> None:
+    """Show a result file (origin, scene, variables), or this system."""
+    from rich.console import Console
+
+    if (file is None) != system:
+        raise click.UsageError("FILE: give a result file, or --system")
+    if (section is not None) + request + system > 1:
+        raise click.UsageError("--section, --request and --system exclude each other")
+    console = Console(width=None if sys.stdout.isatty() else 100)
+    if file is None:
+        from rich.table import Table
+
+        from fastmech.system_info import system_info
+
+        table = Table("", "", show_header=False, box=None)
+        for name, value in system_info().items():
+            table.add_row(f"[bold]{name}[/]", value)
+        console.print(table)
+        return
+    from fastmech.errors import printable
+    from fastmech.store.read import open_results
+    from fastmech.store.summary import summarize
+
+    with open_results(file) as results:
+        if request:
+            click.echo(printable(results.request, kept="\n\t"), nl=False)
+        else:
+            console.print(summarize(results, section))
+
+
+@click.command(name="export")
+@click.argument("file", metavar="FILE.h5", type=click.Path(path_type=Path))
+@click.option("--to", "form", type=click.Choice(["csv", "nc", "npz"]), required=True, help="Format.")
+@section_option("Only this section.")
+@click.option(
+    "--variable", "variables", metavar="NAME", multiple=True, help="Only this variable; repeatable."
+)
+@click.option(
+    "--select",
+    "selections",
+    metavar="NAME=VALUE|LOW:HIGH",
+    multiple=True,
+    help="The nearest point along a coordinate, or a range (--select F0=-10:10); repeatable.",
+)
+@out_option("Folder for the files [default: FILE without its ending].")
+@click.option("--fresh", is_flag=True, help="Replace files that exist.")
+@reporting_options
+def export(
+    file: Path,
+    form: str,
+    section: str | None,
+    variables: tuple[str, ...],
+    selections: tuple[str, ...],
+    out: Path | None,
+    fresh: bool,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Write a result file in another format.
+
+    Selected values must lie within their coordinate's range; along a dimension without coordinate they are
+    places counted from 0. What was taken is told.
+
+    csv: one table for each set of dimensions of a section; nc: netCDF-4, one file for each section (needs
+    xarray); npz: one file for each section.
+    """
+    from fastmech.store.export import export_results
+
+    selected: list[str] = []
+    folder = out if out is not None else file.with_suffix("")
+    with account("export", quiet, as_json) as told:
+        told.facts["selected"] = selected
+
+        def tell(line: str) -> None:
+            selected.append(line)
+            told.say(line)
+
+        for path in export_results(
+            file,
+            folder,
+            form,
+            section=section,
+            variables=variables,
+            selections=selections,
+            replace=fresh,
+            stage=told.bars.stage,
+            tell=tell,
+        ):
+            told.wrote(path)
+
+
+@click.command(name="plot")
+@click.argument("file", metavar="FILE", type=click.Path(path_type=Path))
+@out_option("Folder for the pictures [default: FILE without its ending].")
+@section_option("Only this section.")
+@click.option(
+    "--format", "form", type=click.Choice(["png", "pdf", "svg"]), default="png", help="Format [default: png]."
+)
+@reporting_options
+def plot(file: Path, out: Path | None, section: str | None, form: str, quiet: bool, as_json: bool) -> None:
+    """Draw every section of a result file as pictures."""
+    from fastmech.store.read import open_results
+
+    with account("plot", quiet, as_json) as told:
+        with open_results(file) as results:  # before kernels are compiled, which may take a minute
+            if section is not None:
+                results[section]  # says what there is
+        with told.bars.preparing():
+            from fastmech.runner import draw_results
+        for picture in draw_results(file, out, stage=told.bars.stage, section=section, form=form):
+            told.wrote(picture)
+
+
+@click.command(name="status")
+@click.argument("file", metavar="FILE.h5", type=click.Path(path_type=Path))
+@click.option(
+    "--snapshot",
+    metavar="OTHER.h5",
+    type=click.Path(path_type=Path),
+    help="Write what there is so far as a result file of its own.",
+)
+def status(file: Path, snapshot: Path | None) -> None:
+    """Show how far a running or interrupted scan is.
+
+    FILE.h5 is the result file to be, as given to fastmech run.
+    """
+    from fastmech.tiles.look import ScanLook
+
+    look = ScanLook(file)
+    _show_progress(file, look.progress())
+    if snapshot is not None:
+        look.write_snapshot(snapshot)
+        click.echo(f"Results so far: {snapshot}")
+
+
+def _show_progress(file: Path, progress: ScanProgress) -> None:
+    if progress.complete:
+        click.echo(f"{file}: complete")
+        return
+    for section in progress.sections:
+        items = f", {section.items_done:,} of {section.items:,} {section.what}" if section.tiles > 1 else ""
+        click.echo(f"{section.done:6,} of {section.tiles:,} tiles  {section.name}{items}")
+    done = sum(section.done for section in progress.sections)
+    tiles = sum(section.tiles for section in progress.sections)
+    click.echo(f"{done:6,} of {tiles:,} tiles  in all")
+    if progress.worker is None:
+        click.echo(f"{file}: nobody works on it; fastmech run goes on where it was")
+        return
+    rate = ""
+    if progress.running and progress.since:
+        rate = f", {progress.since / progress.running:.3g} tiles/s"
+    left = "" if progress.left is None else f", about {timedelta(seconds=int(progress.left))} left"
+    since = "" if progress.running is None else f" for {timedelta(seconds=int(progress.running))}"
+    click.echo(f"{file}: {progress.worker} works on it{since}{rate}{left}")
