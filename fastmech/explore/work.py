@@ -67,7 +67,7 @@ def _equilibria(device: Device, message: Any, tell: Progress) -> Iterator[bytes]
         rows.append(row)
         tell(0)
     drawn = device.drawn(message.parameters, [row["position"] for row in rows])
-    axes = {name: np.linspace(*ends, message.num) for name, ends in message.axes.items()}
+    axes = {name: grid(ends, message.num - 1) for name, ends in message.axes.items()}
     energy = device.energy(message.parameters, device.states(axes, message.fixed))
     header = _header(
         device, message, message.num - 1, rows=rows, certificate=found.certificate.sentence,
