@@ -4,11 +4,12 @@ VENV := .venv
 BIN := $(VENV)/bin
 OUT ?= results
 
-.PHONY: help demo test lint bench clean
+.PHONY: help demo test test-browser lint bench clean
 
 help:
 	@echo "make demo   install, run scans/paper.toml and the paper report, say where the results are"
 	@echo "make test   install and run the tests"
+	@echo "make test-browser   the live explorer in chromium"
 	@echo "make lint   formatter, linter and type checker"
 	@echo "make bench  speed against error, side by side with other integrators"
 	@echo "make clean  remove the virtual environment and build output (results stay)"
@@ -45,6 +46,11 @@ test: $(VENV)/.test
 	$(BIN)/python -m pytest -n auto
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -n auto -m nojit
 	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest -n auto -m nojit
+
+# The explorer in a real browser, Debian's chromium.
+test-browser: $(VENV)/.test
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[browser]'
+	$(BIN)/python -m pytest tests/explore -s
 
 lint: $(VENV)/.lint
 	$(BIN)/ruff format --check .

@@ -66,6 +66,7 @@ if TYPE_CHECKING:
     from fastmech.models.equilibria import find_equilibria
     from fastmech.models.mechanism import Mechanism
     from fastmech.models.stability import classify
+    from fastmech.plots.animation import animate
     from fastmech.scene import Scene
     from fastmech.step_limits.predict import largest_stable_step
     from fastmech.step_limits.warning import step_warning
@@ -92,6 +93,7 @@ _MODULES = {
     "Torque": "fastmech.models.elements",
     "TorsionDamper": "fastmech.models.elements",
     "TorsionSpring": "fastmech.models.elements",
+    "animate": "fastmech.plots.animation",
     "angles": "fastmech.models.coordinates",
     "barrier_tree": "fastmech.capture.barriers",
     "basin_entropy": "fastmech.basins.measures.entropy",
@@ -165,6 +167,7 @@ __all__ = [
     "TorsionDamper",
     "TorsionSpring",
     "angles",
+    "animate",
     "barrier_tree",
     "basin_entropy",
     "basin_fractions",

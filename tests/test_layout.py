@@ -55,6 +55,7 @@ LAYERS = (
     "hardcases",
     "bench",
     "faults",
+    "explore",
     "cli",
     "__main__",
 )

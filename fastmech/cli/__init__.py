@@ -25,6 +25,7 @@ COMMANDS = {
     "info": "results",
     "export": "results",
     "plot": "results",
+    "explore": "explore",
     "equilibria": "equilibria",
     "paper": "reports",
     "hardcases": "reports",

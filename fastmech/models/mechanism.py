@@ -254,24 +254,28 @@ class Mechanism:
         Ends are (m, 2, 2), sizes the values [SI] of masses, stiffnesses, coefficients and loads' means.
         Nothing of a mechanism in space.
         """
-        import sympy
-
         if any(len(place) != 2 for place in (*self.points.values(), *(d[2] for d in self._drawn))):
             return {}, []
         values, states = list(self.parameters.values()), self._split(q, 1)
-        symbols = [*self._symbols, *self._constants]
-        sizes = [d[1].mean_at(self.parameters) if isinstance(d[1], Load) else d[1] for d in self._drawn]
-        numbers = sympy.lambdify(self._constants, sizes)(*values)
-
-        def evaluated(expressions: list[Any]) -> Floats:
-            found = sympy.lambdify(symbols, expressions, "numpy", cse=True)(*states, *values)
-            shape = states.shape[1:]
-            return np.stack([np.broadcast_to(np.float64(one), shape) for one in found], axis=-1)
-
-        points = {name: evaluated(list(place)) for name, place in self.points.items()}
-        ends = [evaluated([*a, *b]).reshape(-1, 2, 2) for *_, a, b in self._drawn]
+        sizes, place_of = self._placing
+        numbers = sizes(*values)
+        found = [np.broadcast_to(np.float64(one), states.shape[1:]) for one in place_of(*states, *values)]
+        columns, named = np.stack(found, axis=-1), 2 * len(self.points)
+        points = {name: columns[:, 2 * k : 2 * k + 2] for k, name in enumerate(self.points)}
+        ends = np.moveaxis(columns[:, named:].reshape(-1, len(self._drawn), 2, 2), 1, 0)
         kinds = [kind for kind, *_ in self._drawn]
         return points, list(zip(kinds, map(float, numbers), ends, strict=True))
+
+    @cached_property
+    def _placing(self) -> tuple[Any, Any]:
+        """Sizes of what is drawn, of parameters, and places, of coordinates and parameters."""
+        import sympy
+
+        sizes = [d[1].mean_at(self.parameters) if isinstance(d[1], Load) else d[1] for d in self._drawn]
+        places = [*self.points.values(), *(end for *_, a, b in self._drawn for end in (a, b))]
+        components = [component for place in places for component in place]
+        symbols = [*self._symbols, *self._constants]
+        return sympy.lambdify(self._constants, sizes), sympy.lambdify(symbols, components, "numpy", cse=True)
 
     def energy(self) -> Any:
         """T + U, loads at their means, as an expression of coordinates, rates and parameters.
@@ -397,7 +401,7 @@ class Mechanism:
 
 
 #: Names of what follows from the equations.
-_MADE = ("equations", "_statics", "prints", "derived", "_numpy")
+_MADE = ("equations", "_statics", "prints", "derived", "_numpy", "_placing")
 
 #: Mechanisms without some of their terms, by what tells them apart.
 _with_terms: dict[tuple[str, ...], Mechanism] = {}

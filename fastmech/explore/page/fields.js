@@ -1,0 +1,217 @@
+// Views over two states or two parameters: the landscape, the basin map and the atlas.
+import { Plane, canvas, choice, css, draggable, element, panel, short } from "./ink.js";
+
+// Okabe and Ito's colours and further ones as in the package's pictures; told apart by colour-blind readers.
+const COLORS = ["#56B4E9", "#E69F00", "#009E73", "#F0E442", "#CC79A7", "#0072B2", "#D55E00", "#a7d8ba", "#6200ff", "#4e89ff", "#3b766c", "#a7ffb1", "#62d8ff", "#a7450a", "#76c480", "#ce00a7", "#c4d880", "#62c4c4"];
+const CIVIDIS = [[0, 34, 78], [53, 69, 108], [102, 105, 112], [148, 142, 119], [200, 184, 102], [254, 232, 56]];
+
+const rgb = (hex) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16));
+function cividis(s) {
+  const t = Math.min(0.9999, Math.max(0, s)) * 5, k = Math.floor(t);
+  return CIVIDIS[k].map((v, j) => v + (t - k) * (CIVIDIS[k + 1][j] - v));
+}
+
+// A picture with one pixel for each point (i along x, j along y), colour by `of(i, j)`.
+function picture(nx, ny, of) {
+  const c = document.createElement("canvas");
+  c.width = nx; c.height = ny;
+  const image = new ImageData(nx, ny);
+  for (let i = 0; i < nx; i++) for (let j = 0; j < ny; j++) {
+    const color = of(i, j), p = 4 * ((ny - 1 - j) * nx + i);
+    if (color) image.data.set([...color, 255], p);
+  }
+  c.getContext("2d").putImageData(image, 0, 0);
+  return c;
+}
+
+class Field {
+  constructor(app, id, title, key, about, label) {
+    Object.assign(this, { app, id, key, about });
+    this.canvas = canvas(label);
+    this.plane = new Plane(this.canvas, (p) => this.draw(p));
+    this.panel = panel(id, title, { planes: () => [this.plane] });
+    const names = Object.keys(about);
+    this.selects = [0, 1].map((k) => choice(`${title}, ${k ? "vertical" : "horizontal"} axis`, names, app.state[key][k], (name) => {
+      const axes = [...app.state[key]];
+      if (axes[1 - k] === name) axes[1 - k] = axes[k];
+      axes[k] = name;
+      app.change({ [key]: axes }, id);
+    }));
+    this.note = element("p", { class: "note", "aria-live": "polite" });
+    this.panel.tools.append(...this.selects);
+    this.panel.body.append(this.canvas, this.note);
+  }
+  axes() { return Object.fromEntries(this.app.state[this.key].map((n) => [n, [this.about[n].low, this.about[n].high]])); }
+  set() {
+    const names = this.app.state[this.key];
+    this.selects.forEach((s, k) => { s.value = names[k]; });
+    this.plane.range = names.map((n) => [this.about[n].low, this.about[n].high]);
+    this.plane.labels = names.map((n) => `${n} [${this.about[n].unit}]`);
+  }
+  put(image) {
+    const p = this.plane, [nx, ny] = [image.width - 1, image.height - 1], names = Object.keys(this.shown);
+    const [a, b] = names.map((n) => this.shown[n]);
+    const hx = (p.x(a[1]) - p.x(a[0])) / nx, hy = (p.y(b[0]) - p.y(b[1])) / ny;
+    p.ink.image(image, p.x(a[0]) - hx / 2, p.y(b[1]) - hy / 2, hx * (nx + 1), hy * (ny + 1));
+  }
+  // The equilibria and the motion's path, over the states that are the axes.
+  marks() {
+    const p = this.plane, { coordinates, states } = this.app.about, names = this.app.state[this.key], all = Object.keys(states);
+    const path = this.app.path();
+    if (path) {
+      const k = names.map((n) => all.indexOf(n)), [ts] = path.shape, xs = [], ys = [];
+      let before = null;
+      for (let t = 0; t < ts; t++) {
+        const at = k.map((c, j) => {
+          const { periodic, low, high } = states[names[j]], v = path.data[t * all.length + c];
+          return periodic ? v - Math.floor((v - low) / (high - low)) * (high - low) : v;
+        });
+        if (before && at.some((v, j) => Math.abs(v - before[j]) > 0.5 * (states[names[j]].high - states[names[j]].low))) { xs.push(NaN); ys.push(NaN); }
+        xs.push(at[0]); ys.push(at[1]);
+        before = at;
+        if (t === this.app.frame) this.now = at;
+      }
+      p.curve(xs, ys, { color: "#000000", width: 3 }); p.curve(xs, ys, { color: "#ffffff", width: 1.4 });
+      if (this.now) p.ink.circle(p.x(this.now[0]), p.y(this.now[1]), 6, { fill: "#D55E00", color: "#ffffff" });
+    }
+    (this.app.rows ?? []).forEach((row, k) => {
+      const [x, y] = names.map((n) => (coordinates.includes(n) ? row.position[coordinates.indexOf(n)] : 0));
+      const stable = row.verdict.includes("stable") && !row.verdict.includes("unstable");
+      p.ink.circle(p.x(x), p.y(y), k === this.app.state.chosen ? 8 : 6, { fill: stable ? "#000000" : "#ffffff", color: stable ? "#ffffff" : "#000000", width: 2 });
+      p.ink.text(p.x(x), p.y(y), `${k + 1}`, { color: stable ? "#ffffff" : "#000000", size: 10 });
+    });
+  }
+  starts() {
+    const from = (at) => this.app.startAt(Object.fromEntries(this.app.state[this.key].map((n, k) => [n, at[k]])));
+    draggable(this.plane, {
+      move: from,
+      end: () => this.app.letGo(),
+      keys: (step) => from(this.app.state[this.key].map((n, k) => (this.app.state.start?.[n] ?? 0) + step[k])),
+    });
+  }
+}
+
+export class Landscape extends Field {
+  constructor(app) {
+    super(app, "landscape", "Potential and equilibria", "landscape", app.about.states, "energy at rest over two states with all equilibria; press or drag to start a motion there");
+    this.starts();
+  }
+  take(header, arrays) {
+    this.panel.told(header);
+    this.shown = header.axes;
+    this.proof = header.certificate;
+    this.complete = header.complete;
+    this.image = null;
+    this.note.textContent = `${header.complete ? "Proved: " : "Not decided everywhere: "}${header.certificate}.`;
+    if (arrays.landscape) {
+      const { data, shape } = arrays.landscape, [ny, nx] = shape;
+      let low = Infinity, high = -Infinity;
+      for (const v of data) { if (v < low) low = v; if (v > high) high = v; }
+      this.note.textContent += ` Energy from ${short(low)} J (dark) to ${short(high)} J (bright), contours every ${short((high - low) / 15)} J.`;
+      const level = (i, j) => Math.floor(15 * (data[j * nx + i] - low) / (high - low || 1));
+      this.image = picture(nx, ny, (i, j) => {
+        const edge = (i + 1 < nx && level(i, j) !== level(i + 1, j)) || (j + 1 < ny && level(i, j) !== level(i, j + 1));
+        return cividis((level(i, j) + (edge ? 1 : 0)) / 16);
+      });
+    } else this.note.textContent += " The forces are not known to have a potential.";
+    this.plane.later();
+  }
+  draw() { if (this.image) this.put(this.image); this.marks(); }
+}
+
+export class Basins extends Field {
+  constructor(app) {
+    super(app, "basins", "Basins", "basins", app.about.states, "where starts over two states end; press or drag to start a motion there");
+    this.starts();
+    this.colors = new Map();
+  }
+  color(well, turns) {
+    const name = `${well}:${turns.join(",")}`, plain = !turns.some((t) => t);
+    if (!this.colors.has(name)) {
+      // Unturned wells have the first colours, whatever else is in the picture.
+      const place = plain ? this.wells.indexOf(well) : this.wells.length + this.turned++;
+      this.colors.set(name, { color: rgb(COLORS[place % COLORS.length]), well, turns });
+    }
+    return this.colors.get(name).color;
+  }
+  take(header, arrays) {
+    const n = header.divisions + 1, rows = arrays.well.shape[0], q = arrays.turns.shape[2];
+    if (this.shownId !== header.id) { this.colors.clear(); this.turned = 0; this.wells = header.wells; this.shownId = header.id; this.grid = null; }
+    this.shown = header.axes;
+    if (!this.grid || this.grid.n !== n) {
+      const before = this.grid;
+      this.grid = { n, image: document.createElement("canvas"), well: new Int8Array(n * n).fill(-2), time: new Float32Array(n * n) };
+      this.grid.image.width = this.grid.image.height = n;
+      if (before) this.grid.image.getContext("2d").drawImage(before.image, 0, 0, n, n);
+    }
+    const { image, well, time } = this.grid;
+    well.set(arrays.well.data, header.from * n); time.set(arrays.time.data, header.from * n);
+    const strip = new ImageData(rows, n);
+    for (let r = 0; r < rows; r++) for (let j = 0; j < n; j++) {
+      const at = r * n + j, w = arrays.well.data[at], p = 4 * ((n - 1 - j) * rows + r);
+      if (w === -2) continue;
+      const t = arrays.time.data[at];
+      const base = w < 0 ? [120, 120, 120] : this.color(w, Array.from(arrays.turns.data.subarray(at * q, at * q + q)));
+      const shade = w < 0 ? 1 : 1 - 0.35 * Math.min(1, (Number.isFinite(t) ? t : 0) / 10);
+      strip.data.set([...base.map((v) => v * shade), 255], p);
+    }
+    const c = document.createElement("canvas");
+    c.width = rows; c.height = n;
+    c.getContext("2d").putImageData(strip, 0, 0);
+    image.getContext("2d").drawImage(c, header.from, 0);
+    if (header.last) {
+      this.panel.told(header);
+      const some = [...this.colors.values()].slice(0, 6).map(({ well: w, turns }) => `${w + 1}${turns.some((t) => t) ? ` (${turns.join(", ")} turns)` : ""}`);
+      const none = well.filter((w) => w === -1).length;
+      this.note.textContent = `${n} x ${n} starts${header.final ? "" : ", refining"}. Proved to end at equilibrium ${some.join("; ")}${this.colors.size > 6 ? "; ..." : ""}. Darker: later. Grey: ${none} undecided.`;
+      this.levels = { ...(this.levels ?? {}), [n]: header.waited };
+      this.canvas.dataset.divisions = header.divisions;
+    }
+    this.plane.later();
+  }
+  draw() { if (this.grid) this.put(this.grid.image); this.marks(); }
+}
+
+export class Atlas extends Field {
+  constructor(app) {
+    super(app, "atlas", "Atlas of parameters", "atlas", app.about.parameters, "numbers of equilibria over two parameters with folds; drag the point");
+    const move = (at) => app.change({ parameters: { ...app.state.parameters, ...Object.fromEntries(app.state.atlas.map((n, k) => [n, at[k]])) } }, "atlas point");
+    draggable(this.plane, {
+      move,
+      keys: (step) => move(app.state.atlas.map((n, k) => Math.min(this.about[n].high, Math.max(this.about[n].low, app.state.parameters[n] + step[k])))),
+    });
+  }
+  take(header, arrays) {
+    this.panel.told(header);
+    this.shown = header.axes;
+    const { data, shape } = arrays.count, [nx, ny] = shape, stable = arrays.stable.data;
+    const seen = new Map();
+    for (let k = 0; k < data.length; k++) seen.set(100 * data[k] + stable[k], [data[k], stable[k]]);
+    const kinds = [...seen.keys()].sort((a, b) => a - b);
+    const color = (i, j) => rgb(COLORS[kinds.indexOf(100 * data[i * ny + j] + stable[i * ny + j]) % COLORS.length]);
+    this.image = picture(nx, ny, color);
+    this.legend = kinds.map((k, index) => [COLORS[index % COLORS.length], `${seen.get(k)[0]} equilibria, ${seen.get(k)[1]} stable`]);
+    this.curves = header.curves.map((kind, k) => ({ kind, xy: arrays[`curve${k}`] }));
+    this.note.textContent = `${nx} x ${ny} points.${this.curves.length ? ` ${this.curves.length} curves on which equilibria appear${header.curves_complete ? ": proved to be all" : ""}.` : ""} The cross is the present point.${this.app.held() ? " The force is held at its first value." : ""}`;
+    this.canvas.dataset.divisions = header.divisions;
+    this.plane.later();
+  }
+  draw(p) {
+    if (this.image) this.put(this.image);
+    for (const { xy } of this.curves ?? []) {
+      const n = xy.shape[1];
+      p.curve(xy.data.subarray(0, n), xy.data.subarray(n), { color: "#000000", width: 1.8 });
+    }
+    const [x, y] = this.app.state.atlas.map((n) => this.app.state.parameters[n]);
+    for (const [color, width] of [["#ffffff", 5], ["#000000", 2]]) {
+      p.ink.line([[p.x(x) - 9, p.y(y)], [p.x(x) + 9, p.y(y)]], { color, width });
+      p.ink.line([[p.x(x), p.y(y) - 9], [p.x(x), p.y(y) + 9]], { color, width });
+    }
+    (this.legend ?? []).forEach(([color, words], k) => {
+      const at = [p.box.left + 8, p.box.top + 8 + 18 * k];
+      p.ink.line([[0, 0], [196, 0], [196, 18], [0, 18]].map((d) => [at[0] - 4 + d[0], at[1] - 4 + d[1]]), { fill: css("paper"), closed: true });
+      p.ink.line([[0, 0], [12, 0], [12, 10], [0, 10]].map((d) => [at[0] + d[0], at[1] + d[1]]), { fill: color, color: css("ink"), width: 0.5, closed: true });
+      p.ink.text(at[0] + 18, at[1] + 5, words, { color: css("ink"), align: "left", size: 11 });
+    });
+  }
+}

@@ -1,0 +1,218 @@
+// Drawing in plane coordinates with axes, onto a canvas or into an SVG text.
+
+const SVG = "http://www.w3.org/2000/svg";
+
+export const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+
+class CanvasInk {
+  constructor(context) { this.c = context; }
+  line(points, { color, width = 1.5, dash = [], closed = false, fill = null }) {
+    const c = this.c;
+    c.beginPath();
+    let pen = false;
+    for (const [x, y] of points) {
+      if (!Number.isFinite(x + y)) { pen = false; continue; }
+      if (pen) c.lineTo(x, y); else c.moveTo(x, y);
+      pen = true;
+    }
+    if (closed) c.closePath();
+    if (fill) { c.fillStyle = fill; c.fill(); }
+    if (color) { c.strokeStyle = color; c.lineWidth = width; c.setLineDash(dash); c.lineJoin = c.lineCap = "round"; c.stroke(); }
+  }
+  circle(x, y, r, { color, fill, width = 1.5 }) {
+    const c = this.c;
+    c.beginPath(); c.arc(x, y, r, 0, 2 * Math.PI);
+    if (fill) { c.fillStyle = fill; c.fill(); }
+    if (color) { c.setLineDash([]); c.strokeStyle = color; c.lineWidth = width; c.stroke(); }
+  }
+  text(x, y, words, { color, align = "center", size = 12, turn = 0 }) {
+    const c = this.c;
+    c.save(); c.translate(x, y); c.rotate(turn);
+    c.fillStyle = color; c.font = `${size}px "DejaVu Sans", sans-serif`; c.textAlign = align; c.textBaseline = "middle";
+    c.fillText(words, 0, 0); c.restore();
+  }
+  image(picture, x, y, w, h) { this.c.imageSmoothingEnabled = false; this.c.drawImage(picture, x, y, w, h); }
+  clip(x, y, w, h) { this.c.save(); this.c.beginPath(); this.c.rect(x, y, w, h); this.c.clip(); }
+  unclip() { this.c.restore(); }
+}
+
+class SvgInk {
+  constructor(width, height, paper) {
+    this.root = document.createElementNS(SVG, "svg");
+    for (const [k, v] of Object.entries({ xmlns: SVG, width, height, viewBox: `0 0 ${width} ${height}` })) this.root.setAttribute(k, v);
+    this.at = this.root;
+    this.clips = 0;
+    this.add("rect", { width, height, fill: paper });
+  }
+  add(tag, attributes, words) {
+    const e = document.createElementNS(SVG, tag);
+    for (const [k, v] of Object.entries(attributes)) e.setAttribute(k, v);
+    if (words !== undefined) e.textContent = words;
+    this.at.append(e);
+    return e;
+  }
+  line(points, { color, width = 1.5, dash = [], closed = false, fill = null }) {
+    let d = "", pen = false;
+    for (const [x, y] of points) {
+      if (!Number.isFinite(x + y)) { pen = false; continue; }
+      d += `${pen ? "L" : "M"}${x.toFixed(2)} ${y.toFixed(2)}`;
+      pen = true;
+    }
+    this.add("path", { d: d + (closed ? "Z" : ""), stroke: color || "none", "stroke-width": width, "stroke-dasharray": dash.join(" "), fill: fill || "none" });
+  }
+  circle(cx, cy, r, { color, fill, width = 1.5 }) { this.add("circle", { cx, cy, r, stroke: color || "none", fill: fill || "none", "stroke-width": width }); }
+  text(x, y, words, { color, align = "center", size = 12, turn = 0 }) {
+    const anchor = { center: "middle", left: "start", right: "end" }[align];
+    this.add("text", { transform: `translate(${x} ${y}) rotate(${turn * 180 / Math.PI})`, fill: color, "text-anchor": anchor, "dominant-baseline": "central", "font-size": size, "font-family": "DejaVu Sans, sans-serif" }, words);
+  }
+  image(picture, x, y, width, height) { this.add("image", { x, y, width, height, preserveAspectRatio: "none", "image-rendering": "pixelated", href: picture.toDataURL() }); }
+  clip(x, y, width, height) {
+    const id = `clip${++this.clips}`;
+    const path = this.add("clipPath", { id });
+    const outer = this.at;
+    this.at = path; this.add("rect", { x, y, width, height }); this.at = outer;
+    this.at = this.add("g", { "clip-path": `url(#${id})` });
+  }
+  unclip() { this.at = this.root; }
+}
+
+export function ticks(low, high, most) {
+  const raw = (high - low) / most, power = 10 ** Math.floor(Math.log10(raw));
+  const step = [1, 2, 5, 10].map((m) => m * power).find((s) => s >= raw);
+  const found = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push(k * step);
+  return found.map((v) => Number(v.toPrecision(10)));
+}
+
+export const short = (v) => (v === null || !Number.isFinite(v) ? "–" : Number(v.toPrecision(4)).toString());
+
+// A canvas with axes. `draw(plane)` is called when it is to be drawn; `plane.x` and `plane.y` give pixels.
+export class Plane {
+  constructor(canvas, draw, { equal = false } = {}) {
+    Object.assign(this, { canvas, drawing: draw, equal, range: [[0, 1], [0, 1]], labels: ["", ""], due: false });
+    new ResizeObserver(() => this.later()).observe(canvas);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.later());
+  }
+  later() {
+    if (this.due) return;
+    this.due = true;
+    requestAnimationFrame(() => { this.due = false; this.now(); });
+  }
+  now() {
+    const { clientWidth: w, clientHeight: h } = this.canvas, ratio = devicePixelRatio || 1;
+    if (!w || !h) return;
+    this.canvas.width = Math.round(w * ratio); this.canvas.height = Math.round(h * ratio);
+    const context = this.canvas.getContext("2d");
+    context.scale(ratio, ratio);
+    context.fillStyle = css("paper"); context.fillRect(0, 0, w, h);
+    this.paint(new CanvasInk(context), w, h);
+  }
+  paint(ink, w, h) {
+    const box = { left: 58, right: w - 12, top: 10, bottom: h - 40 };
+    let [[x0, x1], [y0, y1]] = this.range;
+    if (this.equal) {
+      const scale = Math.max((x1 - x0) / (box.right - box.left), (y1 - y0) / (box.bottom - box.top));
+      const cx = (x0 + x1) / 2, cy = (y0 + y1) / 2, dx = scale * (box.right - box.left) / 2, dy = scale * (box.bottom - box.top) / 2;
+      [x0, x1, y0, y1] = [cx - dx, cx + dx, cy - dy, cy + dy];
+    }
+    Object.assign(this, { ink, box, view: [[x0, x1], [y0, y1]] });
+    this.x = (v) => box.left + (v - x0) / (x1 - x0) * (box.right - box.left);
+    this.y = (v) => box.bottom - (v - y0) / (y1 - y0) * (box.bottom - box.top);
+    const soft = css("soft"), line = css("line");
+    for (const v of ticks(x0, x1, 7)) {
+      ink.line([[this.x(v), box.top], [this.x(v), box.bottom]], { color: line, width: 0.6 });
+      ink.text(this.x(v), box.bottom + 10, short(v), { color: soft, size: 11 });
+    }
+    for (const v of ticks(y0, y1, Math.max(2, Math.round((box.bottom - box.top) / 45)))) {
+      ink.line([[box.left, this.y(v)], [box.right, this.y(v)]], { color: line, width: 0.6 });
+      ink.text(box.left - 5, this.y(v), short(v), { color: soft, align: "right", size: 11 });
+    }
+    ink.text((box.left + box.right) / 2, h - 10, this.labels[0], { color: css("ink") });
+    ink.text(11, (box.top + box.bottom) / 2, this.labels[1], { color: css("ink"), turn: -Math.PI / 2 });
+    ink.clip(box.left, box.top, box.right - box.left, box.bottom - box.top);
+    this.drawing(this);
+    ink.unclip();
+  }
+  curve(xs, ys, look) { this.ink.line(Array.from(xs, (x, k) => [this.x(x), this.y(ys[k])]), look); }
+  at(event) {
+    const r = this.canvas.getBoundingClientRect(), [[x0, x1], [y0, y1]] = this.view, b = this.box;
+    const share = (v, a, z) => Math.min(1, Math.max(0, (v - a) / (z - a)));
+    return [x0 + share(event.clientX - r.left, b.left, b.right) * (x1 - x0), y0 + share(event.clientY - r.top, b.bottom, b.top) * (y1 - y0)];
+  }
+  svg() {
+    const { clientWidth: w, clientHeight: h } = this.canvas, ink = new SvgInk(w, h, css("paper"));
+    this.paint(ink, w, h);
+    return new XMLSerializer().serializeToString(ink.root);
+  }
+}
+
+// Drag with the pointer, and arrow keys for who has none.
+export function draggable(plane, { begin = () => true, move, end = () => {}, keys = null }) {
+  const canvas = plane.canvas;
+  let held = false;
+  canvas.addEventListener("pointerdown", (e) => {
+    held = begin(plane.at(e), e);
+    if (held) { canvas.setPointerCapture(e.pointerId); move(plane.at(e), e); }
+  });
+  canvas.addEventListener("pointermove", (e) => { if (held) move(plane.at(e), e); });
+  canvas.addEventListener("pointerup", (e) => { if (held) { held = false; end(plane.at(e), e); } });
+  canvas.addEventListener("pointercancel", () => { held = false; });
+  if (keys) canvas.addEventListener("keydown", (e) => {
+    const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[e.key];
+    if (!step || !plane.view) return;
+    e.preventDefault();
+    keys(step.map((s, k) => s * (plane.view[k][1] - plane.view[k][0]) * (e.shiftKey ? 0.05 : 0.01)));
+  });
+}
+
+export function element(tag, attributes = {}, ...children) {
+  const e = document.createElement(tag);
+  for (const [k, v] of Object.entries(attributes)) {
+    if (k.startsWith("on")) e.addEventListener(k.slice(2), v); else if (v !== null && v !== false) e.setAttribute(k, v);
+  }
+  e.append(...children);
+  return e;
+}
+
+function download(name, content, type) {
+  const url = URL.createObjectURL(content instanceof Blob ? content : new Blob([content], { type }));
+  element("a", { href: url, download: name }).click();
+  setTimeout(() => URL.revokeObjectURL(url), 10000);
+}
+
+// A panel with a heading, tools, and the ways back to work.
+export function panel(id, title, { planes = () => [], lines = true } = {}) {
+  const tools = element("div", { class: "tools" }), body = element("div"), code = element("pre"), request = element("pre");
+  const section = element("section", { id, "aria-label": title });
+  const head = element("div", { class: "head" }, element("h2", {}, title));
+  section.append(head, tools, body);
+  const made = { section, tools, body, say: {}, python: "", request: "" };
+  const button = (words, act) => head.append(element("button", { onclick: act, "aria-label": `${words}: ${title}` }, words));
+  if (lines) {
+    button("copy Python", () => navigator.clipboard?.writeText(made.python).catch(() => {}));
+    button("save request", () => download(`${id}.toml`, made.request, "text/plain"));
+    section.append(element("details", {}, element("summary", {}, "Python and request"), code, request));
+  }
+  if (planes().length) {
+    button("PNG", () => planes().forEach((p, k) => p.canvas.toBlob((b) => download(`${id}${k || ""}.png`, b))));
+    button("SVG", () => planes().forEach((p, k) => download(`${id}${k || ""}.svg`, p.svg(), "image/svg+xml")));
+  }
+  made.told = (header) => {
+    if (header.python === undefined) return;
+    made.python = code.textContent = header.python;
+    made.request = request.textContent = header.request;
+  };
+  document.getElementById("panels").append(section);
+  return made;
+}
+
+export function canvas(label, low = false) {
+  return element("canvas", { tabindex: 0, role: "img", "aria-label": label, class: low ? "low" : null });
+}
+
+export function choice(label, names, chosen, act) {
+  const select = element("select", { "aria-label": label, onchange: () => act(select.value) },
+    ...names.map((n) => element("option", { value: n }, n)));
+  select.value = chosen;
+  return select;
+}

@@ -1,0 +1,185 @@
+// The page's state, which its address holds, and who is told of what changes.
+import { Talk } from "./talk.js";
+import { Parameters } from "./parameters.js";
+import { MechanismView } from "./mechanism.js";
+import { Atlas, Basins, Landscape } from "./fields.js";
+import { Histories } from "./histories.js";
+import { Table, sections } from "./table.js";
+
+const status = document.getElementById("status"), error = document.getElementById("error");
+
+class App {
+  constructor() {
+    this.frame = 0;
+    this.compiled = 0;
+    this.waits = { equilibria: [], motion: [] };
+    this.talk = new Talk({
+      about: (message) => this.begin(message),
+      equilibria: (header, arrays) => this.equilibria(header, arrays),
+      motion: (header, arrays) => this.moves(header, arrays),
+      basins: (header, arrays) => { this.clear(header.kind); this.basins.take(header, arrays); },
+      atlas: (header, arrays) => { this.clear(header.kind); this.atlas.take(header, arrays); },
+      pull: (header) => { this.clear("pull"); this.from(header.state, true); },
+      strike: (header) => {
+        this.clear("strike");
+        this.mechanism.kick.textContent = `struck with ${header.speed.toFixed(2)} m/s, ${header.energy.toPrecision(3)} J`;
+        this.from(header.state, false);
+        this.mechanism.start();
+      },
+      error: (message) => { this.failed = message.of; error.textContent = message.line; },
+      compiling: ({ name }) => this.compiling(name),
+      closed: () => { status.textContent = "the server has ended"; },
+    });
+  }
+  begin(about) {
+    this.about = about;
+    document.getElementById("name").textContent = about.name;
+    const names = Object.keys(about.states), parameters = Object.keys(about.parameters), n = about.coordinates.length;
+    const two = n > 1 ? names.slice(0, 2) : [names[0], names[n]];
+    const atlas = ["F0", "c2"].every((p) => parameters.includes(p)) ? ["F0", "c2"] : parameters.slice(-2);
+    this.state = { parameters: Object.fromEntries(Object.entries(about.parameters).map(([k, v]) => [k, v.value])), landscape: two, basins: two, atlas, chosen: 0, start: null, t_end: 20 };
+    this.restore();
+    this.parameters = new Parameters(this);
+    this.mechanism = new MechanismView(this);
+    this.landscape = new Landscape(this);
+    this.basins = new Basins(this);
+    if (atlas.length > 1) this.atlas = new Atlas(this);
+    this.histories = new Histories(this);
+    this.table = new Table(this);
+    addEventListener("hashchange", () => { if (location.hash !== this.hash) { this.restore(); this.all(); } });
+    status.textContent = "ready";
+    sections(about);
+    this.all();
+  }
+  restore() {
+    if (location.hash.length < 2) return;
+    try {
+      const kept = JSON.parse(decodeURIComponent(location.hash.slice(1))), known = new Set(Object.keys(this.about.states));
+      const pair = (v, names) => Array.isArray(v) && v.length === 2 && v[0] !== v[1] && v.every((n) => names.has(n));
+      for (const [name, value] of Object.entries(kept.parameters ?? {})) if (name in this.state.parameters && Number.isFinite(value)) this.state.parameters[name] = value;
+      for (const key of ["landscape", "basins"]) if (pair(kept[key], known)) this.state[key] = kept[key];
+      if (pair(kept.atlas, new Set(Object.keys(this.about.parameters)))) this.state.atlas = kept.atlas;
+      if (Number.isInteger(kept.chosen) && kept.chosen >= 0) this.state.chosen = kept.chosen;
+      if (kept.t_end > 0 && kept.t_end <= 300) this.state.t_end = kept.t_end;
+      if (kept.start && Object.entries(kept.start).every(([n, v]) => known.has(n) && Number.isFinite(v))) this.state.start = kept.start;
+    } catch { error.textContent = "the address holds no state that can be read"; }
+  }
+  keep() {
+    clearTimeout(this.keeping);
+    this.keeping = setTimeout(() => {
+      this.hash = `#${encodeURIComponent(JSON.stringify(this.state))}`;
+      history.replaceState(null, "", this.hash);
+    }, 150);
+  }
+  clear(kind) { if (this.failed === kind || this.failed === undefined) error.textContent = ""; }
+  compiling(name) {
+    if (name === null) { clearTimeout(this.told); this.told = setTimeout(() => { status.textContent = "ready"; }, 300); return; }
+    clearTimeout(this.told);
+    status.textContent = `compiling ${name} (kernel ${++this.compiled})`;
+  }
+  all() {
+    this.parameters.show();
+    this.askAtlas();
+    this.refresh();
+    if (this.state.start) this.askMotion();
+  }
+  change(change, what) {
+    const before = this.state;
+    this.state = { ...before, ...change };
+    this.keep();
+    if (what === "parameters" || what === "atlas point") {
+      this.parameters.show();
+      this.atlas?.plane.later();
+      const moved = Object.keys(this.state.parameters).some((n) => !this.state.atlas.includes(n) && this.state.parameters[n] !== before.parameters[n]);
+      if (moved) { clearTimeout(this.later); this.later = setTimeout(() => this.askAtlas(), 200); }
+      this.refresh();
+      if (this.state.start) this.askMotion();
+    } else if (what === "atlas") this.askAtlas();
+    else if (what === "basins") this.askBasins();
+    else if (what === "t_end") { if (this.state.start) this.askMotion(); } else this.refresh();
+  }
+  refresh() {
+    // While an answer is under way newer changes wait for it: each picture that comes is of the newest.
+    if (this.busy) { this.again = true; return; }
+    this.busy = true;
+    clearTimeout(this.freed);
+    this.freed = setTimeout(() => this.free(), 400);
+    this.landscape.set();
+    this.talk.ask("equilibria", { parameters: this.state.parameters, axes: this.landscape.axes() });
+    clearTimeout(this.mapping);
+    this.mapping = setTimeout(() => this.askBasins(), 120);
+  }
+  free() {
+    this.busy = false;
+    if (this.again) { this.again = false; this.refresh(); }
+  }
+  askBasins() {
+    this.basins.set();
+    this.talk.ask("basins", { parameters: this.state.parameters, axes: this.basins.axes() });
+  }
+  askAtlas() {
+    if (!this.atlas) return;
+    this.atlas.set();
+    this.talk.ask("atlas", { parameters: this.held() ? { ...this.state.parameters, alpha: 0 } : this.state.parameters, axes: this.atlas.axes() });
+  }
+  // Over the force of a scene the atlas is of one that stays: of one that fades nothing is left at rest.
+  held() { return this.about.scene && this.state.parameters.alpha > 0 && this.state.atlas.includes("F0"); }
+  askMotion() {
+    if (this.moving) { this.movingAgain = true; return; }
+    this.moving = true;
+    const { t_end } = this.state;
+    clearTimeout(this.movingFreed);
+    this.movingFreed = setTimeout(() => { this.moving = false; }, 1000);
+    this.talk.ask("motion", { parameters: this.state.parameters, start: this.state.start, t_end, outputs: Math.min(18001, Math.round(60 * t_end) + 1) });
+  }
+  equilibria(header, arrays) {
+    this.clear("equilibria");
+    this.waits.equilibria.push(header.waited);
+    this.rows = header.rows;
+    this.state.chosen = Math.min(this.state.chosen, Math.max(0, this.rows.length - 1));
+    this.landscape.take(header, arrays);
+    this.table.take();
+    this.mechanism.rest(header, arrays);
+    this.basins.plane.later();
+    clearTimeout(this.freed);
+    this.free();
+  }
+  moves(header, arrays) {
+    this.clear("motion");
+    this.waits.motion.push(header.waited);
+    this.histories.take(header, arrays);
+    this.motion = arrays.y;
+    this.mechanism.moves(header, arrays);
+    if (this.play && !this.mechanism.playing) { this.play = false; this.mechanism.start(); }
+    this.moving = false;
+    if (this.movingAgain) { this.movingAgain = false; this.askMotion(); }
+  }
+  path() { return this.motion; }
+  frameMoved(frame) {
+    this.frame = frame;
+    this.landscape.plane.later();
+    this.basins.plane.later();
+    this.histories.later();
+  }
+  choose(k) {
+    this.state = { ...this.state, chosen: k, start: null };
+    this.motion = null;
+    this.keep();
+    this.mechanism.atRest();
+    this.table.take();
+    this.landscape.plane.later();
+    this.basins.plane.later();
+  }
+  startAt(values) { this.from(values, true); }
+  from(start, still) {
+    this.state = { ...this.state, start };
+    this.keep();
+    if (still) { this.mechanism.pause(); this.mechanism.frame = 0; }
+    this.askMotion();
+  }
+  letGo() { this.play = true; if (!this.moving && this.motion) { this.play = false; this.mechanism.start(); } }
+  pull(what) { this.talk.ask("pull", { parameters: this.state.parameters, ...what }); }
+  strike(what) { this.talk.ask("strike", { parameters: this.state.parameters, ...what }); }
+}
+
+globalThis.explorer = new App();

@@ -1,0 +1,170 @@
+// The mechanism to scale, at an equilibrium or in motion; its masses can be dragged, and it can be struck.
+import { Plane, canvas, css, draggable, element, panel } from "./ink.js";
+
+const [FIXED, POINT, GUIDE, ROD, SPRING, DAMPER, LOAD, MASS] = [0, 1, 2, 3, 4, 5, 6, 7];
+
+export class MechanismView {
+  constructor(app) {
+    this.app = app;
+    this.frame = 0;
+    this.playing = false;
+    const view = canvas("the mechanism; drag a mass to set a start, hold Shift and drag to strike it");
+    this.plane = new Plane(view, () => this.draw(), { equal: true });
+    this.plane.labels = ["x [m]", "y [m]"];
+    this.panel = panel("mechanism", "Mechanism", { planes: () => [this.plane], lines: false });
+    this.play = element("button", { onclick: () => this.toggle() }, "play");
+    this.scrub = element("input", { type: "range", min: 0, max: 1, value: 0, "aria-label": "time" });
+    this.scrub.addEventListener("input", () => { this.pause(); this.frame = Number(this.scrub.value); this.moved(); });
+    this.speed = element("select", { "aria-label": "speed" }, ...[0.1, 0.25, 0.5, 1, 2, 4].map((s) => element("option", { value: s }, `${s}×`)));
+    this.speed.value = 1;
+    this.time = element("span", { role: "timer" });
+    this.kick = element("p", { class: "note" }, "Drag a mass: another start. Shift and drag: strike it.");
+    this.panel.tools.append(this.play, this.speed, this.scrub, this.time);
+    this.panel.body.append(view, this.kick);
+    draggable(this.plane, { begin: (at, e) => this.grab(at, e), move: (at) => this.drag(at), end: (at) => this.release(at) });
+    this.last = 0;
+    this.frames = [];
+    requestAnimationFrame((t) => this.tick(t));
+  }
+  rest(header, arrays) {
+    this.resting = { ...header, ends: arrays.ends };
+    this.extent();
+    if (!this.motion) this.plane.later();
+  }
+  moves(header, arrays) {
+    this.motion = { ...header, ends: arrays.ends, times: arrays.times.data, y: arrays.y };
+    this.scrub.max = arrays.times.data.length - 1;
+    if (header.t_end === 0 || this.frame >= arrays.times.data.length) this.frame = 0;
+    this.extent();
+    this.moved();
+  }
+  atRest() { this.motion = null; this.pause(); this.plane.later(); }
+  extent() {
+    const found = [[Infinity, -Infinity], [Infinity, -Infinity]];
+    for (const { elements, ends } of [this.resting, this.motion].filter(Boolean)) {
+      const n = elements.length, d = ends.data;
+      for (let k = 0; k < d.length; k++) {
+        const kind = elements[Math.floor(k / 4) % n];
+        if (kind === GUIDE || kind === LOAD) continue;
+        found[k % 2][0] = Math.min(found[k % 2][0], d[k]);
+        found[k % 2][1] = Math.max(found[k % 2][1], d[k]);
+      }
+    }
+    if (!Number.isFinite(found[0][0])) return;
+    this.size = Math.max(found[0][1] - found[0][0], found[1][1] - found[1][0], 1e-9);
+    this.plane.range = found.map(([a, b]) => [a - 0.2 * this.size, b + 0.2 * this.size]);
+  }
+  toggle() { if (this.playing) this.pause(); else if (this.motion) { this.playing = true; this.play.textContent = "pause"; this.exact = null; } }
+  pause() { this.playing = false; this.play.textContent = "play"; }
+  start() { this.frame = 0; this.exact = 0; if (!this.playing) this.toggle(); }
+  tick(now) {
+    const passed = Math.min(0.1, (now - this.last) / 1000);
+    this.last = now;
+    if (this.playing && this.motion && this.motion.times.length > 1) {
+      const { times } = this.motion, step = times[1] - times[0];
+      this.exact = (this.exact ?? this.frame) + passed * Number(this.speed.value) / step;
+      if (this.exact >= times.length) this.exact = 0;
+      this.frame = Math.floor(this.exact);
+      this.frames.push(now);
+      if (this.frames.length > 600) this.frames.shift();
+      this.moved();
+    }
+    requestAnimationFrame((t) => this.tick(t));
+  }
+  moved() {
+    this.scrub.value = this.frame;
+    if (this.motion) this.time.textContent = `${this.motion.times[this.frame].toFixed(2)} s`;
+    this.plane.later();
+    this.app.frameMoved(this.frame);
+  }
+  shown() {
+    const of = this.motion ?? this.resting;
+    if (!of) return null;
+    const n = of.elements.length, which = this.motion ? this.frame : Math.min(this.app.state.chosen, of.ends.shape[0] - 1);
+    if (which < 0) return null;
+    const d = of.ends.data, at = [];
+    for (let k = 0, p = 4 * n * which; k < n; k++, p += 4) at.push([[d[p], d[p + 1]], [d[p + 2], d[p + 3]]]);
+    return { ...of, at };
+  }
+  draw() {
+    const of = this.shown();
+    if (!of) return;
+    const { ink } = this.plane, X = (p) => [this.plane.x(p[0]), this.plane.y(p[1])], unit = Math.abs(this.plane.x(this.size) - this.plane.x(0));
+    const heaviest = Math.max(...of.masses.map((m) => m ?? 0), 1e-30);
+    const order = [GUIDE, SPRING, DAMPER, ROD, FIXED, MASS, LOAD, POINT];
+    const indices = of.elements.map((_, k) => k).sort((a, b) => order.indexOf(of.elements[a]) - order.indexOf(of.elements[b]));
+    for (const k of indices) {
+      const kind = of.elements[k], [a, b] = of.at[k].map(X), ax = [b[0] - a[0], b[1] - a[1]], length = Math.hypot(...ax) || 1;
+      const along = (s, t) => [a[0] + s * ax[0] - t * ax[1] / length, a[1] + s * ax[1] + t * ax[0] / length];
+      if (kind === GUIDE) ink.line([along(-2000 / length, 0), along(2000 / length, 0)], { color: css("soft"), width: 0.9, dash: [7, 4] });
+      if (kind === FIXED) ink.line([[-5, -5], [5, -5], [5, 5], [-5, 5]].map((p) => [a[0] + p[0], a[1] + p[1]]), { fill: css("soft"), closed: true });
+      if (kind === MASS) ink.circle(...a, 4 + 0.03 * unit * Math.sqrt((of.masses[k] ?? 0) / heaviest), { fill: css("blue") });
+      if (kind === ROD) ink.line([a, b], { color: css("ink"), width: 3.2 });
+      if (kind === SPRING) {
+        const line = [along(0, 0), along(0.1, 0)];
+        for (let j = 0; j < 18; j++) line.push(along(0.12 + 0.76 * j / 17, j % 2 ? 6 : -6));
+        ink.line([...line, along(0.9, 0), along(1, 0)], { color: css("green"), width: 1.4 });
+      }
+      if (kind === DAMPER) {
+        const look = { color: css("purple"), width: 2 };
+        ink.line([along(0, 0), along(0.55, 0)], look); ink.line([along(0.55, -7), along(0.55, 7)], look);
+        ink.line([along(0.3, 9), along(0.8, 9), along(0.8, -9), along(0.3, -9)], look); ink.line([along(0.8, 0), along(1, 0)], look);
+      }
+      if (kind === LOAD) this.arrow(a, [a[0] + 0.17 * unit * ax[0] / length, a[1] + 0.17 * unit * ax[1] / length], css("vermillion"));
+    }
+    of.names.forEach((name, k) => {
+      // Names of fixed points stand below them on the left, of others above on the right: both can be read where they meet.
+      const fixed = of.elements[k] === FIXED, [x, y] = X(of.at[k][0]);
+      if (name) ink.text(x + (fixed ? -15 : 15), y + (fixed ? 16 : -16), name, { color: css("ink"), size: 13 });
+    });
+    const { coordinates } = this.app.about;
+    const y = this.position();
+    if (y) ink.text(this.plane.box.left + 6, this.plane.box.top + 10, coordinates.map((n, k) => `${n} = ${y[k].toFixed(3)} ${this.app.about.states[n].unit}`).join("   "), { color: css("ink"), align: "left" });
+    if (this.struck) this.arrow(X(this.struck.from), X(this.struck.to), css("orange"));
+  }
+  arrow(a, b, color) {
+    const d = Math.atan2(b[1] - a[1], b[0] - a[0]), h = (t) => [b[0] - 10 * Math.cos(d + t), b[1] - 10 * Math.sin(d + t)];
+    this.plane.ink.line([a, b], { color, width: 2.6 });
+    this.plane.ink.line([b, h(0.45), h(-0.45)], { fill: color, closed: true });
+  }
+  position() {
+    const n = this.app.about.coordinates.length;
+    if (this.motion) return Array.from({ length: n }, (_, k) => this.motion.y.data[this.frame * 2 * n + k]);
+    return this.app.rows?.[this.app.state.chosen]?.position;
+  }
+  grab(at, event) {
+    const of = this.shown();
+    if (!of) return false;
+    let best = null;
+    of.elements.forEach((kind, k) => {
+      if (kind !== MASS) return;
+      const d = Math.hypot(of.at[k][0][0] - at[0], of.at[k][0][1] - at[1]);
+      if (d < 0.1 * this.size && (!best || d < best.d)) best = { k, d };
+    });
+    if (!best) return false;
+    this.pause();
+    const from = of.at[best.k][0];
+    const point = of.names.find((name, j) => name && Math.hypot(of.at[j][0][0] - from[0], of.at[j][0][1] - from[1]) < 1e-5 * this.size);
+    if (!point) return false;
+    this.held = { k: best.k, point, strike: event.shiftKey, from };
+    return true;
+  }
+  drag(at) {
+    if (this.held.strike) {
+      this.struck = { from: this.held.from, to: at };
+      const v = this.velocity(at);
+      this.kick.textContent = `strike: ${Math.hypot(...v).toFixed(2)} m/s on the mass of ${this.shown().masses[this.held.k]} kg`;
+      this.plane.later();
+      return;
+    }
+    this.app.pull({ point: this.held.point, to: at, q: this.position() });
+  }
+  velocity(at) { return [at[0] - this.held.from[0], at[1] - this.held.from[1]].map((d) => 4 * d); }
+  release(at) {
+    if (this.held.strike) {
+      this.struck = null;
+      this.app.strike({ point: this.held.point, mass: this.shown().masses[this.held.k], velocity: this.velocity(at), q: this.position() });
+    } else this.app.letGo();
+    this.held = null;
+  }
+}

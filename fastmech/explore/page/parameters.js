@@ -1,0 +1,41 @@
+// Sliders with numbers and units for every parameter.
+import { element, panel, short } from "./ink.js";
+
+export class Parameters {
+  constructor(app) {
+    this.app = app;
+    this.rows = {};
+    this.panel = panel("parameters", "Parameters", { lines: false });
+    this.panel.tools.append(element("button", { onclick: () => this.reset() }, "reset all"));
+    for (const [name, about] of Object.entries(app.about.parameters)) this.add(name, about);
+    this.show();
+  }
+  add(name, about) {
+    const label = `${name}: ${about.about} [${about.unit}]`;
+    const range = element("input", { type: "range", min: about.low, max: about.high, step: (about.high - about.low) / 1000, "aria-label": label });
+    const number = element("input", { type: "number", step: "any", "aria-label": `${label}, value` });
+    range.addEventListener("input", () => this.set(name, Number(range.value)));
+    range.addEventListener("dblclick", () => number.select());
+    number.addEventListener("change", () => { if (number.value !== "") this.set(name, Number(number.value)); });
+    const back = element("button", { title: `back to ${about.reset}`, "aria-label": `reset ${name} to ${about.reset}`, onclick: () => this.set(name, about.reset) }, "↺");
+    this.rows[name] = { range, number };
+    this.panel.body.append(element("div", { class: "parameter", title: label }, element("span", {}, name), range, number, element("span", {}, about.unit), back));
+  }
+  set(name, value) {
+    this.app.change({ parameters: { ...this.app.state.parameters, [name]: value } }, "parameters");
+  }
+  reset() {
+    const values = Object.entries(this.app.about.parameters).map(([n, a]) => [n, a.reset]);
+    this.app.change({ parameters: Object.fromEntries(values) }, "parameters");
+  }
+  show() {
+    for (const [name, { range, number }] of Object.entries(this.rows)) {
+      const value = this.app.state.parameters[name];
+      if (value > Number(range.max)) range.max = value;
+      if (value < Number(range.min)) range.min = value;
+      range.value = value;
+      range.setAttribute("aria-valuetext", `${short(value)} ${this.app.about.parameters[name].unit}`);
+      if (document.activeElement !== number) number.value = Number(value.toPrecision(12));
+    }
+  }
+}

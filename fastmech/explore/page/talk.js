@@ -1,0 +1,53 @@
+// The websocket: messages as JSON, answers as frames of bytes; of each kind only the newest answer counts.
+
+const ARRAYS = { "<f4": Float32Array, "|i1": Int8Array, "i1": Int8Array };
+
+export function readFrame(buffer) {
+  const length = new DataView(buffer).getUint32(0, true);
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  const arrays = {};
+  for (const { name, type, shape, place } of header.arrays) {
+    const count = shape.reduce((a, b) => a * b, 1);
+    arrays[name] = { data: new ARRAYS[type](buffer, 4 + length + place, count), shape };
+  }
+  return { header, arrays };
+}
+
+export class Talk {
+  constructor(handlers) {
+    this.handlers = handlers;
+    this.newest = {};
+    this.counter = 0;
+    this.asked = {};
+    this.open();
+  }
+
+  open() {
+    this.socket = new WebSocket(`ws://${location.host}/talk`);
+    this.socket.binaryType = "arraybuffer";
+    this.socket.onmessage = ({ data }) => this.take(data);
+    this.socket.onclose = () => this.handlers.closed();
+  }
+
+  take(data) {
+    if (typeof data === "string") {
+      const message = JSON.parse(data);
+      if (message.kind !== "error" || message.id === undefined || this.newest[message.of] === message.id) {
+        this.handlers[message.kind](message);
+      }
+      return;
+    }
+    const { header, arrays } = readFrame(data);
+    if (this.newest[header.kind] !== header.id) return;
+    header.waited = performance.now() - this.asked[header.kind];
+    this.handlers[header.kind](header, arrays);
+  }
+
+  ask(kind, message) {
+    this.newest[kind] = ++this.counter;
+    this.asked[kind] = performance.now();
+    if (this.socket.readyState === WebSocket.OPEN) {
+      this.socket.send(JSON.stringify({ kind, id: this.counter, ...message }));
+    }
+  }
+}

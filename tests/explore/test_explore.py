@@ -1,0 +1,322 @@
+"""The explorer's server without a browser: messages, who may talk to it, and the way back to work."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import random
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import tomllib
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fastmech as fm
+from fastmech.errors import InputError
+from fastmech.explore.device import open_device
+from fastmech.explore.messages import frame, read_message
+from fastmech.explore.work import replies
+from fastmech.runner import run_request
+from fastmech.scan_types import scan_kinds
+from fastmech.scan_types.request import request_of_text
+
+pytest.importorskip("starlette")
+connection = pytest.importorskip("websockets.sync.client")
+
+ROOT = Path(__file__).parents[2]
+AXES = {"phi": [-3.0, 3.0], "theta": [-3.0, 3.0]}
+
+
+def numbers(content: bytes) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """Header and arrays of a frame, read by its description."""
+    length = int.from_bytes(content[:4], "little")
+    header = json.loads(content[4 : 4 + length])
+    arrays = {
+        told["name"]: np.frombuffer(
+            content, told["type"], int(np.prod(told["shape"])), 4 + length + told["place"]
+        ).reshape(told["shape"])
+        for told in header["arrays"]
+    }
+    return header, arrays
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[tuple[str, int]]:
+    command = [sys.executable, "-m", "fastmech", "explore", "--no-browser"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    found = re.search(r"http://([\d.]+):(\d+)/", process.stdout.readline())
+    assert found is not None
+    yield found[1], int(found[2])
+    begun = time.perf_counter()
+    process.send_signal(signal.SIGINT)
+    process.wait(10)
+    process.stdout.close()
+    assert time.perf_counter() - begun < 1.0
+
+
+def talk(server: tuple[str, int], origin: str | None = None) -> Any:
+    host = f"{server[0]}:{server[1]}"
+    return connection.connect(f"ws://{host}/talk", origin=origin or f"http://{host}", max_size=None)
+
+
+def answer(socket: Any, kind: str, last: str | None = None) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    while True:
+        content = socket.recv(timeout=120)
+        if isinstance(content, bytes):
+            header, arrays = numbers(content)
+            if header["kind"] == kind and (last is None or header[last]):
+                return header, arrays
+        else:
+            assert json.loads(content)["kind"] != "error", content
+
+
+def test_equilibria_of_a_frame_are_those_of_the_library(server: tuple[str, int]) -> None:
+    with talk(server) as socket:
+        told = {
+            "kind": "equilibria",
+            "id": 1,
+            "parameters": {"alpha": 0.0, "c2": 200.0},
+            "axes": AXES,
+            "num": 5,
+        }
+        socket.send(json.dumps(told))
+        header, arrays = answer(socket, "equilibria")
+    found = fm.find_equilibria(fm.Scene(alpha=0.0, c2=200.0))
+    assert [row["position"] for row in header["rows"]] == [list(e.position) for e in found]
+    assert header["complete"]
+    scene = fm.Scene(alpha=0.0, c2=200.0)
+    phi, theta = np.meshgrid(np.linspace(-3, 3, 5), np.linspace(-3, 3, 5))
+    l, F = scene.l, scene.F0
+    x1, y1 = l * np.cos(phi), l * np.sin(phi)
+    x2, y2 = x1 - l * np.sin(theta), y1 - l * np.cos(theta)
+    expected = 0.5 * scene.c1 * (x2**2 + y2**2) + 0.5 * scene.c2 * (x1**2 + (y1 - l) ** 2) - F * x2
+    expected = expected + scene.g * (scene.m1 * y1 + scene.m2 * y2)
+    np.testing.assert_allclose(arrays["landscape"], expected, rtol=1e-5, atol=1e-3)
+
+
+def test_motion_of_a_frame_is_that_of_its_lines(server: tuple[str, int]) -> None:
+    with talk(server) as socket:
+        told = {"kind": "motion", "id": 1, "start": {"phi": 1.0}, "t_end": 2.0, "outputs": 21}
+        socket.send(json.dumps(told))
+        header, arrays = answer(socket, "motion")
+    names: dict[str, Any] = {}
+    exec(header["python"], names)
+    np.testing.assert_array_equal(arrays["y"], names["run"].y[:, 0].astype(np.float32))
+
+
+def test_basins_refine_and_their_request_gives_the_same(server: tuple[str, int], tmp_path: Path) -> None:
+    with talk(server) as socket:
+        told = {"kind": "basins", "id": 1, "axes": AXES, "halvings": 1, "parameters": {"alpha": 0.0}}
+        socket.send(json.dumps(told))
+        known = np.full((51, 51), -2)
+        while True:
+            header, arrays = answer(socket, "basins")
+            if header["divisions"] == 50:
+                known[header["from"] : header["from"] + len(arrays["well"])] = arrays["well"]
+                if header["last"]:
+                    break
+    names: dict[str, Any] = {}
+    exec(header["python"], names)
+    np.testing.assert_array_equal(known, names["found"].well)
+    (tmp_path / "request.toml").write_text(header["request"], encoding="utf-8")
+    run_request(tmp_path / "request.toml", tmp_path / "result.h5")
+    with fm.open_results(tmp_path / "result.h5") as results:
+        np.testing.assert_array_equal(known, results["basins"]["well"].data)
+
+
+@pytest.mark.parametrize("what", [None, "von_mises_truss"])
+def test_an_atlas_is_the_library_s_with_its_curves(what: str | None) -> None:
+    device = open_device(what)
+    ranges = {"P": [0.0, 120.0], "rise": [0.2, 0.8]} if what else {"F0": [-200.0, 200.0], "c2": [0.0, 400.0]}
+    parameters = {} if what else {"alpha": 0.0}
+    told = {"kind": "atlas", "id": 1, "axes": ranges, "halvings": 0, "parameters": parameters}
+    *_, last = replies(device, read_message(json.dumps(told)), lambda finished: None)
+    header, arrays = numbers(last)
+    names: dict[str, Any] = {}
+    exec(header["python"], names)
+    np.testing.assert_array_equal(arrays["count"], names["found"].count)
+    assert len(header["curves"]) == len(names["curves"].curves) > 0
+    np.testing.assert_array_equal(arrays["curve0"][0], names["curves"].curves[0].x.astype(np.float32))
+
+
+@pytest.mark.parametrize("what", [None, "von_mises_truss"])
+def test_requests_of_every_view_are_valid(what: str | None) -> None:
+    from fastmech.explore.lines import request_of
+
+    device = open_device(what)
+    axes = {name: [0.1, 0.5] for name in device.coordinates}
+    others = [name for name in device.system.described() if name != "alpha"][-2:]
+    asked: list[dict[str, Any]] = [
+        {"kind": "equilibria", "axes": axes},
+        {"kind": "motion", "start": {device.state[0]: 0.2}},
+        {"kind": "basins", "axes": axes},
+        {"kind": "atlas", "axes": {name: [1.0, 2.0] for name in others}},
+    ]
+    parameters = {"b": 2.0} if what else {"alpha": 0.0}
+    for told in asked:
+        message = read_message(json.dumps({"id": 1, "parameters": parameters, **told}))
+        text = request_of(device, message, 4)
+        assert tomllib.loads(text)["scan"]
+        assert len(request_of_text(text, "request.toml", scan_kinds()).scans) == 1
+
+
+def test_newest_wins_and_two_pages_do_not_disturb_each_other(server: tuple[str, int]) -> None:
+    big = {"kind": "basins", "axes": AXES, "halvings": 4}
+    with talk(server) as one, talk(server) as two:
+        two.send(json.dumps({**big, "id": 7, "halvings": 1}))
+        for k in range(20):
+            one.send(json.dumps({**big, "id": k}))
+        one.send(json.dumps({**big, "id": 20, "halvings": 0}))
+        assert answer(two, "basins", "final")[0]["id"] == 7
+        assert answer(one, "basins", "final")[0]["id"] == 20
+
+
+@pytest.mark.parametrize("origin", ["http://example.org", "http://127.0.0.1:1", "null"])
+def test_other_origins_are_refused(server: tuple[str, int], origin: str) -> None:
+    with pytest.raises(Exception, match="403"):
+        talk(server, origin)
+
+
+@pytest.mark.parametrize("host", ["example.org", "127.0.0.1", "localhost:1"])
+def test_other_hosts_are_refused(server: tuple[str, int], host: str) -> None:
+    asked = http.client.HTTPConnection(*server)
+    asked.request("GET", "/", headers={"Host": host})
+    assert asked.getresponse().status == 403
+    asked.close()
+
+
+def test_a_policy_forbids_foreign_code(server: tuple[str, int]) -> None:
+    asked = http.client.HTTPConnection(*server)
+    asked.request("GET", "/")
+    got = asked.getresponse()
+    assert "script-src 'self';" in got.headers["content-security-policy"]
+    assert b"http" not in got.read()
+    asked.close()
+
+
+def wild(random_: random.Random, depth: int = 0) -> Any:
+    made = [
+        None, True, 0, -1, 1e308, 2**70, "", "equilibria", "phi", "F0", "__class__", "\0", "x" * 50, "../",
+        random_.random(), [], {},
+    ]  # fmt: skip
+    if depth < 3 and random_.random() < 0.4:
+        return [wild(random_, depth + 1) for _ in range(random_.randrange(4))]
+    if depth < 3 and random_.random() < 0.4:
+        keys = ["kind", "id", "axes", "start", "parameters", "phi", "q", "to", "x"]
+        return {random_.choice(keys): wild(random_, depth + 1) for _ in range(random_.randrange(5))}
+    return random_.choice(made)
+
+
+def test_ten_thousand_wild_messages_leave_it_running(server: tuple[str, int]) -> None:
+    random_ = random.Random(1)
+    kinds = ["equilibria", "motion", "basins", "atlas", "pull", "strike", "stop", "x"]
+    fields = [
+        "axes",
+        "start",
+        "parameters",
+        "fixed",
+        "t_end",
+        "outputs",
+        "num",
+        "what",
+        "to",
+        "q",
+        "point",
+        "y",
+    ]
+    with talk(server) as socket:
+        for k in range(10_000):
+            if k % 10 == 0:
+                text: Any = bytes(random_.randrange(256) for _ in range(random_.randrange(1, 60)))
+            else:
+                message = {"kind": random_.choice(kinds), "id": k}
+                message |= {field: wild(random_) for field in random_.sample(fields, 3)}
+                text = json.dumps(message)
+            socket.send(text)
+        lines = 0
+        socket.send(json.dumps({"kind": "motion", "id": 99_999, "start": {"phi": 0.5}, "t_end": 1.0}))
+        while True:
+            content = socket.recv(timeout=120)
+            if isinstance(content, bytes) and numbers(content)[0]["id"] == 99_999:
+                break
+            if isinstance(content, str) and json.loads(content)["kind"] == "error":
+                assert "\n" not in json.loads(content)["line"]
+                lines += 1
+    assert lines > 9_000
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("[]", "must be a JSON object"),
+        ('{"kind": "basin"}', "did you mean 'basins'"),
+        ('{"kind": "motion", "id": 1, "start": {}, "t_end": -1}', "motion.t_end = -1"),
+        ('{"kind": "basins", "id": 1, "axes": {"phi": [1, 0], "theta": [0, 1]}}', "must rise"),
+        ('{"kind": "motion", "id": 1, "start": {}, "code": "1"}', "motion.code: unknown name"),
+    ],
+)
+def test_wrong_messages_give_a_line(text: str, line: str) -> None:
+    with pytest.raises(InputError, match=re.escape(line)):
+        read_message(text)
+
+
+@pytest.mark.parametrize("what", ["no_such_mechanism", "missing.toml", "missing.py:arm", "missing.h5"])
+def test_what_cannot_be_opened_gives_a_line(what: str) -> None:
+    with pytest.raises(InputError, match=r"missing|no_such"):
+        open_device(what)
+
+
+def test_numbers_travel_as_bytes() -> None:
+    values = np.linspace(0.0, 1.0, 250_000).reshape(500, 500)
+    content = frame({"kind": "test"}, {"field": values, "codes": np.arange(5, dtype=np.int8)})
+    assert len(content) < 4 * values.size + 300
+    header, arrays = numbers(content)
+    assert header["kind"] == "test"
+    np.testing.assert_array_equal(arrays["field"], values.astype(np.float32))
+    np.testing.assert_array_equal(arrays["codes"], np.arange(5))
+
+
+def test_a_pulled_point_follows_and_a_strike_brings_its_energy(server: tuple[str, int]) -> None:
+    scene = fm.Scene()
+    with talk(server) as socket:
+        q = [1.2, 0.3]
+        place = [
+            scene.l * (np.cos(1.25) - np.sin(0.35)),
+            scene.l * (np.sin(1.25) - np.cos(0.35)),
+        ]
+        socket.send(json.dumps({"kind": "pull", "id": 1, "point": "M2", "to": place, "q": q}))
+        state = answer(socket, "pull")[0]["state"]
+        assert state["phi"] == pytest.approx(1.25, abs=1e-6)
+        assert state["theta"] == pytest.approx(0.35, abs=1e-6)
+        blow = {"kind": "strike", "id": 2, "point": "M2", "mass": scene.m2, "velocity": [0.5, -0.2], "q": q}
+        socket.send(json.dumps(blow))
+        told = answer(socket, "strike")[0]
+    y = np.array([told["state"][name] for name in ("phi", "theta", "phi_dot", "theta_dot")])
+    energies = fm.mechanisms.slider_pendulum().energies(y)
+    assert told["energy"] == pytest.approx(float(energies.kinetic), rel=1e-12)
+    assert told["energy"] < 0.5 * scene.m2 * (
+        0.5**2 + 0.2**2
+    )  # rods hold back a part of what a free mass takes
+
+
+def test_the_wheel_holds_the_page(tmp_path: Path) -> None:
+    copied = tmp_path / "sources"
+    shutil.copytree(ROOT / "fastmech", copied / "fastmech", ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, copied)
+    command = [sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "-w", str(tmp_path)]
+    made = subprocess.run([*command, str(copied)], capture_output=True, text=True)
+    assert made.returncode == 0, made.stderr
+    names = zipfile.ZipFile(next(tmp_path.glob("*.whl"))).namelist()
+    for path in (ROOT / "fastmech/explore/page").iterdir():
+        assert f"fastmech/explore/page/{path.name}" in names
