@@ -190,7 +190,7 @@ def _settled(flow: Flow, sample: Floats) -> Flow:
     now = replace(flow, scale=scale, middle=0.5 * (low + high))
     if not flow.forced:  # at least as long as motions took to get there
         now = replace(now, period=max(flow.period, min(_time_of_change(now, y[kept]), SLOWER * flow.period)))
-    return _with_steps(now, np.concatenate([sample[kept], y[kept]]), np.count_nonzero(kept))
+    return _with_steps(now, np.concatenate([sample[kept], y[kept]]), int(np.count_nonzero(kept)))
 
 
 def _time_of_change(flow: Flow, states: Floats) -> float:
