@@ -169,12 +169,12 @@ def search_of(
     """Attractors that a sample of starts (n, dim) comes to.
 
     Raises:
-        InputError: there are no two finite starts, the system depends on the time and has no period, or it
+        InputError: no start is finite, the system depends on the time and has no period, or it
             preserves volume.
     """
     usable = np.flatnonzero(np.isfinite(starts).all(axis=1))
-    if usable.size < 2:
-        raise InputError("starts: must be two or more finite states")
+    if not usable.size:
+        raise InputError("starts: none is finite")
     sample = starts[usable[np.unique(np.linspace(0, usable.size - 1, SAMPLE).astype(np.int64))]]
     flow = flow_of(system, sample, {}, method, threads)
     _, jacobians = flow.derivative(sample[:PRESERVING], 1.0)

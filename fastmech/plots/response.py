@@ -13,6 +13,9 @@ from fastmech.scene import nearest
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+#: What tells areas of the same colour apart.
+HATCHES = ("", "//", "..", "xx")
+
 #: Marker of each kind of special point.
 MARKERS = {"fold": "o", "period doubling": "s", "Neimark-Sacker": "D"}
 
@@ -75,7 +78,9 @@ def draw_fractions(along: Any, ax: Axes | None) -> Axes:
                 [*names, "without a label"],
                 [*colors, "#d9d9d9"],
             )
-        ax.stackplot(along.values, shares, labels=names, colors=colors, alpha=0.85)
+        areas = ax.stackplot(along.values, shares, labels=names, colors=colors, alpha=0.85)
+        for k, area in enumerate(areas[:number]):
+            area.set_hatch(HATCHES[k // len(LINES) % len(HATCHES)])
         for tipping in along.tipping:
             ax.axvline(0.5 * (tipping.low + tipping.high), color="black", lw=0.8, ls=":")
         low, high = sorted((along.values[0], along.values[-1]))

@@ -237,7 +237,7 @@ def test_wrong_systems_get_one_line(change: dict[str, object], message: str) -> 
         ({"y": (0.0, 1.0)}, "ranges.y: unknown name"),
         ({"x": (1.0, 0.0)}, "must be"),
         ([[0.0, 1.0, 2.0]], "must be"),
-        ([[np.nan, 0.0]], "two or more finite"),
+        ([[np.nan, 0.0]], "none is finite"),
     ],
 )
 def test_wrong_starts_get_one_line(starts: object, message: str) -> None:

@@ -255,16 +255,20 @@ def test_trapped_needs_no_damper() -> None:
 @pytest.mark.parametrize(
     ("mechanism", "told"),
     [
-        (lambda: double_well(fm.loads.Harmonic(0.3, 1.2)), "never fades"),
         (lambda: double_well(b=0.0), "has no dampers"),
         (lambda: fm.mechanisms.ziegler_column().replace(b=1.0), "not known to come from a potential"),
     ],
-    ids=["harmonic", "undamped", "follower"],
+    ids=["undamped", "follower"],
 )
 def test_what_has_no_labels_says_why(mechanism: object, told: str) -> None:
     made = mechanism()  # type: ignore[operator]
     with pytest.raises(fm.InputError, match=told):
         fm.labels_of(made, np.zeros((1, len(made.state))))
+
+
+def test_no_well_holds_what_a_load_keeps_moving() -> None:
+    with pytest.raises(fm.InputError, match="never fades"):
+        fm.trapped(double_well(fm.loads.Harmonic(0.3, 1.2)), [[1.0, 0.0]])
 
 
 def test_the_papers_mechanism_under_a_pulse_ends_where_scipy_says() -> None:

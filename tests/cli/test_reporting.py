@@ -14,8 +14,8 @@ from fastmech.cli.reporting import account
 from fastmech.jit import listeners
 from fastmech.scan_types.motion import Motion
 
-#: Commands that end at once whatever they are given.
-SHORT = {"status", "info"}
+#: Commands that end at once whatever they are given, and the one that ends when it is interrupted.
+SHORT = {"status", "info", "explore"}
 
 
 def test_every_long_command_has_both_options():
