@@ -6,7 +6,7 @@ a signal is noted first. The exception follows at once where only ordinary code 
 next `check`: before a kernel is compiled, between calls of an integration, whenever progress is told.
 
 Only the command line calls `listen`. In a notebook Python's own handling stays as it is and `check` does
-nothing.
+nothing. A thread may also say itself how long its work is wanted, see `work_while`.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import signal
 import sys
 import threading
 import time
+from collections.abc import Callable
 from types import FrameType
 
 #: Packages whose code is never left by an exception out of nowhere: they are called back from compiled code,
@@ -38,6 +39,10 @@ class Interrupt(KeyboardInterrupt):
         self.signal_number = signal_number
 
 
+class Cancelled(Interrupt):
+    """What a thread computes is not wanted any more."""
+
+
 class _Noted:
     """The signal that has come, and whether the main thread has been told."""
 
@@ -46,6 +51,7 @@ class _Noted:
 
 
 _noted = _Noted()
+_own = threading.local()
 
 
 def listen() -> None:
@@ -60,7 +66,11 @@ def check() -> None:
 
     Raises:
         Interrupt: once in the main thread, which may then tidy up, and always in others.
+        Cancelled: what this thread does is not wanted any more.
     """
+    wanted = still_wanted()
+    if wanted is not None and not wanted():
+        raise Cancelled("not wanted any more")
     if not _noted.number:
         return
     if threading.current_thread() is threading.main_thread():
@@ -68,6 +78,16 @@ def check() -> None:
             return
         _noted.told = True
     raise Interrupt(signal_number=_noted.number)
+
+
+def work_while(wanted: Callable[[], bool] | None) -> None:
+    """From now on work of this thread ends at the next `check` once it is not wanted; None: it always is."""
+    _own.wanted = wanted
+
+
+def still_wanted() -> Callable[[], bool] | None:
+    """What tells whether this thread's work is wanted, for threads that it starts."""
+    return getattr(_own, "wanted", None)
 
 
 def is_noted() -> bool:

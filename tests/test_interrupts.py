@@ -5,9 +5,13 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+import threading
+import time
 
 import pytest
 
+from fastmech import interrupts
+from fastmech.ensembles.threads import in_threads
 from fastmech.interrupts import Interrupt, check, is_noted, signal_of
 
 pytestmark = pytest.mark.nojit
@@ -105,3 +109,26 @@ def test_nothing_is_done_where_nobody_listens() -> None:
 def test_which_signal() -> None:
     assert signal_of(KeyboardInterrupt()) == signal.SIGINT
     assert signal_of(Interrupt("x", signal.SIGTERM)) == signal.SIGTERM
+
+
+def test_work_of_a_thread_ends_where_it_is_not_wanted_and_so_does_what_it_starts() -> None:
+    wanted = [True]
+    seen = list[bool]()
+
+    def task(k: int) -> int:
+        still = interrupts.still_wanted()
+        seen.append(still is not None and still())
+        wanted[0] = k < 3
+        time.sleep(0.01)
+        interrupts.check()
+        return k
+
+    interrupts.work_while(lambda: wanted[0])
+    try:
+        with pytest.raises(interrupts.Cancelled):
+            list(in_threads(task, list(range(200)), 2, threading.Event()))
+        assert seen[0]
+        assert len(seen) < 200
+    finally:
+        interrupts.work_while(None)
+    interrupts.check()

@@ -100,6 +100,12 @@ SEARCH = named_tuple([VECTOR, MATRIX, MATRIX, VECTOR, VECTOR, MATRIX], Search)
 
 
 @inlined
+def fresh_row(empty: Floats, params: Floats, row: int) -> float:
+    """A record's row before anything is seen: NaN stands for the trajectory's parameters (count,)."""
+    return params[row - empty.size + params.size] if np.isnan(empty[row]) else empty[row]
+
+
+@inlined
 def _narrowed(of: Search, i: int, seen: Floats, times: tuple[float, float, float]) -> tuple[float, float]:
     """Where trajectory ``i`` stops, after a step to the middle one of three times."""
     low, middle, high = times
@@ -128,7 +134,7 @@ def halve_steps(rhs: Any, observe: Any, weights: Any, of: Search) -> None:
             for d in range(dim):
                 Y[d, 0] = of.states[i, d]
             for row in range(of.empty.size):
-                seen[row, 0] = of.empty[row]
+                seen[row, 0] = fresh_row(of.empty, of.params[i], row)
             rhs(begin, Y, stages[0], own)
             step_by_stages(rhs, weights, block, Moment(begin, middle - begin, 0, False))
             observe(middle, Y, of.observer_params, seen)
@@ -169,7 +175,7 @@ def halve_implicit_steps(call: Any, scheme: Any, of: Search) -> None:
             for row in range(batch.memory.shape[1]):
                 batch.memory[0, row, 0] = 0.0
             for row in range(of.empty.size):
-                batch.record[0, row, 0] = of.empty[row]
+                batch.record[0, row, 0] = fresh_row(of.empty, of.params[i], row)
             drive_implicit(call, scheme, batch, failed)
             low, high = _narrowed(of, i, batch.record[0], (low, middle, high))
 

@@ -28,6 +28,7 @@ from fastmech.errors import InputError, called_here, shown
 from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method
 from fastmech.kernels.select import FORMULATIONS
 from fastmech.models.mechanism import Mechanism
+from fastmech.objects import Drawn, Field
 from fastmech.scene import STATE, Scene, nearest
 from fastmech.step_limits.warning import TURN, too_long, warn_of_step
 
@@ -43,7 +44,7 @@ BESIDE, OWN = 9, 2
 
 
 @dataclass(frozen=True, repr=False)
-class Trajectories:
+class Trajectories(Drawn):
     """States of an ensemble at its output times; printed, it says how many trajectories have failed."""
 
     t: NDArray[np.float64]  #: output times [s], shape (times,)
@@ -54,8 +55,8 @@ class Trajectories:
     steps: int  #: most steps of a trajectory that runs to the end
     dt: float  #: longest step taken [s]
     method: str  #: name of the method
-    own_steps: NDArray[np.int64]  #: steps of each trajectory that runs to the end, shape (n,)
-    own_dt: NDArray[
+    trajectory_steps: NDArray[np.int64]  #: steps of each trajectory that runs to the end, shape (n,)
+    trajectory_dt: NDArray[
         np.float64
     ]  #: longest step of each [s], shape (pieces, n); one piece, or one for each fit
     precision: str = "float64"  #: of the lanes
@@ -75,12 +76,28 @@ class Trajectories:
         """One line: how many trajectories have failed, and with which status; empty where none has."""
         return failure_line(failure_counts(self.status), self.status.size)
 
-    def __repr__(self) -> str:
+    KIND = "trajectories"
+    PICTURE = "plots.objects:draw_trajectories"
+    FIELDS = {
+        "time": Field("time", "s", "output times", "t"),
+        "*": Field("time trajectory state", "", "state", "y"),
+        "status": Field("trajectory", "1", "what became of it", codes=Status),
+        "steps": Field("trajectory", "1", "steps to the end", "trajectory_steps"),
+        "stop_code": Field("trajectory", "1", "why it stopped, 0: it did not"),
+        "stop_time": Field("trajectory", "s", "when it stopped, NaN: it did not"),
+        "failed": Field("trajectory", "s", "when it was last finite, NaN: it did not fail"),
+        "error": Field("trajectory", "1", "estimate of the error, in the states' units"),
+        "dt": Field("", "s", "longest step taken"),
+    }
+
+    def told(self) -> str:
+        """How many, by which method, with which error, and how many have failed."""
         n, dim = self.y.shape[1:]
-        what = (
-            f"{n:,} trajectories of {dim} states at {self.t.size:,} times, {self.method}, dt = {self.dt:g} s"
+        error = "" if self.error_estimate is None else f", error {self.error_estimate:.2g}"
+        return (
+            f"{n:,} trajectories of {dim} states at {self.t.size:,} times\n"
+            f"  {self.method}, dt = {self.dt:g} s{error}; {self.failures or 'none failed'}"
         )
-        return f"Trajectories({what}; {self.failures or 'none failed'})"
 
 
 @called_here(rtol="tol", atol="tol", t_span="t_end", max_step="dt", h="dt", step="dt", args="parameters")
@@ -174,7 +191,7 @@ def integrate(
             error=found.error,
             error_estimate=found.estimate,
             reason=found.reason,
-        )
+        ).of(scene)
     if quantile is not None:
         raise InputError(f"quantile = {shown(quantile)}: tells whose error tol is; give tol with it")
     formula = find_method("rk4" if method is None else method)
@@ -186,7 +203,7 @@ def integrate(
             passed = np.union1d(outputs, scene.kinks(float(outputs[-1]), dtype))
         solution = solve(Case(problem, starts, passed, threads), settings, progress)
         solution = replace(solution, y=solution.y[np.searchsorted(passed, outputs)])
-        return _trajectories(problem, outputs, solution, settings)
+        return _trajectories(problem, outputs, solution, settings).of(scene)
     warn_of_step(extreme_scenes(scene, own, problem), step, formula.name, starts)
     problem = watched(problem, starts, step, threads)
     solution = solve(Case(problem, starts, outputs, threads), settings, progress)
@@ -199,7 +216,7 @@ def integrate(
     if solution.last_term.size:
         beyond |= solution.last_term > LAST_TERM
     solution.status[beyond & (solution.status == Status.OK)] = Status.STEP_TOO_LARGE
-    return _trajectories(problem, outputs, solution, settings)
+    return _trajectories(problem, outputs, solution, settings).of(scene)
 
 
 def _trajectories(
@@ -216,8 +233,8 @@ def _trajectories(
         steps=int(solution.steps.max(initial=0)),
         dt=float(solution.dt.max(initial=0.0)),
         method=settings.method.name,
-        own_steps=solution.steps,
-        own_dt=solution.dt,
+        trajectory_steps=solution.steps,
+        trajectory_dt=solution.dt,
         precision=np.dtype(settings.precision).name,
         stop_code=code,
         stop_time=time,
@@ -289,5 +306,5 @@ def problem_of(
     if not isinstance(scene, Scene):
         raise InputError(f"scene = {shown(scene)}: must be a Scene, a Mechanism or a System")
     starts = checks.states("y0", y0, 4)
-    own = own_values(parameters, scene.model_dump(), len(starts))
+    own = own_values(parameters, scene.parameters, len(starts))
     return starts, scene_problem(scene, len(starts), own, formulation), own

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
 from fastmech.callee import callee
-from fastmech.ensembles.ends import STOP_CODE
+from fastmech.ensembles.ends import STOP_CODE, fresh_row
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.problem import Case
 from fastmech.ensembles.run import Progress
@@ -247,7 +247,7 @@ def _follow(rhs: Any, switches: Any, observe: Any, course: Any, i: int) -> None:
         for o in range(course.outputs.size):
             course.y[o, i, d] = np.nan
     for k in range(course.empty.size):
-        record[k, 0] = course.empty[k]
+        record[k, 0] = fresh_row(course.empty, w.p, k)
     t, h, cross, last = 0.0, COARSE * longest, 0.0, -longest
     steps, short, o, ended = 0, 0, 0, ENDED
     _rates(rhs, t, w.y, w, 0)

@@ -198,7 +198,7 @@ def scene_problem(scene: Scene, n: int, own: Mapping[str, Floats], formulation: 
     # What a scene allows of one parameter depends on no other.
     for extreme in (np.min, np.max) if n and own else ():
         scene.replace(**{name: float(extreme(column)) for name, column in own.items()})
-    scenes: Any = SimpleNamespace(**(scene.model_dump() | dict(own)))
+    scenes: Any = SimpleNamespace(**(scene.parameters | dict(own)))
     coefficients: Any = reduce(scenes)
     params = Parameters(tuple(np.asarray(c, dtype=np.float64) for c in coefficients))
     rhs = right_hand_side(coefficients, formulation)
@@ -221,8 +221,7 @@ def extreme_scenes(scene: Scene, own: Mapping[str, Floats], problem: Problem) ->
     rows = {int(np.argmax(damping)), int(np.argmin(damping)), int(np.argmax(vibration_frequency(c)))}
     # The values have been checked, all of them.
     return [
-        scene.model_copy(update={name: float(column[row]) for name, column in own.items()})
-        for row in sorted(rows)
+        scene.replace(**{name: float(column[row]) for name, column in own.items()}) for row in sorted(rows)
     ]
 
 

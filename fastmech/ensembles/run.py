@@ -60,7 +60,8 @@ class Observation:
     ``record`` holds the start value of every row of a lane's record. Where ``stops`` is set, the rows begin
     with those of :mod:`fastmech.ensembles.ends` (its own may follow), and a lane whose code is not zero
     is taken out after about ``call_steps`` steps. With ``locate`` a stop is looked for inside the step after
-    which it was seen. The last rows begin as so many of a lane's first states as ``states`` says.
+    which it was seen. The last rows begin as so many of a lane's first states as ``states`` says,
+    or, where ``parameters`` is set, as the lane's parameters: they are NaN in ``record``.
     """
 
     observe: Any
@@ -70,13 +71,19 @@ class Observation:
     call_steps: int = CALL_STEPS_WITH_STOPS
     locate: bool = False
     states: int = 0
+    parameters: bool = False
 
-    def empty(self, begin: Floats) -> Floats:
-        """The record of all lanes (rows,), or of each (n, rows) where it knows their states (n, dim)."""
-        if not self.states:
+    def empty(self, begin: Floats, params: Floats) -> Floats:
+        """The record of all lanes (rows,), or of each (n, rows) where it knows their states (n, dim) or
+        parameters (count,) or (n, count).
+        """
+        if not (self.states or self.parameters):
             return self.record
         each = np.tile(self.record, (len(begin), 1))
-        each[:, -self.states :] = begin[:, : self.states]
+        if self.states:
+            each[:, -self.states :] = begin[:, : self.states]
+        if self.parameters:
+            each[:, -params.shape[-1] :] = params
         return each
 
 
@@ -96,7 +103,7 @@ class Ensemble:
     status: NDArray[np.int8]
     failed: Floats
     #: Greatest last term of an Adams method's predictor in an angle [rad], or in any state of a system of
-    #: one's own, see :mod:`fastmech.kernels.whole`, shape (n,); of other methods empty.
+    #: one's own, see :mod:`fastmech.kernels.steps`, shape (n,); of other methods empty.
     last_term: Floats
     #: Members that failed together, and their last finite states.
     lost: list[tuple[NDArray[np.int64], Floats]]
@@ -173,7 +180,7 @@ def run_ensemble(
             members,
             states,
             params,
-            observation.empty(states),
+            observation.empty(states, params),
             block_lanes=block_lanes,
             carried=method.carried,
             together=SEEN_TOGETHER if block_lanes == method.lanes else 1,
@@ -268,7 +275,8 @@ def _ended(lanes: Lanes, batch: Batch, given_up: Floats | None, observation: Obs
         # A lane that has been given up waits for the call's end: what is seen of it meanwhile is no stop.
         waiting = time > failed
         block, lane = np.divmod(np.flatnonzero(waiting), batch.record.shape[2])
-        batch.record[block, :, lane] = observation.record
+        fresh = np.flatnonzero(~np.isnan(observation.record))
+        batch.record[block[:, None], fresh, lane[:, None]] = observation.record[fresh]
         stopped = np.asarray((code != 0.0) & ~waiting)
         if healthy and not stopped.any():
             return None

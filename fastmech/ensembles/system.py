@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import inspect
 import types
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -36,6 +35,8 @@ from fastmech.kernels.rebuilding import (
     returns,
 )
 from fastmech.kernels.sincos import WITHIN
+from fastmech.objects import Printed
+from fastmech.scene import nearest
 
 #: States of a family at most: a block of an implicit method has the square of it.
 MOST_STATES = 10_000
@@ -71,8 +72,8 @@ def switches(t, y, p, seen):
 '''
 
 
-@dataclass(frozen=True, eq=False)
-class System:
+@dataclass(frozen=True, eq=False, repr=False)
+class System(Printed):
     """A system of ordinary differential equations of your own.
 
     Attributes:
@@ -85,12 +86,15 @@ class System:
             parameters, and one into which it writes the rates, in loops over indices.
         state: names of the states, or ``("x", 100)`` for x0, ..., x99 and arrays.
         parameters: the parameters' values by name; ``rhs`` takes arguments of these names after the states.
-        stop: ``stop(t, *state)`` (or ``stop(t, y)``) gives 0 while the trajectory runs on, any other whole
-            number as the code of why it stops (True is 1); it is looked at after every step. A trajectory
-            that has stopped costs nothing any more.
+        stop: ``stop(t, *state)`` (or ``stop(t, y)``), with parameters behind the states where it needs them
+            (or ``stop(t, y, p)``), gives 0 while the trajectory runs on, any other whole number as the code
+            of why it stops (True is 1); it is looked at after every step. A trajectory that has stopped
+            costs nothing any more.
         period: after which the right-hand side repeats, where it depends on the time: a number [s], or a
             function of parameters by their names, ``lambda omega: 2 * math.pi / omega``.
         angles: names of states of which only the value modulo a turn of 2 pi counts.
+        section: ``section(*state)``: attractors are looked for where it rises through zero, in place of at
+            equal times; of a system that does not depend on the time.
 
     Raises:
         InputError: names do not match the functions' arguments, or values are no finite numbers. A function
@@ -103,6 +107,7 @@ class System:
     stop: Callable[..., float] | None = None
     period: float | Callable[..., float] | None = None
     angles: Sequence[str] = ()
+    section: Callable[..., float] | None = None
     vector: bool = field(default=False, init=False)  #: whether functions take arrays
 
     def __post_init__(self) -> None:
@@ -121,11 +126,15 @@ class System:
         if vector and returns(function):
             raise InputError("rhs: returns something, must write the rates into its last argument")
         if self.stop is not None:
-            _check_function("stop", self.stop, ["y"] if vector else state, [])
+            _check_function("stop", self.stop, ["y"] if vector else state, self._taken_by_stop)
         angles = _names("angles", self.angles, least=0)
         for name in set(angles) - set(state):
             raise InputError(f"angles: {name!r} is no state; must be some of {shown(state)}")
         object.__setattr__(self, "angles", tuple(angles))
+        if self.section is not None:
+            if vector or self.stop is not None or self.period is not None:
+                raise InputError("section: not with a stopping condition, a period or a family of states")
+            _check_function("section", self.section, state, [], first=0)
         self.period_at({})
 
     def period_at(self, values: Mapping[str, float]) -> float | None:
@@ -143,25 +152,63 @@ class System:
             period = period(**{name: known[name] for name in names})
         return None if period is None else checks.number("period", period, "s", above=0.0)
 
-    def with_parameters(self, values: Mapping[str, float]) -> System:
+    @property
+    def name(self) -> str:
+        """That of its right-hand side."""
+        return str(getattr(self.rhs, "__name__", "rhs"))
+
+    def replace(self, **values: float) -> System:
         """The same, compiled once for both, with other values of some parameters.
 
         Raises:
-            InputError: a name is unknown.
+            InputError: a name is unknown, or a value is no finite number.
         """
         for name in set(values) - set(self.parameters):
-            raise InputError(f"parameters.{name}: is no parameter of the system")
-        made = copy.copy(self)
-        object.__setattr__(made, "parameters", {**self.parameters, **values})
+            raise InputError(f"{name}: is no parameter of the system; {nearest(name, list(self.parameters))}")
+        made = object.__new__(System)
+        made.__dict__.update(self.__dict__)
+        known = {name: checks.number(name, value, "") for name, value in values.items()}
+        object.__setattr__(made, "parameters", {**self.parameters, **known})
         return made
+
+    def told(self) -> str:
+        """States and parameters."""
+        values = ", ".join(f"{name}={value:g}" for name, value in self.parameters.items())
+        return f"System({self.name}: {', '.join(self.state)}; {values or 'no parameters'})"
+
+    def described(self) -> dict[str, tuple[float, str, str]]:
+        """Value, unit and description of every parameter."""
+        about = f"parameter of {self.name}"
+        return {name: (value, "1", about) for name, value in self.parameters.items()}
+
+    @property
+    def prints(self) -> dict[str, str]:
+        """What tells its functions apart from others."""
+        given = {"rhs": self.rhs, "stop": self.stop, "period": self.period, "section": self.section}
+        return {k: fingerprint(f) if callable(f) else repr(f) for k, f in given.items()}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what is made again from the rest."""
+        return {
+            k: v for k, v in self.__dict__.items() if k not in ("rates", "kernel", "switches", "_observer")
+        }
 
     @property
     def observation(self) -> Observation:
         """What is watched while the system runs: its stopping condition, if it has one."""
         if self.stop is None:
             return NOTHING
-        record = np.zeros(2 + len(self.state))
-        return Observation(self._observer, np.zeros(0), record, stops=True)
+        record, own = np.zeros(2 + len(self.state)), bool(self._taken_by_stop)
+        if own:
+            record = np.append(record, np.full(len(self.parameters), np.nan))
+        return Observation(self._observer, np.zeros(0), record, stops=True, parameters=own)
+
+    @property
+    def _taken_by_stop(self) -> list[str]:
+        """Parameters that the stopping condition asks for, in its order; "p", all of them as an array."""
+        stop: Any = self.stop
+        taken = list(inspect.signature(stop).parameters) if isinstance(stop, types.FunctionType) else []
+        return [name for name in taken if name in (["p"] if self.vector else self.parameters)]
 
     @cached_property
     def switches(self) -> Any:
@@ -184,13 +231,13 @@ class System:
         functions["rhs"], _ = watching(self.rhs, depend)
         states = [f"y[{d}]" for d in range(len(self.state))]
         own = [f"p[{list(self.parameters).index(name)}]" for name in self.parameter_order]
-        name, arguments = getattr(self.rhs, "__name__", "rhs"), ", ".join(["t", *states, *own])
-        source = _SWITCHES.format(name=name, arguments=arguments)
+        source = _SWITCHES.format(name=self.name, arguments=", ".join(["t", *states, *own]))
         if self.stop is not None:
             names = set(inspect.signature(self.stop).parameters)
             require_noted(self.stop, names, [float64] * len(names))
             functions["stop"], _ = watching(self.stop, names)
-            source += f"    stop(seen, {', '.join(['t', *states])})\n"
+            taken = [f"p[{list(self.parameters).index(name)}]" for name in self._taken_by_stop]
+            source += f"    stop(seen, {', '.join(['t', *states, *taken])})\n"
         prints = [fingerprint(function) for function in (self.rhs, self.stop) if function is not None]
         module = new_module("system", source, prints)
         vars(module).update({field: inlined(function) for field, function in functions.items()})
@@ -208,7 +255,7 @@ class System:
         dim, names = len(self.state), list(self.parameters)
         own = () if self.vector else tuple(names.index(name) for name in self.parameter_order)
         return Rates(
-            getattr(self.rhs, "__name__", "rhs"),
+            self.name,
             dim,
             own,
             partial(_array_functions if self.vector else _functions, "rates", self.rhs),
@@ -236,13 +283,15 @@ class System:
         """The observer of the stopping condition."""
         stop: Any = self.stop
         self._refuse_raising("stop", stop)
-        with self._explained("stop", stop, 1 if self.vector else 1 + len(self.state), None):
-            states = (
-                "t, Y[:, i]"
-                if self.vector
-                else ", ".join(["t", *(f"Y[{d}, i]" for d in range(len(self.state)))])
-            )
-            source = _OBSERVE.format(name=stop.__name__, arguments=states)
+        taken, dim = self._taken_by_stop, len(self.state)
+        with self._explained("stop", stop, (1 if self.vector else 1 + dim) + len(taken), None):
+            own = [
+                f"record[{2 + dim + list(self.parameters).index(name)}, i]" for name in taken if name != "p"
+            ]
+            arguments = ["t", *(f"Y[{d}, i]" for d in range(dim)), *own]
+            if self.vector:
+                arguments = ["t", "Y[:, i]", *([f"record[{2 + dim}:, i]"] if taken else [])]
+            source = _OBSERVE.format(name=stop.__name__, arguments=", ".join(arguments))
             module = new_module("system", source, [fingerprint(stop)])
             vars(module).update(_functions("stop", stop, module.__name__, "float64"))
             made = run_module(module, source).observe
@@ -334,13 +383,16 @@ def _names(field: str, given: Any, least: int) -> list[str]:
     return names
 
 
-def _check_function(field: str, function: Any, state: list[str], parameters: list[str]) -> None:
+def _check_function(
+    field: str, function: Any, state: list[str], parameters: list[str], first: int = 1
+) -> None:
     """Arguments are matched by name: a value never lands in the wrong place silently."""
     if not isinstance(function, types.FunctionType):
         raise InputError(f"{field} = {shown(function)}: must be a plain Python function")
     given = inspect.signature(function).parameters
-    taken, wanted = list(given), ", ".join(["t", *state, *parameters])
-    fits = taken[1 : 1 + len(state)] == state and sorted(taken[1 + len(state) :]) == sorted(parameters)
+    taken, wanted = list(given), ", ".join([*["t"][:first], *state, *parameters])
+    rest = taken[first + len(state) :]
+    fits = taken[first : first + len(state)] == state and sorted(rest) == sorted(parameters)
     if not fits or any(one.kind is not one.POSITIONAL_OR_KEYWORD for one in given.values()):
         told = inspect.Signature([one.replace(annotation=one.empty) for one in given.values()])
         raise InputError(f"{field}: takes {told}, must take ({wanted})")

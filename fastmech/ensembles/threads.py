@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 
 from fastmech.ensembles import checks
-from fastmech.interrupts import check
+from fastmech.interrupts import check, still_wanted, work_while
 
 T = TypeVar("T")
 
@@ -37,7 +37,7 @@ def in_threads(
     if workers <= 1:
         yield from map(work, tasks)
         return
-    with ThreadPoolExecutor(workers) as pool:
+    with ThreadPoolExecutor(workers, initializer=work_while, initargs=(still_wanted(),)) as pool:
         try:
             yield from pool.map(work, tasks)
         except BaseException:  # Ctrl-C too: calls in hand end, the other tasks never begin

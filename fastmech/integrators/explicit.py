@@ -1,7 +1,7 @@
 """What one call of a method is given; driver of explicit Runge-Kutta and Adams methods over blocks of lanes.
 
 The driver knows neither the mechanism nor the method: right-hand side, observer and whole steps
-(:mod:`fastmech.kernels.whole`) come as functions, the method's weights as arrays. By those it takes steps
+(:mod:`fastmech.kernels.steps`) come as functions, the method's weights as arrays. By those it takes steps
 stage by stage where there are no whole ones (systems of many states), where an Adams method starts, and for
 single lanes that need the library's trigonometry.
 """
@@ -32,7 +32,7 @@ from fastmech.jit import (
     single,
 )
 from fastmech.kernels.blocks import VECTOR_LANES, in_single
-from fastmech.kernels.whole import (
+from fastmech.kernels.steps import (
     EVERY,
     Advance,
     Formula,
@@ -139,7 +139,7 @@ class Stepped(NamedTuple):
 
     Y: Floats  #: states (dim, lanes)
     params: Floats  #: (count, lanes)
-    history: Floats  #: (2 rows + 3, dim, lanes), see :mod:`fastmech.kernels.whole`
+    history: Floats  #: (2 rows + 3, dim, lanes), see :mod:`fastmech.kernels.steps`
     stages: Floats  #: scratch (stages + 2, dim, lanes)
 
 
@@ -225,7 +225,7 @@ def step_by_history(rhs: BlockRHS, weights: Weights, block: Stepped, at: Moment)
 
 @called
 def look(weights: Weights, block: Stepped, at: Moment) -> None:
-    """Keep the greatest last terms of the predictor, see :mod:`fastmech.kernels.whole`."""
+    """Keep the greatest last terms of the predictor, see :mod:`fastmech.kernels.steps`."""
     (dim, width), last = block.Y.shape, block.stages.shape[0] - 1
     total = block.stages[last].reshape(dim * width)
     history = block.history.reshape((block.history.shape[0], dim * width))

@@ -45,7 +45,7 @@ from fastmech.integrators.tableau import ImplicitTableau, Tableau
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.integrators.tableaus.implicit import IMPLICIT_TABLEAUS
 from fastmech.kernels.blocks import VECTOR_LANES
-from fastmech.kernels.whole import Formula
+from fastmech.kernels.steps import Formula
 
 
 def interpolatory_weights(nodes: Sequence[int]) -> list[Fraction]:

@@ -2,7 +2,7 @@
 
 What is integrated is handed over as :class:`Rates`: a function of one trajectory's numbers, and what is known
 of it. From that the package writes loops over lanes (trajectories side by side in memory): here the block
-right-hand side, in :mod:`fastmech.kernels.whole` the steps of explicit methods. They are branch-free, over
+right-hand side, in :mod:`fastmech.kernels.steps` the steps of explicit methods. They are branch-free, over
 contiguous rows of a small block, so that they become packed instructions. Lanes whose angles exceed the range
 of the packed trigonometry are done again, one by one: a lane's result never depends on its neighbours.
 """
@@ -50,7 +50,7 @@ class Rates(NamedTuple):
     ranged: bool = False
     near: bool = False
     vector: bool = False
-    looked_at: int = 0  #: first states that tell steps too large, see :mod:`fastmech.kernels.whole`
+    looked_at: int = 0  #: first states that tell steps too large, see :mod:`fastmech.kernels.steps`
 
     def arguments(self, t: str, states: Sequence[str], parameter: str) -> str:
         """Text of the function's arguments; ``parameter`` is that of one, with its row as ``{}``."""

@@ -101,15 +101,17 @@ def _attributes(module: types.ModuleType, names: tuple[str, ...], seen: set[int]
 Swaps = dict[Callable[[float], float], Callable[[float], float]]
 
 
-def rebuilt(function: types.FunctionType, module: str, swaps: Swaps) -> types.FunctionType:
+def rebuilt(
+    function: types.FunctionType, module: str, swaps: Swaps, plain: bool = False
+) -> types.FunctionType:
     """A function object of its own, said to be of ``module``, that calls others where ``swaps`` tells.
 
     Numba compiles one object once, whatever becomes of its globals; and a kernel from the disk wants to
     import the module of every function in it, which for the user's may be a notebook. Compiled functions
     that the function calls are rebuilt with it where they reach a swapped one; those given types of their
-    own stay as they are.
+    own stay as they are. ``plain`` gives all of them uncompiled.
     """
-    return _Rebuilder(module, swaps).copy(function)
+    return _Rebuilder(module, swaps, plain).copy(function)
 
 
 def reaches(function: types.FunctionType, swaps: Swaps) -> bool:
@@ -169,8 +171,8 @@ def _names(code: types.CodeType) -> Iterator[str]:
 class _Rebuilder:
     """Makes copies that are said to be of one module, with the same swaps."""
 
-    def __init__(self, module: str, swaps: Swaps) -> None:
-        self._module, self._swaps = module, swaps
+    def __init__(self, module: str, swaps: Swaps, plain: bool = False) -> None:
+        self._module, self._swaps, self._plain = module, swaps, plain
         self._above: list[Any] = []  # compiled functions that are being copied
 
     def copy(self, function: Any) -> types.FunctionType:
@@ -224,10 +226,12 @@ class _Rebuilder:
         if not isinstance(value, CPUDispatcher):
             return value
         dispatcher: Any = value
-        if value in self._above or not dispatcher._can_compile:
+        if value in self._above or not (self._plain or dispatcher._can_compile):
             return value
         self._above.append(value)
         try:
+            if self._plain:
+                return self.copy(dispatcher.py_func)
             if not self.reaches(dispatcher.py_func):
                 return value
             return numba.jit(**dispatcher.targetoptions)(self.copy(dispatcher.py_func))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.linalg import expm
+from scipy.sparse import random_array
 
 import fastmech as fm
 from fastmech.errors import InputError
@@ -87,6 +89,25 @@ def test_to_a_tolerance_and_with_a_stop() -> None:
     assert stopped.stop_code is not None
     assert stopped.stop_code.tolist() == [3, 3]
     assert (stopped.y[0, :, 0] < 0.5).all()
+
+
+def test_a_network_is_a_sparse_matrix_s_arrays() -> None:
+    """Kuramoto's oscillators on a random graph: the graph Laplacian's, close to synchrony, in closed form."""
+    graph = random_array((60, 60), density=0.1, rng=np.random.default_rng(5), format="csr")
+    graph = ((graph + graph.T) != 0).astype(np.float64).tocsr()
+    first, neighbours = graph.indptr.astype(np.int64), graph.indices.astype(np.int64)
+
+    def kuramoto(t: float, y: Any, p: Any, rates: Any) -> None:
+        for i in range(y.size):
+            pull = 0.0
+            for k in range(first[i], first[i + 1]):
+                pull += math.sin(y[neighbours[k]] - y[i])
+            rates[i] = p[0] * pull
+
+    start = 1e-5 * np.random.default_rng(6).standard_normal((4, 60))
+    run = fm.integrate(fm.System(kuramoto, ("x", 60), {"K": 0.3}), start, 2.0, 0.01)
+    laplacian = np.diag(np.asarray(graph.sum(axis=1)).ravel()) - graph.toarray()
+    np.testing.assert_allclose(run.y[0], start @ expm(-0.6 * laplacian), atol=1e-12)
 
 
 def gives(t: float, y: Any, p: Any, rates: Any) -> Any:

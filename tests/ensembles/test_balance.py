@@ -53,7 +53,7 @@ def test_works_are_integrals_of_powers_along_the_motion() -> None:
 def test_parts_of_the_balance() -> None:
     """Energies by the oracle at the states given; the residual is what the parts leave over."""
     scene, start, _, _ = paper_motion()
-    params = scene.model_dump()
+    params = scene.parameters
     balance = energy_balance(scene, start, [0.0, 0.1], dt=0.05)
     for i, y in enumerate(balance.y):
         assert balance.kinetic[i] == pytest.approx(float(oracle().kinetic_energy(params, y)), abs=1e-11)
@@ -80,7 +80,7 @@ def test_lowest_potential_of_table_1() -> None:
     """The unforced minimum stands upright: phi = pi/2, theta = 0 (reference data table_1_unforced)."""
     scene = paper_motion()[0]
     assert lowest_potential(scene) == pytest.approx(
-        float(oracle().potential(scene.model_dump(), (np.pi / 2, 0.0))), abs=1e-9
+        float(oracle().potential(scene.parameters, (np.pi / 2, 0.0))), abs=1e-9
     )
 
 

@@ -73,7 +73,7 @@ def test_the_bound_is_the_speed_itself_where_the_energy_is_least() -> None:
     """From the bottom of U no motion becomes faster than it is; elsewhere by the height above the bottom."""
     c, rates = reduce(HANGING), np.random.default_rng(3).uniform(-9.0, 9.0, (20, 2))
     starts = np.concatenate([np.tile(BOTTOM, (20, 1)), rates], axis=1)
-    np.testing.assert_allclose(speed_bound(c, starts), kinetic_norm(HANGING.model_dump(), starts), rtol=1e-12)
+    np.testing.assert_allclose(speed_bound(c, starts), kinetic_norm(HANGING.parameters, starts), rtol=1e-12)
     top = np.array([[np.pi / 2, np.pi, 0.0, 0.0]])  # 2 l ((m1 + m2) g + m2 g) above
     m1, m2, l, g = HANGING.m1, HANGING.m2, HANGING.l, HANGING.g
     np.testing.assert_allclose(
@@ -151,14 +151,14 @@ def test_a_fitted_ensemble_equals_single_runs(fit: Any, method: str) -> None:
     starts = random_starts(60, seed=9) * np.array([1.0, 1.0, 2.0, 2.0])
     arguments: dict[str, Any] = {"t_eval": [0.0, 0.3, 1.1, 1.5], "dt": 0.01, "method": method, "fit": fit}
     run = fm.integrate(SCENE, starts, **arguments)
-    assert run.own_dt.shape == (1 if fit is True else 3, 60)
-    assert run.own_steps.shape == (60,)
-    assert np.unique(run.own_steps).size > 3
+    assert run.trajectory_dt.shape == (1 if fit is True else 3, 60)
+    assert run.trajectory_steps.shape == (60,)
+    assert np.unique(run.trajectory_steps).size > 3
     for i, start in enumerate(starts):
         alone = fm.integrate(SCENE, start, **arguments)
         np.testing.assert_array_equal(alone.y[:, 0], run.y[:, i])
-        np.testing.assert_array_equal(alone.own_dt[:, 0], run.own_dt[:, i])
-        assert alone.own_steps[0] == run.own_steps[i]
+        np.testing.assert_array_equal(alone.trajectory_dt[:, 0], run.trajectory_dt[:, i])
+        assert alone.trajectory_steps[0] == run.trajectory_steps[i]
 
 
 def test_steps_that_are_reported() -> None:
@@ -166,19 +166,21 @@ def test_steps_that_are_reported() -> None:
     starts = random_starts(80, seed=2)
     run = fm.integrate(SCENE, starts, 2.0, dt=0.01, fit=True)
     number = np.ceil(2.0 / fitted_steps(reduce(SCENE), starts, 0.01, 1.0) - 1e-9)
-    np.testing.assert_array_equal(run.own_steps, number)
-    np.testing.assert_allclose(run.own_dt[0], 2.0 / number, rtol=1e-13)
+    np.testing.assert_array_equal(run.trajectory_steps, number)
+    np.testing.assert_allclose(run.trajectory_dt[0], 2.0 / number, rtol=1e-13)
     assert run.steps == number.max()
-    assert run.dt == run.own_dt.max()
+    assert run.dt == run.trajectory_dt.max()
 
 
 def test_a_second_fit_never_shortens_a_step() -> None:
     """The damper slows motions down: later pieces have longer steps, none beyond dt."""
     starts = random_starts(50, seed=4) * np.array([1.0, 1.0, 3.0, 3.0])
     run = fm.integrate(SCENE, starts, t_eval=[1.0, 2.0, 4.0], dt=0.0125, fit=[0.0, 1.0, 2.0])
-    assert (np.diff(run.own_dt, axis=0) >= -1e-3 * run.own_dt[1:]).all()  # equal steps in another interval
-    assert (run.own_dt[2] > 1.3 * run.own_dt[0]).any()
-    assert run.own_dt.max() <= 0.0125 * (1.0 + 1e-12)
+    assert (
+        np.diff(run.trajectory_dt, axis=0) >= -1e-3 * run.trajectory_dt[1:]
+    ).all()  # equal steps in another interval
+    assert (run.trajectory_dt[2] > 1.3 * run.trajectory_dt[0]).any()
+    assert run.trajectory_dt.max() <= 0.0125 * (1.0 + 1e-12)
 
 
 @pytest.mark.parametrize("scene", [SCENE, Scene()])
@@ -208,7 +210,7 @@ def test_outputs_of_a_run_in_pieces(scene: Scene, formulation: str, times: list[
     )
     np.testing.assert_array_equal(run.t, times)
     assert run.y.shape == (len(times), 10, 4)
-    assert len(run.own_dt) == 1 + sum(cut < times[-1] for cut in (0.5, 1.25))
+    assert len(run.trajectory_dt) == 1 + sum(cut < times[-1] for cut in (0.5, 1.25))
     right = motions_of(scene, starts, times) if times[-1] > 0.0 else starts[None]
     assert errors(run.y, right).max() < 1e-8
 
@@ -225,7 +227,7 @@ def test_a_bad_start_leaves_others_alone() -> None:
 def test_no_trajectories() -> None:
     run = fm.integrate(SCENE, np.empty((0, 4)), t_eval=[0.1, 0.2], fit=[0.0, 0.15])
     assert run.y.shape == (2, 0, 4)
-    assert run.own_steps.shape == (0,)
+    assert run.trajectory_steps.shape == (0,)
 
 
 def falling(t: float, x: float) -> tuple[float]:
@@ -269,7 +271,7 @@ def test_a_start_that_no_steps_follow_leaves_others_alone(speed: float, fit: Any
     starts[13, 2] = speed
     run, others = fm.integrate(SCENE, starts, t_eval=[0.0, 1.0], fit=fit), np.arange(40) != 13
     np.testing.assert_array_equal(run.y[:, others], right.y)
-    np.testing.assert_array_equal(run.own_dt[:, others], right.own_dt)
+    np.testing.assert_array_equal(run.trajectory_dt[:, others], right.trajectory_dt)
     np.testing.assert_array_equal(run.status[others], right.status)
     assert run.status[13] == fm.Status.STEP_TOO_LARGE
     assert run.failures == "1 of 40 trajectories failed: 1 step_too_large; use a smaller dt"

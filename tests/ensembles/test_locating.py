@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -51,7 +52,7 @@ def test_time_and_state_of_a_stop_keep_the_tolerance(tol: float, method: str | N
     assert true.max() / 3.0 <= run.error_estimate <= 3.0 * true.max()
     # Within the state's error over its speed there, at least 0.1 omega^2.
     assert np.abs(run.stop_time - time).max() <= tol / (0.1 * OMEGA)
-    assert run.own_steps.max() < 2000
+    assert run.trajectory_steps.max() < 2000
 
 
 def test_outputs_before_and_after_the_stop() -> None:
@@ -93,3 +94,53 @@ def test_a_located_stop_has_the_method_s_order(name: str, order: int) -> None:
         assert abs(run.records[STOP_STATE, 0]) < 1e-9
         errors.append(abs(run.records[STOP_TIME, 0] - 0.5 * np.pi / OMEGA))
     assert 2.0 ** (order - 0.6) < errors[0] / errors[1] < 2.0 ** (order + 1.6)
+
+
+def passed(t: float, x: float, v: float, level: float, omega: float) -> float:
+    return omega if x > level else 0.0
+
+
+def family_passed(t: float, y: np.ndarray, p: np.ndarray) -> float:
+    return 3.0 if y[0] > p[1] else 0.0
+
+
+def family(t: float, y: np.ndarray, p: np.ndarray, rates: np.ndarray) -> None:
+    for i in range(y.size):
+        rates[i] = p[0]
+
+
+def steady(t: float, x: float, v: float, omega: float, level: float) -> tuple[float, float]:
+    return v, 0.0 * x * omega * level
+
+
+@pytest.mark.parametrize(
+    ("how", "allowed"),
+    [
+        ({"tol": 1e-9}, 1e-9),
+        ({"tol": 1e-9, "method": "radau5"}, 1e-9),
+        ({"dt": 0.01}, 0.0101),
+        ({"dt": 0.01, "method": "abm8"}, 0.0101),
+    ],
+)
+def test_a_stop_knows_each_trajectory_s_parameters(how: dict[str, Any], allowed: float) -> None:
+    """x = v t passes a level of its own."""
+    rng = np.random.default_rng(3)
+    level, y0 = rng.uniform(0.5, 5.0, 700), np.stack([np.zeros(700), rng.uniform(1.0, 2.0, 700)], axis=1)
+    system = System(steady, ["x", "v"], {"level": 9.0, "omega": 2.0}, stop=passed)
+    run = fm.integrate(system, y0, t_end=10.0, parameters={"level": level}, **how)
+    assert run.stop_time is not None
+    assert (run.stop_code == 2).all()
+    late = run.stop_time - level / y0[:, 1]
+    assert late.min() > -1e-9
+    assert late.max() < allowed
+
+
+def test_a_stop_of_a_family_takes_parameters() -> None:
+    system = System(family, ("x", 3), {"rate": 2.0, "level": 4.0}, stop=family_passed)
+    run = fm.integrate(system, np.zeros((5, 3)), 10.0, 0.25, parameters={"level": np.arange(1.0, 6.0)})
+    np.testing.assert_allclose(run.stop_time, [0.75, 1.25, 1.75, 2.25, 2.75])
+
+
+def test_a_stop_that_asks_for_what_is_no_parameter_is_refused() -> None:
+    with pytest.raises(fm.InputError, match="stop: takes"):
+        System(oscillator, ["x", "v"], {"omega": 1.0}, stop=passed)

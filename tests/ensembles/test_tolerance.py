@@ -141,9 +141,9 @@ def test_what_was_chosen_is_reported() -> None:
     scene, starts, _ = case("constant")
     run = fm.integrate(scene, starts, 4.0, tol=1e-5)
     assert run.method in METHODS
-    assert run.own_dt.shape == (1, N)
-    assert run.own_steps.shape == (N,)
-    assert run.dt == run.own_dt.max()
+    assert run.trajectory_dt.shape == (1, N)
+    assert run.trajectory_steps.shape == (N,)
+    assert run.dt == run.trajectory_dt.max()
     many = np.tile(starts, (FEW // N + 1, 1))
     rough = fm.integrate(scene, many, 4.0, tol=1e-2, quantile=0.5)
     assert rough.precision == "float32"
@@ -159,7 +159,7 @@ def test_outputs_between_steps_are_as_accurate(quantile: float, formulation: str
     few = fm.integrate(scene, starts, 4.0, tol=tol, quantile=quantile, formulation=formulation)
     true = np.sort(errors(run.y, motions_of(scene, starts, times)))[math.ceil(quantile * N) - 1]
     assert run.steps < 800
-    assert run.own_steps.sum() < 2.0 * few.own_steps.sum()
+    assert run.trajectory_steps.sum() < 2.0 * few.trajectory_steps.sum()
     assert tol / 100.0 < true <= tol
 
 
@@ -196,7 +196,7 @@ def test_the_number_of_threads_does_not_matter(name: str) -> None:
             for threads in (1, 3)
         ]
         np.testing.assert_array_equal(runs[0].y, runs[1].y)
-        np.testing.assert_array_equal(runs[0].own_dt, runs[1].own_dt)
+        np.testing.assert_array_equal(runs[0].trajectory_dt, runs[1].trajectory_dt)
         assert runs[0].error_estimate == runs[1].error_estimate
         if quantile == 1.0:
             np.testing.assert_array_equal(runs[0].error, runs[1].error)

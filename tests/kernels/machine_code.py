@@ -47,7 +47,7 @@ from fastmech.integrators.methods import METHODS
 from fastmech.jit import compiled_anew
 from fastmech.kernels.blocks import in_single
 from fastmech.kernels.select import with_terms
-from fastmech.kernels.whole import whole_steps
+from fastmech.kernels.steps import whole_steps
 
 def pendulum(t, x, v, damping):
     return v, -damping * v - fm.sin(x)

@@ -41,7 +41,7 @@ def test_kernel_equals_the_mechanism(formulation: str, terms: str, scene: Scene,
 @EVERY_KERNEL
 def test_kernel_equals_the_oracle(formulation: str, terms: str) -> None:
     scene, Y, t = UNALIKE.replace(**TERMS[terms]), lanes(20, seed=4), 0.6
-    params = scene.model_dump()
+    params = scene.parameters
     actual = evaluate(kernel(formulation, terms), scene, Y, t)
     for lane, y in enumerate(Y.T):
         if formulation == "lagrange":

@@ -22,7 +22,7 @@ from fastmech.integrators.methods import METHODS as REGISTRY
 from fastmech.integrators.methods import Adams, RungeKutta
 from fastmech.jit import MATRIX, VECTOR
 from fastmech.kernels.select import DAMPING, DECAY, FORCE, FORMULATIONS
-from fastmech.kernels.whole import whole_steps
+from fastmech.kernels.steps import whole_steps
 from fastmech.kernels.work import lagrange_work
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene

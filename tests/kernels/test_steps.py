@@ -17,7 +17,7 @@ from fastmech.ensembles.run import Ensemble, run_ensemble
 from fastmech.integrators.methods import METHODS, Adams, RungeKutta, bashforth
 from fastmech.kernels.blocks import VECTOR_LANES, Rates
 from fastmech.kernels.sincos import REDUCTION_LIMIT
-from fastmech.kernels.whole import EVERY, MOST_STATES, Lanes, Steps, term_weights, whole_steps
+from fastmech.kernels.steps import EVERY, MOST_STATES, Lanes, Steps, term_weights, whole_steps
 from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
 

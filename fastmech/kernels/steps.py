@@ -118,7 +118,7 @@ from numpy import float32
 from fastmech.jit import called, kernel
 from fastmech.kernels.attempt import attempt
 from fastmech.kernels.bits import NO_LANE, apart, not_inlined, noted
-from fastmech.kernels.whole import advance_signature
+from fastmech.kernels.steps import advance_signature
 
 {look}
 @kernel(advance_signature(types.{precision}))
