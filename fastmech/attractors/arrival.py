@@ -19,6 +19,8 @@ from scipy.linalg import eig, solve_discrete_lyapunov
 
 from fastmech.attractors.flow import FINER, Floats, Flow
 from fastmech.attractors.orbits import ATTRACTS, Orbit
+from fastmech.attractors.proof import Proof, prove_rest
+from fastmech.ensembles.system import System
 from fastmech.kernels.levels import levels
 
 Integers = NDArray[np.int64]
@@ -41,6 +43,7 @@ class Balls(NamedTuple):
     # how far along a cycle e goes, in distances to the next place
     slopes: Floats  #: (m, dim): rates of change from place to place along a cycle, else zero
     radius: float  #: the least distance to a ball's border, over the scale
+    proof: Proof | None = None  #: of a place of rest
 
 
 def levels_of(flow: Flow, of: Balls, states: Floats) -> tuple[Integers, Floats]:
@@ -52,7 +55,11 @@ def levels_of(flow: Flow, of: Balls, states: Floats) -> tuple[Integers, Floats]:
 
 
 def balls(flow: Flow, orbit: Orbit) -> Balls:
-    """The balls of an orbit that attracts."""
+    """The balls of an orbit that attracts: of a place of rest the proved one, where there is a proof."""
+    if not flow.forced and orbit.periods == 0.0 and isinstance(flow.scene, System):
+        proof = prove_rest(flow.scene, orbit.points[0], flow.scale)
+        if proof is not None:
+            return _proved(flow, orbit.points, proof)
     places, (m, dim) = np.ascontiguousarray(orbit.points), orbit.points.shape
     period = orbit.periods or 1.0
     tried = np.unique(np.linspace(0, m - 1, TRIED).astype(int)) if orbit.cycle else np.arange(m)
@@ -93,6 +100,15 @@ def balls(flow: Flow, orbit: Orbit) -> Balls:
     forms[:, :dim] /= radius
     widest = max(float(np.linalg.norm(forms[j, :dim] * flow.scale, 2)) for j in tried.tolist())
     return own._replace(radius=1.0 / widest)
+
+
+def _proved(flow: Flow, place: Floats, proof: Proof) -> Balls:
+    """The ball of a proof."""
+    root = np.linalg.cholesky(proof.form).T
+    forms = np.zeros((1, len(root) + 1, len(root)))
+    forms[0, :-1] = root
+    radius = 1.0 / float(np.linalg.norm(root * flow.scale, 2))
+    return Balls(np.ascontiguousarray(place), forms, np.zeros_like(place), radius, proof)
 
 
 def keys_of(flow: Flow, size: Floats, states: Floats) -> Integers:

@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -32,13 +32,13 @@ from fastmech.ensembles.problem import Case, Problem, system_of
 from fastmech.ensembles.solve import Settings, solve
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
+from fastmech.generated import new_module, run_module
 from fastmech.jit import FLAGS
+from fastmech.kernels.rebuilding import fingerprint, rebuilt
 from fastmech.models.mechanism import Mechanism
+from fastmech.objects import Drawn
 from fastmech.samplers import Sampler
 from fastmech.scene import nearest
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 Flags = NDArray[np.bool_]
 
@@ -83,7 +83,7 @@ class Branch:
 
 
 @dataclass(frozen=True, repr=False)
-class FrequencyResponse:
+class FrequencyResponse(Drawn):
     """Branches of periodic motion over a parameter; printed, where stability changes."""
 
     parameter: str
@@ -97,7 +97,12 @@ class FrequencyResponse:
         """Folds, period doublings and Neimark-Sacker points of all branches, by the parameter."""
         return sorted((s for branch in self.branches for s in branch.special), key=lambda s: s.value)
 
-    def __repr__(self) -> str:
+    KIND = "frequency_response"
+    PICTURE = "plots.response:draw_response"
+    LAYOUT = "scan_types.frequency_response:response_dataset"
+
+    def told(self) -> str:
+        """How many branches, and where stability changes."""
         closed, cut = (sum(getattr(b, how) for b in self.branches) for how in ("closed", "cut"))
         lines = [
             f"{len(self.branches)} branches of period {self.periods} over {self.parameter}"
@@ -110,12 +115,6 @@ class FrequencyResponse:
             if values:
                 lines.append(f"  {kind} at {self.parameter} = {', '.join(values[:6])}{more}")
         return "\n".join(lines)
-
-    def plot(self, state: str | None = None, ax: Axes | None = None) -> Axes:
-        """Amplitude of a state, the first by default, over the parameter: stable solid, unstable dashed."""
-        from fastmech.plots.response import draw_response
-
-        return draw_response(self, self.names[0] if state is None else state, ax)
 
 
 def frequency_response(
@@ -169,7 +168,8 @@ def frequency_response(
                 branch = _branch(family, place, value)
                 branches.append(branch)
                 known += [place, *_at(family, branch, value)]
-    return FrequencyResponse(parameter, tuple(system.state), _units(system), periods, tuple(branches))
+    found = FrequencyResponse(parameter, tuple(system.state), _units(system), periods, tuple(branches))
+    return found.of(system)
 
 
 def _units(system: System | Mechanism) -> dict[str, str]:
@@ -230,7 +230,7 @@ class Family:
                 raise InputError(f"parameter: at {self.parameter} = {value:g} the system has no period")
             return period * self.periods, [float(found[name]) for name in own.parameters]
 
-        return _in_periods(own), known
+        return _over_periods(own), known
 
     def run(self, y: Floats, values: Floats, times: Floats) -> Floats:
         """States (outputs, n, dim) at times in units of the orbits' periods, each with its own value (n,)."""
@@ -257,7 +257,7 @@ class Family:
         return self.away(image[0], x), J, by_value
 
 
-def _in_periods(system: System) -> System:
+def _over_periods(system: System) -> System:
     """The same with its period, the last parameter, as the unit of time."""
     if system.vector:
         raise InputError("system: branches are followed of systems whose rhs gives a tuple, not of arrays")
@@ -265,13 +265,14 @@ def _in_periods(system: System) -> System:
     rates = ", ".join(f"period_ * rate{k}" for k in range(len(system.state)))
     found = ", ".join(f"rate{k}" for k in range(len(system.state)))
     text = (
-        f"def in_periods(t, {', '.join(names)}, period_):\n"
+        f"def over_periods(t, {', '.join(names)}, period_):\n"
         f"    {found}, = rhs(t * period_, {', '.join(names)})\n"
         f"    return {rates},\n"
     )
-    place: dict[str, Any] = {"rhs": numba.njit(**FLAGS)(system.rhs)}
-    exec(text, place)
-    function = place["in_periods"]
+    rhs: Any = system.rhs
+    module = new_module("system", text, [fingerprint(rhs)])
+    vars(module)["rhs"] = numba.njit(**FLAGS)(rebuilt(rhs, module.__name__, {}))
+    function = run_module(module, text).over_periods
     assert list(inspect.signature(function).parameters)[1:-1] == names
     return System(function, list(system.state), {**dict.fromkeys(system.parameters, 0.0), "period_": 1.0})
 

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import binomtest
 
-from fastmech.attractors.arrival import Cloud
-from fastmech.attractors.flow import Floats, Flow, flow_of
+from fastmech.attractors.arrival import Balls, Cloud
+from fastmech.attractors.flow import FINER, Floats, Flow, SectionFlow, flow_of
 from fastmech.attractors.orbits import Orbit
+from fastmech.attractors.proof import Proof
 from fastmech.attractors.search import Search
 from fastmech.attractors.settle import Ends, settle
 from fastmech.ensembles import checks
@@ -21,6 +22,7 @@ from fastmech.ensembles.status import LABELS, counts
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
+from fastmech.objects import Drawn, Printed
 from fastmech.samplers import Sampler, sampler_of
 
 Integers = NDArray[np.int64]
@@ -38,8 +40,8 @@ LATER, FEWEST, MOST = 8, 256, 1 << 14
 LINES = 5
 
 
-@dataclass(frozen=True)
-class Attractor:
+@dataclass(frozen=True, repr=False)
+class Attractor(Printed):
     """A place of rest, a periodic motion, a torus or chaos that motions come to."""
 
     kind: str  #: "fixed point", "periodic", "torus" or "chaos"
@@ -50,8 +52,13 @@ class Attractor:
     exponent: float  #: largest Lyapunov exponent [1/s]
     exponent_error: float  #: its error
     residual: float | None  #: of the map over its period, as a share of the scale
-    radius: float | None  #: of the ball about it in which the map was measured to contract, of the scale
+    radius: float | None  #: of the ball about it that it attracts, over the scale: measured, or proved
+    proof: Proof | None  #: of a place of rest, where the right-hand side can be called with symbols
     found: int  #: how many starts end there
+
+    def told(self) -> str:
+        """Kind, place, and the largest Lyapunov exponent."""
+        return f"{self.name}; Lyapunov exponent {self.exponent:.3g} 1/s, {self.found:,} starts"
 
     @property
     def name(self) -> str:
@@ -61,11 +68,11 @@ class Attractor:
         if self.forcing_periods is not None:
             period = f", period {self.forcing_periods} of the forcing"
         place = f"at ({where})" if self.kind in ("fixed point", "periodic") else f"about ({where})"
-        return f"{self.kind}{period} {place}"
+        return f"{self.kind}{period} {place}{', proved' if self.proof else ''}"
 
 
 @dataclass(frozen=True, repr=False)
-class Attractors(Sequence[Attractor]):
+class Attractors(Drawn, Sequence[Attractor]):
     """Attractors, the most frequent first, and where each start ends; printed, the shares."""
 
     attractors: tuple[Attractor, ...]
@@ -82,17 +89,25 @@ class Attractors(Sequence[Attractor]):
     search: Search = field(repr=False)  #: what they were found with
     rank: Integers = field(repr=False)  #: place among the attractors of what the search has found
 
+    KIND = "attractors"
+    PICTURE = "plots.objects:draw_attractors"
+    LAYOUT = "scan_types.attractors:attractor_dataset"
+
     def __len__(self) -> int:
         return len(self.attractors)
 
     def __getitem__(self, index):  # type: ignore[no-untyped-def]
         return self.attractors[index]
 
-    def labels_of(self, starts: Floats, progress: Progress | None = None) -> Ends:
+    def label_starts(self, starts: Floats, progress: Progress | None = None) -> Ends:
         """Labels, statuses and times of other starts (n, dim) by these attractors."""
         periods = max(1, round(self.t_end / self.looks))
         ends = settle(self.search, starts, periods, progress)
         return ends._replace(label=self.rank[ends.label])
+
+    def __call__(self, starts: Floats) -> Integers:
+        """Labels (n,) of starts (n, dim), as measures of basins ask for them."""
+        return self.label_starts(starts).label
 
     @property
     def counts(self) -> dict[str, int]:
@@ -104,7 +119,8 @@ class Attractors(Sequence[Attractor]):
         """Share of the starts that ends at each."""
         return np.array([one.found for one in self.attractors]) / max(self.status.size, 1)
 
-    def __repr__(self) -> str:
+    def told(self) -> str:
+        """The shares of the attractors, the most frequent first."""
         n = self.status.size
         told = ", ".join(f"{count:,} {name}" for name, count in self.counts.items() if count)
         lines = [f"{len(self)} attractors of {n:,} starts: {told}"]
@@ -146,10 +162,11 @@ def find_attractors(
     Returns:
         attractors and labels. A start is captured when two runs with different steps stay together until both
         have come into a region about the same attractor in which the map over its period was measured to
-        contract, or have visited the cells of a torus or of chaos 24 times in a row. It is ``unsure`` where
-        they come apart with the finest steps too, ``escaped`` where it goes a thousand times as far as
-        motions do or where the system's stopping condition ends it, ``undecided`` where it has not arrived by
-        ``t_end``.
+        contract (of a system's place of rest a ball that it is proved to attract, where the function can be
+        called with symbols), or have visited the cells of a torus or of chaos 24 times in a row. It is
+        ``unsure`` where they come apart with the finest steps too, ``escaped`` where it goes a thousand times
+        as far as motions do or where the system's stopping condition ends it, ``undecided`` where it has not
+        arrived by ``t_end``.
 
     Raises:
         InputError: an argument is wrong, or the system depends on the time and has no period.
@@ -216,7 +233,7 @@ def labelled(
             search.look(ends.last)
         if search.count == before:
             break
-    every = [_of_orbit(flow, orbit, ball.radius) for orbit, ball in search.orbits]
+    every = [_of_orbit(flow, orbit, ball) for orbit, ball in search.orbits]
     every += [_of_cloud(cloud, flow.forced) for cloud in search.clouds]
     found = np.bincount(ends.label[ends.label >= 0], minlength=len(every))
     order = np.argsort(-found, kind="stable")
@@ -236,7 +253,7 @@ def labelled(
         steps=ends.steps,
         search=search,
         rank=rank,
-    )
+    ).of(flow.scene)
 
 
 def _of_cloud(cloud: Cloud, forced: bool) -> Attractor:
@@ -244,13 +261,26 @@ def _of_cloud(cloud: Cloud, forced: bool) -> Attractor:
     if cloud.still:
         kind = "periodic" if forced else "fixed point"
     return Attractor(
-        kind, cloud.points, None, None, None, cloud.exponent, cloud.error, residual=None, radius=None, found=0
+        kind,
+        cloud.points,
+        None,
+        None,
+        None,
+        cloud.exponent,
+        cloud.error,
+        residual=None,
+        radius=None,
+        proof=None,
+        found=0,
     )
 
 
-def _of_orbit(flow: Flow, orbit: Orbit, radius: float) -> Attractor:
+def _of_orbit(flow: Flow, orbit: Orbit, ball: Balls) -> Attractor:
     rest = orbit.periods == 0.0
     over = flow.period * (orbit.periods or 1.0)
+    passages = isinstance(flow, SectionFlow)
+    if isinstance(flow, SectionFlow):
+        over = float(flow.passages(orbit.points[:1], np.array([orbit.periods]), FINER)[1][0])
     largest = float(np.abs(orbit.multipliers).max()) if orbit.multipliers.size else 0.0
     # Differences give multipliers to about 1e-8; along a cycle nothing grows or falls.
     exponent = 0.0 if orbit.cycle else math.log(max(largest, 1e-300)) / over
@@ -261,11 +291,12 @@ def _of_orbit(flow: Flow, orbit: Orbit, radius: float) -> Attractor:
         kind="fixed point" if rest else "periodic",
         points=points,
         period=None if rest else over,
-        forcing_periods=round(orbit.periods) if flow.forced else None,
+        forcing_periods=round(orbit.periods) if flow.forced and not passages else None,
         multipliers=orbit.multipliers,
         exponent=exponent,
         exponent_error=error,
         residual=orbit.residual,
-        radius=radius,
+        radius=ball.radius,
+        proof=ball.proof,
         found=0,
     )

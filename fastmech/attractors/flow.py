@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, NamedTuple
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,7 +20,10 @@ from fastmech.ensembles.solve import Settings, solve
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError
+from fastmech.generated import new_module, run_module
 from fastmech.integrators.methods import Method, find_method
+from fastmech.jit import FLAGS
+from fastmech.kernels.rebuilding import fingerprint, rebuilt
 from fastmech.models.mechanism import Mechanism
 
 Floats = NDArray[np.float64]
@@ -46,6 +50,9 @@ SLOWER = 8.0
 
 #: Loads' periods that fit into a common one at most so often.
 MULTIPLES = 64
+
+#: Times in which states change by about their size that a motion has to come back to a section.
+WAITED = 64.0
 
 #: Motions beyond so many times the scale have escaped.
 FAR = 1e3
@@ -129,6 +136,71 @@ class Flow:
         return image[:, 0], np.swapaxes(J, 1, 2)
 
 
+@dataclass(frozen=True)
+class SectionFlow(Flow):
+    """The map from one passage of a section to the next; its period is the time that one takes, about."""
+
+    sides: tuple[Problem, ...] = field(kw_only=True)  #: that stop below the section, and above it
+    longest: float = field(kw_only=True)  #: what does not come back for so long never does [s]
+
+    def run(self, y: Floats, times: Floats, finer: float = 1.0) -> Reached:
+        """States at so many passages; a motion that does not come back is stopped."""
+        return self.passages(y, times, finer)[0]
+
+    def passages(self, y: Floats, times: Floats, finer: float = 1.0) -> tuple[Reached, Floats]:
+        """The same, and how long all of them took [s] (n,)."""
+        n, now, dt = len(y), y.copy(), self.period / math.ceil(self.steps * finer)
+        out, last, took = np.full((len(times), *y.shape), np.nan), y.copy(), np.zeros(n)
+        active = np.flatnonzero(np.isfinite(y).all(axis=1))
+        for k in range(1, round(float(times[-1])) + 1):
+            for problem in self.sides:
+                case = Case(problem, now[active], np.array([self.longest]), self.threads)
+                found = solve(case, Settings(self.method, dt))
+                passed = found.records[0] != 0.0
+                final = found.y[-1] if found.last is None else found.last
+                last[active] = np.where(passed[:, None], found.records[2:].T, final)
+                took[active] += found.records[1]
+                active = active[passed]
+                now[active] = last[active]
+            out[times == k] = np.where(np.isin(np.arange(n), active)[:, None], now, np.nan)
+        far = self.is_far(last) | ~np.isfinite(last).all(axis=1)
+        stopped = np.ones(n, dtype=np.bool_)
+        stopped[active] = False
+        return Reached(out, stopped & ~far, far), took
+
+
+def _sides(system: System, n: int) -> tuple[Problem, ...]:
+    """The system with stopping conditions below and above its section, where it passes."""
+    names, made = ", ".join(system.state), []
+    section: Any = system.section
+    for sign in ("<", ">"):
+        text = f"def stop(t, {names}):\n    return 1.0 if section({names}) {sign} 0.0 else 0.0\n"
+        module = new_module("system", text, [fingerprint(section)])
+        vars(module)["section"] = numba.njit(**FLAGS)(rebuilt(section, module.__name__, {}))
+        own = System(system.rhs, system.state, system.parameters, run_module(module, text).stop)
+        problem = system_problem(own, n, {})
+        made.append(replace(problem, observation=replace(problem.observation, locate=True)))
+    return tuple(made)
+
+
+def _section_flow(system: System, flow: Flow, sample: Floats) -> SectionFlow:
+    """The flow's map from passage to passage of the system's section.
+
+    Raises:
+        InputError: hardly any motion passes it.
+    """
+    given = {f.name: getattr(flow, f.name) for f in fields(Flow)} | {"forced": True}
+    sides = _sides(system, len(sample))
+    first = SectionFlow(**given, sides=sides, longest=WAITED * flow.period)
+    begun = first.after(sample[:CHOOSING], 2.0)
+    begun = begun[np.isfinite(begun).all(axis=1)]
+    if not len(begun):
+        raise InputError("section: no start of a sample comes to it twice")
+    period = float(np.median(first.passages(begun, np.array([1.0]))[1]))
+    steps = max(FEWEST, math.ceil(flow.steps * period / flow.period))
+    return replace(first, period=period, steps=steps)
+
+
 def flow_of(
     scene: System | Mechanism,
     sample: Floats,
@@ -141,12 +213,11 @@ def flow_of(
     Raises:
         InputError: it depends on the time and has no period, or its motions need too many steps.
     """
+    scene = scene.replace(**values)
     if isinstance(scene, Mechanism):
-        scene = scene.replace(**values)
         problem, period = mechanism_problem(scene, len(sample), {}, "lagrange"), period_of(scene, {})
         turning = [q.periodic for q in scene.coordinates] + [False] * len(scene.coordinates)
     else:
-        scene = scene.with_parameters(values) if values else scene
         problem, period = system_problem(scene, len(sample), {}), period_of(scene, {})
         turning = [name in scene.angles for name in scene.state]
     angles = np.array(turning)
@@ -163,7 +234,10 @@ def flow_of(
                 "how many seconds it repeats"
             )
         flow = replace(flow, period=_time_of_change(flow, few))
-    return _settled(_with_steps(flow, sample[:CHOOSING]), sample[:CHOOSING])
+    flow = _settled(_with_steps(flow, sample[:CHOOSING]), sample[:CHOOSING])
+    if isinstance(scene, System) and scene.section is not None:
+        return _section_flow(scene, flow, sample)
+    return flow
 
 
 def _alike(a: Floats, b: Floats) -> bool:

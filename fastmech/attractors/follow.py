@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,11 +23,9 @@ from fastmech.ensembles.run import Progress
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
+from fastmech.objects import Drawn
 from fastmech.samplers import Sampler
 from fastmech.scene import nearest
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 Integers = NDArray[np.int64]
 
@@ -46,7 +44,7 @@ class Tipping(NamedTuple):
 
 
 @dataclass(frozen=True, repr=False)
-class BasinsAlong:
+class BasinsAlong(Drawn):
     """Attractors along a parameter; printed, which come and go where."""
 
     parameter: str
@@ -58,7 +56,12 @@ class BasinsAlong:
     attractors: tuple[dict[int, Attractor], ...]  #: at each value, by number
     tipping: tuple[Tipping, ...]
 
-    def __repr__(self) -> str:
+    KIND = "follow_basins"
+    PICTURE = "plots.response:draw_fractions"
+    LAYOUT = "scan_types.follow_basins:along_dataset"
+
+    def told(self) -> str:
+        """Which attractors come and go where."""
         first, last, n = self.values[0], self.values[-1], self.fractions.shape[1]
         lines = [
             f"{n} attractors along {self.parameter} = {first:g} ... {last:g} ({self.values.size} values)"
@@ -68,12 +71,6 @@ class BasinsAlong:
         if len(self.tipping) > 5:
             lines[-1] = f"  and {len(self.tipping) - 4} more"
         return "\n".join(lines)
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Shares stacked over the parameter."""
-        from fastmech.plots.response import draw_fractions
-
-        return draw_fractions(self, ax)
 
 
 def follow_basins(
@@ -119,7 +116,7 @@ def follow_basins(
     shares: list[dict[int, float]] = []
     tipping, count = [], 0
     for k, value in enumerate(along.tolist()):
-        found = find_attractors(with_value(system, parameter, value), y, t_end=t_end, threads=threads)
+        found = find_attractors(system.replace(**{parameter: value}), y, t_end=t_end, threads=threads)
         before = numbered[-1] if numbered else {}
         names = matched(found, before)
         now = {names[j]: found[j] for j in names}
@@ -149,14 +146,8 @@ def follow_basins(
             progress(1)
     table = np.array([[share.get(j, np.nan) for j in range(count)] for share in shares])
     missing = 1.0 - np.nansum(table, axis=1)
-    return BasinsAlong(parameter, along, table, missing, tuple(numbered), tuple(tipping))
-
-
-def with_value(system: System | Mechanism, parameter: str, value: float) -> System | Mechanism:
-    """The same with another value of a parameter."""
-    if isinstance(system, Mechanism):
-        return system.replace(**{parameter: value})
-    return system.with_parameters({parameter: value})
+    followed = BasinsAlong(parameter, along, table, missing, tuple(numbered), tuple(tipping))
+    return followed.of(system)
 
 
 def matched(found: Attractors, before: Mapping[int, Attractor]) -> dict[int, int]:
@@ -198,7 +189,7 @@ class _Tracer(NamedTuple):
 
     def _at(self, attractor: Attractor, value: float) -> tuple[list[Floats], Flow]:
         """Points of the attractors that are found from it at a value."""
-        system, seeds = with_value(self.system, self.parameter, value), _seeds(attractor)
+        system, seeds = self.system.replace(**{self.parameter: value}), _seeds(attractor)
         search = Search(flow_of(system, self.sample, {}, threads=self.threads))
         search.seek(seeds[:1], attractor.period)
         if not search.count:

@@ -169,6 +169,14 @@ def _around(parts: Floats) -> Floats:
     return whole
 
 
+def same(flow: Flow, one: Orbit, two: Orbit) -> bool:
+    """Whether two orbits are one: most of some places along a cycle lie on the other."""
+    if one.cycle != two.cycle:
+        return False
+    some = two.points[:: ALONG // 16] if two.cycle else two.points[:1]
+    return sum(visits(flow, one, place) for place in some) > len(some) // 2
+
+
 def attracts(orbit: Orbit) -> bool:
     """Whether all multipliers lie inside the unit circle."""
     return bool(np.all(np.abs(orbit.multipliers) < ATTRACTS))

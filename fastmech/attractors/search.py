@@ -28,7 +28,7 @@ from fastmech.attractors.arrival import (
 )
 from fastmech.attractors.flow import COARSER, Flags, Floats, Flow, statuses
 from fastmech.attractors.flow import MOST as MOST_STEPS
-from fastmech.attractors.orbits import Orbit, attracts, cycle, periodic, returns, visits
+from fastmech.attractors.orbits import Orbit, attracts, cycle, periodic, returns, same, visits
 from fastmech.ensembles.status import Status
 from fastmech.transients.lyapunov import largest_lyapunov
 
@@ -131,7 +131,7 @@ class Search:
         for i in np.flatnonzero((self.arrived(paths[-1]) < 0) & ~known) if not forced else ():
             if tried == GUESSES or self._known(paths[-1, i]):
                 continue
-            back = _time_back(flow, paths[:, i])
+            back = time_back(flow, paths[:, i])
             if back:
                 tried += 1
                 found = cycle(flow, paths[-1, i], back / DENSE)
@@ -163,7 +163,7 @@ class Search:
         return any(visits(self.flow, orbit, place) for orbit, _ in self.orbits)
 
     def _add(self, orbit: Orbit) -> None:
-        if not attracts(orbit) or self._known(orbit.points[0]):
+        if not attracts(orbit) or any(same(self.flow, own, orbit) for own, _ in self.orbits):
             return
         own = balls(self.flow, orbit)
         self.orbits.append((orbit, own))
@@ -223,7 +223,7 @@ def _groups(cells: list[Integers]) -> list[Flags]:
     return [group == k for k in np.unique(group)]
 
 
-def _time_back(flow: Flow, path: Floats) -> int:
+def time_back(flow: Flow, path: Floats) -> int:
     """Strobes back to where a path (k, dim) was nearest to its end after it had gone away; 0: never near."""
     distance = flow.distance(path[::-1][1:], path[-1])
     gone = np.flatnonzero(distance > 0.5 * distance.max())

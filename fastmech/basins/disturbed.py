@@ -1,6 +1,6 @@
 """``fm.disturb``: what becomes of thousands of random disturbances of one equilibrium.
 
-Where a disturbance ends is what :func:`fastmech.basins.label.labels_of` proves. How long it takes and how far
+Where a disturbance ends is what :func:`fastmech.label_starts` proves. How long it takes and how far
 it swings is measured in a run of its own to the end.
 """
 
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats, Integers
-from fastmech.basins.label import How, label_starts
+from fastmech.basins.label import How, label_states
 from fastmech.basins.measures.fractions import Shares, basin_stability
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.capture.steps import MOST_OCTAVES, TURNING
@@ -39,6 +39,7 @@ from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError, StepWarning
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
+from fastmech.objects import Drawn, Field
 from fastmech.scene import Scene
 
 #: By how much excursions by two steps may differ, over the larger coordinate's.
@@ -58,7 +59,7 @@ MOST_RADIUS = TURNING * 2.0**MOST_OCTAVES
 
 
 @dataclass(frozen=True, repr=False)
-class DisturbedEnsemble:
+class DisturbedEnsemble(Drawn):
     """Random disturbances of one equilibrium and what became of them; arrays over n trajectories.
 
     Printed, it says how many return, how soon, and how far they swing.
@@ -96,7 +97,22 @@ class DisturbedEnsemble:
         known = (self.outcome == Status.RETURNED) | (self.outcome == Status.ELSEWHERE)
         return basin_stability(np.where(known, self.outcome, -1), int(Status.RETURNED))
 
-    def __repr__(self) -> str:
+    KIND = "disturbances"
+    PICTURE = "plots.objects:draw_disturbances"
+    FIELDS = {
+        "start_*": Field("trajectory state", "", "state at the start:", "starts"),
+        "final_*": Field("trajectory state", "", "state at the end:", "final"),
+        "outcome": Field("trajectory", "1", "how it ended", codes=Status),
+        "end_index": Field("trajectory", "1", "stable equilibrium at which it ends, -1: none", codes=-1),
+        "time_to_return": Field("trajectory", "s", "from then on in the ball, NaN: not by the end"),
+        "excursion_*": Field("trajectory coordinate", "", "largest departure of", "excursion"),
+        "dt": Field("trajectory", "s", "step"),
+        "t_end": Field("", "s", "end of the runs"),
+        "share_returned": Field("", "1", "share that is proved to return"),
+    }
+
+    def told(self) -> str:
+        """How many return, how soon, and how far they swing."""
         kind, shares = self.equilibria[self.index].kind, self.returned
         ended = failure_counts(self.outcome, ENDS)
         lines = [
@@ -146,7 +162,7 @@ def disturb(
     Starts are uniform in the ball of the given ``radius`` about the equilibrium, in the norm of
     :class:`fastmech.disturbance.motion.Size`; the k-th 65,536 of them (k = 0, 1, ...) are drawn by NumPy's
     ``default_rng([seed, index, 0, k])``, so any part of an ensemble can be had without the rest. Where they
-    end is proved by capture, see :func:`fastmech.basins.label.labels_of`; a trajectory that has returned may
+    end is proved by capture, see :func:`fastmech.label_starts`; a trajectory that has returned may
     need longer than ``t_end`` to come to rest. It is back when it is within ``return_radius``, in the
     equilibrium's norm, without the energy to leave that ball.
 
@@ -200,7 +216,7 @@ def disturb(
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StepWarning)  # it has been told
-        ends = label_starts(scene, starts, t_end, How(dt, method, threads=threads))
+        ends = label_states(scene, starts, t_end, How(dt, method, threads=threads))
     moment = certificate.slow_step
     at_first = certificate.damped_times(method, min(dt or moment, t_end))
     times = np.array([0.0, *at_first, t_end])
@@ -242,7 +258,7 @@ def disturb(
         reached[driving] = Status.STEP_TOO_LARGE
         # A motion that comes to another well than its proved one has not been followed, whatever it says.
         kept = np.flatnonzero((reached == Status.OK) & (ends.status[again] == Status.CAPTURED))
-        at_once = label_starts(scene, run.states[-1, kept], moment, How(method=method, threads=threads))
+        at_once = label_states(scene, run.states[-1, kept], moment, How(method=method, threads=threads))
         lost = (at_once.well != ends.well[again[kept]]) | (at_once.turns != ends.turns[again[kept]]).any(
             axis=1
         )
@@ -288,7 +304,7 @@ def disturb(
         turns=np.where(failing[:, None], 0, ends.turns).astype(np.int64),
         time_to_return=np.where(back, inside_since, np.nan),
         excursion=np.where((failing | astray)[:, None], np.nan, excursion),
-    )
+    ).of(scene)
 
 
 def refuse_meeting_balls(

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats
-from fastmech.basins.copies import copy_labels, label_name
 from fastmech.basins.measures.labels import LabelOf, ask, check_point
 from fastmech.basins.measures.norm import norm_on
+from fastmech.basins.well_numbers import label_name, well_numbers
 from fastmech.capture.select import certificate_of
 from fastmech.disturbance.motion import equilibria_to_disturb
 from fastmech.ensembles import checks
@@ -26,6 +26,7 @@ from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
+from fastmech.objects import Field, Result
 from fastmech.scene import Scene
 
 #: Points between two starts whose labels are asked for at once.
@@ -41,8 +42,8 @@ FINER = 0.2
 OUTPUTS = 64
 
 
-@dataclass(frozen=True, eq=False)
-class EdgeTrack:
+@dataclass(frozen=True, eq=False, repr=False)
+class EdgeTrack(Result):
     """The way along a boundary; k stretches, each begun by a bisection."""
 
     t: Floats  #: time of every bisection [s] (k,)
@@ -53,6 +54,17 @@ class EdgeTrack:
     settled: bool  #: ``moved`` is within the tolerance: the edge state is a resting one, this one
     lost: bool  #: no boundary was found any more near the track
     labels: tuple[int, int]  #: basins on either side at the start
+
+    KIND = "edge_track"
+    FIELDS = {
+        "time": Field("time", "s", "time of a bisection", "t"),
+        "*": Field("time state", "", "state at a bisection:", "y"),
+        "gap": Field("time", "1", "distance to the other side"),
+        "last_*": Field("state", "", "last state:", "state"),
+        "moved": Field("", "1", "how far the last stretch moved, in the norm"),
+        "settled": Field("", "1", "whether it has come to rest"),
+        "lost": Field("", "1", "whether the boundary was lost"),
+    }
 
 
 def track_edge(
@@ -78,7 +90,7 @@ def track_edge(
         outside: one in another basin (dim,).
         label_of: labels (n,) of starts (n, dim), negative: none. Starts without a label count to neither
             side; a bisection ends where there are no others. By default, of a scene, which copy of which
-            well captures them within 60 s, see :func:`fastmech.basins.copies.copy_labels`.
+            well captures them within 60 s, see :func:`fastmech.basins.well_numbers.well_numbers`.
         norm: matrix N (dim, dim): ``|d @ N|`` is a distance. By default, of a scene, the kinetic-energy norm
             at its deepest well.
         t_end: longest time to follow the boundary [s].
@@ -88,7 +100,7 @@ def track_edge(
         tolerance: the edge state rests if a whole stretch moves by no more than this, ``far`` or more.
         interval: time between looks at their distance [s].
         dt: longest step [s]. By default, of a scene, it follows from frequencies and the starts' energies.
-        method: name of the method; ``dop853`` by default, of a scene see ``fm.labels_of``.
+        method: name of the method; ``dop853`` by default, of a scene see ``fm.label_starts``.
 
     Raises:
         InputError: an argument is wrong, the force decays, or the starts' labels are not two known ones.
@@ -97,7 +109,7 @@ def track_edge(
     if isinstance(scene, Scene | Mechanism):
         equilibria_to_disturb(scene)
         certificate = certificate_of(scene)
-        label_of = label_of or copy_labels(scene)
+        label_of = label_of or well_numbers(scene)
         norm = certificate.size(certificate.tree.wells[0]).to_ball if norm is None else norm
     if label_of is None or norm is None:
         raise InputError("label_of, norm: missing; only a scene or a mechanism has them by default")
@@ -150,10 +162,10 @@ def track_edge(
     settled = not lost and moved <= tolerance
     return EdgeTrack(
         np.array(times), np.array(states), np.array(gaps), states[-1], moved, settled, lost, labels
-    )
+    ).of(scene)
 
 
-def saddle_at(scene: Scene | Mechanism, state: ArrayLike) -> tuple[Equilibrium | RestingPlace, float]:
+def nearest_saddle(scene: Scene | Mechanism, state: ArrayLike) -> tuple[Equilibrium | RestingPlace, float]:
     """The index-1 saddle nearest to a state (states,), and its distance in coordinates and rates as they are.
 
     Angles are compared up to full turns.

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastmech.arrays import Floats, Integers
 from fastmech.atlas.map import map_equilibria
 from fastmech.atlas.resting_map import follow_wells
-from fastmech.basins.label import label_starts
+from fastmech.basins.label import label_states
 from fastmech.basins.measures.fractions import basin_stability
 from fastmech.basins.measures.integrity import integrity
 from fastmech.basins.measures.labels import check_axes, check_point
@@ -38,6 +38,7 @@ from fastmech.ensembles.run import Progress
 from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism
+from fastmech.objects import Drawn
 from fastmech.scene import Scene
 
 #: Relative tolerance of shocks: what a profile shows.
@@ -60,8 +61,8 @@ class Ends(Protocol):
 LabelsOf = Callable[[Any, Floats], Ends]
 
 
-@dataclass(frozen=True, eq=False)
-class ErosionProfile:
+@dataclass(frozen=True, eq=False, repr=False)
+class ErosionProfile(Drawn):
     """Measures of every well along a parameter, arrays (values, wells); NaN where a well does not exist.
 
     Stability counts a start for the well whatever turns it makes on the way. Integrity and shocks are those
@@ -90,6 +91,25 @@ class ErosionProfile:
     kick_undecided: Floats  #: the same of the kicks
     undecided: Floats  #: share of the random starts without a label
 
+    KIND = "erosion"
+    LAYOUT = "scan_types.erosion:profile_dataset"
+    PICTURE = "plots.objects:draw_erosion_profile"
+
+    def told(self) -> str:
+        """Over which values each well exists, and how its share and its smallest shock change."""
+        unit = "" if self.system is None else " " + self.system.described()[self.parameter][1]
+        lines = [f"erosion of {self.sheet.size} wells along {self.parameter}, {self.values.size} values"]
+        for w in range(self.sheet.size):
+            there = np.flatnonzero(np.isfinite(self.stability[:, w]))
+            if there.size:
+                a, b = there[0], there[-1]
+                lines.append(
+                    f"  well {w + 1}, {self.values[a]:g} to {self.values[b]:g}{unit}: share of the starts "
+                    f"{self.stability[a, w]:.1%} to {self.stability[b, w]:.1%}, smallest shock "
+                    f"{self.shock[a, w]:.3g} to {self.shock[b, w]:.3g} rad"
+                )
+        return "\n".join(lines)
+
 
 #: Names of an :class:`ErosionProfile`'s arrays over values and wells.
 MEASURES = tuple(field.name for field in fields(ErosionProfile)[4:])
@@ -105,7 +125,7 @@ class Survey:
     states: tuple[int, ...]  #: axes of the window
     lines: tuple[Floats, ...]  #: coordinates along them
     random: Floats  #: random points in it (n, axes)
-    labels_of: LabelsOf
+    label_starts: LabelsOf
     most_shock: float  #: rad
     directions: int
     seed: int
@@ -133,11 +153,11 @@ class Survey:
 
         def copy_of(y: Floats) -> Integers:
             """0: this copy of the well, 1: elsewhere, -1: not known."""
-            ends = self.labels_of(scene, y)
+            ends = self.label_starts(scene, y)
             elsewhere = (ends.well != own) | (ends.turns != 0).any(axis=1)
             return np.where(ends.well < 0, -1, elsewhere).astype(np.int64)
 
-        share = basin_stability(self.labels_of(scene, self._starts(self.random, place)).well, own)
+        share = basin_stability(self.label_starts(scene, self._starts(self.random, place)).well, own)
         norm = kinetic_norm(scene, e)
         search = partial(
             minimal_shock,
@@ -204,7 +224,7 @@ def erosion(
     *,
     most_shock: float,
     t_end: float = 60.0,
-    labels_of: LabelsOf | None = None,
+    label_starts: LabelsOf | None = None,
     n: int = 2048,
     directions: int = 64,
     seed: int = 0,
@@ -220,7 +240,7 @@ def erosion(
             [rad/s]) with their values, rising in equal steps. States that are no axis are the well's own.
         most_shock: largest shock to look for [rad].
         t_end: end of the runs [s]; what is not captured by then has no label.
-        labels_of: where starts of a scene end, if not :func:`fastmech.basins.label.labels_of` shall tell.
+        label_starts: where starts of a scene end, if not :func:`fastmech.label_starts` shall tell.
         n: random starts, uniform in the window, the same for all values.
         directions: random directions of the search for a shock. It also begins with those to the saddles,
             and with the smallest kick.
@@ -239,7 +259,7 @@ def erosion(
         scene,
         most_shock=most_shock,
         t_end=t_end,
-        labels_of=labels_of,
+        label_starts=label_starts,
         n=n,
         directions=directions,
         seed=seed,
@@ -252,7 +272,7 @@ def erosion(
             progress(1)
     profile: Any = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
     position = {name: profile.pop(name) for name in states_of(scene)[: places.shape[2]]}
-    return ErosionProfile(parameter, along, sheets, position, **profile)
+    return ErosionProfile(parameter, along, sheets, position, **profile).of(scene)
 
 
 def survey_of(
@@ -261,7 +281,7 @@ def survey_of(
     *,
     most_shock: float,
     t_end: float,
-    labels_of: LabelsOf | None = None,
+    label_starts: LabelsOf | None = None,
     n: int,
     directions: int,
     seed: int,
@@ -281,7 +301,7 @@ def survey_of(
         states,
         tuple(lines),
         low + (high - low) * rng.random((n, len(lines))),
-        labels_of or partial(label_starts, t_end=t_end),
+        label_starts or partial(label_states, t_end=t_end),
         most_shock,
         directions,
         seed,

@@ -1,4 +1,4 @@
-"""``fm.labels_of``: the well, and its turn, in which every start ends, proved by capture.
+"""``fm.label_starts``: the well, and its turn, in which every start ends, proved by capture.
 
 The certificate is about the path as it was computed, so every path is computed twice, with one step and with
 two thirds of it, and a label counts only if both are captured by the same copy of the same well at the same
@@ -22,11 +22,11 @@ from numpy.typing import ArrayLike, NDArray
 from fastmech.attractors.find import find_attractors
 from fastmech.attractors.flow import keeps_moving
 from fastmech.attractors.settle import Ends
+from fastmech.basins.convergence import SUBSTEPS, climb, lingering, tell_the_same
 from fastmech.basins.labels import Labels, of_attractors, pieces_of
-from fastmech.basins.ladder import SUBSTEPS, climb, lingering, tell_the_same
 from fastmech.basins.measures.norm import FEW_TURNS, beyond_turns
 from fastmech.basins.runs import Paths, follow, rounds_until
-from fastmech.basins.system import system_labels_of
+from fastmech.basins.system import label_system_starts
 from fastmech.capture.certificate import Certificate
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.ensembles import checks
@@ -60,7 +60,7 @@ MOST_DEGREES = 720.0
 START_NUMBERS = 20
 
 
-def labels_of(
+def label_starts(
     scene: Scene | Mechanism | System,
     starts: ArrayLike,
     t_end: float | None = None,
@@ -101,7 +101,7 @@ def labels_of(
     t_end = 60.0 if t_end is None else t_end
     if isinstance(scene, System):
         states = checks.states("starts", starts, len(scene.state))
-        return system_labels_of(
+        return label_system_starts(
             scene, states, t_end, dt=dt, method=method or "dop853", threads=threads, progress=progress
         )
     require_damper(scene)
@@ -111,7 +111,7 @@ def labels_of(
     largest = float(np.max(angles, initial=0.0, where=np.isfinite(angles)))
     if 2.0 * np.pi * FEW_TURNS < largest <= MOST_DEGREES:
         warnings.warn(f"starts: {beyond_turns(largest)}", stacklevel=2)
-    return label_starts(scene, states, t_end, How(dt, method, settle_radius, threads), progress)
+    return label_states(scene, states, t_end, How(dt, method, settle_radius, threads), progress)
 
 
 def _by_attractors(
@@ -129,7 +129,7 @@ def _by_attractors(
 
 
 class How(NamedTuple):
-    """How starts are labelled: see :func:`labels_of`."""
+    """How starts are labelled: see :func:`label_starts`."""
 
     dt: float | None = None
     method: str | None = None
@@ -138,14 +138,14 @@ class How(NamedTuple):
     ladder: tuple[int, ...] = SUBSTEPS  #: numbers of substeps, one computation after the other
 
 
-def label_starts(
+def label_states(
     scene: Scene | Mechanism,
     states: Floats,
     t_end: float,
     how: How | None = None,
     progress: Progress | None = None,
 ) -> Labels:
-    """As :func:`labels_of`, of states (n, states)."""
+    """As :func:`label_starts`, of states (n, states)."""
     dt, method, settle_radius, threads, ladder = How() if how is None else how
     require_damper(scene)
     checks.progress_function(progress, "starts")
@@ -193,7 +193,7 @@ def label_starts(
         settle,
         status,
         found.steps,
-    )
+    ).of(scene)
 
 
 def _unwound(starts: Floats, periods: Floats) -> tuple[Floats, Integers]:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from fastmech.attractors.find import Attractors
 from fastmech.attractors.settle import Ends
-from fastmech.ensembles.status import LABELS, counts
+from fastmech.ensembles.status import LABELS, Status, counts
+from fastmech.objects import Field, Result
 
 Floats = NDArray[np.float64]
 
@@ -24,7 +25,7 @@ MOST_LINES = 3
 
 
 @dataclass(frozen=True, repr=False)
-class Labels:
+class Labels(Result):
     """Where n starts end; printed, how many end where, and when."""
 
     tree: Any  #: wells, barriers and equilibria; of what keeps moving :class:`~.find.Attractors`
@@ -40,7 +41,18 @@ class Labels:
         """How many starts have each status."""
         return counts(self.status, LABELS)
 
-    def __repr__(self) -> str:
+    KIND = "labels"
+    FIELDS = {
+        "well": Field("start", "1", "well or attractor at the end, -1: no label", codes=-1),
+        "turns": Field("start coordinate_number", "1", "full turns of each coordinate of that well"),
+        "time": Field("start", "s", "when it is known, NaN: it is not"),
+        "settle_time": Field("start", "s", "from then on near its well, NaN: not by the end"),
+        "status": Field("start", "1", "what is known of the start", codes=Status),
+        "steps": Field("", "1", "integration steps of all computations"),
+    }
+
+    def told(self) -> str:
+        """How many starts end where, and when."""
         return told_ends(f"{self.status.size:,} starts", self)
 
 

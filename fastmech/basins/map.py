@@ -13,19 +13,20 @@ from numpy.typing import ArrayLike, NDArray
 from fastmech.attractors.find import find_attractors
 from fastmech.attractors.flow import keeps_moving
 from fastmech.attractors.settle import Ends
-from fastmech.basins.copies import copy_numbers
-from fastmech.basins.label import How, label_starts
+from fastmech.basins.label import How, label_states
 from fastmech.basins.labels import Labels, of_attractors, told_ends
 from fastmech.basins.measures.labels import number_turns
 from fastmech.basins.measures.norm import check_angles
 from fastmech.basins.refine import LevelProgress, refine_grid
-from fastmech.basins.system import system_labels_of
+from fastmech.basins.system import label_system_starts
+from fastmech.basins.well_numbers import number_wells
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import LABELS, Status, counts
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
+from fastmech.objects import Drawn, Field
 from fastmech.scene import STATE, Scene, nearest
 
 Floats = NDArray[np.float64]
@@ -35,7 +36,7 @@ MOST_POINTS, POINT_NUMBERS = 50_000_000, 20
 
 
 @dataclass(frozen=True, repr=False)
-class BasinMap:
+class BasinMap(Drawn):
     """Labels over a grid of starts; arrays have one axis for each of ``axes``, in their order.
 
     Printed, it says how many starts end where, and when.
@@ -66,7 +67,18 @@ class BasinMap:
         """
         return number_turns(self.well, self.turns)
 
-    def __repr__(self) -> str:
+    KIND = "basins"
+    LAYOUT = "scan_types.basins:basin_dataset"
+    PICTURE = "plots.objects:draw_basin_map"
+    FIELDS = {
+        "well": Field("*axes", "1", "attractor or stop code at the end, -1: no label", codes=-1),
+        "time": Field("*axes", "s", "when it is known, NaN: it is not"),
+        "status": Field("*axes", "1", "what is known of the start", codes=Status),
+        "computed": Field("*axes", "1", "computed, not filled in between equal labels"),
+    }
+
+    def told(self) -> str:
+        """How many starts end where, and when."""
         grid = " x ".join(f"{name} ({values.size:,})" for name, values in self.axes.items())
         return told_ends(f"map over {grid}", self)
 
@@ -103,7 +115,7 @@ def map_basins(
             computed have no times.
         parameters: of a system, values of parameters by name that differ between starts, each of a shape that
             broadcasts to the map's: ``values[:, None]`` changes along the first of two axes.
-        dt: coarsest step [s], see :func:`fastmech.basins.label.labels_of`; a system needs one.
+        dt: coarsest step [s], see :func:`fastmech.label_starts`; a system needs one.
         method: name of the integration method; ``dop853`` by default, of a scene see there.
         settle_radius: see there; a scene's only.
         threads: threads to use, all processors by default. The result does not depend on it.
@@ -146,11 +158,11 @@ def map_basins(
             found = attractors
             part = of_attractors(found, Ends(found.label, found.status, found.time, starts, found.steps))
         elif moving is not None:
-            part = of_attractors(attractors, attractors.labels_of(starts, tell))
+            part = of_attractors(attractors, attractors.label_starts(starts, tell))
         elif not isinstance(scene, System):
-            part = label_starts(scene, starts, until, How(dt, method, settle_radius, threads), tell)
+            part = label_states(scene, starts, until, How(dt, method, settle_radius, threads), tell)
         else:
-            part = system_labels_of(
+            part = label_system_starts(
                 scene,
                 starts,
                 until,
@@ -193,7 +205,7 @@ def map_basins(
         computed=computed.reshape(shape),
         t_end=until if attractors is None else attractors.t_end,
         steps=collected.steps,
-    )
+    ).of(scene)
 
 
 def grid_starts(
@@ -225,7 +237,7 @@ class _Collected:
         self.time[points], self.status[points] = part.time, part.status
         if part.settle_time is not None:
             self.settle[points] = part.settle_time
-        return copy_numbers(part)
+        return number_wells(part)
 
 
 def _checked_axes(axes: Mapping[str, ArrayLike], names: tuple[str, ...], least: int) -> dict[str, Floats]:

@@ -14,14 +14,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats, Integers
-from fastmech.basins.copies import with_defaults
 from fastmech.basins.measures.labels import LabelOf, ask
 from fastmech.basins.measures.norm import norm_on
+from fastmech.basins.well_numbers import with_defaults
 from fastmech.ensembles import checks
 from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
+from fastmech.objects import Printed
 from fastmech.scene import Scene
 
 #: Radii at which a ray is looked at before its first way out is narrowed down: at first, and once turned.
@@ -40,8 +41,8 @@ SECTIONS = 7
 CANDIDATES, TRIALS = 6, 8
 
 
-@dataclass(frozen=True, eq=False)
-class Shock:
+@dataclass(frozen=True, eq=False, repr=False)
+class Shock(Printed):
     """The smallest shock found."""
 
     size: float  #: in the norm; NaN: nothing left the basin up to ``most``
@@ -73,7 +74,7 @@ def minimal_shock(
     Args:
         label_of: labels (n,) of starts (n, dim), negative: none. A start without a label is not taken to have
             left the basin; ``undecided_from`` tells of it. Of a scene: which copy of which well captures
-            them within 60 s, see :func:`fastmech.basins.copies.copy_labels`.
+            them within 60 s, see :func:`fastmech.basins.well_numbers.well_numbers`.
         attractor: the resting state (dim,), or a scene's equilibrium; its own label must be known.
         norm: matrix N (dim, dim): ``|d @ N|`` is the size of a disturbance d. By default, for a scene's
             equilibrium, the kinetic-energy norm there (:func:`fastmech.basins.measures.norm.kinetic_norm`).

@@ -18,9 +18,9 @@ import numpy as np
 
 from fastmech.arrays import Floats, Integers
 from fastmech.atlas.map import ROUNDING
-from fastmech.basins.copies import copy_numbers, copy_of_label
-from fastmech.basins.label import How, label_starts
-from fastmech.basins.ladder import SUBSTEPS
+from fastmech.basins.convergence import SUBSTEPS
+from fastmech.basins.label import How, label_states
+from fastmech.basins.well_numbers import number_wells, well_of_number
 from fastmech.capture.certificate import Certificate
 from fastmech.capture.select import certificate_of
 from fastmech.disturbance.motion import equilibria_to_disturb, require_constant_force, state_jacobian
@@ -32,6 +32,7 @@ from fastmech.mechanism.impulse import POINTS, Mobility, impulse_for, mobility, 
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import require_own
+from fastmech.objects import Printed
 from fastmech.scene import Scene
 from fastmech.stability.linearize import require_rest
 
@@ -72,8 +73,8 @@ TOLERANCE, ALONE_TOLERANCE = 1e-4, 1e-5
 SIDES, SIZES, LINE = 4, 8, 32
 
 
-@dataclass(frozen=True)
-class Blow:
+@dataclass(frozen=True, repr=False)
+class Blow(Printed):
     """An impulse on a point of the resting mechanism; NaN where there is none."""
 
     impulse: float  #: N s
@@ -81,9 +82,16 @@ class Blow:
     velocity: float  #: jump of that point's velocity [m/s]; along the impulse or not
     energy: float  #: kinetic energy that it gives [J]
 
+    def told(self) -> str:
+        """Impulse, direction, jump of velocity and energy."""
+        return (
+            f"{self.impulse:.5g} N s at {self.direction:.3g} rad from +x: "
+            f"{self.velocity:.4g} m/s, {self.energy:.4g} J"
+        )
 
-@dataclass(frozen=True)
-class ShockLimit:
+
+@dataclass(frozen=True, repr=False)
+class ShockLimit(Printed):
     """How hard a point may be struck; see :func:`shock_limit`."""
 
     on: str
@@ -97,6 +105,15 @@ class ShockLimit:
     trajectories: int  #: blows that were followed
     impulses_apart: float  #: relative, of those on the finest grid on which nothing less was found; NaN: none
     directions_apart: float  #: the same of directions [rad], 0 along one alone
+
+    def told(self) -> str:
+        """What is proved, what was found, and how hard was searched."""
+        found = "none was found" if math.isnan(self.found.impulse) else self.found.told()
+        return (
+            f"blows on {self.on}: no smaller one leaves (proved): {self.proved.told()}\n"
+            f"  least found to leave: {found}\n"
+            f"  {self.trajectories:,} blows followed, up to {self.tried_to:.4g} N s"
+        )
 
 
 def shock_limit(
@@ -114,7 +131,7 @@ def shock_limit(
     a: the metric, paper (11)). While that is less than the well's depth, the mechanism does not leave. So the
     bound ``sqrt(2 depth / w)`` is proved for every damper, with w = u.W u in the direction u, or W's largest
     eigenvalue over all directions. Above it, directions and sizes are searched for blows that end elsewhere,
-    in another well or some turns further, as :func:`fastmech.basins.label.labels_of` proves. Grids are made
+    in another well or some turns further, as :func:`fastmech.label_starts` proves. Grids are made
     finer until nothing less is found; a window between the blows of the finest one, as the result tells how
     far they are apart, may have been missed.
 
@@ -144,11 +161,7 @@ def shock_limit(
         t_end = _long_enough(certificate, place)
     easiest = math.remainder(moves.direction, 2.0 * math.pi) if angle is None else angle
 
-    def blow(impulse: float, direction: float) -> Blow:
-        along, speed = moves.along(direction), moves.speed(direction)
-        return Blow(impulse, direction, float(speed * impulse), float(0.5 * along * impulse**2))
-
-    proved = blow(float(impulse_for(depth, moves.along(easiest))), easiest)
+    proved = _blow(moves, float(impulse_for(depth, moves.along(easiest))), easiest)
     nothing = Blow(math.nan, math.nan if angle is None else angle, math.nan, math.nan)
     alone = ShockLimit(on, proved, nothing, None, math.nan, math.nan, 0, math.nan, math.nan)
     if math.isnan(proved.impulse):
@@ -170,8 +183,8 @@ def shock_limit(
     )
     found, end = nothing, None
     if np.isfinite(search.size):
-        found = blow(search.size, search.angle if angle is None else angle)
-        end = copy_of_label(search.label, len(certificate.names))
+        found = _blow(moves, search.size, search.angle if angle is None else angle)
+        end = well_of_number(search.label, len(certificate.names))
     unknown = search.unknown if np.isfinite(search.unknown) else math.nan
     return ShockLimit(on, proved, found, end, unknown, most, search.blows, *search.apart)
 
@@ -212,8 +225,8 @@ class _Search:
         starts = np.tile(self.place, (sizes.size, 1))
         blows = sizes * np.stack([np.cos(angles), np.sin(angles)])
         starts[:, self.place.size // 2 :] = blows.T @ self.rates
-        found = label_starts(self.scene, starts, self.t_end, How(threads=self.threads, ladder=ladder))
-        labels = copy_numbers(found)
+        found = label_states(self.scene, starts, self.t_end, How(threads=self.threads, ladder=ladder))
+        labels = number_wells(found)
         self.blows, self.steps = self.blows + sizes.size, self.steps + found.steps
         if self.blows > 1:
             out = np.where((labels >= 0) & (labels != self.own), sizes, np.inf)
@@ -289,6 +302,21 @@ class _Search:
             self.ends(np.full(LINE, self.angle), sizes, SUBSTEPS)
             if self.size > (1.0 - 0.9 * apart) * size:
                 apart *= 2.0 / LINE
+
+
+def _blow(moves: Mobility, impulse: float, direction: float) -> Blow:
+    along, speed = moves.along(direction), moves.speed(direction)
+    return Blow(impulse, direction, float(speed * impulse), float(0.5 * along * impulse**2))
+
+
+def proved_limit(scene: Scene | Mechanism, equilibrium: Equilibrium | RestingPlace, on: str) -> Blow:
+    """The weakest blow on a point that may leave the well: no smaller one does, in whatever direction.
+
+    Arguments and errors as :func:`shock_limit`, of which this is the part that is proved and quick.
+    """
+    _, moves, depth = _well(scene, equilibrium, on)
+    easiest = math.remainder(moves.direction, 2.0 * math.pi)
+    return _blow(moves, float(impulse_for(depth, moves.along(easiest))), easiest)
 
 
 def proved_limits(scene: Scene, equilibrium: Equilibrium) -> dict[str, float]:

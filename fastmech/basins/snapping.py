@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Floats, Integers
-from fastmech.basins.ladder import SUBSTEPS, Indices, climb, near_saddle, tell_the_same
+from fastmech.basins.convergence import SUBSTEPS, Indices, climb, near_saddle, tell_the_same
 from fastmech.basins.measures.labels import check_point
 from fastmech.basins.runs import Paths
 from fastmech.capture.scene import SceneCertificate, scene_certificate
@@ -35,6 +35,7 @@ from fastmech.equilibria.find import Equilibria, Equilibrium, find_equilibria
 from fastmech.errors import InputError, shown
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
+from fastmech.objects import Drawn
 from fastmech.scene import Scene
 
 #: Time between looks at what is captured [s].
@@ -215,8 +216,8 @@ class Window(NamedTuple):
     left: bool  #: whether that is elsewhere
 
 
-@dataclass(frozen=True, eq=False)
-class SnappingMap:
+@dataclass(frozen=True, eq=False, repr=False)
+class SnappingMap(Drawn):
     """Ends over F0 and alpha; arrays (alphas, forces)."""
 
     F0: Floats  #: N (forces,)
@@ -227,6 +228,20 @@ class SnappingMap:
     turns: Integers  #: full turns of phi and theta, (alphas, forces, 2); 0 without a label
     time: Floats  #: when its capture was found [s], looked for every second; NaN: it was not
     status: NDArray[np.int8]  #: :class:`fastmech.ensembles.status.Status`
+
+    KIND = "snapping"
+    LAYOUT = "scan_types.snapping:snapping_dataset"
+    PICTURE = "plots.objects:draw_snapping_map"
+
+    def told(self) -> str:
+        """How many motions leave, and which force is the least to."""
+        ends = ", ".join(f"{count:,} {name}" for name, count in self.counts.items() if count)
+        least = self.smallest[np.isfinite(self.smallest)]
+        force = f"; the least force that leaves: {np.abs(least).min():.4g} N" if least.size else ""
+        return (
+            f"dynamic snapping over alpha ({self.alpha.size:,}) x F0 ({self.F0.size:,}): {ends}\n"
+            f"  {np.count_nonzero(self.left):,} leave their well{force}"
+        )
 
     @property
     def left(self) -> NDArray[np.bool_]:
@@ -275,7 +290,7 @@ def map_snapping(
 ) -> SnappingMap:
     """The (F0, alpha) map of dynamic snapping, each end proved by capture.
 
-    As for :func:`fastmech.basins.label.labels_of`: a label is that of the well w, and its turn, in whose
+    As for :func:`fastmech.label_starts`: a label is that of the well w, and its turn, in whose
     component of {Pi < B(w)} the motion is while ``T + Pi + |F(t)| (2 l - sgn(F) x2(t))``, which no later
     T + Pi exceeds, is below B(w); and it counts only if two computations with different steps agree so
     closely that all between them is captured too. Others are computed again with smaller steps.
@@ -334,7 +349,7 @@ def map_snapping(
         turns.reshape(*shape, 2),
         np.where(captured, found.time, np.nan).reshape(shape),
         status.reshape(shape),
-    )
+    ).of(scene)
 
 
 def default_end(alpha: ArrayLike) -> Floats:

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
+from fastmech.basins.convergence import SUBSTEPS
 from fastmech.basins.labels import Labels, pieces_of
-from fastmech.basins.ladder import SUBSTEPS
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.run import Progress
@@ -18,7 +18,7 @@ from fastmech.ensembles.system import System
 from fastmech.errors import InputError
 
 
-def system_labels_of(
+def label_system_starts(
     system: System,
     starts: Floats,
     t_end: float,
@@ -92,4 +92,4 @@ def system_labels_of(
         None,
         status,
         steps,
-    )
+    ).of(system)

@@ -33,6 +33,7 @@ from fastmech.integrators.methods import find_method
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import JACOBIAN, MATRIX, RHS, VECTOR, kernel, named_tuple
 from fastmech.models.mechanism import Mechanism
+from fastmech.objects import Drawn, Field, Printed
 from fastmech.scene import Scene
 from fastmech.stability.linearize import Rest, jacobian, linearized
 from fastmech.step_limits.warning import too_long, warn_of_step
@@ -133,7 +134,7 @@ PIECES = 20
 
 
 @dataclass(frozen=True, repr=False)
-class LyapunovExponents:
+class LyapunovExponents(Drawn):
     """Estimates at :data:`PIECES` times: the mean growth rate of a disturbance from the start to each."""
 
     t: Floats  #: s, shape (times,)
@@ -150,9 +151,19 @@ class LyapunovExponents:
         """One line: how many motions have failed, and with which status; empty where none has."""
         return failure_line(failure_counts(self.status), self.status.size)
 
-    def __repr__(self) -> str:
-        what = f"{self.status.size:,} motions to t = {self.t[-1]:g} s"
-        return f"LyapunovExponents({what}; {self.failures or 'none failed'})"
+    KIND = "lyapunov_exponents"
+    PICTURE = "plots.objects:draw_exponents"
+    FIELDS = {
+        "time": Field("time", "s", "time of an estimate", "t"),
+        "exponents": Field("time trajectory", "s-1", "mean growth rate of a disturbance from the start"),
+        "status": Field("trajectory", "1", "what became of the motion", codes=Status),
+    }
+
+    def told(self) -> str:
+        """How many motions, the last estimates, and how many have failed."""
+        known = self.largest[np.isfinite(self.largest)]
+        last = f"largest exponents {known.min():.4g} to {known.max():.4g} 1/s; " if known.size else ""
+        return f"{self.status.size:,} motions to t = {self.t[-1]:g} s: {last}{self.failures or 'none failed'}"
 
 
 def largest_lyapunov(
@@ -212,20 +223,28 @@ def largest_lyapunov(
         beyond = too_long(find_method(METHOD), problem.coefficients, starts, np.full(len(starts), h))
         beyond |= breaks_energy_bounds(problem.coefficients, starts, Y.T)
         status[beyond & (status == Status.OK)] = Status.STEP_TOO_LARGE
-    return LyapunovExponents(times[1:], exponents, status)
+    return LyapunovExponents(times[1:], exponents, status).of(scene)
 
 
 #: Times looked at between 0 and the end.
 TIMES = 400
 
 
-class TransientGrowth(NamedTuple):
+@dataclass(frozen=True, repr=False)
+class TransientGrowth(Printed):
     """What disturbances of an equilibrium do first."""
 
     reactivity: float  #: largest initial growth rate of the norm [1/s]; 0 at a minimum: power only leaves
     amplification: float  #: largest growth of the norm up to ``until``; 1 at a minimum
     time: float  #: when that is reached [s]
     until: float  #: [s]
+
+    FIELDS = {
+        "reactivity": Field("", "1/s", "largest initial growth rate"),
+        "amplification": Field("", "1", "largest growth of the norm"),
+        "time": Field("", "s", "reached at"),
+        "until": Field("", "s", "looked at until"),
+    }
 
 
 def transient_growth(scene: Scene, equilibrium: Rest, until: float = 10.0) -> TransientGrowth:

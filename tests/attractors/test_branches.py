@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -56,7 +59,7 @@ def test_duffings_branch_and_its_folds_are_those_of_harmonic_balance() -> None:
     for k in range(0, branch.values.size, 7):
         omega = branch.values[k]
         run = fm.integrate(
-            SYSTEM.with_parameters({"omega": omega}),
+            SYSTEM.replace(omega=omega),
             branch.places[k],
             t_eval=2.0 * np.pi / omega * np.arange(PLACES) / PLACES,
             dt=0.02,
@@ -75,7 +78,7 @@ def test_duffings_branch_and_its_folds_are_those_of_harmonic_balance() -> None:
 
     for fold in folds:
         run = fm.integrate(
-            SYSTEM.with_parameters({"omega": fold.value}),
+            SYSTEM.replace(omega=fold.value),
             fold.place,
             t_eval=2.0 * np.pi / fold.value * np.arange(PLACES) / PLACES,
             dt=0.02,
@@ -115,7 +118,7 @@ def test_a_linear_mechanism_has_its_resonance_curve() -> None:
     k = w.size // 2
     expected = np.exp(np.roots([2.0, 0.6, 9.0]) * 2.0 * np.pi / w[k])
     np.testing.assert_allclose(np.sort_complex(branch.multipliers[k]), np.sort_complex(expected), atol=1e-8)
-    axes = found.plot("x")
+    axes = found.plot(state="x")
     assert axes.get_xlabel() == "omega"
     assert axes.get_ylabel() == "amplitude of x [m]"
 
@@ -152,3 +155,26 @@ def test_without_time_there_is_no_response() -> None:
     system = fm.System(lambda t, x, v, c: (v, -x - c * v), ["x", "v"], {"c": 0.1})
     with pytest.raises(fm.InputError, match="does not depend on the time"):
         fm.frequency_response(system, "c", (0.1, 0.2), {"x": (-1.0, 1.0)})
+
+
+SCRIPT = """
+import math
+import fastmech as fm
+
+def spring(t, x, v, A):
+    return v, -0.3 * v - x - x * x * x + A * fm.cos(t)
+
+system = fm.System(spring, ["x", "v"], {"A": 0.2}, period=2.0 * math.pi)
+print(fm.frequency_response(system, "A", (0.1, 0.2), [[0.0, 0.0]]))
+"""
+
+
+def test_a_second_process_finds_the_same_with_kernels_from_the_disk(tmp_path: Path) -> None:
+    script = tmp_path / "spring.py"
+    script.write_text(SCRIPT)
+    told = [
+        subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=True).stdout
+        for _ in range(2)
+    ]
+    assert told[0] == told[1]
+    assert told[0].startswith("1 branches of period 1 over A")

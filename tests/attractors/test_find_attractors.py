@@ -145,7 +145,7 @@ def test_labels_maps_and_refinement_agree() -> None:
     axes = {"x": np.linspace(-1.0, 1.0, 33), "x_dot": np.linspace(-0.5, 1.0, 33)}
     found = fm.map_basins(DUFFING, axes)
     starts = np.stack(np.meshgrid(*axes.values(), indexing="ij"), axis=-1).reshape(-1, 2)
-    labels = fm.labels_of(DUFFING, starts)
+    labels = fm.label_starts(DUFFING, starts)
     np.testing.assert_array_equal(labels.well, found.well.ravel())
     assert len(found.tree) == 5
     _, shares = fm.basin_fractions(found.labels[0])
@@ -167,7 +167,7 @@ def test_results_do_not_depend_on_threads_or_on_other_starts() -> None:
     np.testing.assert_array_equal(one.label, two.label)
     np.testing.assert_array_equal(one.time, two.time)
     y = fm.samplers.Uniform(ranges).draw(600, DUFFING.state)
-    again = one.labels_of(y[100:200])
+    again = one.label_starts(y[100:200])
     np.testing.assert_array_equal(again.label, one.label[100:200])
 
 
@@ -204,7 +204,7 @@ def test_a_mechanism_under_a_load_that_repeats_is_labelled_by_its_attractors() -
     )
     found = fm.find_attractors(mechanism, {"q": (-3.0, 3.0), "q_dot": (-2.0, 2.0)}, 300)
     assert [one.forcing_periods for one in found] == [1]
-    labels = fm.labels_of(mechanism, [[0.1, 0.0], [2.0, -1.0]])
+    labels = fm.label_starts(mechanism, [[0.1, 0.0], [2.0, -1.0]])
     assert labels.counts["captured"] == 2
     # x = Re(A e^(i 2 t)) with A = -0.01 i / (9.81 - 4 + i), at t = 0.
     assert found[0].points[0, 0] == pytest.approx((-0.01j / (9.81 - 4.0 + 1.0j)).real, rel=1e-4)
@@ -269,3 +269,21 @@ def test_a_place_that_is_approached_ever_more_slowly_is_a_fixed_point() -> None:
     found = fm.find_attractors(slow, {"x": (-3.0, 3.0)}, 200)
     assert [one.kind for one in found] == ["fixed point"]
     assert found.counts["captured"] == 200
+
+
+def test_the_smallest_shock_out_of_a_place_of_rest_reaches_the_saddle_s_manifold() -> None:
+    """Measures take attractors for labels; the boundary is the stable manifold of the saddle, by SciPy."""
+    found = fm.find_attractors(PENDULUM, {"x": (-2.6, 3.6), "x_dot": (-10.0, 10.0)}, 500)
+    rest, saddle = np.array([math.pi / 6.0, 0.0]), np.array([5.0 * math.pi / 6.0, 0.0])
+    shock = fm.minimal_shock(found, rest, np.eye(2), most=3.0)
+    slow = np.roots([1.0, 0.1, -math.cos(math.pi / 6.0)]).min()  # x'' = -0.1 x' + cos(pi / 6) x
+    distance = np.inf
+    for side in (1e-6, -1e-6):
+        back = solve_ivp(
+            lambda t, y: -np.array(pendulum(t, *y, 0.1, 0.5, 1.0)), (0.0, 25.0),
+            saddle + side * np.array([1.0, slow]), rtol=1e-10, atol=1e-12, max_step=0.002,
+        )  # fmt: skip
+        away = back.y.T - rest
+        away[:, 0] -= 2.0 * math.pi * np.round(away[:, 0] / (2.0 * math.pi))
+        distance = min(distance, float(np.linalg.norm(away, axis=1).min()))
+    assert shock.size == pytest.approx(distance, abs=2e-3)

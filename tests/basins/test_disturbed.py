@@ -10,7 +10,7 @@ import pytest
 from disturbance.known import center, equilibria, known, oracle_size, scipy_motion, stiff_motion
 
 from fastmech.basins.disturbed import DisturbedEnsemble, disturb
-from fastmech.basins.label import labels_of
+from fastmech.basins.label import label_starts
 from fastmech.capture.barriers import barrier_tree
 from fastmech.capture.select import trapped
 from fastmech.ensembles.status import ENDS, FAILURES, Status
@@ -104,7 +104,7 @@ def test_steps_that_heavy_damping_forbids_are_told_in_one_word() -> None:
         run = disturb(scene, e, 64, dt=0.05, method="dop853")
     assert np.all(run.outcome == Status.STEP_TOO_LARGE)
     with pytest.warns(StepWarning):
-        ends = labels_of(scene, run.starts, dt=0.05, method="dop853")
+        ends = label_starts(scene, run.starts, dt=0.05, method="dop853")
     assert ends.counts["step_too_large"] == 64
 
 
@@ -157,13 +157,13 @@ def test_a_run_that_ends_inside_by_chance_has_not_returned() -> None:
 def test_what_is_proved_to_return_need_not_be_back() -> None:
     """A well deep enough to hold nearly all, a damper that takes minutes to bring them to rest.
 
-    98.4 % return by ``labels_of``. SciPy brings the first eight, and two that end elsewhere, to t = 300 s:
+    98.4 % return by ``label_starts``. SciPy brings the first eight, and two that end elsewhere, to t = 300 s:
     they are beside the well that they are said to end in, and too low to leave any.
     """
     scene = Scene(F0=-150.0, c1=260.0, c2=60.0, alpha=0.0)
     first = find_equilibria(scene)[0]
     run = disturb(scene, first, 512, radius=1.2, t_end=300.0)
-    labels = labels_of(scene, run.starts, 300.0)
+    labels = label_starts(scene, run.starts, 300.0)
     home = (labels.well == 0) & ~labels.turns.any(axis=1)
     np.testing.assert_array_equal(run.outcome == Status.RETURNED, home)
     assert np.all(labels.well >= 0)
@@ -232,7 +232,7 @@ def test_a_light_crank_pin_loses_no_motion() -> None:
     own = disturb(scene, first, 128, radius=1.2, t_end=1.0, dt=2e-3)
     assert np.isin(own.outcome[again], FAILURES).sum() > 4
     assert (own.dt == own.dt[0]).all()
-    ends = labels_of(scene, run.starts, 30.0)
+    ends = label_starts(scene, run.starts, 30.0)
     assert ends.counts["step_too_large"] == ends.counts["not_finite"] == 0
 
 

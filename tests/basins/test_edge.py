@@ -7,9 +7,9 @@ import pytest
 from own_ends import ends
 
 import fastmech as fm
-from fastmech.basins.copies import copy_of_label
-from fastmech.basins.edge import saddle_at, track_edge
+from fastmech.basins.edge import nearest_saddle, track_edge
 from fastmech.basins.measures.norm import kinetic_norm
+from fastmech.basins.well_numbers import well_of_number
 
 BISTABLE = fm.Scene(F0=85.3, c1=294.9, c2=92.85, alpha=0.0)
 
@@ -62,7 +62,7 @@ def test_the_bistable_mechanism_s_edge_lands_on_a_saddle(from_well: int, energy:
         t_end=400.0, dt=0.05,
     )  # fmt: skip
     assert track.settled
-    saddle, away = saddle_at(BISTABLE, track.state)
+    saddle, away = nearest_saddle(BISTABLE, track.state)
     assert saddle.morse_index == 1
     assert away < 1e-3
     assert saddle.energy == pytest.approx(energy, abs=1e-5)
@@ -76,8 +76,8 @@ def test_the_default_labels_and_norm_lead_to_the_same_saddle() -> None:
     rest = np.array([well.phi, well.theta, 0.0, 0.0])
     track = track_edge(scene, rest, rest + np.array([0.0, 2.0 * np.pi, 0.0, 0.0]), t_end=60.0)
     assert track.settled
-    assert [copy_of_label(label) for label in track.labels] == [(0, (0, 0)), (0, (0, 1))]
-    saddle, away = saddle_at(scene, track.state)
+    assert [well_of_number(label) for label in track.labels] == [(0, (0, 0)), (0, (0, 1))]
+    saddle, away = nearest_saddle(scene, track.state)
     assert away < 1e-3
     assert saddle.energy == pytest.approx(tree.barrier[0], abs=1e-9)
     turned = rest + np.array([0.0, 2.0 * np.pi, 0.0, 0.0])

@@ -44,7 +44,7 @@ def balls(scene: fm.Scene, y: np.ndarray) -> Ends:
 
 def test_measures_of_known_basins() -> None:
     """Each well's own copy has a ball as its basin: all radii are the ball's."""
-    profile = erosion(BISTABLE, "F0", [85.3], GRID, labels_of=balls, most_shock=1.0, n=4000, directions=16)
+    profile = erosion(BISTABLE, "F0", [85.3], GRID, label_starts=balls, most_shock=1.0, n=4000, directions=16)
     scene = BISTABLE.replace(F0=85.3)
     wells = [e for e in fm.find_equilibria(scene) if e.kind == "minimum"]
     np.testing.assert_allclose(profile.shock, RADIUS, rtol=1e-3)
@@ -68,7 +68,7 @@ def test_wells_keep_their_identity_where_their_order_changes() -> None:
     """At F0 = 0 the two wells are mirror images: which is the deeper one changes there."""
     values = np.linspace(-40.0, 40.0, 5)
     small = {name: line[::10] for name, line in GRID.items()}
-    profile = erosion(BISTABLE, "F0", values, small, labels_of=balls, most_shock=1.0, n=500, directions=4)
+    profile = erosion(BISTABLE, "F0", values, small, label_starts=balls, most_shock=1.0, n=500, directions=4)
     deepest = [fm.find_equilibria(BISTABLE.replace(F0=float(v)))[0].phi for v in values]
     assert deepest[0] > 2.0
     assert deepest[-1] < 1.0
@@ -94,8 +94,8 @@ def test_starts_without_a_label_leave_room_above_the_measures() -> None:
         return Ends(np.where((sizes > RADIUS / 2) & (sizes <= RADIUS), -1, ends.well), ends.turns)
 
     options: dict[str, Any] = {"most_shock": 1.0, "n": 200, "directions": 4}
-    whole = erosion(BISTABLE, "F0", [85.3], GRID, labels_of=balls, **options)
-    ring = erosion(BISTABLE, "F0", [85.3], GRID, labels_of=undecided_ring, **options)
+    whole = erosion(BISTABLE, "F0", [85.3], GRID, label_starts=balls, **options)
+    ring = erosion(BISTABLE, "F0", [85.3], GRID, label_starts=undecided_ring, **options)
     for name in ("gim", "lim"):
         assert (getattr(ring, name) < 0.8 * getattr(whole, name)).all()
     for name in ("gim", "lim", "factor"):
@@ -107,7 +107,7 @@ def test_starts_without_a_label_leave_room_above_the_measures() -> None:
 
 def test_a_slice_of_rates_goes_through_the_well() -> None:
     rates = {"theta_dot": np.linspace(-4, 4, 41), "phi_dot": np.linspace(-4, 4, 41)}
-    profile = erosion(BISTABLE, "c1", [290.0], rates, labels_of=balls, most_shock=1.0, n=200, directions=4)
+    profile = erosion(BISTABLE, "c1", [290.0], rates, label_starts=balls, most_shock=1.0, n=200, directions=4)
     scene = BISTABLE.replace(c1=290.0)
     e = fm.find_equilibria(scene)[0]
     step = np.abs(np.array([0.2, 0.2]) @ norm_on(kinetic_norm(scene, e), 4, (3, 2))).sum()
@@ -154,7 +154,7 @@ def test_a_well_erodes_towards_its_fold() -> None:
 )
 def test_wrong_arguments_are_refused(changes: dict[str, Any], message: str) -> None:
     arguments: dict[str, Any] = {
-        "scene": BISTABLE, "parameter": "F0", "values": [1.0, 2.0], "labels_of": balls, "axes": GRID,
+        "scene": BISTABLE, "parameter": "F0", "values": [1.0, 2.0], "label_starts": balls, "axes": GRID,
         "most_shock": 1.0,
     }  # fmt: skip
     with pytest.raises(fm.InputError) as refusal:
@@ -192,7 +192,7 @@ def test_a_truss_s_well_lasts_until_it_snaps() -> None:
         return Ends(np.where(y[:, 1] > 0.0, up, down), np.zeros((len(y), 2), dtype=int))
 
     axes = {"x": np.linspace(-0.5, 0.5, 5), "y": np.linspace(-1.0, 1.0, 9)}
-    profile = erosion(truss, "P", values, axes, labels_of=upwards, most_shock=3.0, n=400, directions=4)
+    profile = erosion(truss, "P", values, axes, label_starts=upwards, most_shock=3.0, n=400, directions=4)
     heights = profile.position["y"]
     assert heights.shape == (4, 2)
     upper = int(np.argmax(heights[0]))

@@ -10,7 +10,7 @@ from scan_types.values import scipy_motion
 
 import fastmech as fm
 from fastmech.atlas.folds import find_folds
-from fastmech.basins.copies import copy_labels, copy_of_label
+from fastmech.basins.well_numbers import well_numbers, well_of_number
 from fastmech.ensembles.status import Status
 from fastmech.mechanism.lagrange import metric
 
@@ -39,7 +39,7 @@ def test_every_label_of_a_map_is_where_scipy_comes_to_rest(
     found = fm.map_basins(scene, {"phi": angle, "theta": angle})
     starts = np.zeros((144, 4))
     starts[:, :2] = np.stack(np.meshgrid(angle, angle, indexing="ij"), -1).reshape(-1, 2)
-    final = scipy_motion(scene.model_dump(), starts, np.array([0.0, 25.0]))[-1]
+    final = scipy_motion(scene.parameters, starts, np.array([0.0, 25.0]))[-1]
     turns = np.round((final[:, :2] - well) / TURN)
     assert np.abs(final[:, :2] - TURN * turns - well).max() < 0.7
     assert (found.status == Status.CAPTURED).all()
@@ -64,7 +64,7 @@ def test_mirror_image() -> None:
 def test_a_start_turned_by_full_turns_ends_so_many_turns_further() -> None:
     starts = random_starts(200, 3.0)
     turned = starts + np.array([2 * TURN, -3 * TURN, 0.0, 0.0])
-    one, two = fm.labels_of(CONSTANT, starts), fm.labels_of(CONSTANT, turned)
+    one, two = fm.label_starts(CONSTANT, starts), fm.label_starts(CONSTANT, turned)
     np.testing.assert_array_equal(one.well, two.well)
     np.testing.assert_array_equal(one.turns + np.array([2, -3]), two.turns)
 
@@ -72,9 +72,9 @@ def test_a_start_turned_by_full_turns_ends_so_many_turns_further() -> None:
 @pytest.mark.parametrize(("scene", "t_end"), [(CONSTANT, 30.0), (BISTABLE, 60.0)])
 def test_same_for_any_threads_and_company(scene: fm.Scene, t_end: float) -> None:
     starts = random_starts(700, 3.0)
-    one = fm.labels_of(scene, starts, t_end, threads=1)
-    two = fm.labels_of(scene, starts, t_end, threads=3)
-    few = fm.labels_of(scene, starts[300:309], t_end)
+    one = fm.label_starts(scene, starts, t_end, threads=1)
+    two = fm.label_starts(scene, starts, t_end, threads=3)
+    few = fm.label_starts(scene, starts[300:309], t_end)
     for name in ("well", "turns", "time", "status"):
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
         np.testing.assert_array_equal(getattr(one, name)[300:309], getattr(few, name))
@@ -82,10 +82,10 @@ def test_same_for_any_threads_and_company(scene: fm.Scene, t_end: float) -> None
 
 def test_steps_do_not_matter() -> None:
     starts = random_starts(500, 6.0)
-    usual, small = fm.labels_of(CONSTANT, starts), fm.labels_of(CONSTANT, starts, dt=0.02)
+    usual, small = fm.label_starts(CONSTANT, starts), fm.label_starts(CONSTANT, starts, dt=0.02)
     np.testing.assert_array_equal(usual.well, small.well)
     np.testing.assert_array_equal(usual.turns, small.turns)
-    large = fm.labels_of(CONSTANT, starts, dt=0.4)  # useless at first: what counts is that they agree
+    large = fm.label_starts(CONSTANT, starts, dt=0.4)  # useless at first: what counts is that they agree
     known = large.well >= 0
     np.testing.assert_array_equal(large.turns[known], usual.turns[known])
 
@@ -95,7 +95,7 @@ def test_a_force_that_dies_out_at_once_is_a_blow(F0: float, alpha: float) -> Non
     """SciPy after the impulse F0/alpha on M2 along x, in the limit: 1e-4, 10 and -10 N s."""
     scene = fm.Scene(F0=F0, alpha=alpha)
     starts = random_starts(400, 2.0)
-    found = fm.labels_of(scene, starts)
+    found = fm.label_starts(scene, starts)
     assert found.counts["captured"] >= 398
     some = starts[:60]
     B = np.zeros((60, 2))
@@ -103,13 +103,13 @@ def test_a_force_that_dies_out_at_once_is_a_blow(F0: float, alpha: float) -> Non
     jump = np.linalg.solve(metric(scene, some[:, :2]), (F0 / alpha * B)[..., None])[..., 0]
     kicked = some + np.concatenate([np.zeros((60, 2)), jump], axis=1)
     free = scene.replace(F0=0.0, alpha=0.0)
-    final = scipy_motion(free.model_dump(), kicked, np.array([0.0, 30.0]))[-1]
+    final = scipy_motion(free.parameters, kicked, np.array([0.0, 30.0]))[-1]
     turns = np.round((final[:, :2] - [np.pi / 2, 0.0]) / TURN)
     same = (found.turns[:60] == turns).all(axis=1)
     # What the position moves while the force acts is of order 1/alpha: only beside a boundary does it matter.
     assert same.mean() > (0.97 if alpha < 1e5 else 0.999)
     # The same motions with steps of the user's own, and capture times that count from the start.
-    own = fm.labels_of(scene, some, dt=0.05)
+    own = fm.label_starts(scene, some, dt=0.05)
     np.testing.assert_array_equal(own.turns, found.turns[:60])
     assert (found.time > 0.0).all()
 
@@ -124,21 +124,21 @@ def test_a_start_many_turns_away_is_brought_back_exactly() -> None:
     # Doubles this large are multiples of 2^-32: with places that are, too, sums are exact.
     starts[:, :2] = np.round(starts[:, :2] * 2.0**20) / 2.0**20
     moved = starts + np.array([away[0], away[1], 0.0, 0.0])
-    near = fm.labels_of(CONSTANT, starts + np.array([beside[0], beside[1], 0.0, 0.0]))
-    far = fm.labels_of(CONSTANT, moved)
+    near = fm.label_starts(CONSTANT, starts + np.array([beside[0], beside[1], 0.0, 0.0]))
+    far = fm.label_starts(CONSTANT, moved)
     assert far.counts["captured"] == 200
     np.testing.assert_array_equal(far.turns - near.turns, np.tile([500_000, -300_000], (200, 1)))
-    lone = fm.labels_of(CONSTANT, [[away[2] + 1.0, 0.0, 0.0, 0.0], [1e300, 0.0, 0.0, 0.0]])
+    lone = fm.label_starts(CONSTANT, [[away[2] + 1.0, 0.0, 0.0, 0.0], [1e300, 0.0, 0.0, 0.0]])
     assert lone.status.tolist() == [Status.CAPTURED, Status.START_NOT_FINITE]
     assert lone.turns[0, 0] == 2**26
-    numbers = copy_labels(CONSTANT)(np.array([[away[2] + 1.0, 0.0, 0.0, 0.0]]))
-    assert copy_of_label(int(numbers[0])) == (0, (2**26, 0))
+    numbers = well_numbers(CONSTANT)(np.array([[away[2] + 1.0, 0.0, 0.0, 0.0]]))
+    assert well_of_number(int(numbers[0])) == (0, (2**26, 0))
 
 
 def test_capture_long_before_rest() -> None:
     """A twentieth of the steps; both counts are of the same lanes."""
     starts = random_starts(300)
-    found = fm.labels_of(CONSTANT, starts, 200.0, settle_radius=1e-3)
+    found = fm.label_starts(CONSTANT, starts, 200.0, settle_radius=1e-3)
     assert found.settle_time is not None
     assert np.isfinite(found.settle_time).all()
     assert 20.0 * found.time.mean() < found.settle_time.mean()
@@ -159,14 +159,14 @@ def test_statuses() -> None:
             [0.0, 0.0, 1e200, 0.0],
         ]
     )
-    found = fm.labels_of(fm.Scene(F0=0.0, alpha=0.0), starts, 4.0)
+    found = fm.label_starts(fm.Scene(F0=0.0, alpha=0.0), starts, 4.0)
     kinds = [Status(s).name for s in found.status]
     assert kinds[:3] == ["CAPTURED", "AT_SADDLE", "START_NOT_FINITE"]
     assert kinds[3] in ("NOT_FINITE", "STEP_TOO_LARGE")
     assert sum(found.counts.values()) == 4
-    implicit = fm.labels_of(fm.Scene(F0=0.0, alpha=0.0), starts[[0, 3]], 4.0, method="radau5")
+    implicit = fm.label_starts(fm.Scene(F0=0.0, alpha=0.0), starts[[0, 3]], 4.0, method="radau5")
     assert implicit.status.tolist() == [Status.CAPTURED, Status.NOT_CONVERGED]
-    undecided = fm.labels_of(BISTABLE, random_starts(50), 2.0)
+    undecided = fm.label_starts(BISTABLE, random_starts(50), 2.0)
     assert undecided.counts["undecided"] > 25
     assert (undecided.well[undecided.status == Status.UNDECIDED] == -1).all()
 
@@ -177,7 +177,7 @@ def test_a_slow_passage_beside_a_fold_is_at_no_saddle() -> None:
     fold = find_folds(scene, "F0", np.linspace(600.0, 750.0, 16))[0]
     ghost = np.array([fold.phi, fold.theta, 0.0, 0.0])
     starts = ghost + np.array([[0.0], [1e-5], [-1e-5]]) * [1.0, 0.0, 0.0, 0.0]
-    before = fm.labels_of(scene.replace(F0=fold.value - 1e-6), starts, 60.0)
+    before = fm.label_starts(scene.replace(F0=fold.value - 1e-6), starts, 60.0)
     assert (before.status == Status.UNDECIDED).all()
 
 
@@ -185,19 +185,19 @@ def test_a_slow_passage_beside_a_fold_is_at_no_saddle() -> None:
 def test_saddles_are_at_a_saddle(scene: fm.Scene) -> None:
     saddles = [e for e in fm.find_equilibria(scene) if e.kind == "saddle"]
     starts = [[e.phi, e.theta, 0.0, 0.0] for e in saddles]
-    assert (fm.labels_of(scene, starts).status == Status.AT_SADDLE).all()
+    assert (fm.label_starts(scene, starts).status == Status.AT_SADDLE).all()
 
 
 def test_motions_too_fast_to_tell_are_at_no_saddle() -> None:
     starts = np.random.default_rng(3).uniform(-1000.0, 1000.0, (10, 4)) * [0.0, 0.0, 1.0, 1.0]
-    found = fm.labels_of(CONSTANT, starts)
+    found = fm.label_starts(CONSTANT, starts)
     assert set(found.status.tolist()) <= {Status.CAPTURED, Status.UNDECIDED}
 
 
 def test_without_damper_there_are_no_basins() -> None:
     scene = fm.Scene(beta=0.0, alpha=0.0)
     with pytest.raises(fm.InputError, match=r"scene.beta = 0: .*no attractor; fastmech.trapped"):
-        fm.labels_of(scene, np.zeros((1, 4)))
+        fm.label_starts(scene, np.zeros((1, 4)))
     # What is trapped stays: the energy is conserved, and no angle leaves its turn in 200 s.
     starts = random_starts(300, 2.0)
     held = fm.trapped(scene, starts).well >= 0
@@ -210,12 +210,12 @@ def test_without_damper_there_are_no_basins() -> None:
 
 def test_progress_that_is_no_function_is_refused() -> None:
     with pytest.raises(fm.InputError, match=r"^progress = 3: .*finished starts"):
-        fm.labels_of(CONSTANT, [1.0, 0.0, 0.0, 0.0], progress=3)  # type: ignore[arg-type]
+        fm.label_starts(CONSTANT, [1.0, 0.0, 0.0, 0.0], progress=3)  # type: ignore[arg-type]
 
 
 def test_an_end_that_cannot_be_counted_to_is_refused() -> None:
     with pytest.raises(fm.InputError, match=r"t_end = 1e\+308 s: must be at most"):
-        fm.labels_of(CONSTANT, np.zeros((1, 4)), 1e308)
+        fm.label_starts(CONSTANT, np.zeros((1, 4)), 1e308)
 
 
 @pytest.mark.parametrize("beta", [1e5, 1e7])
@@ -223,7 +223,7 @@ def test_heavy_damping_is_labelled_by_default(beta: float) -> None:
     """No motion is lost, moving or not, and wells are those that hold the ends of SciPy's Radau."""
     scene = CONSTANT.replace(beta=beta)
     starts = random_starts(256, fastest=8.0)
-    found = fm.labels_of(scene, starts, 10.0)
+    found = fm.label_starts(scene, starts, 10.0)
     assert found.counts["captured"] + found.counts["undecided"] == 256
     proved = np.flatnonzero(found.well >= 0)[:4]
     assert proved.size == 4
@@ -231,7 +231,7 @@ def test_heavy_damping_is_labelled_by_default(beta: float) -> None:
         end = fm.trapped(scene, stiff_motion(scene, starts[lane], 10.0))
         assert end.well[0] == found.well[lane]
         np.testing.assert_array_equal(end.turns[0], found.turns[lane])
-    alone = fm.labels_of(scene, starts[proved[0]], 10.0)
+    alone = fm.label_starts(scene, starts[proved[0]], 10.0)
     assert alone.time[0] == found.time[proved[0]]
 
 
@@ -242,18 +242,18 @@ def test_heavy_damping_and_a_force_that_is_gone_at_once() -> None:
     rest = fm.find_equilibria(free)[0]
     blow = fm.impulse_start(free, rest, 1.0)
     still = np.array([rest.phi, rest.theta, 0.0, 0.0])
-    found, same = fm.labels_of(scene, still, 10.0), fm.labels_of(free, blow, 10.0)
+    found, same = fm.label_starts(scene, still, 10.0), fm.label_starts(free, blow, 10.0)
     assert found.counts["captured"] == same.counts["captured"] == 1
     assert found.well[0] == same.well[0]
 
 
 def test_angles_that_may_be_degrees_give_a_warning() -> None:
     with pytest.warns(UserWarning, match=r"starts: reaches 180, beyond 4 turns; .*numpy.deg2rad"):
-        fm.labels_of(BISTABLE, [[90.0, 180.0, 0.0, 0.0]], 1.0)
+        fm.label_starts(BISTABLE, [[90.0, 180.0, 0.0, 0.0]], 1.0)
 
 
 def test_printed_it_says_where_they_end() -> None:
-    found = fm.labels_of(BISTABLE, random_starts(200))
+    found = fm.label_starts(BISTABLE, random_starts(200))
     for lines in (
         str(found).splitlines(),
         str(fm.map_basins(BISTABLE, {"phi": [0, 1], "theta": [0, 1]})).split("\n"),

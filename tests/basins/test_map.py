@@ -215,7 +215,7 @@ def test_fixed_coordinates_are_starts() -> None:
     axes = {"phi_dot": np.linspace(-5.0, 5.0, 9), "theta": np.linspace(-1.0, 2.0, 5)}
     found = fm.map_basins(CONSTANT, axes, fixed={"phi": -2.0, "theta_dot": 1.5})
     i, j = 2, 3
-    one = fm.labels_of(CONSTANT, [-2.0, axes["theta"][j], axes["phi_dot"][i], 1.5])
+    one = fm.label_starts(CONSTANT, [-2.0, axes["theta"][j], axes["phi_dot"][i], 1.5])
     assert found.well[i, j] == one.well[0]
     assert found.turns[i, j].tolist() == one.turns[0].tolist()
     assert found.time[i, j] == one.time[0]
@@ -271,7 +271,7 @@ def test_wrong_requests(change: dict[str, Any], message: str) -> None:
 def test_two_milliard_starts_are_refused_before_they_are_copied() -> None:
     starts = np.broadcast_to(np.zeros(4), (2_000_000_000, 4))
     for refused in (
-        lambda: fm.labels_of(CONSTANT, starts),
+        lambda: fm.label_starts(CONSTANT, starts),
         lambda: fm.integrate(CONSTANT, starts, 1.0, dt=0.1),
     ):
         with pytest.raises(fm.InputError, match=r"^\w+: the states would take 59\.6 GiB on the way, [^\n]*$"):

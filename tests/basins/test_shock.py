@@ -8,9 +8,9 @@ import pytest
 from own_ends import depths, ends
 
 import fastmech as fm
-from fastmech.basins.copies import copy_labels, copy_numbers, copy_of_label
 from fastmech.basins.measures.norm import kinetic_norm
 from fastmech.basins.shock import Shock, brute_force_shock, minimal_shock
+from fastmech.basins.well_numbers import number_wells, well_numbers, well_of_number
 from fastmech.mechanism.lagrange import kinetic_energy
 
 PLACE = np.array([0.2, -0.1, 0.3])
@@ -112,13 +112,13 @@ def test_an_equilibrium_of_a_scene_needs_neither_labels_nor_norm() -> None:
     place, norm = [well.phi, well.theta, 0.0, 0.0], kinetic_norm(scene, well)
     few = {"most": 3.0, "coordinates": (2, 3), "directions": 8, "tolerance": 1e-2}
     found = minimal_shock(scene, well, **few)
-    told = minimal_shock(copy_labels(scene), place, norm, **few)
+    told = minimal_shock(well_numbers(scene), place, norm, **few)
     assert (found.size, found.label) == (told.size, told.label)
     np.testing.assert_array_equal(found.shock, told.shock)
-    index, turns = copy_of_label(found.label)
+    index, turns = well_of_number(found.label)
     assert index == 0
     assert turns != (0, 0)
-    end = fm.labels_of(scene, place + found.shock)
+    end = fm.label_starts(scene, place + found.shock)
     assert tuple(end.turns[0]) == turns
     with pytest.raises(fm.InputError, match=r"^norm: missing; only an equilibrium of a scene"):
         minimal_shock(scene, place, most=1.0)
@@ -129,9 +129,9 @@ def test_copies_have_numbers_of_their_own() -> None:
     ends = SimpleNamespace(
         well=np.array([0, 5, -1, 3]), turns=np.array([[0, 0], [-7, 300], [0, 0], [4000, -1]], dtype=np.int32)
     )
-    numbers = copy_numbers(ends)  # type: ignore[arg-type]
+    numbers = number_wells(ends)  # type: ignore[arg-type]
     assert numbers[2] == -1
-    assert [copy_of_label(int(k)) for k in numbers[[0, 1, 3]]] == [
+    assert [well_of_number(int(k)) for k in numbers[[0, 1, 3]]] == [
         (0, (0, 0)), (5, (-7, 300)), (3, (4000, -1)),
     ]  # fmt: skip
 

@@ -49,7 +49,7 @@ def struck(scene: fm.Scene, well: int, on: str, impulse: Floats, angle: Floats) 
 def stays(scene: fm.Scene, well: int, starts: Floats, t_end: float) -> NDArray[np.bool_]:
     """Whether motions by SciPy's DOP853 at 1e-12 end where they began, their energy below the way out."""
     e = fm.find_equilibria(scene)[well]
-    final = scipy_motion(scene.model_dump(), starts, np.array([0.0, t_end]))[-1]
+    final = scipy_motion(scene.parameters, starts, np.array([0.0, t_end]))[-1]
     energy = kinetic_energy(scene, final) + potential_energy(scene, final[:, :2], scene.F0)
     assert (energy < e.energy + depths(scene)[well]).all()
     # Below every way out the angles are nearer to their own minimum than to any other.
@@ -109,7 +109,7 @@ def test_no_blow_below_the_proved_bound_leaves(well: int, on: str) -> None:
     size = bound * np.append(np.full(5, 0.999), rng.uniform(0.2, 0.999, 5))
     starts = struck(BISTABLE, well, on, size, angle)
     for scene in (BISTABLE, FRICTIONLESS):
-        y = scipy_motion(scene.model_dump(), starts, np.linspace(0.0, 15.0, 61))
+        y = scipy_motion(scene.parameters, starts, np.linspace(0.0, 15.0, 61))
         assert (fm.trapped(scene, y.reshape(-1, 4)).well == well).all()
         assert (fm.trapped(scene, y.reshape(-1, 4)).turns == 0).all()
 
@@ -236,7 +236,7 @@ def test_a_search_that_finds_nothing_tells_how_far_it_went() -> None:
     assert np.isnan(told.found.impulse)
     assert told.proved.impulse < told.tried_to < 640.0
     start = struck(scene, 0, "M1", np.array([640.0]), np.array([1.178]))[0]
-    rates = motion_rates(scene.model_dump())
+    rates = motion_rates(scene.parameters)
     final = solve_ivp(rates, (0.0, 200.0), start, method="Radau", rtol=1e-9, atol=1e-10).y[:, -1]
     np.testing.assert_allclose(
         final - struck(scene, 0, "M1", np.zeros(1), np.zeros(1))[0], [TURN, 0, 0, 0], atol=1e-4
@@ -252,7 +252,7 @@ def test_first_steps_too_long_for_a_damper_are_no_end_of_the_search() -> None:
     assert told.found.impulse < 80.41  # the least of 800 blows between the bound and the largest
     rest = struck(scene, 0, "M2", np.zeros(1), np.zeros(1))[0]
     starts = struck(scene, 0, "M2", told.found.impulse * np.array([1.01, 0.99]), np.zeros(2))
-    rates = motion_rates(scene.model_dump())
+    rates = motion_rates(scene.parameters)
     turns = []
     for start in starts:
         run = solve_ivp(rates, (0.0, 20.0), start, method="Radau", rtol=1e-6, atol=1e-6)
@@ -267,7 +267,7 @@ def test_where_no_blow_leaves_none_is_left_undecided_that_finer_steps_decide() -
     told = limit(scene, 0, "M3", 0.0)
     assert np.isnan([told.found.impulse, told.undecided_from]).all()
     rest = struck(scene, 0, "M3", np.zeros(1), np.zeros(1))[0]
-    rates = motion_rates(scene.model_dump())
+    rates = motion_rates(scene.parameters)
     for start in struck(scene, 0, "M3", told.tried_to * np.array([0.62, 0.8, 0.95]), np.zeros(3)):
         run = solve_ivp(rates, (0.0, 20.0), start, method="Radau", rtol=1e-6, atol=1e-6)
         np.testing.assert_array_equal(np.rint((run.y[:2, -1] - rest[:2]) / TURN), [0.0, 0.0])
@@ -280,7 +280,7 @@ def test_blows_that_few_steps_do_not_decide_are_decided_below_one_that_leaves() 
     scene = fm.Scene(**masses, **springs, l=0.3769942645975386, beta=84.66179041445628, alpha=0.0)
     told = limit(scene, 1, "M1")
     starts = struck(scene, 1, "M1", np.array([35.41, 35.43, 38.2]), np.full(3, told.proved.direction))
-    rates = motion_rates(scene.model_dump())
+    rates = motion_rates(scene.parameters)
     runs = [solve_ivp(rates, (0.0, 300.0), y, method="DOP853", rtol=1e-11, atol=1e-11) for y in starts]
     other, own = (fm.find_equilibria(scene)[k].phi for k in (0, 1))
     leaves = [abs(run.y[0, -1] - other) < abs(run.y[0, -1] - own) for run in runs]

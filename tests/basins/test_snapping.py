@@ -139,7 +139,7 @@ def test_labels_are_those_of_a_map_s_starts() -> None:
     rest = snapping.equilibria[0]
     for k, rate in enumerate(rates):
         for j, force in enumerate(forces):
-            own = fm.labels_of(fm.Scene(F0=force, alpha=rate), [rest.phi, rest.theta, 0.0, 0.0])
+            own = fm.label_starts(fm.Scene(F0=force, alpha=rate), [rest.phi, rest.theta, 0.0, 0.0])
             assert own.well[0] == snapping.label[k, j]
             np.testing.assert_array_equal(own.turns[0], snapping.turns[k, j])
             assert own.time[0] <= snapping.time[k, j]  # it looks every second only

@@ -29,12 +29,13 @@ from fastmech.basins.measures.labels import LabelsLike, check_map, check_point, 
 from fastmech.basins.measures.slopes import PARTS, BoundaryDimension, boundary_dimension, half_width, part_of
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
+from fastmech.objects import Printed
 
 LN2 = float(np.log(2.0))
 
 
-@dataclass(frozen=True)
-class BasinEntropy:
+@dataclass(frozen=True, repr=False)
+class BasinEntropy(Printed):
     """Basin entropy of a map, natural logarithms."""
 
     basin: float  #: S_b: mean over all boxes
@@ -84,8 +85,8 @@ def basin_entropy(labels: LabelsLike, edge: int = 5) -> BasinEntropy:
     )
 
 
-@dataclass(frozen=True)
-class FractalTest:
+@dataclass(frozen=True, repr=False)
+class FractalTest(Printed):
     """What balls and boxes of several sizes see of a map's boundaries."""
 
     fractal: bool | None  #: None: the map cannot tell

@@ -20,10 +20,11 @@ from fastmech.arrays import Floats, Integers
 from fastmech.basins.measures.labels import LabelsLike, check_labels, known_labels
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
+from fastmech.objects import Printed
 
 
-@dataclass(frozen=True)
-class Shares:
+@dataclass(frozen=True, repr=False)
+class Shares(Printed):
     """Shares of n starts, arrays of one shape."""
 
     count: Integers  #: starts that belong to each

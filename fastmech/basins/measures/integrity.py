@@ -31,11 +31,12 @@ from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
+from fastmech.objects import Printed
 from fastmech.scene import Scene
 
 
-@dataclass(frozen=True)
-class Integrity:
+@dataclass(frozen=True, repr=False)
+class Integrity(Printed):
     """Integrity of one basin on one map. Radii are lengths in the stated norm."""
 
     gim: float  #: share of the map's points: the basin's volume over the window's

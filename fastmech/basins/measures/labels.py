@@ -21,7 +21,7 @@ WHOLE = 5
 
 
 class Labelled(Protocol):
-    """Where starts end: what :func:`fastmech.map_basins` and :func:`fastmech.labels_of` give."""
+    """Where starts end: what :func:`fastmech.map_basins` and :func:`fastmech.label_starts` give."""
 
     @property
     def well(self) -> NDArray[np.integer[Any]]:

@@ -28,6 +28,7 @@ from fastmech.arrays import Floats, Integers
 from fastmech.basins.measures.labels import LabelOf, LabelsLike, ask, check_map, check_point, too_thin
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
+from fastmech.objects import Printed
 
 #: Half width above which an error bar round 1 does not tell a smooth boundary from a fractal one.
 TELLING = 0.15
@@ -39,8 +40,8 @@ BENT = 2.0
 BEYOND = 1.5
 
 
-@dataclass(frozen=True)
-class PowerLaw:
+@dataclass(frozen=True, repr=False)
+class PowerLaw(Printed):
     """f(scale) ~ scale^exponent. Slopes belong to neighbouring scales, the last two of which fix the last."""
 
     exponent: float  #: weighted least squares of log f over log scale; NaN: fewer than two scales with f > 0
@@ -143,8 +144,8 @@ def half_width(without: Floats) -> float:
     return float(t.ppf(0.975, m - 1) * spread)
 
 
-@dataclass(frozen=True)
-class BoundaryDimension:
+@dataclass(frozen=True, repr=False)
+class BoundaryDimension(Printed):
     """Boxes that hold more than one label, over their size, and the power law."""
 
     edge: Integers  #: edges of the boxes [steps of the grid] (sizes,)
@@ -263,8 +264,8 @@ def _log(share: Floats) -> Floats:
 DISORDER = 0.75
 
 
-@dataclass(frozen=True)
-class UncertaintyExponent:
+@dataclass(frozen=True, repr=False)
+class UncertaintyExponent(Printed):
     """Shares of uncertain starts over rising distances, and their power law."""
 
     epsilon: Floats  #: distances, in units of the box (scales,)

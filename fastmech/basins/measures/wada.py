@@ -22,6 +22,7 @@ from scipy.ndimage import distance_transform_cdt
 from fastmech.arrays import Floats, Integers
 from fastmech.basins.measures.labels import LabelsLike, check_map, known_labels, too_thin
 from fastmech.ensembles import checks
+from fastmech.objects import Printed
 
 #: Strides with which a map is looked at, from coarse to fine.
 STRIDES = (4, 2, 1)
@@ -34,8 +35,8 @@ SHRINKS, STAYS, STAYED = 0.65, 0.8, 0.45
 FULL = 0.5
 
 
-@dataclass(frozen=True)
-class WadaTest:
+@dataclass(frozen=True, repr=False)
+class WadaTest(Printed):
     """Boundaries of every basin against that of all others, compared with each other."""
 
     wada: bool | None  #: whether three or more basins share one boundary; None: the map cannot tell

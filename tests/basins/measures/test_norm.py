@@ -12,7 +12,7 @@ from fastmech.mechanism.lagrange import kinetic_energy
 def test_the_kinetic_norm_is_the_oracle_s() -> None:
     scene = fm.Scene(alpha=0.0)
     e = fm.find_equilibria(scene)[0]
-    params, q = scene.model_dump(), (e.phi, e.theta)
+    params, q = scene.parameters, (e.phi, e.theta)
     a = np.array(oracle().metric(params, q), dtype=np.float64)
     hessian = np.array(oracle().hessian(params, q, scene.F0), dtype=np.float64)
     square = np.linalg.eigvals(np.linalg.solve(a, hessian)).real.max()

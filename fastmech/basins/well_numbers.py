@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats, Integers
-from fastmech.basins.label import How, label_starts
+from fastmech.basins.label import How, label_states
 from fastmech.basins.labels import Labels
 from fastmech.basins.measures.labels import LabelOf, check_point
 from fastmech.basins.measures.norm import kinetic_norm
@@ -25,7 +25,7 @@ WELL_BITS, TURN_BITS = 7, 56
 
 
 @dataclass(frozen=True)
-class CopyLabels:
+class WellNumbers:
     """Labels starts (n, states) with one number for each copy of each well, -1 where not proved."""
 
     scene: Scene | Mechanism
@@ -34,29 +34,29 @@ class CopyLabels:
 
     def __call__(self, starts: Floats) -> Integers:
         """Labels (n,) of starts (n, states)."""
-        return copy_numbers(label_starts(self.scene, starts, self.t_end, How(threads=self.threads)))
+        return number_wells(label_states(self.scene, starts, self.t_end, How(threads=self.threads)))
 
 
-def copy_labels(scene: Scene | Mechanism, t_end: float = 60.0, *, threads: int | None = None) -> CopyLabels:
+def well_numbers(scene: Scene | Mechanism, t_end: float = 60.0, *, threads: int | None = None) -> WellNumbers:
     """A function that labels starts (n, states) with a number for each copy of each well, -1: not proved.
 
     It is what :func:`fastmech.basins.shock.minimal_shock`, :func:`fastmech.basins.edge.track_edge` and
-    :func:`fastmech.basins.measures.slopes.uncertainty_exponent` ask; :func:`copy_of_label` reads its
+    :func:`fastmech.basins.measures.slopes.uncertainty_exponent` ask; :func:`well_of_number` reads its
     numbers.
 
     Args:
         scene: the mechanism, with a damper.
-        t_end: end of the runs [s], see :func:`fastmech.basins.label.labels_of`.
+        t_end: end of the runs [s], see :func:`fastmech.label_starts`.
         threads: threads to use.
 
     Raises:
         InputError: the scene has no damper, or ``t_end`` is wrong.
     """
     require_damper(scene)
-    return CopyLabels(scene, checks.number("t_end", t_end, "s", above=0.0), threads)
+    return WellNumbers(scene, checks.number("t_end", t_end, "s", above=0.0), threads)
 
 
-def copy_numbers(ends: Labels) -> Integers:
+def number_wells(ends: Labels) -> Integers:
     """One number for each copy of each well (n,), -1 without a label or too many turns away to count."""
     coordinates = ends.turns.shape[1]
     bits = TURN_BITS // coordinates
@@ -68,8 +68,8 @@ def copy_numbers(ends: Labels) -> Integers:
     return np.where((ends.well < 0) | ~counted, -1, (number << WELL_BITS) + ends.well)
 
 
-def copy_of_label(label: int, coordinates: int = 2) -> tuple[int, tuple[int, ...]]:
-    """The equilibrium's index and its full turns of each coordinate that a number of ``copy_labels`` means.
+def well_of_number(label: int, coordinates: int = 2) -> tuple[int, tuple[int, ...]]:
+    """The equilibrium's index and its full turns of each coordinate that a number of ``well_numbers`` means.
 
     Raises:
         InputError: the label is negative: it means no copy.
@@ -84,13 +84,13 @@ def copy_of_label(label: int, coordinates: int = 2) -> tuple[int, tuple[int, ...
 
 
 def label_name(label_of: LabelOf, label: int) -> str:
-    """What a label means, in words: of ``copy_labels`` the well and its turns, else the number itself."""
+    """What a label means, in words: of ``well_numbers`` the well and its turns, else the number itself."""
     if label < 0:
         return "no label"
-    if not isinstance(label_of, CopyLabels):
+    if not isinstance(label_of, WellNumbers):
         return f"the label {label}"
     names = certificate_of(label_of.scene).names
-    well, turns = copy_of_label(label, len(names))
+    well, turns = well_of_number(label, len(names))
     made = [f"{t:+d} turn{'s' * (abs(t) > 1)} of {name}" for t, name in zip(turns, names, strict=True) if t]
     return ", ".join([f"well {well}", *made])
 
@@ -117,5 +117,5 @@ def with_defaults(
             "kinetic-energy norm"
         )
     if isinstance(label_of, Scene | Mechanism):
-        return copy_labels(label_of), place, norm
+        return well_numbers(label_of), place, norm
     return label_of, place, norm

@@ -1,0 +1,182 @@
+"""``fm.group_by_features``: starts grouped by what their motions look like, not by where they come to.
+
+Features of the later part of a motion are grouped by density, with the radius of the clearest groups
+(Stender and Hoffmann, Nonlinear Dynamics 107 (2022), 2003; DBSCAN: Ester and others, KDD 1996). A
+group may be more than one attractor, or a part of one. It is the way to see what recurrences do not, such as
+motions that differ in a feature of your own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import binomtest
+
+from fastmech.arrays import Floats
+from fastmech.attractors.find import starts_of
+from fastmech.attractors.flow import Flow, flow_of, statuses
+from fastmech.ensembles import checks
+from fastmech.ensembles.status import Status
+from fastmech.ensembles.system import System
+from fastmech.errors import InputError, shown
+from fastmech.models.mechanism import Mechanism
+from fastmech.objects import Field, Result
+from fastmech.samplers import Sampler
+
+#: Starts by default and integrated together; outputs in a period, and periods that are looked at: motions of
+#: one, two, three, four or six of them are seen whole.
+STARTS, TOGETHER, OUTPUTS, LOOKED = 2000, 2048, 32, 24
+
+#: Starts that make a group at least, and their share of all.
+FEWEST, LEAST = 5, 0.002
+
+#: Radii of neighbourhoods that are tried, in typical sizes of states, and starts that tell the best.
+RADII, JUDGES = tuple(0.02 * 2.0**k for k in range(5)), 1000
+
+#: Features of states, by name, of the motion (outputs, n, dim) of states that are no angles.
+FEATURES: dict[str, Callable[[Floats], Floats]] = {
+    "least": lambda y: y.min(axis=0),
+    "greatest": lambda y: y.max(axis=0),
+    "mean": lambda y: y.mean(axis=0),
+    "spread": lambda y: y.std(axis=0),
+}
+
+#: Groups that are printed.
+LINES = 5
+
+
+@dataclass(frozen=True, repr=False)
+class FeatureGroups(Result):
+    """Starts in groups of like motions; printed, their shares and middles."""
+
+    label: NDArray[np.int64]  #: group of each start, the most frequent is 0; -1: like no others (n,)
+    status: NDArray[np.int8]  #: OK, ESCAPED, UNSURE (in no group) or NOT_FINITE (n,)
+    features: Floats  #: of each start, usual ones in typical sizes of the states and periods (n, features)
+    names: tuple[str, ...]  #: of the features
+    t_end: float  #: s
+
+    @property
+    def fractions(self) -> Floats:
+        """Share of the starts in each group."""
+        return np.bincount(self.label[self.label >= 0]) / self.label.size
+
+    KIND = "feature_groups"
+    FIELDS = {
+        "label": Field("start", "1", "group of the start, -1: none", codes=-1),
+        "status": Field("start", "1", "what is known of the start", codes=Status),
+        "features": Field("start feature", "1", "features of its motion"),
+        "names": Field("feature", "1", "name of the feature"),
+        "t_end": Field("", "s", "when motions have settled"),
+    }
+
+    def told(self) -> str:
+        """Shares and middles of the groups."""
+        n, number = self.label.size, np.bincount(self.label[self.label >= 0])
+        lines = [f"{number.size} groups of {n:,} starts, {np.count_nonzero(self.label < 0):,} in none"]
+        for k in range(min(number.size, LINES)):
+            low, high = binomtest(int(number[k]), n).proportion_ci(method="wilson")
+            middle = np.median(self.features[self.label == k], axis=0)
+            told = ", ".join(f"{a} {b:.3g}" for a, b in list(zip(self.names, middle, strict=True))[:3])
+            lines.append(f"  {number[k] / n:.4f} ({low:.4f} to {high:.4f}): {told}")
+        return "\n".join(lines)
+
+
+def group_by_features(
+    system: System | Mechanism,
+    starts: Sampler | Mapping[str, ArrayLike] | ArrayLike,
+    n: int = STARTS,
+    *,
+    t_end: float,
+    features: Callable[[Floats, Floats], ArrayLike] | None = None,
+    radius: float | None = None,
+    seed: int = 0,
+    threads: int | None = None,
+) -> FeatureGroups:
+    """Group starts by features of their motions (needs the extra ``features``: scikit-learn).
+
+    Args:
+        system: a system of your own or a mechanism, as for :func:`fastmech.find_attractors`.
+        starts: ranges by name, a sampler or states (n, dim).
+        n: how many starts.
+        t_end: when motions have settled [s]; 24 periods from then on are looked at, of a system that does not
+            depend on the time 24 times as long as states take to change by their size.
+        features: ``features(t, y)`` of times (m,) and one motion (m, dim) gives numbers; by default least,
+            greatest and mean value, spread and strongest frequency of each state; of angles the mean sine and
+            cosine and the turns a second.
+        radius: neighbours lie nearer than so many typical sizes of a state (standard deviations of features
+            of your own); by default the one, of five from 0.02 to 0.32, with the greatest silhouette.
+        seed: of the sampler.
+        threads: threads to use, all processors by default.
+
+    Raises:
+        InputError: an argument is wrong, or scikit-learn is not installed.
+    """
+    try:
+        from sklearn.cluster import DBSCAN
+        from sklearn.metrics import silhouette_score
+    except ImportError:
+        raise InputError("group_by_features: needs scikit-learn; pip install 'fastmech[features]'") from None
+    if not isinstance(system, System | Mechanism):
+        raise InputError(f"system = {shown(system)}: must be a System or a Mechanism")
+    until = checks.number("t_end", t_end, "s", above=0.0)
+    y = starts_of(starts, system.state, n, seed)
+    flow = flow_of(system, y[np.isfinite(y).all(axis=1)][:256], {}, threads=threads)
+    times = until / flow.period + np.arange(1.0, OUTPUTS * LOOKED + 1.0) / OUTPUTS
+    rows, status = [], np.empty(len(y), dtype=np.int8)
+    names: tuple[str, ...] = ()
+    for first in range(0, len(y), TOGETHER):  # memory holds the motions of so many
+        reached = flow.run(y[first : first + TOGETHER], times)
+        status[first : first + TOGETHER] = statuses(reached)
+        if features is None:
+            found, names = _usual(flow, reached.y, tuple(system.state))
+        else:
+            own = [
+                np.ravel(features(times * flow.period, reached.y[:, i])) for i in range(reached.y.shape[1])
+            ]
+            found = np.array(own, dtype=np.float64)
+            names = tuple(f"feature {k}" for k in range(found.shape[1]))
+        rows.append(found)
+    table = np.concatenate(rows)
+    usable = np.isfinite(table).all(axis=1) & (status == Status.OK)
+    label = np.full(len(y), -1, dtype=np.int64)
+    if np.count_nonzero(usable) >= 2 * FEWEST:
+        points = table[usable]
+        if features is not None:
+            points = points / np.maximum(points.std(axis=0), 1e-9 * np.abs(points).max(axis=0) + 1e-300)
+        least = max(FEWEST, int(LEAST * len(points)))
+        tried = RADII if radius is None else (checks.number("radius", radius, "", above=0.0),)
+        best, label[usable] = -np.inf, 0
+        for eps in tried:
+            found = DBSCAN(eps=eps, min_samples=least).fit_predict(points)
+            judged = np.flatnonzero(found >= 0)[:JUDGES]
+            several = np.unique(found[judged]).size > 1
+            clear = float(silhouette_score(points[judged], found[judged])) if several else 0.0
+            if clear > best:
+                best, label[usable] = clear, found
+    number = np.bincount(label[label >= 0])
+    rank = np.append(np.argsort(np.argsort(-number, kind="stable")), -1)
+    label = rank[label]
+    status[(label < 0) & (status == Status.OK)] = Status.UNSURE
+    return FeatureGroups(label, status, table, names, until).of(system)
+
+
+def _usual(flow: Flow, y: Floats, states: tuple[str, ...]) -> tuple[Floats, tuple[str, ...]]:
+    """The features of motions (outputs, n, dim) in typical sizes and periods, and their names."""
+    columns, names = [], []
+    for d, state in enumerate(states):
+        one = y[:, :, d]
+        if flow.angles[d]:
+            turns = (one[-1] - one[0]) / (2.0 * np.pi * LOOKED)
+            columns += [np.sin(one).mean(axis=0), np.cos(one).mean(axis=0), turns]
+            names += [f"mean sine of {state}", f"mean cosine of {state}", f"turns of {state} in a period"]
+            continue
+        columns += [feature(one) / flow.scale[d] for feature in FEATURES.values()]
+        names += [f"{name} {state}" for name in FEATURES]
+        spectrum = np.abs(np.fft.rfft(one - one.mean(axis=0), axis=0))
+        moves = one.std(axis=0) > 1e-4 * flow.scale[d]
+        columns.append(np.where(moves, np.argmax(spectrum, axis=0) / LOOKED, 0.0))
+        names.append(f"frequency of {state} in a period")
+    return np.stack(columns, axis=1), tuple(names)

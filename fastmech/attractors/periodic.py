@@ -1,0 +1,202 @@
+"""``fm.periodic_orbits``: periodic motions and places of rest by Newton's method, unstable ones too."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastmech.arrays import Floats
+from fastmech.attractors.find import starts_of
+from fastmech.attractors.flow import DIFFERENCE, Flow, flow_of
+from fastmech.attractors.orbits import RESIDUAL, SAME, Orbit, cycle, periodic, same, visits
+from fastmech.attractors.search import DENSE, time_back
+from fastmech.ensembles import checks
+from fastmech.ensembles.system import System
+from fastmech.errors import InputError, shown
+from fastmech.models.mechanism import Mechanism
+from fastmech.objects import Field, Printed, Result
+from fastmech.samplers import Sampler
+
+#: Starts by default; periods after which motions are guesses too, and those in which cycles may close.
+STARTS, RUN_IN, WINDOWS = 128, (8.0, 64.0), (2, 4, 16, 64)
+
+#: Newton's iterations for places of rest, and the shares of a step of which the best is taken.
+ITERATIONS, SHARES = 30, 0.5 ** np.arange(8.0)
+
+#: Orbits that are printed.
+LINES = 5
+
+
+@dataclass(frozen=True, repr=False)
+class PeriodicOrbit(Printed):
+    """A periodic motion, or a place of rest."""
+
+    points: Floats  #: after each forcing period, or along a cycle, or the place (m, dim)
+    period: float | None  #: s; None: a place of rest
+    forcing_periods: int | None  #: the same in periods of the forcing, where there is one
+    multipliers: NDArray[np.complex128]  #: of the map over its period; of a cycle without the one along it,
+    # of a place of rest over the time in which states change by about their size
+    residual: float  #: of the map, over the typical state
+
+    def told(self) -> str:
+        """Stability, period and place."""
+        return self.name
+
+    @property
+    def stable(self) -> bool:
+        """Whether all multipliers lie inside the unit circle."""
+        return bool((np.abs(self.multipliers) < 1.0).all())
+
+    @property
+    def name(self) -> str:
+        """Stability, period and place in a few words."""
+        where = ", ".join(f"{x:.6g}" for x in np.round(self.points[0], 9) + 0.0)
+        kind = "rests" if self.period is None else f"period {self.period:.6g} s"
+        if self.forcing_periods is not None:
+            kind = f"period {self.forcing_periods} of the forcing"
+        largest = float(np.abs(self.multipliers).max()) if self.multipliers.size else 0.0
+        how = "stable" if self.stable else "unstable"
+        return f"{how}, {kind} at ({where}), largest multiplier {largest:.4g}"
+
+
+@dataclass(frozen=True, repr=False)
+class PeriodicOrbits(Result, Sequence[PeriodicOrbit]):
+    """Periodic orbits, short ones first; printed, some of them."""
+
+    orbits: tuple[PeriodicOrbit, ...]
+
+    def __len__(self) -> int:
+        return len(self.orbits)
+
+    def __getitem__(self, index):  # type: ignore[no-untyped-def]
+        return self.orbits[index]
+
+    KIND = "periodic_orbits"
+    FIELDS = {
+        "name": Field("orbit", "1", "stability, period and place", "orbits.name"),
+        "stable": Field("orbit", "1", "whether it is stable", "orbits.stable"),
+        "residual": Field("orbit", "1", "of the map, over the typical state", "orbits.residual"),
+        "points": Field("orbit", "1", "how many of the points are of the orbit"),
+        "*": Field("point state", "", "points of the orbits, one after the other:", "orbits.points"),
+    }
+
+    @property
+    def points(self) -> list[int]:
+        """How many points each orbit has."""
+        return [len(one.points) for one in self.orbits]
+
+    def told(self) -> str:
+        """The orbits, stable and unstable."""
+        stable = sum(orbit.stable for orbit in self.orbits)
+        lines = [f"{len(self)} periodic orbits, {stable} stable"]
+        lines += [f"  {orbit.name}" for orbit in self.orbits[: LINES if len(self) <= LINES else LINES - 1]]
+        return "\n".join(lines + [f"  {len(self) - LINES + 1} more"] * (len(self) > LINES))
+
+
+def periodic_orbits(
+    system: System | Mechanism,
+    starts: Sampler | Mapping[str, ArrayLike] | ArrayLike,
+    n: int = STARTS,
+    *,
+    periods: int = 1,
+    seed: int = 0,
+    threads: int | None = None,
+) -> PeriodicOrbits:
+    """Periodic orbits that Newton's method finds from many starts together, on lanes.
+
+    Args:
+        system: a system of your own or a mechanism, as for :func:`fastmech.find_attractors`.
+        starts: ranges by name, a sampler or states (n, dim): guesses, and so are the states to which they
+            have moved a little and a while later.
+        n: how many starts.
+        periods: orbits take up to so many periods of the forcing. Of a system that does not depend on the
+            time cycles of any period are looked for where motions come back near to themselves.
+        seed: of the sampler.
+        threads: threads to use, all processors by default.
+
+    Returns:
+        places, periods and multipliers (Floquet's), measured by differences of the map over a period; what no
+        guess leads to is not found.
+
+    Raises:
+        InputError: an argument is wrong, or the system depends on the time and has no period.
+    """
+    if not isinstance(system, System | Mechanism):
+        raise InputError(f"system = {shown(system)}: must be a System or a Mechanism")
+    most = checks.whole_number("periods", periods, least=1, most=64)
+    y = starts_of(starts, system.state, n, seed)
+    y = y[np.isfinite(y).all(axis=1)]
+    if not len(y):
+        raise InputError("starts: none is finite")
+    flow = flow_of(system, y, {}, threads=threads)
+    found: list[Orbit] = []
+    guesses = np.concatenate([y, *flow.run(y, np.array(RUN_IN)).y])
+    guesses = guesses[np.isfinite(guesses).all(axis=1) & ~flow.is_far(guesses)]
+    if flow.forced:
+        for p in range(1, most + 1):
+            found += [new for new in periodic(flow, guesses, p) if not _known(flow, found, new)]
+    else:
+        found += _rests(flow, guesses)
+        _add_cycles(flow, y, found)
+    orbits = tuple(_told(flow, orbit) for orbit in sorted(found, key=lambda o: o.periods))
+    return PeriodicOrbits(orbits).of(system)
+
+
+def _jacobians(flow: Flow, y: Floats) -> Floats:
+    """Derivatives of the rates at states (n, dim), by differences (n, dim, dim)."""
+    dim, h = y.shape[1], DIFFERENCE * flow.scale
+    shifts = np.concatenate([np.diag(h), np.diag(-h)])
+    rates = flow.rates((y[:, None] + shifts).reshape(-1, dim)).reshape(len(y), 2, dim, dim)
+    return np.swapaxes(rates[:, 0] - rates[:, 1], 1, 2) / (2.0 * h)
+
+
+def _rests(flow: Flow, y: Floats) -> list[Orbit]:
+    """Zeros of the rates by Newton's method from states (n, dim), each once."""
+    for _ in range(ITERATIONS):
+        J = _jacobians(flow, y)
+        usable = np.isfinite(J).all(axis=(1, 2))
+        y, J = y[usable], J[usable]
+        step = -np.einsum("nij,nj->ni", np.linalg.pinv(J), flow.rates(y))
+        largest = np.abs(step / flow.scale).max(axis=1, initial=0.0)
+        step *= np.minimum(1.0, 0.5 / np.maximum(largest, 1e-300))[:, None]
+        tried = y + step * SHARES[:, None, None]
+        rates = flow.rates(tried.reshape(-1, y.shape[1])).reshape(tried.shape) / flow.scale
+        best = np.argmin(np.nan_to_num((rates**2).sum(axis=2), nan=np.inf), axis=0)
+        y = tried[best, np.arange(len(y))]
+    y = y[~flow.is_far(y) & (largest < SAME)]
+    found: list[Orbit] = []
+    for place, jacobian in zip(y, _jacobians(flow, y), strict=True):
+        residual = float(np.abs(flow.rates(place[None])[0] * flow.period / flow.scale).max())
+        over = np.exp(np.linalg.eigvals(jacobian) * flow.period)
+        new = Orbit(place[None], 0.0, jacobian[None], over, residual)
+        if residual < RESIDUAL and not _known(flow, found, new):
+            found.append(new)
+    return found
+
+
+def _known(flow: Flow, found: list[Orbit], new: Orbit) -> bool:
+    return any(same(flow, orbit, new) for orbit in found)
+
+
+def _add_cycles(flow: Flow, starts: Floats, found: list[Orbit]) -> None:
+    """Cycles near motions that come back, at once or after a while."""
+    paths = flow.run(starts, np.arange(1.0, WINDOWS[-1] * DENSE + 1.0) / DENSE).y
+    for end in WINDOWS:
+        part = paths[: end * DENSE]
+        for i in np.flatnonzero(np.isfinite(part).all(axis=(0, 2)) & ~flow.is_far(part[-1])):
+            back = time_back(flow, part[:, i])
+            if back and not any(visits(flow, orbit, part[-1, i]) for orbit in found):
+                new = cycle(flow, part[-1, i], back / DENSE)
+                if new is not None and not _known(flow, found, new):
+                    found.append(new)
+
+
+def _told(flow: Flow, orbit: Orbit) -> PeriodicOrbit:
+    points = orbit.points.copy()
+    points[:, flow.angles] = flow.away(points, np.zeros_like(points))[:, flow.angles]
+    period = orbit.periods * flow.period if orbit.periods else None
+    forcing = round(orbit.periods) if flow.forced else None
+    return PeriodicOrbit(points, period, forcing, orbit.multipliers, orbit.residual)

@@ -1,0 +1,102 @@
+"""Periodic orbits, stable and unstable, against closed forms and published numbers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import fastmech as fm
+
+
+def van_der_pol(t, x, v, mu):  # type: ignore[no-untyped-def]
+    return v, mu * (1.0 - x * x) * v - x
+
+
+def rings(t, x, y):  # type: ignore[no-untyped-def]
+    r = x * x + y * y
+    g = (r - 1.0) * (4.0 - r)  # circles of radius 1, which repels, and 2, which attracts
+    return y + 0.02 * x * g, -x + 0.02 * y * g
+
+
+def linear(t, x, v):  # type: ignore[no-untyped-def]
+    return v, -2.0 * x - 0.4 * v + 3.0 * fm.cos(t)
+
+
+def duffing(t, x, v, A):  # type: ignore[no-untyped-def]
+    return v, -0.08 * v - x * x * x + A * fm.cos(t)
+
+
+def thomas(t, x, y, z, b):  # type: ignore[no-untyped-def]
+    return fm.sin(y) - b * x, fm.sin(z) - b * y, fm.sin(x) - b * z
+
+
+def test_van_der_pol_s_cycle_and_its_place_of_rest() -> None:
+    system = fm.System(van_der_pol, ["x", "v"], {"mu": 1.0})
+    rest, cycle = fm.periodic_orbits(system, {"x": (-3.0, 3.0), "v": (-3.0, 3.0)})
+    np.testing.assert_allclose(rest.points, [[0.0, 0.0]], atol=1e-12)
+    assert not rest.stable
+    assert cycle.stable
+    # Period and amplitude: Andersen and Geer, SIAM J. Appl. Math. 42 (1982), 678: 6.66328686.
+    assert cycle.period == pytest.approx(6.66328686, abs=1e-6)
+    assert np.abs(cycle.points[:, 0]).max() == pytest.approx(2.00862, abs=1e-3)
+
+
+def test_a_cycle_that_repels_is_found_where_motions_begin_near_it() -> None:
+    starts = np.array([[1.0, 0.0], [0.0, 1.01], [2.5, 0.0]])
+    found = fm.periodic_orbits(fm.System(rings, ["x", "y"], {}), starts, 3)
+    cycles = [orbit for orbit in found if orbit.period is not None]
+    radii = sorted(float(np.hypot(*orbit.points.T).mean()) for orbit in cycles)
+    np.testing.assert_allclose(radii, [1.0, 2.0], atol=1e-8)
+    for orbit in cycles:
+        r = float(np.hypot(*orbit.points.T).mean())
+        slope = 0.04 * r * r * (5.0 - 2.0 * r * r)  # of dr/dt over r at the circle
+        assert orbit.multipliers[0].real == pytest.approx(math.exp(2.0 * math.pi * slope), rel=1e-5)
+        assert orbit.stable == (r > 1.5)
+
+
+def test_a_linear_oscillator_s_response_and_multipliers() -> None:
+    system = fm.System(linear, ["x", "v"], {}, period=2.0 * math.pi)
+    (orbit,) = fm.periodic_orbits(system, {"x": (-1.0, 1.0)}, 4, periods=3)
+    response = 3.0 / (2.0 - 1.0 + 0.4j)
+    np.testing.assert_allclose(orbit.points, [[response.real, -response.imag]], atol=1e-9)
+    roots = np.exp(2.0 * math.pi * np.roots([1.0, 0.4, 2.0]))
+    np.testing.assert_allclose(np.sort_complex(orbit.multipliers), np.sort_complex(roots), atol=1e-7)
+    assert orbit.forcing_periods == 1
+
+
+def test_stable_ones_are_the_attractors() -> None:
+    system = fm.System(duffing, ["x", "v"], {"A": 0.2}, period=2.0 * math.pi)
+    region = {"x": (-1.0, 1.0), "v": (-0.5, 1.0)}
+    stable = [o for o in fm.periodic_orbits(system, region, periods=3) if o.stable]
+    attractors = fm.find_attractors(system, region, 1000)
+    assert len(stable) == len(attractors) == 5
+    for orbit in stable:
+        away = [min(np.abs(a.points - orbit.points[0]).max(axis=1)) for a in attractors]
+        assert min(away) < 1e-7
+
+
+def test_all_places_of_rest_of_thomas_s_system() -> None:
+    """They are roots of one equation: z = sin(x) / b, y = sin(z) / b, x = sin(y) / b."""
+    b = 0.1665
+    system = fm.System(thomas, ["x", "y", "z"], {"b": b})
+
+    def around(x: np.ndarray) -> np.ndarray:
+        return np.sin(np.sin(np.sin(x) / b) / b) / b - x
+
+    grid = np.linspace(-6.01, 6.02, 2_000_001)
+    change = np.flatnonzero(np.signbit(around(grid[:-1])) != np.signbit(around(grid[1:])))
+    roots = [brentq(around, grid[k], grid[k + 1], xtol=1e-14) for k in change]
+    orbits = fm.periodic_orbits(system, dict.fromkeys("xyz", (-6.0, 6.0)), 4000)
+    rests = sorted(float(orbit.points[0, 0]) for orbit in orbits if orbit.period is None)
+    np.testing.assert_allclose(rests, roots, atol=1e-9)
+
+
+def test_wrong_arguments() -> None:
+    system = fm.System(van_der_pol, ["x", "v"], {"mu": 1.0})
+    with pytest.raises(fm.InputError, match="system = 3: must be a System or a Mechanism"):
+        fm.periodic_orbits(3, {"x": 1.0})  # type: ignore[arg-type]
+    with pytest.raises(fm.InputError, match="periods = 0"):
+        fm.periodic_orbits(system, {"x": 1.0}, periods=0)

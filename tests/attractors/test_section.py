@@ -1,0 +1,68 @@
+"""Attractors by their passages of a section: Roessler's period doublings, against the flow without one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import fastmech as fm
+
+
+def roessler(t, x, y, z, c):  # type: ignore[no-untyped-def]
+    return -y - z, x + 0.2 * y, 0.2 + z * (x - c)
+
+
+def leaving(x, y, z):  # type: ignore[no-untyped-def]
+    return -x
+
+
+REGION = {"x": (-5.0, 5.0), "y": (-5.0, 5.0), "z": (0.0, 1.0)}
+
+
+def system(c: float) -> fm.System:
+    return fm.System(roessler, ["x", "y", "z"], {"c": c}, section=leaving)
+
+
+@pytest.mark.parametrize(("c", "passages"), [(2.5, 1), (3.5, 2), (4.0, 4)])
+def test_cycles_double_their_passages(c: float, passages: int) -> None:
+    """Period doublings at c = 2.83 and 3.84 (a = b = 0.2): Strogatz, *Nonlinear Dynamics and Chaos*, 12.3."""
+    (cycle,) = fm.find_attractors(system(c), REGION, 100)
+    assert cycle.kind == "periodic"
+    assert len(cycle.points) == passages
+    np.testing.assert_allclose(cycle.points[:, 0], 0.0, atol=1e-12)  # located on the section
+    assert cycle.period is not None
+    run = solve_ivp(
+        lambda t, y: roessler(t, *y, c), (0.0, cycle.period), cycle.points[0], method="DOP853",
+        rtol=1e-12, atol=1e-13,
+    )  # fmt: skip
+    np.testing.assert_allclose(run.y[:, -1], cycle.points[0], atol=1e-7)  # back after a period
+
+
+def test_chaos_is_a_band_on_the_section() -> None:
+    (chaos,) = fm.find_attractors(system(5.7), REGION, 100)
+    assert chaos.kind == "chaos"
+    assert chaos.exponent == pytest.approx(0.0714, abs=0.01)  # Sprott, *Chaos and Time-Series Analysis*, 2003
+    assert np.abs(chaos.points[:, 0]).max() < 1e-9
+
+
+def test_what_does_not_come_back_has_escaped() -> None:
+    def spiral(t, x, y):  # type: ignore[no-untyped-def]
+        r = x * x + y * y
+        return y + 0.1 * x * (1.0 - r), -x + 0.1 * y * (1.0 - r) + 0.0 * r
+
+    ring = fm.System(spiral, ["x", "y"], {}, section=lambda x, y: x)
+    found = fm.find_attractors(ring, {"x": (-2.0, 2.0), "y": (-2.0, 2.0)}, 50)
+    assert len(found) == 1
+    assert found.counts["captured"] == 50
+    with pytest.raises(fm.InputError, match="section: no start of a sample comes to it twice"):
+        fm.find_attractors(
+            fm.System(spiral, ["x", "y"], {}, section=lambda x, y: x - 7.0), {"x": (-2.0, 2.0)}, 50
+        )
+
+
+def test_sections_that_cannot_be_are_refused() -> None:
+    with pytest.raises(fm.InputError, match=r"section: takes \(x\), must take \(x, y, z\)"):
+        fm.System(roessler, ["x", "y", "z"], {"c": 1.0}, section=lambda x: x)
+    with pytest.raises(fm.InputError, match="section: not with a stopping condition"):
+        fm.System(roessler, ["x", "y", "z"], {"c": 1.0}, section=leaving, period=1.0)
