@@ -22,7 +22,7 @@ from fastmech.capture.steps import method_for
 from fastmech.ensembles.status import FAILURES, LABELS, Status
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
-from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers
+from fastmech.results import NO_CODE, Dataset, Variable, coordinate_units, flags, numbers, told
 from fastmech.scan_types.request import (
     Axis,
     Planes,
@@ -37,10 +37,10 @@ from fastmech.scan_types.request import (
     check_size,
     check_starts,
     failures,
-    told,
 )
 from fastmech.scene import STATE, Number, Scene, nearest
 from fastmech.step_limits.warning import step_warning
+from fastmech.store.objects import dataset_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -180,25 +180,9 @@ class BasinTiling(Planes):
             steps=sum(int(part.attrs["steps"]) for part in tiles),
             **{name: self._known(tiles, name) for name in _ARRAYS},
         )
-        attrs: dict[str, Any] = {
-            "axes": tuple(self.axes),
-            "t_end": found.t_end,
-            "method": certificate.method(self.request.method),
-        }
-        if isinstance(self.scene, Mechanism):
-            turning = [n for n, period in zip(certificate.names, certificate.periods, strict=True) if period]
-            attrs |= told(self.scene)
-            attrs |= {"turning_names": tuple(turning)} if turning else {}
-        attrs |= {"steps": found.steps, "refine": self.request.refine or 0}
-        attrs |= {f"fixed_{name}": value for name, value in found.fixed.items()}
-        coordinates = dict(zip(certificate.names, certificate.units, strict=True))
-        groups = {
-            "basins": Dataset(_basins(found, coordinates)),
-            "equilibria": Dataset(_wells(found, coordinates)),
-        }
-        return Dataset(
-            _variables(found, coordinates), attrs | found.counts | failures(found.status, FAILURES), groups
-        )
+        dataset = basin_dataset(found.of(self.scene))
+        more = {"method": certificate.method(self.request.method), "refine": self.request.refine or 0}
+        return Dataset(dataset.variables, {**dataset.attrs, **more}, dataset.groups)
 
     def missing(self, index: int) -> Dataset:
         """Starts that have not been computed."""
@@ -225,6 +209,21 @@ class BasinTiling(Planes):
         return Dataset(
             {name: Variable(dims[: array.ndim], array) for name, array in there.items()}, {"steps": steps}
         )
+
+
+def basin_dataset(found: BasinMap) -> Dataset:
+    """The section of a map; one labelled by attractors or codes has no wells."""
+    if not hasattr(found.tree, "equilibria"):
+        return dataset_of(found)
+    attrs: dict[str, Any] = {"axes": tuple(found.axes), "t_end": found.t_end, "steps": found.steps}
+    attrs |= told(found.system) | {f"fixed_{name}": value for name, value in found.fixed.items()}
+    if isinstance(found.system, Mechanism):
+        turning = [str(q.symbol) for q in found.system.coordinates if q.periodic]
+        attrs |= {"turning_names": tuple(turning)} if turning else {}
+    units = coordinate_units(found.system)
+    groups = {"basins": Dataset(_basins(found, units)), "equilibria": Dataset(_wells(found, units))}
+    attrs |= found.counts | failures(found.status, FAILURES)
+    return Dataset(_variables(found, units), attrs, groups)
 
 
 def _states(scene: Scene | Mechanism) -> tuple[str, ...]:

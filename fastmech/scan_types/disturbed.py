@@ -51,7 +51,17 @@ from fastmech.errors import InputError, shown
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
 from fastmech.models.mechanism import Mechanism
-from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers, parts
+from fastmech.results import (
+    NO_CODE,
+    Dataset,
+    Variable,
+    coordinate_units,
+    flags,
+    numbers,
+    parts,
+    state_units,
+    told,
+)
 from fastmech.scan_types.map_layout import about_of, one_of
 from fastmech.scan_types.request import (
     HALVING,
@@ -68,11 +78,8 @@ from fastmech.scan_types.request import (
     check_parameters,
     check_size,
     check_steps,
-    coordinate_units,
     counted_failures,
     known_parameters,
-    state_units,
-    told,
 )
 from fastmech.scene import Scene, nearest
 from fastmech.step_limits.warning import step_warning

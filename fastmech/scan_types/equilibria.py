@@ -13,9 +13,9 @@ import scipy.linalg
 from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import classify
-from fastmech.results import Dataset, Variable, flags, numbers, parts
+from fastmech.results import Dataset, Variable, coordinate_units, flags, numbers, parts, told
 from fastmech.scan_types.map_layout import HESSIAN, about_of, drawing_group, eigenvalue_variables
-from fastmech.scan_types.request import Each, Scan, Tiling, coordinate_units, told
+from fastmech.scan_types.request import Each, Scan, Tiling
 from fastmech.scene import Scene
 from fastmech.stability.classify import Verdict
 
@@ -56,87 +56,7 @@ class EquilibriaScan(Scan):
         return Each("equilibria", 1, lambda _: self._found(scene), join)
 
     def _found(self, scene: Scene | Mechanism) -> Dataset:
-        """Find and classify."""
-        equilibria: Any = find_equilibria(scene)
-        found: list[Any] = [classify(scene, equilibrium) for equilibrium in equilibria]
-        coordinates, each = coordinate_units(scene), ("equilibrium",)
-        n, of_paper = len(coordinates), isinstance(scene, Scene)
-
-        def columns(name: str, values: list[Any], units: Iterable[str], about: str) -> dict[str, Variable]:
-            entries = {str(k): unit for k, unit in enumerate(units, start=1)}
-            columns = np.array(values, dtype=np.float64).reshape(len(found), len(entries))
-            return parts(name, each, columns, entries, about)
-
-        def verdicts(values: list[str], criterion: str) -> Variable:
-            codes = [Verdict[value.upper().replace(" ", "_")] for value in values]
-            return Variable(
-                each, np.array(codes, dtype=np.int8), "1", f"verdict: {criterion}", flags(list(Verdict)[1:])
-            )
-
-        kinds = np.array([Kind[name.upper()] for name in equilibria.kind], dtype=np.int8)
-        index = [-1 if e.morse_index is None else e.morse_index for e in equilibria]
-        energy = "potential energy Pi - F x2" if of_paper else "potential energy, loads at their means"
-        swings = [_swings(scene, e, f) for e, f in zip(equilibria, found, strict=True)]
-        variables = {
-            **numbers("equilibrium", len(found), "number of the equilibrium"),
-            **{
-                name: Variable(each, equilibria.position[:, k], unit, f"{about_of(unit)} {name}")
-                for k, (name, unit) in enumerate(coordinates.items())
-            },
-            "energy": Variable(each, equilibria.energy, "J", energy),
-            "kind": Variable(
-                each, kinds, "1", "kind of equilibrium", flags(list(Kind)[: 4 if of_paper else None])
-            ),
-            "morse_index": Variable(
-                each,
-                np.array(index, dtype=np.int8),
-                "1",
-                "negative eigenvalues of the Hessian, -1: no potential",
-            ),
-            **_stiffness(scene, equilibria, found),
-            **columns(
-                "polynomial",
-                [f.polynomial[1:] for f in found],
-                [f"s-{k}" for k in range(1, 2 * n + 1)],
-                f"monic characteristic polynomial of degree {2 * n}: coefficient of power {2 * n} - {{}}",
-            ),
-            **columns(
-                "hurwitz",
-                [f.hurwitz_determinants for f in found],
-                [f"s-{k * (k + 1) // 2}" for k in range(1, 2 * n + 1)],
-                "Hurwitz determinant {}",
-            ),
-            **eigenvalue_variables(each, np.array([f.eigenvalues for f in found]).reshape(-1, 2 * n)),
-            **columns(
-                "natural_frequency",
-                [frequencies for frequencies, _ in swings],
-                ["rad/s"] * n,
-                "undamped natural frequency {}, NaN for a direction that grows",
-            ),
-            "decay_time": Variable(
-                each,
-                np.array([time for _, time in swings]),
-                "s",
-                "slowest linear mode falls to 1/e; NaN: unstable",
-            ),
-            **(
-                {"verdict_sylvester": verdicts([f.sylvester.verdict for f in found], "Lagrange-Dirichlet")}
-                if of_paper
-                else {}
-            ),
-            "verdict_hurwitz": verdicts([f.hurwitz.verdict for f in found], "Hurwitz"),
-            "verdict_eigenvalues": verdicts([f.spectrum.verdict for f in found], "eigenvalues"),
-            "verdict": verdicts([f.verdict for f in found], "joint"),
-            "explanation": Variable(
-                each, np.array([f.explanation for f in found], dtype=object), "1", "why, and what disagrees"
-            ),
-        }
-        attrs = {
-            **({"force": equilibria.force} if of_paper else told(scene)),
-            "certificate": equilibria.certificate.sentence,
-            "outcome": equilibria.certificate.outcome.name.lower(),
-        }
-        return Dataset(variables, attrs)
+        return equilibria_dataset(find_equilibria(scene))
 
     @staticmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
@@ -144,6 +64,90 @@ class EquilibriaScan(Scan):
         from fastmech.plots.equilibria import draw_equilibria
 
         return draw_equilibria(dataset, scene)
+
+
+def equilibria_dataset(equilibria: Any) -> Dataset:
+    """The section of a list of equilibria, classified."""
+    scene = equilibria.system
+    found: list[Any] = [classify(scene, equilibrium) for equilibrium in equilibria]
+    coordinates, each = coordinate_units(scene), ("equilibrium",)
+    n, of_paper = len(coordinates), isinstance(scene, Scene)
+
+    def columns(name: str, values: list[Any], units: Iterable[str], about: str) -> dict[str, Variable]:
+        entries = {str(k): unit for k, unit in enumerate(units, start=1)}
+        columns = np.array(values, dtype=np.float64).reshape(len(found), len(entries))
+        return parts(name, each, columns, entries, about)
+
+    def verdicts(values: list[str], criterion: str) -> Variable:
+        codes = [Verdict[value.upper().replace(" ", "_")] for value in values]
+        return Variable(
+            each, np.array(codes, dtype=np.int8), "1", f"verdict: {criterion}", flags(list(Verdict)[1:])
+        )
+
+    kinds = np.array([Kind[name.upper()] for name in equilibria.kind], dtype=np.int8)
+    index = [-1 if e.morse_index is None else e.morse_index for e in equilibria]
+    energy = "potential energy Pi - F x2" if of_paper else "potential energy, loads at their means"
+    swings = [_swings(scene, e, f) for e, f in zip(equilibria, found, strict=True)]
+    variables = {
+        **numbers("equilibrium", len(found), "number of the equilibrium"),
+        **{
+            name: Variable(each, equilibria.position[:, k], unit, f"{about_of(unit)} {name}")
+            for k, (name, unit) in enumerate(coordinates.items())
+        },
+        "energy": Variable(each, equilibria.energy, "J", energy),
+        "kind": Variable(
+            each, kinds, "1", "kind of equilibrium", flags(list(Kind)[: 4 if of_paper else None])
+        ),
+        "morse_index": Variable(
+            each,
+            np.array(index, dtype=np.int8),
+            "1",
+            "negative eigenvalues of the Hessian, -1: no potential",
+        ),
+        **_stiffness(scene, equilibria, found),
+        **columns(
+            "polynomial",
+            [f.polynomial[1:] for f in found],
+            [f"s-{k}" for k in range(1, 2 * n + 1)],
+            f"monic characteristic polynomial of degree {2 * n}: coefficient of power {2 * n} - {{}}",
+        ),
+        **columns(
+            "hurwitz",
+            [f.hurwitz_determinants for f in found],
+            [f"s-{k * (k + 1) // 2}" for k in range(1, 2 * n + 1)],
+            "Hurwitz determinant {}",
+        ),
+        **eigenvalue_variables(each, np.array([f.eigenvalues for f in found]).reshape(-1, 2 * n)),
+        **columns(
+            "natural_frequency",
+            [frequencies for frequencies, _ in swings],
+            ["rad/s"] * n,
+            "undamped natural frequency {}, NaN for a direction that grows",
+        ),
+        "decay_time": Variable(
+            each,
+            np.array([time for _, time in swings]),
+            "s",
+            "slowest linear mode falls to 1/e; NaN: unstable",
+        ),
+        **(
+            {"verdict_sylvester": verdicts([f.sylvester.verdict for f in found], "Lagrange-Dirichlet")}
+            if of_paper
+            else {}
+        ),
+        "verdict_hurwitz": verdicts([f.hurwitz.verdict for f in found], "Hurwitz"),
+        "verdict_eigenvalues": verdicts([f.spectrum.verdict for f in found], "eigenvalues"),
+        "verdict": verdicts([f.verdict for f in found], "joint"),
+        "explanation": Variable(
+            each, np.array([f.explanation for f in found], dtype=object), "1", "why, and what disagrees"
+        ),
+    }
+    attrs = {
+        **({"force": equilibria.force} if of_paper else told(scene)),
+        "certificate": equilibria.certificate.sentence,
+        "outcome": equilibria.certificate.outcome.name.lower(),
+    }
+    return Dataset(variables, attrs)
 
 
 def _stiffness(scene: Scene | Mechanism, equilibria: Any, found: list[Any]) -> dict[str, Variable]:

@@ -7,7 +7,7 @@ slots beyond ``count`` hold NaN in numbers and -1 in codes, which is their ``_Fi
 ``map.phi.where(map.sheet == 3).max("root")`` is one of them over the whole map. Coordinates: the axes in
 their units and ``root`` (rank by energy), so that a table of the map has a row for each slot of each point.
 What has other dimensions is a group. ``sheets``: ``sheet_branch`` says which sheets continue one another
-round a cusp, ``sheet_break`` where a sheet is torn. ``curves``, of a map over two parameters: its fold
+round a cusp, ``sheet_discontinuity`` where a sheet is torn. ``curves``, of a map over two parameters: fold
 curves, cusps and vanishing-damping curves, point after point, ``fold_curve`` and ``unreached_curve``
 numbering them; of a map over one its folds.
 
@@ -35,7 +35,7 @@ from fastmech.equilibria.certificate import Outcome
 from fastmech.equilibria.search import MOST
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
-from fastmech.results import Dataset, Variable, numbers
+from fastmech.results import Dataset, Variable, coordinate_units, numbers, told
 from fastmech.scan_types.map_layout import (
     RESTING,
     TOGETHER,
@@ -56,9 +56,7 @@ from fastmech.scan_types.request import (
     axis_variables,
     check_parameters,
     check_size,
-    coordinate_units,
     known_parameters,
-    told,
 )
 from fastmech.scene import Scene, nearest
 from fastmech.store.write import Piece, Stream

@@ -14,12 +14,13 @@ import numpy as np
 from pydantic import AfterValidator, Field
 
 from fastmech.basins.disturbed import MOST_RADIUS
-from fastmech.basins.erosion import FLAGS, MEASURES, Ends, survey_of, wells_along
-from fastmech.basins.label import How, label_starts
+from fastmech.basins.erosion import FLAGS, MEASURES, Ends, ErosionProfile, survey_of, wells_along
+from fastmech.basins.label import How, label_states
 from fastmech.capture.select import require_damper
 from fastmech.disturbance.motion import require_constant_force
 from fastmech.errors import InputError, shown
-from fastmech.results import Dataset, Variable
+from fastmech.results import Dataset, Variable, coordinate_units, told
+from fastmech.scan_types.map_layout import about_of
 from fastmech.scan_types.request import (
     Axis,
     RunContext,
@@ -28,13 +29,14 @@ from fastmech.scan_types.request import (
     Tiles,
     Tiling,
     arrays,
+    axis_variables,
     check_duration,
     check_parameters,
     check_rising,
     check_size,
     check_starts,
 )
-from fastmech.scene import STATE, Scene, nearest
+from fastmech.scene import PARAMETERS, STATE, Scene, nearest
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,8 +45,6 @@ if TYPE_CHECKING:
 MOST_POINTS = 1_000_000
 
 _ABOUT = {
-    "phi": ("rad", "angle phi of the well"),
-    "theta": ("rad", "angle theta of the well"),
     "stability": ("1", "basin stability: share of random starts in the window that end in the well"),
     "stability_at_most": ("1", "basin stability if all random starts without a label ended there"),
     "lower": ("1", "lower end of its 95 % Wilson interval, none of those ending there"),
@@ -110,8 +110,8 @@ class Erosion(Scan):
         require_constant_force(scene)
         require_damper(scene)
         name, axis = next(iter(self.along.items()))
-        if name not in Scene.model_fields or name == "alpha":
-            allowed = [field for field in Scene.model_fields if field != "alpha"]
+        if name not in PARAMETERS or name == "alpha":
+            allowed = [field for field in PARAMETERS if field != "alpha"]
             raise InputError(f"along.{name}: unknown parameter; {nearest(name, allowed)}")
         check_rising(f"along.{name}", axis)
         check_parameters(scene, self.along, "along")
@@ -132,6 +132,28 @@ class Erosion(Scan):
         from fastmech.plots.erosion import draw_erosion
 
         return draw_erosion(dataset, scene)
+
+
+def profile_dataset(found: ErosionProfile) -> Dataset:
+    """The section of a profile."""
+    name, units = found.parameter, coordinate_units(found.system)
+    about = {key: (unit, f"{about_of(unit)} {key} of the well") for key, unit in units.items()} | _ABOUT
+    arrays = found.position | {key: getattr(found, key) for key in MEASURES}
+    return Dataset(
+        {
+            **axis_variables(found.system, {name: found.values}),
+            "sheet": Variable(
+                ("well",), found.sheet.astype(np.int32), "1", "identity of the well in the atlas"
+            ),
+            **{
+                f"well_{key}": Variable(
+                    (name, "well"), data.astype(np.bool_) if key in FLAGS else data, *about[key]
+                )
+                for key, data in arrays.items()
+            },
+        },
+        {**told(found.system), "along": name},
+    )
 
 
 class ErosionTiling(Tiling):
@@ -155,14 +177,14 @@ class ErosionTiling(Tiling):
 
         def ends(scene: Scene, starts: np.ndarray) -> Ends:
             context.check()
-            return label_starts(scene, starts, self.request.t_end, How(threads=context.threads))
+            return label_states(scene, starts, self.request.t_end, How(threads=context.threads))
 
         survey = survey_of(
             self.window,
             self.scene,
             most_shock=self.request.most_shock,
             t_end=self.request.t_end,
-            labels_of=ends,
+            label_starts=ends,
             n=self.request.starts,
             directions=self.request.directions,
             seed=self.request.seed,
@@ -175,23 +197,16 @@ class ErosionTiling(Tiling):
         """Join the wells and values."""
         name = self.request.parameter
         tiles = [tile(index) for index in range(self.count)]
-        unit, about = self.scene.described()[name][1:]
-        variables = {
-            name: Variable((name,), self.values, unit, about),
-            "sheet": Variable(
-                ("well",), self.sheets.astype(np.int32), "1", "identity of the well in the atlas"
-            ),
-        }
-        for key in (*STATE[:2], *MEASURES):
-            array = np.array([part[key].data for part in tiles]).reshape(self.values.size, -1)
-            variables[f"well_{key}"] = Variable(
-                (name, "well"), array.astype(np.bool_) if key in FLAGS else array, *_ABOUT[key]
-            )
-        attrs: dict[str, Any] = {"along": name, "axes": tuple(self.window), "t_end": self.request.t_end}
+        shape = (self.values.size, -1)
+        arrays = {key: np.array([part[key].data for part in tiles]).reshape(shape) for key in tiles[0]}
+        position = {key: arrays.pop(key) for key in STATE[:2]}
+        found = ErosionProfile(name, self.values, self.sheets, position, **arrays).of(self.scene)
+        attrs: dict[str, Any] = {"axes": tuple(self.window), "t_end": self.request.t_end}
         attrs |= {"starts": self.request.starts, "most_shock": self.request.most_shock}
         for axis, line in self.window.items():
             attrs[f"window_{axis}"] = np.array([line[0], line[-1]])
-        return Dataset(variables, attrs)
+        dataset = profile_dataset(found)
+        return Dataset(dataset.variables, {**dataset.attrs, **attrs})
 
     def missing(self, index: int) -> Dataset:
         """A well that has not been measured."""

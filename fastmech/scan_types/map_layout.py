@@ -10,16 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.atlas.damping import trace_unreached
-from fastmech.atlas.folds import find_folds, trace_folds
+from fastmech.atlas.damping import UndampedSet, trace_undamped
+from fastmech.atlas.folds import FoldPoints, FoldSet, find_folds, trace_folds
 from fastmech.atlas.map import Coincidence, Slab
 from fastmech.atlas.resting_map import RestingMap
 from fastmech.equilibria.certificate import Outcome
 from fastmech.mechanism.impulse import POINTS
 from fastmech.models.drawing import Element, drawing
 from fastmech.models.mechanism import Mechanism
-from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers, parts
-from fastmech.scan_types.request import coordinate_units
+from fastmech.results import NO_CODE, Dataset, Variable, coordinate_units, flags, numbers, parts, told
+from fastmech.scan_types.request import axis_variables
 from fastmech.scene import Scene
 from fastmech.stability.classify import Verdict
 from fastmech.stability.linearize import SIN_PHI, SIN_PSI, UNLOADED
@@ -178,9 +178,22 @@ TOGETHER = {
 }
 
 
+def map_dataset(found: Any) -> Dataset:
+    """The section of a map of a scene's or a mechanism's equilibria."""
+    system, grid = found.system, tuple(found.axes)
+    attrs = told(system) | {"axes": grid}
+    slots = found.energy.shape[-1]
+    own = axis_variables(system, found.axes) | numbers("root", slots, "rank of the equilibrium by energy")
+    if isinstance(found, RestingMap):
+        return Dataset(own | resting_variables(system, grid, found), attrs)
+    own |= point_variables(grid, found) | sheet_variables(grid, found.sheet)
+    table = sheet_table(found.sheet_morse_index, found.sheet_branch, found.sheet_discontinuities)
+    return Dataset(own, attrs, {"sheets": Dataset(table)})
+
+
 def sheet_variables(grid: tuple[str, ...], sheet: NDArray[np.int32]) -> dict[str, Variable]:
     """The sheet of every slot."""
-    about = "equal numbers at neighbours: one equilibrium, continued, but for sheet_break"
+    about = "equal numbers at neighbours: one equilibrium, continued, but for sheet_discontinuity"
     return {"sheet": Variable((*grid, "root"), sheet, "1", about, NO_CODE)}
 
 
@@ -201,7 +214,7 @@ def sheet_table(
         "sheet_branch": Variable(
             each, branch, "1", "sheets with equal numbers continue one another round a cusp or across a fold"
         ),
-        "sheet_break": Variable(("break", "break_entry"), breaks, "1", torn),
+        "sheet_discontinuity": Variable(("break", "break_entry"), breaks, "1", torn),
     }
 
 
@@ -248,19 +261,20 @@ def curve_variables(scene: Scene, axes: dict[str, Floats], threads: int | None) 
     if "alpha" in axes or not all(d.size and ((d > 0.0).all() or (d < 0.0).all()) for d in steps):
         return {}
     if len(axes) == 1:
-        return _fold_points(scene, axes)
+        return dict(fold_points(find_folds(scene, *next(iter(axes.items())))).variables)
     if len(axes) == 2:
         x, y = axes.items()
-        return _fold_curves(scene, x, y) | _unreached_curves(scene, x, y, threads)
+        thin = [(n, np.linspace(v[0], v[-1], min(v.size, SEED_VALUES))) for n, v in (x, y)]
+        undamped = undamped_curves(trace_undamped(scene, *thin, threads=threads))
+        return {**fold_curves(trace_folds(scene, x, y)).variables, **undamped.variables}
     return {}
 
 
-def _fold_points(scene: Scene, axes: dict[str, Floats]) -> dict[str, Variable]:
-    ((name, values),) = axes.items()
-    unit = scene.described()[name][1]
-    found = find_folds(scene, name, values)
-    each = ("fold",)
-    return {
+def fold_points(found: FoldPoints) -> Dataset:
+    """What files hold of folds over a parameter."""
+    name, each = found.parameter, ("fold",)
+    unit = found.system.described()[name][1]
+    variables = {
         f"fold_{name}": _numbers(each, [f.value for f in found], unit, f"{name} at the fold"),
         "fold_phi": _numbers(each, [f.phi for f in found], "rad", "phi where two equilibria merge"),
         "fold_theta": _numbers(each, [f.theta for f in found], "rad", "theta where two equilibria merge"),
@@ -270,16 +284,17 @@ def _fold_points(scene: Scene, axes: dict[str, Floats]) -> dict[str, Variable]:
         "fold_kind": _codes(each, [Kind[f.kind.upper()] for f in found], "kind of the fold", Kind),
         "fold_proof": _proof(found.reason),
     }
+    return Dataset(variables, {"axes": (name,)})
 
 
-def _fold_curves(scene: Scene, x: tuple[str, Floats], y: tuple[str, Floats]) -> dict[str, Variable]:
-    found = trace_folds(scene, x, y)
-    curves = found.curves
-    units = [scene.described()[name][1] for name, _ in (x, y)]
+def fold_curves(found: FoldSet) -> Dataset:
+    """What files hold of fold curves over two parameters."""
+    x, y, curves = *found.names, found.curves
+    units = [found.system.described()[name][1] for name in (x, y)]
     each, cusp = ("fold_point",), ("cusp",)
     variables = {
-        f"fold_{x[0]}": _joined(each, [c.x for c in curves], units[0], f"{x[0]} along the fold curves"),
-        f"fold_{y[0]}": _joined(each, [c.y for c in curves], units[1], f"{y[0]} along the fold curves"),
+        f"fold_{x}": _joined(each, [c.x for c in curves], units[0], f"{x} along the fold curves"),
+        f"fold_{y}": _joined(each, [c.y for c in curves], units[1], f"{y} along the fold curves"),
         "fold_phi": _joined(each, [c.phi for c in curves], "rad", "phi where two equilibria merge"),
         "fold_theta": _joined(each, [c.theta for c in curves], "rad", "theta where two equilibria merge"),
         "fold_curve": _numbering(each, [c.x.size for c in curves], "number of the fold curve"),
@@ -293,33 +308,28 @@ def _fold_curves(scene: Scene, x: tuple[str, Floats], y: tuple[str, Floats]) -> 
             each, [k for c in curves for k in [Kind[c.kind.upper()]] * c.x.size], "kind of the curve", Kind
         ),
         "fold_proof": _proof(found.reason),
-        f"cusp_{x[0]}": _numbers(cusp, [c.x for c in found.cusps], units[0], f"{x[0]} at the cusp"),
-        f"cusp_{y[0]}": _numbers(cusp, [c.y for c in found.cusps], units[1], f"{y[0]} at the cusp"),
+        f"cusp_{x}": _numbers(cusp, [c.x for c in found.cusps], units[0], f"{x} at the cusp"),
+        f"cusp_{y}": _numbers(cusp, [c.y for c in found.cusps], units[1], f"{y} at the cusp"),
         "cusp_phi": _numbers(cusp, [c.phi for c in found.cusps], "rad", "phi where three equilibria merge"),
         "cusp_theta": _numbers(cusp, [c.theta for c in found.cusps], "rad", "theta where three merge"),
     }
     about = "edges between whose ends the count changes, those that no fold curve crosses, curves cut short"
     counts = np.array([found.crossings, found.unexplained, found.unfinished])
     variables["fold_crossings"] = Variable((TALLY,), counts, "1", about)
-    return variables
+    return Dataset(variables, {"axes": found.names})
 
 
-def _unreached_curves(
-    scene: Scene, x: tuple[str, Floats], y: tuple[str, Floats], threads: int | None
-) -> dict[str, Variable]:
-    thin = [
-        (name, np.linspace(values[0], values[-1], min(values.size, SEED_VALUES))) for name, values in (x, y)
-    ]
-    found = trace_unreached(scene, *thin, threads=threads)
-    curves, sheets = found.curves, found.everywhere
+def undamped_curves(found: UndampedSet) -> Dataset:
+    """What files hold of where damping misses a mode, over two parameters."""
+    x, y, curves, sheets = *found.names, found.curves, found.everywhere
     one = ("unreached_sheet",)
-    told = "of one of the points of a sheet on which the damper misses a mode everywhere"
-    units = [scene.described()[name][1] for name, _ in (x, y)]
+    about = "of one of the points of a sheet on which the damper misses a mode everywhere"
+    units = [found.system.described()[name][1] for name in (x, y)]
     each = ("unreached_point",)
     what = "where the damper misses a mode"
-    return {
-        f"unreached_{x[0]}": _joined(each, [c.x for c in curves], units[0], f"{x[0]} {what}"),
-        f"unreached_{y[0]}": _joined(each, [c.y for c in curves], units[1], f"{y[0]} {what}"),
+    variables = {
+        f"unreached_{x}": _joined(each, [c.x for c in curves], units[0], f"{x} {what}"),
+        f"unreached_{y}": _joined(each, [c.y for c in curves], units[1], f"{y} {what}"),
         "unreached_phi": _joined(each, [c.phi for c in curves], "rad", f"phi {what}"),
         "unreached_theta": _joined(each, [c.theta for c in curves], "rad", f"theta {what}"),
         "unreached_curve": _numbering(each, [c.x.size for c in curves], "number of the curve"),
@@ -329,10 +339,10 @@ def _unreached_curves(
             "what vanishes there",
             Vanishing,
         ),
-        f"unreached_sheet_{x[0]}": _numbers(one, [s.x for s in sheets], units[0], f"{x[0]} {told}"),
-        f"unreached_sheet_{y[0]}": _numbers(one, [s.y for s in sheets], units[1], f"{y[0]} {told}"),
-        "unreached_sheet_phi": _numbers(one, [s.phi for s in sheets], "rad", f"phi {told}"),
-        "unreached_sheet_theta": _numbers(one, [s.theta for s in sheets], "rad", f"theta {told}"),
+        f"unreached_sheet_{x}": _numbers(one, [s.x for s in sheets], units[0], f"{x} {about}"),
+        f"unreached_sheet_{y}": _numbers(one, [s.y for s in sheets], units[1], f"{y} {about}"),
+        "unreached_sheet_phi": _numbers(one, [s.phi for s in sheets], "rad", f"phi {about}"),
+        "unreached_sheet_theta": _numbers(one, [s.theta for s in sheets], "rad", f"theta {about}"),
         "unreached_sheet_share": _numbers(
             one, [s.share for s in sheets], "1", "share of the map's points at which that sheet has it"
         ),
@@ -346,6 +356,7 @@ def _unreached_curves(
             "edges of the seeding grid that such a curve crosses, those without a curve, curves cut short",
         ),
     }
+    return Dataset(variables, {"axes": found.names})
 
 
 def _proof(reason: str) -> Variable:

@@ -19,7 +19,7 @@ from fastmech.mechanism.coefficients import force
 from fastmech.mechanism.geometry import constraints, positions, reactions
 from fastmech.mechanism.lagrange import momenta
 from fastmech.models.mechanism import Mechanism
-from fastmech.results import Dataset, Variable, parts
+from fastmech.results import Dataset, Variable, parts, state_units, told
 from fastmech.scan_types.request import (
     HALVING,
     Each,
@@ -28,8 +28,6 @@ from fastmech.scan_types.request import (
     Tiling,
     check_steps,
     failures,
-    state_units,
-    told,
 )
 from fastmech.scene import Scene, nearest
 from fastmech.step_limits.warning import step_warning

@@ -15,19 +15,20 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from fastmech.arrays import Floats
-from fastmech.basins.ladder import SUBSTEPS
+from fastmech.basins.convergence import SUBSTEPS
 from fastmech.basins.measures.norm import check_angles
 from fastmech.basins.runs import rounds_until
 from fastmech.capture.steps import fastest_followed, shortest_step
 from fastmech.ensembles import checks
 from fastmech.ensembles.lanes import MOST_STEPS
 from fastmech.ensembles.status import failure_counts, failure_line
+from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.integrators.methods import find_method
 from fastmech.mechanism.coefficients import reduce
 from fastmech.models.mechanism import MOST_COORDINATES, Mechanism
-from fastmech.results import ANGLE_UNITS, Dataset, Variable, check_name, scene_parameters
-from fastmech.scene import STATE, Number, Scene, explain, nearest, parse_toml, read_text
+from fastmech.results import Dataset, Variable, check_name, scene_parameters
+from fastmech.scene import PARAMETERS, STATE, Number, Scene, explain, nearest, parse_toml, read_text
 from fastmech.store.write import Stream, in_memory
 
 if TYPE_CHECKING:
@@ -105,31 +106,10 @@ def arrays(axes: Mapping[str, Axis]) -> dict[str, Floats]:
     return {name: axis.array for name, axis in axes.items()}
 
 
-def axis_variables(system: Scene | Mechanism, axes: Mapping[str, Floats]) -> dict[str, Variable]:
+def axis_variables(system: Scene | Mechanism | System, axes: Mapping[str, Floats]) -> dict[str, Variable]:
     """Axes over parameters as the coordinates of a section."""
     described = system.described()
     return {name: Variable((name,), values, *described[name][1:]) for name, values in axes.items()}
-
-
-def coordinate_units(system: Scene | Mechanism) -> dict[str, str]:
-    """Names of coordinates with their units."""
-    if isinstance(system, Scene):
-        return dict(ANGLE_UNITS)
-    names = system.state[: len(system.coordinates)]
-    return {name: "m" if name in system.lengths else "rad" for name in names}
-
-
-def state_units(system: Scene | Mechanism) -> dict[str, str]:
-    """Names of coordinates, then of rates, with their units."""
-    units = coordinate_units(system)
-    return units | {f"{name}_dot": f"{unit}/s" for name, unit in units.items()}
-
-
-def told(system: Scene | Mechanism) -> dict[str, Any]:
-    """What a section says of a mechanism that is not the paper's."""
-    if isinstance(system, Scene):
-        return {}
-    return {"mechanism": system.name, "coordinate_names": tuple(coordinate_units(system))}
 
 
 def known_parameters(system: Scene | Mechanism, axes: Mapping[str, Axis]) -> None:
@@ -378,6 +358,7 @@ class Scan(BaseModel, ABC):
     kind: ClassVar[str]
 
     of_mechanisms: ClassVar[bool] = False  #: whether it works for any mechanism, not for the paper's alone
+    of_systems: ClassVar[bool] = False  #: whether it works for systems of one's own
     taken: ClassVar[frozenset[str]] = frozenset()  #: names of results that no coordinate may have
 
     scene: dict[str, Any] = Field(default={}, description="parameters that differ from the file's scene")
@@ -439,7 +420,7 @@ class Request:
     """A request file: title, scene and scans by name, with the text it was read from."""
 
     title: str
-    scene: Any  #: a ``Scene``, or a ``Mechanism`` for scans that are ``of_mechanisms``
+    scene: Any  #: a ``Scene``; a ``Mechanism`` or ``System`` for scans that are of those
     scans: Mapping[str, Scan]
     text: str
 
@@ -463,11 +444,11 @@ def read_request(
     path: str | Path,
     kinds: Mapping[str, type[Scan]],
     text: str | None = None,
-    mechanism: Mechanism | None = None,
+    mechanism: Mechanism | System | None = None,
 ) -> Request:
     """Read and validate a request file, or the text that is given as its own.
 
-    ``mechanism`` is one of the user's own, which the file does not name: nothing in a file is executed.
+    ``mechanism`` is one of the user's own, or a system: the file does not name it, nothing in it is executed.
 
     Raises:
         InputError: the file cannot be read, or anything in it is unknown, of a wrong type or out of range.
@@ -476,7 +457,10 @@ def read_request(
 
 
 def request_of_text(
-    text: str, path: str | Path, kinds: Mapping[str, type[Scan]], mechanism: Mechanism | None = None
+    text: str,
+    path: str | Path,
+    kinds: Mapping[str, type[Scan]],
+    mechanism: Mechanism | System | None = None,
 ) -> Request:
     """Validate the text of a request file; ``path`` is for messages and the default title.
 
@@ -484,14 +468,10 @@ def request_of_text(
         InputError: it is no TOML, or anything in it is unknown, of a wrong type or out of range.
     """
     table = parse_toml(text, path)
-    allowed = ["title", "mechanism", "scene", "scan"]
-    for name in table:
-        if name not in allowed:
-            raise InputError(f"{shown_name(name)}: unknown name; {nearest(name, allowed)}")
     title = table.get("title", Path(path).stem)
     if not isinstance(title, str) or "\0" in title:
         raise InputError(f"title = {shown(title)}: must be a text without null characters")
-    scene = _scene(table, mechanism)
+    scene = device_of(table, mechanism)
     scans = _table(table.get("scan", {}), "scan")
     if not scans:
         raise InputError(
@@ -499,19 +479,18 @@ def request_of_text(
         )
     request = Request(title, scene, {name: _scan(name, scans[name], kinds) for name in scans}, text)
     for name, scan in request.scans.items():
-        if isinstance(scene, Mechanism):
-            if not scan.of_mechanisms:
-                usable = ", ".join(kind for kind, made in kinds.items() if made.of_mechanisms)
-                raise InputError(
-                    f"scan.{name}.kind = {scan.kind}: is for the paper's mechanism; of others: {usable}"
-                )
+        what = "systems" if isinstance(scene, System) else "mechanisms"
+        if not isinstance(scene, Scene):
+            if not getattr(scan, f"of_{what}"):
+                usable = ", ".join(kind for kind, made in kinds.items() if getattr(made, f"of_{what}"))
+                raise InputError(f"scan.{name}.kind = {scan.kind}: is not for {what}; these are: {usable}")
             for taken in scan.taken & {*scene.state}:
                 raise InputError(
                     f"scan.{name}.mechanism: {taken} is the name of a coordinate and of a variable of"
                     " the result"
                 )
             if name in scene.parameters:
-                raise InputError(f"scan.{name}: is the name of a parameter of the mechanism; choose another")
+                raise InputError(f"scan.{name}: is the name of a parameter; choose another")
         try:
             scan.check(request.scene_of(name))
         except InputError as error:
@@ -519,9 +498,28 @@ def request_of_text(
     return request
 
 
-def _scene(table: Mapping[str, Any], mechanism: Mechanism | None) -> Any:
-    """The scene, or the mechanism with the file's parameters."""
-    values, name = _table(table.get("scene", {}), "scene"), table.get("mechanism")
+#: Keys of a parameter with a tolerance.
+TOLERANCE = {"value", "plus_minus"}
+
+
+def tolerances_of(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Half widths of parameters that a file gives as ``{ value = 900.0, plus_minus = 20.0 }``."""
+    entries = _table(table.get("scene", {}), "scene").items()
+    return {name: v["plus_minus"] for name, v in entries if isinstance(v, dict) and {*v} == TOLERANCE}
+
+
+def device_of(table: Mapping[str, Any], mechanism: Mechanism | System | None = None) -> Any:
+    """The scene, or the mechanism or system with the file's parameters.
+
+    Raises:
+        InputError: a name or a value is wrong.
+    """
+    allowed = ["title", "mechanism", "scene", "scan"]
+    for key in table:
+        if key not in allowed:
+            raise InputError(f"{shown_name(key)}: unknown name; {nearest(key, allowed)}")
+    entries, name = _table(table.get("scene", {}), "scene"), table.get("mechanism")
+    values = {k: v["value"] if isinstance(v, dict) and {*v} == TOLERANCE else v for k, v in entries.items()}
     if name is None and mechanism is None:
         return Scene(**values)
     if name is not None:
@@ -554,7 +552,7 @@ def _scan(name: str, value: Any, kinds: Mapping[str, type[Scan]]) -> Scan:
     check_name(name, where)
     if len(name) > LONGEST_NAME:
         raise InputError(f"{where}: has {len(name):,} characters, at most {LONGEST_NAME} are allowed")
-    if name in Scene.model_fields:
+    if name in PARAMETERS:
         raise InputError(f"{where}: is the name of a parameter of the scene; choose another")
     entry = dict(_table(value, where))
     kind = entry.pop("kind", None)

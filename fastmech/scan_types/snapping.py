@@ -146,10 +146,11 @@ class SnappingTiling(Planes):
         joined = {name: self.joined(tiles, name) for name in tiles[0]}
         free, equilibria, start = force_free(self.scene, None)
         ends = (joined[name] for name in ("label", "turns", "time", "status"))
-        found = SnappingMap(self.forces, self.rates, equilibria, start, *ends)
+        found = SnappingMap(self.forces, self.rates, equilibria, start, *ends).of(self.scene)
         side = 0.0 if self.forces[0] > 0.0 else np.pi
         limit = np.cos(side) * shock_limit(free, equilibria[start], "M2", side).found.impulse
-        variables = _ends(found)
+        dataset = snapping_dataset(found)
+        variables = dict(dataset.variables)
         variables["critical_F0"] = Variable(
             ("alpha",),
             joined["critical"],
@@ -160,12 +161,10 @@ class SnappingTiling(Planes):
             (), np.array(limit), "N s", "limit of the critical F0/alpha for fast decay, NaN: none was found"
         )
         attrs = {
-            "start": start,
             "tolerance": self.request.tolerance,
             "method": method_for(free, self.request.method),
         }
-        groups = {"windows": Dataset(_windows(found)), "equilibria": Dataset(_equilibria(found))}
-        return Dataset(variables, attrs | found.counts | failures(found.status, FAILURES), groups)
+        return Dataset(variables, {**dataset.attrs, **attrs}, dataset.groups)
 
     def missing(self, index: int) -> Dataset:
         """Rates that have not been computed."""
@@ -173,6 +172,13 @@ class SnappingTiling(Planes):
         nothing, undecided = np.full(shape, np.nan), np.full(shape, Status.UNDECIDED, dtype=np.int8)
         turns = np.zeros((*shape, 2), dtype=np.int64)
         return _tile(np.full(shape, -1), turns, nothing, undecided, nothing[:, 0])
+
+
+def snapping_dataset(found: SnappingMap) -> Dataset:
+    """The section of a map, without critical forces."""
+    groups = {"windows": Dataset(_windows(found)), "equilibria": Dataset(_equilibria(found))}
+    attrs = {"start": found.start, **found.counts, **failures(found.status, FAILURES)}
+    return Dataset(_ends(found), attrs, groups)
 
 
 def _tile(*arrays: NDArray[Any]) -> Dataset:

@@ -33,7 +33,7 @@ def test_layout(tmp_path: Path) -> None:
     assert section["label"].dims == ("theta", "phi")
     states = np.stack(np.meshgrid(section["phi"].data, section["theta"].data), -1)
     starts = np.concatenate([states, np.broadcast_to([0.0, 1.0], states.shape)], axis=-1)
-    expected = fm.labels_of(CONSTANT, starts.reshape(-1, 4))
+    expected = fm.label_starts(CONSTANT, starts.reshape(-1, 4))
     np.testing.assert_array_equal(section["turns_phi"].data.ravel(), expected.turns[:, 0])
     np.testing.assert_array_equal(section["capture_time"].data.ravel(), expected.time)
     assert set(np.ravel(decoded(section["status"]))) == {"captured"}
@@ -112,7 +112,7 @@ def test_pictures(scene: fm.Scene, fields: dict[str, object], names: set[str], t
             "theta": {"start": 2.0, "stop": 2.2, "num": 5},
         }
     )
-    figures = Basins.draw(stored(Basins(axes=axes, **fields), scene, tmp_path), scene.model_dump())
+    figures = Basins.draw(stored(Basins(axes=axes, **fields), scene, tmp_path), scene.parameters)
     assert set(figures) == names
     for figure in figures.values():
         assert_legible(figure)

@@ -72,7 +72,7 @@ class Run:
     section: Dataset
 
     def __post_init__(self) -> None:
-        self.params = self.scene.model_dump()
+        self.params = self.scene.parameters
         self.norms = [Norm(self.params, q) for q in self.angles]
         self.centers = np.concatenate([self.angles, np.zeros_like(self.angles)], axis=1)
         self.starts = together(self.section, "start")
@@ -203,7 +203,7 @@ def test_error_estimate(run: Run) -> None:
 
 
 def test_outcomes(run: Run) -> None:
-    """What is proved is where SciPy comes to rest; or, where that takes minutes, what ``labels_of`` says."""
+    """What is proved is where SciPy comes to rest; or, where that takes minutes, what labels say."""
     end, turns = run.section["end_equilibrium"].data, together(run.section, "turns")
     names = np.array(decoded(run.section["outcome"]))
     known = (names == "returned") | (names == "elsewhere")
@@ -218,7 +218,7 @@ def test_outcomes(run: Run) -> None:
             assert (end[i, k], *turns[i, k]) == place
             assert names[i, k] == run.outcome(i, place)
     else:
-        labels = fm.labels_of(run.scene, run.starts.reshape(-1, 4), run.scan.t_end, dt=0.07, method="rk4")
+        labels = fm.label_starts(run.scene, run.starts.reshape(-1, 4), run.scan.t_end, dt=0.07, method="rk4")
         np.testing.assert_array_equal(labels.well.reshape(end.shape), end)
         np.testing.assert_array_equal(labels.turns.reshape(turns.shape), turns)
     attrs = run.section["outcome"].attrs

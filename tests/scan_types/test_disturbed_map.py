@@ -135,7 +135,7 @@ def test_failures_and_refusals_are_no_results() -> None:
     assert refused.attrs["refused"] == np.isfinite(refused["phi"].data).sum()
     assert str(refused.attrs["refused_first"]).startswith("return_radius = 3 rad: must not exceed")
     for dataset in (lost, refused):
-        figures = Disturbed.draw(dataset, scene.model_dump())
+        figures = Disturbed.draw(dataset, scene.parameters)
         for figure in figures.values():
             assert_legible(figure)
         texts = [text.get_text() for text in figures["excursions"].legends[0].get_texts()]
@@ -145,7 +145,7 @@ def test_failures_and_refusals_are_no_results() -> None:
 @pytest.mark.parametrize("axes", [AXES, {"c2": AXES["c2"]}, AXES | {"c1": AXES["c2"] | {"num": 1}}])
 def test_pictures(axes: dict[str, Any]) -> None:
     found = Disturbed(axes=axes, **SMALL | {"trajectories": 12}).run(BISTABLE, RunContext(threads=1))
-    figures = Disturbed.draw(found, BISTABLE.model_dump())
+    figures = Disturbed.draw(found, BISTABLE.parameters)
     assert set(figures) == {"share_returned", "time_to_return", "excursions"}
     for figure in figures.values():
         assert_legible(figure)

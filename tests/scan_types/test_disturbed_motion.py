@@ -25,7 +25,7 @@ from fastmech.scan_types.request import HALVING
 from fastmech.scene import Scene
 
 SCENE, ANGLES = deepest_first("bistable")
-PARAMS = SCENE.model_dump()
+PARAMS = SCENE.parameters
 DISTURBANCE = np.array([0.11, -0.07, 0.3, -0.5])
 CENTERS = np.concatenate([ANGLES, np.zeros_like(ANGLES)], axis=1)
 TIMES = np.linspace(0.0, 1.5, 7)

@@ -49,7 +49,7 @@ class Case:
     section: Dataset
 
     def __post_init__(self) -> None:
-        self.params = self.scene.model_dump()
+        self.params = self.scene.parameters
         self.hessians = array([oracle().hessian(self.params, q, self.scene.F0) for q in self.angles])
         self.metrics = array([oracle().metric(self.params, q) for q in self.angles])
         self.polynomials = [
@@ -203,7 +203,7 @@ def test_a_decaying_force_is_gone_at_rest(tmp_path: Path) -> None:
     assert section.attrs["force"] == 0.0
     phi, theta = section["phi"].data, section["theta"].data
     assert (phi[0], theta[0]) == pytest.approx((np.pi / 2, 0.0), abs=1e-12)
-    params = Scene().model_dump()
+    params = Scene().parameters
     energies = array([oracle().potential(params, q, 0.0) for q in zip(phi, theta, strict=True)])
     close(section["energy"].data, energies)
 

@@ -134,7 +134,7 @@ def test_pictures_read_a_part_of_a_large_map(tmp_path: Path, monkeypatch: pytest
     monkeypatch.setattr("fastmech.plots.map_view.MOST_DRAWN", 10)
     monkeypatch.setattr("fastmech.store.decode.PIECE_BYTES", 4000)
     with open_results(path) as results:
-        drawn = EquilibriumMap.read(results["map"], SCENE.model_dump())
+        drawn = EquilibriumMap.read(results["map"], SCENE.parameters)
     assert drawn.sizes["F0"] <= 10
     assert drawn.sizes["c2"] <= 10
     for name in drawn:
@@ -145,7 +145,7 @@ def test_pictures_read_a_part_of_a_large_map(tmp_path: Path, monkeypatch: pytest
     assert {"phi", "sheet", "count"} <= set(drawn)
     assert {"fold_F0", "unreached_c2"} <= set(drawn.groups["curves"])
     assert not {"hessian_phi_phi", "eigenvalue_re_1", "radius"} & set(drawn)
-    figures = EquilibriumMap.draw(drawn, SCENE.model_dump())
+    figures = EquilibriumMap.draw(drawn, SCENE.parameters)
     assert figures["count"].get_suptitle().endswith("; 1 in 4 values of F0; 1 in 3 values of c2")
 
 
@@ -157,11 +157,11 @@ def test_of_a_third_axis_only_the_drawn_plane_is_read(tmp_path: Path) -> None:
     attrs = {**provenance(1), "title": "map"}
     write_results(path, scene_parameters={}, sections={"map": whole}, attrs=attrs)
     with open_results(path) as results:
-        drawn = EquilibriumMap.read(results["map"], SCENE.model_dump())
+        drawn = EquilibriumMap.read(results["map"], SCENE.parameters)
     # 290 N/m is the nearest of 280, 290, 300, 310 to the scene's 294.9.
     assert list(drawn["c1"].data) == [290.0]
     np.testing.assert_array_equal(drawn["phi"].data, whole["phi"].data[:, :, 1:2])
-    assert "c1 = 290 N/m" in EquilibriumMap.draw(drawn, SCENE.model_dump())["count"].get_suptitle()
+    assert "c1 = 290 N/m" in EquilibriumMap.draw(drawn, SCENE.parameters)["count"].get_suptitle()
 
 
 def test_chosen_variables_only() -> None:

@@ -83,7 +83,7 @@ def test_a_tile_is_left_between_integrations() -> None:
 
 
 def test_picture(section: Dataset) -> None:
-    figures = Erosion.draw(section, BISTABLE.model_dump())
+    figures = Erosion.draw(section, BISTABLE.parameters)
     assert set(figures) == {"profile"}
     assert_legible(figures["profile"])
     labels = [text.get_text() for text in figures["profile"].legends[0].get_texts()]
@@ -95,7 +95,7 @@ def test_picture_marks_radii_that_undecided_starts_limit(section: Dataset) -> No
     """Of this short section one start of the map is undecided, next to the shallow well."""
 
     def drawn(shown: Dataset) -> tuple[bool, list[float]]:
-        figure = Erosion.draw(shown, BISTABLE.model_dump())["profile"]
+        figure = Erosion.draw(shown, BISTABLE.parameters)["profile"]
         assert_legible(figure)
         texts = [text.get_text() for text in figure.legends[0].get_texts()]
         marks = [line for line in figure.axes[1].lines if line.get_marker() == "^"]

@@ -269,7 +269,7 @@ def test_a_mechanism_goes_to_other_processes() -> None:
         ("von_mises_truss", "von_mises_trus", "mechanism = 'von_mises_trus': unknown"),
         ("P = 20.0", "Q = 20.0", "parameters.Q: unknown name"),
         ("P = 20.0", 'P = "much"', "scene.P = 'much': must be a number"),
-        ('kind = "basins"', 'kind = "snap"', "is for the paper's mechanism"),
+        ('kind = "basins"', 'kind = "snap"', "is not for mechanisms; these are: "),
         ("x = {", "phi = {", "axes.phi: unknown coordinate 'phi'"),
         ("b = 2.0", "b = 0.0", "has no dampers"),
     ],

@@ -76,7 +76,7 @@ def test_pictures(t_end: float | None, section: Dataset, tmp_path: Path) -> None
     """Also of a run that ends before anything is decided."""
     short = REQUEST.model_copy(update={"t_end": t_end})
     dataset = section if t_end is None else stored(short, SCENE, tmp_path)
-    figures = Snapping.draw(dataset, SCENE.model_dump())
+    figures = Snapping.draw(dataset, SCENE.parameters)
     assert set(figures) == {"map"}
     assert_legible(figures["map"])
     labels = [text.get_text() for text in figures["map"].legends[0].get_texts()]

@@ -59,7 +59,7 @@ def decoded(variable: Variable) -> list[Any]:
 def deepest_first(name: str) -> tuple[Scene, Floats]:
     """A scene of data/equilibria.toml and its equilibria (n, 2) [rad], the least potential energy first."""
     scene, angles, _ = known(name)
-    energies = [float(oracle().potential(scene.model_dump(), q, scene.F0)) for q in angles]
+    energies = [float(oracle().potential(scene.parameters, q, scene.F0)) for q in angles]
     assert np.diff(np.sort(energies)).min() > 1e-6
     return scene, angles[np.argsort(energies)]
 
