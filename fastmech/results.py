@@ -26,7 +26,6 @@ from fastmech.errors import InputError, shown
 if TYPE_CHECKING:
     import xarray
 
-    from fastmech.scene import Scene
 
 Attribute: TypeAlias = "str | int | float | tuple[str, ...] | npt.NDArray[Any]"
 
@@ -240,10 +239,33 @@ def parts(
     }
 
 
-def scene_parameters(scene: Scene) -> dict[str, Variable]:
-    """A scene's parameters as a result file holds them."""
-    described = scene.described().items()
+def scene_parameters(system: Any) -> dict[str, Variable]:
+    """Parameters of a scene, a mechanism or a system (None: none) as a result file holds them."""
+    described = system.described().items() if system is not None else ()
     return {name: Variable((), np.array(value), unit, about) for name, (value, unit, about) in described}
+
+
+def coordinate_units(system: Any) -> dict[str, str]:
+    """Names of a scene's or a mechanism's coordinates with their units."""
+    if not hasattr(system, "coordinates"):
+        return dict(ANGLE_UNITS)
+    names = system.state[: len(system.coordinates)]
+    return {name: "m" if name in system.lengths else "rad" for name in names}
+
+
+def state_units(system: Any) -> dict[str, str]:
+    """Names of coordinates, then of rates, with their units; a system's are pure numbers."""
+    if hasattr(system, "rhs"):
+        return {name: "rad" if name in system.angles else "1" for name in system.state}
+    units = coordinate_units(system)
+    return units | {f"{name}_dot": f"{unit}/s" for name, unit in units.items()}
+
+
+def told(system: Any) -> dict[str, Any]:
+    """What a section says of a mechanism that is not the paper's, or of a system."""
+    if not hasattr(system, "coordinates"):
+        return {"system": system.name} if hasattr(system, "rhs") else {}
+    return {"mechanism": system.name, "coordinate_names": tuple(coordinate_units(system))}
 
 
 def numbers(dim: str, count: int, about: str) -> dict[str, Variable]:

@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 import difflib
+import inspect
 import os
 import sys
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Self, cast
+from typing import Annotated, Any, NamedTuple, Self, cast
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    create_model,
+)
 
 from fastmech.errors import InputError, shown, shown_name
 
@@ -44,43 +53,58 @@ NonNegative = Annotated[Number, Field(ge=0)]
 #: States of the mechanism by name.
 STATE = ("phi", "theta", "phi_dot", "theta_dot")
 
-_UNITS: dict[str, str] = {
-    "m1": "kg",
-    "m2": "kg",
-    "m3": "kg",
-    "l": "m",
-    "c1": "N/m",
-    "c2": "N/m",
-    "beta": "N s/m",
-    "g": "m/s2",
-    "F0": "N",
-    "alpha": "1/s",
+
+class Parameter(NamedTuple):
+    """One of the scene's parameters."""
+
+    kind: Any  #: what is allowed
+    default: float
+    unit: str
+    about: str
+
+
+#: The mechanism's parameters; the defaults are the paper's Table 1 as printed.
+PARAMETERS = {
+    "m1": Parameter(Positive, 10.0, "kg", "mass of material point M1"),
+    "m2": Parameter(Positive, 12.0, "kg", "mass of material point M2"),
+    "m3": Parameter(NonNegative, 8.0, "kg", "mass of slider M3"),
+    "l": Parameter(Positive, 1.25, "m", "length of the rods OM1 and M1M2; M1M3 is twice as long"),
+    "c1": Parameter(NonNegative, 162.5, "N/m", "stiffness of the spring from M2 to O"),
+    "c2": Parameter(NonNegative, 366.67, "N/m", "stiffness of the spring from M1 to A = (0, l)"),
+    "beta": Parameter(NonNegative, 121.0, "N s/m", "coefficient of the damper on the slider"),
+    "g": Parameter(NonNegative, 9.80665, "m/s2", "acceleration of gravity"),
+    "F0": Parameter(Number, 100.0, "N", "force on M2 along +x at t = 0"),
+    "alpha": Parameter(NonNegative, 0.7, "1/s", "decay rate of the force F0 exp(-alpha t)"),
 }
 
+_CONFIG = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+_FIELDS: Any = {name: (one.kind, one.default) for name, one in PARAMETERS.items()}
+_Checked: Any = create_model("Scene", __config__=_CONFIG, **_FIELDS)
 
-class Scene(BaseModel):
+
+class Scene:
     """Parameters of the mechanism in SI units; the defaults are the paper's Table 1 as printed.
 
-    Frozen; a wrong name, type or value raises :class:`fastmech.errors.InputError` with one line that names
-    the field, the value and what is allowed. The standard gravity 9.80665 m/s^2 is what the paper computed
-    with. Masses m1 and m2 must be positive: without either the metric is singular.
+    PARAMETERS
+
+    A scene does not change; a wrong name, type or value raises :class:`fastmech.errors.InputError` with one
+    line that names the field, the value and what is allowed. The standard gravity 9.80665 m/s^2 is what the
+    paper computed with. Masses m1 and m2 must be positive: without either the metric is singular.
 
     ``Scene(load=...)`` gives the same device under another load on M2 along +x, one of :mod:`fastmech.loads`,
     in place of F0 exp(-alpha t): a :class:`fastmech.Mechanism`, :func:`fastmech.mechanisms.slider_pendulum`.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-
-    m1: Positive = Field(10.0, description="mass of material point M1")
-    m2: Positive = Field(12.0, description="mass of material point M2")
-    m3: NonNegative = Field(8.0, description="mass of slider M3")
-    l: Positive = Field(1.25, description="length of the rods OM1 and M1M2; M1M3 is twice as long")
-    c1: NonNegative = Field(162.5, description="stiffness of the spring from M2 to O")
-    c2: NonNegative = Field(366.67, description="stiffness of the spring from M1 to A = (0, l)")
-    beta: NonNegative = Field(121.0, description="coefficient of the damper on the slider")
-    g: NonNegative = Field(9.80665, description="acceleration of gravity")
-    F0: Number = Field(100.0, description="force on M2 along +x at t = 0")
-    alpha: NonNegative = Field(0.7, description="decay rate of the force F0 exp(-alpha t)")
+    m1: float
+    m2: float
+    m3: float
+    l: float
+    c1: float
+    c2: float
+    beta: float
+    g: float
+    F0: float
+    alpha: float
 
     def __new__(cls, *, load: Any = None, **parameters: Any) -> Self:
         """The scene; under a load of ``fm.loads`` the mechanism that it stands for."""
@@ -90,32 +114,25 @@ class Scene(BaseModel):
 
         for name in {"F0", "alpha"} & set(parameters):
             raise InputError(f"scene.{name}: the load acts in place of F0 exp(-alpha t); give one of them")
-        made: Any = slider_pendulum(load).replace(**cls(**parameters).model_dump(exclude={"F0", "alpha"}))
+        own = {n: v for n, v in cls(**parameters).parameters.items() if n not in ("F0", "alpha")}
+        made: Any = slider_pendulum(load).replace(**own)
         return cast(Self, made)
 
     def __init__(self, **parameters: Any) -> None:
         try:
-            super().__init__(**parameters)
+            checked = _Checked(**parameters)
         except ValidationError as error:
-            raise InputError(explain(error, "scene", type(self))) from None
+            raise InputError(explain(error, "scene", _Checked)) from None
+        self.__dict__.update({name: getattr(checked, name) for name in PARAMETERS})
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Values of the parameters by name."""
+        return {name: getattr(self, name) for name in PARAMETERS}
 
     def replace(self, **changes: Any) -> Self:
         """A scene with some parameters changed, validated again."""
-        return type(self)(**(self.model_dump() | changes))
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        """Refuse it, with the call that gives another scene."""
-        if name not in type(self).model_fields:
-            raise InputError(
-                f"scene.{shown_name(name)}: unknown name; {nearest(name, list(type(self).model_fields))}"
-            )
-        raise InputError(
-            f"scene.{name}: a scene does not change; write scene = scene.replace({name}={shown(value)})"
-        )
-
-    def __delattr__(self, name: str) -> None:
-        """Refuse it."""
-        raise InputError(f"scene.{shown_name(name)}: a scene does not change; its parameters stay")
+        return type(self)(**(self.parameters | changes))
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:
@@ -131,10 +148,49 @@ class Scene(BaseModel):
 
     def described(self) -> dict[str, tuple[float, str, str]]:
         """Value, unit and description of every parameter."""
-        return {
-            name: (getattr(self, name), _UNITS[name], str(field.description))
-            for name, field in type(self).model_fields.items()
-        }
+        return {name: (getattr(self, name), one.unit, one.about) for name, one in PARAMETERS.items()}
+
+    def __repr__(self) -> str:
+        own = {n: v for n, v in self.parameters.items() if v != PARAMETERS[n].default}
+        lines = [f"Scene({', '.join(f'{name}={value!r}' for name, value in own.items())})"]
+        lines += [f"  {name} = {v:g} {unit}: {about}" for name, (v, unit, about) in self.described().items()]
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        rows = (
+            f"<tr><td>{name}</td><td>{v:g} {unit}</td><td>{about}</td></tr>"
+            for name, (v, unit, about) in self.described().items()
+        )
+        return f"<b>Scene</b><table>{''.join(rows)}</table>"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Scene) and self.parameters == other.parameters
+
+    def __hash__(self) -> int:
+        return hash(tuple(self.parameters.values()))
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Refuse it, with the call that gives another scene."""
+        if name not in PARAMETERS:
+            raise InputError(f"scene.{shown_name(name)}: unknown name; {nearest(name, list(PARAMETERS))}")
+        raise InputError(
+            f"scene.{name}: a scene does not change; write scene = scene.replace({name}={shown(value)})"
+        )
+
+    def __delattr__(self, name: str) -> None:
+        """Refuse it."""
+        raise InputError(f"scene.{shown_name(name)}: a scene does not change; its parameters stay")
+
+
+_table = [f"- ``{name}`` = {one.default:g} {one.unit}: {one.about}" for name, one in PARAMETERS.items()]
+Scene.__doc__ = str(Scene.__doc__).replace("PARAMETERS", "\n    ".join(_table))
+_names = [
+    inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=one.default, annotation=float)
+    for name, one in PARAMETERS.items()
+]
+Scene.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+    [*_names, inspect.Parameter("load", inspect.Parameter.KEYWORD_ONLY, default=None)]
+)
 
 
 def require_scene(scene: Any, hint: str = "") -> None:

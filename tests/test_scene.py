@@ -39,7 +39,7 @@ def refused(start: str, allowed: str, **parameters: Any) -> None:
 
 
 def test_defaults_are_table_1() -> None:
-    assert Scene().model_dump() == TABLE_1
+    assert Scene().parameters == TABLE_1
 
 
 def test_every_parameter_has_a_unit_and_a_description() -> None:
@@ -144,8 +144,8 @@ def test_huge_values_are_shown_short(wrong: dict[str, Any]) -> None:
 def test_replace_validates_and_leaves_the_original() -> None:
     scene = Scene(F0=50.0)
     changed = scene.replace(m1=1, alpha=0.0)
-    assert changed.model_dump() == TABLE_1 | {"F0": 50.0, "m1": 1.0, "alpha": 0.0}
-    assert scene.model_dump() == TABLE_1 | {"F0": 50.0}
+    assert changed.parameters == TABLE_1 | {"F0": 50.0, "m1": 1.0, "alpha": 0.0}
+    assert scene.parameters == TABLE_1 | {"F0": 50.0}
     assert scene.replace() == scene
     for change, message in (
         ({"m1": -3.0}, "scene.m1 = -3.0: "),
@@ -222,5 +222,5 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
 )
 def test_every_valid_scene_keeps_its_numbers(parameters: dict[str, float]) -> None:
     scene = Scene(**parameters)
-    assert scene.model_dump() == {name: parameters[name] for name in TABLE_1}
-    assert Scene(**scene.model_dump()) == scene
+    assert scene.parameters == {name: parameters[name] for name in TABLE_1}
+    assert Scene(**scene.parameters) == scene

@@ -246,7 +246,9 @@ def draw_basins(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figur
     """Pictures of a dataset of the scan type ``basins`` about the scene with these parameters."""
     with style():
         slice_ = Slice(dataset, None if "mechanism" in dataset.attrs else Scene(**scene))
-        figures = {"labels": _labels(slice_)}
+        figures = {"labels": new_figure(8.2, 8.0)}
+        handles = draw_labels(figures["labels"].subplots(), slice_)
+        figures["labels"].legend(handles=handles, loc="outside lower center", ncols=2)
         for name, title in (
             ("capture_time", "Time until capture is proved"),
             ("settle_time", "Time to settle"),
@@ -254,16 +256,15 @@ def draw_basins(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figur
             if name in dataset and np.isfinite(slice_.data(name)).any():
                 figures[name] = _times(slice_, name, title)
         for figure in figures.values():
-            _describe(figure.axes[0], slice_, scene)
+            describe(figure.axes[0], slice_, scene)
         return figures
 
 
-def _labels(view: Slice) -> Figure:
+def draw_labels(axes: Axes, view: Slice) -> list[Artist]:
+    """Draw who ends where; returns the legend's entries."""
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
-    figure = new_figure(8.2, 8.0)
-    axes = figure.subplots()
     label, status = view.data("label").astype(int), view.data("status")
     codes = flag_codes(view.dataset["status"])
     present, number = np.unique(label[label >= 0], return_counts=True)
@@ -314,10 +315,8 @@ def _labels(view: Slice) -> Figure:
         shading="nearest",
         rasterized=True,
     )
-    handles += decisive(axes, view)
-    figure.legend(handles=handles, loc="outside lower center", ncols=2)
     axes.set_title("Where starts come to rest")
-    return figure
+    return handles + decisive(axes, view)
 
 
 def unlabelled(codes: Codes) -> dict[str, tuple[str, str, str]]:
@@ -386,7 +385,7 @@ def _times(view: Slice, name: str, title: str) -> Figure:
     return figure
 
 
-def _describe(axes: Axes, view: Slice, parameters: Mapping[str, float]) -> None:
+def describe(axes: Axes, view: Slice, parameters: Mapping[str, float]) -> None:
     """Labels with units, the decisive parameters, and what is held."""
     if view.scene is not None:
         scene = view.scene
@@ -413,36 +412,41 @@ BACK = "#e6e6e6"
 
 def draw_snapping(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
     """Picture of a dataset of the scan type ``snapping`` about the scene with these parameters."""
-    from matplotlib.colors import ListedColormap
-
     with style():
         figure = new_figure(8.2, 6.6)
-        axes = figure.subplots()
-        picture, colors, handles = _ends(dataset)
-        force, alpha = dataset["F0"].data, dataset["alpha"].data
-        axes.pcolormesh(
-            _edges(np.log(alpha), exponential=True),
-            _edges(force),
-            picture.T,
-            cmap=ListedColormap(colors),
-            vmin=-0.5,
-            vmax=len(colors) - 0.5,
-            rasterized=True,
-        )
-        axes.set_xscale("log")
-        handles += _unlabelled(axes, dataset) + _curves(axes, dataset)
-        axes.set_xlim(*_edges(np.log(alpha), exponential=True)[[0, -1]])
-        axes.set_ylim(*_edges(force)[[0, -1]])
-        in_fifths(axes.xaxis)
-        axes.set_xlabel("rate α at which the force decays [1/s]")
-        axes.set_ylabel("force F0 when it is switched on [N]")
-        axes.set_title(
-            "Where the mechanism ends that rests until F0 exp(-α t) is switched on\n"
-            f"c1 = {scene['c1']:g} N/m, c2 = {scene['c2']:g} N/m"
-        )
-        axes.grid(visible=False)
+        handles = draw_ends(figure.subplots(), dataset, scene)
         figure.legend(handles=handles, loc="outside lower center", ncols=2)
         return {"map": figure}
+
+
+def draw_ends(axes: Axes, dataset: Dataset, scene: Mapping[str, float]) -> list[Artist]:
+    """Draw who ends where over force and decay rate; returns the legend's entries."""
+    from matplotlib.colors import ListedColormap
+
+    picture, colors, handles = _ends(dataset)
+    force, alpha = dataset["F0"].data, dataset["alpha"].data
+    axes.pcolormesh(
+        _edges(np.log(alpha), exponential=True),
+        _edges(force),
+        picture.T,
+        cmap=ListedColormap(colors),
+        vmin=-0.5,
+        vmax=len(colors) - 0.5,
+        rasterized=True,
+    )
+    axes.set_xscale("log")
+    handles += _unlabelled(axes, dataset) + _curves(axes, dataset)
+    axes.set_xlim(*_edges(np.log(alpha), exponential=True)[[0, -1]])
+    axes.set_ylim(*_edges(force)[[0, -1]])
+    in_fifths(axes.xaxis)
+    axes.set_xlabel("rate α at which the force decays [1/s]")
+    axes.set_ylabel("force F0 when it is switched on [N]")
+    axes.set_title(
+        "Where the mechanism ends that rests until F0 exp(-α t) is switched on\n"
+        f"c1 = {scene['c1']:g} N/m, c2 = {scene['c2']:g} N/m"
+    )
+    axes.grid(visible=False)
+    return handles
 
 
 def _ends(dataset: Dataset) -> tuple[np.ndarray, list[str], list[Artist]]:
@@ -507,8 +511,10 @@ def _unlabelled(axes: Axes, dataset: Dataset) -> list[Artist]:
 
 def _curves(axes: Axes, dataset: Dataset) -> list[Artist]:
     """The critical curve, and its limit for fast decay."""
-    alpha, critical = dataset["alpha"].data, dataset["critical_F0"].data
     handles: list[Artist] = []
+    if "critical_F0" not in dataset:
+        return handles
+    alpha, critical = dataset["alpha"].data, dataset["critical_F0"].data
     if np.isfinite(critical).any():
         line = axes.plot(alpha, critical, color="black", lw=1.6, marker="o", ms=2.5, zorder=5)
         line[0].set_label("smallest force that leaves")

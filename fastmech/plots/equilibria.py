@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from fastmech.mechanism.lagrange import potential_energy
 from fastmech.models.drawing import Drawing, Element, drawing
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots.style import (
+    ANGLES,
     LINES,
     PALETTE,
     PI_TICKS,
@@ -185,7 +186,12 @@ def draw_equilibria(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, F
     """Pictures of a dataset of the scan type ``equilibria`` of the scene with these parameters."""
     of_paper = "mechanism" not in dataset.attrs
     with style():
-        figures = {"potential": _potential(dataset, Scene(**scene))} if of_paper else {}
+        figures = {}
+        if of_paper:
+            figures["potential"] = new_figure(7.4, 6.4)
+            draw_potential(figures["potential"].subplots(), dataset, Scene(**scene))
+            if dataset.sizes["equilibrium"]:
+                legend_below(figures["potential"], figures["potential"].axes[0], 4)
         if dataset.sizes["equilibrium"]:
             figures["eigenvalues"] = _eigenvalues(dataset)
             if of_paper:
@@ -201,40 +207,36 @@ def draw_equilibria(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, F
     return figures
 
 
-def _potential(dataset: Dataset, scene: Scene) -> Figure:
-    figure = new_figure(7.4, 6.4)
-    axes = figure.subplots()
+def draw_potential(axes: Axes, dataset: Dataset, scene: Scene) -> None:
+    """Draw the potential over both angles, with the equilibria."""
     angle = np.linspace(-np.pi, np.pi, GRID)
     q = np.stack(np.meshgrid(angle, angle), axis=-1)
     energy = potential_energy(scene, q, float(dataset.attrs["force"]))
     filled = axes.contourf(angle, angle, energy, levels=24)
     axes.contour(angle, angle, energy, levels=24, colors="white", linewidths=0.4, alpha=0.6)
-    figure.colorbar(filled, ax=axes, label="potential energy Π - F x2 [J]")
-    codes = flag_codes(dataset["kind"])
-    for kind, marker in {**dict.fromkeys(codes.others(MARKERS), "P"), **MARKERS}.items():
-        of_kind = dataset["kind"].data == codes[kind]
-        if of_kind.any():
-            place = dataset["phi"].data[of_kind], dataset["theta"].data[of_kind]
-            axes.plot(*place, marker, color="white", mec="black", mew=1.4, ms=10, clip_on=False, label=kind)
-    _number(axes, dataset)
+    axes.figure.colorbar(filled, ax=axes, label="potential energy Π - F x2 [J]")
+    mark_kinds(axes, dataset, ANGLES)
     axes.set_xticks(*PI_TICKS)
     axes.set_yticks(*PI_TICKS)
     axes.set(xlabel="angle φ [rad]", ylabel="angle θ [rad]")
     axes.set_title(f"Equilibria and potential, force F = {dataset.attrs['force']:g} N")
     axes.grid(visible=False)
-    if dataset.sizes["equilibrium"]:
-        legend_below(figure, axes, 4)
-    return figure
 
 
-def _number(axes: Axes, dataset: Dataset) -> None:
-    """Numbers beside the equilibria, towards the middle so that none leaves the picture."""
-    places = zip(dataset["phi"].data, dataset["theta"].data, strict=True)
-    for number, (phi, theta) in enumerate(places, start=1):
-        offset = (-13.0 if phi > 0 else 13.0, -13.0 if theta > 0 else 13.0)
+def mark_kinds(axes: Axes, dataset: Dataset, names: Sequence[str]) -> None:
+    """Mark equilibria by their kind in the plane of two variables, with their numbers."""
+    codes = flag_codes(dataset["kind"])
+    for kind, marker in {**dict.fromkeys(codes.others(MARKERS), "P"), **MARKERS}.items():
+        of_kind = dataset["kind"].data == codes[kind]
+        if of_kind.any():
+            place = [dataset[name].data[of_kind] for name in names]
+            axes.plot(*place, marker, color="white", mec="black", mew=1.4, ms=10, clip_on=False, label=kind)
+    for number, (x, y) in enumerate(zip(*(dataset[name].data for name in names), strict=True), start=1):
+        # Towards the middle, so that none leaves the picture.
+        offset = (-13.0 if x > 0 else 13.0, -13.0 if y > 0 else 13.0)
         box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
         axes.annotate(
-            str(number), (phi, theta), offset, textcoords="offset points", ha="center", va="center", bbox=box
+            str(number), (x, y), offset, textcoords="offset points", ha="center", va="center", bbox=box
         )
 
 

@@ -19,6 +19,7 @@ from fastmech.plots.style import (
     flag_codes,
     in_fifths,
     legend_below,
+    legend_under,
     logarithmic,
     new_figure,
     quantity,
@@ -71,31 +72,36 @@ def draw_bifurcation(view: View) -> Figure:
     third = view.has("decay_time")
     figure = new_figure(7.6, 8.4 if third else 6.2)
     panels = figure.subplots(3 if third else 2, 1, sharex=True)
-    folds = _folds(view, name)
+    folds = folds_of(view, name)
     for axes, variable in zip(panels, ANGLES, strict=False):
-        labelled: set[str] = set()
-        for (color, dash, width, label), x, y in _looks(_sheets(view, name, variable, folds)):
-            axes.plot(
-                x, y, color=color, ls=dash, lw=width, marker="." if np.isfinite(y).sum() < 2 else "",
-                label="" if label in labelled else label,
-            )  # fmt: skip
-            labelled.add(label)
-        if folds:
-            for kind, there in _kinds(view, folds).items():
-                marker, label = MARKS.get(kind, ("P", kind))
-                places = folds["at"][there], folds[f"fold_{variable}"][there]
-                axes.plot(*places, marker, color="white", mec="black", ms=6, ls="none", label=label)
-            for value in folds["at"]:
-                axes.axvline(value, color="black", lw=0.6, ls=":", zorder=0)
-        axes.set(ylabel=f"angle {symbol(variable)} [rad]", ylim=(-3.4, 3.4))
-        axes.set_yticks(*PI_TICKS)
-        _own(axes, view)
+        draw_branches(axes, view, variable, folds)
     if third:
         _decay_times(panels[2], view, name)
     panels[-1].set_xlabel(view.label(name))
     panels[0].set_title(f"Equilibria over {name}{_told(view, folds, name)}\n{view.setting}")
     legend_below(figure, panels[0], 4)
     return figure
+
+
+def draw_branches(axes: Axes, view: View, variable: str, folds: dict[str, Floats]) -> None:
+    """Draw an angle of all equilibria over one parameter."""
+    (name,), labelled = view.axes, set[str]()
+    for (color, dash, width, label), x, y in _looks(_sheets(view, name, variable, folds)):
+        axes.plot(
+            x, y, color=color, ls=dash, lw=width, marker="." if np.isfinite(y).sum() < 2 else "",
+            label="" if label in labelled else label,
+        )  # fmt: skip
+        labelled.add(label)
+    if folds:
+        for kind, there in _kinds(view, folds).items():
+            marker, label = MARKS.get(kind, ("P", kind))
+            places = folds["at"][there], folds[f"fold_{variable}"][there]
+            axes.plot(*places, marker, color="white", mec="black", ms=6, ls="none", label=label)
+        for value in folds["at"]:
+            axes.axvline(value, color="black", lw=0.6, ls=":", zorder=0)
+    axes.set(ylabel=f"angle {symbol(variable)} [rad]", ylim=(-3.4, 3.4))
+    axes.set_yticks(*PI_TICKS)
+    _own(axes, view)
 
 
 def draw_places(view: View) -> Figure:
@@ -105,34 +111,39 @@ def draw_places(view: View) -> Figure:
     rows = [*coordinates_of(view.dataset), *(["decay_time"] if timed else [])]
     figure = new_figure(7.6, 2.0 + 2.4 * len(rows))
     panels = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
-    codes, verdict = flag_codes(view.variable("verdict")), view.data("verdict")
     for axes, variable in zip(panels, rows, strict=True):
-        values = np.asarray(view.data(variable), dtype=np.float64)
-        x = np.broadcast_to(view.axis(name)[:, None], values.shape)
-        for word, (color, marker) in VERDICTS.items():
-            there = (verdict == codes[word]) & np.isfinite(values)
-            if there.any():
-                axes.plot(
-                    x[there],
-                    values[there],
-                    marker,
-                    color=color,
-                    ms=3,
-                    ls="none",
-                    label=word.replace("_", " "),
-                )
-        if variable == "decay_time":
-            axes.set(ylabel="slowest decay time\nof the stable [s]", yscale="log")
-            _widen(axes, 0.9, 1.1)
-            logarithmic(axes.yaxis)
-        else:
-            _widen(axes, -LEAST_SPAN, LEAST_SPAN)
-            axes.set_ylabel(quantity(view.dataset, variable))
-        _own(axes, view)
+        draw_verdicts(axes, view, variable)
     panels[-1].set_xlabel(view.label(name))
     panels[0].set_title(f"Equilibria over {name}\n{view.setting}")
     legend_below(figure, panels[0], 4)
     return figure
+
+
+def draw_verdicts(axes: Axes, view: View, variable: str) -> None:
+    """Draw a coordinate or the decay time of all equilibria over one parameter, by their verdicts."""
+    codes, verdict = flag_codes(view.variable("verdict")), view.data("verdict")
+    values = np.asarray(view.data(variable), dtype=np.float64)
+    x = np.broadcast_to(view.axis(view.axes[0])[:, None], values.shape)
+    for word, (color, marker) in VERDICTS.items():
+        there = (verdict == codes[word]) & np.isfinite(values)
+        if there.any():
+            axes.plot(
+                x[there],
+                values[there],
+                marker,
+                color=color,
+                ms=3,
+                ls="none",
+                label=word.replace("_", " "),
+            )
+    if variable == "decay_time":
+        axes.set(ylabel="slowest decay time\nof the stable [s]", yscale="log")
+        _widen(axes, 0.9, 1.1)
+        logarithmic(axes.yaxis)
+    else:
+        _widen(axes, -LEAST_SPAN, LEAST_SPAN)
+        axes.set_ylabel(quantity(view.dataset, variable))
+    _own(axes, view)
 
 
 def _widen(axes: Axes, low: float, high: float) -> None:
@@ -201,7 +212,8 @@ def _own(axes: Axes, view: View) -> None:
         axes.axvline(point[0], color="black", lw=1.0, ls="-.", label="the scene")
 
 
-def _folds(view: View, name: str) -> dict[str, Floats]:
+def folds_of(view: View, name: str) -> dict[str, Floats]:
+    """Where equilibria merge over one parameter."""
     if len(view.dataset.attrs["axes"]) != 1 or not view.has(f"fold_{name}"):
         return {}
     return {"at": view.axis(f"fold_{name}")} | {key: view.axis(key) for key in ("fold_phi", "fold_theta")}
@@ -307,34 +319,39 @@ def draw_equilibrium_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[s
 
 
 def _counts(view: View) -> Figure:
-    from matplotlib import colormaps
-    from matplotlib.colors import ListedColormap, to_hex
-    from matplotlib.patches import Patch
-
     figure = new_figure(9.6, 5.6)
-    most = max(6, int(view.data("count").max()))
-    more = colormaps["tab20c"](np.linspace(0.0, 1.0, max(1, most - 6)))
-    looks = {**COUNT_COLORS, **{n: to_hex(more[n - 7]) for n in range(7, most + 1)}}
-    colors = ListedColormap(list(looks.values()))
     for axes, name, title in zip(
         figure.subplots(1, 2),
         ("count", "count_stable"),
         ("Number of equilibria", "Number of stable equilibria"),
         strict=True,
     ):
-        counts = view.data(name)
-        axes.pcolormesh(
-            *map(view.axis, view.axes), counts.T, cmap=colors, vmin=-0.5, vmax=most + 0.5, shading="nearest"
-        )
-        handles: list[Artist] = [
-            Patch(color=looks[int(n)], label=f"{n} ({np.mean(counts == n):.1%})") for n in np.unique(counts)
-        ]
-        curves = draw_curves(axes, view)
-        handles += _mark_unsettled(axes, view) + _mark_own(axes, view)
-        axes.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3)
-        _label(axes, view, title)
+        curves = draw_count(axes, view, name, title)
     _finish(figure, view, curves)
     return figure
+
+
+def draw_count(axes: Axes, view: View, name: str, title: str) -> list[Artist]:
+    """Draw a number of equilibria over two parameters; returns the curves' entries of a legend."""
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap, to_hex
+    from matplotlib.patches import Patch
+
+    most = max(6, int(view.data("count").max()))
+    more = colormaps["tab20c"](np.linspace(0.0, 1.0, max(1, most - 6)))
+    looks = {**COUNT_COLORS, **{n: to_hex(more[n - 7]) for n in range(7, most + 1)}}
+    colors = ListedColormap(list(looks.values()))
+    counts = view.data(name)
+    axes.pcolormesh(
+        *map(view.axis, view.axes), counts.T, cmap=colors, vmin=-0.5, vmax=most + 0.5, shading="nearest"
+    )
+    handles: list[Artist] = [
+        Patch(color=looks[int(n)], label=f"{n} ({np.mean(counts == n):.1%})") for n in np.unique(counts)
+    ]
+    curves = draw_curves(axes, view)
+    legend_under(axes, handles + _mark_unsettled(axes, view) + _mark_own(axes, view), 3)
+    _label(axes, view, title)
+    return curves
 
 
 def _mark_unsettled(axes: Axes, view: View) -> list[Artist]:
@@ -447,7 +464,6 @@ def _nothing(view: View) -> list[Artist]:
 
 def _label(axes: Axes, view: View, title: str) -> None:
     axes.set(xlabel=view.label(view.axes[0]), ylabel=view.label(view.axes[1]))
-    axes.label_outer()
     axes.set_title(title, fontsize=10.5)
     axes.grid(visible=False)
 
@@ -455,6 +471,9 @@ def _label(axes: Axes, view: View, title: str) -> None:
 def _finish(figure: Figure, view: View, handles: list[Artist]) -> None:
     """The scene above everything, the legend below."""
     figure.suptitle(view.setting + not_proved(view), fontsize=10.0)
+    for axes in figure.axes:
+        if axes.get_subplotspec() is not None:
+            axes.label_outer()
     if handles:
         columns = 2 if figure.get_figwidth() > 8.0 else 1
         figure.legend(handles=handles, loc="outside lower center", ncols=columns)

@@ -48,10 +48,27 @@ def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figu
         return {"profile": figure}
 
 
+def draw_stability(axes: Axes, dataset: Dataset) -> list[Artist]:
+    """Draw the wells' shares of the starts; returns the legend's entries."""
+    name = str(dataset.attrs["along"])
+    for well in range(dataset.sizes["well"]):
+        _stability(axes, dataset, well, LINES[well % len(LINES)])
+    axes.set(xlabel=_along(dataset, name), ylabel="share of the starts [%]", ylim=(0.0, 102.0))
+    return [
+        entry(_name(dataset, well), color=LINES[well % len(LINES)], lw=3.0)
+        for well in range(dataset.sizes["well"])
+    ]
+
+
+def _along(dataset: Dataset, name: str) -> str:
+    greek = {"alpha": "α", "beta": "β"}.get(name, name)
+    return f"{dataset[name].long_name}, {greek} [{dataset[name].units}]"
+
+
 def _name(dataset: Dataset, well: int) -> str:
     """A well's number, and the range over which it exists."""
     name = str(dataset.attrs["along"])
-    there = np.isfinite(dataset["well_phi"].data[:, well])
+    there = np.isfinite(dataset["well_stability"].data[:, well])
     values = dataset[name].data[there]
     if not values.size:
         return f"well {well + 1}: not at these values"
@@ -109,8 +126,7 @@ def _axes(panels: np.ndarray, dataset: Dataset, name: str) -> None:
         axes.set_title(title)
         axes.set_ylim(bottom=0.0)
     panels[0].set_ylim(0.0, 102.0)
-    greek = {"alpha": "α", "beta": "β"}.get(name, name)
-    panels[-1].set_xlabel(f"{dataset[name].long_name}, {greek} [{dataset[name].units}]")
+    panels[-1].set_xlabel(_along(dataset, name))
 
 
 def _title(dataset: Dataset, scene: Mapping[str, float], name: str) -> str:

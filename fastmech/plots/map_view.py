@@ -183,7 +183,7 @@ UNREACHED = {
 
 def draw_curves(axes: Axes, view: View) -> list[Artist]:
     """Draw what the map has of curves; returns one handle a legend entry."""
-    if len(view.dataset.attrs["axes"]) != 2 or not view.has("fold_curve"):
+    if len(view.dataset.attrs["axes"]) != 2 or not (view.has("fold_curve") or view.has("unreached_curve")):
         return []
     handles: list[Artist] = []
     merges, kinds = _codes(view, "fold_merges"), _codes(view, "fold_kind")
@@ -195,9 +195,13 @@ def draw_curves(axes: Axes, view: View) -> list[Artist]:
     for name, chosen in _codes(view, "unreached_vanishes").items():
         color, dash, label = UNREACHED.get(name, ("#777777", "-.", f"damping misses a mode: {name}"))
         handles += _line(axes, view, "unreached", chosen, (color, dash, 1.4, label))
-    cusp = [view.axis(f"cusp_{name}") for name in view.axes]
-    if cusp[0].size:
-        handles += axes.plot(*cusp, "D", color="white", mec="black", ms=5.5, ls="none", label="cusp")
+    cusp = [f"cusp_{name}" for name in view.axes]
+    if view.has(*cusp) and view.axis(cusp[0]).size:
+        handles += axes.plot(
+            *map(view.axis, cusp), "D", color="white", mec="black", ms=5.5, ls="none", label="cusp"
+        )
+    if not all(name in view.dataset for name in view.axes):
+        return handles
     low, high = zip(*((view.axis(name).min(), view.axis(name).max()) for name in view.axes), strict=True)
     margin = [
         0.5 * (b - a) / max(1, view.axis(name).size - 1)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fastmech.arrays import Floats
-from fastmech.plots.style import coordinates_of, logarithmic, new_figure, style, symbol
+from fastmech.plots.style import LINES, coordinates_of, logarithmic, new_figure, style, symbol
 from fastmech.results import Dataset
 
 if TYPE_CHECKING:
@@ -46,12 +47,21 @@ def _states(dataset: Dataset, states: tuple[str, ...]) -> Figure:
     units = list(dict.fromkeys(dataset[name].units for name in states))
     figure, panels = _rows(len(units))
     for axes, unit in zip(panels, units, strict=True):
-        for k, name in enumerate(n for n in states if dataset[n].units == unit):
-            axes.plot(t, dataset[name].data, ("-", "--", "-.", ":")[k], label=symbol(name))
-        axes.set(ylabel=f"{KINDS.get(unit, 'rate')} [{unit}]")
+        draw_states(axes, t, {n: dataset[n].data for n in states if dataset[n].units == unit}, unit)
         _legend(axes)
     panels[0].set_title("Coordinates and their rates")
     return figure
+
+
+def draw_states(axes: Axes, t: Floats, values: Mapping[str, Floats], unit: str) -> None:
+    """Draw states of one unit over time, each (times,) or (times, trajectories), in one look a state."""
+    for k, (name, states) in enumerate(values.items()):
+        look: Any = {"color": LINES[k % len(LINES)], "ls": ("-", "--", "-.", ":")[k % 4]}
+        look["marker"] = "o" if t.size == 1 else ""
+        first, *_ = axes.plot(t, states, **look)
+        first.set_label(symbol(name))
+    kind = KINDS.get(unit, "rate" if "/s" in unit else "state")
+    axes.set_ylabel(kind if unit == "1" else f"{kind} [{unit}]")
 
 
 def _points(dataset: Dataset) -> dict[str, tuple[str, str | None]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
@@ -86,6 +86,13 @@ def legend_below(figure: Figure, axes: Axes, columns: int) -> None:
     figure.legend(handles, labels, loc="outside lower center", ncols=columns)
 
 
+def legend_under(axes: Axes, handles: Sequence[Artist] | None = None, columns: int = 2) -> None:
+    """A legend under axes that may be one panel of a user's figure."""
+    known = axes.get_legend_handles_labels()[0] if handles is None else handles
+    if known:
+        axes.legend(handles=list(known), loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=columns)
+
+
 def save(figure: Figure, path: Path) -> None:
     """Write a figure as PNG (150 dots an inch), or in the format that the file's name says, undated."""
     with style():
@@ -130,7 +137,8 @@ def coordinates_of(dataset: Dataset | Section) -> tuple[str, ...]:
 def setting_of(dataset: Dataset, parameters: Mapping[str, float]) -> str:
     """A mechanism and some of its parameters, for titles."""
     each = ", ".join(f"{name} = {value:g}" for name, value in list(parameters.items())[:MOST_TOLD])
-    return f"{dataset.attrs['mechanism']}: {each}{', ...' * (len(parameters) > MOST_TOLD)}"
+    name = dataset.attrs.get("mechanism", dataset.attrs.get("system", ""))
+    return f"{name}: {each}{', ...' * (len(parameters) > MOST_TOLD)}"
 
 
 def quantity(dataset: Dataset, name: str) -> str:

@@ -35,7 +35,7 @@ def run(kind: str, scene: Scene, **fields: Any) -> Dataset:
 
 
 def draw(kind: str, scene: Scene, **fields: Any) -> dict[str, Figure]:
-    return scan_kinds()[kind].draw(run(kind, scene, **fields), scene.model_dump())
+    return scan_kinds()[kind].draw(run(kind, scene, **fields), scene.parameters)
 
 
 def panel(figure: Figure, title: str) -> Axes:
@@ -147,7 +147,7 @@ def test_extremes_are_named():
 
 def test_every_equilibrium_is_marked():
     dataset = run("equilibria", BISTABLE)
-    axes = scan_kinds()["equilibria"].draw(dataset, BISTABLE.model_dump())["potential"].axes[0]
+    axes = scan_kinds()["equilibria"].draw(dataset, BISTABLE.parameters)["potential"].axes[0]
     marked = {line.get_label(): len(line.get_xdata()) for line in axes.lines}
     codes = flag_codes(dataset["kind"])
     assert marked == {kind: int(np.sum(dataset["kind"].data == codes[kind])) for kind in marked}
@@ -168,7 +168,7 @@ def test_failures_are_no_part_of_where_motions_end():
     """Steps far too long: bars hold the motions that were computed, and the rest is told apart."""
     scene = Scene(c1=2000.0, c2=8000.0, beta=20.0, alpha=0.0)
     dataset = run("disturbed", scene, trajectories=64, radius=1.0, t_end=20.0, dt=0.05, linear_directions=1)
-    figures = scan_kinds()["disturbed"].draw(dataset, scene.model_dump())
+    figures = scan_kinds()["disturbed"].draw(dataset, scene.parameters)
     for figure in figures.values():
         assert_legible(figure)
     codes = flag_codes(dataset["outcome"])
@@ -208,7 +208,7 @@ def test_outcomes_are_drawn_from_what_was_kept(kept: set[str], told: str):
     left_out = {"outcome", "end_equilibrium", "time_to_return", *apart} - kept
     variables = {n: v for n, v in {**dataset.variables, **changed}.items() if n not in left_out}
     figures = scan_kinds()["disturbed"].draw(
-        Dataset(variables, dataset.attrs, dataset.groups), BISTABLE.model_dump()
+        Dataset(variables, dataset.attrs, dataset.groups), BISTABLE.parameters
     )
     assert set(figures) == {"outcomes", "linear_range"}
     figure = figures["outcomes"]
@@ -230,7 +230,7 @@ def test_older_files_are_drawn_by_the_meanings_of_their_codes():
     attrs = dict(dataset["outcome"].attrs) | codes
     changed = {"outcome": replace(dataset["outcome"], data=outcome, attrs=attrs)}
     older = Dataset({**dataset.variables, **changed}, dataset.attrs, dataset.groups)
-    figure = scan_kinds()["disturbed"].draw(older, BISTABLE.model_dump())["outcomes"]
+    figure = scan_kinds()["disturbed"].draw(older, BISTABLE.parameters)["outcomes"]
     known = {text.get_text() for text in figure.legends[0].get_texts()}
     assert {"still at an unstable one", "not decided"} <= known
     for place in range(6):
@@ -298,19 +298,19 @@ def test_pitchforks_are_named_and_missing_proofs_told():
     assert [float(x) for x in marks[0].get_xdata()] == pytest.approx([43.17473449000661])
     grid = {"c1": axis(1.0, 400.0, 8), "c2": axis(1.0, 800.0, 9)}
     dataset = run("equilibrium_map", unforced, axes=grid)
-    figure = scan_kinds()["equilibrium_map"].draw(dataset, unforced.model_dump())["count"]
+    figure = scan_kinds()["equilibrium_map"].draw(dataset, unforced.parameters)["count"]
     (legend,) = figure.legends
     assert {text.get_text() for text in legend.get_texts()} >= {
         "pitchfork (symmetric) of resting positions", "pitchfork (symmetric) of unstable equilibria"
     }  # fmt: skip
     dataset.groups["curves"]["fold_proof"].data[0] = "not proved near c1 = 1 N/m"
-    figure = scan_kinds()["equilibrium_map"].draw(dataset, unforced.model_dump())["count"]
+    figure = scan_kinds()["equilibrium_map"].draw(dataset, unforced.parameters)["count"]
     assert "not proved that these are all folds" in figure.get_suptitle()
 
 
 def test_stable_branches_are_solid_and_unstable_dashed():
     dataset = run("equilibrium_map", CONSTANT, axes={"F0": axis(-3.0, 3.0, 41)})
-    axes = scan_kinds()["equilibrium_map"].draw(dataset, CONSTANT.model_dump())["branches"].axes[0]
+    axes = scan_kinds()["equilibrium_map"].draw(dataset, CONSTANT.parameters)["branches"].axes[0]
     looks = {line.get_label(): line for line in axes.lines}
     assert looks["stable"].get_linestyle() == "-"
     assert looks["unstable: saddle"].get_linestyle() == "--"

@@ -1,0 +1,641 @@
+"""One device on a few pages: where it rests, what ends that, what it survives, and how sure that is.
+
+Sensitivities are closed forms. Of a position of rest q with forces f(q, p) = 0 the implicit function theorem
+gives dq/dp = -f_q^-1 f_p; of an eigenvalue l of the motion about it, with P(l) = l^2 M + l D + K, left and
+right vectors w and v, dl/dp = -w.P'v / w.(2 l M + D)v with P' along that change; of a value c at which a
+position ends, where w f_q = 0, dc/dp = -w.f_p / w.f_c. What has no closed form is asked of an ensemble.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.linalg
+import scipy.optimize
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from fastmech.arrays import Floats
+from fastmech.atlas.snap import MOVING, Snap, find_snap
+from fastmech.basins.disturbed import disturb
+from fastmech.basins.erosion import wells_along
+from fastmech.basins.label import label_starts
+from fastmech.basins.map import map_basins
+from fastmech.basins.measures.fractions import basin_stability
+from fastmech.basins.shock_limit import Blow, proved_limit, shock_limit
+from fastmech.errors import InputError, shown
+from fastmech.mechanism.impulse import POINTS
+from fastmech.models.equilibria import find_equilibria
+from fastmech.models.mechanism import Mechanism
+from fastmech.models.stability import classify
+from fastmech.plots.basins import draw_basins
+from fastmech.plots.equilibria import draw_equilibria
+from fastmech.plots.style import LINES, new_figure, png, style, symbol
+from fastmech.reports import Stage, no_stage, table, to_html, to_pdf
+from fastmech.results import Dataset, coordinate_units
+from fastmech.scan_types.map_layout import drawing_group
+from fastmech.scene import Scene, nearest, path_of
+from fastmech.store.provenance import history_line
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Points along each axis of the map, starts of the shares, of each load and of each member of the ensemble,
+#: loads along which wells erode, disturbances, and members.
+MAP, STARTS, ERODED, FEW, LOADS, DISTURBANCES, MEMBERS = 121, 4096, 512, 256, 11, 1024, 64
+
+#: Ends of runs [s]: so long, or so many of the slowest decay times but at most so long; and members of the
+#: ensemble of a mechanism, whose wells take longer to prove.
+UNTIL, DECAYS, LATEST, MEMBERS_OF_MECHANISMS = 120.0, 6.0, 900.0, 8
+
+#: Decay slower than this [1/s] is none.
+LEAST = 1e-12
+
+#: Units of loads; and how far, over the present value or 1, a mechanism's positions may end under them.
+LOAD_UNITS = ("N", "N m")
+DECADES = (1.0, 10.0, 100.0, 1e3, 1e4)
+
+
+def report(
+    system: Scene | Mechanism,
+    path: str | Path,
+    *,
+    tolerances: Mapping[str, float] | None = None,
+    threads: int | None = None,
+    stage: Stage = no_stage,
+) -> tuple[Path, Path]:
+    """Write what an engineer hands over about a device: one HTML page, which needs no other file, and a PDF.
+
+    Args:
+        system: a scene (a force that decays has done so) or a mechanism (loads are at their means).
+        path: of the page; the PDF lies beside it.
+        tolerances: half widths of the uniform distributions of parameters, by name, in the parameters' units.
+        threads: threads to use, all processors by default.
+        stage: makes a bar, which is told of each part.
+
+    Returns:
+        the paths of the page and of the PDF.
+
+    Raises:
+        InputError: the system is neither, a tolerance is unknown or does not fit, or the files cannot be
+            written.
+    """
+    if not isinstance(system, Scene | Mechanism):
+        raise InputError(f"system = {shown(system)}: must be a Scene or a Mechanism")
+    target = path_of(path).with_suffix(".html")
+    made = _Report(system, _checked(system, tolerances or {}), threads)
+    lines: list[str] = []
+    parts = {
+        "": made.device,
+        "Positions of rest": made.rests,
+        "Where positions end (snap loads)": made.snaps,
+        "Shocks it survives": made.shocks,
+        "Basins": made.basins,
+        "Disturbances": made.disturbances,
+        "Erosion over the load": made.erosion,
+        "Tolerances": made.tolerances,
+        "How each number was obtained": made.proofs,
+        "To repeat this": made.repeat,
+    }
+    advance = stage("parts of the report", len(parts))
+    for heading, part in parts.items():
+        lines += [f"## {heading}", ""] if heading else []
+        try:
+            lines += part()
+        except InputError as error:  # what this device has not is said in its place
+            lines += [f"Not for this device: {error}.", ""]
+        advance(1)
+    text = "\n".join(lines)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        pictures = {f"{name}.png": png(figure) for name, figure in made.figures.items()}
+        target.write_text(to_html(text, made.title, pictures), encoding="utf-8")
+        to_pdf(text, made.figures, target.with_suffix(".pdf"))
+    except OSError as error:
+        raise InputError(f"{target}: cannot be written: {error.strerror}") from None
+    return target, target.with_suffix(".pdf")
+
+
+def _checked(system: Scene | Mechanism, tolerances: Mapping[str, float]) -> dict[str, float]:
+    known = system.described()
+    for name, half in tolerances.items():
+        if name not in known:
+            raise InputError(f"tolerances.{name}: unknown parameter; {nearest(str(name), list(known))}")
+        if isinstance(half, bool) or not isinstance(half, int | float) or not 0.0 < half < math.inf:
+            raise InputError(f"tolerances.{name} = {shown(half)}: must be a number > 0 {known[name][1]}")
+        for end in (known[name][0] - half, known[name][0] + half):
+            system.replace(**{name: end})
+    return {name: float(half) for name, half in tolerances.items()}
+
+
+class _Report:
+    """The parts of a report, and what they share."""
+
+    def __init__(self, given: Scene | Mechanism, tolerances: dict[str, float], threads: int | None) -> None:
+        self.given, self.plus_minus, self.threads = given, tolerances, threads
+        self.figures: dict[str, Figure] = {}
+        self.of_paper = isinstance(given, Scene)
+        self.decays = isinstance(given, Scene) and given.alpha > 0.0
+        self.system: Any = given.replace(F0=0.0, alpha=0.0) if self.decays else given
+        self.load = "after the force has decayed" if self.decays else "under its constant load"
+        self.title = "Report on a slider and pendulum"
+        if isinstance(given, Mechanism):
+            self.title = f"Report on {given.name}"
+        self.known = given.described()
+        self.units = coordinate_units(self.system)
+        self.found: Any = find_equilibria(self.system)
+        self.stability = [classify(self.system, e) for e in self.found]
+        verdicts = [one.verdict for one in self.stability]
+        self.stable = [k for k, v in enumerate(verdicts) if v in ("stable", "asymptotically stable")]
+        slowest = [-float(self.stability[k].eigenvalues.real.max()) for k in self.stable]
+        decay = max([1.0 / rate for rate in slowest if rate > LEAST], default=0.0)
+        self.until = min(max(UNTIL, DECAYS * decay), LATEST)
+        self.snapped: dict[tuple[int, str], Snap] = {}
+
+    def name(self, k: int) -> str:
+        """Number of a position, from 1."""
+        return f"position {k + 1}"
+
+    def device(self) -> list[str]:
+        """Parameters, and the device to scale where it rests."""
+        half = {name: f"± {value:g}" for name, value in self.plus_minus.items()}
+        rows = (
+            f"{name} | {value:g} | {half.get(name, '')} | {unit} | {about}"
+            for name, (value, unit, about) in self.known.items()
+        )
+        stable = f"{len(self.stable)} of them stable" if self.found else ""
+        lines = [
+            f"# {self.title}", "",
+            f"{len(self.found)} positions of rest {self.load}, {stable}. "
+            f"Made by: `{history_line()}`. Units are SI, angles in rad.", "",
+            "## The device", "",
+            *table("Parameter | Value | Tolerance | Unit | Meaning", rows, (0, 2, 3, 4)),
+        ]  # fmt: skip
+        dataset = self.found.dataset()
+        groups = {} if self.of_paper else drawing_group(self.system, self.found.position)
+        drawn = draw_equilibria(Dataset(dataset.variables, dataset.attrs, groups), self.values)
+        for name, caption in (
+            ("positions", "The device to scale in every position of rest."),
+            ("potential", "Potential energy over both angles; numbers are those of the positions."),
+        ):
+            if name in drawn:
+                lines += self.picture(name, drawn[name], caption)
+        return lines
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Values of the parameters at which it rests."""
+        return {name: value for name, (value, *_) in self.system.described().items()}
+
+    def picture(self, name: str, figure: Figure, caption: str) -> list[str]:
+        """Lines that show a figure."""
+        self.figures[name] = figure
+        return [f"![{caption}]({name}.png)", "", caption, ""]
+
+    def rests(self) -> list[str]:
+        """Positions with stability and decay times."""
+        rows = []
+        for k, (e, s) in enumerate(zip(self.found, self.stability, strict=True)):
+            place = ", ".join(
+                f"{symbol(n)} = {x:z.6f} {u}"
+                for (n, u), x in zip(self.units.items(), e.position, strict=True)
+            )
+            slowest, swing = -float(s.eigenvalues.real.max()), float(np.abs(s.eigenvalues.imag).max())
+            decay = "" if k not in self.stable else f"{1.0 / slowest:.4g}" if slowest > LEAST else "does not"
+            told = f"{round(e.energy, 9) + 0.0:.6g} | {e.kind} | {s.verdict} | {decay} | {swing:.4g}"
+            rows.append(f"{k + 1} | {place} | {told} | {e.radius:.1g}")
+        heads = "No. | Where | Energy [J] | Kind | Stability | Decay to 1/e [s] | Fastest swing [rad/s]"
+        return [
+            *table(f"{heads} | Proved to within", rows, (0, 1, 3, 4)),
+            f"Proof: {self.found.certificate.sentence}.", "",
+            *(f"- {self.name(k)}: {self.stability[k].explanation}." for k in self.stable), "",
+        ]  # fmt: skip
+
+    def snaps(self) -> list[str]:
+        """Values of every parameter at which each stable position ends."""
+        rows = []
+        for k in self.stable:
+            for name in MOVING if self.of_paper else self.known:
+                snap = self.snap(k, name)
+                if snap is None:
+                    continue
+                self.snapped[k, name] = snap
+                ends = [
+                    "-" if v is None else f"{v:.6g} ({how})"
+                    for v, how in zip((snap.below, snap.above), snap.how, strict=True)
+                ]
+                near = [abs(v - snap.value) for v in (snap.below, snap.above) if v is not None]
+                margin = f"{min(near):.4g}" if near else "none found"
+                low, high = snap.searched
+                rows.append(
+                    f"{k + 1} | {name} | {snap.unit} | {snap.value:g} | {ends[0]} | {ends[1]} | {margin} | "
+                    f"{low:.4g} to {high:.4g}"
+                )
+        heads = "Position | Parameter | Unit | Present | Ends below | Ends above | Margin | Searched"
+        return [
+            "Each parameter changes alone and slowly. A position ends where it merges with an unstable one, "
+            "turns unstable or begins to flutter.", "",
+            *table(heads, rows, (0, 1, 2, 4, 5, 7)),
+        ]  # fmt: skip
+
+    def snap(self, k: int, name: str) -> Snap | None:
+        """Where a position ends as a parameter changes; None: it does not move it, or cannot change."""
+        try:
+            if self.of_paper:
+                return find_snap(self.system, self.found[k], parameter=name)
+            value, unit, _ = self.known[name]
+            either = value == 0.0 or unit in LOAD_UNITS  # it may act the other way, too
+            for far in DECADES if either else (1.0,):
+                far *= max(abs(value), 1.0)
+                low, high = (-far, far) if either else sorted((0.01 * value, 3.0 * value))
+                snap = find_snap(self.system, self.found[k], (low, high), parameter=name)
+                if snap.below is not None or snap.above is not None:
+                    break
+            return snap
+        except InputError:
+            return None
+
+    def blows(self, system: Any, place: Any) -> dict[str, Blow]:
+        """The proved limit of every point that can be struck."""
+        found = {}
+        for on in POINTS if self.of_paper else system.points:
+            with suppress(InputError):  # a point in space, or a well that is not certain
+                found[on] = proved_limit(system, place, on)
+        return {on: blow for on, blow in found.items() if math.isfinite(blow.impulse)}
+
+    def shocks(self) -> list[str]:
+        """The blows that each stable position survives; the search is for the point that yields most."""
+        rows = []
+        for k in self.stable:
+            proved = self.blows(self.system, self.found[k])
+            weakest = min(proved, key=lambda on: proved[on].impulse, default=None)
+            for on, blow in proved.items():
+                least = ""
+                if on == weakest:
+                    search = shock_limit(self.system, self.found[k], on, blow.direction, threads=self.threads)
+                    least = _told(search.found)
+                angle = f"{math.degrees(blow.direction):.1f}°"
+                rows.append(f"{k + 1} | {on} | {angle} | {_told(blow)} | {least or 'not searched | - | -'}")
+        if not rows:
+            raise InputError("no point can be struck so that a bound is known")
+        heads = "Position | On | Direction | Proved [N s] | [m/s] | [J] | Found [N s] | [m/s] | [J]"
+        return [
+            "A blow on a point of the resting device. Proved: no smaller blow leaves the well, in whatever "
+            "direction and whatever the damper; the direction is that in which the point yields most, from "
+            "+x; m/s: the jump of the point's velocity. Found: the least blow in that direction "
+            "that was seen to leave (-: none), searched for the point with the least proved limit.",
+            "",
+            *table(heads, rows, (0, 1)),
+        ]
+
+    @cached_property
+    def window(self) -> dict[str, tuple[float, float]]:
+        """From where motions are started at rest: a turn of angles, what positions span of lengths."""
+        spans = {}
+        for j, (name, unit) in enumerate(self.units.items()):
+            low, high = -math.pi, math.pi
+            if unit != "rad":
+                places = self.found.position[:, j]
+                room = 0.5 * float(np.ptp(places)) + 0.1 * float(np.abs(places).max()) + 0.1
+                low, high = float(places.min()) - room, float(places.max()) + room
+            spans[name] = (low, high)
+        return spans
+
+    def nearest(self, found: Any, q: Floats) -> int:
+        """Which of some positions is the nearest to a place, whole turns apart."""
+        away = found.position - q
+        turns = np.array([2.0 * math.pi if unit == "rad" else math.inf for unit in self.units.values()])
+        return int(np.abs(away - np.nan_to_num(turns * np.round(away / turns))).sum(axis=1).argmin())
+
+    def starts(self, n: int, seed: int = 0) -> Floats:
+        """Starts at rest (n, states), evenly spread over the window."""
+        low, high = np.array(list(self.window.values())).T
+        points = qmc.scale(qmc.Sobol(low.size, seed=seed).random(n), low, high)
+        return np.concatenate([points, np.zeros_like(points)], axis=1)
+
+    def basins(self) -> list[str]:
+        """Shares of starts that end in each stable position, and a map."""
+        labels = label_starts(self.system, self.starts(STARTS), self.until, threads=self.threads)
+        ends = [(status, n) for status, n in labels.counts.items() if n]
+        rows = []
+        for k in self.stable:
+            share = basin_stability(labels.well.astype(np.int64), k)
+            rows.append(
+                f"{k + 1} | {share.fraction:.2%} | {share.lower:.2%} to {share.upper:.2%} | "
+                f"{share.at_most:.2%}"
+            )
+        span = "; ".join(
+            f"{symbol(n)} from {a:.4g} to {b:.4g} {self.units[n]}" for n, (a, b) in self.window.items()
+        )
+        lines = [
+            f"{STARTS:,} starts at rest, spread over {span}, followed until their end is proved, at most "
+            f"{self.until:.0f} s: {', '.join(f'{n:,} {status}' for status, n in ends)}.", "",
+            *table("Position | Share | 95 % interval | If all undecided ended there", rows),
+        ]  # fmt: skip
+        names = [*self.units][:2]
+        axes = {n: np.linspace(*self.window[n], MAP) for n in names}
+        if len(names) == 1:
+            axes[f"{names[0]}_dot"] = np.linspace(-10.0, 10.0, MAP)
+        found = map_basins(self.system, axes, self.until, threads=self.threads)
+        caption = (
+            f"Where starts of the map end; {MAP} x {MAP} points, colours are wells with their full turns."
+        )
+        return lines + self.picture(
+            "basins", draw_basins(found.dataset().merged, self.values)["labels"], caption
+        )
+
+    def disturbances(self) -> list[str]:
+        """How soon disturbed motions are back."""
+        rows = []
+        for k in self.stable:
+            found = disturb(self.system, self.found[k], DISTURBANCES, t_end=UNTIL, threads=self.threads)
+            times = found.time_to_return[np.isfinite(found.time_to_return)]
+            share = found.returned
+            back = f"{np.median(times):.4g} | {times.max():.4g}" if times.size else "- | -"
+            known = found.excursion[np.isfinite(found.excursion).all(axis=1)].max(axis=0, initial=0.0)
+            far = ", ".join(f"{x:.3g} {unit}" for x, unit in zip(known, self.units.values(), strict=True))
+            interval = f"{share.lower:.2%} to {share.upper:.2%}"
+            rows.append(
+                f"{k + 1} | {share.fraction:.2%} | {interval} | {back} | {far} | {found.dt.min():.3g}"
+            )
+        heads = "Position | Return, proved | 95 % interval | Back after, median [s] | Longest [s]"
+        return [
+            f"{DISTURBANCES:,} random disturbances of coordinates and rates of each stable position, up to "
+            f"0.5 {[*self.units.values()][-1]} in the norm of the kinetic energy, for {UNTIL:g} s.", "",
+            *table(f"{heads} | Largest swing | Step [s]", rows, (0, 5)),
+        ]  # fmt: skip
+
+    def erosion(self) -> list[str]:
+        """Shares of the starts over the load, between its snap loads."""
+        loads = [
+            n
+            for n, (_, unit, _) in self.known.items()
+            if unit in LOAD_UNITS and (self.of_paper or n in self.values)
+        ]
+        name = next((n for n in loads if any((k, n) in self.snapped for k in self.stable)), None)
+        if name is None:
+            raise InputError("no parameter is a load that ends a position")
+        ends = [
+            v for (_, n), s in self.snapped.items() if n == name for v in (s.below, s.above) if v is not None
+        ]
+        value, unit = self.system.described()[name][:2]
+        reach = 1.1 * max([abs(v - value) for v in ends] or [abs(value) or 1.0])
+        loads_tried = np.linspace(value - reach, value + reach, LOADS)
+        _, places = wells_along(self.system, name, loads_tried)
+        figure = new_figure(7.2, 4.2)
+        with style():
+            axes = figure.subplots()
+            for w in range(places.shape[1]):
+                self._erode(axes, name, loads_tried, places[:, w], w)
+            axes.axvline(value, color="black", lw=1.0, ls="-.", label="present load")
+            axes.set(xlabel=f"{name} [{unit}]", ylabel="share of the starts [%]", ylim=(0.0, 102.0))
+            figure.legend(loc="outside lower center", ncols=3)
+        caption = (
+            f"Share of {ERODED} starts at rest that end in each well as {name} changes; the band is the 95 % "
+            "Wilson interval, with undecided starts as none or all."
+        )
+        return self.picture("erosion", figure, caption)
+
+    def well(self, places: Floats, w: int) -> str:
+        """A well that is followed over loads, of which the present one is in the middle."""
+        now = places[len(places) // 2]
+        return (
+            self.name(self.nearest(self.found, now)) if np.isfinite(now).all() else f"another well ({w + 1})"
+        )
+
+    def _erode(self, axes: Any, name: str, loads: Floats, places: Floats, w: int) -> None:
+        rows = []
+        for load, place in zip(loads, places, strict=True):
+            if not np.isfinite(place).all():
+                continue
+            changed = self.system.replace(**{name: float(load)})
+            k = self.nearest(find_equilibria(changed), place)
+            try:
+                ends = label_starts(changed, self.starts(ERODED), self.until, threads=self.threads)
+            except InputError:  # too near to where it ends: its well is not certain
+                continue
+            share = basin_stability(ends.well.astype(np.int64), k)
+            rows.append([load, share.fraction, share.lower, share.upper])
+        if rows:
+            x, middle, low, high = np.array(rows, dtype=np.float64).T
+            color = LINES[w % len(LINES)]
+            axes.fill_between(x, 100.0 * low, 100.0 * high, color=color, alpha=0.3, lw=0)
+            axes.plot(x, 100.0 * middle, color=color, marker="o", ms=4, label=self.well(places, w))
+
+    def tolerances(self) -> list[str]:
+        """How the answers vary with the parameters."""
+        if not self.plus_minus:
+            return [
+                "No tolerances were given: `c1 = { value = 900.0, plus_minus = 20.0 }` in the request.",
+                "",
+            ]
+        gone = ("F0", "alpha") if self.decays else ()
+        names = [name for name in self.plus_minus if name not in gone]
+        half = np.array([self.plus_minus[name] for name in names])
+        slopes = Sensitivities(self.system, names)
+        rows: list[str] = []
+
+        def answer(what: str, unit: str, value: float, row: Floats) -> None:
+            by = row * half
+            each = " | ".join(f"{change:+.3g}" for change in by)
+            deviation, worst = math.sqrt(float((by**2).sum() / 3.0)), float(np.abs(by).sum())
+            rows.append(f"{what} | {value:.6g} | {unit} | {each} | {deviation:.3g} | {worst:.3g}")
+
+        for k in self.stable:
+            q = self.found[k].position
+            for (n, unit), value, row in zip(self.units.items(), q, slopes.position(q), strict=True):
+                answer(f"{k + 1}: {symbol(n)}", unit, value, row)
+            root, change = slopes.slowest(q)
+            answer(f"{k + 1}: decay rate of the slowest mode", "1/s", -root.real, -change.real)
+        for (k, name), snap in self.snapped.items():
+            for value, how in zip((snap.below, snap.above), snap.how, strict=True):
+                if value is not None and how == "disappears":
+                    ends = slopes.end(name, value, self.found[k].position)
+                    if ends is not None:
+                        answer(f"{k + 1}: ends at {name}", snap.unit, value, ends)
+        told = ", ".join(
+            f"{n} = {self.known[n][0]:g} ± {d:g} {self.known[n][1]}" for n, d in zip(names, half, strict=True)
+        )
+        heads = " | ".join(f"by {n} + {d:g}" for n, d in zip(names, half, strict=True))
+        return [
+            f"Parameters are uniform and independent: {told}. Changes of first order, in closed form: by "
+            "each parameter at the upper end of its tolerance; the standard deviation of all; and the "
+            "worst, all at the ends that add up.", "",
+            *table(f"Answer | Value | Unit | {heads} | Standard deviation | Worst", rows, (0, 2)),
+            *self._ensemble(names, half),
+        ]  # fmt: skip
+
+    def _ensemble(self, names: list[str], half: Floats) -> Iterator[str]:
+        """What has no closed form, of members with parameters drawn from their distributions."""
+        n = MEMBERS if self.of_paper else MEMBERS_OF_MECHANISMS
+        drawn = qmc.Sobol(len(names), seed=1).random(n) * 2.0 - 1.0
+        columns: dict[str, list[float]] = {}
+        lost = 0
+        for row in drawn:
+            values = {name: self.system.described()[name][0] for name in names}
+            changed = self.system.replace(
+                **{m: values[m] + float(r * d) for m, r, d in zip(names, row, half, strict=True)}
+            )
+            places = find_equilibria(changed)
+            try:
+                ends = label_starts(changed, self.starts(FEW), UNTIL, threads=self.threads).well
+            except InputError:
+                ends = None
+            for k in self.stable:
+                j = self.nearest(places, self.found[k].position)
+                if places[j].morse_index != self.found[k].morse_index:
+                    lost += 1
+                    continue
+                for on, blow in self.blows(changed, places[j]).items():
+                    columns.setdefault(f"{k + 1}: proved blow on {on} [N s]", []).append(blow.impulse)
+                if ends is not None:
+                    columns.setdefault(f"{k + 1}: share of {FEW} starts [%]", []).append(
+                        100.0 * float(np.mean(ends == j))
+                    )
+        yield f"What has no closed form, over {n} devices with parameters drawn from these distributions:"
+        yield ""
+        rows = (
+            f"{what} | " + " | ".join(f"{q:.4g}" for q in np.quantile(found, [0.0, 0.05, 0.5, 0.95, 1.0]))
+            for what, found in columns.items()
+        )
+        yield from table("Answer | Least | 5 % | Median | 95 % | Largest", rows)
+        yield (
+            f"In {lost} cases a stable position had disappeared."
+            if lost
+            else "Every stable position exists in all of them."
+        )
+        yield ""
+
+    def proofs(self) -> list[str]:
+        """Step and error of every number, and what proves it."""
+        closed = self.of_paper
+        rows = [
+            "positions of rest | no steps | radius in the table | "
+            + ("counting theorem and interval balls" if closed else "branch and prune over interval boxes"),
+            "stability | no steps | eigenvalues to rounding | potential's Hessian, then eigenvalues",
+            "snap loads | continuation | 1e-9 relative | the position is followed to where it ends",
+            "proved blows | no steps | rounding | energy below the lowest saddle of the well",
+            "blows found | halved until two runs agree | last grid's spacing | none: weaker ones may leave",
+            "shares, map, erosion | halved until two runs agree | none in labels; the share's interval | "
+            "capture: energy below the barrier, inside the well",
+            "disturbances | in the table | compared with half the step | capture, as for shares",
+        ]
+        if self.plus_minus:
+            rows.append("tolerances | no steps | second order in the half widths | implicit function theorem")
+        return [
+            *table("Number | Step | Error | Proof", rows, (0, 1, 2, 3)),
+        ]
+
+    def repeat(self) -> list[str]:
+        """The request that gives the same pages."""
+        head = [f'mechanism = "{self.given.name}"'] if isinstance(self.given, Mechanism) else []
+        values = [
+            f"{n} = {{ value = {v!r}, plus_minus = {self.plus_minus[n]!r} }}"
+            if n in self.plus_minus
+            else f"{n} = {v!r}"
+            for n, (v, *_) in self.known.items()
+        ]
+        lines = [*head, "[scene]", *values]
+        return [
+            "Save the following as `device.toml` and run `fastmech report device.toml`:", "",
+            *(f"    {line}" for line in lines), "",
+        ]  # fmt: skip
+
+
+def _told(blow: Any) -> str:
+    return " | ".join(
+        "-" if math.isnan(x) else f"{x:.4g}" for x in (blow.impulse, abs(blow.velocity), blow.energy)
+    )
+
+
+class Sensitivities:
+    """Derivatives by parameters of positions of rest, of the motion about them, and of where they end.
+
+    Args:
+        system: with its loads at rest.
+        names: of the parameters.
+    """
+
+    def __init__(self, system: Scene | Mechanism, names: list[str]) -> None:
+        import sympy
+
+        if isinstance(system, Scene):
+            from fastmech.mechanisms.slider_pendulum import slider_pendulum
+
+            system = slider_pendulum().replace(**system.parameters)
+        self.mechanism, self.names = system, names
+        statics = system.statics()
+        self.all = [str(symbol) for symbol in statics.parameters]
+        q, p = [c.symbol for c in statics.coordinates], list(statics.parameters)
+        forces = sympy.Matrix(statics.forces)
+        made = [
+            sympy.lambdify([*q, *p], m, "numpy") for m in (forces, forces.jacobian(q), forces.jacobian(p))
+        ]
+        self._forces, self._by_place, self._by_parameter = made
+
+    def _at(self, function: Callable[..., Any], q: Floats, changes: Mapping[str, float] = {}) -> Floats:
+        values = {**self.mechanism.parameters, **changes}
+        return np.asarray(function(*q, *(values[name] for name in self.all)), dtype=np.float64)
+
+    def position(self, q: Floats) -> Floats:
+        """Of coordinates by parameters (coordinates, names)."""
+        columns = [self.all.index(name) for name in self.names]
+        by = self._at(self._by_parameter, q)[:, columns]
+        return np.asarray(-np.linalg.solve(self._at(self._by_place, q), by))
+
+    def slowest(self, q: Floats) -> tuple[complex, NDArray[np.complex128]]:
+        """The eigenvalue of the largest real part, and its derivatives by parameters (names,)."""
+        n, along = len(q), self.position(q)
+        M, D, K = self.mechanism.linear(q)
+        zero, one = np.zeros((n, n)), np.eye(n)
+        roots, vectors = scipy.linalg.eig(
+            np.block([[zero, one], [-K, -D]]), np.block([[one, zero], [zero, M]])
+        )
+        k = int(np.argmax(roots.real))
+        root, v = roots[k], vectors[:n, k]
+        w = np.linalg.svd(root**2 * M + root * D + K)[0][:, -1].conj()
+        change = []
+        for j, name in enumerate(self.names):
+            value = self.mechanism.parameters[name]
+            h = 1e-5 * max(abs(value), 1e-3)
+            ends = [
+                self.mechanism.linear(q + s * h * along[:, j], {name: value + s * h}) for s in (1.0, -1.0)
+            ]
+            m, d, c = ((np.asarray(a) - np.asarray(b)) / (2.0 * h) for a, b in zip(*ends, strict=True))
+            change.append(-(w @ (root**2 * m + root * d + c) @ v) / (w @ (2.0 * root * M + D) @ v))
+        return complex(root), np.array(change)
+
+    def end(self, name: str, value: float, q: Floats) -> Floats | None:
+        """Of a parameter's value at which a position disappears, by parameters (names,); None: not found."""
+        n, present = len(q), self.mechanism.parameters[name]
+        for share in np.linspace(0.0, 1.0 - 1e-6, 41)[1:]:  # along the branch, by Newton's method
+            at = {name: present + (value - present) * float(share)}
+            for _ in range(8):
+                q = (
+                    q
+                    - np.linalg.lstsq(
+                        self._at(self._by_place, q, at), self._at(self._forces, q, at).ravel(), rcond=None
+                    )[0]
+                )
+        null = np.linalg.svd(self._at(self._by_place, q, {name: value}))[2][-1]
+
+        def equations(z: Floats) -> Floats:
+            at, v = {name: float(z[-1])}, z[n : 2 * n]
+            forces, K = self._at(self._forces, z[:n], at).ravel(), self._at(self._by_place, z[:n], at)
+            return np.concatenate([forces, K @ v, [v @ v - 1.0]])
+
+        found = scipy.optimize.root(equations, np.concatenate([q, null, [value]]), method="lm")
+        if abs(found.x[-1] - value) > 1e-6 * max(abs(value), 1.0):
+            return None
+        at = {name: float(found.x[-1])}
+        w = np.linalg.svd(self._at(self._by_place, found.x[:n], at))[0][:, -1]
+        by = w @ self._at(self._by_parameter, found.x[:n], at)
+        own = by[self.all.index(name)]
+        each = np.array([0.0 if other == name else -by[self.all.index(other)] / own for other in self.names])
+        return each if abs(own) > 1e-9 * np.abs(by).max() else None

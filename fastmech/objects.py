@@ -1,0 +1,161 @@
+"""What public functions return: objects that print in six lines, draw, and save themselves as scans do.
+
+A class says what it holds as data: ``FIELDS``, a unit and a meaning for each of its arrays and numbers. From
+this follow what is printed, what notebooks show, the xarray dataset and the result file. Where a kind of scan
+has a layout for the same thing, ``LAYOUT`` names the function that makes it; ``PICTURE`` names the function
+that draws it into axes. Both lie in layers above and are loaded by name when they are asked for, here alone.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
+from enum import IntEnum
+from functools import cache
+from html import escape
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
+
+import numpy as np
+
+from fastmech.errors import InputError, shown
+
+if TYPE_CHECKING:
+    import os
+
+    import xarray
+    from matplotlib.axes import Axes
+
+    from fastmech.results import Dataset
+
+#: Lines that an object prints, and their width.
+LINES, WIDTH = 6, 110
+
+
+class Field(NamedTuple):
+    """What an object holds, as files tell it."""
+
+    dims: str  #: names of dimensions, with blanks between; ``*name``: the keys of that attribute
+    unit: str  #: ``@name``: that of the parameter which that attribute names
+    about: str  #: what it is, in a few words
+    source: str = ""  #: the attribute, by default the variable's name; ``items.x``: that of each of the items
+    codes: type[IntEnum] | int | None = None  #: of integers what they mean, or which of them stands for none
+
+
+@cache
+def _load(where: str) -> Any:
+    """A function of a layer above, ``module:name``."""
+    module, _, name = where.partition(":")
+    return getattr(import_module(f"fastmech.{module}"), name)
+
+
+class Printed:
+    """What prints a summary in at most six lines, and says the same in notebooks."""
+
+    FIELDS: ClassVar[Mapping[str, Field]] = {}
+
+    def told(self) -> str:
+        """What is printed, before it is cut: by default the numbers among the fields."""
+        name = "".join(f" {c.lower()}" if c.isupper() else c for c in type(self).__name__).strip()
+        own: Any = self
+        known = self.FIELDS or {f.name: Field("", "1", f.name.replace("_", " ")) for f in fields(own)}
+        each = [_told(field, self.value_of(key)) for key, field in known.items()]
+        return "; ".join([f"{name}: {each[0]}" if each else name, *each[1:]])
+
+    def __repr__(self) -> str:
+        lines = [
+            part
+            for line in self.told().splitlines()
+            for part in textwrap.wrap(line, WIDTH, subsequent_indent="  ", drop_whitespace=True)
+        ]
+        if len(lines) > LINES:
+            lines[LINES - 1 :] = [f"  ... and {len(lines) - LINES + 1} more lines; see its attributes"]
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        first, *others = repr(self).splitlines()
+        return f"<div><b>{escape(first)}</b><br>{'<br>'.join(map(escape, others))}</div>"
+
+    def value_of(self, key: str) -> Any:
+        """What a field says: an attribute, or that of each of some items, one after the other."""
+        field = self.FIELDS.get(key)
+        items, _, name = ((field and field.source) or key).rpartition(".")
+        if not items:
+            return getattr(self, name)
+        each = [getattr(item, name) for item in getattr(self, items)]
+        return np.concatenate(each) if each and np.ndim(each[0]) else np.array(each)
+
+
+class Result(Printed):
+    """What also becomes an xarray dataset and saves itself."""
+
+    KIND: ClassVar[str] = ""  #: what files call it, as ``kind`` of a request
+    LAYOUT: ClassVar[str] = ""
+    system: Any = None  #: the scene, mechanism or system that it is about
+
+    def of(self, system: Any) -> Self:
+        """The same, which knows what it is about."""
+        object.__setattr__(self, "system", system)
+        return self
+
+    def dataset(self) -> Dataset:
+        """What files hold of it, with units."""
+        made = _load(self.LAYOUT)(self) if self.LAYOUT else _load("store.objects:dataset_of")(self)
+        return replace(made, attrs={**made.attrs, "kind": self.KIND})
+
+    def to_xarray(self) -> xarray.Dataset:
+        """As an xarray dataset, a unit and a meaning on every variable.
+
+        Raises:
+            InputError: xarray is not installed.
+        """
+        return self.dataset().merged.to_xarray()
+
+    def save(self, path: str | os.PathLike[str], *, replace: bool = False) -> None:
+        """Write a result file with one section, as scans do: ``fm.open_results(path)`` reads it.
+
+        Raises:
+            InputError: the file exists and ``replace`` is False, or it cannot be written.
+        """
+        _load("store.objects:save")(self, path, replace)
+
+
+class Drawn(Result):
+    """What also draws itself."""
+
+    PICTURE: ClassVar[str] = ""
+
+    def plot(self, ax: Axes | None = None, **how: Any) -> Axes:
+        """Draw it into axes, by default those of a new figure; ``matplotlib.rcParams`` are respected.
+
+        Raises:
+            InputError: ``ax`` are no axes, or there is nothing to draw.
+        """
+        if ax is None:
+            from matplotlib import pyplot
+
+            ax = pyplot.subplots(layout="constrained")[1]
+        elif not callable(getattr(ax, "plot", None)):
+            raise InputError(f"ax = {shown(ax)}: must be the axes of a matplotlib figure")
+        _load(self.PICTURE)(self, ax, **how)
+        return ax
+
+
+def _told(field: Field, value: Any) -> str:
+    """A field in words."""
+    unit = "" if field.unit in ("1", "") or field.unit.startswith("@") else f" {field.unit}"
+    if value is None:
+        return f"{field.about}: not known"
+    if isinstance(value, str | bool | np.bool_):
+        return f"{field.about}: {value}"
+    array = np.asarray(value)
+    if array.size == 1:
+        return (
+            f"{field.about}: {array.item():.6g}{unit}"
+            if array.dtype.kind in "iuf"
+            else f"{field.about}: {value}"
+        )
+    if array.dtype.kind not in "iuf" or not np.isfinite(array).any():
+        return f"{field.about}: {len(value) if isinstance(value, Sequence) else array.size:,} values"
+    return f"{field.about}: {np.nanmin(array):.4g} to {np.nanmax(array):.4g}{unit} ({array.size:,} values)"

@@ -1,0 +1,75 @@
+"""What public functions return as datasets, by their tables of fields, and as result files."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+
+from fastmech.ensembles.threads import thread_count
+from fastmech.objects import Field, Result
+from fastmech.results import Dataset, Variable, flags, scene_parameters, state_units
+from fastmech.scene import path_of
+from fastmech.store.provenance import provenance
+from fastmech.store.write import write_results
+
+
+def dataset_of(found: Result) -> Dataset:
+    """The fields of an object with their units; what it does not have is left out."""
+    variables: dict[str, Variable] = {}
+    for name, field in found.FIELDS.items():
+        value = found.value_of(name)
+        if value is not None:
+            variables |= _variables(found, name, field, value)
+    return Dataset(variables)
+
+
+def _variables(found: Result, name: str, field: Field, value: Any) -> dict[str, Variable]:
+    dims: list[str] = []
+    own: dict[str, Variable] = {}
+    units = state_units(found.system)
+    for dim in field.dims.split():
+        if dim.startswith("*"):
+            axes = getattr(found, dim[1:])
+            dims += axes
+            own |= {n: Variable((n,), v, units.get(n, "1"), f"{n} at the start") for n, v in axes.items()}
+        else:
+            dims.append(dim)
+    data = np.asarray(
+        value, dtype=object if field.unit == "1" and np.asarray(value).dtype.kind in "UO" else None
+    )
+    if name.endswith("*"):
+        prefix = name[:-1]
+        entries = list(units.items())[: data.shape[-1]]
+        for k, (entry, unit) in enumerate(entries):
+            about = f"{field.about} {entry}".strip()
+            own[prefix + entry] = Variable(tuple(dims[:-1]), data[..., k], unit, about)
+        return own
+    if field.codes is None:
+        attrs: dict[str, Any] = {}
+    else:
+        attrs = {"_FillValue": field.codes} if isinstance(field.codes, int) else flags(field.codes)
+    return own | {name: Variable(tuple(dims), data, _unit(found, field.unit), field.about, attrs)}
+
+
+def _unit(found: Result, unit: str) -> str:
+    """A unit, or that of the parameter which an attribute names: ``@parameter``, ``@names.0``."""
+    if not unit.startswith("@"):
+        return unit
+    attribute, _, place = unit[1:].partition(".")
+    named: Any = getattr(found, attribute)
+    parameter = named[int(place)] if place else named
+    described: Any = getattr(found.system, "described", dict)()
+    return described[parameter][1] if parameter in described else "1"
+
+
+def save(found: Result, path: str | os.PathLike[str], replace: bool) -> None:
+    """Write a result file with an object as its one section, named by its kind."""
+    write_results(
+        path_of(path),
+        scene_parameters=scene_parameters(found.system),
+        sections={found.KIND: found.dataset()},
+        attrs=provenance(thread_count(None)) | {"title": repr(found).splitlines()[0]},
+        replace=replace,
+    )

@@ -1,0 +1,174 @@
+"""The report on a device: what it says, and derivatives against solving again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import fastmech as fm
+from fastmech import device_report
+from fastmech.device_report import Sensitivities
+from fastmech.scan_types.request import device_of, tolerances_of
+from fastmech.scene import read_toml
+
+SCENE = fm.Scene(F0=10.0, alpha=0.0, c1=300.0, c2=93.0)
+NAMES = ["c1", "m2", "F0"]
+
+
+def shallow() -> fm.Scene | fm.Mechanism:
+    """The truss, with a damper and a load."""
+    return fm.mechanisms.von_mises_truss().replace(b=3.0, P=5.0)
+
+
+@pytest.mark.parametrize(("system", "names"), [(SCENE, NAMES), (shallow(), ["k", "rise", "P"])])
+def test_positions_and_decay_follow_parameters_as_solving_again_shows(system, names) -> None:
+    """Central differences of what find_equilibria and classify give at changed parameters."""
+    slopes = Sensitivities(system, names)
+    found = fm.find_equilibria(system)
+    e = found[0]
+    root, change = slopes.slowest(e.position)
+    assert_allclose(root.real, fm.classify(system, e).eigenvalues.real.max(), rtol=1e-9)
+    for j, name in enumerate(names):
+        value = system.described()[name][0]
+        h = 1e-4 * abs(value)
+        ends = [system.replace(**{name: value + s * h}) for s in (1.0, -1.0)]
+        places = [fm.find_equilibria(one)[0] for one in ends]
+        expected = (places[0].position - places[1].position) / (2.0 * h)
+        assert_allclose(slopes.position(e.position)[:, j], expected, rtol=1e-6, atol=1e-9)
+        rates = [fm.classify(one, at).eigenvalues.real.max() for one, at in zip(ends, places, strict=True)]
+        assert_allclose(change[j].real, (rates[0] - rates[1]) / (2.0 * h), rtol=1e-5, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("system", "along", "other", "searched"),
+    [(SCENE, "F0", "c1", None), (SCENE, "c2", "m2", None), (shallow(), "P", "k", (-100.0, 100.0))],
+)
+def test_where_a_position_ends_follows_parameters_as_searching_again_shows(
+    system, along, other, searched
+) -> None:
+    e = next(one for one in fm.find_equilibria(system) if one.kind == "minimum")
+    snap = fm.find_snap(system, e, searched, parameter=along)
+    value = snap.below if snap.below is not None else snap.above
+    row = Sensitivities(system, [other, along]).end(along, value, e.position)
+    assert row is not None
+    assert row[1] == 0.0  # the parameter itself is what ends it
+    p = system.described()[other][0]
+    ends = []
+    for s in (1.0, -1.0):
+        changed = system.replace(**{other: p * (1.0 + s * 1e-4)})
+        found = fm.find_equilibria(changed)
+        near = found[int(np.abs(found.position - e.position).sum(axis=1).argmin())]
+        again = fm.find_snap(changed, near, searched, parameter=along)
+        ends.append(again.below if snap.below is not None else again.above)
+    assert_allclose(row[0], (ends[0] - ends[1]) / (2e-4 * p), rtol=1e-5)
+
+
+def test_the_truss_ends_where_geometry_says() -> None:
+    """Springs of length L0 over a half span a: P = 2 k y (L0/L - 1), greatest at L = (L0 a^2)^(1/3)."""
+    truss = fm.mechanisms.von_mises_truss()
+    p = truss.parameters
+    a, rest = 0.5 * p["span"], np.hypot(0.5 * p["span"], p["rise"])
+    per_k = 2.0 * (rest ** (2 / 3) - a ** (2 / 3)) ** 1.5
+    e = fm.find_equilibria(truss)[0]
+    snap = fm.find_snap(truss, e, (-100.0, 100.0), parameter="P")
+    value = snap.below if snap.below is not None else snap.above
+    assert_allclose(abs(value), p["k"] * per_k, rtol=1e-6)
+    slope = Sensitivities(truss, ["k"]).end("P", value, e.position)
+    assert_allclose(abs(slope[0]), per_k, rtol=1e-6)
+
+
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Everything quick."""
+    for name, value in {
+        "MAP": 5,
+        "STARTS": 16,
+        "ERODED": 16,
+        "FEW": 8,
+        "LOADS": 3,
+        "DISTURBANCES": 8,
+        "MEMBERS": 4,
+    }.items():
+        monkeypatch.setattr(device_report, name, value)
+    monkeypatch.setattr(device_report, "UNTIL", 20.0)
+    monkeypatch.setattr(device_report, "LATEST", 20.0)
+    monkeypatch.setattr(device_report, "MEMBERS_OF_MECHANISMS", 2)
+
+
+def test_it_says_what_the_functions_say(small, tmp_path: Path) -> None:
+    page, paper = fm.report(SCENE, tmp_path / "device.html", tolerances={"c1": 6.0})
+    text = page.read_text(encoding="utf-8")
+    assert paper.read_bytes().startswith(b"%PDF")
+    assert text.count("data:image/png;base64,") == 4
+    for heading in (
+        "Positions of rest",
+        "snap loads",
+        "Shocks",
+        "Basins",
+        "Erosion",
+        "Tolerances",
+        "To repeat this",
+    ):
+        assert heading in text
+    found = fm.find_equilibria(SCENE)
+    minimum = next(e for e in found if e.kind == "minimum")
+    assert f"{minimum.phi:.6f}" in text
+    assert f"{fm.classify(SCENE, minimum).decay_time:.4g}" in text
+    assert f"{fm.find_snap(SCENE, minimum).below:.6g}" in text
+    assert f"{fm.shock_limit(SCENE, minimum, 'M2', 0.0).proved.energy:.4g}" in text
+    assert "c1 = { value = 300.0, plus_minus = 6.0 }" in text
+    assert "Not for this device" not in text
+
+
+def test_its_request_gives_the_same_device(small, tmp_path: Path) -> None:
+    page, _ = fm.report(SCENE, tmp_path / "device.html", tolerances={"c1": 6.0})
+    text = page.read_text(encoding="utf-8")
+    (tmp_path / "again.toml").write_text(text.split("<pre><code>")[1].split("</code>")[0], encoding="utf-8")
+    table = read_toml(tmp_path / "again.toml")
+    assert device_of(table) == SCENE
+    assert tolerances_of(table) == {"c1": 6.0}
+
+
+def test_what_a_device_has_not_is_said(small, tmp_path: Path) -> None:
+    page, _ = fm.report(fm.mechanisms.von_mises_truss(), tmp_path / "truss.html")
+    text = page.read_text(encoding="utf-8")
+    assert "has no dampers" in text
+    assert "mechanism = &quot;von_mises_truss&quot;" in text or 'mechanism = "von_mises_truss"' in text
+
+
+@pytest.mark.parametrize(
+    ("tolerances", "line"),
+    [
+        ({"c3": 1.0}, "did you mean 'm3'"),
+        ({"c1": -1.0}, "must be a number > 0 N/m"),
+        ({"m1": 11.0}, "scene.m1 = -1"),
+    ],
+)
+def test_bad_tolerances_are_refused(tolerances, line, tmp_path: Path) -> None:
+    with pytest.raises(fm.InputError, match=line):
+        fm.report(SCENE, tmp_path / "x.html", tolerances=tolerances)
+
+
+def test_systems_of_states_have_no_report(tmp_path: Path) -> None:
+    with pytest.raises(fm.InputError, match="must be a Scene or a Mechanism"):
+        fm.report(fm.System(lambda t, x: (-x,), ("x",), {}), tmp_path / "x.html")  # type: ignore[arg-type]
+
+
+def test_the_command_reads_tolerances_and_refuses_what_it_does_not_know(small, tmp_path: Path) -> None:
+    from click.testing import CliRunner
+
+    from fastmech.cli import main
+
+    text = "[scene]\nF0 = 10.0\nalpha = 0.0\nc1 = { value = 300.0, plus_minus = 6.0 }\nc2 = 93.0\n"
+    (tmp_path / "device.toml").write_text(text, encoding="utf-8")
+    out = tmp_path / "page.html"
+    done = CliRunner().invoke(main, ["report", str(tmp_path / "device.toml"), "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    assert "± 6" in out.read_text(encoding="utf-8")
+    (tmp_path / "wrong.toml").write_text("c1 = 3.0\n", encoding="utf-8")
+    refused = CliRunner().invoke(main, ["report", str(tmp_path / "wrong.toml")])
+    assert refused.exit_code == 2
+    assert "c1: unknown name" in refused.output

@@ -1,0 +1,253 @@
+"""What public functions return: six lines, HTML, xarray with units, files, pictures in given axes."""
+
+from __future__ import annotations
+
+import copy
+import inspect
+import pickle
+import pydoc
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import fastmech as fm
+from fastmech.objects import Drawn, Printed, Result
+
+matplotlib.use("Agg")
+
+SCENE = fm.Scene(F0=10.0, alpha=0.0, c1=300.0, c2=93.0)
+FEW = {"x": [-1.0, 0.5, 1.0], "v": [0.0, 1.0]}
+GRID = {"phi": np.linspace(-2.0, 2.0, 5), "theta": np.linspace(-1.0, 1.0, 4)}
+
+
+def duffing() -> fm.System:
+    """Two attractors, forced."""
+    return fm.System(
+        lambda t, x, v, amplitude: (v, x - x * x * x - 0.25 * v + amplitude * fm.cos(t)),
+        ("x", "v"),
+        {"amplitude": 0.05},
+        period=2.0 * np.pi,
+    )
+
+
+def stopping() -> fm.System:
+    """It stops on either side."""
+    return fm.System(
+        lambda t, x, v: (v, x - 0.1 * v),
+        ("x", "v"),
+        {},
+        stop=lambda t, x, v: 1 if x > 2.0 else 2 if x < -2.0 else 0,
+    )
+
+
+def sides(y: Any) -> Any:
+    """Which side of the edge states are on."""
+    return (np.atleast_2d(y)[:, 0] > 0.0).astype(int)
+
+
+def stable(system: Any) -> Any:
+    """Its deepest equilibrium."""
+    return fm.find_equilibria(system)[0]
+
+
+#: Cheap calls of public functions whose results are objects.
+CALLS: dict[str, Callable[[], Any]] = {
+    "find_equilibria": lambda: fm.find_equilibria(SCENE),
+    "find_equilibria, mechanism": lambda: fm.find_equilibria(fm.mechanisms.von_mises_truss()),
+    "one equilibrium": lambda: stable(SCENE),
+    "one resting place": lambda: stable(fm.mechanisms.von_mises_truss()),
+    "classify": lambda: fm.classify(SCENE, stable(SCENE)),
+    "classify, mechanism": lambda: fm.classify(m := fm.mechanisms.von_mises_truss(), stable(m)),
+    "integrate": lambda: fm.integrate(SCENE, np.zeros((3, 4)), 1.0, 0.01),
+    "integrate to tol": lambda: fm.integrate(SCENE, np.full((3, 4), 0.1), 1.0, tol=1e-4, t_eval=[0.5, 1.0]),
+    "integrate, system": lambda: fm.integrate(duffing(), np.ones((2, 2)), 1.0, 0.01),
+    "disturb": lambda: fm.disturb(SCENE, stable(SCENE), 16, t_end=20.0),
+    "disturbed_motion": lambda: fm.disturbed_motion(SCENE, stable(SCENE), [0.1, 0, 0, 0], [0.5, 1.0, 2.0]),
+    "linear_range": lambda: fm.linear_range(SCENE, stable(SCENE), directions=4),
+    "map_basins": lambda: fm.map_basins(SCENE, GRID, 10.0),
+    "map_basins, stop codes": lambda: fm.map_basins(stopping(), FEW, 20.0, dt=0.05),
+    "map_basins, attractors": lambda: fm.map_basins(duffing(), FEW),
+    "label_starts": lambda: fm.label_starts(SCENE, np.zeros((3, 4)), 10.0),
+    "map_equilibria": lambda: fm.map_equilibria(SCENE, {"F0": np.linspace(-20, 20, 4), "c1": [200.0, 300.0]}),
+    "map_equilibria, one axis": lambda: fm.map_equilibria(SCENE, {"c1": np.linspace(200.0, 300.0, 7)}),
+    "map_equilibria, mechanism": lambda: fm.map_equilibria(
+        fm.mechanisms.von_mises_truss(), {"P": np.linspace(-5.0, 5.0, 5)}
+    ),
+    "find_folds": lambda: fm.find_folds(SCENE, "c1", [100.0, 400.0]),
+    "trace_folds": lambda: fm.trace_folds(SCENE, ("c1", [150.0, 350.0]), ("F0", [0.0, 200.0])),
+    "trace_undamped": lambda: fm.trace_undamped(
+        SCENE, ("c1", np.linspace(250, 300, 4)), ("F0", np.linspace(1, 200, 4))
+    ),
+    "find_snap": lambda: fm.find_snap(SCENE, stable(SCENE)),
+    "critical_values": lambda: fm.critical_values(
+        fm.mechanisms.von_mises_truss(), "P", np.linspace(-900.0, 900.0, 7)
+    ),
+    "critical_curves": lambda: fm.critical_curves(
+        fm.mechanisms.von_mises_truss(), ("P", np.linspace(-900, 900, 5)), ("k", [800.0, 1200.0])
+    ),
+    "erosion": lambda: fm.erosion(
+        SCENE, "F0", [0.0, 10.0], GRID, most_shock=1.0, n=8, directions=4
+    ),
+    "map_snapping": lambda: fm.map_snapping(SCENE.replace(alpha=1.0), [50.0, 100.0], [1.0, 2.0], t_end=20.0),
+    "shock_limit": lambda: fm.shock_limit(SCENE, stable(SCENE), "M2", 0.0),
+    "barrier_tree": lambda: fm.barrier_tree(SCENE),
+    "basin_fractions": lambda: fm.basin_fractions([0, 0, 1, -1])[1],
+    "basin_stability": lambda: fm.basin_stability([0, 0, 1, -1], 0),
+    "basin_entropy": lambda: fm.basin_entropy(np.indices((20, 20)).sum(0) // 7 % 3),
+    "integrity": lambda: fm.integrity(np.zeros((9, 9), int), [np.arange(9.0)] * 2, 0, [4.0, 4.0], np.eye(2)),
+    "largest_lyapunov": lambda: fm.largest_lyapunov(SCENE, [0.1, 0.2, 0.0, 0.0], 2.0),
+    "transient_growth": lambda: fm.transient_growth(SCENE, stable(SCENE)),
+    "find_attractors": lambda: fm.find_attractors(duffing(), {"x": (-1.5, 1.5), "v": (-1.0, 1.0)}, 32),
+    "frequency_response": lambda: fm.frequency_response(
+        duffing(), "amplitude", (0.01, 0.06), {"x": (-1.5, 1.5), "v": (-1.0, 1.0)}
+    ),
+    "follow_basins": lambda: fm.follow_basins(
+        duffing(), "amplitude", [0.02, 0.04], {"x": (-1.5, 1.5), "v": (-1.0, 1.0)}, 32
+    ),
+    "periodic_orbits": lambda: fm.periodic_orbits(duffing(), {"x": (-1.5, 1.5), "v": (-1.0, 1.0)}, 8),
+    "minimal_shock": lambda: fm.minimal_shock(
+        lambda y: (y[:, 0] > 1.0).astype(int), [0.0, 0.0], np.eye(2), most=3.0, directions=8
+    ),
+    "track_edge": lambda: fm.track_edge(
+        duffing(), [1.0, 0.0], [-1.0, 0.0], sides, np.eye(2), t_end=1.0, dt=0.1
+    ),
+    "wada_merge_test": lambda: fm.wada_merge_test(np.indices((30, 30)).sum(0) // 20),
+    "fractal_boundary_test": lambda: fm.fractal_boundary_test(np.indices((40, 40)).sum(0) // 40, balls=50),
+    "boundary_dimension": lambda: fm.boundary_dimension(np.indices((64, 64)).sum(0) // 64),
+    "system": duffing,
+    "mechanism": fm.mechanisms.von_mises_truss,
+    "work_precision": lambda: fm.work_precision(
+        SCENE, np.full((4, 4), 0.1), 1.0, errors=(1e-3,), methods=("rk4",)
+    ),
+}  # fmt: skip
+
+#: Public functions that give plain arrays, numbers, functions, open files or another library's objects; those
+#: whose results are of a class that is walked; and one that needs a further library.
+PLAIN = {
+    "angles", "animate", "cos", "critical_forces", "impulse_start", "kinetic_norm", "largest_stable_step",
+    "lengths",
+    "nearest_saddle", "number_turns", "open_results", "report", "reactions",
+    "sin", "step_warning", "system_info",
+    "tipping_probabilities", "trapped", "well_numbers", "well_of_number", "wilson",
+    "brute_force_shock", "finite_time_basin_stability", "uncertainty_exponent", "group_by_features",
+}  # fmt: skip
+
+found: dict[str, Any] = {}
+
+
+def test_every_public_function_is_walked() -> None:
+    functions = {name for name in fm.__all__ if not isinstance(getattr(fm, name), type)}
+    assert functions == {name.partition(",")[0] for name in CALLS} & functions | PLAIN
+
+
+def test_dir_holds_public_names_and_the_docstring_groups_them() -> None:
+    assert dir(fm) == sorted([*fm.__all__, "loads", "mechanisms", "samplers", "__version__"])
+    told = set(re.findall(r"\w+", str(fm.__doc__)))
+    assert set(fm.__all__) <= told
+
+
+def test_help_on_a_scene_shows_parameters_and_hides_how_they_are_checked() -> None:
+    page = pydoc.render_doc(fm.Scene, renderer=pydoc.plaintext)
+    assert len(page.splitlines()) < 100
+    assert "pydantic" not in page
+    assert not [name for name in dir(fm.Scene) if name.startswith(("model_", "__pydantic"))]
+    for name, (value, unit, about) in fm.Scene(c1=300.0).described().items():
+        assert f"{name} = {value:g} {unit}: {about}" in repr(fm.Scene(c1=300.0))
+        assert about in page
+    assert str(inspect.signature(fm.Scene)).startswith("(*, m1: float = 10.0")
+
+
+def test_scenes_are_values() -> None:
+    scene = fm.Scene(c1=300.0)
+    assert pickle.loads(pickle.dumps(scene)) == copy.deepcopy(scene) == scene
+    assert eval(repr(scene).splitlines()[0], {"Scene": fm.Scene}) == scene
+    assert len({scene, fm.Scene(c1=300.0), fm.Scene()}) == 2
+
+
+@pytest.fixture(params=CALLS)
+def result(request: pytest.FixtureRequest) -> Any:
+    """What a call gives, computed once."""
+    if request.param not in found:
+        found[request.param] = CALLS[request.param]()
+    return found[request.param]
+
+
+def test_it_prints_in_six_lines(result: Any) -> None:
+    lines = repr(result).splitlines()
+    assert 1 <= len(lines) <= 6, repr(result)
+    assert max(map(len, lines)) <= 110, repr(result)
+    assert "array(" not in repr(result)
+    assert "object at" not in repr(result)
+
+
+def test_notebooks_show_the_same(result: Printed) -> None:
+    html = result._repr_html_()
+    assert html.startswith("<div>")
+    assert (
+        repr(result).splitlines()[0].replace("<", "&lt;").replace(">", "&gt;").replace("'", "&#x27;")[:20]
+        in html
+    )
+
+
+def test_xarray_has_a_unit_on_every_variable_and_files_give_equal_numbers(
+    result: Any, tmp_path: Path
+) -> None:
+    if not isinstance(result, Result):
+        return
+    dataset = result.to_xarray()
+    assert dataset.variables
+    for name, variable in dataset.variables.items():
+        assert variable.attrs["units"], name
+        assert variable.attrs["long_name"], name
+    result.save(tmp_path / "kept.h5")
+    with fm.open_results(tmp_path / "kept.h5") as kept:
+        (section,) = kept.sections
+        stored = kept[section].load()
+        if result.system is not None:
+            assert kept.scene == {n: v for n, (v, *_) in result.system.described().items()}
+    for name, variable in stored.merged.variables.items():
+        np.testing.assert_array_equal(variable.data, dataset[name].values, err_msg=name)
+        assert variable.units == dataset[name].attrs["units"]
+    with pytest.raises(fm.InputError, match="exists already"):
+        result.save(tmp_path / "kept.h5")
+    result.save(tmp_path / "kept.h5", replace=True)
+
+
+def test_it_draws_into_the_axes_that_it_is_given(result: Any) -> None:
+    if not isinstance(result, Drawn):
+        return
+    with matplotlib.rc_context({"font.size": 17.0, "axes.facecolor": "#eeeeff", "axes.grid": True}):
+        before = dict(matplotlib.rcParams)
+        figure = Figure(figsize=(12.0, 8.0), layout="constrained")
+        left, right = figure.subplots(1, 2)
+        assert result.plot(ax=right) is right
+        assert dict(matplotlib.rcParams) == before
+        assert right.has_data()
+        assert not left.has_data()
+        assert matplotlib.colors.same_color(right.get_facecolor(), "#eeeeff")
+        assert right.xaxis.label.get_fontsize() == 17.0
+        assert right.get_xlabel() or right.get_ylabel()
+        figure.canvas.draw()
+    with pytest.raises(fm.InputError, match="must be the axes"):
+        result.plot(ax=3)
+
+
+def test_without_axes_it_makes_a_figure_of_its_own() -> None:
+    from matplotlib import pyplot
+
+    ax = fm.find_equilibria(SCENE).plot()
+    assert pyplot.gcf() is ax.figure
+    pyplot.close(ax.figure)
+
+
+def test_files_of_objects_are_drawn_as_scans_are(tmp_path: Path) -> None:
+    from fastmech.runner import draw_results
+
+    fm.map_basins(SCENE, GRID, 10.0).save(tmp_path / "map.h5")
+    assert next(draw_results(tmp_path / "map.h5")).name == "basins_labels.png"
