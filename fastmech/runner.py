@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from fastmech.ensembles.run import Progress
+from fastmech.ensembles.system import System
 from fastmech.errors import InputError, StepWarning, shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots.style import save
@@ -26,7 +27,7 @@ def run_request(
     hire: Hiring | None = None,
     tell: Callable[[str], None] = lambda line: None,
     text: str | None = None,
-    mechanism: Mechanism | None = None,
+    mechanism: Mechanism | System | None = None,
 ) -> RunReport:
     """Run every scan of a request file and write one result file; an interrupted run goes on.
 
@@ -43,7 +44,7 @@ def run_request(
         hire: who computes, threads of this process by default; see :mod:`fastmech.tiles.cluster`.
         tell: is given lines for the user.
         text: of the request, by default that of the file; ``path`` then is its name.
-        mechanism: one of your own that the request is about.
+        mechanism: one of your own, or a system, that the request is about.
 
     Raises:
         InputError: the request is wrong, the result cannot be written, or it exists and ``fresh`` is False.

@@ -28,6 +28,7 @@ COMMANDS = {
     "explore": "explore",
     "equilibria": "equilibria",
     "paper": "reports",
+    "report": "reports",
     "hardcases": "reports",
     "bench": "reports",
     "warmup": "warmup",

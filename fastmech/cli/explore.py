@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 import click
 
 from fastmech.errors import InputError
+
+if TYPE_CHECKING:
+    from fastmech.explore.device import Device
 
 
 @click.command(name="explore")
@@ -28,14 +34,50 @@ def explore(what: str | None, port: int, no_browser: bool) -> None:
             "explore: needs starlette, uvicorn and websockets; install them with:"
             " pip install 'fastmech[explore]'"
         ) from None
-    from fastmech.explore.device import open_device
     from fastmech.explore.serve import serve
 
     def ready(address: str) -> None:
         click.echo(f"fastmech: {address} (Ctrl-C ends)")
         if not no_browser:
+            import threading
             import webbrowser
 
-            webbrowser.open(address)
+            threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
 
-    serve(open_device(what), port, ready)
+    serve(opened(what), port, ready)
+
+
+def opened(what: str | None) -> Device:
+    """What the command's argument stands for; None is Table 1.
+
+    Raises:
+        InputError: there is no such thing.
+    """
+    from fastmech.explore.device import Device
+    from fastmech.scene import Scene, parse_toml, read_toml
+
+    if what is None:
+        return Device(Scene())
+    results = None
+    if what.endswith((".h5", ".hdf5")):
+        from fastmech.store.read import open_results
+
+        with open_results(what) as found:
+            table, results = parse_toml(found.request, what), Path(what)
+    elif what.endswith(".toml"):
+        table = read_toml(what)
+    elif ":" in what:
+        from fastmech.cli.run import mechanism_named
+        from fastmech.models.mechanism import Mechanism
+
+        made = mechanism_named(what)
+        if not isinstance(made, Mechanism):
+            raise InputError(f"{what}: is a System, which has no drawing; give a Mechanism")
+        return Device(made, what)
+    else:
+        table = {"mechanism": what}
+    if "mechanism" not in table:
+        return Device(Scene(**table.get("scene", {})), None, results)
+    from fastmech.scan_types.request import device_of
+
+    return Device(device_of(table), table["mechanism"], results)

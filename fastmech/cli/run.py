@@ -13,6 +13,7 @@ import click
 from fastmech.cli.reporting import Account, account, reporting_options
 
 if TYPE_CHECKING:
+    from fastmech.ensembles.system import System
     from fastmech.models.mechanism import Mechanism
     from fastmech.scan_types.request import RunContext
     from fastmech.tiles.run import RunReport
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
 @click.option(
     "--mechanism",
     metavar="FILE.py:NAME",
-    help="What the request is about: a mechanism, or a function that gives one.",
+    help="What the request is about: a mechanism, a system, or a function that gives one.",
 )
 @click.option("--tile", metavar="SECTION:INDEX", help="Compute one tile alone.")
 @click.option(
@@ -83,7 +84,7 @@ def run(
             from fastmech.scan_types.request import RunContext
             from fastmech.tiles.run import default_output
 
-            own = None if mechanism is None else _mechanism_named(mechanism)
+            own = None if mechanism is None else mechanism_named(mechanism)
         context = RunContext(threads, told.bars.stage)
         target = out or default_output(request_file)
         if tile is not None:
@@ -100,12 +101,13 @@ def run(
             _compare(told, before, report.path)
 
 
-def _mechanism_named(where: str) -> Mechanism:
-    """A mechanism by file and name.
+def mechanism_named(where: str) -> Mechanism | System:
+    """A mechanism or a system by file and name.
 
     Raises:
         InputError: there is none.
     """
+    from fastmech.ensembles.system import System
     from fastmech.errors import InputError, one_line, shown, shown_name
     from fastmech.models.mechanism import Mechanism
 
@@ -122,8 +124,10 @@ def _mechanism_named(where: str) -> Mechanism:
     except Exception as error:
         told = one_line(f"{type(error).__name__}: {error}")
         raise InputError(f"{shown_name(file)}: cannot be run: {told}") from None
-    if not isinstance(found, Mechanism):
-        raise InputError(f"{shown_name(file)}: {shown_name(name)} is no fastmech.Mechanism, nor gives one")
+    if not isinstance(found, Mechanism | System):
+        raise InputError(
+            f"{shown_name(file)}: {shown_name(name)} is no fastmech.Mechanism or System, nor gives one"
+        )
     return found
 
 
@@ -167,7 +171,7 @@ def _run_tile(
     target: Path,
     keep: Path | None,
     context: RunContext,
-    mechanism: Mechanism | None,
+    mechanism: Mechanism | System | None,
 ) -> None:
     from fastmech.store.write import check_writable
     from fastmech.tiles.look import compute_alone

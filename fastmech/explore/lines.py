@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,43 +12,50 @@ from fastmech.explore.device import Device
 
 def python_of(device: Device, message: Any, divisions: int) -> str:
     """Python lines that compute what a message asked for; axes have so many divisions."""
-    lines = ["import numpy as np", "import fastmech as fm", "", device.python(message.parameters)]
+    lines = ["import numpy as np", "import fastmech as fm", "", _system(device, message.parameters)]
     match message.kind:
         case "equilibria":
-            lines += [
-                "found = fm.find_equilibria(system)",
-                "verdicts = [fm.classify(system, e).verdict for e in found]",
-                "print(found, verdicts)",
-            ]
+            lines += ["found = fm.find_equilibria(system)"]
+            lines += ["print(found, [fm.classify(system, e).verdict for e in found])"]
         case "motion":
             start = [message.start.get(name, 0.0) for name in device.state]
-            lines += [
-                f"times = np.linspace(0.0, {message.t_end!r}, {message.outputs})",
-                f"run = fm.integrate(system, [{start!r}], {message.t_end!r}, t_eval=times,"
-                f' dt={device.dt!r}, method="dop853")',
-                "print(run.y[:, 0])",
-            ]
+            how = f'{message.t_end!r}, t_eval=times, dt={device.dt!r}, method="dop853"'
+            lines += [f"times = np.linspace(0.0, {message.t_end!r}, {message.outputs})"]
+            lines += [f"run = fm.integrate(system, [{start!r}], {how})", "print(run.y[:, 0])"]
         case "basins":
-            lines += [
-                f"axes = {_axes(message.axes, divisions)}",
-                f"found = fm.map_basins(system, axes, {message.t_end!r}, fixed={dict(message.fixed)!r})",
-                "print(found)",
-            ]
+            how = f"{message.t_end!r}, fixed={dict(message.fixed)!r}"
+            lines += [f"axes = {_axes(message.axes, divisions)}"]
+            lines += [f"found = fm.map_basins(system, axes, {how})", "print(found)"]
         case "atlas":
             curves = "fm.trace_folds" if device.is_scene else "fm.critical_curves"
-            first, second = message.axes
-            lines += [
-                f"axes = {_axes(message.axes, divisions)}",
-                "found = fm.map_equilibria(system, axes)",
-                f'curves = {curves}(system, ("{first}", axes["{first}"]), ("{second}", axes["{second}"]))',
-                "print(found.count)",
-            ]
+            lines += [f"axes = {_axes(message.axes, divisions)}", "found = fm.map_equilibria(system, axes)"]
+            lines += [f"curves = {curves}(system, *axes.items())", "print(found.count)"]
     return "\n".join(lines) + "\n"
+
+
+def _system(device: Device, parameters: Mapping[str, float]) -> str:
+    """The lines that make the system."""
+    values = device.at(parameters).described().items()
+    given = ", ".join(f"{name}={value!r}" for name, (value, *_) in values)
+    source = str(device.source)
+    if device.is_scene:
+        return f"system = fm.Scene({given})"
+    if ":" in source:
+        file, _, name = source.rpartition(":")
+        made = f"import runpy\n\nmade = runpy.run_path({file!r})[{name!r}]\n"
+        return f"{made}system = (made if isinstance(made, fm.Mechanism) else made()).replace({given})"
+    made, _, number = source.rpartition("_") if source.startswith("pendulum_chain") else (source, "", "")
+    return f"system = fm.mechanisms.{made}({number}).replace({given})"
 
 
 def request_of(device: Device, message: Any, divisions: int) -> str:
     """The text of a request that computes the same."""
-    lines = [f'title = "{device.name}, from the explorer"', *device.request_head()]
+    source, head = str(device.source), list[str]()
+    if ":" in source:
+        head = [f"# fastmech run THIS.toml --mechanism {source}"]
+    elif not device.is_scene:
+        head = [f'mechanism = "{source}"']
+    lines = [f'title = "{device.name}, from the explorer"', *head]
     lines += ["", "[scene]", *(f"{name} = {value!r}" for name, value in message.parameters.items())]
     match message.kind:
         case "equilibria":
@@ -75,14 +81,10 @@ def grid(ends: list[float], divisions: int) -> np.ndarray[Any, np.dtype[np.float
 
 
 def _axes(axes: Mapping[str, list[float]], divisions: int) -> str:
-    each = (
-        f"{json.dumps(name)}: np.linspace({a!r}, {b!r}, {divisions + 1})" for name, (a, b) in axes.items()
-    )
+    each = (f"{name!r}: np.linspace({a!r}, {b!r}, {divisions + 1})" for name, (a, b) in axes.items())
     return "{" + ", ".join(each) + "}"
 
 
 def _tables(axes: Mapping[str, list[float]], divisions: int) -> list[str]:
-    return [
-        f"axes.{name} = {{ start = {a!r}, stop = {b!r}, num = {divisions + 1} }}"
-        for name, (a, b) in axes.items()
-    ]
+    ends = ((name, f"start = {a!r}, stop = {b!r}") for name, (a, b) in axes.items())
+    return [f"axes.{name} = {{ {told}, num = {divisions + 1} }}" for name, told in ends]

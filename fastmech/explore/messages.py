@@ -72,8 +72,8 @@ class PullMessage(Message):
 
     kind: Literal["pull"]
     point: Annotated[str, Field(max_length=100)]
-    to: Range
     q: Annotated[list[float], Field(max_length=4)]
+    to: Range
 
 
 class StrikeMessage(Message):
@@ -81,9 +81,9 @@ class StrikeMessage(Message):
 
     kind: Literal["strike"]
     point: Annotated[str, Field(max_length=100)]
+    q: Annotated[list[float], Field(max_length=4)]
     mass: Annotated[float, Field(gt=0)]
     velocity: Range
-    q: Annotated[list[float], Field(max_length=4)]
 
 
 class StopMessage(Message):
@@ -93,15 +93,7 @@ class StopMessage(Message):
     what: Literal["equilibria", "motion", "basins", "atlas", "pull", "strike"]
 
 
-_KINDS: dict[str, type[Message]] = {
-    "equilibria": EquilibriaMessage,
-    "motion": MotionMessage,
-    "basins": BasinsMessage,
-    "atlas": AtlasMessage,
-    "pull": PullMessage,
-    "strike": StrikeMessage,
-    "stop": StopMessage,
-}
+_KINDS = {one.__name__.removesuffix("Message").lower(): one for one in Message.__subclasses__()}
 _TABLE = TypeAdapter(dict[str, Any])
 
 
@@ -119,8 +111,7 @@ def read_message(text: str | bytes) -> Any:
         raise InputError(f"message = {shown(text)}: must be a JSON object") from None
     kind = table.get("kind")
     if not isinstance(kind, str) or kind not in _KINDS:
-        hint = nearest(kind if isinstance(kind, str) else "", list(_KINDS))
-        raise InputError(f"message.kind = {shown(kind)}: unknown; {hint}")
+        raise InputError(f"message.kind = {shown(kind)}: unknown; {nearest(str(kind), list(_KINDS))}")
     try:
         message = _KINDS[kind].model_validate(table)
     except ValidationError as error:
@@ -139,11 +130,9 @@ def frame(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> bytes:
     """
     told, pieces, place = [], list[bytes](), 0
     for name, values in arrays.items():
-        array = np.ascontiguousarray(values)
-        array = array.astype("<f4" if array.dtype.kind == "f" else "i1")
-        content = array.tobytes()
+        array = np.asarray(values, dtype="<f4" if np.asarray(values).dtype.kind == "f" else "i1")
         told.append({"name": name, "type": array.dtype.str, "shape": array.shape, "place": place})
-        pieces.append(content + b"\0" * (-len(content) % 8))
+        pieces.append(array.tobytes() + b"\0" * (-array.nbytes % 8))
         place += len(pieces[-1])
     text = json.dumps({**header, "arrays": told}, allow_nan=False).encode()
     text += b" " * ((-len(text) - 4) % 8)

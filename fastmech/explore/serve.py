@@ -15,35 +15,36 @@ import tempfile
 import threading
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-import uvicorn
 from starlette.applications import Starlette
+from starlette.datastructures import Headers
 from starlette.middleware import Middleware
 from starlette.requests import Request
 from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocket
 
 from fastmech.errors import InputError, one_line
 from fastmech.explore.device import Device
 from fastmech.explore.messages import LONGEST, read_message
-from fastmech.explore.work import replies
-from fastmech.jit import listeners
+from fastmech.explore.work import MODULES, load, replies
+from fastmech.interrupts import Cancelled, work_while
 
 PAGE = Path(__file__).parent / "page"
 
+#: Answers that wait for a page, seconds that they do, and kernels of all views of a scene, about.
+WAITING, PATIENCE, KERNELS = 64, 10.0, 15
+
 #: What a browser may load: this server's files alone, and no code but them.
 POLICY = (
-    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
-    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' blob: data:;"
 )
-
-
-class _CancelledError(Exception):
-    """Newer work has come, or the page is gone."""
+POLICY += " base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+HEADERS = ((b"content-security-policy", POLICY.encode()), (b"x-content-type-options", b"nosniff"))
 
 
 class _OnlyHere:
@@ -56,153 +57,160 @@ class _OnlyHere:
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
-        headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
-        origin = headers.get("origin")
-        own = {f"http://{host}" for host in self._hosts}
-        right = headers.get("host") in self._hosts and (origin in own or origin is None)
-        if scope["type"] == "websocket" and (not right or origin is None):
-            await WebSocket(scope, receive, send).close(1008)
-            return
-        if not right:
-            await PlainTextResponse("fastmech explore answers this machine only\n", 403)(scope, receive, send)
+        headers, talks = Headers(scope=scope), scope["type"] == "websocket"
+        own = {f"http://{host}" for host in self._hosts} | (set() if talks else {None})
+        if headers.get("host") not in self._hosts or headers.get("origin") not in own:
+            refused = PlainTextResponse("fastmech explore answers this machine only\n", 403)
+            await (WebSocket(scope, receive, send).close(1008) if talks else refused(scope, receive, send))
             return
 
         async def guarded(message: Any) -> None:
             if message["type"] == "http.response.start":
-                message["headers"] = [
-                    *message["headers"],
-                    (b"content-security-policy", POLICY.encode()),
-                    (b"x-content-type-options", b"nosniff"),
-                    (b"cache-control", b"no-store"),
-                ]
+                message["headers"] = [*message["headers"], *HEADERS, (b"cache-control", b"no-store")]
             await send(message)
 
         await self._app(scope, receive, guarded)
 
 
 class _Page:
-    """The work for one open page: of each kind the newest only."""
+    """The work for one open page: of each kind one thread, which does the newest message only."""
 
     def __init__(self, device: Device, send: Callable[[str | bytes], None]) -> None:
-        self._device, self._send, self._newest = device, send, dict[str, int]()
-        self._counter = 0
+        self._device, self._send = device, send
+        self._newest, self._waiting, self._busy = dict[str, int](), dict[str, Any](), set[str]()
+        self._counter, self._lock = 0, threading.Lock()
 
     def take(self, text: str | bytes) -> None:
-        """Begin what a message asks for; what is wrong with it is told to the page."""
-        try:
-            message = read_message(text)
-        except InputError as error:
-            self.fail(str(error), {})
-            return
+        """Begin what a message asks for; what is wrong with it is told to the page.
+
+        Raises:
+            InputError: it is no message.
+        """
+        message = read_message(text)
         kind = message.what if message.kind == "stop" else message.kind
-        self._counter += 1
-        self._newest[kind] = self._counter
-        if message.kind != "stop":
-            threading.Thread(target=self._work, args=(message, self._counter), daemon=True).start()
+        with self._lock:
+            self._counter += 1
+            self._newest[kind] = self._counter
+            self._waiting[kind] = message
+            if message.kind == "stop":
+                del self._waiting[kind]
+            elif kind not in self._busy:
+                self._busy.add(kind)
+                threading.Thread(target=self._work, args=(kind,), name=kind, daemon=True).start()
 
     def close(self) -> None:
         """End all work."""
-        self._newest.clear()
+        with self._lock:
+            self._newest.clear()
+            self._waiting.clear()
 
-    def fail(self, line: str, about: dict[str, Any]) -> None:
-        """Tell one line of error."""
-        self._send(json.dumps({"kind": "error", "line": one_line(line), **about}))
+    def _wants(self, kind: str, number: int | None) -> bool:
+        return self._newest.get(kind) == number
 
-    def _work(self, message: Any, number: int) -> None:
-        def tell(finished: int) -> None:
-            if self._newest.get(message.kind) != number:
-                raise _CancelledError
+    def _work(self, kind: str) -> None:
+        while True:
+            with self._lock:
+                message, number = self._waiting.pop(kind, None), self._newest.get(kind)
+                if message is None:
+                    self._busy.discard(kind)
+                    return
+            work_while(partial(self._wants, kind, number))
+            try:
+                for content in replies(self._device, message):
+                    self._send(content)
+            except Cancelled:
+                pass
+            except Exception as error:  # whatever goes wrong, the page says so and the server goes on
+                line = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
+                self._send(_error(line, of=kind, id=message.id))
 
-        try:
-            for content in replies(self._device, message, tell):
-                tell(0)
-                self._send(content)
-        except _CancelledError:
-            pass
-        except InputError as error:
-            self.fail(str(error), {"of": message.kind, "id": message.id})
-        except Exception as error:  # whatever goes wrong, the page says so and the server goes on
-            self.fail(f"{type(error).__name__}: {error}", {"of": message.kind, "id": message.id})
+
+def _error(line: str, **about: Any) -> str:
+    return json.dumps({"kind": "error", "line": one_line(line), **about})
 
 
 def application(device: Device, port: int) -> Starlette:
     """The server's application."""
-    pages = set[Callable[[str | bytes], None]]()
+    pages, kernels = set[Callable[..., None]](), list[str]()
 
     def compiling(name: str | None) -> None:
+        kernels.extend([name] if name else [])
+        told: dict[str, Any] = {"kind": "compiling", "name": name, "of": threading.current_thread().name}
+        told |= {"number": len(kernels), "about": max(KERNELS, len(kernels))}
         for send in list(pages):
-            send(json.dumps({"kind": "compiling", "name": name}))
+            send(json.dumps(told), 0.0)
+
+    def prepare() -> None:
+        load("equilibria")
+        from fastmech.jit import listeners
+
+        listeners.append(compiling)
+        for kind in MODULES:
+            load(kind)
 
     @asynccontextmanager
     async def listening(app: Starlette) -> AsyncIterator[None]:
-        listeners.append(compiling)
-        try:
-            yield
-        finally:
-            listeners.remove(compiling)
-
-    async def index(request: Request) -> Response:
-        return Response((PAGE / "index.html").read_bytes(), media_type="text/html")
+        threading.Thread(target=prepare, daemon=True).start()
+        yield
 
     async def sections(request: Request) -> Response:
         try:
-            return JSONResponse(await asyncio.to_thread(_pictures, device, folder))
+            return JSONResponse(device.results and await asyncio.to_thread(_sections, device.results, folder))
         except InputError as error:
             return JSONResponse({"error": str(error)}, 400)
 
     async def talk(websocket: WebSocket) -> None:
         await websocket.accept()
-        loop, queue = asyncio.get_running_loop(), asyncio.Queue[str | bytes]()
+        loop, queue = asyncio.get_running_loop(), asyncio.Queue[str | bytes](WAITING)
 
-        def send(content: str | bytes) -> None:
-            if not loop.is_closed():
-                loop.call_soon_threadsafe(queue.put_nowait, content)
+        def send(content: str | bytes, patience: float = PATIENCE) -> None:
+            """Called by threads; a page that takes nothing is not waited for endlessly."""
+            with suppress(RuntimeError, TimeoutError):
+                asyncio.run_coroutine_threadsafe(queue.put(content), loop).result(patience)
 
         async def deliver() -> None:
             while True:
                 content = await queue.get()
-                if isinstance(content, str):
-                    await websocket.send_text(content)
-                else:
-                    await websocket.send_bytes(content)
+                kind = "text" if isinstance(content, str) else "bytes"
+                await websocket.send({"type": "websocket.send", kind: content})
 
         page, delivery = _Page(device, send), asyncio.create_task(deliver())
         pages.add(send)
-        send(json.dumps({"kind": "about", **device.about()}))
+        await queue.put(json.dumps({"kind": "about", **device.about()}))
         try:
-            while True:
-                got = await websocket.receive()
-                if got["type"] == "websocket.disconnect":
-                    break
-                page.take(got.get("text") or got.get("bytes") or "")
-        except WebSocketDisconnect:
-            pass
+            while (got := await websocket.receive())["type"] != "websocket.disconnect":
+                try:
+                    page.take(got.get("text") or got.get("bytes") or "")
+                except InputError as error:
+                    await queue.put(_error(str(error)))
         finally:
             pages.discard(send)
             page.close()
             delivery.cancel()
 
     folder = Path(tempfile.mkdtemp(prefix="fastmech-explore-")) if device.results else PAGE
-    routes = [
-        Route("/", index),
-        Route("/sections", sections),
-        WebSocketRoute("/talk", talk),
-        Mount("/page", StaticFiles(directory=PAGE)),
-        Mount("/pictures", StaticFiles(directory=folder)),
-    ]
+    routes = [Route("/sections", sections), WebSocketRoute("/talk", talk)]
+    files = {"/pictures": StaticFiles(directory=folder), "/": StaticFiles(directory=PAGE, html=True)}
+    routes += [Mount(path, served) for path, served in files.items()]
     return Starlette(routes=routes, middleware=[Middleware(_OnlyHere, port=port)], lifespan=listening)
 
 
-def _pictures(device: Device, folder: Path) -> list[str]:
-    """Names of the pictures of a result file's sections, drawn when they are asked for first."""
-    if device.results is None:
-        return []
-    there = sorted(path.name for path in folder.glob("*.svg"))
-    if there:
-        return there
+@cache
+def _sections(path: Path, folder: Path) -> list[dict[str, Any]]:
+    """Sections of the result file with their pictures, which are drawn when they are asked for first."""
     from fastmech.runner import draw_results
+    from fastmech.store.read import open_results
 
-    return [path.name for path in draw_results(device.results, folder, form="svg")]
+    with open_results(path) as results:
+        names, request = list(results), results.request
+    told = []
+    for k, name in enumerate(names):
+        drawn = draw_results(path, folder / str(k), form="svg", section=name)
+        python = f"import fastmech as fm\n\nwith fm.open_results({str(path)!r}) as results:\n"
+        python += f"    print(results[{name!r}].to_xarray())\n"
+        pictures = [f"{k}/{one.name}" for one in drawn]
+        told.append({"name": name, "pictures": pictures, "python": python, "request": request})
+    return told
 
 
 def serve(device: Device, port: int, ready: Callable[[str], None]) -> None:
@@ -211,22 +219,20 @@ def serve(device: Device, port: int, ready: Callable[[str], None]) -> None:
     Raises:
         InputError: the port is taken.
     """
-    own = socket.socket()
-    own.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    import uvicorn
+
     try:
-        own.bind(("127.0.0.1", port))
+        own = socket.create_server(("127.0.0.1", port))
     except OSError as error:
         raise InputError(f"--port {port}: cannot be used: {error.strerror}") from None
     port = own.getsockname()[1]
-    config = uvicorn.Config(
-        application(device, port), log_level="critical", ws="websockets-sansio", ws_max_size=LONGEST * 4,
-        timeout_graceful_shutdown=0,
-    )  # fmt: skip
-    server = uvicorn.Server(config)
-    own.listen()
+    how: dict[str, Any] = {"log_level": "critical", "ws": "websockets-sansio", "ws_max_size": 4 * LONGEST}
+    config = uvicorn.Config(application(device, port), timeout_graceful_shutdown=0, **how)
+    # The page's files are served while the libraries are imported: threads take turns that often [s].
+    sys.setswitchinterval(5e-4)
     ready(f"http://127.0.0.1:{port}/")
     with suppress(KeyboardInterrupt):
-        server.run(sockets=[own])
+        uvicorn.Server(config).run(sockets=[own])
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(0)  # a kernel that is being compiled or runs would hold the process

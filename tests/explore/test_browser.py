@@ -1,8 +1,13 @@
-"""The explorer's page in Debian's chromium: its numbers are the library's, and it is quick."""
+"""The explorer's page in Debian's chromium: its numbers are the library's, and it is quick.
+
+Times are told in a table beside what is wanted on two processors that are idle; what fails is only what no
+loaded machine explains.
+"""
 
 from __future__ import annotations
 
 import json
+import os
 import random
 import re
 import shutil
@@ -11,13 +16,17 @@ import statistics
 import subprocess
 import sys
 import time
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import fastmech as fm
+from fastmech.runner import run_request
 
 pytest.importorskip("starlette", reason="the extra explore is not installed")
 driver = pytest.importorskip("playwright.sync_api", reason="no Playwright: make test-browser")
@@ -52,26 +61,42 @@ class Opened:
         self.page.wait_for_timeout(1500)
 
     def press(self, where: str, x: float, y: float) -> None:
+        self.page.locator(f"{where} canvas").first.scroll_into_view_if_needed()
         box = self.page.locator(f"{where} canvas").first.bounding_box()
         self.page.mouse.click(box["x"] + x * box["width"], box["y"] + y * box["height"])
 
 
-@pytest.fixture(scope="module")
-def opened() -> Iterator[Opened]:
-    command = [sys.executable, "-m", "fastmech", "explore", "--no-browser"]
+@contextmanager
+def serving(*what: str) -> Iterator[str]:
+    """The command's page, ended by Ctrl-C."""
+    command = [sys.executable, "-m", "fastmech", "explore", "--no-browser", *what]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
     found = re.search(r"http\S+", process.stdout.readline())
     assert found is not None
-    with driver.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        made = Opened(browser.new_page(viewport={"width": 1600, "height": 1000}), found[0])
-        made.settle()
-        yield made
-        browser.close()
+    yield found[0]
     process.send_signal(signal.SIGINT)
     process.wait(10)
     process.stdout.close()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with driver.sync_playwright() as playwright:
+        opened = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield opened
+        opened.close()
+
+
+@pytest.fixture(scope="module")
+def opened(browser: Any) -> Iterator[Opened]:
+    with serving() as address:
+        context = browser.new_context(viewport={"width": 1600, "height": 1000})
+        context.grant_permissions(["clipboard-read", "clipboard-write"])
+        made = Opened(context.new_page(), address)
+        made.settle()
+        yield made
+        context.close()
 
 
 def positions(opened: Opened) -> list[list[float]]:
@@ -119,31 +144,280 @@ def test_a_reload_restores_the_state(opened: Opened) -> None:
     assert json.loads(before) == opened.page.evaluate("explorer.state")
 
 
-def test_budgets(opened: Opened) -> None:
-    opened.settle()
-    opened.page.evaluate("explorer.choose(0); explorer.waits.equilibria = []")
-    for k in range(40):
-        opened.page.evaluate(f"explorer.parameters.set('c1', {150 + k})")
-        opened.page.wait_for_timeout(110)
-    slider = statistics.median(opened.page.evaluate("explorer.waits.equilibria"))
-    opened.page.wait_for_timeout(6000)
-    opened.page.evaluate("explorer.basins.levels = {}; explorer.askBasins()")
-    opened.until("explorer.basins.levels[401] !== undefined", 30)
-    levels = opened.page.evaluate("explorer.basins.levels")
-    opened.page.evaluate("explorer.startAt({phi: 0.5, theta: 1}); explorer.letGo()")
-    opened.until("explorer.mechanism.playing", 10)
-    opened.page.wait_for_timeout(500)
-    opened.page.evaluate("explorer.mechanism.frames = []")
-    opened.page.wait_for_timeout(5000)
-    shown = np.diff(opened.page.evaluate("explorer.mechanism.frames"))
-    print(
-        f"\nslider to picture {slider:.0f} ms (median); basins 101 x 101 {levels['101']:.0f} ms,"
-        f" 401 x 401 {levels['401']:.0f} ms; {1e3 / shown.mean():.0f} pictures a second,"
-        f" longest pause {shown.max():.0f} ms"
+def test_the_atlas_s_point_is_dragged_and_the_table_follows(opened: Opened) -> None:
+    opened.page.locator("#atlas canvas").scroll_into_view_if_needed()
+    box = opened.page.locator("#atlas canvas").bounding_box()
+    x, y = box["x"] + 0.6 * box["width"], box["y"] + 0.5 * box["height"]
+    opened.page.mouse.move(x, y)
+    opened.page.mouse.down()
+    opened.page.mouse.move(x + 40, y + 60, steps=4)
+    opened.page.mouse.up()
+    opened.page.wait_for_timeout(1000)
+    parameters = opened.page.evaluate("explorer.state.parameters")
+    assert parameters["F0"] != 100.0
+    assert parameters["c2"] != 366.67
+    np.testing.assert_allclose(
+        positions(opened), fm.find_equilibria(fm.Scene(**parameters)).position, atol=1e-6
     )
-    assert slider < 500.0
-    assert levels["401"] < 15_000.0
-    assert shown.max() < 1000.0
+    opened.page.get_by_text("reset all").click()
+
+
+def of_point(opened: Opened, name: str) -> tuple[float, float]:
+    """Where a point of the drawing is on the screen."""
+    told = opened.page.evaluate(
+        f"(() => {{ const m = explorer.mechanism, s = m.shown(), p = s.at[s.names.indexOf('{name}')][0],"
+        " r = m.plane.canvas.getBoundingClientRect();"
+        " return [r.left + m.plane.x(p[0]), r.top + m.plane.y(p[1])]; })()"
+    )
+    return float(told[0]), float(told[1])
+
+
+def test_a_mass_is_dragged_to_a_start(opened: Opened) -> None:
+    opened.page.evaluate("explorer.choose(0)")
+    opened.page.wait_for_timeout(300)
+    opened.page.locator("#mechanism canvas").scroll_into_view_if_needed()
+    x, y = of_point(opened, "M1")
+    opened.page.mouse.move(x, y)
+    opened.page.mouse.down()
+    opened.page.mouse.move(x + 40, y + 30, steps=5)
+    opened.page.wait_for_timeout(500)
+    there = of_point(opened, "M1")
+    opened.page.mouse.up()
+    opened.until("explorer.mechanism.playing", 20)
+    start = opened.page.evaluate("explorer.state.start")
+    # M1 moves on a circle about O: the nearest place lies towards the pointer.
+    o = of_point(opened, "O")
+    expected = np.arctan2(o[1] - y - 30, x + 40 - o[0])
+    assert start["phi"] == pytest.approx(expected, abs=0.05)
+    assert np.arctan2(o[1] - there[1], there[0] - o[0]) == pytest.approx(expected, abs=0.05)
+
+
+def test_a_kick_tells_speed_and_energy(opened: Opened) -> None:
+    opened.page.evaluate("explorer.choose(0)")
+    opened.page.wait_for_timeout(300)
+    opened.page.locator("#mechanism canvas").scroll_into_view_if_needed()
+    x, y = of_point(opened, "M2")
+    opened.page.keyboard.down("Shift")
+    opened.page.mouse.move(x, y)
+    opened.page.mouse.down()
+    opened.page.mouse.move(x + 50, y - 20, steps=4)
+    opened.until("explorer.mechanism.struck?.words.includes(' J')", 20)
+    words = opened.page.evaluate("explorer.mechanism.struck.words")
+    scale = opened.page.evaluate("explorer.mechanism.plane.x(1) - explorer.mechanism.plane.x(0)")
+    opened.page.mouse.up()
+    opened.page.keyboard.up("Shift")
+    opened.until("explorer.mechanism.playing", 20)
+    start = opened.page.evaluate("explorer.state.start")
+    state = [[start[name] for name in ("phi", "theta", "phi_dot", "theta_dot")]]
+    energy = float(fm.mechanisms.slider_pendulum().energies(state).kinetic[0])
+    speed, told = map(float, re.findall(r"[\d.]+", words))
+    assert told == pytest.approx(energy, rel=1e-2)
+    assert speed == pytest.approx(4.0 * np.hypot(50, 20) / scale, rel=0.1)
+
+
+def test_the_keyboard_reaches_and_works_everything(opened: Opened) -> None:
+    page = opened.page
+    page.evaluate("explorer.choose(0); document.activeElement.blur()")
+    every = "button, select, input, canvas, summary"
+    count = page.evaluate(f"document.querySelectorAll('{every}').length")
+    seen = "(e => { e.seen = true; return e === document.body || getComputedStyle(e).outlineStyle; })"
+    for _ in range(count + 3):  # it may begin at the end
+        page.keyboard.press("Tab")
+        assert page.evaluate(f"{seen}(document.activeElement)") != "none"
+    unseen = f"[...document.querySelectorAll('{every}')].filter(e => !e.seen && !e.disabled)"
+    assert page.evaluate(f"{unseen}.map(e => e.outerHTML.slice(0, 80))") == []
+    for view, value in [
+        ("#landscape canvas", "explorer.state.start"),
+        ("#basins canvas", "explorer.state.start"),
+        ("#mechanism canvas", "explorer.state.start"),
+        ("#atlas canvas", "explorer.state.parameters.F0"),
+        ("#parameters input[type=range]", "explorer.state.parameters.m1"),
+    ]:
+        before = page.evaluate(f"JSON.stringify({value} ?? null)")
+        page.locator(view).first.focus()
+        page.keyboard.press("ArrowRight")
+        opened.until(f"JSON.stringify({value} ?? null) !== {before!r}", 20)
+    page.get_by_label("velocity of the kick upwards [m/s]").fill("0.5")
+    page.get_by_text("kick [m/s]").press("Enter")
+    opened.until("explorer.state.start.theta_dot !== 0 && explorer.mechanism.playing", 20)
+    page.get_by_text("reset all").click()
+
+
+def test_screen_readers_find_a_name_of_everything(opened: Opened) -> None:
+    session = opened.page.context.new_cdp_session(opened.page)
+    nodes = session.send("Accessibility.getFullAXTree")["nodes"]
+    roles = {"button", "slider", "spinbutton", "combobox", "img", "image", "region", "DisclosureTriangle"}
+    told = [(n["role"]["value"], n.get("name", {}).get("value", "")) for n in nodes if not n["ignored"]]
+    named = [(role, name) for role, name in told if role in roles]
+    assert len(named) > 60
+    assert [role for role, name in named if not name.strip()] == []
+    buttons = [name for role, name in named if role == "button"]
+    assert len(buttons) == len(set(buttons))  # none is called as another
+
+
+def test_pictures_requests_and_python_are_taken_along(opened: Opened, tmp_path: Path) -> None:
+    page = opened.page
+    opened.press("#landscape", 0.6, 0.4)
+    opened.until("explorer.mechanism.playing", 30)
+    for view in ("mechanism", "landscape", "basins", "atlas", "motion", "portrait"):
+        for form in ("PNG", "SVG"):
+            with page.expect_download() as got:
+                page.locator(f"#{view} button", has_text=form).click()
+            path = tmp_path / f"{view}.{form.lower()}"
+            got.value.save_as(path)
+            if form == "PNG":
+                assert path.read_bytes().startswith(b"\x89PNG")
+            else:
+                marks = [e.tag.rpartition("}")[2] for e in ElementTree.parse(path).getroot().iter()]
+                assert marks.count("path") > 10
+                assert "text" in marks
+        with page.expect_download() as got:
+            page.locator(f"#{view} button", has_text="save request").click()
+        got.value.save_as(tmp_path / f"{view}.toml")
+        page.locator(f"#{view} button", has_text="copy Python").click()
+        page.wait_for_timeout(100)
+        lines = page.evaluate("navigator.clipboard.readText()")
+        assert lines == page.evaluate(f"document.querySelector('#{view} pre').textContent")
+    names: dict[str, Any] = {}
+    exec(lines, names)  # the motion's
+    shown = page.evaluate("Array.from(explorer.motion.data)")
+    np.testing.assert_array_equal(np.float32(names["run"].y[:, 0].ravel()), np.float32(shown))
+    run_request(tmp_path / "motion.toml", tmp_path / "motion.h5")
+    with fm.open_results(tmp_path / "motion.h5") as results:
+        computed = np.stack([results["swing"][name].data for name in ("phi", "theta")], axis=-1)
+    np.testing.assert_array_equal(
+        np.float32(computed.ravel()), np.float32(shown).reshape(-1, 4)[:, :2].ravel()
+    )
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_every_width_and_both_lights_can_be_read(opened: Opened, dark: bool) -> None:
+    page = opened.page
+    page.emulate_media(color_scheme="dark" if dark else "light")
+    for width in (1000, 1600, 3000):
+        page.set_viewport_size({"width": width, "height": 1000})
+        page.wait_for_timeout(300)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        sizes = page.evaluate(
+            "[...document.querySelectorAll('section')].map(s => [s.clientWidth, s.scrollWidth])"
+        )
+        assert all(held >= 430 and needed <= held for held, needed in sizes), sizes
+        ink, paper = page.evaluate(
+            "['--ink', '--paper'].map(n => getComputedStyle(document.documentElement).getPropertyValue(n))"
+        )
+        assert contrast(ink.strip(), paper.strip()) > 7.0
+        for soft in ("--soft", "--blue", "--vermillion", "--green", "--purple"):
+            colour = page.evaluate(f"getComputedStyle(document.documentElement).getPropertyValue('{soft}')")
+            assert contrast(colour.strip(), paper.strip()) > 3.0, soft
+    page.set_viewport_size({"width": 1600, "height": 1000})
+    page.emulate_media(color_scheme="light")
+
+
+def contrast(one: str, other: str) -> float:
+    """Ratio of contrast by WCAG 2."""
+
+    def light(colour: str) -> float:
+        parts = np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)]) / 255.0
+        return float(
+            np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
+            @ [0.2126, 0.7152, 0.0722]
+        )
+
+    a, b = sorted((light(one), light(other)))
+    return (b + 0.05) / (a + 0.05)
+
+
+def test_a_result_file_opens_with_its_sections_as_panels(browser: Any, tmp_path: Path) -> None:
+    (tmp_path / "r.toml").write_text(
+        '[scene]\nc2 = 200.0\n[scan.rest]\nkind = "equilibria"\n[scan.swing]\nkind = "motion"\n'
+        "phi = 1.0\ntheta = 0.1\nt_end = 2.0\noutputs = 50\n"
+    )
+    run_request(tmp_path / "r.toml", tmp_path / "r.h5")
+    with serving(str(tmp_path / "r.h5")) as address:
+        made = Opened(browser.new_page(viewport={"width": 1600, "height": 1000}), address)
+        assert made.page.evaluate("explorer.state.parameters.c2") == 200.0
+        for name in ("rest", "swing"):
+            made.page.wait_for_selector(f"#section-{name} img", timeout=60_000)
+            made.until(f"document.querySelector('#section-{name} img').naturalWidth > 100")
+            assert f"results['{name}']" in made.page.locator(f"#section-{name} pre").first.text_content()
+        assert made.said == []
+        made.page.close()
+
+
+def test_the_status_line_says_what_is_compiled(opened: Opened) -> None:
+    told = "{ name: 'march', of: 'basins', number: 3, about: 60 }"
+    opened.page.evaluate(f"explorer.compiling({told})")
+    assert (
+        opened.page.inner_text("#status")
+        == "loading or compiling for the basin map: march, kernel 3 of about 60"
+    )
+    opened.page.evaluate("explorer.compiling({ name: null })")
+    opened.until("document.querySelector('#status').textContent === 'ready'", 5)
+
+
+def started(browser: Any) -> tuple[float, float]:
+    """Seconds from the command to a page that can be used, and to its first equilibria."""
+    page = browser.new_page(viewport={"width": 1600, "height": 1000})
+    begun = time.monotonic()
+    with serving() as address:
+        page.goto(address)
+        page.wait_for_selector("#parameters input")
+        usable = time.monotonic() - begun
+        page.wait_for_selector("#equilibria td", timeout=120_000)
+        first = time.monotonic() - begun
+        page.close()
+    return usable, first
+
+
+def test_budgets(browser: Any, opened: Opened) -> None:
+    told = list[tuple[str, float, float, str]]()
+    opened.settle()
+    opened.page.evaluate("explorer.choose(0)")
+    opened.page.wait_for_timeout(3000)
+    starts = np.median([started(browser) for _ in range(5)], axis=0)
+    told.append(("page usable after the command", starts[0], 1.0, "s"))
+    told.append(("first equilibria after the command", starts[1], np.nan, "s"))
+    page = opened.page
+
+    def slide(when: str) -> None:
+        page.evaluate("explorer.waits.equilibria = []; explorer.waits.answers = []")
+        for k in range(40):
+            page.evaluate(f"explorer.parameters.set('c1', {150 + k})")
+            page.wait_for_timeout(110)
+        answers, drawn = page.evaluate("[explorer.waits.answers, explorer.waits.equilibria]")
+        told.append((f"slider to answer{when}", statistics.median(answers), np.nan, "ms"))
+        told.append((f"slider to drawn pictures{when}", statistics.median(drawn), 50.0, "ms"))
+
+    page.evaluate("explorer.choose(0)")
+    slide("")
+    page.evaluate("explorer.startAt({phi: 0.5, theta: 1}); explorer.letGo()")
+    opened.until("explorer.mechanism.playing", 10)
+    slide(", motion plays")
+    page.get_by_text("reset all").click()
+    page.evaluate("explorer.choose(0)")
+    levels = []
+    for _ in range(5):
+        page.wait_for_timeout(2500)
+        page.evaluate("explorer.basins.levels = {}; explorer.askBasins()")
+        opened.until("explorer.basins.levels[401] !== undefined", 30)
+        found = page.evaluate("explorer.basins.levels")
+        levels.append([found["26"], found["101"], found["401"]])
+    first, hundred, all_ = np.median(levels, axis=0)
+    told.append(("basins, first picture of 26 x 26", first, np.nan, "ms"))
+    told.append(("basins, 101 x 101", hundred, 200.0, "ms"))
+    told.append(("basins, 401 x 401", 1e-3 * all_, 3.0, "s"))
+    page.evaluate("explorer.startAt({phi: 0.5, theta: 1}); explorer.letGo()")
+    opened.until("explorer.mechanism.playing", 10)
+    page.wait_for_timeout(500)
+    page.evaluate("explorer.mechanism.frames = []")
+    page.wait_for_timeout(8000)
+    shown = np.diff(page.evaluate("explorer.mechanism.frames"))
+    told.append(("time of a picture of a motion", shown.mean(), 1e3 / 60.0, "ms"))
+    told.append(("longest pause of a motion", shown.max(), 1e3, "ms"))
+    print(f"\nmedians; {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}")
+    for title, value, budget, unit in told:
+        print(f"{title:36} {value:8.2f} {unit:2}   wanted {budget:7.2f} {unit}")
+        assert np.isnan(budget) or value < 10.0 * budget, title
 
 
 def test_random_actions_leave_no_error_and_no_request_leaves_the_machine(opened: Opened) -> None:

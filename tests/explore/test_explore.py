@@ -10,10 +10,12 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 import tomllib
 import zipfile
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +23,11 @@ import numpy as np
 import pytest
 
 import fastmech as fm
+from fastmech.cli.explore import opened
 from fastmech.errors import InputError
-from fastmech.explore.device import open_device
 from fastmech.explore.messages import frame, read_message
 from fastmech.explore.work import replies
+from fastmech.interrupts import Cancelled, work_while
 from fastmech.runner import run_request
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import request_of_text
@@ -49,8 +52,9 @@ def numbers(content: bytes) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     return header, arrays
 
 
-@pytest.fixture(scope="module")
-def server() -> Iterator[tuple[str, int]]:
+@contextmanager
+def serving() -> Iterator[tuple[str, int]]:
+    """The command's server; Ctrl-C ends it within a second."""
     command = [sys.executable, "-m", "fastmech", "explore", "--no-browser"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
@@ -62,6 +66,12 @@ def server() -> Iterator[tuple[str, int]]:
     process.wait(10)
     process.stdout.close()
     assert time.perf_counter() - begun < 1.0
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[tuple[str, int]]:
+    with serving() as told:
+        yield told
 
 
 def talk(server: tuple[str, int], origin: str | None = None) -> Any:
@@ -136,11 +146,11 @@ def test_basins_refine_and_their_request_gives_the_same(server: tuple[str, int],
 
 @pytest.mark.parametrize("what", [None, "von_mises_truss"])
 def test_an_atlas_is_the_library_s_with_its_curves(what: str | None) -> None:
-    device = open_device(what)
+    device = opened(what)
     ranges = {"P": [0.0, 120.0], "rise": [0.2, 0.8]} if what else {"F0": [-200.0, 200.0], "c2": [0.0, 400.0]}
     parameters = {} if what else {"alpha": 0.0}
     told = {"kind": "atlas", "id": 1, "axes": ranges, "halvings": 0, "parameters": parameters}
-    *_, last = replies(device, read_message(json.dumps(told)), lambda finished: None)
+    *_, last = replies(device, read_message(json.dumps(told)))
     header, arrays = numbers(last)
     names: dict[str, Any] = {}
     exec(header["python"], names)
@@ -153,7 +163,7 @@ def test_an_atlas_is_the_library_s_with_its_curves(what: str | None) -> None:
 def test_requests_of_every_view_are_valid(what: str | None) -> None:
     from fastmech.explore.lines import request_of
 
-    device = open_device(what)
+    device = opened(what)
     axes = {name: [0.1, 0.5] for name in device.coordinates}
     others = [name for name in device.system.described() if name != "alpha"][-2:]
     asked: list[dict[str, Any]] = [
@@ -273,7 +283,7 @@ def test_wrong_messages_give_a_line(text: str, line: str) -> None:
 @pytest.mark.parametrize("what", ["no_such_mechanism", "missing.toml", "missing.py:arm", "missing.h5"])
 def test_what_cannot_be_opened_gives_a_line(what: str) -> None:
     with pytest.raises(InputError, match=r"missing|no_such"):
-        open_device(what)
+        opened(what)
 
 
 def test_numbers_travel_as_bytes() -> None:
@@ -320,3 +330,84 @@ def test_the_wheel_holds_the_page(tmp_path: Path) -> None:
     names = zipfile.ZipFile(next(tmp_path.glob("*.whl"))).namelist()
     for path in (ROOT / "fastmech/explore/page").iterdir():
         assert f"fastmech/explore/page/{path.name}" in names
+
+
+@pytest.mark.parametrize("alpha", [0.0, 0.7])
+def test_works_are_what_the_energy_changes_by(alpha: float) -> None:
+    told = {"kind": "motion", "id": 1, "start": {"phi": 1.0, "theta_dot": 2.0}, "t_end": 5.0, "outputs": 3001}
+    (content,) = replies(opened(None), read_message(json.dumps({**told, "parameters": {"alpha": alpha}})))
+    _, arrays = numbers(content)
+    energy = arrays["kinetic"].astype(float) + arrays["potential"]
+    balance = energy - energy[0] - (arrays["brought"] - arrays["lost"])
+    assert np.abs(balance).max() < 1e-4 * np.ptp(energy)
+    assert np.all(np.diff(arrays["lost"]) >= 0.0)
+    # The force's work on M2 by its own path.
+    scene, t, (phi, theta, *_) = fm.Scene(alpha=alpha), arrays["times"], arrays["y"].T.astype(float)
+    x2 = scene.l * (np.cos(phi) - np.sin(theta))
+    force = scene.F0 * np.exp(-alpha * t)
+    work = np.append(0.0, np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(x2)))
+    np.testing.assert_allclose(arrays["brought"], work, atol=1e-3 * np.abs(work).max())
+
+
+@pytest.mark.parametrize("kind", ["motion", "basins", "atlas"])
+def test_work_that_is_not_wanted_ends_between_calls_of_kernels(kind: str) -> None:
+    device = opened(None)
+    told: dict[str, Any] = {"kind": kind, "id": 1, "parameters": {"alpha": 0.0}}
+    if kind == "motion":
+        told |= {"start": {"phi": 1.0}, "t_end": 300.0}
+    else:
+        told["axes"] = AXES if kind == "basins" else {"F0": [-200.0, 200.0], "c2": [1.0, 400.0]}
+    message = read_message(json.dumps(told))
+    begun = time.perf_counter()
+    list(replies(device, message))
+    begun = time.perf_counter()
+    list(replies(device, message))
+    whole = time.perf_counter() - begun
+    late = list[float]()
+    for share in np.linspace(0.1, 0.8, 8):
+        unwanted, ended = threading.Event(), list[float]()
+
+        def work(unwanted: threading.Event = unwanted, ended: list[float] = ended) -> None:
+            work_while(lambda: not unwanted.is_set())
+            try:
+                list(replies(device, message))
+            except Cancelled:
+                ended.append(time.perf_counter())
+
+        thread = threading.Thread(target=work)
+        thread.start()
+        time.sleep(share * whole)
+        unwanted.set()
+        asked = time.perf_counter()
+        thread.join()
+        late += [end - asked for end in ended]
+    print(f"\n{kind}: ends after {1e3 * np.median(late):.0f} ms (median of {len(late)}), whole {whole:.2f} s")
+    assert np.median(late) < 0.5
+
+
+def test_kernels_that_are_made_are_told_with_their_number() -> None:
+    with serving() as server, talk(server) as socket:
+        socket.send(json.dumps({"kind": "motion", "id": 1, "start": {"phi": 1.0}, "t_end": 1.0}))
+        told = list[dict[str, Any]]()
+        while True:
+            content = socket.recv(timeout=120)
+            if isinstance(content, bytes):
+                break
+            told += [json.loads(content)]
+    kernels = [one for one in told if one["kind"] == "compiling" and one["name"]]
+    assert kernels
+    assert {one["of"] for one in kernels} == {"motion"}
+    assert [one["number"] for one in kernels] == list(range(1, len(kernels) + 1))
+    assert all(one["number"] <= one["about"] for one in kernels)
+
+
+@pytest.mark.parametrize("what", ["double_pendulum", "ziegler_column", None])
+def test_angles_of_a_drawing_are_the_coordinates(what: str | None) -> None:
+    device = opened(what)
+    q = np.random.default_rng(3).uniform(-0.7, 0.7, (5, 2))
+    drawn = device.drawn({}, q)
+    assert sorted(angle.coordinate for angle in drawn.angles) == [0, 1]
+    for rod, end, k, sign, origin in drawn.angles:
+        away = drawn.ends[:, rod, 1 - end] - drawn.ends[:, rod, end]
+        direction = np.arctan2(away[:, 1], away[:, 0])
+        np.testing.assert_allclose(np.exp(1j * direction), np.exp(1j * (origin + sign * q[:, k])), atol=1e-9)

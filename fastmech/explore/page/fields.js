@@ -5,6 +5,8 @@ import { Plane, canvas, choice, css, draggable, element, panel, short } from "./
 const COLORS = ["#56B4E9", "#E69F00", "#009E73", "#F0E442", "#CC79A7", "#0072B2", "#D55E00", "#a7d8ba", "#6200ff", "#4e89ff", "#3b766c", "#a7ffb1", "#62d8ff", "#a7450a", "#76c480", "#ce00a7", "#c4d880", "#62c4c4"];
 const CIVIDIS = [[0, 34, 78], [53, 69, 108], [102, 105, 112], [148, 142, 119], [200, 184, 102], [254, 232, 56]];
 
+const STEPS = 15; // of height in the landscape
+
 const rgb = (hex) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16));
 function cividis(s) {
   const t = Math.min(0.9999, Math.max(0, s)) * 5, k = Math.floor(t);
@@ -24,11 +26,37 @@ function picture(nx, ny, of) {
   return c;
 }
 
+// Steps of height with lines between them, two pixels a value.
+function heights(data, nx, ny, low, high) {
+  const w = 2 * nx - 1, h = 2 * ny - 1, levels = new Uint8Array(w * h), scale = STEPS / (high - low || 1);
+  for (let j = 0; j < h; j++) for (let i = 0; i < w; i++) {
+    const a = Math.min(nx - 2, i >> 1), b = Math.min(ny - 2, j >> 1), x = i / 2 - a, y = j / 2 - b, p = b * nx + a;
+    const v = (1 - y) * ((1 - x) * data[p] + x * data[p + 1]) + y * ((1 - x) * data[p + nx] + x * data[p + nx + 1]);
+    levels[j * w + i] = Math.min(STEPS - 1, (v - low) * scale);
+  }
+  const shades = Array.from({ length: STEPS }, (_, k) => cividis((k + 0.5) / STEPS)), c = document.createElement("canvas");
+  c.width = w; c.height = h;
+  const image = new ImageData(w, h);
+  for (let j = 0; j < h; j++) for (let i = 0; i < w; i++) {
+    const p = j * w + i, q = 4 * ((h - 1 - j) * w + i), line = (i + 1 < w && levels[p] !== levels[p + 1]) || (j + 1 < h && levels[p] !== levels[p + w]), s = shades[levels[p]];
+    for (let k = 0; k < 3; k++) image.data[q + k] = line ? 0.7 * s[k] : s[k];
+    image.data[q + 3] = 255;
+  }
+  c.getContext("2d").putImageData(image, 0, 0);
+  return c;
+}
+
+function swatch(color) {
+  const made = element("span", { class: "swatch" });
+  made.style.background = `rgb(${color.join(",")})`;
+  return made;
+}
+
 class Field {
   constructor(app, id, title, key, about, label) {
     Object.assign(this, { app, id, key, about });
     this.canvas = canvas(label);
-    this.plane = new Plane(this.canvas, (p) => this.draw(p));
+    this.plane = new Plane(this.canvas, (p) => this.draw(p), { over: (p) => this.over(p), edge: 10, top: 12 });
     this.panel = panel(id, title, { planes: () => [this.plane] });
     const names = Object.keys(about);
     this.selects = [0, 1].map((k) => choice(`${title}, ${k ? "vertical" : "horizontal"} axis`, names, app.state[key][k], (name) => {
@@ -56,30 +84,42 @@ class Field {
   }
   // The equilibria and the motion's path, over the states that are the axes.
   marks() {
-    const p = this.plane, { coordinates, states } = this.app.about, names = this.app.state[this.key], all = Object.keys(states);
-    const path = this.app.path();
-    if (path) {
-      const k = names.map((n) => all.indexOf(n)), [ts] = path.shape, xs = [], ys = [];
-      let before = null;
-      for (let t = 0; t < ts; t++) {
-        const at = k.map((c, j) => {
-          const { periodic, low, high } = states[names[j]], v = path.data[t * all.length + c];
-          return periodic ? v - Math.floor((v - low) / (high - low)) * (high - low) : v;
-        });
-        if (before && at.some((v, j) => Math.abs(v - before[j]) > 0.5 * (states[names[j]].high - states[names[j]].low))) { xs.push(NaN); ys.push(NaN); }
-        xs.push(at[0]); ys.push(at[1]);
-        before = at;
-        if (t === this.app.frame) this.now = at;
-      }
-      p.curve(xs, ys, { color: "#000000", width: 3 }); p.curve(xs, ys, { color: "#ffffff", width: 1.4 });
-      if (this.now) p.ink.circle(p.x(this.now[0]), p.y(this.now[1]), 6, { fill: "#D55E00", color: "#ffffff" });
-    }
+    const p = this.plane, { coordinates } = this.app.about, names = this.app.state[this.key];
+    this.wrapped();
+    if (this.path) { p.curve(...this.path, { color: "#000000", width: 3 }); p.curve(...this.path, { color: "#ffffff", width: 1.4 }); }
     (this.app.rows ?? []).forEach((row, k) => {
       const [x, y] = names.map((n) => (coordinates.includes(n) ? row.position[coordinates.indexOf(n)] : 0));
-      const stable = row.verdict.includes("stable") && !row.verdict.includes("unstable");
-      p.ink.circle(p.x(x), p.y(y), k === this.app.state.chosen ? 8 : 6, { fill: stable ? "#000000" : "#ffffff", color: stable ? "#ffffff" : "#000000", width: 2 });
-      p.ink.text(p.x(x), p.y(y), `${k + 1}`, { color: stable ? "#ffffff" : "#000000", size: 10 });
+      const stable = row.verdict.includes("stable") && !row.verdict.includes("unstable"), chosen = k === this.app.state.chosen;
+      if (chosen) p.ink.circle(p.x(x), p.y(y), 12, { color: "#ffffff", width: 3 });
+      p.ink.circle(p.x(x), p.y(y), 8, { fill: stable ? "#000000" : "#ffffff", color: stable ? "#ffffff" : "#000000", width: 1.5 });
+      p.ink.text(p.x(x), p.y(y), `${k + 1}`, { color: stable ? "#ffffff" : "#000000", size: 11 });
     });
+  }
+  // The path within one turn, broken where it leaves at one side and comes back at the other.
+  wrapped() {
+    const motion = this.app.motion, names = this.app.state[this.key], key = names.join();
+    if (this.wrappedOf === motion && this.wrappedKey === key) return;
+    Object.assign(this, { wrappedOf: motion, wrappedKey: key, path: null, at: null });
+    if (!motion) return;
+    const { states } = this.app.about, all = Object.keys(states), [ts] = motion.shape, xs = [], ys = [];
+    const k = names.map((n) => all.indexOf(n));
+    this.at = (t) => k.map((c, j) => {
+      const { periodic, low, high } = states[names[j]], v = motion.data[t * all.length + c];
+      return periodic ? v - Math.floor((v - low) / (high - low)) * (high - low) : v;
+    });
+    for (let t = 0, before = null; t < ts; t++) {
+      const at = this.at(t);
+      if (before && at.some((v, j) => Math.abs(v - before[j]) > 0.5 * (states[names[j]].high - states[names[j]].low))) { xs.push(NaN); ys.push(NaN); }
+      xs.push(at[0]); ys.push(at[1]);
+      before = at;
+    }
+    this.path = [xs, ys];
+  }
+  over(p) {
+    const { motion, frame } = this.app;
+    if (!motion || !this.at) return;
+    const [x, y] = this.at(Math.min(frame, motion.shape[0] - 1));
+    p.ink.circle(p.x(x), p.y(y), 7, { fill: "#D55E00", color: "#ffffff", width: 2 });
   }
   starts() {
     const from = (at) => this.app.startAt(Object.fromEntries(this.app.state[this.key].map((n, k) => [n, at[k]])));
@@ -107,12 +147,8 @@ export class Landscape extends Field {
       const { data, shape } = arrays.landscape, [ny, nx] = shape;
       let low = Infinity, high = -Infinity;
       for (const v of data) { if (v < low) low = v; if (v > high) high = v; }
-      this.note.textContent += ` Energy from ${short(low)} J (dark) to ${short(high)} J (bright), contours every ${short((high - low) / 15)} J.`;
-      const level = (i, j) => Math.floor(15 * (data[j * nx + i] - low) / (high - low || 1));
-      this.image = picture(nx, ny, (i, j) => {
-        const edge = (i + 1 < nx && level(i, j) !== level(i + 1, j)) || (j + 1 < ny && level(i, j) !== level(i, j + 1));
-        return cividis((level(i, j) + (edge ? 1 : 0)) / 16);
-      });
+      this.note.textContent += ` Energy from ${short(low)} J (dark) to ${short(high)} J (bright), lines every ${short((high - low) / STEPS)} J.`;
+      this.image = heights(data, nx, ny, low, high);
     } else this.note.textContent += " The forces are not known to have a potential.";
     this.plane.later();
   }
@@ -161,9 +197,9 @@ export class Basins extends Field {
     image.getContext("2d").drawImage(c, header.from, 0);
     if (header.last) {
       this.panel.told(header);
-      const some = [...this.colors.values()].slice(0, 6).map(({ well: w, turns }) => `${w + 1}${turns.some((t) => t) ? ` (${turns.join(", ")} turns)` : ""}`);
+      const shown = [...this.colors.values()].slice(0, 8).flatMap(({ color, well: w, turns }) => [swatch(color), `${w + 1}${turns.some((t) => t) ? ` after ${turns.join(", ")} turns` : ""}   `]);
       const none = well.filter((w) => w === -1).length;
-      this.note.textContent = `${n} x ${n} starts${header.final ? "" : ", refining"}. Proved to end at equilibrium ${some.join("; ")}${this.colors.size > 6 ? "; ..." : ""}. Darker: later. Grey: ${none} undecided.`;
+      this.note.replaceChildren(`${n} × ${n} starts${header.final ? "" : ", refining"}. Proved to end at equilibrium `, ...shown, this.colors.size > 8 ? `and ${this.colors.size - 8} more. ` : "", "Darker: later. ", ...(none ? [swatch([120, 120, 120]), `undecided: ${none}.`] : []));
       this.levels = { ...(this.levels ?? {}), [n]: header.waited };
       this.canvas.dataset.divisions = header.divisions;
     }
@@ -202,16 +238,18 @@ export class Atlas extends Field {
       const n = xy.shape[1];
       p.curve(xy.data.subarray(0, n), xy.data.subarray(n), { color: "#000000", width: 1.8 });
     }
-    const [x, y] = this.app.state.atlas.map((n) => this.app.state.parameters[n]);
-    for (const [color, width] of [["#ffffff", 5], ["#000000", 2]]) {
-      p.ink.line([[p.x(x) - 9, p.y(y)], [p.x(x) + 9, p.y(y)]], { color, width });
-      p.ink.line([[p.x(x), p.y(y) - 9], [p.x(x), p.y(y) + 9]], { color, width });
-    }
     (this.legend ?? []).forEach(([color, words], k) => {
       const at = [p.box.left + 8, p.box.top + 8 + 18 * k];
       p.ink.line([[0, 0], [196, 0], [196, 18], [0, 18]].map((d) => [at[0] - 4 + d[0], at[1] - 4 + d[1]]), { fill: css("paper"), closed: true });
       p.ink.line([[0, 0], [12, 0], [12, 10], [0, 10]].map((d) => [at[0] + d[0], at[1] + d[1]]), { fill: color, color: css("ink"), width: 0.5, closed: true });
       p.ink.text(at[0] + 18, at[1] + 5, words, { color: css("ink"), align: "left", size: 11 });
     });
+  }
+  over(p) {
+    const [x, y] = this.app.state.atlas.map((n) => this.app.state.parameters[n]);
+    for (const [color, width] of [["#ffffff", 5], ["#000000", 2]]) {
+      p.ink.line([[p.x(x) - 9, p.y(y)], [p.x(x) + 9, p.y(y)]], { color, width });
+      p.ink.line([[p.x(x), p.y(y) - 9], [p.x(x), p.y(y) + 9]], { color, width });
+    }
   }
 }

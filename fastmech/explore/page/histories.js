@@ -1,29 +1,39 @@
 // Time histories, phase portrait and energies of the motion that was started.
 import { Plane, canvas, choice, css, element, panel, short } from "./ink.js";
 
-const COLORS = ["blue", "vermillion", "green", "purple"];
+const COLORS = ["blue", "vermillion", "green", "purple"], DASHES = [[], [7, 4], [2, 4], [9, 3, 2, 3]];
 
 export class Histories {
   constructor(app) {
     this.app = app;
-    this.views = [
-      new Plane(canvas("coordinates against time", true), (p) => this.history(p)),
-      new Plane(canvas("energies against time", true), (p) => this.energies(p)),
-      new Plane(canvas("phase portrait: rate against coordinate"), (p) => this.portrait(p)),
-    ];
-    this.panel = panel("motion", "Motion", { planes: () => this.views });
-    const { coordinates } = app.about;
+    const { coordinates } = app.about, over = (p) => this.cursor(p);
+    const view = (label, draw, low, more = { over, top: 26 }) => new Plane(canvas(label, low), draw, more);
+    const history = view("coordinates against time", (p) => this.history(p), false);
+    const energies = view("energies against time", (p) => this.energies(p), true);
+    const works = view("works of loads and of dampers against time", (p) => this.works(p), true);
+    const portrait = view("phase portrait: rate against coordinate", (p) => this.portrait(p), false, { over: (p) => this.point(p) });
+    this.views = [history, energies, works, portrait];
+    this.panels = [["motion", "Time histories", [history]], ["energies", "Energy and works", [energies, works]], ["portrait", "Phase portrait", [portrait]]].map(([id, title, planes]) => {
+      const made = panel(id, title, { planes: () => planes });
+      made.body.append(...planes.map((p) => p.canvas));
+      return made;
+    });
     this.of = coordinates[0];
     this.note = element("p", { class: "note" }, "Press on the landscape or the basin map to start a motion.");
+    this.sums = element("p", { class: "note" });
     const until = element("input", { type: "number", class: "number", min: 1, max: 300, value: app.state.t_end, "aria-label": "length of the motion [s]" });
     until.addEventListener("change", () => app.change({ t_end: Math.min(300, Math.max(0.1, Number(until.value) || 20)) }, "t_end"));
-    this.panel.tools.append(until, " s, portrait of ", choice("coordinate of the phase portrait", coordinates, this.of, (name) => { this.of = name; this.set(); }));
-    this.panel.body.append(this.note, ...this.views.map((v) => v.canvas));
+    this.panels[0].tools.append(until, " s");
+    this.panels[0].body.append(this.note);
+    this.panels[1].body.append(this.sums);
+    this.panels[2].tools.append(choice("coordinate of the phase portrait", coordinates, this.of, (name) => { this.of = name; this.set(); }));
   }
   take(header, arrays) {
-    this.panel.told(header);
+    for (const one of this.panels) one.told(header);
     Object.assign(this, { header, arrays });
-    this.note.textContent = header.status || `Energy falls from ${short(this.total(0))} J to ${short(this.total(arrays.times.data.length - 1))} J.`;
+    const last = arrays.times.data.length - 1, { brought, lost } = arrays;
+    this.note.textContent = header.status || Object.entries(this.app.state.start ?? {}).map(([n, v]) => `${n} = ${short(v)}`).join(", ").replace(/^/, "From ");
+    this.sums.textContent = `Kinetic and potential energy: ${short(this.total(0))} J at first, ${short(this.total(last))} J at the end. Loads bring ${short(brought.data[last])} J, dampers take ${short(lost.data[last])} J.`;
     this.set();
   }
   total(k) { return this.arrays.kinetic.data[k] + this.arrays.potential.data[k]; }
@@ -46,37 +56,37 @@ export class Histories {
     this.pair = [this.columns[k], this.column(n + k)];
     Object.assign(this.views[0], { range: [times, span(this.columns)], labels: ["time [s]", `coordinates [${units.join(", ")}]`] });
     Object.assign(this.views[1], { range: [times, span([kinetic.data, potential.data, [this.total(0)]])], labels: ["time [s]", "energy [J]"] });
-    Object.assign(this.views[2], { range: this.pair.map((c) => span([c])), labels: [`${this.of} [${states[this.of].unit}]`, `${this.of}' [${states[this.of].unit}/s]`] });
+    Object.assign(this.views[2], { range: [times, span([this.arrays.brought.data, this.arrays.lost.data, [0]])], labels: ["time [s]", "work [J]"] });
+    Object.assign(this.views[3], { range: this.pair.map((c) => span([c])), labels: [`${this.of} [${states[this.of].unit}]`, `${this.of}' [${states[this.of].unit}/s]`] });
     this.later();
   }
   later() { this.views.forEach((v) => v.later()); }
-  legend(p, words) {
-    words.forEach((word, k) => p.ink.text(p.box.right - 6, p.box.top + 8 + 14 * k, word, { color: css(COLORS[k]), align: "right" }));
+  moved() { this.views.forEach((v) => v.moved()); }
+  // Every curve with a colour, a dash and a word in the legend.
+  curves(p, columns, words) {
+    if (!this.arrays) return;
+    columns.forEach((c, k) => p.curve(this.arrays.times.data, c, { color: css(COLORS[k]), dash: DASHES[k], width: 1.8 }));
+    let x = p.box.left;
+    words.forEach((word, k) => {
+      p.above.push([[x, 12], [x + 26, 12], css(COLORS[k]), DASHES[k], word]);
+      x += 44 + 7.4 * word.length;
+    });
   }
   cursor(p) {
     if (!this.arrays) return;
     const t = this.arrays.times.data[Math.min(this.app.frame, this.arrays.times.data.length - 1)];
     p.ink.line([[p.x(t), p.box.top], [p.x(t), p.box.bottom]], { color: css("orange"), width: 1.5 });
   }
-  history(p) {
-    if (!this.arrays) return;
-    this.columns.forEach((c, k) => p.curve(this.arrays.times.data, c, { color: css(COLORS[k]) }));
-    this.legend(p, this.app.about.coordinates);
-    this.cursor(p);
-  }
+  history(p) { this.curves(p, this.columns ?? [], this.app.about.coordinates); }
   energies(p) {
-    if (!this.arrays) return;
-    const { times, kinetic, potential } = this.arrays;
-    p.curve(times.data, kinetic.data, { color: css(COLORS[0]) });
-    p.curve(times.data, potential.data, { color: css(COLORS[1]) });
-    p.curve(times.data, kinetic.data.map((_, k) => this.total(k)), { color: css(COLORS[2]) });
-    this.legend(p, ["kinetic", "potential, without load", "sum"]);
-    this.cursor(p);
+    const { kinetic, potential } = this.arrays ?? {};
+    if (kinetic) this.curves(p, [kinetic.data, potential.data, kinetic.data.map((_, k) => this.total(k))], ["kinetic", "potential", "sum, without loads"]);
   }
-  portrait(p) {
+  works(p) { if (this.arrays) this.curves(p, [this.arrays.brought.data, this.arrays.lost.data], ["brought by loads", "taken by dampers"]); }
+  portrait(p) { if (this.arrays) p.curve(...this.pair, { color: css("blue") }); }
+  point(p) {
     if (!this.arrays) return;
-    p.curve(...this.pair, { color: css("blue") });
     const k = Math.min(this.app.frame, this.pair[0].length - 1);
-    p.ink.circle(p.x(this.pair[0][k]), p.y(this.pair[1][k]), 6, { fill: css("vermillion") });
+    p.ink.circle(p.x(this.pair[0][k]), p.y(this.pair[1][k]), 6, { fill: css("vermillion"), color: css("paper") });
   }
 }

@@ -2,7 +2,12 @@
 
 const SVG = "http://www.w3.org/2000/svg";
 
-export const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+const scheme = matchMedia("(prefers-color-scheme: dark)"), colors = new Map();
+scheme.addEventListener("change", () => colors.clear());
+export function css(name) {
+  if (!colors.has(name)) colors.set(name, getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());
+  return colors.get(name);
+}
 
 class CanvasInk {
   constructor(context) { this.c = context; }
@@ -86,29 +91,56 @@ export function ticks(low, high, most) {
 
 export const short = (v) => (v === null || !Number.isFinite(v) ? "–" : Number(v.toPrecision(4)).toString());
 
-// A canvas with axes. `draw(plane)` is called when it is to be drawn; `plane.x` and `plane.y` give pixels.
+// On wide screens all is larger, words too.
+const zoom = () => (innerWidth >= 2200 ? 1.3 : 1);
+
+// A canvas with axes. `draw(plane)` paints what stands still and is kept as a picture, `over(plane)` what moves on
+// top of it; `plane.x` and `plane.y` give pixels.
 export class Plane {
-  constructor(canvas, draw, { equal = false } = {}) {
-    Object.assign(this, { canvas, drawing: draw, equal, range: [[0, 1], [0, 1]], labels: ["", ""], due: false });
+  constructor(canvas, draw, { equal = false, over = () => {}, top = 10, edge = 0 } = {}) {
+    Object.assign(this, { top, edge, canvas, drawing: draw, over, equal, range: [[0, 1], [0, 1]], labels: ["", ""], due: false, stale: true });
+    this.kept = document.createElement("canvas");
     new ResizeObserver(() => this.later()).observe(canvas);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.later());
+    new IntersectionObserver((seen) => { this.unseen = !seen.at(-1).isIntersecting; this.moved(); }).observe(canvas);
+    scheme.addEventListener("change", () => this.later());
   }
-  later() {
-    if (this.due) return;
+  later() { this.stale = true; this.moved(); }
+  moved() {
+    if (this.due || this.unseen) return; // what is out of sight is drawn when it comes into sight
     this.due = true;
     requestAnimationFrame(() => { this.due = false; this.now(); });
   }
+  size() { return [this.canvas.clientWidth, this.canvas.clientHeight].map((v) => v / zoom()); }
   now() {
-    const { clientWidth: w, clientHeight: h } = this.canvas, ratio = devicePixelRatio || 1;
+    const { kept } = this, [w, h] = this.size(), ratio = (devicePixelRatio || 1) * zoom();
     if (!w || !h) return;
-    this.canvas.width = Math.round(w * ratio); this.canvas.height = Math.round(h * ratio);
     const context = this.canvas.getContext("2d");
-    context.scale(ratio, ratio);
-    context.fillStyle = css("paper"); context.fillRect(0, 0, w, h);
-    this.paint(new CanvasInk(context), w, h);
+    if (this.stale) {
+      this.stale = false;
+      for (const c of [kept, this.canvas]) if (c.width !== Math.round(w * ratio) || c.height !== Math.round(h * ratio)) [c.width, c.height] = [w, h].map((v) => Math.round(v * ratio));
+      const below = kept.getContext("2d");
+      below.setTransform(ratio, 0, 0, ratio, 0, 0);
+      below.fillStyle = css("paper"); below.fillRect(0, 0, w, h);
+      this.paint(new CanvasInk(below), w, h);
+    }
+    context.setTransform(1, 0, 0, 1, 0, 0);
+    context.drawImage(kept, 0, 0);
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    this.cover(new CanvasInk(context));
+  }
+  cover(ink) {
+    this.ink = ink;
+    this.within(ink, () => this.over(this));
+  }
+  // Nothing is drawn beyond the axes, but marks that lie on them are whole.
+  within(ink, paint) {
+    const { left, right, top, bottom } = this.box, e = this.edge;
+    ink.clip(left - e, top - e, right - left + 2 * e, bottom - top + 2 * e);
+    paint();
+    ink.unclip();
   }
   paint(ink, w, h) {
-    const box = { left: 58, right: w - 12, top: 10, bottom: h - 40 };
+    const box = { left: 58, right: w - 14, top: this.top, bottom: h - 40 };
     let [[x0, x1], [y0, y1]] = this.range;
     if (this.equal) {
       const scale = Math.max((x1 - x0) / (box.right - box.left), (y1 - y0) / (box.bottom - box.top));
@@ -129,19 +161,23 @@ export class Plane {
     }
     ink.text((box.left + box.right) / 2, h - 10, this.labels[0], { color: css("ink") });
     ink.text(11, (box.top + box.bottom) / 2, this.labels[1], { color: css("ink"), turn: -Math.PI / 2 });
-    ink.clip(box.left, box.top, box.right - box.left, box.bottom - box.top);
-    this.drawing(this);
-    ink.unclip();
+    this.above = []; // the legend, above the axes
+    this.within(ink, () => this.drawing(this));
+    for (const [a, b, color, dash, word] of this.above) {
+      ink.line([a, b], { color, dash, width: 1.8 });
+      ink.text(b[0] + 5, b[1], word, { color: css("ink"), align: "left", size: 12 });
+    }
   }
   curve(xs, ys, look) { this.ink.line(Array.from(xs, (x, k) => [this.x(x), this.y(ys[k])]), look); }
   at(event) {
     const r = this.canvas.getBoundingClientRect(), [[x0, x1], [y0, y1]] = this.view, b = this.box;
     const share = (v, a, z) => Math.min(1, Math.max(0, (v - a) / (z - a)));
-    return [x0 + share(event.clientX - r.left, b.left, b.right) * (x1 - x0), y0 + share(event.clientY - r.top, b.bottom, b.top) * (y1 - y0)];
+    return [x0 + share((event.clientX - r.left) / zoom(), b.left, b.right) * (x1 - x0), y0 + share((event.clientY - r.top) / zoom(), b.bottom, b.top) * (y1 - y0)];
   }
   svg() {
-    const { clientWidth: w, clientHeight: h } = this.canvas, ink = new SvgInk(w, h, css("paper"));
+    const [w, h] = this.size(), ink = new SvgInk(w, h, css("paper"));
     this.paint(ink, w, h);
+    this.cover(ink);
     return new XMLSerializer().serializeToString(ink.root);
   }
 }
@@ -180,21 +216,33 @@ function download(name, content, type) {
   setTimeout(() => URL.revokeObjectURL(url), 10000);
 }
 
+// A picture that the page has as SVG.
+export function savePicture(name, image) {
+  const c = element("canvas", { width: 2 * image.naturalWidth, height: 2 * image.naturalHeight }), context = c.getContext("2d");
+  context.fillStyle = "#ffffff"; context.fillRect(0, 0, c.width, c.height);
+  context.drawImage(image, 0, 0, c.width, c.height);
+  c.toBlob((b) => download(`${name}.png`, b));
+}
+
 // A panel with a heading, tools, and the ways back to work.
 export function panel(id, title, { planes = () => [], lines = true } = {}) {
   const tools = element("div", { class: "tools" }), body = element("div"), code = element("pre"), request = element("pre");
   const section = element("section", { id, "aria-label": title });
   const head = element("div", { class: "head" }, element("h2", {}, title));
+  const told = element("span", { role: "status" });
   section.append(head, tools, body);
   const made = { section, tools, body, say: {}, python: "", request: "" };
-  const button = (words, act) => head.append(element("button", { onclick: act, "aria-label": `${words}: ${title}` }, words));
+  const button = (words, act) => head.append(element("button", { onclick: act, "aria-label": `${words.length > 3 ? words : `save picture as ${words}`}: ${title}`, title: words.length > 3 ? null : `save picture as ${words}` }, words));
   if (lines) {
-    button("copy Python", () => navigator.clipboard?.writeText(made.python).catch(() => {}));
+    button("copy Python", async () => {
+      try { await navigator.clipboard.writeText(made.python); told.textContent = "copied"; } catch { download(`${id}.py`, made.python, "text/plain"); told.textContent = "saved as a file"; }
+      setTimeout(() => { told.textContent = ""; }, 2000);
+    });
     button("save request", () => download(`${id}.toml`, made.request, "text/plain"));
     section.append(element("details", {}, element("summary", {}, "Python and request"), code, request));
   }
   if (planes().length) {
-    button("PNG", () => planes().forEach((p, k) => p.canvas.toBlob((b) => download(`${id}${k || ""}.png`, b))));
+    button("PNG", () => planes().forEach((p, k) => p.now() ?? p.canvas.toBlob((b) => download(`${id}${k || ""}.png`, b))));
     button("SVG", () => planes().forEach((p, k) => download(`${id}${k || ""}.svg`, p.svg(), "image/svg+xml")));
   }
   made.told = (header) => {
@@ -202,6 +250,7 @@ export function panel(id, title, { planes = () => [], lines = true } = {}) {
     made.python = code.textContent = header.python;
     made.request = request.textContent = header.request;
   };
+  head.append(told);
   document.getElementById("panels").append(section);
   return made;
 }

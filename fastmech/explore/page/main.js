@@ -8,11 +8,13 @@ import { Table, sections } from "./table.js";
 
 const status = document.getElementById("status"), error = document.getElementById("error");
 
+const RATE = 5; // end of the range of a rate [rad/s or m/s]
+const VIEWS = { equilibria: "the equilibria", motion: "the motion", basins: "the basin map", atlas: "the atlas" };
+
 class App {
   constructor() {
-    this.frame = 0;
-    this.compiled = 0;
-    this.waits = { equilibria: [], motion: [] };
+    this.frame = this.shown = 0;
+    this.waits = { answers: [], equilibria: [], motion: [] };
     this.talk = new Talk({
       about: (message) => this.begin(message),
       equilibria: (header, arrays) => this.equilibria(header, arrays),
@@ -20,19 +22,24 @@ class App {
       basins: (header, arrays) => { this.clear(header.kind); this.basins.take(header, arrays); },
       atlas: (header, arrays) => { this.clear(header.kind); this.atlas.take(header, arrays); },
       pull: (header) => { this.clear("pull"); this.from(header.state, true); },
-      strike: (header) => {
-        this.clear("strike");
-        this.mechanism.kick.textContent = `struck with ${header.speed.toFixed(2)} m/s, ${header.energy.toPrecision(3)} J`;
-        this.from(header.state, false);
-        this.mechanism.start();
-      },
+      strike: (header) => { this.clear("strike"); this.mechanism.kicked(header); },
       error: (message) => { this.failed = message.of; error.textContent = message.line; },
-      compiling: ({ name }) => this.compiling(name),
+      compiling: (told) => this.compiling(told),
       closed: () => { status.textContent = "the server has ended"; },
     });
   }
+  // Ranges of sliders: from zero to some times the usual value, wider where the value lies outside.
+  ranges(about) {
+    for (const [name, p] of Object.entries(about.parameters)) {
+      p.high = Number((2.5 * (Math.max(Math.abs(p.reset), Math.abs(p.value)) || 1)).toPrecision(1));
+      p.low = (about.scene && name === "F0") || Math.min(p.reset, p.value) < 0 ? -p.high : 0;
+    }
+    about.coordinates = Object.keys(about.states);
+    about.rates.forEach((rate, k) => { about.states[rate] = { unit: `${about.states[about.coordinates[k]].unit}/s`, low: -RATE, high: RATE, periodic: false }; });
+  }
   begin(about) {
     this.about = about;
+    this.ranges(about);
     document.getElementById("name").textContent = about.name;
     const names = Object.keys(about.states), parameters = Object.keys(about.parameters), n = about.coordinates.length;
     const two = n > 1 ? names.slice(0, 2) : [names[0], names[n]];
@@ -48,6 +55,7 @@ class App {
     this.table = new Table(this);
     addEventListener("hashchange", () => { if (location.hash !== this.hash) { this.restore(); this.all(); } });
     status.textContent = "ready";
+    performance.mark("usable");
     sections(about);
     this.all();
   }
@@ -72,10 +80,10 @@ class App {
     }, 150);
   }
   clear(kind) { if (this.failed === kind || this.failed === undefined) error.textContent = ""; }
-  compiling(name) {
-    if (name === null) { clearTimeout(this.told); this.told = setTimeout(() => { status.textContent = "ready"; }, 300); return; }
+  compiling({ name, of, number, about }) {
     clearTimeout(this.told);
-    status.textContent = `compiling ${name} (kernel ${++this.compiled})`;
+    if (name === null) this.told = setTimeout(() => { status.textContent = "ready"; }, 300);
+    else status.textContent = `loading or compiling for ${VIEWS[of] ?? of}: ${name}, kernel ${number} of about ${about}`;
   }
   all() {
     this.parameters.show();
@@ -89,14 +97,26 @@ class App {
     this.keep();
     if (what === "parameters" || what === "atlas point") {
       this.parameters.show();
-      this.atlas?.plane.later();
+      this.atlas?.plane.moved();
+      this.stop();
       const moved = Object.keys(this.state.parameters).some((n) => !this.state.atlas.includes(n) && this.state.parameters[n] !== before.parameters[n]);
       if (moved) { clearTimeout(this.later); this.later = setTimeout(() => this.askAtlas(), 200); }
       this.refresh();
-      if (this.state.start) this.askMotion();
+      this.follow();
     } else if (what === "atlas") this.askAtlas();
     else if (what === "basins") this.askBasins();
     else if (what === "t_end") { if (this.state.start) this.askMotion(); } else this.refresh();
+  }
+  // What takes longer leaves the processors to the equilibria, and begins anew when the slider rests.
+  stop() {
+    if (this.mapped) this.talk.ask("stop", { what: "basins" });
+    this.mapped = false;
+  }
+  follow() {
+    if (!this.state.start) return;
+    clearTimeout(this.following);
+    const since = performance.now() - (this.talk.asked.motion ?? 0);
+    this.following = setTimeout(() => this.askMotion(), since > 1000 ? 0 : 200);
   }
   refresh() {
     // While an answer is under way newer changes wait for it: each picture that comes is of the newest.
@@ -107,13 +127,14 @@ class App {
     this.landscape.set();
     this.talk.ask("equilibria", { parameters: this.state.parameters, axes: this.landscape.axes() });
     clearTimeout(this.mapping);
-    this.mapping = setTimeout(() => this.askBasins(), 120);
+    this.mapping = setTimeout(() => this.askBasins(), 200);
   }
   free() {
     this.busy = false;
     if (this.again) { this.again = false; this.refresh(); }
   }
   askBasins() {
+    this.mapped = true;
     this.basins.set();
     this.talk.ask("basins", { parameters: this.state.parameters, axes: this.basins.axes() });
   }
@@ -129,37 +150,44 @@ class App {
     this.moving = true;
     const { t_end } = this.state;
     clearTimeout(this.movingFreed);
-    this.movingFreed = setTimeout(() => { this.moving = false; }, 1000);
+    this.movingFreed = setTimeout(() => this.stood(), 1000);
     this.talk.ask("motion", { parameters: this.state.parameters, start: this.state.start, t_end, outputs: Math.min(18001, Math.round(60 * t_end) + 1) });
   }
   equilibria(header, arrays) {
     this.clear("equilibria");
-    this.waits.equilibria.push(header.waited);
+    const asked = performance.now() - header.waited;
+    this.waits.answers.push(header.waited);
     this.rows = header.rows;
     this.state.chosen = Math.min(this.state.chosen, Math.max(0, this.rows.length - 1));
     this.landscape.take(header, arrays);
-    this.table.take();
+    this.table.take(header);
     this.mechanism.rest(header, arrays);
     this.basins.plane.later();
+    requestAnimationFrame(() => this.waits.equilibria.push(performance.now() - asked)); // when it has been drawn
     clearTimeout(this.freed);
     this.free();
   }
   moves(header, arrays) {
     this.clear("motion");
     this.waits.motion.push(header.waited);
-    this.histories.take(header, arrays);
     this.motion = arrays.y;
+    this.histories.take(header, arrays);
+    this.landscape.plane.later();
+    this.basins.plane.later();
     this.mechanism.moves(header, arrays);
     if (this.play && !this.mechanism.playing) { this.play = false; this.mechanism.start(); }
+    this.stood();
+  }
+  stood() {
     this.moving = false;
     if (this.movingAgain) { this.movingAgain = false; this.askMotion(); }
   }
-  path() { return this.motion; }
   frameMoved(frame) {
     this.frame = frame;
-    this.landscape.plane.later();
-    this.basins.plane.later();
-    this.histories.later();
+    if (this.mechanism.playing && ++this.shown % 3) return; // often enough to follow
+    this.landscape.plane.moved();
+    this.basins.plane.moved();
+    this.histories.moved();
   }
   choose(k) {
     this.state = { ...this.state, chosen: k, start: null };

@@ -8,20 +8,23 @@ export class MechanismView {
     this.app = app;
     this.frame = 0;
     this.playing = false;
-    const view = canvas("the mechanism; drag a mass to set a start, hold Shift and drag to strike it");
-    this.plane = new Plane(view, () => this.draw(), { equal: true });
+    const view = canvas("the mechanism; drag a mass to set a start, hold Shift and drag to kick it; arrows move the chosen point");
+    this.plane = new Plane(view, () => {}, { equal: true, over: () => this.draw() });
     this.plane.labels = ["x [m]", "y [m]"];
-    this.panel = panel("mechanism", "Mechanism", { planes: () => [this.plane], lines: false });
+    this.panel = panel("mechanism", "Mechanism", { planes: () => [this.plane] });
     this.play = element("button", { onclick: () => this.toggle() }, "play");
     this.scrub = element("input", { type: "range", min: 0, max: 1, value: 0, "aria-label": "time" });
     this.scrub.addEventListener("input", () => { this.pause(); this.frame = Number(this.scrub.value); this.moved(); });
     this.speed = element("select", { "aria-label": "speed" }, ...[0.1, 0.25, 0.5, 1, 2, 4].map((s) => element("option", { value: s }, `${s}×`)));
     this.speed.value = 1;
     this.time = element("span", { role: "timer" });
-    this.kick = element("p", { class: "note" }, "Drag a mass: another start. Shift and drag: strike it.");
-    this.panel.tools.append(this.play, this.speed, this.scrub, this.time);
+    this.kick = element("p", { class: "note", role: "status" }, "Drag a mass: another start. Shift and drag: kick it.");
+    this.points = element("select", { "aria-label": "point that arrow keys move and kicks hit" });
+    const [vx, vy] = ["to the right", "upwards"].map((way, k) => element("input", { type: "number", class: "number", step: "any", value: k ? 0 : 1, "aria-label": `velocity of the kick ${way} [m/s]` }));
+    const kick = element("button", { onclick: () => { this.fire = true; this.strike(this.points.value, [Number(vx.value), Number(vy.value)]); } }, "kick [m/s]");
+    this.panel.tools.append(this.play, this.speed, this.scrub, this.time, element("span", { class: "group" }, this.points, vx, vy, kick));
     this.panel.body.append(view, this.kick);
-    draggable(this.plane, { begin: (at, e) => this.grab(at, e), move: (at) => this.drag(at), end: (at) => this.release(at) });
+    draggable(this.plane, { begin: (at, e) => this.grab(at, e), move: (at) => this.drag(at), end: (at) => this.release(at), keys: (step) => this.nudge(step) });
     this.last = 0;
     this.frames = [];
     requestAnimationFrame((t) => this.tick(t));
@@ -29,30 +32,40 @@ export class MechanismView {
   rest(header, arrays) {
     this.resting = { ...header, ends: arrays.ends };
     this.extent();
-    if (!this.motion) this.plane.later();
+    if (!this.motion) this.panel.told(header);
+    const movable = this.masses(this.resting).map((m) => m.point), before = this.points.value;
+    if (movable.join() !== [...this.points.options].map((o) => o.value).join()) {
+      this.points.replaceChildren(...movable.map((name) => element("option", { value: name }, name)));
+      this.points.value = movable.includes(before) ? before : movable[1] ?? movable[0] ?? "";
+    }
   }
   moves(header, arrays) {
+    this.panel.told(header);
     this.motion = { ...header, ends: arrays.ends, times: arrays.times.data, y: arrays.y };
     this.scrub.max = arrays.times.data.length - 1;
     if (header.t_end === 0 || this.frame >= arrays.times.data.length) this.frame = 0;
     this.extent();
     this.moved();
   }
-  atRest() { this.motion = null; this.pause(); this.plane.later(); }
+  atRest() { this.motion = null; this.pause(); this.extent(); this.plane.moved(); }
   extent() {
     const found = [[Infinity, -Infinity], [Infinity, -Infinity]];
-    for (const { elements, ends } of [this.resting, this.motion].filter(Boolean)) {
-      const n = elements.length, d = ends.data;
-      for (let k = 0; k < d.length; k++) {
-        const kind = elements[Math.floor(k / 4) % n];
-        if (kind === GUIDE || kind === LOAD) continue;
-        found[k % 2][0] = Math.min(found[k % 2][0], d[k]);
-        found[k % 2][1] = Math.max(found[k % 2][1], d[k]);
-      }
+    // The motion's whole extent, or that of the chosen equilibrium.
+    const of = this.motion ?? this.resting;
+    if (!of) return;
+    const n = of.elements.length, chosen = 4 * n * Math.min(this.app.state.chosen, of.ends.shape[0] - 1);
+    const d = this.motion ? of.ends.data : of.ends.data.subarray(chosen, chosen + 4 * n);
+    for (let k = 0; k < d.length; k++) {
+      const kind = of.elements[Math.floor(k / 4) % n];
+      if (kind === GUIDE || kind === LOAD) continue;
+      found[k % 2][0] = Math.min(found[k % 2][0], d[k]);
+      found[k % 2][1] = Math.max(found[k % 2][1], d[k]);
     }
     if (!Number.isFinite(found[0][0])) return;
     this.size = Math.max(found[0][1] - found[0][0], found[1][1] - found[1][0], 1e-9);
-    this.plane.range = found.map(([a, b]) => [a - 0.2 * this.size, b + 0.2 * this.size]);
+    if (this.held) return; // what is dragged stays under the hand
+    this.plane.range = found.map(([a, b]) => [a - 0.16 * this.size, b + 0.16 * this.size]);
+    this.plane.later();
   }
   toggle() { if (this.playing) this.pause(); else if (this.motion) { this.playing = true; this.play.textContent = "pause"; this.exact = null; } }
   pause() { this.playing = false; this.play.textContent = "play"; }
@@ -74,7 +87,7 @@ export class MechanismView {
   moved() {
     this.scrub.value = this.frame;
     if (this.motion) this.time.textContent = `${this.motion.times[this.frame].toFixed(2)} s`;
-    this.plane.later();
+    this.plane.moved();
     this.app.frameMoved(this.frame);
   }
   shown() {
@@ -117,14 +130,34 @@ export class MechanismView {
       const fixed = of.elements[k] === FIXED, [x, y] = X(of.at[k][0]);
       if (name) ink.text(x + (fixed ? -15 : 15), y + (fixed ? 16 : -16), name, { color: css("ink"), size: 13 });
     });
-    const { coordinates } = this.app.about;
-    const y = this.position();
-    if (y) ink.text(this.plane.box.left + 6, this.plane.box.top + 10, coordinates.map((n, k) => `${n} = ${y[k].toFixed(3)} ${this.app.about.states[n].unit}`).join("   "), { color: css("ink"), align: "left" });
-    if (this.struck) this.arrow(X(this.struck.from), X(this.struck.to), css("orange"));
+    const { coordinates, states } = this.app.about, y = this.position();
+    if (y) {
+      for (const [rod, end, k, sign, origin] of of.angles) {
+        const [x0, y0] = X(of.at[rod][end]), r = 0.17 * unit, q = y[k] - 2 * Math.PI * Math.round(y[k] / (2 * Math.PI));
+        const on = (angle, radius) => [x0 + radius * Math.cos(angle), y0 - radius * Math.sin(angle)], color = css("orange");
+        const arc = Array.from({ length: 33 }, (_, j) => on(origin + sign * q * j / 32, r));
+        ink.line([[x0, y0], on(origin, 1.25 * r)], { color, width: 1, dash: [4, 3] });
+        ink.line(arc, { color, width: 2 });
+        if (Math.abs(q) > 0.25) this.head(arc[28], arc[32], color);
+        ink.text(...on(origin + 0.5 * sign * q, 1.3 * r), coordinates[k], { color: css("ink"), size: 13 });
+      }
+      coordinates.forEach((n, k) => {
+        const degrees = states[n].unit === "rad" ? ` (${(y[k] * 180 / Math.PI).toFixed(1)}°)` : "";
+        ink.text(this.plane.box.left + 6, this.plane.box.top + 10 + 16 * k, `${n} = ${y[k].toFixed(3)} ${states[n].unit}${degrees}`, { color: css("ink"), align: "left" });
+      });
+    }
+    if (this.struck) {
+      const [a, b] = [X(this.struck.from), X(this.struck.to)];
+      this.arrow(a, b, css("orange"));
+      ink.text(b[0], b[1] + (b[1] < a[1] ? -14 : 14), this.struck.words, { color: css("ink"), size: 13 });
+    }
   }
   arrow(a, b, color) {
-    const d = Math.atan2(b[1] - a[1], b[0] - a[0]), h = (t) => [b[0] - 10 * Math.cos(d + t), b[1] - 10 * Math.sin(d + t)];
     this.plane.ink.line([a, b], { color, width: 2.6 });
+    this.head(a, b, color);
+  }
+  head(a, b, color) {
+    const d = Math.atan2(b[1] - a[1], b[0] - a[0]), h = (t) => [b[0] - 10 * Math.cos(d + t), b[1] - 10 * Math.sin(d + t)];
     this.plane.ink.line([b, h(0.45), h(-0.45)], { fill: color, closed: true });
   }
   position() {
@@ -132,39 +165,70 @@ export class MechanismView {
     if (this.motion) return Array.from({ length: n }, (_, k) => this.motion.y.data[this.frame * 2 * n + k]);
     return this.app.rows?.[this.app.state.chosen]?.position;
   }
+  // Masses at points that have names and move.
+  masses(of) {
+    const first = (k, c) => of.ends.data[4 * k + c], found = [];
+    of.elements.forEach((kind, k) => {
+      if (kind !== MASS) return;
+      const j = of.names.findIndex((name, i) => name && of.elements[i] === POINT && Math.hypot(first(i, 0) - first(k, 0), first(i, 1) - first(k, 1)) < 1e-5 * this.size);
+      if (j >= 0) found.push({ point: of.names[j], element: j, mass: of.masses[k] });
+    });
+    return found;
+  }
   grab(at, event) {
     const of = this.shown();
     if (!of) return false;
     let best = null;
-    of.elements.forEach((kind, k) => {
-      if (kind !== MASS) return;
-      const d = Math.hypot(of.at[k][0][0] - at[0], of.at[k][0][1] - at[1]);
-      if (d < 0.1 * this.size && (!best || d < best.d)) best = { k, d };
-    });
+    for (const one of this.masses(of)) {
+      const [x, y] = of.at[one.element][0], d = Math.hypot(x - at[0], y - at[1]);
+      if (d < 0.1 * this.size && (!best || d < best.d)) best = { ...one, d, from: [x, y] };
+    }
     if (!best) return false;
     this.pause();
-    const from = of.at[best.k][0];
-    const point = of.names.find((name, j) => name && Math.hypot(of.at[j][0][0] - from[0], of.at[j][0][1] - from[1]) < 1e-5 * this.size);
-    if (!point) return false;
-    this.held = { k: best.k, point, strike: event.shiftKey, from };
+    this.points.value = best.point;
+    this.fire = false;
+    this.held = { ...best, strike: event.shiftKey };
     return true;
   }
   drag(at) {
-    if (this.held.strike) {
-      this.struck = { from: this.held.from, to: at };
-      const v = this.velocity(at);
-      this.kick.textContent = `strike: ${Math.hypot(...v).toFixed(2)} m/s on the mass of ${this.shown().masses[this.held.k]} kg`;
-      this.plane.later();
-      return;
-    }
-    this.app.pull({ point: this.held.point, to: at, q: this.position() });
+    if (!this.held.strike) { this.app.pull({ point: this.held.point, to: at, q: this.position() }); return; }
+    const v = this.velocity(at);
+    this.struck = { from: this.held.from, to: at, words: `${Math.hypot(...v).toFixed(2)} m/s` };
+    this.strike(this.held.point, v);
+    this.plane.moved();
   }
+  // Four metres a second for a metre of arrow.
   velocity(at) { return [at[0] - this.held.from[0], at[1] - this.held.from[1]].map((d) => 4 * d); }
-  release(at) {
+  release() {
     if (this.held.strike) {
-      this.struck = null;
-      this.app.strike({ point: this.held.point, mass: this.shown().masses[this.held.k], velocity: this.velocity(at), q: this.position() });
+      if (this.told?.id === this.app.talk.newest.strike) this.go(); else this.fire = true;
     } else this.app.letGo();
     this.held = null;
+  }
+  strike(point, velocity) {
+    const one = this.resting && this.masses(this.resting).find((m) => m.point === point);
+    if (one) this.app.strike({ point, mass: one.mass, velocity, q: this.position() });
+    this.asked = Math.hypot(...velocity);
+  }
+  // The server has said what a kick brings: told beside the arrow until it is let go.
+  kicked(header) {
+    this.told = header;
+    const words = `${this.asked.toFixed(2)} m/s, ${header.energy.toPrecision(3)} J`;
+    this.kick.textContent = `Kick of ${words}: the point starts with ${header.speed.toFixed(2)} m/s, as its rods let it.`;
+    if (this.struck) this.struck.words = words;
+    this.plane.moved();
+    if (this.fire) this.go();
+  }
+  go() {
+    this.struck = null;
+    this.fire = false;
+    this.app.from(this.told.state, true);
+    this.app.letGo();
+  }
+  nudge(step) {
+    const of = this.shown(), k = of ? of.names.indexOf(this.points.value) : -1;
+    if (k < 0) return;
+    const [x, y] = of.at[k][0];
+    this.app.pull({ point: this.points.value, to: [x + step[0], y + step[1]], q: this.position() });
   }
 }
