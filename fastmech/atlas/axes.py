@@ -17,7 +17,7 @@ from fastmech.errors import InputError, shown, shown_name
 from fastmech.jit import MATRIX, VECTOR, kernel
 from fastmech.mechanism.coefficients import reduce
 from fastmech.models.mechanism import Mechanism
-from fastmech.scene import Scene, nearest, require_scene
+from fastmech.scene import PARAMETERS, Scene, nearest, require_scene
 
 
 def check_axes(scene: Scene, axes: Mapping[str, ArrayLike], most: int = 3) -> dict[str, Floats]:
@@ -71,7 +71,7 @@ def check_axis(scene: Scene, name: str, values: ArrayLike) -> Floats:
 
 
 def _check_values(scene: Scene, name: str, values: ArrayLike) -> Floats:
-    names = list(Scene.model_fields)
+    names = list(PARAMETERS)
     if not isinstance(name, str) or name not in names:
         hint = nearest(name, names) if isinstance(name, str) else f"allowed: {', '.join(names)}"
         raise InputError(f"axes.{shown_name(name)}: unknown parameter; {hint}")
@@ -108,7 +108,7 @@ def coefficient_columns(scene: Scene, values: Mapping[str, Any]) -> Any:
     The force is the one at rest: F0 where alpha = 0, else its limit 0. The formulas are plain arithmetic, so
     vectors, and complex numbers for derivatives, go through them as floats do.
     """
-    fields: dict[str, Any] = {**scene.model_dump(), **values}
+    fields: dict[str, Any] = {**scene.parameters, **values}
     fields["F0"] = fields["F0"] * np.where(np.real(fields["alpha"]) == 0.0, 1.0, 0.0)
     point: Any = SimpleNamespace(**fields)
     return reduce(point)
@@ -129,7 +129,7 @@ def grid_coefficients(scene: Scene, axes: Mapping[str, Floats]) -> tuple[Floats,
         return np.ravel(np.broadcast_to(np.asarray(value, dtype=np.float64), grid))
 
     columns = [full(column) for column in coefficient_columns(scene, spread)]
-    fields: Any = {**scene.model_dump(), **spread}
+    fields: Any = {**scene.parameters, **spread}
     return (
         np.ascontiguousarray(np.stack(columns, axis=1)),
         full(fields["m2"] * fields["l"] ** 2),

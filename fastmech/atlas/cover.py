@@ -33,6 +33,7 @@ from scipy.spatial import cKDTree
 
 from fastmech.arrays import Floats
 from fastmech.atlas.continuation import Curve
+from fastmech.interrupts import check
 from fastmech.jit import CUBE, INTEGERS, MATRIX, VECTOR, inlined, kernel
 
 CONSTANT, VARIABLE, ADD, SUBTRACT, MULTIPLY, SINE, COSINE = range(7)
@@ -393,6 +394,7 @@ def solutions(system: System, follow: Callable[[Floats], Curve | None]) -> Found
     known: list[Neighbourhoods] = []
     tiny, looked_at, vain = [centre[:0]], 0, 0
     while 0 < len(centre) <= MOST_BOXES - looked_at and vain < MOST_VAIN:
+        check()
         looked_at += len(centre)
         centre, half, slope, ripe = pruned(system, centre, half)
         left = ~held_by(known, centre, half)
@@ -403,6 +405,7 @@ def solutions(system: System, follow: Callable[[Floats], Curve | None]) -> Found
         z = z[~held_by(known, z, np.zeros_like(z))]
         before = len(known)
         while len(z) and vain < MOST_VAIN:
+            check()
             seed, z = z[:1], z[1:]
             curve = follow(seed[0])
             if curve is not None and held_by(known, curve.points, np.zeros_like(curve.points)).mean() < 0.5:

@@ -21,6 +21,7 @@ from fastmech.equilibria.certificate import Outcome
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import VERDICTS
+from fastmech.objects import Field, Printed, Result
 
 #: Relative width at which a value is located, and halvings at most.
 WIDTH, HALVINGS = 4.0 * 2.0**-52, 120
@@ -38,8 +39,8 @@ EVENLY = 0.1
 STEADY = 1e-6
 
 
-@dataclass(frozen=True)
-class CriticalValue:
+@dataclass(frozen=True, repr=False)
+class CriticalValue(Printed):
     """A value of a parameter at which something changes."""
 
     value: float
@@ -47,9 +48,32 @@ class CriticalValue:
     kind: Literal["fold", "pitchfork", "Hopf", "coalescence", "divergence", "exchange", "several"]
     position: tuple[float, ...]  #: of the equilibrium at which it happens, NaN where there are several
 
-    def __str__(self) -> str:
+    def told(self) -> str:
+        """Value, kind and place."""
         place = ", ".join(f"{x:.6g}" for x in self.position)
         return f"{self.value:.12g}: {self.kind} at ({place})"
+
+
+class CriticalValues(Result, tuple[CriticalValue, ...]):
+    """Critical values of a parameter, rising."""
+
+    KIND = "critical_values"
+    FIELDS = {
+        "value": Field("change", "@parameter", "value at which something changes", "changes.value"),
+        "width": Field("change", "@parameter", "width of the interval about it", "changes.width"),
+        "kind": Field("change", "1", "what happens", "changes.kind"),
+    }
+    parameter = ""
+
+    @property
+    def changes(self) -> tuple[CriticalValue, ...]:
+        """The values one by one."""
+        return tuple(self)
+
+    def told(self) -> str:
+        """Each value, what happens there, and where."""
+        head = f"{len(self)} critical values of {self.parameter}"
+        return "\n".join([head, *(f"  {self.parameter} = {value.told()}" for value in self)])
 
 
 def critical_values(
@@ -59,7 +83,7 @@ def critical_values(
     *,
     threads: int | None = None,
     progress: Callable[[int], None] | None = None,
-) -> list[CriticalValue]:
+) -> CriticalValues:
     """Values of a parameter at which equilibria appear, vanish or change their stability, rising.
 
     Folds and pitchforks change how many there are; at a Hopf point a pair of eigenvalues crosses the
@@ -97,7 +121,9 @@ def critical_values(
             kind, position, _ = named(mechanism, [parameter], a, b)
             value, width = 0.5 * a.at[0] + 0.5 * b.at[0], b.at[0] - a.at[0]
             found.append(CriticalValue(float(value), float(width), kind, tuple(map(float, position))))
-    return found
+    told = CriticalValues(found).of(mechanism)
+    told.parameter = parameter
+    return told
 
 
 class Known:

@@ -26,6 +26,7 @@ from fastmech.atlas.resting_map import map_resting_places
 from fastmech.equilibria.certificate import Outcome
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
+from fastmech.objects import Drawn, Field
 
 #: Halvings of an edge of the grid before Newton's method is tried.
 HALVINGS = 10
@@ -59,7 +60,7 @@ class CriticalCurve:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CriticalCurves:
+class CriticalCurves(Drawn):
     """The critical curves that a grid shows."""
 
     names: tuple[str, str]  #: of the parameters
@@ -69,7 +70,27 @@ class CriticalCurves:
     changes: int  #: edges of the grid between whose ends the equilibria change
     unexplained: Floats  #: (k, 2): changes on no curve
 
-    def __repr__(self) -> str:
+    KIND = "critical_curves"
+    PICTURE = "plots.objects:draw_critical_curves"
+    FIELDS = {
+        "x": Field("point", "@names.0", "value of the first parameter", "curves.x"),
+        "y": Field("point", "@names.1", "value of the second parameter", "curves.y"),
+        "*": Field("point coordinate", "", "equilibrium at which it happens,", "curves.position"),
+        "frequency": Field("point", "rad/s", "of the swing that grows, 0: none swings", "curves.frequency"),
+        "points": Field("curve", "1", "points of the curve"),
+        "kind": Field("curve", "1", "kind of the curve", "curves.kind"),
+        "closed": Field("curve", "1", "whether its last point is its first one", "curves.closed"),
+        "finished": Field("curve", "1", "whether it ends where a curve may end", "curves.finished"),
+        "unexplained": Field("change parameter", "1", "changes between points of the grid on no curve"),
+    }
+
+    @property
+    def points(self) -> list[int]:
+        """Points of each curve."""
+        return [curve.x.size for curve in self.curves]
+
+    def told(self) -> str:
+        """Curves by their kinds, and changes that none explains."""
         kinds = [curve.kind for curve in self.curves]
         told = ", ".join(f"{kinds.count(kind)} of {kind}s" for kind in dict.fromkeys(kinds)) or "none"
         lines = [
@@ -127,7 +148,7 @@ def critical_curves(
         np.concatenate([np.empty((0, 2 + balance.n)), *cusps]),
         len(pairs),
         np.array(lost).reshape(-1, 2),
-    )
+    ).of(mechanism)
 
 
 def _changes(found: Any) -> Pairs:

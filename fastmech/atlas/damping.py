@@ -6,6 +6,7 @@ The slider's damper misses a mode where sin phi = 0, where sin(phi + theta) = 0 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -18,6 +19,7 @@ from fastmech.atlas.cover import System, apart
 from fastmech.atlas.folds import MOST_POINTS, checked_plane, finish_on_edge, inside, plane_of
 from fastmech.atlas.map import EquilibriumMap, map_equilibria
 from fastmech.atlas.systems import Plane, dead_centre, point_at, straight, unloaded
+from fastmech.objects import Drawn
 from fastmech.scene import Scene
 from fastmech.stability.linearize import SIN_PHI, SIN_PSI, UNLOADED
 
@@ -38,7 +40,7 @@ END = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class UnreachedCurve:
+class UndampedCurve:
     """A curve on which the damper misses a mode of a stable equilibrium; arrays over its points, in order."""
 
     vanishes: str  #: ``sin phi``, ``sin(phi+theta)`` or ``U_theta,theta - C``
@@ -50,10 +52,10 @@ class UnreachedCurve:
 
 
 @dataclass(frozen=True, eq=False)
-class UnreachedSheet:
+class UndampedSheet:
     """Stable equilibria of which the damper misses a mode all over a part of the plane, not on a curve."""
 
-    vanishes: str  #: as for ``UnreachedCurve``
+    vanishes: str  #: as for ``UndampedCurve``
     x: float  #: one of the points
     y: float
     phi: float  #: the stable equilibrium there [rad]
@@ -61,20 +63,35 @@ class UnreachedSheet:
     share: float  #: of the grid's points
 
 
-@dataclass(frozen=True, eq=False)
-class UnreachedSet:
+@dataclass(frozen=True, eq=False, repr=False)
+class UndampedSet(Drawn):
     """Where, in a plane of two parameters, the damper misses a mode of a stable equilibrium."""
 
-    curves: tuple[UnreachedCurve, ...]
-    everywhere: tuple[UnreachedSheet, ...]
+    curves: tuple[UndampedCurve, ...]
+    everywhere: tuple[UndampedSheet, ...]
     crossings: int  #: edges of the grid along which one of the quantities changes sign on a stable sheet
     unexplained: int  #: of these, how many have no curve, because none was found or ``MOST_POINTS`` was met
     unfinished: int  #: curves that end where they could not be followed any further
+    names: tuple[str, str] = ("x", "y")  #: of the parameters
+
+    KIND = "undamped_curves"
+    LAYOUT = "scan_types.map_layout:undamped_curves"
+    PICTURE = "plots.objects:draw_curves_of"
+
+    def told(self) -> str:
+        """How many curves of which kind, and what none explains."""
+        kinds = Counter(curve.vanishes for curve in self.curves)
+        each = ", ".join(f"{count} of {what} = 0" for what, count in kinds.items())
+        return (
+            f"where damping misses a mode, over {self.names[0]} and {self.names[1]}: {each or 'no curve'}\n"
+            f"  of {self.crossings:,} changes on the grid {self.unexplained:,} lie on no curve; "
+            f"{len(self.everywhere)} sheets miss one throughout"
+        )
 
 
-def trace_unreached(
+def trace_undamped(
     scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike], *, threads: int | None = None
-) -> UnreachedSet:
+) -> UndampedSet:
     """Vanishing-damping curves of ``scene`` in the plane of two parameters.
 
     The values are the grid of the map that seeds them: a curve passes wherever one of the three quantities
@@ -90,10 +107,10 @@ def trace_unreached(
     axes = checked_plane(scene, x, y)
     plane = plane_of(scene, axes)
     if scene.beta == 0.0 and "beta" not in axes:
-        return UnreachedSet((), (), 0, 0, 0)
+        return UndampedSet((), (), 0, 0, 0, (x[0], y[0])).of(scene)
     atlas = map_equilibria(scene, axes, threads=threads)
-    curves: list[UnreachedCurve] = []
-    everywhere: list[UnreachedSheet] = []
+    curves: list[UndampedCurve] = []
+    everywhere: list[UndampedSheet] = []
     crossings = unexplained = unfinished = traced = 0
     for name, make in SYSTEMS.items():
         equations = make(plane)
@@ -122,7 +139,8 @@ def trace_unreached(
             traced += len(line.points)
             unfinished += not line.finished
         curves += [curve_of(plane, name, equations, line) for line in lines if len(line) > 1]
-    return UnreachedSet(tuple(curves), tuple(everywhere), crossings, unexplained, unfinished)
+    found = UndampedSet(tuple(curves), tuple(everywhere), crossings, unexplained, unfinished, (x[0], y[0]))
+    return found.of(scene)
 
 
 def stable(plane: Plane, z: Floats) -> bool:
@@ -149,7 +167,7 @@ def finish(plane: Plane, equations: System) -> Callable[[Floats, Floats], Floats
     return end
 
 
-def seeds(plane: Plane, atlas: EquilibriumMap, name: str) -> tuple[Floats, list[UnreachedSheet]]:
+def seeds(plane: Plane, atlas: EquilibriumMap, name: str) -> tuple[Floats, list[UndampedSheet]]:
     """Points (n, 4) near which the quantity vanishes, by linear interpolation between neighbours.
 
     Cells of the grid at whose four corners it vanishes are no place of a curve: their sheets are told apart.
@@ -199,17 +217,17 @@ def all_over(zero: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return flat
 
 
-def sheet_of(plane: Plane, name: str, places: Floats, share: float) -> UnreachedSheet:
+def sheet_of(plane: Plane, name: str, places: Floats, share: float) -> UndampedSheet:
     """A sheet that vanishes at these places (n, 4), told by the middle one, in the parameters' units."""
     phi, theta, u, v = places[len(places) // 2]
     x, y = (float(value) for value in plane.values((u, v)).values())
-    return UnreachedSheet(name, x, y, float(phi), float(theta), float(share))
+    return UndampedSheet(name, x, y, float(phi), float(theta), float(share))
 
 
-def curve_of(plane: Plane, name: str, equations: System, points: Floats) -> UnreachedCurve:
+def curve_of(plane: Plane, name: str, equations: System, points: Floats) -> UndampedCurve:
     """A traced curve in the parameters' units."""
     residual = max(float(np.max(np.abs(equations(z)[0]))) for z in points)
     values = plane.values(points[:, 2:].T)
     x, y = (np.asarray(values[key]) for key in plane.names)
     phi, theta = (np.mod(points[:, k] + np.pi, 2.0 * np.pi) - np.pi for k in (0, 1))
-    return UnreachedCurve(name, x, y, phi, theta, residual)
+    return UndampedCurve(name, x, y, phi, theta, residual)

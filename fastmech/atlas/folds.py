@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
@@ -14,6 +15,7 @@ from fastmech.atlas.axes import check_axis, check_pair, coefficient_columns, gri
 from fastmech.atlas.continuation import LONGEST, Curve, newton, trace
 from fastmech.atlas.cover import TURNS, Found, System, apart, solutions, wrapped
 from fastmech.atlas.systems import Plane, Point, cusp, families, point_at, rest, suited
+from fastmech.objects import Drawn, Printed
 from fastmech.scene import Scene
 
 #: Points after which no further curve is begun.
@@ -57,8 +59,8 @@ class CuspPoint:
     residual: float  #: scaled
 
 
-@dataclass(frozen=True, eq=False)
-class FoldSet:
+@dataclass(frozen=True, eq=False, repr=False)
+class FoldSet(Drawn):
     """The folds of a plane of two parameters."""
 
     names: tuple[str, str]
@@ -69,6 +71,20 @@ class FoldSet:
     crossings: int  #: edges of the grid between whose ends the number of equilibria changes
     unexplained: int  #: of these, how many no curve crosses
     unfinished: int  #: curves that end where they could not be followed any further
+
+    KIND = "fold_curves"
+    LAYOUT = "scan_types.map_layout:fold_curves"
+    PICTURE = "plots.objects:draw_curves_of"
+
+    def told(self) -> str:
+        """How many curves of which kind, and whether these are all."""
+        kinds = Counter(f"{c.kind} of a {c.merges}" for c in self.curves)
+        each = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
+        proof = "proved to be all" if self.complete else f"not proved to be all: {self.reason}"
+        return (
+            f"fold curves over {self.names[0]} and {self.names[1]}: {each or 'none'}\n"
+            f"  {len(self.cusps)} cusps; {proof}"
+        )
 
 
 def trace_folds(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike]) -> FoldSet:
@@ -131,7 +147,7 @@ def trace_folds(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike]
         len(crossings),
         unexplained,
         unfinished,
-    )
+    ).of(scene)
 
 
 def checked_plane(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike]) -> dict[str, Floats]:
@@ -337,8 +353,8 @@ TOGETHER = 1e-3
 FLAT = 1e-3
 
 
-@dataclass(frozen=True)
-class FoldPoint:
+@dataclass(frozen=True, repr=False)
+class FoldPoint(Printed):
     """A value of a parameter at which equilibria merge."""
 
     value: float
@@ -350,18 +366,34 @@ class FoldPoint:
     right to rounding: ``cusp``: three merge into one; ``transcritical``: two meet and part again."""
     residual: float  #: scaled residual of gradient and Hessian's determinant
 
+    def told(self) -> str:
+        """Value, kind and place."""
+        return f"{self.value:.12g}: {self.kind} of a {self.merges} at ({self.phi:.6g}, {self.theta:.6g}) rad"
 
-class FoldPoints(tuple[FoldPoint, ...]):
+
+class FoldPoints(Drawn, tuple[FoldPoint, ...]):
     """The folds of a range, in rising order."""
 
+    KIND = "folds"
+    LAYOUT = "scan_types.map_layout:fold_points"
+    PICTURE = "plots.objects:draw_curves_of"
+
+    parameter: str
     complete: bool  #: it is proved that the range holds no other one
     reason: str  #: why it is not; empty if it is
 
-    def __new__(cls, points: Iterable[FoldPoint], reason: str) -> FoldPoints:
-        """The points and why they may not be all."""
+    def __new__(cls, points: Iterable[FoldPoint], reason: str, parameter: str) -> FoldPoints:
+        """The points, why they may not be all, and what changes."""
         self = super().__new__(cls, points)
+        self.parameter = parameter
         self.complete, self.reason = not reason, reason
         return self
+
+    def told(self) -> str:
+        """How many, whether these are all, and each."""
+        proof = "proved to be all" if self.complete else f"not proved to be all: {self.reason}"
+        each = [f"  {self.parameter} = {point.told()}" for point in self]
+        return "\n".join([f"{len(self)} folds over {self.parameter}, {proof}", *each])
 
 
 def find_folds(scene: Scene, name: str, values: ArrayLike) -> FoldPoints:
@@ -386,7 +418,7 @@ def find_folds(scene: Scene, name: str, values: ArrayLike) -> FoldPoints:
         points += [_point(plane, curve.points[0], family.kind) for curve in folds]
         points += [point for z in _together(found.open) if (point := _singular(plane, z)).residual < RESIDUAL]
         reasons += doubts
-    return FoldPoints(sorted(points, key=lambda point: point.value), "; ".join(reasons))
+    return FoldPoints(sorted(points, key=lambda point: point.value), "; ".join(reasons), name).of(scene)
 
 
 def _alone(system: System) -> Callable[[Floats], Curve | None]:

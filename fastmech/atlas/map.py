@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Codes, Floats
 from fastmech.atlas.axes import check_axes, grid_coefficients
-from fastmech.atlas.resting_map import map_resting_places
+from fastmech.atlas.resting_map import map_resting_places, told_map
 from fastmech.atlas.sheets import SheetBuilder
 from fastmech.ensembles import checks
 from fastmech.ensembles.threads import thread_count
@@ -32,6 +32,7 @@ from fastmech.jit import CUBE, MATRIX, STATUSES, kernel, named_tuple
 from fastmech.mechanism.impulse import POINTS, impulse_for, mobility
 from fastmech.mechanism.reduced import potential_hessian
 from fastmech.models.mechanism import Mechanism
+from fastmech.objects import Drawn
 from fastmech.scene import Scene
 from fastmech.stability.classify import assess_one
 
@@ -274,8 +275,8 @@ class Slab:
         return Slab(**{field.name: getattr(self, field.name)[rows] for field in fields(Slab)})
 
 
-@dataclass(frozen=True, eq=False)
-class EquilibriumMap(Slab):
+@dataclass(frozen=True, eq=False, repr=False)
+class EquilibriumMap(Drawn, Slab):
     """Equilibria over a grid; the arrays of ``Slab`` with the axes' lengths in place of n.
 
     ``sheet`` keeps the identity of an equilibrium across the map (see ``fastmech.atlas.sheets``).
@@ -285,7 +286,15 @@ class EquilibriumMap(Slab):
     sheet: NDArray[np.int32]  #: grid + (6,), -1 where there is none
     sheet_morse_index: Codes  #: (sheets,)
     sheet_branch: NDArray[np.int32]  #: (sheets,): sheets of one branch continue one another round a cusp
-    sheet_breaks: NDArray[np.int32]  #: (breaks, axes + 2): see ``fastmech.atlas.sheets``
+    sheet_discontinuities: NDArray[np.int32]  #: (breaks, axes + 2): see ``fastmech.atlas.sheets``
+
+    KIND = "equilibrium_map"
+    LAYOUT = "scan_types.map_layout:map_dataset"
+    PICTURE = "plots.objects:draw_map"
+
+    def told(self) -> str:
+        """The grid, how many equilibria where, and what is proved."""
+        return told_map(self, ("phi", "theta"), f"  {len(self.sheet_morse_index)} sheets")
 
 
 Progress = Callable[[int], None]
@@ -343,8 +352,8 @@ def map_equilibria(
         sheet=np.concatenate(sheets.labels).reshape(*grid, MOST),
         sheet_morse_index=sheets.morse_index,
         sheet_branch=sheets.branch,
-        sheet_breaks=sheets.breaks,
-    )
+        sheet_discontinuities=sheets.breaks,
+    ).of(scene)
 
 
 def solve_in_slabs(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,14 +21,28 @@ from fastmech.intervals.search import Found
 from fastmech.models.equilibria import DIGITS, alike, outcome_of_row, search_rows, wrapped
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import VERDICTS, spectra, verdicts
+from fastmech.objects import Drawn
 from fastmech.scene import nearest
 
 #: Points that a thread proves at a time, and the numbers of 8 bytes that each takes meanwhile.
 BLOCK, POINT_NUMBERS = 64, 1200
 
 
+def told_map(found: Any, names: Iterable[str], more: str) -> str:
+    """What a map of equilibria holds, in words."""
+    grid = " x ".join(f"{name} ({values.size:,})" for name, values in found.axes.items())
+    counts, number = np.unique(found.count, return_counts=True)
+    complete = np.count_nonzero(found.outcome == Outcome.COMPLETE)
+    lines = [
+        f"equilibria of {', '.join(names)} over {grid}",
+        f"  proved complete at {complete:,} of {found.count.size:,} points",
+        "  equilibria: " + ", ".join(f"{k} at {n:,}" for k, n in zip(counts, number, strict=True)),
+    ]
+    return "\n".join([*lines, more])
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class RestingMap:
+class RestingMap(Drawn):
     """Equilibria over a grid of parameters; arrays have the grid's shape first, then a slot an equilibrium.
 
     Equilibria come the deepest first. Numbers are NaN in slots without one, codes -1.
@@ -46,23 +60,21 @@ class RestingMap:
     verdict: Codes  #: stability, a number of :data:`fastmech.models.stability.VERDICTS`
     eigenvalues: NDArray[np.complex128]  #: [1/s], (..., slots, 2 n), largest real part first
 
-    def __repr__(self) -> str:
-        grid = " x ".join(f"{name} ({values.size:,})" for name, values in self.axes.items())
-        kinds, number = np.unique(self.count, return_counts=True)
-        complete = np.count_nonzero(self.outcome == Outcome.COMPLETE)
+    KIND = "equilibrium_map"
+    LAYOUT = "scan_types.map_layout:map_dataset"
+    PICTURE = "plots.objects:draw_map"
+
+    @property
+    def count_stable(self) -> Codes:
+        """Equilibria that are stable, of the grid's shape."""
+        stable = [VERDICTS.index(verdict) for verdict in ("asymptotically stable", "stable")]
+        return np.isin(self.verdict, stable).sum(axis=-1).astype(np.int8)
+
+    def told(self) -> str:
+        """The grid, how many equilibria where, and what is proved."""
         there = self.verdict[self.verdict >= 0]
-        each = ", ".join(
-            f"{np.count_nonzero(there == k):,} {name}"
-            for k, name in enumerate(VERDICTS)
-            if (there == k).any()
-        )
-        lines = [
-            f"equilibria of {', '.join(self.names)} over {grid}",
-            f"  proved complete at {complete:,} of {self.count.size:,} points",
-            "  equilibria: " + ", ".join(f"{k} at {n:,}" for k, n in zip(kinds, number, strict=True)),
-            f"  {each}",
-        ]
-        return "\n".join(lines)
+        each = (f"{np.count_nonzero(there == k):,} {v}" for k, v in enumerate(VERDICTS) if (there == k).any())
+        return told_map(self, self.names, f"  {', '.join(each)}")
 
 
 def map_resting_places(
@@ -205,7 +217,7 @@ def _joined(
         arrays[name] = whole.reshape(*grid, slots, *values.shape[1:])
     outcome = np.concatenate([block.outcome for block in blocks])
     names = mechanism.state[: len(mechanism.coordinates)]
-    return RestingMap(axes, names, count.reshape(grid), outcome.reshape(grid), **arrays)
+    return RestingMap(axes, names, count.reshape(grid), outcome.reshape(grid), **arrays).of(mechanism)
 
 
 #: Longest and shortest step of a position [rad, lengths over their ranges by 2 pi].

@@ -19,6 +19,7 @@ from fastmech.models.equilibria import RestingPlace
 from fastmech.models.equilibria import find_equilibria as resting_places
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import assess
+from fastmech.objects import Printed
 from fastmech.scene import Scene, nearest, require_scene
 
 #: Longest step along the branch [rad, and parts of the range], and the shortest.
@@ -44,8 +45,8 @@ CROSSING = 1e-3
 How = Literal["disappears", "turns unstable", "begins to flutter", "leaves its range"]
 
 
-@dataclass(frozen=True)
-class Snap:
+@dataclass(frozen=True, repr=False)
+class Snap(Printed):
     """Values of a parameter at which a resting position ends."""
 
     parameter: str
@@ -77,6 +78,10 @@ class Snap:
             f"{' and '.join(ends) or f'disappears at {nowhere}'} "
             f"(searched from {low:.6g} to {high:.6g} {self.unit}{beyond})"
         )
+
+    def told(self) -> str:
+        """The answer in words."""
+        return self.sentence
 
     @property
     def sentence(self) -> str:

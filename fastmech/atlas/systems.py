@@ -47,7 +47,7 @@ class Plane:
         corners = np.meshgrid(*([0.0, 1.0] for _ in self.names), indexing="ij")
         values = self.values([part.ravel() for part in corners])
         c = coefficient_columns(self.scene, values)
-        full = {**self.scene.model_dump(), **values}
+        full = {**self.scene.parameters, **values}
         over_l = full["m2"] * full["l"]
         rows = [np.broadcast_to(x * over_l, corners[0].size) for x in (c.lift, c.spring, c.gravity, c.force)]
         parts = np.array(rows, dtype=np.float64).reshape(4, *corners[0].shape)

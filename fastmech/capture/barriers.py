@@ -18,6 +18,7 @@ from fastmech.equilibria.descent import convex_radius, descend, step_off
 from fastmech.equilibria.find import Equilibria, find_equilibria
 from fastmech.errors import InputError
 from fastmech.mechanism.coefficients import reduce
+from fastmech.objects import Printed
 from fastmech.scene import Scene
 
 Turns = tuple[int, int]
@@ -55,8 +56,8 @@ class Component:
         return not self.periods
 
 
-@dataclass(frozen=True)
-class BarrierTree:
+@dataclass(frozen=True, repr=False)
+class BarrierTree(Printed):
     """How the wells of a scene are connected."""
 
     equilibria: Equilibria
@@ -64,6 +65,14 @@ class BarrierTree:
     wells: tuple[int, ...]  #: which equilibria are minima, the deepest first
     barrier: Floats  #: B of every well [J]: the least energy at which it meets another well, copies included
     radius: Floats  #: of every well [rad]: U is convex in a ball of this radius
+
+    def told(self) -> str:
+        """Each well and how deep it is."""
+        each = (
+            f"well {well} at {self.equilibria.place(well)}: {barrier - self.equilibria[well].energy:.6g} J"
+            for well, barrier in zip(self.wells, self.barrier, strict=True)
+        )
+        return "\n".join([f"{len(self.wells)} wells, {len(self.openings)} saddles", *each])
 
     def components(self, energy: float) -> list[Component]:
         """Components of {U < energy}, one for all copies; wells that are not flooded are left out."""

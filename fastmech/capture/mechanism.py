@@ -37,6 +37,7 @@ from fastmech.integrators.methods import Method, find_method
 from fastmech.models.balance import balance_kernel, energy_kernel, range_of
 from fastmech.models.equilibria import Place, RestingPlaces, domain_of, find_equilibria
 from fastmech.models.mechanism import Mechanism, in_precision
+from fastmech.objects import Printed
 
 #: Cells along a coordinate, by the number of coordinates; odd, so that the middle of a range is inside one.
 SIDES = {1: 8191, 2: 255, 3: 61, 4: 23}
@@ -84,7 +85,7 @@ class Cells(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Wells:
+class Wells(Printed):
     """The wells of a mechanism: minima of U, loads at their means, and what parts them."""
 
     mechanism: Mechanism
@@ -96,7 +97,8 @@ class Wells:
     ]  #: the saddle there; None: an end of a range, an undecided place, or no exit
     cells: Cells
 
-    def __repr__(self) -> str:
+    def told(self) -> str:
+        """Each well, how deep it is, and the way out of it."""
         lines = []
         for well, barrier, saddle in zip(self.wells, self.barrier, self.passes, strict=True):
             depth = barrier - self.equilibria[well].energy

@@ -30,6 +30,7 @@ from fastmech.equilibria.solve import explain, solve_rows
 from fastmech.errors import InputError, shown
 from fastmech.mechanism.coefficients import Coefficients, force, reduce
 from fastmech.mechanism.reduced import potential_gradient, potential_hessian
+from fastmech.objects import Drawn, Field, Printed
 from fastmech.scene import Scene, require_scene
 
 #: How far a double root may lie from its place in |z|: the square root of rounding, and some.
@@ -214,8 +215,8 @@ def gather(coefficients: Coefficients, phi: Floats, theta: Floats, radius: Float
 KINDS = {0: "minimum", 1: "saddle", 2: "maximum", -2: "degenerate"}
 
 
-@dataclass(frozen=True, eq=False)
-class Equilibrium:
+@dataclass(frozen=True, eq=False, repr=False)
+class Equilibrium(Printed):
     """One resting position."""
 
     phi: float  #: [rad] in (-pi, pi]
@@ -225,6 +226,15 @@ class Equilibrium:
     morse_index: int  #: number of negative eigenvalues of the Hessian; -2: singular within rounding
     radius: float  #: the true equilibrium is proved to be within so many rad; inf: not proved
     force: float  #: the frozen force F that it holds for [N]
+
+    FIELDS = {
+        "kind": Field("", "1", "kind"),
+        "phi": Field("", "rad", "angle phi"),
+        "theta": Field("", "rad", "angle theta"),
+        "energy": Field("", "J", "potential energy"),
+        "radius": Field("", "rad", "proved to within"),
+        "force": Field("", "N", "force"),
+    }
 
     @property
     def position(self) -> Floats:
@@ -254,13 +264,24 @@ class Certificate:
         return self.outcome is Outcome.COMPLETE
 
 
-@dataclass(frozen=True, eq=False)
-class Equilibria(Sequence[Equilibrium]):
+def told_places(found: Any) -> str:
+    """How many equilibria, what is proved of the list, and where they are."""
+    places = "; ".join(f"{kind} at {found.place(k)}" for k, kind in enumerate(found.kind))
+    return f"{'; '.join(found.certificate.sentence.split('; ')[:2])}\n  {places}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Equilibria(Drawn, Sequence[Equilibrium]):
     """The equilibria of a scene, the deepest first."""
 
     items: tuple[Equilibrium, ...]
     force: float  #: the frozen force F [N]
     certificate: Certificate
+
+    KIND = "equilibria"
+    LAYOUT = "scan_types.equilibria:equilibria_dataset"
+    PICTURE = "plots.objects:draw_resting"
+    told = told_places
 
     def __len__(self) -> int:
         return len(self.items)
@@ -370,7 +391,7 @@ def find_equilibria(scene: Scene, at: float = math.inf) -> Equilibria:
         sentence = f"{explain(outcome, count, expected, margin)}; {evidence.sentence}"
     return Equilibria(
         items, frozen, Certificate(outcome, count, expected or None, margin, evidence, sentence)
-    )
+    ).of(scene)
 
 
 def frozen_force(scene: Scene, at: float) -> float:

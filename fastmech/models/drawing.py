@@ -33,6 +33,16 @@ class Element(IntEnum):
     MASS = 7
 
 
+class Angle(NamedTuple):
+    """Where a coordinate is seen as the angle of a rod: its direction is ``origin + sign * q`` [rad]."""
+
+    rod: int  #: place among the elements
+    end: int  #: of the rod that is the vertex, 0 or 1
+    coordinate: int
+    sign: int
+    origin: float
+
+
 class Drawing(NamedTuple):
     """Elements at some positions; springs, dampers and loads whose parameter is zero are left out."""
 
@@ -40,6 +50,7 @@ class Drawing(NamedTuple):
     name: tuple[str, ...]  #: of points
     mass: NDArray[np.float64]  #: [kg] (elements,), NaN of others than masses
     ends: NDArray[np.float64]  #: [m] (positions, elements, 2, 2): both ends, x and y
+    angles: tuple[Angle, ...] = ()  #: at most one of a coordinate
 
 
 def drawing(mechanism: Mechanism, q: ArrayLike) -> Drawing:
@@ -53,9 +64,11 @@ def drawing(mechanism: Mechanism, q: ArrayLike) -> Drawing:
         for ends in zip(*(c[1:3] for c in mechanism.coordinates), strict=True)
     )
     samples = low + (high - low) * np.random.default_rng(0).random((SAMPLES, len(low)))
-    points, elements = mechanism.places(np.concatenate([places, samples]))
+    alone = samples[0] + 0.3 * np.eye(len(low))  # each coordinate moved by itself
+    points, elements = mechanism.places(np.concatenate([places, samples, alone]))
     count = len(places)
     found: list[tuple[Element, str, float, NDArray[np.float64]]] = []
+    angles: dict[int, Angle] = {}
 
     def add(kind: Element, ends: NDArray[np.float64], name: str = "", mass: float = np.nan) -> None:
         found.append((kind, name, mass, ends[:count]))
@@ -73,6 +86,15 @@ def drawing(mechanism: Mechanism, q: ArrayLike) -> Drawing:
     for a, b in combinations(points.values(), 2):
         length = np.hypot(*(b - a).T)
         if (varies(a) or varies(b)) and not varies(length) and length.min() > ROUNDING:
+            for end, (vertex, other) in enumerate(((a, b), (b, a))):
+                away = (other - vertex)[count : count + SAMPLES]
+                for k, coordinate in enumerate(mechanism.coordinates):
+                    if np.ptp(vertex[[count, count + SAMPLES + k]], axis=0).max() > ROUNDING or k in angles:
+                        continue
+                    for sign in () if str(coordinate.symbol) in mechanism.lengths else (1, -1):
+                        from_origin = np.exp(1j * (np.arctan2(*away.T[::-1]) - sign * samples[:, k]))
+                        if np.abs(from_origin - from_origin[0]).max() <= ROUNDING:
+                            angles[k] = Angle(len(found), end, k, sign, float(np.angle(from_origin[0])))
             add(Element.ROD, np.stack([a, b], axis=1))
     for kind, size, ends in elements:
         if kind is Element.MASS:
@@ -84,6 +106,7 @@ def drawing(mechanism: Mechanism, q: ArrayLike) -> Drawing:
         tuple(one[1] for one in found),
         np.array([one[2] for one in found]),
         np.stack([one[3] for one in found], axis=1) if found else np.zeros((count, 0, 2, 2)),
+        tuple(angles.values()),
     )
 
 

@@ -20,6 +20,7 @@ from fastmech.intervals.search import AT_END, LIMIT, TWO_PI, UNCLEAR, UNDEFINED,
 from fastmech.loads import Constant
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.statics import Statics
+from fastmech.objects import Drawn, Printed
 from fastmech.scene import Scene
 
 #: Boxes that are treated at most, by the number of coordinates; a chain of four pendulums takes 9,600.
@@ -44,8 +45,8 @@ DIGITS = 9
 FACES = 1000
 
 
-@dataclass(frozen=True, eq=False)
-class RestingPlace:
+@dataclass(frozen=True, eq=False, repr=False)
+class RestingPlace(Printed):
     """One equilibrium of a mechanism; the forces Q - dU/dq vanish there."""
 
     position: Floats  #: coordinates (n,) [rad or m], periodic angles in (-pi, pi]
@@ -54,6 +55,11 @@ class RestingPlace:
     orientation: int  #: sign of the stiffness matrix' determinant, proved; 0 if it is not
     morse_index: int | None  #: directions in which U falls, proved; -2 not proved; None without a potential
     energy: float = math.nan  #: U [J], loads at their means; NaN where forces are not known to have one
+
+    def told(self) -> str:
+        """Kind, place and energy."""
+        place = ", ".join(f"{value:.6g}" for value in self.position)
+        return f"resting place: {self.kind} at ({place}) within {self.radius:.2g}; {self.energy:.6g} J"
 
     @property
     def kind(self) -> str:
@@ -93,13 +99,18 @@ class Proof:
         return self.outcome is Outcome.COMPLETE
 
 
-@dataclass(frozen=True, eq=False)
-class RestingPlaces(Sequence[RestingPlace]):
+@dataclass(frozen=True, eq=False, repr=False)
+class RestingPlaces(Drawn, Sequence[RestingPlace]):
     """Equilibria of a mechanism: the deepest first, or without a potential by orientation and position."""
 
     items: tuple[RestingPlace, ...]
     names: tuple[str, ...]  #: of the coordinates
     certificate: Proof
+
+    KIND = "equilibria"
+    LAYOUT = "scan_types.equilibria:equilibria_dataset"
+    PICTURE = "plots.objects:draw_resting"
+    told = find.told_places
 
     def __len__(self) -> int:
         return len(self.items)
@@ -146,11 +157,7 @@ class RestingPlaces(Sequence[RestingPlace]):
     def place(self, k: int) -> str:
         """Where an equilibrium is, in words."""
         named = zip(self.names, self.items[k].position, strict=True)
-        return ", ".join(f"{name} = {value:.6g}" for name, value in named)
-
-    def __repr__(self) -> str:
-        lines = [f"{self.place(k)}: {item.kind}" for k, item in enumerate(self.items)]
-        return "\n".join([*lines, self.certificate.sentence])
+        return ", ".join(f"{name} = {round(value, 9) + 0.0:.6g}" for name, value in named)
 
 
 @overload
@@ -187,9 +194,9 @@ def find_equilibria(system: Any, at: float = math.inf) -> find.Equilibria | Rest
         order = np.argsort(alike(energies), kind="stable")  # the deepest first, equal ones in their order
         found = replace(found, items=tuple(items[k] for k in order))
     if all(isinstance(load, Constant) for load in system.loads):
-        return found
+        return found.of(system)
     told = f"{found.certificate.sentence}; loads that change are at their means, or at what they come to"
-    return replace(found, certificate=replace(found.certificate, sentence=told))
+    return replace(found, certificate=replace(found.certificate, sentence=told)).of(system)
 
 
 def prove_equilibria(

@@ -22,6 +22,7 @@ from fastmech.kernels.rebuilding import fingerprint
 from fastmech.loads import BEFORE, Function, Load, Sampled
 from fastmech.models.checks import check
 from fastmech.models.statics import Coordinate, Statics
+from fastmech.objects import Printed
 from fastmech.scene import nearest
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ class Linear(NamedTuple):
     stiffness: Floats  #: (n, n), symmetric where forces have a potential
 
 
-class Mechanism:
+class Mechanism(Printed):
     """A holonomic mechanism.
 
     Write it the engineer's way, by points that are expressions of the coordinates and what acts between them,
@@ -243,10 +244,8 @@ class Mechanism:
         """
         if point not in self.points:
             raise InputError(f"on = {shown(point)}: must be one of {', '.join(self.points) or 'no points'}")
-        given = dict(zip(self._symbols, np.asarray(q, dtype=np.float64).tolist(), strict=True))
-        given |= dict(zip(self._constants, self.parameters.values(), strict=True))
-        jacobian = self.points[point].jacobian(list(self._symbols)).xreplace(given)
-        return np.array(jacobian.evalf().tolist(), dtype=np.float64)
+        slopes = self._placing[2][point](*self._split(q, 1), *self.parameters.values())
+        return np.array(slopes, dtype=np.float64)
 
     def places(self, q: ArrayLike) -> tuple[dict[str, Floats], list[tuple[Any, float, Floats]]]:
         """Named points (m, 2) of the plane [m] at positions (m, n), and kind, size and ends of elements.
@@ -257,7 +256,7 @@ class Mechanism:
         if any(len(place) != 2 for place in (*self.points.values(), *(d[2] for d in self._drawn))):
             return {}, []
         values, states = list(self.parameters.values()), self._split(q, 1)
-        sizes, place_of = self._placing
+        sizes, place_of, _ = self._placing
         numbers = sizes(*values)
         found = [np.broadcast_to(np.float64(one), states.shape[1:]) for one in place_of(*states, *values)]
         columns, named = np.stack(found, axis=-1), 2 * len(self.points)
@@ -267,15 +266,20 @@ class Mechanism:
         return points, list(zip(kinds, map(float, numbers), ends, strict=True))
 
     @cached_property
-    def _placing(self) -> tuple[Any, Any]:
-        """Sizes of what is drawn, of parameters, and places, of coordinates and parameters."""
+    def _placing(self) -> tuple[Any, Any, dict[str, Any]]:
+        """Sizes of what is drawn, of parameters; places, and points' slopes, of coordinates too."""
         import sympy
 
         sizes = [d[1].mean_at(self.parameters) if isinstance(d[1], Load) else d[1] for d in self._drawn]
         places = [*self.points.values(), *(end for *_, a, b in self._drawn for end in (a, b))]
         components = [component for place in places for component in place]
         symbols = [*self._symbols, *self._constants]
-        return sympy.lambdify(self._constants, sizes), sympy.lambdify(symbols, components, "numpy", cse=True)
+        slopes = {name: place.jacobian(list(self._symbols)) for name, place in self.points.items()}
+        return (
+            sympy.lambdify(self._constants, sizes),
+            sympy.lambdify(symbols, components, "numpy", cse=True),
+            {name: sympy.lambdify(symbols, one.tolist()) for name, one in slopes.items()},
+        )
 
     def energy(self) -> Any:
         """T + U, loads at their means, as an expression of coordinates, rates and parameters.
@@ -395,7 +399,8 @@ class Mechanism:
             raise InputError(f"y: has shape {states.shape}, must be (..., {count})")
         return np.moveaxis(states, -1, 0)
 
-    def __repr__(self) -> str:
+    def told(self) -> str:
+        """Coordinates and parameters."""
         values = ", ".join(f"{name}={value:g}" for name, value in self.parameters.items())
         return f"Mechanism({self.name}: {', '.join(map(str, self._symbols))}; {values})"
 

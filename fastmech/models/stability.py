@@ -14,6 +14,7 @@ from fastmech.errors import InputError, shown
 from fastmech.intervals.arithmetic import Interval, add, div, mul, sub
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Linear, Mechanism
+from fastmech.objects import Printed
 from fastmech.stability import classify as of_scene
 from fastmech.stability.classify import Finding
 
@@ -29,7 +30,7 @@ _NONE = -1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Stability:
+class Stability(Printed):
     """What decides whether a mechanism stays at an equilibrium; SI units."""
 
     eigenvalues: NDArray[np.complex128]  #: (2 n,) [1/s], largest real part first
@@ -43,7 +44,8 @@ class Stability:
     instability: Literal["flutter", "divergence"] | None  #: growing swings, or growth without; if unstable
     explanation: str
 
-    def __repr__(self) -> str:
+    def told(self) -> str:
+        """Verdict, why, and the eigenvalues."""
         swings = ", ".join(f"{value:.6g}" for value in self.eigenvalues)
         return f"{self.verdict}: {self.explanation}\neigenvalues [1/s]: {swings}"
 

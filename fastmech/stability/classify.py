@@ -25,6 +25,7 @@ from fastmech.equilibria.search import EPS, pulls
 from fastmech.equilibria.solve import morse_index
 from fastmech.jit import inlined
 from fastmech.mechanism.lagrange import unit
+from fastmech.objects import Printed
 from fastmech.scene import Scene
 from fastmech.stability.linearize import (
     MEANING,
@@ -400,8 +401,8 @@ class Finding(NamedTuple):
     reason: str
 
 
-@dataclass(frozen=True, eq=False)
-class Classification:
+@dataclass(frozen=True, eq=False, repr=False)
+class Classification(Printed):
     """Everything that decides an equilibrium's stability; SI units."""
 
     minors: Floats  #: Sylvester's leading minors of the Hessian of U (2,) [J, J^2]
@@ -418,6 +419,12 @@ class Classification:
     decay_rate: float  #: of the slowest linear mode [1/s]; NaN unless U has a minimum
     reach: dict[str, float]  #: how well the damper reaches the modes; see ``modes.reach``
     unreached: str | None  #: which measure of ``reach`` vanishes, if the damper misses a mode
+
+    def told(self) -> str:
+        """Verdict, why, how fast motions decay, and the eigenvalues."""
+        decay = "" if np.isnan(self.decay_rate) else f"\ndecay time {self.decay_time:.4g} s"
+        swings = ", ".join(f"{value:.6g}" for value in self.eigenvalues)
+        return f"{self.verdict}: {self.explanation}{decay}\neigenvalues [1/s]: {swings}"
 
     @property
     def decay_time(self) -> float:

@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import Dataset
@@ -230,7 +231,7 @@ def compute_alone(
     context: RunContext,
     target: Path,
     text: str | None = None,
-    mechanism: Mechanism | None = None,
+    mechanism: Mechanism | System | None = None,
 ) -> LoneTile:
     """Compute one tile.
 

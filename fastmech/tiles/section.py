@@ -12,6 +12,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown_name
 from fastmech.kernel_cache import COMPILED, PACKAGE, source_hash
 from fastmech.models.mechanism import Mechanism
@@ -68,10 +69,13 @@ def asked_for(request: Request) -> str:
     return json.dumps(content, sort_keys=True)
 
 
-def _told(scene: Scene | Mechanism) -> dict[str, Any]:
-    """What tells a scene or a mechanism apart."""
+def _told(scene: Scene | Mechanism | System) -> dict[str, Any]:
+    """What tells a scene, a mechanism or a system apart."""
     if isinstance(scene, Scene):
-        return scene.model_dump(mode="json")
+        return dict(scene.parameters)
+    if isinstance(scene, System):
+        about = {"state": list(scene.state), "angles": list(scene.angles)}
+        return {"system": scene.name, "equations": scene.prints, **about, **scene.parameters}
     ranges = {str(c.symbol): [c.low, c.high, c.periodic] for c in scene.coordinates}
     return {"mechanism": scene.name, "equations": scene.prints, "ranges": ranges, **scene.parameters}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fastmech.atlas.damping import trace_unreached
+from fastmech.atlas.damping import trace_undamped
 from fastmech.equilibria.find import find_equilibria
 from fastmech.scene import Scene
 from fastmech.stability.classify import classify
@@ -28,7 +28,7 @@ def test_verified_sets_lie_on_a_curve(name: str) -> None:
         ("F0", np.linspace(F0 - 40.0, F0 + 37.0, 41)),
         ("c2", np.linspace(max(c2 - 30.0, 0.0), c2 + 33.0, 43)),
     )
-    curves = [curve for curve in trace_unreached(scene, *axes).curves if curve.vanishes == name.strip()]
+    curves = [curve for curve in trace_undamped(scene, *axes).curves if curve.vanishes == name.strip()]
     assert all(curve.residual < 1e-12 for curve in curves)
     near = min(
         np.min(
@@ -46,7 +46,7 @@ def test_verified_sets_lie_on_a_curve(name: str) -> None:
 def test_points_of_the_curves_are_stable_and_silent() -> None:
     """On a curve the eigenvalues leave the verdict open and the Hessian says minimum."""
     scene = Scene(c1=294.9, alpha=0.0)
-    curves = trace_unreached(
+    curves = trace_undamped(
         scene, ("F0", np.linspace(-300.0, 300.0, 61)), ("c2", np.linspace(10.0, 300.0, 41))
     ).curves
     assert {curve.vanishes for curve in curves} >= {SIN_PHI, UNLOADED}
@@ -68,7 +68,7 @@ def test_points_of_the_curves_are_stable_and_silent() -> None:
 
 def test_no_damper_no_curve() -> None:
     scene = Scene(beta=0.0, alpha=0.0)
-    found = trace_unreached(scene, ("F0", [0.0, 1.0]), ("c1", [0.0, 1.0]))
+    found = trace_undamped(scene, ("F0", [0.0, 1.0]), ("c1", [0.0, 1.0]))
     assert (found.curves, found.everywhere, found.crossings) == ((), (), 0)
 
 
@@ -81,7 +81,7 @@ def test_a_sheet_that_damping_misses_everywhere_is_named(c2: float) -> None:
     """
     scene = Scene(F0=60.0, c1=120.0, c2=c2, alpha=0.0)
     F0, c1 = np.linspace(-400.0, 400.0, 41), np.linspace(0.0, 400.0, 41)
-    found = trace_unreached(scene, ("F0", F0), ("c1", c1))
+    found = trace_undamped(scene, ("F0", F0), ("c1", c1))
     assert [sheet.vanishes for sheet in found.everywhere] == [UNLOADED, UNLOADED]
     assert (found.unexplained, found.unfinished) == (0, 0)
     assert UNLOADED not in {curve.vanishes for curve in found.curves}
@@ -100,12 +100,12 @@ def test_a_sheet_that_damping_misses_everywhere_is_named(c2: float) -> None:
 def test_what_cannot_be_traced_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     axes = (("F0", np.linspace(-300.0, 300.0, 31)), ("c2", np.linspace(10.0, 300.0, 21)))
     scene = Scene(c1=294.9, alpha=0.0)
-    whole = trace_unreached(scene, *axes)
+    whole = trace_undamped(scene, *axes)
     assert (whole.unexplained, whole.unfinished) == (0, 0)
     monkeypatch.setattr("fastmech.atlas.continuation.MOST_STEPS", 7)
-    assert trace_unreached(scene, *axes).unfinished > 0
+    assert trace_undamped(scene, *axes).unfinished > 0
     monkeypatch.undo()
     monkeypatch.setattr("fastmech.atlas.damping.MOST_POINTS", 0)
-    none = trace_unreached(scene, *axes)
+    none = trace_undamped(scene, *axes)
     assert none.curves == ()
     assert none.unexplained == none.crossings == whole.crossings > 0

@@ -136,7 +136,7 @@ ISLANDS = Scene(alpha=0.0, c1=294.9)
 
 def pulls_at(scene: Scene, phi: Any, theta: Any, **changes: Any) -> tuple[Any, ...]:
     """Gradient and Hessian's determinant of U, and A1^2, A2^2, A3^2, f (a - b), at 50 digits."""
-    p = {n: mpmath.mpf(v) for n, v in scene.model_dump().items()} | changes
+    p = {n: mpmath.mpf(v) for n, v in scene.parameters.items()} | changes
     a = (p["m1"] + p["m2"]) * p["g"] * p["l"] - p["c2"] * p["l"] ** 2
     b, C, f = p["m2"] * p["g"] * p["l"], p["c1"] * p["l"] ** 2, p["F0"] * p["l"]
     one = a * mpmath.cos(phi) + f * mpmath.sin(phi) - C * mpmath.cos(phi + theta)
@@ -291,7 +291,7 @@ def zeros_on_the_torus(
     phi, theta = np.meshgrid(angle, angle, indexing="ij")
 
     def gradient(first: Any, second: Any) -> tuple[Any, Any, Any, Any, Any, Any]:
-        p = scene.model_dump() | {names[0]: first, names[1]: second}
+        p = scene.parameters | {names[0]: first, names[1]: second}
         # Over l the loads are linear in l and c1 l together; c1 l stands for c1 where both vary.
         spring = p["c1"] if names == ("l", "c1") else p["c1"] * p["l"]
         a, b, f = (p["m1"] + p["m2"]) * p["g"] - p["c2"] * p["l"], p["m2"] * p["g"], p["F0"]

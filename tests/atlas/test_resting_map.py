@@ -116,4 +116,4 @@ def test_a_map_may_hold_no_equilibrium() -> None:
     found = fm.map_equilibria(falls, {"a": [-1.0, 1.0, 2.0]})
     assert found.position.shape == (3, 0, 1)
     assert (found.outcome == Outcome.COMPLETE).all()
-    assert fm.critical_values(falls, "a", [1.0, 2.0]) == []
+    assert fm.critical_values(falls, "a", [1.0, 2.0]) == ()

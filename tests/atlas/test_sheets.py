@@ -52,7 +52,7 @@ def gradient_and_hessian(
     scene: Scene, values: dict[str, float], q: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Of U = Pi - F x2, written out from the design's potential."""
-    p = {**scene.model_dump(), **values}
+    p = {**scene.parameters, **values}
     a = (p["m1"] + p["m2"]) * p["g"] * p["l"] - p["c2"] * p["l"] ** 2
     b, C, f = p["m2"] * p["g"] * p["l"], p["c1"] * p["l"] ** 2, p["F0"] * p["l"]
     phi, theta = q
@@ -92,7 +92,7 @@ def on_sheet_all_the_way(
 ) -> bool:
     """Whether all corners of the cells on a straight way have the sheet, none of them at a break of it."""
     way = np.array(one) + np.linspace(0.0, 1.0, 400)[:, None] * (np.array(two) - np.array(one))
-    torn = {tuple(row[:2]) for row in atlas.sheet_breaks.tolist() if row[-1] == sheet}
+    torn = {tuple(row[:2]) for row in atlas.sheet_discontinuities.tolist() if row[-1] == sheet}
     for rounded in (np.floor, np.ceil):
         for other in (np.floor, np.ceil):
             i, j = rounded(way[:, 0]).astype(int), other(way[:, 1]).astype(int)
@@ -143,8 +143,8 @@ def test_breaks_are_few_and_real(name: str) -> None:
     """
     scene, axes = MAPS[name]
     atlas = map_equilibria(scene, axes)
-    assert len(atlas.sheet_breaks) <= 2 * sum(atlas.count.shape)
-    for *two, axis, sheet in atlas.sheet_breaks[:10].tolist():
+    assert len(atlas.sheet_discontinuities) <= 2 * sum(atlas.count.shape)
+    for *two, axis, sheet in atlas.sheet_discontinuities[:10].tolist():
         one = [k - (d == axis) for d, k in enumerate(two)]
         i, j = (list(atlas.sheet[tuple(k)]).index(sheet) for k in (one, two))
         start, end = ({n: float(axes[n][k]) for n, k in zip(axes, p, strict=True)} for p in (one, two))

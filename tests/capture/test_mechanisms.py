@@ -61,7 +61,7 @@ def test_the_papers_mechanism_has_the_scenes_wells_barriers_and_labels(values: d
     rng = np.random.default_rng(5)
     angles, rates = rng.uniform(-np.pi, np.pi, (1500, 2)), rng.normal(0.0, 4.0, (1500, 2))
     starts = np.concatenate([angles, rates], axis=1)
-    expected, found = fm.labels_of(scene, starts), fm.labels_of(mechanism, starts)
+    expected, found = fm.label_starts(scene, starts), fm.label_starts(mechanism, starts)
     np.testing.assert_allclose(found.tree.barrier, expected.tree.barrier, rtol=1e-10)
     np.testing.assert_allclose(found.tree.equilibria.energy, expected.tree.equilibria.energy, rtol=1e-10)
     both = (expected.well >= 0) & (found.well >= 0)
@@ -102,7 +102,7 @@ def test_a_spring_at_length_zero_bars_no_labels() -> None:
     assert end - 2.0 < wells.barrier[0] <= end
     assert wells.passes == (None,)
     rng = np.random.default_rng(4)
-    found = fm.labels_of(swing, np.concatenate([rng.uniform(-1.0, 1.0, (200, 4))], axis=1))
+    found = fm.label_starts(swing, np.concatenate([rng.uniform(-1.0, 1.0, (200, 4))], axis=1))
     assert found.counts["captured"] == 200
 
 
@@ -160,7 +160,7 @@ def test_labels_under_loads_that_fade(load: object) -> None:
     mechanism = double_well(load)
     rng = np.random.default_rng(2)
     starts = rng.uniform([-2.0, -2.0], [2.0, 2.0], (300, 2))
-    found = fm.labels_of(mechanism, starts)
+    found = fm.label_starts(mechanism, starts)
     assert (found.well >= 0).mean() > 0.9
     places = found.tree.equilibria.position[:, 0]
     for start, well in zip(starts[:12], found.well[:12], strict=True):
@@ -173,7 +173,7 @@ def test_labels_of_chains_count_turns(n: int) -> None:
     chain = damped_chain(n)
     rng = np.random.default_rng(3)
     starts = np.concatenate([rng.uniform(-3.0, 3.0, (200, n)), rng.normal(0.0, 6.0, (200, n))], axis=1)
-    found = fm.labels_of(chain, starts, 120.0)
+    found = fm.label_starts(chain, starts, 120.0)
     assert (found.well >= 0).mean() > 0.95
     assert np.abs(found.turns).max() > 0
     for start, well, turns in zip(starts[:8], found.well[:8], found.turns[:8], strict=True):
@@ -183,7 +183,7 @@ def test_labels_of_chains_count_turns(n: int) -> None:
 
 
 def test_a_motion_that_leaves_its_range_says_so() -> None:
-    found = fm.labels_of(double_well(reach=1.5), [[1.0, 3.0], [1.0, 0.1], [-1.0, -3.0]])
+    found = fm.label_starts(double_well(reach=1.5), [[1.0, 3.0], [1.0, 0.1], [-1.0, -3.0]])
     assert [fm.Status(s).name for s in found.status] == ["OUT_OF_RANGE", "CAPTURED", "OUT_OF_RANGE"]
     assert found.well.tolist() == [-1, found.well[1], -1]
     assert found.counts["out_of_range"] == 2
@@ -216,7 +216,7 @@ def test_disturbances_maps_and_shocks_of_a_mechanism() -> None:
     assert not comes_back(1.001 * speed)
     edge = fm.track_edge(mechanism, [1.0, 0.0], [-1.0, 0.0], t_end=40.0)
     assert edge.settled
-    saddle, away = fm.saddle_at(mechanism, edge.state)
+    saddle, away = fm.nearest_saddle(mechanism, edge.state)
     assert abs(saddle.position[0]) < 1e-9
     assert away < 1e-2
 
@@ -263,7 +263,7 @@ def test_trapped_needs_no_damper() -> None:
 def test_what_has_no_labels_says_why(mechanism: object, told: str) -> None:
     made = mechanism()  # type: ignore[operator]
     with pytest.raises(fm.InputError, match=told):
-        fm.labels_of(made, np.zeros((1, len(made.state))))
+        fm.label_starts(made, np.zeros((1, len(made.state))))
 
 
 def test_no_well_holds_what_a_load_keeps_moving() -> None:
@@ -275,7 +275,7 @@ def test_the_papers_mechanism_under_a_pulse_ends_where_scipy_says() -> None:
     mechanism = fm.mechanisms.slider_pendulum(fm.loads.Pulse(3000.0, 0.2, 0.3)).replace(c1=294.9, c2=92.85)
     rng = np.random.default_rng(6)
     starts = np.concatenate([rng.uniform(-3.0, 3.0, (40, 2)), np.zeros((40, 2))], axis=1)
-    found = fm.labels_of(mechanism, starts, 60.0)
+    found = fm.label_starts(mechanism, starts, 60.0)
     assert (found.well >= 0).any()
     for k in np.flatnonzero(found.well >= 0)[:4]:
         expected = found.tree.equilibria[int(found.well[k])].position + TURN * found.turns[k]
@@ -290,7 +290,7 @@ def test_an_offset_of_the_potential_costs_margin_and_no_label() -> None:
         dampers=[fm.Damper("O", "M", 0.2, along=(1, 0))], name="raised",
     )  # fmt: skip
     starts = np.random.default_rng(2).uniform([-2.0, -2.0], [2.0, 2.0], (100, 2))
-    found, plain = fm.labels_of(well, starts, 120.0), fm.labels_of(double_well(), starts, 120.0)
+    found, plain = fm.label_starts(well, starts, 120.0), fm.label_starts(double_well(), starts, 120.0)
     assert (found.well >= 0).mean() > 0.95
     both = (found.well >= 0) & (plain.well >= 0)
     assert (found.well == plain.well)[both].all()

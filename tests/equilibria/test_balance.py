@@ -42,7 +42,7 @@ def test_three_sinusoids_are_the_gradient() -> None:
     one = p.amplitude_phi * math.cos(phi - p.phase_phi)
     two = p.amplitude_theta * math.cos(theta - p.phase_theta)
     three = p.amplitude_psi * math.cos(phi + theta)
-    gradient = [float(x) for x in oracle().gradient(PAPER.model_dump(), (phi, theta), F=100.0)]
+    gradient = [float(x) for x in oracle().gradient(PAPER.parameters, (phi, theta), F=100.0)]
     np.testing.assert_allclose([scale * (one - three), scale * (two - three)], gradient, rtol=1e-13)
 
 
@@ -63,7 +63,7 @@ def test_corner_against_a_root_finder(r2: float, r3: float) -> None:
 @pytest.mark.nojit
 def test_fold_force_of_table_1_against_a_singular_hessian() -> None:
     """The margin vanishes where gradient and Hessian determinant vanish together, found by SciPy."""
-    params = PAPER.model_dump()
+    params = PAPER.parameters
 
     def singular(x: np.ndarray) -> list[float]:
         phi, theta, force = x

@@ -66,7 +66,7 @@ def test_table_3_to_the_printed_digit() -> None:
 
 def test_energy_and_hessian_against_the_oracle() -> None:
     found = find_equilibria(PAPER)
-    params = PAPER.model_dump()
+    params = PAPER.parameters
     for e in found:
         assert e.energy == pytest.approx(
             float(oracle().potential(params, (e.phi, e.theta), F=100.0)), rel=1e-14
@@ -78,7 +78,7 @@ def test_energy_and_hessian_against_the_oracle() -> None:
 
 def test_radius_encloses_the_root_at_forty_digits() -> None:
     scene = Scene(m1=0.3, m2=40.0, m3=2.0, l=0.7, c1=9000.0, c2=3.0, F0=-700.0, alpha=0.0)
-    params = scene.model_dump()
+    params = scene.parameters
     for e in find_equilibria(scene):
         with mpmath.workdps(40):
             root = mpmath.findroot(

@@ -41,7 +41,7 @@ def test_the_paper_s_mechanism_moves_as_the_scene(
     states: np.ndarray, t: float, changes: dict[str, float]
 ) -> None:
     mechanism, scene = fm.mechanisms.slider_pendulum().replace(**changes), fm.Scene(**changes)
-    assert mechanism.parameters == scene.model_dump()
+    assert mechanism.parameters == scene.parameters
     assert distance(mechanism.accelerations(t, states), angular_accelerations(scene, states, t)) < 1e-13
 
 

@@ -117,7 +117,7 @@ def test_decay_rate_near_a_missed_mode_against_forty_digits(name: str, away: flo
     e = nearest(scene, phi, theta)
     c = classify(scene, e)
     assert c.verdict == "asymptotically stable"
-    params = scene.model_dump()
+    params = scene.parameters
     with mpmath.workdps(40):
         root = mpmath.findroot(lambda x, y: oracle().gradient(params, (x, y), F=F0), (e.phi, e.theta))
         roots = mpmath.polyroots(
@@ -134,7 +134,7 @@ def test_closed_form_decay_where_eigenvalues_have_no_digits() -> None:
     e = nearest(scene, phi, theta)
     c = classify(scene, e)
     assert c.unreached == SIN_PSI
-    params = scene.model_dump()
+    params = scene.parameters
     with mpmath.workdps(40):
         root = mpmath.findroot(lambda x, y: oracle().gradient(params, (x, y), F=F0), (e.phi, e.theta))
         roots = mpmath.polyroots(
@@ -170,7 +170,7 @@ DAMPED = {
 def test_eigenvalues_and_their_verdict_against_fifty_digits(name: str, beta: float) -> None:
     """Their rates span 24 decades. By Kelvin-Tait-Chetaev each negative direction of U is one that grows."""
     scene = DAMPED[name].replace(beta=beta)
-    params = scene.model_dump()
+    params = scene.parameters
     for e in find_equilibria(scene):
         c = classify(scene, e)
         with mpmath.workdps(50):

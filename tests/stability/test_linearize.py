@@ -19,7 +19,7 @@ SCENES = [
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_jacobian_and_polynomial_against_the_oracle(scene: Scene) -> None:
-    params = scene.model_dump()
+    params = scene.parameters
     for e in find_equilibria(scene):
         J = np.array(oracle().jacobian(params, (e.phi, e.theta, 0.0, 0.0), t=0.0), dtype=float)
         np.testing.assert_allclose(jacobian(scene, e), J, rtol=1e-10, atol=1e-12 * np.abs(J).max())
