@@ -4,12 +4,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 OUT ?= results
 
-.PHONY: help demo test test-browser lint bench clean
+.PHONY: help demo test test-browser docs lint bench clean
 
 help:
 	@echo "make demo   install, run scans/paper.toml and the paper report, say where the results are"
 	@echo "make test   install and run the tests"
 	@echo "make test-browser   the live explorer in chromium"
+	@echo "make docs   the documentation as pages, in docs/_build"
 	@echo "make lint   formatter, linter and type checker"
 	@echo "make bench  speed against error, side by side with other integrators"
 	@echo "make clean  remove the virtual environment and build output (results stay)"
@@ -51,6 +52,11 @@ test: $(VENV)/.test
 test-browser: $(VENV)/.test
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[browser]'
 	$(BIN)/python -m pytest tests/explore -s
+
+# Warnings are errors; nothing is fetched from a network.
+docs: $(VENV)/.test
+	$(BIN)/python -m sphinx -W --keep-going -q -j auto docs docs/_build
+	@echo "Pages: docs/_build/index.html"
 
 lint: $(VENV)/.lint
 	$(BIN)/ruff format --check .

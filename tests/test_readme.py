@@ -1,9 +1,12 @@
-"""The README holds what it says: links lead somewhere, commands exist, examples run as written."""
+"""README and documentation hold what they say: links lead somewhere, commands exist, examples run."""
 
 from __future__ import annotations
 
+import importlib.util
 import re
 import runpy
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,9 +15,19 @@ from click.testing import CliRunner
 from fastmech.cli import COMMANDS, main
 
 ROOT = Path(__file__).parents[1]
-TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
-EXAMPLES = re.findall(r"^```python\n(.*?)^```", TEXT, re.MULTILINE | re.DOTALL)
-REQUESTS = re.findall(r"^```toml\n(.*?)^```", TEXT, re.MULTILINE | re.DOTALL)
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("[a-z]*.md"))]
+PAGES = [page for page in PAGES if not {"made", "_build"} & {*page.relative_to(ROOT).parts}]
+TEXTS = {str(page.relative_to(ROOT)): page.read_text(encoding="utf-8") for page in PAGES}
+TEXT = TEXTS["README.md"]
+
+
+def blocks(kind: str) -> list[tuple[str, int, str]]:
+    """Page, number and text of every block of code of a kind."""
+    found = {name: re.findall(rf"^```{kind}\n(.*?)^```", text, re.M | re.S) for name, text in TEXTS.items()}
+    return [(name, k, block) for name, each in found.items() for k, block in enumerate(each)]
+
+
+EXAMPLES, REQUESTS = blocks("python"), blocks("toml")
 
 #: The sections of scans/paper.toml that examples read, with fewer points.
 PAPER = """
@@ -43,39 +56,67 @@ def run(request: str, folder: Path, name: str) -> None:
 
 
 @pytest.mark.nojit
-def test_links_and_anchors_lead_somewhere() -> None:
-    anchors = {anchor(heading) for heading in re.findall(r"^##+ (.+)$", TEXT, re.MULTILINE)}
-    links = re.findall(r"\]\(([^)]+)\)", TEXT)
-    assert len(links) > 20
-    for link in links:
-        if link.startswith("#"):
-            assert link[1:] in anchors, link
-        elif not link.startswith("http"):
-            assert (ROOT / link).exists(), link
+@pytest.mark.parametrize("name", TEXTS)
+def test_links_and_anchors_lead_somewhere(name: str) -> None:
+    folder = (ROOT / name).parent
+    for link in re.findall(r"\]\(([^)]+)\)", TEXTS[name]):
+        where, _, place = link.partition("#")
+        if link.startswith("http"):
+            continue
+        target = folder / where if where else ROOT / name
+        assert target.exists(), link
+        if place:
+            headings = re.findall(r"^#+ (.+)$", target.read_text(encoding="utf-8"), re.MULTILINE)
+            assert place in {anchor(heading) for heading in headings}, link
 
 
 @pytest.mark.nojit
 def test_what_commands_name_exists() -> None:
-    for name in re.findall(r"(?:^ {4}|`)fastmech ([a-z]+)", TEXT, re.MULTILINE):
-        assert name in COMMANDS, name
-    paths = re.findall(r"\b(?:tests|scans|data)/[\w/]+(?:\.py|\.toml|\.png|\.h5)?\b", TEXT)
+    text = "\n".join(TEXTS.values())
+    for name in re.findall(r"(?:^ {4}|`|^)fastmech ([a-z]+)", text, re.MULTILINE):
+        assert name in COMMANDS or name == "answers", name
+    paths = re.findall(r"\b(?:tests|scans|data)/[\w/]+(?:\.py|\.toml|\.png|\.h5)?\b", text)
     assert len(paths) > 40
     for path in paths:
         assert (ROOT / path).exists(), path
     assert {name for name in COMMANDS if f"`fastmech {name}" not in TEXT} == set()
 
 
-@pytest.mark.parametrize("number", range(len(EXAMPLES)))
-def test_examples_run(number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.nojit
+def test_the_readme_is_short() -> None:
+    assert len(TEXT.splitlines()) <= 150
+
+
+@pytest.mark.parametrize(("page", "number", "code"), EXAMPLES, ids=[f"{p}-{k}" for p, k, _ in EXAMPLES])
+def test_examples_run(
+    page: str, number: int, code: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
-    if "results/" in EXAMPLES[number]:
+    if "results/" in code:
         run(PAPER, tmp_path, "paper")
+    if "mine.toml" in code:
+        (tmp_path / "mine.toml").write_text(REQUESTS[0][2], encoding="utf-8")
     script = tmp_path / "example.py"
-    script.write_text(EXAMPLES[number], encoding="utf-8")
+    script.write_text(code, encoding="utf-8")
     runpy.run_path(str(script))
 
 
-def test_the_request_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("page", "number", "request_text"), REQUESTS, ids=[p for p, _, _ in REQUESTS])
+def test_requests_run(
+    page: str, number: int, request_text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
-    (request,) = REQUESTS
-    run(request, tmp_path, "mine")
+    run(request_text, tmp_path, "mine")
+
+
+@pytest.mark.nojit
+@pytest.mark.skipif(importlib.util.find_spec("sphinx") is None, reason="Sphinx is not installed")
+def test_the_documentation_builds_without_a_warning(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-d", str(tmp_path / "trees")]
+    built = subprocess.run(
+        [*command, str(ROOT / "docs"), str(tmp_path / "pages")], capture_output=True, text=True, check=False
+    )
+    assert built.returncode == 0, built.stderr
+    for page in (tmp_path / "pages").rglob("*.html"):
+        text = page.read_text(encoding="utf-8")
+        assert not re.search(r"<(?:script|link)[^>]+(?:src|href)=\"https?:", text), page  # no network
