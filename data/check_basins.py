@@ -84,7 +84,7 @@ def random_starts(n: int) -> int:
         starts[:, :2] = rng.uniform(-np.pi, np.pi, (len(starts), 2))
         half = len(starts) // 2
         starts[half:, 2:] = rng.uniform(-fastest, fastest, (len(starts) - half, 2))
-        found = fm.labels_of(scene, starts, t_end)
+        found = fm.label_starts(scene, starts, t_end)
         began = time.perf_counter()
         final = fm.integrate(scene, starts, t_rest, dt=step, method="hairer10").y[-1]
         finer = fm.integrate(scene, starts[:500], t_rest, dt=step / 2, method="hairer10").y[-1]
@@ -96,7 +96,7 @@ def random_starts(n: int) -> int:
         wrong += compare(name, found, at_rest(scene, final))
         sample = rng.choice(len(starts), SCIPY_SAMPLE, replace=False)
         states = np.array([by_scipy(scene, starts[i], min(t_rest, 200.0)) for i in sample])
-        part = fm.labels_of(scene, starts[sample], min(t_rest, 200.0))
+        part = fm.label_starts(scene, starts[sample], min(t_rest, 200.0))
         wrong += compare(f"{name}, SciPy", part, at_rest(scene, states))
     return wrong
 
@@ -106,7 +106,7 @@ def scipy_map(side: int) -> int:
     angles = -np.pi + (np.arange(side) + 0.5) * 2.0 * np.pi / side
     starts = np.zeros((side * side, 4))
     starts[:, :2] = np.stack(np.meshgrid(angles, angles, indexing="ij"), axis=-1).reshape(-1, 2)
-    found = fm.labels_of(CONSTANT, starts)
+    found = fm.label_starts(CONSTANT, starts)
     p = np.array(reduce(CONSTANT))
 
     def together(t: float, y: np.ndarray) -> np.ndarray:

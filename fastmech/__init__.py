@@ -1,6 +1,42 @@
-"""High-throughput stability explorer for a constrained mechanism.
+"""High-throughput stability explorer for mechanisms: where they rest, what they survive, how they move.
 
 ``import fastmech as fm`` is cheap: a public name loads what it needs when it is first used.
+
+The device and its loads:
+    Scene, Mechanism, System, Body, Spring, TorsionSpring, Damper, TorsionDamper, Force, Torque,
+    angles, lengths, sin, cos
+
+Where it rests, and when that ends:
+    find_equilibria, classify, find_snap, find_folds, trace_folds, map_equilibria, critical_values,
+    critical_curves, trace_undamped, barrier_tree, reactions
+
+How it moves:
+    integrate, disturbed_motion, disturb, linear_range, transient_growth, largest_lyapunov, animate,
+    work_precision, step_warning, largest_stable_step
+
+Which shock it survives:
+    shock_limit, impulse_start, minimal_shock, brute_force_shock, map_snapping, critical_forces,
+    kinetic_norm, nearest_saddle, track_edge
+
+Where motions end:
+    map_basins, label_starts, trapped, erosion, find_attractors, frequency_response, follow_basins,
+    periodic_orbits, group_by_features, tipping_probabilities, well_numbers, well_of_number
+
+What a map of basins tells:
+    basin_fractions, basin_stability, finite_time_basin_stability, wilson, integrity, basin_entropy,
+    fractal_boundary_test, boundary_dimension, uncertainty_exponent, wada_merge_test, number_turns
+
+Files, reports and this installation:
+    open_results, report, system_info, Status, InputError, StepWarning
+
+What functions return:
+    Attractor, Attractors, BasinMap, BasinsAlong, Classification, CriticalCurves, CriticalValues,
+    DisturbedEnsemble, DisturbedMotion, EdgeTrack, Equilibria, Equilibrium, EquilibriumMap,
+    ErosionProfile, FoldPoints, FoldSet, FrequencyResponse, Labels, LinearRange, LyapunovExponents,
+    RestingMap, RestingPlace, RestingPlaces, Results, Shares, Shock, ShockLimit, Snap, SnappingMap,
+    Stability, Trajectories, UndampedSet, WorkPrecision
+
+Modules: ``fm.loads`` (forces over time), ``fm.mechanisms`` (shipped ones), ``fm.samplers`` (starts).
 """
 
 from __future__ import annotations
@@ -14,22 +50,27 @@ if TYPE_CHECKING:
     from fastmech import loads as loads
     from fastmech import mechanisms as mechanisms
     from fastmech import samplers as samplers
-    from fastmech.atlas.critical import critical_values
-    from fastmech.atlas.critical_curves import critical_curves
-    from fastmech.atlas.folds import find_folds, trace_folds
-    from fastmech.atlas.map import map_equilibria
-    from fastmech.atlas.snap import find_snap
-    from fastmech.attractors.branches import frequency_response
-    from fastmech.attractors.find import find_attractors
-    from fastmech.attractors.follow import follow_basins, tipping_probabilities
-    from fastmech.basins.copies import copy_labels, copy_of_label
-    from fastmech.basins.disturbed import disturb
-    from fastmech.basins.edge import saddle_at, track_edge
-    from fastmech.basins.erosion import erosion
-    from fastmech.basins.label import labels_of
-    from fastmech.basins.map import map_basins
+    from fastmech.atlas.critical import CriticalValues, critical_values
+    from fastmech.atlas.critical_curves import CriticalCurves, critical_curves
+    from fastmech.atlas.damping import UndampedSet, trace_undamped
+    from fastmech.atlas.folds import FoldPoints, FoldSet, find_folds, trace_folds
+    from fastmech.atlas.map import EquilibriumMap, map_equilibria
+    from fastmech.atlas.resting_map import RestingMap
+    from fastmech.atlas.snap import Snap, find_snap
+    from fastmech.attractors.branches import FrequencyResponse, frequency_response
+    from fastmech.attractors.features import group_by_features
+    from fastmech.attractors.find import Attractor, Attractors, find_attractors
+    from fastmech.attractors.follow import BasinsAlong, follow_basins, tipping_probabilities
+    from fastmech.attractors.periodic import periodic_orbits
+    from fastmech.basins.disturbed import DisturbedEnsemble, disturb
+    from fastmech.basins.edge import EdgeTrack, nearest_saddle, track_edge
+    from fastmech.basins.erosion import ErosionProfile, erosion
+    from fastmech.basins.label import label_starts
+    from fastmech.basins.labels import Labels
+    from fastmech.basins.map import BasinMap, map_basins
     from fastmech.basins.measures.entropy import basin_entropy, fractal_boundary_test
     from fastmech.basins.measures.fractions import (
+        Shares,
         basin_fractions,
         basin_stability,
         finite_time_basin_stability,
@@ -40,194 +81,124 @@ if TYPE_CHECKING:
     from fastmech.basins.measures.norm import kinetic_norm
     from fastmech.basins.measures.slopes import boundary_dimension, uncertainty_exponent
     from fastmech.basins.measures.wada import wada_merge_test
-    from fastmech.basins.shock import brute_force_shock, minimal_shock
-    from fastmech.basins.shock_limit import impulse_start, shock_limit
-    from fastmech.basins.snapping import critical_forces, map_snapping
-    from fastmech.bench.frontier import work_precision
+    from fastmech.basins.shock import Shock, brute_force_shock, minimal_shock
+    from fastmech.basins.shock_limit import ShockLimit, impulse_start, shock_limit
+    from fastmech.basins.snapping import SnappingMap, critical_forces, map_snapping
+    from fastmech.basins.well_numbers import well_numbers, well_of_number
+    from fastmech.bench.frontier import WorkPrecision, work_precision
     from fastmech.capture.barriers import barrier_tree
     from fastmech.capture.select import trapped
-    from fastmech.disturbance.motion import disturbed_motion, linear_range
-    from fastmech.ensembles.integrate import integrate
+    from fastmech.device_report import report
+    from fastmech.disturbance.motion import DisturbedMotion, LinearRange, disturbed_motion, linear_range
+    from fastmech.ensembles.integrate import Trajectories, integrate
     from fastmech.ensembles.status import Status
     from fastmech.ensembles.system import System
-    from fastmech.errors import InputError
+    from fastmech.equilibria.find import Equilibria, Equilibrium
+    from fastmech.errors import InputError, StepWarning
     from fastmech.kernels.sincos import cos, sin
     from fastmech.mechanism.geometry import reactions
     from fastmech.models.coordinates import angles, lengths
-    from fastmech.models.elements import (
-        Body,
-        Damper,
-        Force,
-        Spring,
-        Torque,
-        TorsionDamper,
-        TorsionSpring,
-    )
-    from fastmech.models.equilibria import find_equilibria
+    from fastmech.models.elements import Body, Damper, Force, Spring, Torque, TorsionDamper, TorsionSpring
+    from fastmech.models.equilibria import RestingPlace, RestingPlaces, find_equilibria
     from fastmech.models.mechanism import Mechanism
-    from fastmech.models.stability import classify
+    from fastmech.models.stability import Stability, classify
     from fastmech.plots.animation import animate
     from fastmech.scene import Scene
+    from fastmech.stability.classify import Classification
     from fastmech.step_limits.predict import largest_stable_step
     from fastmech.step_limits.warning import step_warning
-    from fastmech.store.read import open_results
+    from fastmech.store.read import Results, open_results
     from fastmech.system_info import system_info
-    from fastmech.transients.lyapunov import largest_lyapunov, transient_growth
+    from fastmech.transients.lyapunov import LyapunovExponents, largest_lyapunov, transient_growth
 
 try:
     __version__ = metadata.version("fastmech")
 except metadata.PackageNotFoundError:  # run from its sources, not installed
     __version__ = "unknown"
 
-_MODULES = {
-    "Body": "fastmech.models.elements",
-    "Damper": "fastmech.models.elements",
-    "Force": "fastmech.models.elements",
-    "InputError": "fastmech.errors",
-    "Mechanism": "fastmech.models.mechanism",
-    "Scene": "fastmech.scene",
-    "Spring": "fastmech.models.elements",
-    "Status": "fastmech.ensembles.status",
-    "StepWarning": "fastmech.errors",
-    "System": "fastmech.ensembles.system",
-    "Torque": "fastmech.models.elements",
-    "TorsionDamper": "fastmech.models.elements",
-    "TorsionSpring": "fastmech.models.elements",
-    "animate": "fastmech.plots.animation",
-    "angles": "fastmech.models.coordinates",
-    "barrier_tree": "fastmech.capture.barriers",
-    "basin_entropy": "fastmech.basins.measures.entropy",
-    "basin_fractions": "fastmech.basins.measures.fractions",
-    "basin_stability": "fastmech.basins.measures.fractions",
-    "boundary_dimension": "fastmech.basins.measures.slopes",
-    "brute_force_shock": "fastmech.basins.shock",
-    "classify": "fastmech.models.stability",
-    "copy_labels": "fastmech.basins.copies",
-    "copy_of_label": "fastmech.basins.copies",
-    "cos": "fastmech.kernels.sincos",
-    "critical_curves": "fastmech.atlas.critical_curves",
-    "critical_forces": "fastmech.basins.snapping",
-    "critical_values": "fastmech.atlas.critical",
-    "disturb": "fastmech.basins.disturbed",
-    "disturbed_motion": "fastmech.disturbance.motion",
-    "erosion": "fastmech.basins.erosion",
-    "find_attractors": "fastmech.attractors.find",
-    "find_equilibria": "fastmech.models.equilibria",
-    "find_folds": "fastmech.atlas.folds",
-    "follow_basins": "fastmech.attractors.follow",
-    "find_snap": "fastmech.atlas.snap",
-    "finite_time_basin_stability": "fastmech.basins.measures.fractions",
-    "frequency_response": "fastmech.attractors.branches",
-    "fractal_boundary_test": "fastmech.basins.measures.entropy",
-    "impulse_start": "fastmech.basins.shock_limit",
-    "integrate": "fastmech.ensembles.integrate",
-    "integrity": "fastmech.basins.measures.integrity",
-    "kinetic_norm": "fastmech.basins.measures.norm",
-    "labels_of": "fastmech.basins.label",
-    "largest_lyapunov": "fastmech.transients.lyapunov",
-    "largest_stable_step": "fastmech.step_limits.predict",
-    "lengths": "fastmech.models.coordinates",
-    "linear_range": "fastmech.disturbance.motion",
-    "map_basins": "fastmech.basins.map",
-    "map_equilibria": "fastmech.atlas.map",
-    "map_snapping": "fastmech.basins.snapping",
-    "minimal_shock": "fastmech.basins.shock",
-    "number_turns": "fastmech.basins.measures.labels",
-    "open_results": "fastmech.store.read",
-    "reactions": "fastmech.mechanism.geometry",
-    "saddle_at": "fastmech.basins.edge",
-    "shock_limit": "fastmech.basins.shock_limit",
-    "sin": "fastmech.kernels.sincos",
-    "step_warning": "fastmech.step_limits.warning",
-    "tipping_probabilities": "fastmech.attractors.follow",
-    "system_info": "fastmech.system_info",
-    "trace_folds": "fastmech.atlas.folds",
-    "trace_unreached": "fastmech.atlas.damping",
-    "track_edge": "fastmech.basins.edge",
-    "transient_growth": "fastmech.transients.lyapunov",
-    "trapped": "fastmech.capture.select",
-    "uncertainty_exponent": "fastmech.basins.measures.slopes",
-    "wada_merge_test": "fastmech.basins.measures.wada",
-    "wilson": "fastmech.basins.measures.fractions",
-    "work_precision": "fastmech.bench.frontier",
+#: Public names by the module that they come from.
+_NAMES = {
+    "atlas.critical": "CriticalValues critical_values",
+    "atlas.critical_curves": "CriticalCurves critical_curves",
+    "atlas.damping": "UndampedSet trace_undamped",
+    "atlas.folds": "FoldPoints FoldSet find_folds trace_folds",
+    "atlas.map": "EquilibriumMap map_equilibria",
+    "atlas.resting_map": "RestingMap",
+    "atlas.snap": "Snap find_snap",
+    "attractors.branches": "FrequencyResponse frequency_response",
+    "attractors.features": "group_by_features",
+    "attractors.find": "Attractor Attractors find_attractors",
+    "attractors.follow": "BasinsAlong follow_basins tipping_probabilities",
+    "attractors.periodic": "periodic_orbits",
+    "basins.disturbed": "DisturbedEnsemble disturb",
+    "basins.edge": "EdgeTrack nearest_saddle track_edge",
+    "basins.erosion": "ErosionProfile erosion",
+    "basins.label": "label_starts",
+    "basins.labels": "Labels",
+    "basins.map": "BasinMap map_basins",
+    "basins.measures.entropy": "basin_entropy fractal_boundary_test",
+    "basins.measures.fractions": "Shares basin_fractions basin_stability finite_time_basin_stability wilson",
+    "basins.measures.integrity": "integrity",
+    "basins.measures.labels": "number_turns",
+    "basins.measures.norm": "kinetic_norm",
+    "basins.measures.slopes": "boundary_dimension uncertainty_exponent",
+    "basins.measures.wada": "wada_merge_test",
+    "basins.shock": "Shock brute_force_shock minimal_shock",
+    "basins.shock_limit": "ShockLimit impulse_start shock_limit",
+    "basins.snapping": "SnappingMap critical_forces map_snapping",
+    "basins.well_numbers": "well_numbers well_of_number",
+    "bench.frontier": "WorkPrecision work_precision",
+    "capture.barriers": "barrier_tree",
+    "capture.select": "trapped",
+    "device_report": "report",
+    "disturbance.motion": "DisturbedMotion LinearRange disturbed_motion linear_range",
+    "ensembles.integrate": "Trajectories integrate",
+    "ensembles.status": "Status",
+    "ensembles.system": "System",
+    "equilibria.find": "Equilibria Equilibrium",
+    "errors": "InputError StepWarning",
+    "kernels.sincos": "cos sin",
+    "mechanism.geometry": "reactions",
+    "models.coordinates": "angles lengths",
+    "models.elements": "Body Damper Force Spring Torque TorsionDamper TorsionSpring",
+    "models.equilibria": "RestingPlace RestingPlaces find_equilibria",
+    "models.mechanism": "Mechanism",
+    "models.stability": "Stability classify",
+    "plots.animation": "animate",
+    "scene": "Scene",
+    "stability.classify": "Classification",
+    "step_limits.predict": "largest_stable_step",
+    "step_limits.warning": "step_warning",
+    "store.read": "Results open_results",
+    "system_info": "system_info",
+    "transients.lyapunov": "LyapunovExponents largest_lyapunov transient_growth",
 }
+_MODULES = {name: f"fastmech.{module}" for module, names in _NAMES.items() for name in names.split()}
+_PARTS = ("loads", "mechanisms", "samplers")
 
 __all__ = [
-    "Body",
-    "Damper",
-    "Force",
-    "InputError",
-    "Mechanism",
-    "Scene",
-    "Spring",
-    "Status",
-    "StepWarning",
-    "System",
-    "Torque",
-    "TorsionDamper",
-    "TorsionSpring",
-    "angles",
-    "animate",
-    "barrier_tree",
-    "basin_entropy",
-    "basin_fractions",
-    "basin_stability",
-    "boundary_dimension",
-    "brute_force_shock",
-    "classify",
-    "copy_labels",
-    "copy_of_label",
-    "cos",
-    "critical_curves",
-    "critical_forces",
-    "critical_values",
-    "disturb",
-    "disturbed_motion",
-    "erosion",
-    "find_attractors",
-    "find_equilibria",
-    "find_folds",
-    "find_snap",
-    "finite_time_basin_stability",
-    "follow_basins",
-    "fractal_boundary_test",
-    "frequency_response",
-    "impulse_start",
-    "integrate",
-    "integrity",
-    "kinetic_norm",
-    "labels_of",
-    "largest_lyapunov",
-    "largest_stable_step",
-    "lengths",
-    "linear_range",
-    "map_basins",
-    "map_equilibria",
-    "map_snapping",
-    "minimal_shock",
-    "number_turns",
-    "open_results",
-    "reactions",
-    "saddle_at",
-    "shock_limit",
-    "sin",
-    "step_warning",
-    "system_info",
-    "tipping_probabilities",
-    "trace_folds",
-    "trace_unreached",
-    "track_edge",
-    "transient_growth",
-    "trapped",
-    "uncertainty_exponent",
-    "wada_merge_test",
-    "wilson",
-    "work_precision",
-]
+    "Attractor", "Attractors", "BasinMap", "BasinsAlong", "Body", "Classification", "CriticalCurves",
+    "CriticalValues", "Damper", "DisturbedEnsemble", "DisturbedMotion", "EdgeTrack", "Equilibria",
+    "Equilibrium", "EquilibriumMap", "ErosionProfile", "FoldPoints", "FoldSet", "Force",
+    "FrequencyResponse", "InputError", "Labels", "LinearRange", "LyapunovExponents", "Mechanism",
+    "RestingMap", "RestingPlace", "RestingPlaces", "Results", "Scene", "Shares", "Shock", "ShockLimit",
+    "Snap", "SnappingMap", "Spring", "Stability", "Status", "StepWarning", "System", "Torque",
+    "TorsionDamper", "TorsionSpring", "Trajectories", "UndampedSet", "WorkPrecision", "angles", "animate",
+    "barrier_tree", "basin_entropy", "basin_fractions", "basin_stability", "boundary_dimension",
+    "brute_force_shock", "classify", "cos", "critical_curves", "critical_forces", "critical_values",
+    "disturb", "disturbed_motion", "erosion", "find_attractors", "find_equilibria", "find_folds",
+    "find_snap", "finite_time_basin_stability", "follow_basins", "fractal_boundary_test",
+    "frequency_response", "group_by_features", "impulse_start", "integrate", "integrity", "kinetic_norm",
+    "label_starts", "largest_lyapunov", "largest_stable_step", "lengths", "linear_range", "map_basins",
+    "map_equilibria", "map_snapping", "minimal_shock", "nearest_saddle", "number_turns", "open_results",
+    "periodic_orbits", "reactions", "report", "shock_limit", "sin", "step_warning", "system_info",
+    "tipping_probabilities", "trace_folds", "trace_undamped", "track_edge", "transient_growth", "trapped",
+    "uncertainty_exponent", "wada_merge_test", "well_numbers", "well_of_number", "wilson", "work_precision",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:
-    if name in ("loads", "mechanisms", "samplers"):
+    if name in _PARTS:
         return import_module(f"fastmech.{name}")
     if name not in _MODULES:
         raise AttributeError(f"module 'fastmech' has no attribute {name!r}")
@@ -237,4 +208,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *__all__])
+    return sorted([*__all__, *_PARTS, "__version__"])

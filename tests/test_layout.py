@@ -19,6 +19,7 @@ pytestmark = pytest.mark.nojit
 LAYERS = (
     "arrays",
     "errors",
+    "objects",
     "interrupts",
     "kernel_cache",
     "generated",
@@ -51,6 +52,7 @@ LAYERS = (
     "tiles",
     "runner",
     "reports",
+    "device_report",
     "paper",
     "hardcases",
     "bench",
@@ -60,8 +62,8 @@ LAYERS = (
     "__main__",
 )
 
-#: A scene under another load is a mechanism, which is made where one is asked for; results draw themselves.
-UPWARD = {("scene.py", "mechanisms"), ("branches.py", "plots"), ("follow.py", "plots")}
+#: A scene under another load is a mechanism, which is made where one is asked for; results become datasets.
+UPWARD = {("scene.py", "mechanisms"), ("objects.py", "results")}
 
 MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path != PACKAGE / "__init__.py")
 
@@ -158,6 +160,7 @@ def test_compiled_places_import_compiled_places_only(path: Path) -> None:
         allowed = {name.removesuffix(".py") for name in COMPILED} | {
             "scene",
             "errors",
+            "objects",
             "interrupts",
             "kernel_cache",
         }
@@ -166,7 +169,7 @@ def test_compiled_places_import_compiled_places_only(path: Path) -> None:
 
 def test_whatever_a_scan_computes_with_decides_its_identity() -> None:
     """Kept tiles of other sources are not continued; what only tells, shows or writes may change."""
-    apart = {"", "errors", "interrupts", "kernel_cache", "store", "plots"}
+    apart = {"", "errors", "objects", "interrupts", "kernel_cache", "store", "plots"}
     reached: set[str] = set()
     more = {"scan_types"}
     while more - reached:

@@ -24,11 +24,11 @@ def test_every_public_name_exists_and_is_described(name: str) -> None:
 
 def test_public_names() -> None:
     promised = {"Scene", "InputError", "find_equilibria", "classify", "integrate", "disturb", "open_results"}
-    promised |= {"map_basins", "labels_of", "copy_labels", "copy_of_label", "number_turns"}
+    promised |= {"map_basins", "label_starts", "well_numbers", "well_of_number", "number_turns"}
     promised |= {"basin_fractions", "basin_stability", "finite_time_basin_stability", "wilson"}
     promised |= {"integrity", "kinetic_norm", "minimal_shock", "brute_force_shock", "erosion"}
     promised |= {"uncertainty_exponent", "boundary_dimension", "basin_entropy", "fractal_boundary_test"}
-    promised |= {"wada_merge_test", "track_edge", "saddle_at"}
+    promised |= {"wada_merge_test", "track_edge", "nearest_saddle"}
     promised |= {"map_snapping", "critical_forces", "shock_limit", "impulse_start"}
     assert promised <= set(fm.__all__)
     assert fm.__all__ == sorted(fm.__all__)

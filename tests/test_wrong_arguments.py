@@ -32,13 +32,13 @@ WRONG = [
 #: Public functions, what they are given otherwise, and arguments for which none of the values above will do.
 CALLS: list[tuple[Callable[..., Any], dict[str, Any], tuple[str, ...]]] = [
     (fm.integrate, {"scene": SCENE, "y0": STARTS, "t_end": 1.0}, ("scene",)),
-    (fm.labels_of, {"scene": SCENE, "starts": STARTS}, ("scene",)),
+    (fm.label_starts, {"scene": SCENE, "starts": STARTS}, ("scene",)),
     (fm.map_basins, {"scene": SCENE, "axes": AXES}, ("scene", "axes")),
     (fm.map_snapping, {"scene": SCENE, "F0": [1.0], "alpha": [1.0]}, ("scene",)),
-    (fm.copy_labels, {"scene": SCENE}, ("scene",)),
+    (fm.well_numbers, {"scene": SCENE}, ("scene",)),
     (fm.trapped, {"scene": SCENE, "states": STARTS}, ("scene",)),
     (fm.reactions, {"scene": SCENE, "y": STARTS, "t": 0.0}, ("scene", "y")),
-    (fm.saddle_at, {"scene": SCENE, "state": STARTS[0]}, ("scene", "state")),
+    (fm.nearest_saddle, {"scene": SCENE, "state": STARTS[0]}, ("scene", "state")),
     (
         fm.erosion,
         {"scene": SCENE, "parameter": "F0", "values": [1.0], "axes": AXES, "most_shock": 1.0},
@@ -69,7 +69,7 @@ def test_integers_beyond_doubles() -> None:
         lambda: fm.step_warning(SCENE, huge, "rk4"),
         lambda: fm.step_warning(SCENE, 0.1, "rk4", [huge, 0, 0, 0]),
         lambda: fm.integrate(SCENE, STARTS, huge),
-        lambda: fm.saddle_at(SCENE, [huge, 0, 0, 0]),
+        lambda: fm.nearest_saddle(SCENE, [huge, 0, 0, 0]),
         lambda: fm.map_basins(SCENE, {**AXES, "phi": [0, huge]}),
         lambda: fm.reactions(SCENE, [huge, 0, 0, 0], 0.0),
     ):

@@ -38,6 +38,9 @@ SIDE, QUICK_SIDE = 1000, 100
 #: Distance over the scale at which a motion has arrived at an orbit; so many times as long it may take.
 NEAR, LONGER = 1e-6, (1, 2, 4, 10)
 
+#: Looks after which the others are looked at first, at least.
+FIRST = 16.0
+
 #: Looks in a row at which a motion lies in a chaotic attractor's cells, nearly all of them.
 LOOKS, IN_CELLS = 24, 0.8
 
@@ -166,12 +169,12 @@ def beside(
 ) -> str:
     """Wrong labels of so many starts, of those that have one: ``wrong of compared``."""
     starts = starts_of(ranges, system.state, number, 1)
-    ends = found.labels_of(starts)
+    ends = found.label_starts(starts)
     wrong = compared = 0
     for start, label, status, arrived in zip(starts, ends.label, ends.status, ends.time, strict=True):
         if status not in (Status.CAPTURED, Status.ESCAPED):
             continue
-        length = arrived if np.isfinite(arrived) else 50.0 * found.looks
+        length = max(arrived, FIRST * found.looks) if np.isfinite(arrived) else FIRST * found.looks
         reached = _end(found, path, start, max(1, round(length / found.looks)))
         if reached is not None:
             compared, wrong = compared + 1, wrong + (reached != label)

@@ -15,7 +15,7 @@ from numba import njit
 from scipy.integrate import solve_ivp
 
 from fastmech.arrays import Floats
-from fastmech.basins.label import labels_of
+from fastmech.basins.label import label_starts
 from fastmech.bench.plain import scalar_rhs
 from fastmech.disturbance.motion import confining_energy, excess_energy
 from fastmech.ensembles.threads import thread_count
@@ -70,7 +70,7 @@ def _timed(starts: Floats, turns: int, threads: int, radius: float | None = None
     runs = []
 
     def label() -> None:
-        runs.append(labels_of(SCENE, starts, T_END, settle_radius=radius, threads=threads))
+        runs.append(label_starts(SCENE, starts, T_END, settle_radius=radius, threads=threads))
 
     (seconds,) = in_turns({"": label}, turns, clock=time.perf_counter).values()
     return statistics.median(seconds), runs[0].steps / len(starts)
@@ -115,7 +115,7 @@ def lsoda(starts: Floats) -> BasinRow:
 
     rests.terminal = True  # type: ignore[attr-defined]
     scalar_rhs(0.0, starts[0], p)
-    labels = labels_of(SCENE, starts, T_END)
+    labels = label_starts(SCENE, starts, T_END)
     began = time.perf_counter()
     ends, steps = [], 0
     for start in starts:

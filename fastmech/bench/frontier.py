@@ -28,7 +28,8 @@ from fastmech.ensembles.work_precision import (
 from fastmech.errors import InputError, called_here, shown
 from fastmech.integrators.methods import METHODS, ImplicitRungeKutta, Method, find_method
 from fastmech.models.mechanism import Mechanism
-from fastmech.plots.style import LINES, new_figure, style
+from fastmech.objects import Drawn, Field
+from fastmech.plots.style import LINES
 from fastmech.scene import Scene
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ class WorkPoint:
 
 
 @dataclass(frozen=True, repr=False)
-class WorkPrecision:
+class WorkPrecision(Drawn):
     """Methods and steps on one problem; printed, it names the frontier."""
 
     points: tuple[WorkPoint, ...]
@@ -86,32 +87,44 @@ class WorkPrecision:
         fit = f", fit={list(self.fit)}" if self.fit else ""
         return f'fm.integrate(problem, starts, t_end, dt={best.dt:.4g}, method="{best.method}"{fit})'
 
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Trajectories a second over the largest error, a line for each method, the frontier marked."""
-        with style():
-            axes: Axes = new_figure(9.0, 5.4).subplots() if ax is None else ax
-            names = list(dict.fromkeys(point.method for point in self.points))
-            for k, name in enumerate(names):
-                mine = sorted((p.largest, p.rate) for p in self.points if p.method == name)
-                marker = MARKERS[k // len(LINES) % len(MARKERS)]
-                x, y = zip(*mine, strict=True)
-                axes.plot(x, y, marker=marker, color=LINES[k % len(LINES)], label=name, linewidth=1.2)
-            best = self.frontier
-            axes.plot(
-                [p.largest for p in best], [p.rate for p in best], "o", markersize=13, fillstyle="none",
-                color="black", label="fastest at its error",
-            )  # fmt: skip
-            axes.set_xscale("log")
-            axes.set_yscale("log")
-            axes.set_xlabel("largest error [state's units]")
-            axes.set_ylabel("trajectories [1/s]")
-            axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
-            axes.grid(which="both", alpha=0.25)
-        return axes
+    KIND = "work_precision"
+    PICTURE = "bench.frontier:draw_frontier"
+    FIELDS = {
+        "method": Field("point", "1", "method", "points.method"),
+        "dt": Field("point", "s", "step", "points.dt"),
+        "largest": Field(
+            "point", "1", "error of the worst trajectory, in the states' units", "points.largest"
+        ),
+        "error_99": Field("point", "1", "99 % quantile of the errors", "points.error_99"),
+        "rate": Field("point", "s-1", "trajectories a second", "points.rate"),
+    }
 
-    def __repr__(self) -> str:
-        each = "; ".join(f"{p.largest:.0e}: {p.method} {p.rate:,.0f}/s" for p in self.frontier[:6])
-        return f"WorkPrecision({len(self.points)} points; largest error and fastest method: {each})"
+    def told(self) -> str:
+        """The frontier."""
+        each = [
+            f"  error {p.largest:.0e}: {p.method}, dt = {p.dt:.3g} s, {p.rate:,.0f} trajectories/s"
+            for p in self.frontier
+        ]
+        return "\n".join([f"{len(self.points)} methods and steps; the fastest for each error:", *each])
+
+
+def draw_frontier(found: WorkPrecision, axes: Axes) -> None:
+    """Trajectories a second over the largest error, a line for each method, the frontier marked."""
+    names = list(dict.fromkeys(point.method for point in found.points))
+    for k, name in enumerate(names):
+        mine = sorted((p.largest, p.rate) for p in found.points if p.method == name)
+        marker = MARKERS[k // len(LINES) % len(MARKERS)]
+        x, y = zip(*mine, strict=True)
+        axes.plot(x, y, marker=marker, color=LINES[k % len(LINES)], label=name, linewidth=1.2)
+    best = found.frontier
+    axes.plot(
+        [p.largest for p in best], [p.rate for p in best], "o", markersize=13, fillstyle="none",
+        color="black", label="fastest at its error",
+    )  # fmt: skip
+    axes.set(xscale="log", yscale="log")
+    axes.set(xlabel="largest error [state's units]", ylabel="trajectories [1/s]")
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+    axes.grid(which="both", alpha=0.25)
 
 
 @called_here(t_span="t_end", tol="errors")
@@ -176,7 +189,7 @@ def work_precision(
                 points.append(_timed(case, trial, method, dt))
         if progress is not None:
             progress(1)
-    return WorkPrecision(tuple(points), tuple(wanted), trial.fit)
+    return WorkPrecision(tuple(points), tuple(wanted), trial.fit).of(scene)
 
 
 def _timed(case: Case, trial: Trial, method: Method, dt: float) -> WorkPoint:

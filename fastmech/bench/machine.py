@@ -117,7 +117,7 @@ def costs(problem: Problem, stage: Stage) -> list[Cost]:
     rng = np.random.default_rng(3)
     own = {
         name: value * rng.uniform(0.99, 1.01, len(starts))
-        for name, value in Scene(alpha=0.0).model_dump().items()
+        for name, value in Scene(alpha=0.0).parameters.items()
         if value
     }
 

@@ -13,7 +13,7 @@ from fastmech.bench.frontier import EXPLICIT, WorkPrecision, work_precision
 from fastmech.ensembles.fitting import vibration_frequency
 from fastmech.errors import InputError, one_line, shown, shown_name
 from fastmech.mechanism.coefficients import reduce
-from fastmech.plots.style import save
+from fastmech.plots.style import new_figure, save, style
 from fastmech.reports import Stage, no_stage, table
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import read_request
@@ -102,5 +102,8 @@ def run_problem(where: str, out: Path, stage: Stage = no_stage) -> tuple[list[st
     out.mkdir(parents=True, exist_ok=True)
     written, picture = out / "problem.md", out / "problem.png"
     written.write_text("\n".join([f"# {shown_name(where)}", "", *lines]) + "\n", encoding="utf-8")
-    save(found.plot().figure, picture)  # type: ignore[arg-type]
+    with style():
+        figure = new_figure(9.0, 5.4)
+        found.plot(figure.subplots())
+    save(figure, picture)
     return lines, [written, picture]

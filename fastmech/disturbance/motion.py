@@ -15,6 +15,7 @@ from fastmech.arrays import Floats
 from fastmech.ensembles import checks
 from fastmech.ensembles.fitting import damping_rate
 from fastmech.ensembles.integrate import integrate
+from fastmech.ensembles.status import Status
 from fastmech.equilibria.find import Equilibrium, degenerate_sentence
 from fastmech.equilibria.search import pulls, vanishing
 from fastmech.errors import InputError
@@ -24,6 +25,7 @@ from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import kinetic_energy, metric, potential_energy, potential_hessian, unit
 from fastmech.models.equilibria import RestingPlace, find_equilibria
 from fastmech.models.mechanism import Mechanism
+from fastmech.objects import Drawn, Field, Result
 from fastmech.scene import Scene, require_scene
 from fastmech.stability.linearize import jacobian
 
@@ -167,8 +169,8 @@ STABLE, LAYER = 6.0, 1.0
 _ILL_CONDITIONED = 1e4
 
 
-@dataclass(frozen=True)
-class DisturbedMotion:
+@dataclass(frozen=True, repr=False)
+class DisturbedMotion(Drawn):
     """Disturbances xi_phi, xi_theta [rad], eta_phi, eta_theta [rad/s] over time, paper (21)."""
 
     t: Floats  #: s, shape (times,)
@@ -177,6 +179,24 @@ class DisturbedMotion:
     status: NDArray[
         np.int8
     ]  #: :class:`fastmech.ensembles.status.Status` of the nonlinear motions, shape (n,)
+
+    KIND = "disturbances_over_time"
+    PICTURE = "plots.objects:draw_departures"
+    FIELDS = {
+        "time": Field("time", "s", "output times", "t"),
+        "nonlinear_*": Field("time trajectory state", "", "nonlinear departure of", "nonlinear"),
+        "linearized_*": Field("time trajectory state", "", "linearized departure of", "linearized"),
+        "status": Field("trajectory", "1", "what became of the nonlinear motion", codes=Status),
+    }
+
+    def told(self) -> str:
+        """How many motions, and how far the linearized ones are from them."""
+        apart = np.abs(self.nonlinear - self.linearized).max(initial=0.0)
+        return (
+            f"{self.status.size:,} disturbed motions to t = {self.t[-1]:g} s at {self.t.size:,} times\n"
+            f"  largest departure {np.abs(self.nonlinear).max(initial=0.0):.3g}, linearized from nonlinear "
+            f"{apart:.3g} (rad, rad/s)"
+        )
 
 
 def disturbed_motion(
@@ -208,7 +228,8 @@ def disturbed_motion(
     passed = np.union1d(t, damped_times(scene, method, min(dt, float(t[-1]))))
     run = integrate(scene, center + start, dt=dt, method=method, t_eval=passed, threads=threads)
     linearized = start @ propagators(state_jacobian(scene, equilibrium), t).mT
-    return DisturbedMotion(t, run.y[np.searchsorted(passed, t)] - center, linearized, run.status)
+    away = run.y[np.searchsorted(passed, t)] - center
+    return DisturbedMotion(t, away, linearized, run.status).of(scene)
 
 
 def state_jacobian(system: Scene | Mechanism, equilibrium: Equilibrium | RestingPlace) -> Floats:
@@ -314,8 +335,8 @@ BISECTIONS = 13
 OUTPUTS = 200
 
 
-@dataclass(frozen=True)
-class LinearRange:
+@dataclass(frozen=True, repr=False)
+class LinearRange(Result):
     """Largest sizes at which the linearized motion is within the tolerance, direction by direction."""
 
     directions: Floats  #: disturbances of size 1 rad, shape (directions, states)
@@ -323,6 +344,14 @@ class LinearRange:
     size: Size  #: the norm
     horizon: float  #: s
     tolerance: float
+
+    KIND = "linear_range"
+    FIELDS = {
+        "limit": Field("direction", "rad", "largest size at which the linearized motion is within tolerance"),
+        "directions": Field("direction state_number", "1", "disturbances of size 1 rad, rates in rad/s"),
+        "horizon": Field("", "s", "time looked at"),
+        "tolerance": Field("", "1", "relative deviation allowed"),
+    }
 
 
 def linear_range(
@@ -378,4 +407,4 @@ def linear_range(
         above = ~(deviation(middle[:, None])[:, 0] <= tolerance)
         low, high = np.where(above, low, middle), np.where(above, middle, high)
     limit = np.where(exceeded.any(axis=1), low, np.inf)
-    return LinearRange(rays, np.where(exceeded[:, 0], 0.0, limit), size, horizon, tolerance)
+    return LinearRange(rays, np.where(exceeded[:, 0], 0.0, limit), size, horizon, tolerance).of(scene)

@@ -110,9 +110,9 @@ def row_of(
 
 
 def labels_row(method: str, found: Labels, wrong: int, told: str = "") -> Row:
-    """A row of what ``fm.labels_of`` gave: the error is how many are wrong, and none may be."""
+    """A row of what ``fm.label_starts`` gave: the error is how many are wrong, and none may be."""
     remark = "labels: " + ", ".join(f"{n} {name}" for name, n in found.counts.items() if n) + told
-    nan, why = float("nan"), "fm.labels_of"
+    nan, why = float("nan"), "fm.label_starts"
     return Row(method, nan, found.steps, float(wrong), 0.0, nan, "ok", True, remark, why)
 
 

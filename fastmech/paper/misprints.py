@@ -166,7 +166,7 @@ def _largest(values: Floats) -> float:
 
 def _names(y: Floats, scale: float = 1.0) -> dict[str, Any]:
     """The paper's quantities at states ``y`` (n, 4), with lengths in units of 1/scale m."""
-    scene = PAPER_SCENE.model_dump()
+    scene = PAPER_SCENE.parameters
     scene["l"], scene["g"] = scene["l"] * scale, scene["g"] * scale
     points = {name: value * scale for name, value in positions(PAPER_SCENE, y)._asdict().items()}
     angles = dict(zip(("phi", "theta", "phi_dot", "theta_dot"), y.T, strict=True))
@@ -199,7 +199,7 @@ def _christoffel(expression: str, motion: EnergyBalance) -> float:
     # a11 is analytic and periodic: its Fourier series differentiates it to rounding.
     waves = np.fft.rfft(a11) * 1j * np.arange(ANGLES // 2 + 1)
     return _largest(
-        evaluate(expression, **PAPER_SCENE.model_dump(), phi=phi) - 0.5 * np.fft.irfft(waves, ANGLES)
+        evaluate(expression, **PAPER_SCENE.parameters, phi=phi) - 0.5 * np.fft.irfft(waves, ANGLES)
     )
 
 

@@ -108,7 +108,7 @@ def all_rows(printed: Printed, computed: Computed, misprints: Collection[str]) -
 def _table_1(judge: Judge, printed: Printed) -> Iterator[Row]:
     units = {name: unit for name, (_, unit, _) in PAPER_SCENE.described().items()}
     start = dict(zip(("phi_0", "theta_0", "phi_dot_0", "theta_dot_0"), START, strict=True))
-    values = {**PAPER_SCENE.model_dump(), **start}
+    values = {**PAPER_SCENE.parameters, **start}
     units |= {"phi_0": "rad", "theta_0": "rad", "phi_dot_0": "rad/s", "theta_dot_0": "rad/s"}
     for symbol, value in printed["table_1"].items():
         if symbol in values:

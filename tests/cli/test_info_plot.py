@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from cli.refusal import assert_refused
 
-from fastmech import Scene, open_results
-from fastmech.plots.equilibria import _potential
+from fastmech import open_results
+from fastmech.plots.equilibria import draw_equilibria
 
 PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -126,7 +126,7 @@ def test_codes_are_named_by_the_file(invoke, done):
     with open_results(done) as results:
         dataset = results["rest"].load()
         scene = results.scene_of("rest")
-    figure = _potential(dataset, Scene(**scene))
+    figure = draw_equilibria(dataset, scene)["potential"]
     (axes,) = [axes for axes in figure.axes if axes.get_lines()]
     labels = {line.get_label(): len(line.get_xdata()) for line in axes.get_lines()}
     # Of the four equilibria one is a minimum (0), two are saddles (1), one is a maximum (2).

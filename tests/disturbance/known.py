@@ -71,12 +71,12 @@ def stiff_motion(scene: Scene, start: Floats, t_end: float) -> Floats:
 
 
 def oracle_jacobian(scene: Scene, e: Equilibrium) -> Floats:
-    return np.array(oracle().jacobian(scene.model_dump(), center(e), 0.0), dtype=np.float64)
+    return np.array(oracle().jacobian(scene.parameters, center(e), 0.0), dtype=np.float64)
 
 
 def oracle_size(scene: Scene, e: Equilibrium, disturbances: Floats) -> Floats:
     """The kinetic-energy norm from the oracle's metric and Hessian."""
-    params, q = scene.model_dump(), (e.phi, e.theta)
+    params, q = scene.parameters, (e.phi, e.theta)
     a = np.array(oracle().metric(params, q), dtype=np.float64)
     hessian = np.array(oracle().hessian(params, q, scene.F0), dtype=np.float64)
     square = np.abs(np.linalg.eigvals(np.linalg.inv(a) @ hessian)).max()

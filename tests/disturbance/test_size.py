@@ -33,7 +33,7 @@ def test_size_measures_kinetic_energy() -> None:
     (e,) = equilibria("table_1", 0)
     size = size_at(scene, e.phi, e.theta)
     rates = np.array([0.4, -0.9])
-    energy = float(oracle().kinetic_energy(scene.model_dump(), (e.phi, e.theta, *rates)))
+    energy = float(oracle().kinetic_energy(scene.parameters, (e.phi, e.theta, *rates)))
     for disturbance in (np.array([0, 0, *rates]), np.array([*rates / size.omega, 0, 0])):
         assert size(disturbance) ** 2 * size.omega**2 * 12 * 1.25**2 / 2 == pytest.approx(energy, rel=1e-12)
 

@@ -32,7 +32,7 @@ class Draw:
 
     @property
     def params(self) -> dict[str, float]:
-        return self.scene.model_dump()
+        return self.scene.parameters
 
     @property
     def q(self) -> Floats:

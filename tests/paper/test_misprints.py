@@ -96,7 +96,7 @@ def test_a_wrong_correction_proves_nothing(changed: dict[str, Any], computed: Co
 def test_corrected_christoffel_symbol_is_the_oracles(print_: dict[str, Any]) -> None:
     for phi, theta, *_ in STATES:
         true = float(oracle().christoffel(TABLE_1, (phi, theta))[0][0][0])
-        names = {**PAPER_SCENE.model_dump(), "phi": phi}
+        names = {**PAPER_SCENE.parameters, "phi": phi}
         formula = print_["formula"]["equation_12"]
         assert evaluate(formula["corrected"], **names) == pytest.approx(true, rel=1e-12)
         assert evaluate(formula["printed"], **names) != pytest.approx(true, rel=1e-2)
@@ -107,7 +107,7 @@ def test_corrected_energies_are_the_oracles(print_: dict[str, Any]) -> None:
     for y in STATES:
         places = (float(x) for x in oracle().positions(TABLE_1, y[:2]))
         angles = dict(zip(("phi", "theta", "phi_dot", "theta_dot"), y, strict=True))
-        names = {**PAPER_SCENE.model_dump(), **dict(zip(points, places, strict=True)), **angles}
+        names = {**PAPER_SCENE.parameters, **dict(zip(points, places, strict=True)), **angles}
         kinetic, potential = print_["formula"]["equation_9"], print_["formula"]["equation_10"]
         T, Pi = float(oracle().kinetic_energy(TABLE_1, y)), float(oracle().potential(TABLE_1, y[:2]))
         assert evaluate(kinetic["corrected"], **names) == pytest.approx(T, rel=1e-12)

@@ -160,7 +160,7 @@ def test_the_scene_s_limit_holds_at_every_equilibrium(method: str) -> None:
                 assert step_limit(scene, method) <= 1.05 * largest_stable_step(scene, e, method)
 
 
-@pytest.mark.parametrize("call", ["integrate", "parameters", "disturb", "labels_of"])
+@pytest.mark.parametrize("call", ["integrate", "parameters", "disturb", "label_starts"])
 def test_a_step_beyond_the_limit_is_told_before_the_run(call: str) -> None:
     scene = fm.Scene(alpha=0.0, beta=1e5)
     minimum = next(e for e in find_equilibria(scene) if e.morse_index == 0)
@@ -170,7 +170,7 @@ def test_a_step_beyond_the_limit_is_told_before_the_run(call: str) -> None:
             fm.Scene(), np.zeros((3, 4)), 0.1, 0.01, parameters={"beta": [1.0, 1e5, 10.0]}
         ),
         "disturb": lambda: fm.disturb(scene, minimum, 4, t_end=0.1, dt=0.01, method="rk4"),
-        "labels_of": lambda: fm.labels_of(scene, [0, 0, 0, 0], 0.1, dt=0.01, method="rk4"),
+        "label_starts": lambda: fm.label_starts(scene, [0, 0, 0, 0], 0.1, dt=0.01, method="rk4"),
     }
     with pytest.warns(
         fm.StepWarning, match=r"^dt = 0.01 s: too long for rk4 here, .*; dt = 0.00\d+ s would do"
@@ -230,10 +230,10 @@ def test_the_step_taken_decides() -> None:
 def test_no_label_from_steps_beyond_the_limit() -> None:
     scene, starts = SCENE.replace(beta=1e5), [[0.9, 0.4, 0.0, 0.0], [0.1, 0.2, 0.0, 0.0]]
     with pytest.warns(fm.StepWarning):
-        beyond = fm.labels_of(scene, starts, 20.0, dt=0.05, method="rk4")
+        beyond = fm.label_starts(scene, starts, 20.0, dt=0.05, method="rk4")
     assert set(beyond.status) == {fm.Status.STEP_TOO_LARGE}
     assert (beyond.well == -1).all()
-    assert set(fm.labels_of(scene, starts, 20.0, method="radau5").status) == {fm.Status.CAPTURED}
+    assert set(fm.label_starts(scene, starts, 20.0, method="radau5").status) == {fm.Status.CAPTURED}
 
 
 def test_no_step_will_do() -> None:

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from fastmech.arrays import Floats
-from fastmech.basins.label import labels_of
+from fastmech.basins.label import label_starts
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.ensembles.status import Status
 from fastmech.equilibria.find import find_equilibria
@@ -157,7 +157,7 @@ def _circling(quick: bool) -> Sequence[Row]:
 
 def _undecided(method: str) -> Row:
     """The label of the circling motion: there is none."""
-    found = labels_of(_CIRCLING, _CIRCLING_START, LABELLED, method=method)
+    found = label_starts(_CIRCLING, _CIRCLING_START, LABELLED, method=method)
     return labels_row(method, found, int((found.status == Status.CAPTURED).sum()))
 
 
@@ -176,7 +176,7 @@ CASES = (
         "endless_circling",
         "M2 can circle M1 for ever, the rod between them unloaded: rest is not the rule here",
         "energy above the circling orbit falls like 1/t; error: distance of the fitted power from 1; of "
-        "fm.labels_of, the labels given, for there is none",
+        "fm.label_starts, the labels given, for there is none",
         "nothing is captured, the label is undecided: M2 turns at sqrt(c1/m2) to the end",
         _circling,
     ),

@@ -16,7 +16,7 @@ import numpy as np
 
 from fastmech.arrays import Floats
 from fastmech.atlas.folds import find_folds
-from fastmech.basins.label import labels_of
+from fastmech.basins.label import label_starts
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import Status
 from fastmech.equilibria.find import Equilibria, find_equilibria
@@ -125,7 +125,7 @@ def _labels(passage: _Passage, side: float, method: str) -> Row:
     starts = np.zeros((OUTWARDS.size, 4))
     saddle = passage.half if side < 0.0 else 0.0
     starts[:, :2] = passage.middle + (saddle + OUTWARDS[:, None]) * passage.way
-    found = labels_of(scene, starts, LABELLED, method=method, settle_radius=SETTLED)
+    found = label_starts(scene, starts, LABELLED, method=method, settle_radius=SETTLED)
     assert found.settle_time is not None
     captured = found.status == Status.CAPTURED
     # Before the fold starts on the saddle, and inwards of it, are not the deep well's.
@@ -148,7 +148,7 @@ CASES = tuple(
         name,
         f"{DISTANCE:g} N {where}: speeds of 1e-7 rad/s far from any rest",
         "the fold's normal form with the saddle's eigenvalue; error: of the phase on the way, of the time of "
-        "leaving, of the minimum's place; of fm.labels_of, the number of wrong labels and of settled motions",
+        "leaving, of the minimum's place; of fm.label_starts, how many labels are wrong and motions settled",
         must,
         partial(_beside, side),
     )

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.basins.label import labels_of
+from fastmech.basins.label import label_starts
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import Status
 from fastmech.errors import InputError
@@ -85,7 +85,7 @@ def _ends(line: _Line, method: str, dt: float, dtype: str) -> Row:
 def _certified(line: _Line, method: str) -> Row:
     """Labels with a proof: none may be wrong, and near the boundary there must be none but a status."""
     edge, starts, above, distance = line
-    found = labels_of(edge.scene, starts, T_END, method=method)
+    found = label_starts(edge.scene, starts, T_END, method=method)
     tree = found.tree
     assert tree is not None
     places = np.array([[tree.equilibria[w].phi, tree.equilibria[w].theta] for w in found.well])
@@ -104,9 +104,9 @@ CASES = (
         "float32_at_a_boundary",
         "starts 1e-3 to 1e-14 rad from a basin boundary, in lanes of float32 and of float64",
         "the boundary by bisection with heyoka in 80-bit arithmetic; error: distance from it at which an end "
-        "is wrong; of fm.labels_of, the number of wrong proofs",
-        "wrong ends only within the grown rounding of the precision; fm.labels_of proves none: nearer to the "
-        "boundary it gives a status",
+        "is wrong; of fm.label_starts, the number of wrong proofs",
+        "wrong ends only within the grown rounding of the precision; fm.label_starts proves none: closer "
+        "to it there is a status",
         _run,
     ),
 )

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.basins.label import labels_of
+from fastmech.basins.label import label_starts
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.ensembles.status import Status
 from fastmech.equilibria.find import find_equilibria
@@ -94,10 +94,10 @@ def _labels(saddle: _Saddle, root: float, method: str) -> Row:
     """Labels of starts on either side of the manifold at offset ``root``: the side's well, or none."""
     distance = 10.0 ** -np.arange(2.0, 13.0)
     sides = np.array([-1.0, 1.0])
-    far = labels_of(SCENE, _starts(saddle, root + sides * distance[0]), LABELLED)
+    far = label_starts(SCENE, _starts(saddle, root + sides * distance[0]), LABELLED)
     assert (far.status == Status.CAPTURED).all()
     offsets = np.concatenate([-distance, [0.0], distance])
-    found = labels_of(SCENE, _starts(saddle, root + offsets), LABELLED, method=method)
+    found = label_starts(SCENE, _starts(saddle, root + offsets), LABELLED, method=method)
     captured = found.status == Status.CAPTURED
     right = (offsets > 0.0).astype(int)
     wrong = captured & (
@@ -125,7 +125,7 @@ CASES = (
         "saddle_manifold",
         "starts on a saddle's stable manifold to 1e-12, found by bisection: the last digits decide",
         "the saddle's growing eigenvalue; error: relative difference of the growth seen in times of leaving; "
-        "of fm.labels_of, the number of wrong labels",
+        "of fm.label_starts, the number of wrong labels",
         "the manifold is found, starts 1e-12 on either side of it leave on either side, and ten times nearer "
         "stay longer by ln(10) over the eigenvalue; a label is the side's well or none",
         _run,
