@@ -75,6 +75,8 @@ def _gallery(folder: Path) -> None:
         name = "mechanism" if own.exists() and "def mechanism" in own.read_text() else "system"
         how = f" --mechanism {own.relative_to(ROOT)}:{name}" if own.exists() else ""
         lines += [f"## {table.get('title', path.stem)}", "", " ".join(about), "", f"Scans: {kinds}.", ""]
+        if (picture := ROOT / "docs" / "pictures" / "gallery" / f"{path.stem}.png").exists():
+            lines += [f"![{table.get('title', path.stem)}](../pictures/gallery/{picture.name})", ""]
         lines += ["```sh", f"fastmech run {where}{how}", f"fastmech plot results/{path.stem}.h5", "```", ""]
     (folder / "gallery.md").write_text("\n".join(lines), encoding="utf-8")
 

@@ -1,21 +1,32 @@
-"""Draw the pictures of the README: the labelled mechanism, its basins and a motion.
+"""Draw the pictures of the README, of the explanations and of the gallery.
 
-python docs/make_pictures.py
+python docs/make_pictures.py [readme] [explanations] [gallery]
+
+Without a word it draws all. The gallery runs every shipped request, which takes half an hour on two cores.
 """
 
 from __future__ import annotations
 
+import subprocess
+import sys
+import tempfile
+import warnings
 from pathlib import Path
 
 import numpy as np
 from matplotlib.patches import Arc
+from PIL import Image
 
 import fastmech as fm
 from fastmech.plots.equilibria import draw_mechanism, drawing_of, legend_handles
 from fastmech.plots.style import PALETTE, new_figure, save, style
 from fastmech.runner import draw_results, run_request
 
-HERE = Path(__file__).parent / "pictures"
+ROOT = Path(__file__).parents[1]
+HERE = ROOT / "docs" / "pictures"
+
+#: The scene of the explanations: two wells.
+BISTABLE = fm.Scene(F0=-150.0, alpha=0.0, c1=260.0, c2=60.0)
 
 #: A position in which all angles can be seen [rad].
 POSITION = (0.9, 1.2)
@@ -92,8 +103,174 @@ def motion() -> None:
     fm.animate(scene, run, HERE / "motion.gif")
 
 
+def general(scene: fm.Scene) -> fm.Mechanism:
+    """The scene as a mechanism, which tells energies."""
+    return fm.mechanisms.slider_pendulum().replace(**scene.parameters)
+
+
+def energies(scene: fm.Scene, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Kinetic energy, and U = Pi - F x2 with the constant force's potential [J]."""
+    found = general(scene).energies(y)
+    x2 = scene.l * (np.cos(y[..., 0]) - np.sin(y[..., 1]))
+    return found.kinetic, found.potential - scene.F0 * x2
+
+
+def potential(scene: fm.Scene, sides: int) -> tuple[np.ndarray, np.ndarray]:
+    """U [J] over (phi, theta) from -pi to pi, and the angles of a side [rad]."""
+    angles = np.linspace(-np.pi, np.pi, sides)
+    states = np.zeros((sides, sides, 4))
+    states[..., 0], states[..., 1] = np.meshgrid(angles, angles, indexing="ij")
+    return energies(scene, states)[1], angles
+
+
+def completeness() -> None:
+    """Lines on which one of the two generalized forces vanishes; rest is where they cross."""
+    U, angles = potential(BISTABLE, 401)
+    slopes = np.gradient(U, angles, angles)
+    with style():
+        figure = new_figure(6.4, 5.6)
+        axes = figure.subplots()
+        for slope, color in zip(slopes, ("blue", "orange"), strict=True):
+            axes.contour(angles, angles, slope.T, levels=[0.0], colors=[PALETTE[color]], linewidths=1.4)
+        marks = {"minimum": "o", "saddle": "X", "maximum": "^"}
+        found = fm.find_equilibria(BISTABLE)
+        for kind, mark in marks.items():
+            places = np.array([e.position for e in found if e.kind == kind])
+            axes.plot(*places.T, mark, color="black", ms=8, label=f"{kind} of U ({len(places)})")
+        for color, name in (("blue", "∂U/∂φ = 0"), ("orange", "∂U/∂θ = 0")):
+            axes.plot([], [], color=PALETTE[color], label=name)
+        axes.set_xlabel("φ [rad]")
+        axes.set_ylabel("θ [rad]")
+        axes.set_aspect("equal")
+        axes.set_title(f"{len(found)} positions of rest; minima + maxima − saddles = 0")
+        figure.legend(loc="outside lower center", ncols=3)
+        save(figure, HERE / "completeness.png")
+
+
+def capture() -> None:
+    """A motion that loses energy until it cannot leave its well."""
+    U, angles = potential(BISTABLE, 301)
+    start = np.array([-2.2, 2.6, 0.0, 0.0])
+    label = fm.label_starts(BISTABLE, start)
+    tree = label.tree
+    well, at = int(label.well[0]), float(label.time[0])
+    barrier = float(tree.barrier[tree.wells.index(well)])
+    times = np.linspace(0.0, 4.0 * at, 2001)
+    run = fm.integrate(BISTABLE, start, t_eval=times, tol=1e-8)
+    total = np.sum(energies(BISTABLE, run.y[:, 0]), axis=0)
+    with style():
+        figure = new_figure(10.4, 4.6)
+        left, right = figure.subplots(1, 2)
+        filled = left.contourf(angles, angles, U.T, levels=24, cmap="cividis")
+        figure.colorbar(filled, ax=left, label="potential U [J]")
+        left.contour(angles, angles, U.T, levels=[barrier], colors="white", linewidths=1.6)
+        path = run.y[:, 0, :2] - 2.0 * np.pi * np.round(run.y[:, 0, :2] / (2.0 * np.pi))
+        path[1:][np.abs(np.diff(path, axis=0)).max(axis=1) > np.pi] = np.nan
+        before = times <= at
+        left.plot(*path[before].T, color=PALETTE["vermillion"], lw=1.6)
+        left.plot(*path[~before].T, color=PALETTE["sky"], lw=1.6)
+        left.plot(*start[:2], "o", color=PALETTE["vermillion"], ms=7)
+        left.set_xlabel("φ [rad]")
+        left.set_ylabel("θ [rad]")
+        left.set_aspect("equal")
+        left.grid(False)
+        left.set_title("white: U = B, the barrier of the well")
+        right.plot(times[before], total[before], color=PALETTE["vermillion"], label="energy E, still free")
+        right.plot(times[~before], total[~before], color=PALETTE["sky"], label="energy E, captured")
+        right.axhline(barrier, color="black", ls="--", lw=1.2, label=f"barrier B = {barrier:.4g} J")
+        right.axvline(at, color="0.5", lw=1.0, ls=":", label=f"label is given at {at:.3g} s")
+        right.set_xlabel("time t [s]")
+        right.set_ylabel("energy [J]")
+        right.set_title("below B in the well's region: it cannot leave")
+        right.legend(loc="upper right")
+        save(figure, HERE / "capture.png")
+
+
+def errors() -> None:
+    """Estimated errors of motions against true ones."""
+    scene = BISTABLE
+    starts = np.zeros((600, 4))
+    starts[:, :2] = np.random.default_rng(1).uniform(-np.pi, np.pi, (600, 2))
+    exact = fm.integrate(scene, starts, 10.0, tol=1e-12, quantile=1.0).y[-1]
+    with style():
+        figure = new_figure(6.2, 5.4)
+        axes = figure.subplots()
+        for tol, color in ((1e-3, "vermillion"), (1e-6, "blue"), (1e-9, "green")):
+            run = fm.integrate(scene, starts, 10.0, tol=tol, quantile=1.0)
+            true = np.abs(run.y[-1] - exact).max(axis=-1)
+            axes.loglog(run.error, true, ".", color=PALETTE[color], ms=4, label=f"tol = {tol:g}")
+        ends = [1e-14, 1e-2]
+        axes.plot(ends, ends, color="black", lw=1.0, label="true = estimated")
+        axes.set_xlabel("estimated error, run.error")
+        axes.set_ylabel("true error")
+        axes.set_title("600 motions of 10 s from rest, three tolerances")
+        figure.legend(loc="outside lower center", ncols=4)
+        save(figure, HERE / "errors.png")
+
+
+def step_limits() -> None:
+    """Error over the step, with the longest stable step of each method."""
+    scene = fm.Scene(alpha=0.0, beta=3000.0)
+    rest = fm.find_equilibria(scene)[0]
+    start = [rest.position[0] + 0.3, rest.position[1] + 0.2, 0.0, 0.0]
+    exact = fm.integrate(scene, start, 1.0, dt=2e-5, method="radau5").y[-1, 0]
+    with style():
+        figure = new_figure(7.4, 4.8)
+        axes = figure.subplots()
+        for method, color in (
+            ("ab6", "vermillion"),
+            ("rk4", "blue"),
+            ("dop853", "green"),
+            ("radau5", "purple"),
+        ):
+            steps = 1.0 / np.unique(np.round(np.geomspace(10, 20000, 40)))
+            error = []
+            for dt in steps:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore", fm.StepWarning)  # this is what is shown
+                    run = fm.integrate(scene, start, 1.0, dt=float(dt), method=method)
+                error.append(
+                    np.abs(run.y[-1, 0] - exact).max() if np.isfinite(run.y[-1, 0]).all() else np.nan
+                )
+            axes.loglog(steps, error, ".-", color=PALETTE[color], label=method)
+            limit = fm.largest_stable_step(scene, rest, method)
+            if np.isfinite(limit):
+                axes.axvline(limit, color=PALETTE[color], ls="--", lw=1.0)
+        axes.set_xlabel("step dt [s]")
+        axes.set_ylabel("error of the state after 1 s")
+        axes.set_ylim(1e-15, 1e2)
+        axes.set_title("β = 3,000 N s/m; dashed: fm.largest_stable_step of the method")
+        figure.legend(loc="outside lower center", ncols=4)
+        save(figure, HERE / "step_limits.png")
+
+
+def gallery() -> None:
+    """The picture of the first scan of every shipped request, drawn by the commands that the page shows."""
+    pictures = HERE / "gallery"
+    pictures.mkdir(exist_ok=True)
+    for request in sorted((ROOT / "scans").rglob("*.toml")):
+        with tempfile.TemporaryDirectory() as folder:
+            result, drawn = Path(folder) / "result.h5", Path(folder) / "drawn"
+            own = request.with_suffix(".py")
+            name = "mechanism" if own.exists() and "def mechanism" in own.read_text() else "system"
+            how = ["--mechanism", f"{own}:{name}"] if own.exists() else []
+            fastmech = [sys.executable, "-m", "fastmech"]
+            subprocess.run([*fastmech, "run", str(request), "--out", str(result), *how], check=True)
+            subprocess.run([*fastmech, "plot", str(result), "--out", str(drawn), *how], check=True)
+            first = max(drawn.glob("*.png"), key=lambda path: ("map" in path.name, path.stat().st_size))
+            small = Image.open(first).convert("RGB")
+            small.thumbnail((900, 900))
+            small.quantize(128).save(pictures / f"{request.stem}.png", optimize=True)
+
+
+DRAWN = {
+    "readme": (sketch, basins, motion),
+    "explanations": (completeness, capture, errors, step_limits),
+    "gallery": (gallery,),
+}
+
 if __name__ == "__main__":
     HERE.mkdir(exist_ok=True)
-    sketch()
-    basins()
-    motion()
+    for word in sys.argv[1:] or DRAWN:
+        for draw in DRAWN[word]:
+            draw()
