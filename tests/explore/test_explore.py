@@ -6,14 +6,12 @@ import http.client
 import json
 import random
 import re
-import shutil
 import signal
 import subprocess
 import sys
 import threading
 import time
 import tomllib
-import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -317,19 +315,6 @@ def test_a_pulled_point_follows_and_a_strike_brings_its_energy(server: tuple[str
     assert told["energy"] < 0.5 * scene.m2 * (
         0.5**2 + 0.2**2
     )  # rods hold back a part of what a free mass takes
-
-
-def test_the_wheel_holds_the_page(tmp_path: Path) -> None:
-    copied = tmp_path / "sources"
-    shutil.copytree(ROOT / "fastmech", copied / "fastmech", ignore=shutil.ignore_patterns("__pycache__"))
-    for name in ("pyproject.toml", "README.md", "LICENSE"):
-        shutil.copy(ROOT / name, copied)
-    command = [sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "-w", str(tmp_path)]
-    made = subprocess.run([*command, str(copied)], capture_output=True, text=True)
-    assert made.returncode == 0, made.stderr
-    names = zipfile.ZipFile(next(tmp_path.glob("*.whl"))).namelist()
-    for path in (ROOT / "fastmech/explore/page").iterdir():
-        assert f"fastmech/explore/page/{path.name}" in names
 
 
 @pytest.mark.parametrize("alpha", [0.0, 0.7])
