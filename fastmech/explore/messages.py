@@ -130,7 +130,8 @@ def frame(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> bytes:
     """
     told, pieces, place = [], list[bytes](), 0
     for name, values in arrays.items():
-        array = np.asarray(values, dtype="<f4" if np.asarray(values).dtype.kind == "f" else "i1")
+        with np.errstate(over="ignore"):  # beyond float32 is beyond every picture
+            array = np.asarray(values).astype("<f4" if np.asarray(values).dtype.kind == "f" else "i1")
         told.append({"name": name, "type": array.dtype.str, "shape": array.shape, "place": place})
         pieces.append(array.tobytes() + b"\0" * (-array.nbytes % 8))
         place += len(pieces[-1])

@@ -72,7 +72,7 @@ class _OnlyHere:
         await self._app(scope, receive, guarded)
 
 
-class _Page:
+class Page:
     """The work for one open page: of each kind one thread, which does the newest message only."""
 
     def __init__(self, device: Device, send: Callable[[str | bytes], None]) -> None:
@@ -97,6 +97,11 @@ class _Page:
             elif kind not in self._busy:
                 self._busy.add(kind)
                 threading.Thread(target=self._work, args=(kind,), name=kind, daemon=True).start()
+
+    @property
+    def works(self) -> bool:
+        """Whether anything is being computed for it."""
+        return bool(self._busy)
 
     def close(self) -> None:
         """End all work."""
@@ -174,7 +179,7 @@ def application(device: Device, port: int) -> Starlette:
                 kind = "text" if isinstance(content, str) else "bytes"
                 await websocket.send({"type": "websocket.send", kind: content})
 
-        page, delivery = _Page(device, send), asyncio.create_task(deliver())
+        page, delivery = Page(device, send), asyncio.create_task(deliver())
         pages.add(send)
         await queue.put(json.dumps({"kind": "about", **device.about()}))
         try:

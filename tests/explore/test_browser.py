@@ -344,6 +344,13 @@ def test_a_result_file_opens_with_its_sections_as_panels(browser: Any, tmp_path:
         made.page.close()
 
 
+def test_a_motion_that_a_kernel_cannot_follow_gives_a_line(opened: Opened) -> None:
+    opened.page.evaluate("explorer.startAt({phi: 0.5, theta: 1, theta_dot: 1e200})")
+    opened.until("explorer.histories.note.textContent.includes('not_finite')", 30)
+    opened.page.evaluate("explorer.startAt({phi: 0.5, theta: 1})")
+    opened.until("explorer.histories.note.textContent.startsWith('From ')", 30)
+
+
 def test_the_status_line_says_what_is_compiled(opened: Opened) -> None:
     told = "{ name: 'march', of: 'basins', number: 3, about: 60 }"
     opened.page.evaluate(f"explorer.compiling({told})")

@@ -370,6 +370,41 @@ def test_work_that_is_not_wanted_ends_between_calls_of_kernels(kind: str) -> Non
     assert np.median(late) < 0.5
 
 
+def test_a_closed_page_s_work_ends() -> None:
+    from fastmech.explore.serve import Page
+
+    sent = list[str | bytes]()
+    page = Page(opened(None), sent.append)
+    told = {"kind": "basins", "id": 1, "parameters": {"alpha": 0.0}, "axes": AXES, "halvings": 4}
+    before = set(threading.enumerate())
+    page.take(json.dumps(told))
+    (working,) = set(threading.enumerate()) - before
+    while not sent:
+        time.sleep(0.01)
+    page.close()
+    working.join(5.0)
+    assert not working.is_alive()
+    assert not any(numbers(content)[0]["final"] for content in sent if isinstance(content, bytes))
+
+
+def test_whatever_goes_wrong_is_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    from fastmech.explore import serve
+
+    def broken(*_: object) -> Iterator[bytes]:
+        raise FloatingPointError("in a kernel")
+        yield b""
+
+    monkeypatch.setattr(serve, "replies", broken)
+    sent = list[str | bytes]()
+    page = serve.Page(opened(None), sent.append)
+    for _ in range(2):  # it goes on
+        page.take(json.dumps({"kind": "motion", "id": 7, "start": {"phi": 1.0}, "t_end": 1.0}))
+        while page.works:
+            time.sleep(0.01)
+    line = {"kind": "error", "line": "FloatingPointError: in a kernel", "of": "motion", "id": 7}
+    assert [json.loads(text) for text in sent] == [line] * 2
+
+
 def test_kernels_that_are_made_are_told_with_their_number() -> None:
     with serving() as server, talk(server) as socket:
         socket.send(json.dumps({"kind": "motion", "id": 1, "start": {"phi": 1.0}, "t_end": 1.0}))
