@@ -74,7 +74,15 @@ def _gallery(folder: Path) -> None:
         own = path.with_suffix(".py")
         name = "mechanism" if own.exists() and "def mechanism" in own.read_text() else "system"
         how = f" --mechanism {own.relative_to(ROOT)}:{name}" if own.exists() else ""
-        lines += [f"## {table.get('title', path.stem)}", "", " ".join(about), "", f"Scans: {kinds}.", ""]
+        coarse = " The picture has 400 x 400 points." if "num = 4000" in text else ""
+        lines += [
+            f"## {table.get('title', path.stem)}",
+            "",
+            " ".join(about),
+            "",
+            f"Scans: {kinds}.{coarse}",
+            "",
+        ]
         if (picture := ROOT / "docs" / "pictures" / "gallery" / f"{path.stem}.png").exists():
             lines += [f"![{table.get('title', path.stem)}](../pictures/gallery/{picture.name})", ""]
         lines += ["```sh", f"fastmech run {where}{how}", f"fastmech plot results/{path.stem}.h5", "```", ""]

@@ -23,7 +23,7 @@ from scipy.stats import qmc
 
 from fastmech.arrays import Floats
 from fastmech.atlas.snap import MOVING, Snap, find_snap
-from fastmech.basins.disturbed import disturb
+from fastmech.basins.disturbed import disturb, return_quantile
 from fastmech.basins.erosion import wells_along
 from fastmech.basins.label import label_starts
 from fastmech.basins.map import map_basins
@@ -66,6 +66,7 @@ def report(
     system: Scene | Mechanism,
     path: str | Path,
     *,
+    title: str | None = None,
     tolerances: Mapping[str, float] | None = None,
     threads: int | None = None,
     stage: Stage = no_stage,
@@ -75,6 +76,7 @@ def report(
     Args:
         system: a scene (a force that decays has done so) or a mechanism (loads are at their means).
         path: of the page; the PDF lies beside it.
+        title: of the page, by default "Report on" and the device's name.
         tolerances: half widths of the uniform distributions of parameters, by name, in the parameters' units.
         threads: threads to use, all processors by default.
         stage: makes a bar, which is told of each part.
@@ -90,6 +92,7 @@ def report(
         raise InputError(f"system = {shown(system)}: must be a Scene or a Mechanism")
     target = path_of(path).with_suffix(".html")
     made = _Report(system, _checked(system, tolerances or {}), threads)
+    made.title = title or made.title
     lines: list[str] = []
     parts = {
         "": made.device,
@@ -172,7 +175,7 @@ class _Report:
         stable = f"{len(self.stable)} of them stable" if self.found else ""
         lines = [
             f"# {self.title}", "",
-            f"{len(self.found)} positions of rest {self.load}, {stable}. "
+            f"{len(self.found)} position{'s' * (len(self.found) != 1)} of rest {self.load}, {stable}. "
             f"Made by: `{history_line()}`. Units are SI, angles in rad.", "",
             "## The device", "",
             *table("Parameter | Value | Tolerance | Unit | Meaning", rows, (0, 2, 3, 4)),
@@ -208,7 +211,8 @@ class _Report:
             )
             slowest, swing = -float(s.eigenvalues.real.max()), float(np.abs(s.eigenvalues.imag).max())
             decay = "" if k not in self.stable else f"{1.0 / slowest:.4g}" if slowest > LEAST else "does not"
-            told = f"{round(e.energy, 9) + 0.0:.6g} | {e.kind} | {s.verdict} | {decay} | {swing:.4g}"
+            fastest = f"{swing:.4g}" if swing > 0.0 else ""
+            told = f"{round(e.energy, 9) + 0.0:.6g} | {e.kind} | {s.verdict} | {decay} | {fastest}"
             rows.append(f"{k + 1} | {place} | {told} | {e.radius:.1g}")
         heads = "No. | Where | Energy [J] | Kind | Stability | Decay to 1/e [s] | Fastest swing [rad/s]"
         return [
@@ -271,7 +275,7 @@ class _Report:
 
     def shocks(self) -> list[str]:
         """The blows that each stable position survives; the search is for the point that yields most."""
-        rows = []
+        rows, notes = [], []
         for k in self.stable:
             proved = self.blows(self.system, self.found[k])
             weakest = min(proved, key=lambda on: proved[on].impulse, default=None)
@@ -280,6 +284,11 @@ class _Report:
                 if on == weakest:
                     search = shock_limit(self.system, self.found[k], on, blow.direction, threads=self.threads)
                     least = _told(search.found)
+                    if not math.isnan(search.undecided_from):
+                        notes.append(
+                            f"- {self.name(k)}: where blows on {on} of {search.undecided_from:.4g} N s and "
+                            "more lead is not known of all."
+                        )
                 angle = f"{math.degrees(blow.direction):.1f}°"
                 rows.append(f"{k + 1} | {on} | {angle} | {_told(blow)} | {least or 'not searched | - | -'}")
         if not rows:
@@ -292,6 +301,8 @@ class _Report:
             "that was seen to leave (-: none), searched for the point with the least proved limit.",
             "",
             *table(heads, rows, (0, 1)),
+            *notes,
+            "",
         ]
 
     @cached_property
@@ -310,8 +321,9 @@ class _Report:
     def nearest(self, found: Any, q: Floats) -> int:
         """Which of some positions is the nearest to a place, whole turns apart."""
         away = found.position - q
-        turns = np.array([2.0 * math.pi if unit == "rad" else math.inf for unit in self.units.values()])
-        return int(np.abs(away - np.nan_to_num(turns * np.round(away / turns))).sum(axis=1).argmin())
+        periodic = [unit == "rad" for unit in self.units.values()]
+        away[:, periodic] -= 2.0 * math.pi * np.round(away[:, periodic] / (2.0 * math.pi))
+        return int(np.abs(away).sum(axis=1).argmin())
 
     def starts(self, n: int, seed: int = 0) -> Floats:
         """Starts at rest (n, states), evenly spread over the window."""
@@ -344,7 +356,8 @@ class _Report:
             axes[f"{names[0]}_dot"] = np.linspace(-10.0, 10.0, MAP)
         found = map_basins(self.system, axes, self.until, threads=self.threads)
         caption = (
-            f"Where starts of the map end; {MAP} x {MAP} points, colours are wells with their full turns."
+            f"Where starts of the map end; {MAP} x {MAP} points. A colour is a well together with the full "
+            "turns that the angles make on the way there; its share is in the legend."
         )
         return lines + self.picture(
             "basins", draw_basins(found.dataset().merged, self.values)["labels"], caption
@@ -357,17 +370,23 @@ class _Report:
             found = disturb(self.system, self.found[k], DISTURBANCES, t_end=UNTIL, threads=self.threads)
             times = found.time_to_return[np.isfinite(found.time_to_return)]
             share = found.returned
-            back = f"{np.median(times):.4g} | {times.max():.4g}" if times.size else "- | -"
+            in_time = f"{times.size / DISTURBANCES:.2%}"
+            median = return_quantile(found, 0.5)
+            back = f"{in_time} | {f'{median:.4g}' if median < math.inf else 'later'}"
             known = found.excursion[np.isfinite(found.excursion).all(axis=1)].max(axis=0, initial=0.0)
             far = ", ".join(f"{x:.3g} {unit}" for x, unit in zip(known, self.units.values(), strict=True))
             interval = f"{share.lower:.2%} to {share.upper:.2%}"
             rows.append(
                 f"{k + 1} | {share.fraction:.2%} | {interval} | {back} | {far} | {found.dt.min():.3g}"
             )
-        heads = "Position | Return, proved | 95 % interval | Back after, median [s] | Longest [s]"
+        heads = (
+            f"Position | Return, proved | 95 % interval | Back within {UNTIL:g} s | Back after, median [s]"
+        )
         return [
             f"{DISTURBANCES:,} random disturbances of coordinates and rates of each stable position, up to "
-            f"0.5 {[*self.units.values()][-1]} in the norm of the kinetic energy, for {UNTIL:g} s.", "",
+            f"0.5 {[*self.units.values()][-1]} in the norm of the kinetic energy, for {UNTIL:g} s. A motion "
+            "returns when it is captured by the position's well. It is back when it is within 0.01 of the "
+            "position, in the same norm, and cannot leave that ball.", "",
             *table(f"{heads} | Largest swing | Step [s]", rows, (0, 5)),
         ]  # fmt: skip
 
@@ -432,7 +451,9 @@ class _Report:
         """How the answers vary with the parameters."""
         if not self.plus_minus:
             return [
-                "No tolerances were given: `c1 = { value = 900.0, plus_minus = 20.0 }` in the request.",
+                "No tolerances were given. To give one, write for example "
+                f"`{next(iter(self.known))} = {{ value = 1.0, plus_minus = 0.1 }}` in the table `[scene]` of "
+                "the request, or `tolerances=` in Python.",
                 "",
             ]
         gone = ("F0", "alpha") if self.decays else ()
@@ -467,7 +488,7 @@ class _Report:
             f"Parameters are uniform and independent: {told}. Changes of first order, in closed form: by "
             "each parameter at the upper end of its tolerance; the standard deviation of all; and the "
             "worst, all at the ends that add up.", "",
-            *table(f"Answer | Value | Unit | {heads} | Standard deviation | Worst", rows, (0, 2)),
+            *table(f"Answer | Value | Unit | {heads} | Deviation | Worst, first order", rows, (0, 2)),
             *self._ensemble(names, half),
         ]  # fmt: skip
 
@@ -534,7 +555,11 @@ class _Report:
 
     def repeat(self) -> list[str]:
         """The request that gives the same pages."""
-        head = [f'mechanism = "{self.given.name}"'] if isinstance(self.given, Mechanism) else []
+        from fastmech import mechanisms
+
+        own = isinstance(self.given, Mechanism) and not self.given.name.startswith(tuple(mechanisms.__all__))
+        head = [f'mechanism = "{self.given.name}"'] if isinstance(self.given, Mechanism) and not own else []
+        how = " --mechanism FILE.py:NAME` with the file that defines the mechanism" if own else "`"
         values = [
             f"{n} = {{ value = {v!r}, plus_minus = {self.plus_minus[n]!r} }}"
             if n in self.plus_minus
@@ -543,7 +568,7 @@ class _Report:
         ]
         lines = [*head, "[scene]", *values]
         return [
-            "Save the following as `device.toml` and run `fastmech report device.toml`:", "",
+            f"Save the following as `device.toml` and run `fastmech report device.toml{how}:", "",
             *(f"    {line}" for line in lines), "",
         ]  # fmt: skip
 

@@ -106,8 +106,10 @@ class Scene:
     F0: float
     alpha: float
 
-    def __new__(cls, *, load: Any = None, **parameters: Any) -> Self:
+    def __new__(cls, *unnamed: Any, load: Any = None, **parameters: Any) -> Self:
         """The scene; under a load of ``fm.loads`` the mechanism that it stands for."""
+        if unnamed:
+            raise InputError(f"scene: {shown(unnamed[0])} has no name; write Scene(m1=..., c1=...)")
         if load is None:
             return super().__new__(cls)
         from fastmech.mechanisms.slider_pendulum import slider_pendulum  # what is general knows the scene
@@ -122,7 +124,10 @@ class Scene:
         try:
             checked = _Checked(**parameters)
         except ValidationError as error:
-            raise InputError(explain(error, "scene", _Checked)) from None
+            line = explain(error, "scene", _Checked)
+            name = str(error.errors()[0]["loc"][0])
+            unit = f" in {PARAMETERS[name].unit}" if line.endswith(NO_NUMBER) else ""
+            raise InputError(line + unit) from None
         self.__dict__.update({name: getattr(checked, name) for name in PARAMETERS})
 
     @property
@@ -200,7 +205,7 @@ def require_scene(scene: Any, hint: str = "") -> None:
         InputError: it is something else.
     """
     if not isinstance(scene, Scene):
-        raise InputError(f"scene = {shown(scene)}: must be a Scene{hint}")
+        raise InputError(f"scene = {shown(scene)}: must be a Scene{hint or ' or a Mechanism'}")
 
 
 #: How HDF5 files begin.
@@ -261,9 +266,14 @@ def parse_toml(text: str, path: str | Path) -> dict[str, Any]:
         raise InputError(f"{path}: is not valid TOML: an integer has more than {most} digits") from None
 
 
+#: What is said of a text in place of a number.
+NO_NUMBER = "must be a number"
+
+
 def nearest(name: str, valid: Mapping[str, Any] | list[str]) -> str:
     """Hint for a name that is not valid: the nearest valid one, or all of them."""
-    close = difflib.get_close_matches(name, list(valid), n=1, cutoff=0.5)
+    same = [one for one in valid if one.lower() == name.lower()]
+    close = same or difflib.get_close_matches(name, list(valid), n=1, cutoff=0.5)
     return f"did you mean {close[0]!r}?" if close else f"allowed: {', '.join(valid)}"
 
 
@@ -276,6 +286,8 @@ def explain(error: ValidationError, where: str, model: type[BaseModel]) -> str:
     if first["type"] == "missing":
         return f"{path}: missing"
     message = first["msg"].removeprefix("Value error, ")
+    if first["type"] == "float_type":
+        message = NO_NUMBER
     limits = first.get("ctx", {})
     if first["type"] == "too_long":
         message = f"at most {limits['max_length']:,} entries are allowed"

@@ -6,10 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from numpy.testing import assert_allclose
 
 import fastmech as fm
 from fastmech import device_report
+from fastmech.basins.disturbed import return_quantile
+from fastmech.cli import main
 from fastmech.device_report import Sensitivities
 from fastmech.scan_types.request import device_of, tolerances_of
 from fastmech.scene import read_toml
@@ -172,3 +175,32 @@ def test_the_command_reads_tolerances_and_refuses_what_it_does_not_know(small, t
     refused = CliRunner().invoke(main, ["report", str(tmp_path / "wrong.toml")])
     assert refused.exit_code == 2
     assert "c1: unknown name" in refused.output
+
+
+def test_a_mechanism_of_a_file_repeats_with_tolerances(small, tmp_path: Path) -> None:
+    own = tmp_path / "twin.py"
+    made = "fm.mechanisms.von_mises_truss().replace(b=3.0)"
+    own.write_text(f"import fastmech as fm\n\ntruss = {made}\ntruss.name = 'twin'\n", encoding="utf-8")
+    request = tmp_path / "twin.toml"
+    request.write_text(
+        'title = "Our twin"\n[scene]\nk = { value = 90.0, plus_minus = 2.0 }\n', encoding="utf-8"
+    )
+    command = ["report", str(request), "--mechanism", f"{own}:truss", "--out", str(tmp_path / "twin.html")]
+    done = CliRunner().invoke(main, command)
+    assert done.exit_code == 0, done.output
+    text = (tmp_path / "twin.html").read_text(encoding="utf-8")
+    assert "Our twin</h1>" in text
+    assert "k = { value = 90.0, plus_minus = 2.0 }" in text
+    assert "--mechanism FILE.py:NAME" in text
+    assert "mechanism = \"twin\"" not in text
+
+
+def test_a_median_counts_those_that_return_later() -> None:
+    """With the end of the runs before most are back, the median is not that of the first ones."""
+    scene = fm.Scene(m1=4.0, m2=6.0, m3=3.0, l=0.6, c1=900.0, c2=150.0, beta=40.0, F0=60.0, alpha=0.0)
+    e = fm.find_equilibria(scene)[0]
+    early, late = (fm.disturb(scene, e, 256, t_end=t) for t in (120.0, 600.0))
+    assert np.isfinite(early.time_to_return).any()
+    assert return_quantile(early, 0.5) == np.inf
+    assert return_quantile(late, 0.5) == pytest.approx(np.median(late.time_to_return), rel=0.05)
+    assert "others later" in str(early)

@@ -83,6 +83,12 @@ def test_what_commands_name_exists() -> None:
 
 
 @pytest.mark.nojit
+def test_every_shipped_request_has_its_picture() -> None:
+    pictures = {path.stem for path in (ROOT / "docs/pictures/gallery").glob("*.png")}
+    assert pictures == {path.stem for path in (ROOT / "scans").rglob("*.toml")}
+
+
+@pytest.mark.nojit
 def test_the_readme_is_short() -> None:
     assert len(TEXT.splitlines()) <= 150
 

@@ -150,6 +150,8 @@ def test_replace_validates_and_leaves_the_original() -> None:
     for change, message in (
         ({"m1": -3.0}, "scene.m1 = -3.0: "),
         ({"alpa": 0.0}, "scene.alpa: unknown name; did you mean 'alpha'?"),
+        ({"C1": 900.0}, "scene.C1: unknown name; did you mean 'c1'?"),
+        ({"c1": "900 N/m"}, "scene.c1 = '900 N/m': must be a number in N/m"),
     ):
         with pytest.raises(InputError, match=f"^{re.escape(message)}"):
             scene.replace(**change)

@@ -122,9 +122,11 @@ class DisturbedEnsemble(Drawn):
             f"  returned: {shares.fraction:.2%}, at most {shares.at_most:.2%} "
             f"(95 % interval {shares.lower:.2%} to {shares.upper:.2%})",
         ]
-        times = self.time_to_return[np.isfinite(self.time_to_return)]
-        if times.size:
-            lines.append(f"  back after {np.median(times):.3g} s (median), {times.max():.3g} s at most")
+        back, median = np.isfinite(self.time_to_return).sum(), return_quantile(self, 0.5)
+        half = f"half of those that return after {median:.3g} s" if median < np.inf else "the others later"
+        lines.append(
+            f"  back (see time_to_return) by {self.t_end:g} s: {back:,} of {self.outcome.size:,}, {half}"
+        )
         if np.isfinite(self.excursion).any():
             most = zip(np.nanmax(self.excursion, axis=0), self.names.items(), strict=True)
             each = ", ".join(f"{value:.3g} {unit} of {name}" for value, (name, unit) in most)
@@ -305,6 +307,14 @@ def disturb(
         time_to_return=np.where(back, inside_since, np.nan),
         excursion=np.where((failing | astray)[:, None], np.nan, excursion),
     ).of(scene)
+
+
+def return_quantile(ensemble: DisturbedEnsemble, share: float) -> float:
+    """A quantile of the time to return [s] of those that return; infinite: later than the end of the runs."""
+    times = ensemble.time_to_return[ensemble.outcome == Status.RETURNED]
+    if not times.size:
+        return np.inf
+    return float(np.quantile(np.nan_to_num(times, nan=np.inf), share, method="higher"))
 
 
 def refuse_meeting_balls(

@@ -113,6 +113,7 @@ class ShockLimit(Printed):
             f"blows on {self.on}: no smaller one leaves (proved): {self.proved.told()}\n"
             f"  least found to leave: {found}\n"
             f"  {self.trajectories:,} blows followed, up to {self.tried_to:.4g} N s"
+            + ("" if math.isnan(self.undecided_from) else f"; undecided from {self.undecided_from:.4g} N s")
         )
 
 
