@@ -192,7 +192,7 @@ def test_a_mechanism_of_a_file_repeats_with_tolerances(small, tmp_path: Path) ->
     assert "Our twin</h1>" in text
     assert "k = { value = 90.0, plus_minus = 2.0 }" in text
     assert "--mechanism FILE.py:NAME" in text
-    assert "mechanism = \"twin\"" not in text
+    assert 'mechanism = "twin"' not in text
 
 
 def test_a_median_counts_those_that_return_later() -> None:

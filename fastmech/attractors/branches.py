@@ -290,7 +290,10 @@ def _correct(family: Family, guess: Floats, tangent: Floats) -> _Point | None:
     u, size, low = guess.copy(), np.inf, family.between[0]
     range_ = family.between[1] - low
     for _ in range(CORRECTIONS):
-        G, J, by_value = family.derivative(u[:-1] * family.scale, low + u[-1] * range_)
+        try:
+            G, J, by_value = family.derivative(u[:-1] * family.scale, low + u[-1] * range_)
+        except InputError:  # no period there: a frequency of zero or less
+            return None
         if not (np.isfinite(G).all() and np.isfinite(J).all()):
             return None
         A = np.zeros((len(u), len(u)))
@@ -406,16 +409,22 @@ def _between(family: Family, one: _Point, two: _Point) -> list[Special]:
 
 
 def _amplitudes(family: Family, places: Floats, values: Floats) -> Floats:
-    """Half of the range of each state over a period (m, dim), between outputs by parabolas."""
-    path = family.run(places, values, np.arange(1.0, OUTPUTS + 1.0) / OUTPUTS)
+    """Half of the range of each state over a period (m, dim), between outputs by parabolas.
+
+    Of an angle that makes full turns it is the range over one period, in which it does not come back.
+    """
+    path = np.concatenate([places[None], family.run(places, values, np.arange(1.0, OUTPUTS + 1.0) / OUTPUTS)])
+    turns = path[-1:] - path[:1]
+    path = np.concatenate([path[-2:-1] - turns, path, path[1:2] + turns])
     ends = []
     for sign in (1.0, -1.0):
         y = sign * path
-        k = np.argmax(y, axis=0)[None]
-        low, top, high = (np.take_along_axis(y, (k + s) % OUTPUTS, axis=0)[0] for s in (-1, 0, 1))
+        k = np.argmax(y[1:-1], axis=0)[None] + 1
+        low, top, high = (np.take_along_axis(y, k + s, axis=0)[0] for s in (-1, 0, 1))
         bend = low - 2.0 * top + high
         with np.errstate(divide="ignore", invalid="ignore"):
-            ends.append(np.where(bend < 0.0, top - (high - low) ** 2 / (8.0 * bend), top))
+            beyond = -((high - low) ** 2) / (8.0 * bend)
+        ends.append(top + np.where((top >= low) & (top >= high) & (bend < 0.0), beyond, 0.0))
     return np.asarray(0.5 * (ends[0] + ends[1]))
 
 

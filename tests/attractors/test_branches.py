@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 import fastmech as fm
@@ -178,3 +179,26 @@ def test_a_second_process_finds_the_same_with_kernels_from_the_disk(tmp_path: Pa
     ]
     assert told[0] == told[1]
     assert told[0].startswith("1 branches of period 1 over A")
+
+
+def test_rotating_motions_have_the_range_of_their_turn() -> None:
+    """A driven pendulum that turns over once or twice a period, beside SciPy."""
+
+    def driven(t, x, v, F, w):
+        return v, -0.1 * v - fm.sin(x) + F * fm.cos(w * t)
+
+    period = lambda w: 2.0 * np.pi / w  # noqa: E731
+    system = fm.System(driven, ["x", "v"], {"F": 0.5, "w": 0.6}, period=period, angles=["x"])
+    found = fm.frequency_response(system, "w", (0.5, 0.65), {"x": (-np.pi, np.pi), "v": (-3.0, 3.0)})
+    turning = 0
+    for branch in found.branches:
+        for k in (0, len(branch.values) // 2, -1):
+            if np.abs(branch.multipliers[k]).max() > 10.0:
+                continue  # SciPy would leave it
+            w, end = branch.values[k], 2.0 * np.pi / branch.values[k]
+            rates = lambda t, y, w=w: driven(t, *y, 0.5, w)  # noqa: E731
+            run = solve_ivp(rates, (0.0, end), branch.places[k], rtol=1e-11, atol=1e-11, dense_output=True)
+            y = run.sol(np.linspace(0.0, end, 20_001))
+            assert branch.amplitudes[k] == pytest.approx(0.5 * np.ptp(y, axis=1), abs=2e-5)
+            turning += abs(y[0, -1] - y[0, 0]) > 6.0
+    assert turning >= 2
