@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from fastmech.attractors.arrival import Balls, Cloud
@@ -23,7 +23,7 @@ from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Printed
-from fastmech.samplers import Sampler, sampler_of
+from fastmech.samplers import Starts
 
 Integers = NDArray[np.int64]
 
@@ -135,11 +135,11 @@ class Attractors(Drawn, Sequence[Attractor]):
 
 def find_attractors(
     system: System | Mechanism,
-    starts: Sampler | Mapping[str, ArrayLike] | ArrayLike,
+    starts: Starts,
     n: int | None = None,
     *,
     t_end: float | None = None,
-    seed: int = 0,
+    seed: int | None = None,
     method: str = "dop853",
     threads: int | None = None,
     progress: Progress | None = None,
@@ -151,10 +151,10 @@ def find_attractors(
             mechanism's is that of its loads. States that count modulo a turn are its ``angles``.
         starts: ranges by name, ``{"x": (-1, 1), "x_dot": (-0.5, 1)}`` for uniform starts (what is not named
             is zero), a sampler of ``fm.samplers``, or states (n, dim).
-        n: how many starts, 10,000 by default; of states given all.
+        n: how many starts, by default the sampler's, or 10,000; of states given all.
         t_end: how long a motion has to arrive [s]; by default eight times as long as the last motion of the
             sample takes.
-        seed: of the sampler.
+        seed: of the sampler, by default its own.
         method: of integration, with a fixed step that a sample chooses; "radau5" where motion is stiff.
         threads: threads to use, all processors by default. The result does not depend on it.
         progress: is told how many starts are done since its last call.
@@ -173,7 +173,7 @@ def find_attractors(
     """
     if not isinstance(system, System | Mechanism):
         raise InputError(f"system = {shown(system)}: must be a System or a Mechanism")
-    y = starts_of(starts, system.state, n, seed)
+    y = checks.starts("starts", starts, system.state, n=n, seed=seed, default=STARTS)
     checks.progress_function(progress, "starts")
     if t_end is not None:
         t_end = checks.number("t_end", t_end, "s", above=0.0)
@@ -201,21 +201,6 @@ def search_of(
     search = Search(flow)
     search.look(sample)
     return search
-
-
-def starts_of(given: object, names: Sequence[str], n: int | None, seed: int) -> Floats:
-    """Starts (n, dim) from a sampler, ranges or states.
-
-    Raises:
-        InputError: none of these, or a wrong one.
-    """
-    sampler = sampler_of(given)
-    if sampler is not None:
-        count = checks.whole_number("n", STARTS if n is None else n, least=1, most=1 << 31)
-        checks.memory(count * len(names), 2, f"n: {count:,} starts", "fewer")
-        return sampler.draw(count, tuple(names), checks.whole_number("seed", seed, least=0))
-    array = np.array(checks.states("starts", given, len(names)))  # type: ignore[arg-type]
-    return array if n is None else array[: checks.whole_number("n", n, least=1)]
 
 
 def labelled(

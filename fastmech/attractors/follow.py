@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
-from fastmech.attractors.find import Attractor, Attractors, find_attractors, starts_of
+from fastmech.attractors.find import Attractor, Attractors, find_attractors
 from fastmech.attractors.flow import Floats, Flow, flow_of
 from fastmech.attractors.search import Search
 from fastmech.ensembles import checks
@@ -24,10 +24,13 @@ from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn
-from fastmech.samplers import Sampler
+from fastmech.samplers import Starts
 from fastmech.scene import nearest
 
 Integers = NDArray[np.int64]
+
+#: Starts by default.
+STARTS = 1000
 
 #: Points of an attractor from which motions begin, distance over the scale within which it is the same,
 #: and halvings of the step to where it comes or goes.
@@ -77,11 +80,11 @@ def follow_basins(
     system: System | Mechanism,
     parameter: str,
     values: ArrayLike,
-    starts: Sampler | Mapping[str, ArrayLike] | ArrayLike,
-    n: int = 1000,
+    starts: Starts,
+    n: int | None = None,
     *,
     t_end: float | None = None,
-    seed: int = 0,
+    seed: int | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> BasinsAlong:
@@ -92,9 +95,9 @@ def follow_basins(
         parameter: its name.
         values: of it, rising or falling.
         starts: as for :func:`fastmech.find_attractors`, the same at every value.
-        n: how many starts.
+        n: how many starts, by default the sampler's, or 1,000; of states given all.
         t_end: how long a motion has to arrive [s].
-        seed: of the sampler.
+        seed: of the sampler, by default its own.
         threads: threads to use, all processors by default.
         progress: is told 1 after each value.
 
@@ -110,7 +113,7 @@ def follow_basins(
     if along.ndim != 1 or along.size < 2 or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
         raise InputError("values: must be two or more rising or falling numbers")
     checks.progress_function(progress, "values")
-    y = starts_of(starts, system.state, n, seed)
+    y = checks.starts("starts", starts, system.state, n=n, seed=seed, default=STARTS)
     tracer = _Tracer(system, parameter, y, threads)
     numbered: list[dict[int, Attractor]] = []
     shares: list[dict[int, float]] = []

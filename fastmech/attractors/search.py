@@ -209,6 +209,8 @@ class Search:
                 self.clouds[k] = cloud._replace(points=points, size=np.maximum(cloud.size, new.size))
                 return
         exponent, error = _exponent(self.flow, last)
+        if new.still and exponent > 3.0 * error:
+            return  # a saddle, beside which each turn of a heteroclinic cycle takes longer than the last
         self.clouds.append(new._replace(exponent=exponent, error=error))
 
 

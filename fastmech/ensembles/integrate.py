@@ -29,6 +29,7 @@ from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method
 from fastmech.kernels.select import FORMULATIONS
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Field
+from fastmech.samplers import Starts
 from fastmech.scene import STATE, Scene, nearest
 from fastmech.step_limits.warning import TURN, too_long, warn_of_step
 
@@ -103,7 +104,7 @@ class Trajectories(Drawn):
 @called_here(rtol="tol", atol="tol", t_span="t_end", max_step="dt", h="dt", step="dt", args="parameters")
 def integrate(
     scene: Scene | Mechanism | System,
-    y0: ArrayLike,
+    y0: Starts,
     t_end: float | None = None,
     dt: float | None = None,
     method: str | None = None,
@@ -122,9 +123,9 @@ def integrate(
 
     Args:
         scene: the paper's mechanism, a :class:`fastmech.Mechanism`, or a system of your own.
-        y0: starts, shape (n, dim) or (dim,) at t = 0; a scene's: phi, theta [rad], phi', theta' [rad/s], a
-            mechanism's: coordinates, then rates.
-            Angles are not wrapped.
+        y0: starts at t = 0: a sampler of ``fm.samplers``, or states of shape (n, dim) or (dim,); a scene's:
+            phi, theta [rad], phi', theta' [rad/s], a mechanism's: coordinates, then rates. Angles are not
+            wrapped.
         t_end: end of the run [s]; the last of ``t_eval`` by default.
         dt: longest step [s], 0.01 by default. Each interval between outputs is divided into equal steps not
             longer than it.
@@ -284,7 +285,7 @@ def _output_times(t_end: float | None, t_eval: ArrayLike | None) -> NDArray[np.f
 
 def problem_of(
     scene: Scene | Mechanism | System,
-    y0: ArrayLike,
+    y0: Starts,
     parameters: Mapping[str, ArrayLike],
     formulation: str | None,
 ) -> tuple[NDArray[np.float64], Problem, dict[str, NDArray[np.float64]]]:
@@ -297,14 +298,14 @@ def problem_of(
             f"formulation = {shown(formulation)}: unknown; {nearest(str(formulation), list(FORMULATIONS))}"
         )
     if isinstance(scene, System):
-        starts = checks.states("y0", y0, len(scene.state))
+        starts = checks.starts("y0", y0, scene.state)
         return starts, system_problem(scene, len(starts), parameters), {}
     if isinstance(scene, Mechanism):
-        starts = checks.states("y0", y0, len(scene.state))
+        starts = checks.starts("y0", y0, scene.state)
         own = own_values(parameters, scene.parameters, len(starts))
         return starts, mechanism_problem(scene, len(starts), own, formulation), own
     if not isinstance(scene, Scene):
         raise InputError(f"scene = {shown(scene)}: must be a Scene, a Mechanism or a System")
-    starts = checks.states("y0", y0, 4)
+    starts = checks.starts("y0", y0, STATE)
     own = own_values(parameters, scene.parameters, len(starts))
     return starts, scene_problem(scene, len(starts), own, formulation), own

@@ -271,6 +271,22 @@ def test_a_place_that_is_approached_ever_more_slowly_is_a_fixed_point() -> None:
     assert found.counts["captured"] == 200
 
 
+def test_saddles_that_motions_linger_at_are_no_attractors() -> None:
+    """May and Leonard's three competitors, SIAM J. Appl. Math. 29 (1975) 243: they win in turn."""
+
+    def competition(t, x, y, z, a, b):  # type: ignore[no-untyped-def]
+        return x * (1.0 - x - a * y - b * z), y * (1.0 - b * x - y - a * z), z * (1.0 - a * x - b * y - z)
+
+    system = fm.System(competition, ["x", "y", "z"], {"a": 0.8, "b": 1.5})
+    ranges = dict.fromkeys(system.state, (0.01, 1.0))
+    found = fm.find_attractors(system, ranges, 200)
+    assert not len(found)
+    assert found.counts["undecided"] == 200
+    settled = fm.find_attractors(system.replace(b=1.1), ranges, 200)  # a + b < 2: they live together
+    assert [one.kind for one in settled] == ["fixed point"]
+    np.testing.assert_allclose(settled[0].points[0], 1.0 / 2.9, rtol=1e-9)
+
+
 def test_the_smallest_shock_out_of_a_place_of_rest_reaches_the_saddle_s_manifold() -> None:
     """Measures take attractors for labels; the boundary is the stable manifold of the saddle, by SciPy."""
     found = fm.find_attractors(PENDULUM, {"x": (-2.6, 3.6), "x_dot": (-10.0, 10.0)}, 500)
