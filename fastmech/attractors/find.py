@@ -36,6 +36,9 @@ PRESERVING = 16
 #: Periods that motions have to arrive: so many times those of the sample's last, and at least and at most.
 LATER, FEWEST, MOST = 8, 256, 1 << 14
 
+#: States of a place that are printed.
+SHOWN = 6
+
 #: Lines of attractors that are printed.
 LINES = 5
 
@@ -44,7 +47,7 @@ LINES = 5
 class Attractor(Printed):
     """A place of rest, a periodic motion, a torus or chaos that motions come to."""
 
-    kind: str  #: "fixed point", "periodic", "torus" or "chaos"
+    kind: str  #: "fixed point", "periodic", "torus", "chaos", or "continuum" of the first two side by side
     points: Floats  #: (m, dim): the place; after each forcing period, or all along; a sample
     period: float | None  #: of a periodic motion [s]
     forcing_periods: int | None  #: the same in periods of the forcing, where there is one
@@ -63,7 +66,8 @@ class Attractor(Printed):
     @property
     def name(self) -> str:
         """Kind, period and place in a few words."""
-        where = ", ".join(f"{x:.4g}" for x in np.round(self.points[0], 9) + 0.0)
+        where = ", ".join(f"{x:.4g}" for x in np.round(self.points[0, :SHOWN], 9) + 0.0)
+        where += ", ..." * (self.points.shape[1] > SHOWN)
         period = "" if self.period is None else f", period {self.period:.6g} s"
         if self.forcing_periods is not None:
             period = f", period {self.forcing_periods} of the forcing"
@@ -213,10 +217,10 @@ def labelled(
         if t_end is not None:
             periods = max(1, math.ceil(t_end / flow.period))
         ends = settle(search, starts, periods, progress if attempt == 0 else None)
-        before = search.count
+        before = search.changes
         if len(ends.last):
             search.look(ends.last)
-        if search.count == before:
+        if search.changes == before:
             break
     every = [_of_orbit(flow, orbit, ball) for orbit, ball in search.orbits]
     every += [_of_cloud(cloud, flow.forced) for cloud in search.clouds]
@@ -243,7 +247,9 @@ def labelled(
 
 def _of_cloud(cloud: Cloud, forced: bool) -> Attractor:
     kind = "chaos" if cloud.exponent > 3.0 * cloud.error else "torus"
-    if cloud.still:
+    if cloud.continuum:
+        kind = "continuum"
+    elif cloud.still:
         kind = "periodic" if forced else "fixed point"
     return Attractor(
         kind,

@@ -172,8 +172,8 @@ def integrate(
     starts, problem, own = problem_of(scene, y0, {} if parameters is None else parameters, formulation)
     fitted_at = _fit_times(fit, scene, outputs[-1])
     kept = starts.shape[1] * (outputs.size + max(len(fitted_at) - 1, 0) + problem.canonical)
-    beside = BESIDE + OWN * sum(column.ndim for column in problem.params.columns)
-    checks.memory(len(starts) * (kept + (1 if tol is None else 2) * beside), 2 if tol is None else 4)
+    own_columns = sum(column.ndim for column in problem.params.columns)
+    checks.memory(*_needed(len(starts), kept, own_columns, tol))
     if tol is not None:
         if dt is not None or fit is not False or dtype != "float64":
             raise InputError(
@@ -218,6 +218,28 @@ def integrate(
         beyond |= solution.last_term > LAST_TERM
     solution.status[beyond & (solution.status == Status.OK)] = Status.STEP_TOO_LARGE
     return _trajectories(problem, outputs, solution, settings).of(scene)
+
+
+def _needed(n: int, kept: int, own: int, tol: float | None) -> tuple[int, int]:
+    """Numbers of n trajectories with so many states each and coefficients of its own, and copies of them."""
+    runs = 1 if tol is None else 2
+    return n * (kept + runs * (BESIDE + OWN * own)), 2 * runs
+
+
+def memory(scene: Scene | Mechanism | System, n: int, times: int = 1, *, tol: float | None = None) -> int:
+    """Bytes that :func:`integrate` takes at most on the way for n trajectories at so many output times.
+
+    Attractors and labels take as much for one output time, and half a gigabyte, however many starts.
+
+    Raises:
+        InputError: an argument is wrong.
+    """
+    if not isinstance(scene, Scene | Mechanism | System):
+        raise InputError(f"scene = {shown(scene)}: must be a Scene, a Mechanism or a System")
+    n, times = checks.whole_number("n", n, least=1), checks.whole_number("times", times, least=1)
+    dim = len(STATE if isinstance(scene, Scene) else scene.state)
+    numbers, copies = _needed(n, dim * times, 0, tol)
+    return 8 * numbers * copies
 
 
 def _trajectories(
