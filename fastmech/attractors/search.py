@@ -70,6 +70,9 @@ MOST_POINTS = 1 << 18
 #: for; cells of such a continuum; places of it by which it goes on.
 NEUTRAL, BESIDE, CONTINUUM, KNOWN = 1e-5, 1 / 32, 1 / 16, 512
 
+#: Fixed points about which steps are tried, and periods for which.
+TRIED, WAITED = 16, 8.0
+
 #: Motions of one attractor that are followed for its exponent, and periods.
 FOLLOWED, EXPONENT_PERIODS = 8, 512
 
@@ -206,11 +209,11 @@ class Search:
                 break
         else:
             return
-        still = (np.ptp(paths[half:, filling], axis=0) < size).all(axis=1)
-        still[still] = self._have_neighbours(paths[-1, filling[still]])
-        if still.any():
-            self._add_continua(paths[-1, filling[still]], size)
-            filling = filling[~still]
+        resting: Flags = (np.ptp(paths[half:, filling], axis=0) < size).all(axis=1)
+        resting[resting] = self._have_neighbours(paths[-1, filling[resting]])
+        if resting.any():
+            self._add_continua(paths[-1, filling[resting]], size)
+            filling = filling[~resting]
         if not filling.size:
             return
         for group in _groups([np.unique(own) for own in keys[:, filling].T]):
@@ -228,7 +231,8 @@ class Search:
         """Which fixed points of the map, near places (n, dim), have others beside them."""
         flow, n = self.flow, len(places)
         jacobians = flow.derivative(places, 1.0)[1] * flow.scale / flow.scale[:, None]
-        beside, neutral = places.copy(), np.isfinite(jacobians).all(axis=(1, 2))
+        beside = places.copy()
+        neutral: Flags = np.isfinite(jacobians).all(axis=(1, 2))
         for k in np.flatnonzero(neutral):
             values, vectors = np.linalg.eig(jacobians[k])
             j = int(np.argmin(np.abs(values - 1.0)))
@@ -239,7 +243,7 @@ class Search:
             y, residual, _ = newton(flow, np.concatenate([places, beside]), 1)
             neutral &= (residual[:n] < RESIDUAL) & (residual[n:] < RESIDUAL)
             neutral &= flow.distance(y[:n], y[n:]) > 0.5 * BESIDE
-        return np.asarray(neutral)
+        return neutral
 
     def _add_continua(self, places: Floats, size: Floats) -> None:
         """Add fixed points (n, dim) that have others beside them: those between which others lie are one."""
@@ -249,17 +253,28 @@ class Search:
         tree = minimum_spanning_tree(flow.distance(y[:, None], y) + 1e-12).tocoo()
         gaps = flow.away(y[tree.col], y[tree.row])
         middle = y[tree.row] + 0.5 * gaps
-        between, residual, _ = newton(flow, middle, 1)
+        between, residual, jacobians = newton(flow, middle, 1)
+        residual[np.abs(np.linalg.eigvals(jacobians)).max(axis=1) > 1.0 + NEUTRAL] = np.inf  # unstable
         joined = (residual < RESIDUAL) & (flow.distance(between, middle) < 0.25 * tree.data)
         joined |= tree.data < BESIDE
-        links = csr_matrix((joined * 1.0, (tree.row, tree.col)), shape=tree.shape)
+        links = csr_matrix((tree.data[joined], (tree.row[joined], tree.col[joined])), shape=tree.shape)
         _, group = connected_components(links, directed=False)
+        self._shorten_steps(places[:TRIED], size)
         self.clouds = [cloud for cloud in self.clouds if not cloud.continuum]
         for k in np.unique(group):
             exponent, error = _exponent(flow, y[group == k])
             wide = np.maximum(size, CONTINUUM * flow.scale)
             self.clouds.append(Cloud(y[group == k], wide, True, exponent, error, continuum=True))
         self.changes += 1
+
+    def _shorten_steps(self, places: Floats, size: Floats) -> None:
+        """Take steps so short that motions near places of rest (n, dim) stay there."""
+        nearby = places + 0.25 * size * np.random.default_rng(0).uniform(-1.0, 1.0, places.shape)
+        while self.flow.steps < MOST_STEPS:
+            away = self.flow.away(self.flow.after(nearby, WAITED, COARSER), places)
+            if (np.abs(away / size) < 1.0).all():
+                break
+            self.flow = replace(self.flow, steps=2 * self.flow.steps)
 
     def _add_cloud(self, new: Cloud, last: Floats) -> None:
         """Add a cloud, or its points to the one with which it has many cells in common."""
@@ -276,6 +291,8 @@ class Search:
         exponent, error = _exponent(self.flow, last)
         if new.still and exponent > 3.0 * error:
             return  # a saddle, beside which each turn of a heteroclinic cycle takes longer than the last
+        if new.still:
+            self._shorten_steps(last[:1], new.size)
         self.changes += 1
         self.clouds.append(new._replace(exponent=exponent, error=error))
 
