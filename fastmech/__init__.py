@@ -12,7 +12,7 @@ Where it rests, and when that ends:
 
 How it moves:
     integrate, disturbed_motion, disturb, linear_range, transient_growth, largest_lyapunov, animate,
-    work_precision, step_warning, largest_stable_step
+    work_precision, step_warning, largest_stable_step, memory
 
 Which shock it survives:
     shock_limit, impulse_start, minimal_shock, brute_force_shock, map_snapping, critical_forces,
@@ -30,8 +30,8 @@ Files, reports and this installation:
     open_results, report, system_info, Status, InputError, StepWarning
 
 What functions return:
-    Attractor, Attractors, BasinMap, BasinsAlong, Classification, CriticalCurves, CriticalValues,
-    DisturbedEnsemble, DisturbedMotion, EdgeTrack, Equilibria, Equilibrium, EquilibriumMap,
+    Attractor, Attractors, BasinMap, BasinsAlong, BasinsOver, Classification, CriticalCurves,
+    CriticalValues, DisturbedEnsemble, DisturbedMotion, EdgeTrack, Equilibria, Equilibrium, EquilibriumMap,
     ErosionProfile, FoldPoints, FoldSet, FrequencyResponse, Labels, LinearRange, LyapunovExponents,
     RestingMap, RestingPlace, RestingPlaces, Results, Shares, Shock, ShockLimit, Snap, SnappingMap,
     Stability, Trajectories, UndampedSet, WorkPrecision

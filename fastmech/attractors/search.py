@@ -232,7 +232,7 @@ class Search:
         flow, n = self.flow, len(places)
         jacobians = flow.derivative(places, 1.0)[1] * flow.scale / flow.scale[:, None]
         beside = places.copy()
-        neutral: Flags = np.isfinite(jacobians).all(axis=(1, 2))
+        neutral: Flags = np.asarray(np.isfinite(jacobians).all(axis=(1, 2)))
         for k in np.flatnonzero(neutral):
             values, vectors = np.linalg.eig(jacobians[k])
             j = int(np.argmin(np.abs(values - 1.0)))
