@@ -12,7 +12,7 @@ Where it rests, and when that ends:
 
 How it moves:
     integrate, disturbed_motion, disturb, linear_range, transient_growth, largest_lyapunov, animate,
-    work_precision, step_warning, largest_stable_step
+    work_precision, step_warning, largest_stable_step, memory
 
 Which shock it survives:
     shock_limit, impulse_start, minimal_shock, brute_force_shock, map_snapping, critical_forces,
@@ -30,8 +30,8 @@ Files, reports and this installation:
     open_results, report, system_info, Status, InputError, StepWarning
 
 What functions return:
-    Attractor, Attractors, BasinMap, BasinsAlong, Classification, CriticalCurves, CriticalValues,
-    DisturbedEnsemble, DisturbedMotion, EdgeTrack, Equilibria, Equilibrium, EquilibriumMap,
+    Attractor, Attractors, BasinMap, BasinsAlong, BasinsOver, Classification, CriticalCurves,
+    CriticalValues, DisturbedEnsemble, DisturbedMotion, EdgeTrack, Equilibria, Equilibrium, EquilibriumMap,
     ErosionProfile, FoldPoints, FoldSet, FrequencyResponse, Labels, LinearRange, LyapunovExponents,
     RestingMap, RestingPlace, RestingPlaces, Results, Shares, Shock, ShockLimit, Snap, SnappingMap,
     Stability, Trajectories, UndampedSet, WorkPrecision
@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     from fastmech.attractors.branches import FrequencyResponse, frequency_response
     from fastmech.attractors.features import group_by_features
     from fastmech.attractors.find import Attractor, Attractors, find_attractors
-    from fastmech.attractors.follow import BasinsAlong, follow_basins, tipping_probabilities
+    from fastmech.attractors.follow import BasinsAlong, BasinsOver, follow_basins, tipping_probabilities
     from fastmech.attractors.periodic import periodic_orbits
     from fastmech.basins.disturbed import DisturbedEnsemble, disturb
     from fastmech.basins.edge import EdgeTrack, nearest_saddle, track_edge
@@ -90,7 +90,7 @@ if TYPE_CHECKING:
     from fastmech.capture.select import trapped
     from fastmech.device_report import report
     from fastmech.disturbance.motion import DisturbedMotion, LinearRange, disturbed_motion, linear_range
-    from fastmech.ensembles.integrate import Trajectories, integrate
+    from fastmech.ensembles.integrate import Trajectories, integrate, memory
     from fastmech.ensembles.status import Status
     from fastmech.ensembles.system import System
     from fastmech.equilibria.find import Equilibria, Equilibrium
@@ -128,7 +128,7 @@ _NAMES = {
     "attractors.branches": "FrequencyResponse frequency_response",
     "attractors.features": "group_by_features",
     "attractors.find": "Attractor Attractors find_attractors",
-    "attractors.follow": "BasinsAlong follow_basins tipping_probabilities",
+    "attractors.follow": "BasinsAlong BasinsOver follow_basins tipping_probabilities",
     "attractors.periodic": "periodic_orbits",
     "basins.disturbed": "DisturbedEnsemble disturb",
     "basins.edge": "EdgeTrack nearest_saddle track_edge",
@@ -152,7 +152,7 @@ _NAMES = {
     "capture.select": "trapped",
     "device_report": "report",
     "disturbance.motion": "DisturbedMotion LinearRange disturbed_motion linear_range",
-    "ensembles.integrate": "Trajectories integrate",
+    "ensembles.integrate": "Trajectories integrate memory",
     "ensembles.status": "Status",
     "ensembles.system": "System",
     "equilibria.find": "Equilibria Equilibrium",
@@ -177,9 +177,9 @@ _MODULES = {name: f"fastmech.{module}" for module, names in _NAMES.items() for n
 _PARTS = ("loads", "mechanisms", "samplers")
 
 __all__ = [
-    "Attractor", "Attractors", "BasinMap", "BasinsAlong", "Body", "Classification", "CriticalCurves",
-    "CriticalValues", "Damper", "DisturbedEnsemble", "DisturbedMotion", "EdgeTrack", "Equilibria",
-    "Equilibrium", "EquilibriumMap", "ErosionProfile", "FoldPoints", "FoldSet", "Force",
+    "Attractor", "Attractors", "BasinMap", "BasinsAlong", "BasinsOver", "Body", "Classification",
+    "CriticalCurves", "CriticalValues", "Damper", "DisturbedEnsemble", "DisturbedMotion", "EdgeTrack",
+    "Equilibria", "Equilibrium", "EquilibriumMap", "ErosionProfile", "FoldPoints", "FoldSet", "Force",
     "FrequencyResponse", "InputError", "Labels", "LinearRange", "LyapunovExponents", "Mechanism",
     "RestingMap", "RestingPlace", "RestingPlaces", "Results", "Scene", "Shares", "Shock", "ShockLimit",
     "Snap", "SnappingMap", "Spring", "Stability", "Status", "StepWarning", "System", "Torque",
@@ -190,10 +190,11 @@ __all__ = [
     "find_snap", "finite_time_basin_stability", "follow_basins", "fractal_boundary_test",
     "frequency_response", "group_by_features", "impulse_start", "integrate", "integrity", "kinetic_norm",
     "label_starts", "largest_lyapunov", "largest_stable_step", "lengths", "linear_range", "map_basins",
-    "map_equilibria", "map_snapping", "minimal_shock", "nearest_saddle", "number_turns", "open_results",
-    "periodic_orbits", "reactions", "report", "shock_limit", "sin", "step_warning", "system_info",
-    "tipping_probabilities", "trace_folds", "trace_undamped", "track_edge", "transient_growth", "trapped",
-    "uncertainty_exponent", "wada_merge_test", "well_numbers", "well_of_number", "wilson", "work_precision",
+    "map_equilibria", "map_snapping", "memory", "minimal_shock", "nearest_saddle", "number_turns",
+    "open_results", "periodic_orbits", "reactions", "report", "shock_limit", "sin", "step_warning",
+    "system_info", "tipping_probabilities", "trace_folds", "trace_undamped", "track_edge",
+    "transient_growth", "trapped", "uncertainty_exponent", "wada_merge_test", "well_numbers",
+    "well_of_number", "wilson", "work_precision",
 ]  # fmt: skip
 
 

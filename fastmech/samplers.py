@@ -1,26 +1,23 @@
-"""Samplers: where starts are drawn from, as data; ``draw(n, names, seed)`` gives the first n of a sequence.
+"""Samplers: where starts are drawn from, as data, for every function that takes starts.
 
 Each names states by ranges ``(low, high)`` or by one value; what is not named is zero. A plain mapping of
-names to ranges is :class:`Uniform`.
+names to ranges is :class:`Uniform`. The first starts are the same for every number of them.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from fastmech.errors import InputError, shown
 from fastmech.scene import nearest
 
 Floats = NDArray[np.float64]
-
-#: Points of one Latin hypercube.
-HYPERCUBE = 1024
 
 
 @dataclass(frozen=True)
@@ -28,6 +25,8 @@ class Sampler:
     """What samplers share."""
 
     ranges: Mapping[str, Any]  #: by name (low, high), or a value
+    n: int | None = field(default=None, kw_only=True)  #: how many, where the function is not told
+    seed: int = field(default=0, kw_only=True)
 
     def draw(self, n: int, names: Sequence[str], seed: int = 0) -> Floats:
         """The first n starts, shape (n, len(names)), in the order of ``names``.
@@ -89,20 +88,36 @@ class Sobol(Sampler):
 
 @dataclass(frozen=True)
 class LatinHypercube(Sampler):
-    """Latin hypercubes (SciPy's) of 1,024 points, one after the other; the last one may be cut off."""
+    """Nested Latin hypercubes: of the first 2^k starts every state has one in each of 2^k equal intervals.
+
+    Each hypercube is doubled by starts in the halves of intervals that are empty, in an order of its own for
+    every state (Qian, Biometrika 96 (2009) 957).
+    """
 
     def _unit(self, n: int, names: Sequence[str], seed: int) -> Floats:
-        from scipy.stats import qmc
-
-        drawn = qmc.LatinHypercube(len(names), rng=seed)
-        return np.concatenate([drawn.random(HYPERCUBE) for _ in range(-(-max(n, 1) // HYPERCUBE))])[:n]
+        rng = np.random.default_rng(seed)
+        points = rng.random((1, len(names)))
+        while len(points) < n:
+            parts = 2 * len(points)
+            empty = np.floor(parts * points).astype(np.int64) ^ 1
+            # In single precision: the sum is exact, so that no start comes into the next interval.
+            places = rng.permuted(empty, axis=0) + rng.random(points.shape, np.float32)
+            points = np.concatenate([points, places / parts])
+        return points[:n]
 
 
 @dataclass(frozen=True)
 class Grid(Sampler):
-    """A grid over the ranges, ends included, the last state fastest; ``counts`` are its points by name."""
+    """A grid over the ranges, ends included, the last state fastest; ``counts`` are its points by name.
+
+    All of them where no ``n`` is given.
+    """
 
     counts: Mapping[str, int]
+
+    def __post_init__(self) -> None:
+        if self.n is None:
+            object.__setattr__(self, "n", math.prod(self.counts.values()))
 
     def _unit(self, n: int, names: Sequence[str], seed: int) -> Floats:
         try:
@@ -144,6 +159,10 @@ class Ball(Sampler):
         radius = norm.cdf(z[:, -1]) ** (1.0 / max(1, int(np.count_nonzero(ranged))))
         inside = z[:, :-1] * (radius / np.where(size > 0.0, size, 1.0))[:, None]
         return np.asarray(0.5 * (low + high) + 0.5 * (high - low) * np.where(ranged, inside, 0.0))
+
+
+#: What functions take as starts: a sampler, ranges of uniform starts, or states (n, dim).
+Starts = Sampler | Mapping[str, ArrayLike] | ArrayLike
 
 
 def sampler_of(given: Any) -> Sampler | None:

@@ -26,6 +26,7 @@ LAYERS = (
     "callee",
     "jit",
     "scene",
+    "samplers",
     "mechanism",
     "kernels",
     "intervals",
@@ -41,7 +42,6 @@ LAYERS = (
     "atlas",
     "disturbance",
     "capture",
-    "samplers",
     "attractors",
     "basins",
     "results",
@@ -159,6 +159,7 @@ def test_compiled_places_import_compiled_places_only(path: Path) -> None:
     if is_compiled(path):
         allowed = {name.removesuffix(".py") for name in COMPILED} | {
             "scene",
+            "samplers",
             "errors",
             "objects",
             "interrupts",

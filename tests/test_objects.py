@@ -29,9 +29,9 @@ GRID = {"phi": np.linspace(-2.0, 2.0, 5), "theta": np.linspace(-1.0, 1.0, 4)}
 def duffing() -> fm.System:
     """Two attractors, forced."""
     return fm.System(
-        lambda t, x, v, amplitude: (v, x - x * x * x - 0.25 * v + amplitude * fm.cos(t)),
+        lambda t, x, v, amplitude, delta: (v, x - x * x * x - delta * v + amplitude * fm.cos(t)),
         ("x", "v"),
-        {"amplitude": 0.05},
+        {"amplitude": 0.05, "delta": 0.25},
         period=2.0 * np.pi,
     )
 
@@ -110,6 +110,9 @@ CALLS: dict[str, Callable[[], Any]] = {
     "follow_basins": lambda: fm.follow_basins(
         duffing(), "amplitude", [0.02, 0.04], {"x": (-1.5, 1.5), "v": (-1.0, 1.0)}, 32
     ),
+    "follow_basins, two parameters": lambda: fm.follow_basins(
+        duffing(), "amplitude", [0.02, 0.04], {"x": (-1.5, 1.5)}, 16, each={"delta": [0.2, 0.3]}
+    ),
     "periodic_orbits": lambda: fm.periodic_orbits(duffing(), {"x": (-1.5, 1.5), "v": (-1.0, 1.0)}, 8),
     "minimal_shock": lambda: fm.minimal_shock(
         lambda y: (y[:, 0] > 1.0).astype(int), [0.0, 0.0], np.eye(2), most=3.0, directions=8
@@ -131,7 +134,7 @@ CALLS: dict[str, Callable[[], Any]] = {
 #: whose results are of a class that is walked; and one that needs a further library.
 PLAIN = {
     "angles", "animate", "cos", "critical_forces", "impulse_start", "kinetic_norm", "largest_stable_step",
-    "lengths",
+    "lengths", "memory",
     "nearest_saddle", "number_turns", "open_results", "report", "reactions",
     "sin", "step_warning", "system_info",
     "tipping_probabilities", "trapped", "well_numbers", "well_of_number", "wilson",

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import fastmech as fm
+from fastmech.ensembles.checks import starts
 from fastmech.samplers import Ball, Gaussian, Grid, LatinHypercube, Sampler, Sobol, Uniform
 
 pytestmark = pytest.mark.nojit
@@ -36,10 +37,30 @@ def test_a_ball_is_filled_evenly() -> None:
     assert np.mean(radius < np.sqrt(0.5)) == pytest.approx(0.5, abs=0.015)
 
 
-def test_a_hypercube_has_a_point_in_every_slice() -> None:
-    drawn = LatinHypercube({"x": (0.0, 1.0), "y": (0.0, 1.0)}).draw(1024, ("x", "y"))
-    for column in drawn.T:
-        np.testing.assert_array_equal(np.sort(np.floor(column * 1024)), np.arange(1024))
+def test_every_doubled_hypercube_has_a_point_in_every_slice() -> None:
+    """Qian's nested designs; and states are independent of each other."""
+    drawn = LatinHypercube({"x": (0.0, 1.0), "y": (0.0, 1.0)}).draw(5000, ("x", "y"))
+    assert drawn.shape == (5000, 2)
+    for n in 2 ** np.arange(13):
+        for column in drawn[:n].T:
+            np.testing.assert_array_equal(np.sort(np.floor(column * n)), np.arange(n))
+    assert abs(np.corrcoef(drawn[:4096].T)[0, 1]) < 0.05
+    assert abs(np.corrcoef((drawn[:4096].T * 2.0) % 1.0)[0, 1]) < 0.05
+
+
+def test_checked_starts_know_their_number_and_seed() -> None:
+    sampler = Sobol({"x": (0.0, 2.0)}, n=8, seed=3)
+    np.testing.assert_array_equal(starts("y0", sampler, NAMES), sampler.draw(8, NAMES, 3))
+    np.testing.assert_array_equal(starts("y0", sampler, NAMES, n=2, seed=4), sampler.draw(2, NAMES, 4))
+    assert len(starts("y0", Grid({"x": (0.0, 1.0)}, {"x": 5}), NAMES)) == 5
+    assert len(starts("y0", {"x": (0.0, 1.0)}, NAMES, default=7)) == 7
+    np.testing.assert_array_equal(starts("y0", np.eye(3), NAMES, n=2), np.eye(3)[:2])
+    with pytest.raises(fm.InputError, match=r"^y0: how many starts\? such as fastmech.samplers.Uniform"):
+        starts("y0", {"x": (0.0, 1.0)}, NAMES)
+    with pytest.raises(fm.InputError, match=r"^n = 0: must be an integer not less than 1$"):
+        starts("y0", Uniform({"x": (0.0, 1.0)}, n=0), NAMES)
+    with pytest.raises(fm.InputError, match=r"^seed = -1: must be"):
+        starts("y0", Uniform({"x": (0.0, 1.0)}, n=1, seed=-1), NAMES)
 
 
 def test_a_grid_holds_its_ends() -> None:

@@ -136,6 +136,7 @@ class Cloud(NamedTuple):
     )
     exponent: float = 0.0  #: largest Lyapunov exponent [1/s]
     error: float = 0.0  #: its standard error, and what a linear growth of disturbances would give
+    continuum: bool = False  #: whether fixed points of the map lie side by side, each motion in its own
 
 
 class Cells(NamedTuple):

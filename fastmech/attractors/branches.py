@@ -20,10 +20,9 @@ from typing import Any, NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from fastmech.attractors.find import starts_of
 from fastmech.attractors.flow import DIFFERENCE, FINER, Floats, Flow, flow_of, period_of
 from fastmech.attractors.orbits import RESIDUAL, newton
 from fastmech.ensembles import checks
@@ -37,7 +36,7 @@ from fastmech.jit import FLAGS
 from fastmech.kernels.rebuilding import fingerprint, rebuilt
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn
-from fastmech.samplers import Sampler
+from fastmech.samplers import Starts
 from fastmech.scene import nearest
 
 Flags = NDArray[np.bool_]
@@ -121,10 +120,10 @@ def frequency_response(
     system: System | Mechanism,
     parameter: str,
     between: tuple[float, float],
-    starts: Sampler | Mapping[str, ArrayLike] | ArrayLike,
+    starts: Starts,
     *,
     periods: int = 1,
-    seed: int = 0,
+    seed: int | None = None,
     threads: int | None = None,
 ) -> FrequencyResponse:
     """Periodic motions over a range of a parameter, such as the frequency or amplitude of a load.
@@ -137,7 +136,7 @@ def frequency_response(
             Newton's method begins at 64 of them, and at where these are after 48 periods, at nine values.
         periods: how many periods of the forcing a motion takes; motions that take a part of them are branches
             too.
-        seed: of the sampler.
+        seed: of the sampler, by default its own.
         threads: threads to use, all processors by default.
 
     Returns:
@@ -155,7 +154,7 @@ def frequency_response(
     if not low < high:
         raise InputError(f"between = {shown(between)}: must rise")
     periods = checks.whole_number("periods", periods, least=1, most=1024)
-    y = starts_of(starts, system.state, STARTS, seed)
+    y = checks.starts("starts", starts, system.state, n=STARTS, seed=seed)
     family = Family(system, parameter, (low, high), y, periods, threads)
     branches: list[Branch] = []
     for value, flow in family.flows.items():

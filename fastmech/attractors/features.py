@@ -8,7 +8,7 @@ motions that differ in a feature of your own.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import binomtest
 
 from fastmech.arrays import Floats
-from fastmech.attractors.find import starts_of
 from fastmech.attractors.flow import Flow, flow_of, statuses
 from fastmech.ensembles import checks
 from fastmech.ensembles.status import Status
@@ -24,7 +23,7 @@ from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Field, Result
-from fastmech.samplers import Sampler
+from fastmech.samplers import Starts
 
 #: Starts by default and integrated together; outputs in a period, and periods that are looked at: motions of
 #: one, two, three, four or six of them are seen whole.
@@ -86,13 +85,13 @@ class FeatureGroups(Result):
 
 def group_by_features(
     system: System | Mechanism,
-    starts: Sampler | Mapping[str, ArrayLike] | ArrayLike,
-    n: int = STARTS,
+    starts: Starts,
+    n: int | None = None,
     *,
     t_end: float,
     features: Callable[[Floats, Floats], ArrayLike] | None = None,
     radius: float | None = None,
-    seed: int = 0,
+    seed: int | None = None,
     threads: int | None = None,
 ) -> FeatureGroups:
     """Group starts by features of their motions (needs the extra ``features``: scikit-learn).
@@ -100,7 +99,7 @@ def group_by_features(
     Args:
         system: a system of your own or a mechanism, as for :func:`fastmech.find_attractors`.
         starts: ranges by name, a sampler or states (n, dim).
-        n: how many starts.
+        n: how many starts, by default the sampler's, or 2,000; of states given all.
         t_end: when motions have settled [s]; 24 periods from then on are looked at, of a system that does not
             depend on the time 24 times as long as states take to change by their size.
         features: ``features(t, y)`` of times (m,) and one motion (m, dim) gives numbers; by default least,
@@ -108,7 +107,7 @@ def group_by_features(
             cosine and the turns a second.
         radius: neighbours lie nearer than so many typical sizes of a state (standard deviations of features
             of your own); by default the one, of five from 0.02 to 0.32, with the greatest silhouette.
-        seed: of the sampler.
+        seed: of the sampler, by default its own.
         threads: threads to use, all processors by default.
 
     Raises:
@@ -122,7 +121,7 @@ def group_by_features(
     if not isinstance(system, System | Mechanism):
         raise InputError(f"system = {shown(system)}: must be a System or a Mechanism")
     until = checks.number("t_end", t_end, "s", above=0.0)
-    y = starts_of(starts, system.state, n, seed)
+    y = checks.starts("starts", starts, system.state, n=n, seed=seed, default=STARTS)
     flow = flow_of(system, y[np.isfinite(y).all(axis=1)][:256], {}, threads=threads)
     times = until / flow.period + np.arange(1.0, OUTPUTS * LOOKED + 1.0) / OUTPUTS
     rows, status = [], np.empty(len(y), dtype=np.int8)

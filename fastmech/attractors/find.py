@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from fastmech.attractors.arrival import Balls, Cloud
@@ -23,7 +23,7 @@ from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Printed
-from fastmech.samplers import Sampler, sampler_of
+from fastmech.samplers import Starts
 
 Integers = NDArray[np.int64]
 
@@ -36,6 +36,9 @@ PRESERVING = 16
 #: Periods that motions have to arrive: so many times those of the sample's last, and at least and at most.
 LATER, FEWEST, MOST = 8, 256, 1 << 14
 
+#: States of a place that are printed.
+SHOWN = 6
+
 #: Lines of attractors that are printed.
 LINES = 5
 
@@ -44,7 +47,7 @@ LINES = 5
 class Attractor(Printed):
     """A place of rest, a periodic motion, a torus or chaos that motions come to."""
 
-    kind: str  #: "fixed point", "periodic", "torus" or "chaos"
+    kind: str  #: "fixed point", "periodic", "torus", "chaos", or "continuum" of the first two side by side
     points: Floats  #: (m, dim): the place; after each forcing period, or all along; a sample
     period: float | None  #: of a periodic motion [s]
     forcing_periods: int | None  #: the same in periods of the forcing, where there is one
@@ -63,7 +66,8 @@ class Attractor(Printed):
     @property
     def name(self) -> str:
         """Kind, period and place in a few words."""
-        where = ", ".join(f"{x:.4g}" for x in np.round(self.points[0], 9) + 0.0)
+        where = ", ".join(f"{x:.4g}" for x in np.round(self.points[0, :SHOWN], 9) + 0.0)
+        where += ", ..." * (self.points.shape[1] > SHOWN)
         period = "" if self.period is None else f", period {self.period:.6g} s"
         if self.forcing_periods is not None:
             period = f", period {self.forcing_periods} of the forcing"
@@ -135,11 +139,11 @@ class Attractors(Drawn, Sequence[Attractor]):
 
 def find_attractors(
     system: System | Mechanism,
-    starts: Sampler | Mapping[str, ArrayLike] | ArrayLike,
+    starts: Starts,
     n: int | None = None,
     *,
     t_end: float | None = None,
-    seed: int = 0,
+    seed: int | None = None,
     method: str = "dop853",
     threads: int | None = None,
     progress: Progress | None = None,
@@ -151,10 +155,10 @@ def find_attractors(
             mechanism's is that of its loads. States that count modulo a turn are its ``angles``.
         starts: ranges by name, ``{"x": (-1, 1), "x_dot": (-0.5, 1)}`` for uniform starts (what is not named
             is zero), a sampler of ``fm.samplers``, or states (n, dim).
-        n: how many starts, 10,000 by default; of states given all.
+        n: how many starts, by default the sampler's, or 10,000; of states given all.
         t_end: how long a motion has to arrive [s]; by default eight times as long as the last motion of the
             sample takes.
-        seed: of the sampler.
+        seed: of the sampler, by default its own.
         method: of integration, with a fixed step that a sample chooses; "radau5" where motion is stiff.
         threads: threads to use, all processors by default. The result does not depend on it.
         progress: is told how many starts are done since its last call.
@@ -173,7 +177,7 @@ def find_attractors(
     """
     if not isinstance(system, System | Mechanism):
         raise InputError(f"system = {shown(system)}: must be a System or a Mechanism")
-    y = starts_of(starts, system.state, n, seed)
+    y = checks.starts("starts", starts, system.state, n=n, seed=seed, default=STARTS)
     checks.progress_function(progress, "starts")
     if t_end is not None:
         t_end = checks.number("t_end", t_end, "s", above=0.0)
@@ -203,21 +207,6 @@ def search_of(
     return search
 
 
-def starts_of(given: object, names: Sequence[str], n: int | None, seed: int) -> Floats:
-    """Starts (n, dim) from a sampler, ranges or states.
-
-    Raises:
-        InputError: none of these, or a wrong one.
-    """
-    sampler = sampler_of(given)
-    if sampler is not None:
-        count = checks.whole_number("n", STARTS if n is None else n, least=1, most=1 << 31)
-        checks.memory(count * len(names), 2, f"n: {count:,} starts", "fewer")
-        return sampler.draw(count, tuple(names), checks.whole_number("seed", seed, least=0))
-    array = np.array(checks.states("starts", given, len(names)))  # type: ignore[arg-type]
-    return array if n is None else array[: checks.whole_number("n", n, least=1)]
-
-
 def labelled(
     search: Search, starts: Floats, t_end: float | None, progress: Progress | None = None
 ) -> Attractors:
@@ -228,10 +217,10 @@ def labelled(
         if t_end is not None:
             periods = max(1, math.ceil(t_end / flow.period))
         ends = settle(search, starts, periods, progress if attempt == 0 else None)
-        before = search.count
+        before = search.changes
         if len(ends.last):
             search.look(ends.last)
-        if search.count == before:
+        if search.changes == before:
             break
     every = [_of_orbit(flow, orbit, ball) for orbit, ball in search.orbits]
     every += [_of_cloud(cloud, flow.forced) for cloud in search.clouds]
@@ -258,7 +247,9 @@ def labelled(
 
 def _of_cloud(cloud: Cloud, forced: bool) -> Attractor:
     kind = "chaos" if cloud.exponent > 3.0 * cloud.error else "torus"
-    if cloud.still:
+    if cloud.continuum:
+        kind = "continuum"
+    elif cloud.still:
         kind = "periodic" if forced else "fixed point"
     return Attractor(
         kind,

@@ -214,14 +214,13 @@ def flow_of(
         InputError: it depends on the time and has no period, or its motions need too many steps.
     """
     scene = scene.replace(**values)
+    problem, period = _problem(scene, len(sample)), period_of(scene, {})
     if isinstance(scene, Mechanism):
-        problem, period = mechanism_problem(scene, len(sample), {}, "lagrange"), period_of(scene, {})
         turning = [q.periodic for q in scene.coordinates] + [False] * len(scene.coordinates)
     else:
-        problem, period = system_problem(scene, len(sample), {}), period_of(scene, {})
         turning = [name in scene.angles for name in scene.state]
     angles = np.array(turning)
-    scale = _spread(sample, angles)
+    scale = spread(sample, angles)
     flow = Flow(
         scene, problem, period or 1.0, period is not None, angles, scale, np.median(sample, axis=0),
         find_method(method), threads=threads,
@@ -240,11 +239,26 @@ def flow_of(
     return flow
 
 
+def flow_at(flow: Flow, values: Mapping[str, float]) -> Flow:
+    """The same with other values of parameters, in steps as long, over its own period."""
+    scene = flow.scene.replace(**values)
+    moved = replace(flow, scene=scene, problem=_problem(scene), period=period_of(scene, {}) or flow.period)
+    if isinstance(moved, SectionFlow) and isinstance(scene, System):
+        return replace(moved, sides=_sides(scene, 1))
+    return moved
+
+
+def _problem(scene: System | Mechanism, n: int = 1) -> Problem:
+    if isinstance(scene, Mechanism):
+        return mechanism_problem(scene, n, {}, "lagrange")
+    return system_problem(scene, n, {})
+
+
 def _alike(a: Floats, b: Floats) -> bool:
     return bool(np.array_equal(a, b, equal_nan=True))
 
 
-def _spread(sample: Floats, angles: Flags) -> Floats:
+def spread(sample: Floats, angles: Flags) -> Floats:
     """Half the range of a sample in each state; where it has none the others', a turn of angles is pi."""
     scale = 0.5 * np.ptp(sample, axis=0)
     scale[~(scale > 0.0)] = max(float(scale.max()), float(np.abs(sample).max()), 1e-300)

@@ -1,22 +1,27 @@
-"""``fm.follow_basins``: attractors and their shares of the starts along a parameter.
+"""``fm.follow_basins``: attractors and their shares of the starts along one parameter or over two.
 
 An attractor goes on at the next value in the one that lies next to it. One that has none is followed there in
 steps, by Newton's method and by motions that begin on it, each as short as it takes to find it again: it has
 moved, no start ends there any more, or steps become ever shorter before a value where it is gone.
+
+Over two parameters lines along the first are joined in the same way along the second. Two attractors of lines
+next to each other become one at the values of the first parameter where one goes on in the other; what has
+most such values is joined first, and never two that are there together: around a cusp one goes on in both.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
-from fastmech.attractors.find import Attractor, Attractors, find_attractors, starts_of
-from fastmech.attractors.flow import Floats, Flow, flow_of
+from fastmech.attractors.find import Attractor, find_attractors
+from fastmech.attractors.flow import Floats, Flow, flow_at, flow_of, spread
 from fastmech.attractors.search import Search
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
@@ -24,14 +29,20 @@ from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn
-from fastmech.samplers import Sampler
+from fastmech.samplers import Starts
 from fastmech.scene import nearest
 
 Integers = NDArray[np.int64]
 
+#: Starts by default.
+STARTS = 1000
+
 #: Points of an attractor from which motions begin, distance over the scale within which it is the same,
 #: and halvings of the step to where it comes or goes.
 SEEDS, NEAR, HALVINGS = 16, 0.05, 12
+
+#: The same where lines are joined, which does not ask where it comes or goes.
+JOINING = 7
 
 
 class Tipping(NamedTuple):
@@ -41,6 +52,13 @@ class Tipping(NamedTuple):
     kind: str  #: "born" or "dies", in the order of the values
     low: float  #: of the parameter: it happens between low and high
     high: float
+
+
+class Place(NamedTuple):
+    """What an attractor is followed by."""
+
+    points: Floats  #: (m, dim)
+    period: float | None  #: s; None: it rests, or is no orbit
 
 
 @dataclass(frozen=True, repr=False)
@@ -53,7 +71,7 @@ class BasinsAlong(Drawn):
         Floats  #: share of the starts that ends at each attractor (m, attractors), NaN: it is not there
     )
     unlabelled: Floats  #: share that escapes, is unsure, undecided or not finite (m,)
-    attractors: tuple[dict[int, Attractor], ...]  #: at each value, by number
+    attractors: tuple[Mapping[int, Attractor | Place], ...]  #: at each value, by number
     tipping: tuple[Tipping, ...]
 
     KIND = "follow_basins"
@@ -73,28 +91,58 @@ class BasinsAlong(Drawn):
         return "\n".join(lines)
 
 
+@dataclass(frozen=True, repr=False)
+class BasinsOver(Drawn):
+    """Attractors over two parameters, which keep their numbers over both; printed, how many come and go."""
+
+    second: str  #: the second parameter
+    values: Floats  #: of it (lines,)
+    lines: tuple[BasinsAlong, ...]  #: along the first one, at each value of the second
+
+    @property
+    def fractions(self) -> Floats:
+        """Share of the starts that ends at each attractor (lines, m, attractors), NaN: it is not there."""
+        return np.stack([line.fractions for line in self.lines])
+
+    KIND = "follow_basins"
+    PICTURE = "plots.response:draw_numbers"
+    LAYOUT = "scan_types.follow_basins:over_dataset"
+
+    def told(self) -> str:
+        """How many attractors there are, and how many come and go."""
+        lines, m, number = self.fractions.shape
+        tipping = sum(len(line.tipping) for line in self.lines)
+        return (
+            f"{number} attractors over {self.lines[0].parameter} and {self.second} ({m} x {lines} values)\n"
+            f"  {tipping} times one comes or goes along {self.lines[0].parameter}"
+        )
+
+
 def follow_basins(
     system: System | Mechanism,
     parameter: str,
     values: ArrayLike,
-    starts: Sampler | Mapping[str, ArrayLike] | ArrayLike,
-    n: int = 1000,
+    starts: Starts,
+    n: int | None = None,
     *,
+    each: Mapping[str, ArrayLike] | None = None,
     t_end: float | None = None,
-    seed: int = 0,
+    seed: int | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
-) -> BasinsAlong:
-    """Attractors and basin fractions along a parameter.
+) -> BasinsAlong | BasinsOver:
+    """Attractors and basin fractions along a parameter, or over two.
 
     Args:
         system: a system of your own or a mechanism.
         parameter: its name.
         values: of it, rising or falling.
         starts: as for :func:`fastmech.find_attractors`, the same at every value.
-        n: how many starts.
+        n: how many starts, by default the sampler's, or 1,000; of states given all.
+        each: a second parameter and its values: the same at each of them, and attractors have the same
+            numbers where they go on in each other.
         t_end: how long a motion has to arrive [s].
-        seed: of the sampler.
+        seed: of the sampler, by default its own.
         threads: threads to use, all processors by default.
         progress: is told 1 after each value.
 
@@ -105,12 +153,42 @@ def follow_basins(
         raise InputError(f"system = {shown(system)}: must be a System or a Mechanism")
     if parameter not in system.parameters:
         raise InputError(f"parameter: {nearest(str(parameter), list(system.parameters))}")
-    along = checks.reals("values", values, "real numbers")
+    along = _rising("values", values)
+    checks.progress_function(progress, "values")
+    y = checks.starts("starts", starts, system.state, n=n, seed=seed, default=STARTS)
+    if each is None:
+        return _followed(system, parameter, along, y, t_end, threads, progress)
+    if not isinstance(each, Mapping) or len(each) != 1 or {parameter} & set(each):
+        raise InputError(f"each = {shown(each)}: must map one other parameter to its values")
+    ((second, others),) = each.items()
+    if second not in system.parameters:
+        raise InputError(f"each: {nearest(str(second), list(system.parameters))}")
+    across = _rising(f"each.{second}", others)
+    lines = [
+        _followed(system.replace(**{second: value}), parameter, along, y, t_end, threads, progress)
+        for value in across.tolist()
+    ]
+    return joined(system, second, across, lines, y, threads).of(system)
+
+
+def _rising(name: str, values: ArrayLike) -> Floats:
+    along = checks.reals(name, values, "real numbers")
     steps = np.diff(along)
     if along.ndim != 1 or along.size < 2 or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
-        raise InputError("values: must be two or more rising or falling numbers")
-    checks.progress_function(progress, "values")
-    y = starts_of(starts, system.state, n, seed)
+        raise InputError(f"{name}: must be two or more rising or falling numbers")
+    return along
+
+
+def _followed(
+    system: System | Mechanism,
+    parameter: str,
+    along: Floats,
+    y: Floats,
+    t_end: float | None,
+    threads: int | None,
+    progress: Progress | None,
+) -> BasinsAlong:
+    """Along one parameter, from starts (n, dim)."""
     tracer = _Tracer(system, parameter, y, threads)
     numbered: list[dict[int, Attractor]] = []
     shares: list[dict[int, float]] = []
@@ -118,15 +196,15 @@ def follow_basins(
     for k, value in enumerate(along.tolist()):
         found = find_attractors(system.replace(**{parameter: value}), y, t_end=t_end, threads=threads)
         before = numbered[-1] if numbered else {}
-        names = matched(found, before)
+        names = matched(found.search.flow, dict(enumerate(found)), before)
         now = {names[j]: found[j] for j in names}
         share = {names[j]: float(found.fractions[j]) for j in names}
         for number in set(before) - set(now):
-            there, gone, last = tracer.follow(before[number], along[k - 1], value)
+            there, gone, points = tracer.follow(before[number], along[k - 1], value)
             if gone is None:  # it has moved, or no start ends there
-                now[number], share[number] = last, 0.0
+                now[number], share[number] = replace(before[number], points=points), 0.0
                 for j in set(range(len(found))) - set(names):
-                    if _apart(found.search.flow, found[j].points, last.points) < NEAR:
+                    if _apart(found.search.flow, found[j].points, points) < NEAR:
                         names[j], now[number], share[number] = number, found[j], float(found.fractions[j])
             else:
                 tipping.append(Tipping(number, "dies", *sorted((there, gone))))
@@ -134,10 +212,11 @@ def follow_basins(
             now[count], share[count] = found[j], float(found.fractions[j])
             last = found[j]
             for kk in range(k - 1, -1, -1):
-                there, gone, last = tracer.follow(last, along[kk + 1], along[kk])
+                there, gone, points = tracer.follow(last, along[kk + 1], along[kk])
                 if gone is not None:
                     tipping.append(Tipping(count, "born", *sorted((there, gone))))
                     break
+                last = replace(last, points=points)
                 numbered[kk][count], shares[kk][count] = last, 0.0
             count += 1
         numbered.append(now)
@@ -150,14 +229,83 @@ def follow_basins(
     return followed.of(system)
 
 
-def matched(found: Attractors, before: Mapping[int, Attractor]) -> dict[int, int]:
-    """Numbers of earlier attractors by index of those found now that lie next to them."""
-    if not before or not len(found):
+def joined(
+    system: System | Mechanism,
+    second: str,
+    across: Floats,
+    lines: Sequence[BasinsAlong],
+    y: Floats,
+    threads: int | None = None,
+) -> BasinsOver:
+    """Lines at each value of a second parameter with numbers in common; y (n, dim) are their starts."""
+    along, votes = lines[0].values, Counter[tuple[tuple[int, int], tuple[int, int]]]()
+    for k in range(1, len(lines)):
+        middle = {second: float(across[k]), lines[0].parameter: float(along[along.size // 2])}
+        flow = flow_of(system, y, middle, threads=threads)
+        for before, now in zip(lines[k - 1].attractors, lines[k].attractors, strict=True):
+            for number, old in matched(flow, now, before).items():
+                votes[(k - 1, old), (k, number)] += 1
+        alone = _where(lines[k - 1]).keys() - {one[1] for one, two in votes if two[0] == k}
+        for number in sorted(alone):  # it moves further than matching sees
+            both = [i for i in _where(lines[k - 1])[number] if lines[k].attractors[i]]
+            for i in dict.fromkeys(both[m] for m in (len(both) // 2, 0, -1)[: len(both)]):
+                if any(one == (k - 1, number) for one, _ in votes):
+                    break
+                moved_to = system.replace(**{lines[0].parameter: float(along[i])})
+                tracer = _Tracer(moved_to, second, y, threads, JOINING)
+                last = lines[k - 1].attractors[i][number]
+                _, gone, points = tracer.follow(last, float(across[k - 1]), float(across[k]))
+                moved = {number: Place(points, last.period)} if gone is None else {}
+                for found in matched(flow, lines[k].attractors[i], moved):
+                    votes[(k - 1, number), (k, found)] += 1
+    group = {
+        (k, j): {(k, j, i) for i in places}
+        for k in range(len(lines))
+        for j, places in _where(lines[k]).items()
+    }
+    members = {one: [one] for one in group}
+    for (one, two), _ in sorted(votes.items(), key=lambda vote: (-vote[1], vote[0])):
+        first, other = members[one], members[two]
+        taken = {(k, i) for node in first for k, _, i in group[node]}
+        if first is not other and not taken & {(k, i) for node in other for k, _, i in group[node]}:
+            first += other
+            members |= dict.fromkeys(other, first)
+    number_of: dict[int, int] = {}
+    for node in sorted(group):
+        number_of.setdefault(id(members[node]), len(number_of))
+    renumbered = [
+        _renumbered(line, {j: number_of[id(members[k, j])] for j in _where(line)}, len(number_of))
+        for k, line in enumerate(lines)
+    ]
+    return BasinsOver(second, across, tuple(renumbered))
+
+
+def _where(line: BasinsAlong) -> dict[int, list[int]]:
+    """At which values of the first parameter each attractor is there."""
+    numbers = sorted({j for there in line.attractors for j in there})
+    return {j: [i for i, there in enumerate(line.attractors) if j in there] for j in numbers}
+
+
+def _renumbered(line: BasinsAlong, numbers: Mapping[int, int], count: int) -> BasinsAlong:
+    fractions = np.full((line.values.size, count), np.nan)
+    for old, new in numbers.items():
+        there = np.isfinite(line.fractions[:, old])
+        fractions[there, new] = line.fractions[there, old]
+    attractors: Any = tuple({numbers[j]: one for j, one in there.items()} for there in line.attractors)
+    tipping = tuple(t._replace(attractor=numbers[t.attractor]) for t in line.tipping)
+    return replace(line, fractions=fractions, attractors=attractors, tipping=tipping)
+
+
+def matched(
+    flow: Flow, found: Mapping[int, Attractor | Place], before: Mapping[int, Attractor | Place]
+) -> dict[int, int]:
+    """Numbers of earlier attractors by those of attractors found now that lie next to them."""
+    if not before or not found:
         return {}
-    flow, numbers = found.search.flow, list(before)
-    away = np.array([[_apart(flow, new.points, before[k].points) for k in numbers] for new in found])
+    new, old = list(found), list(before)
+    away = np.array([[_apart(flow, found[j].points, before[k].points) for k in old] for j in new])
     rows, columns = linear_sum_assignment(away)
-    return {int(j): numbers[k] for j, k in zip(rows, columns, strict=True) if away[j, k] < NEAR}
+    return {new[j]: old[k] for j, k in zip(rows, columns, strict=True) if away[j, k] < NEAR}
 
 
 class _Tracer(NamedTuple):
@@ -167,39 +315,40 @@ class _Tracer(NamedTuple):
     parameter: str
     sample: Floats
     threads: int | None
+    halvings: int = HALVINGS
 
-    def follow(self, attractor: Attractor, there: float, end: float) -> tuple[float, float | None, Attractor]:
-        """From where it is there towards an end: the last value where it is, the first where not, and it.
+    def follow(
+        self, attractor: Attractor | Place, there: float, end: float
+    ) -> tuple[float, float | None, Floats]:
+        """From where it is there towards an end: the last value where it is, the first where not, its points.
 
         None in place of the first where not: it is there at the end.
         """
-        step = end - there
-        least = abs(step) / 2.0**HALVINGS
+        step, last = end - there, attractor.points
+        least = abs(step) / 2.0**self.halvings
+        flow = flow_of(self.system, self.sample, {self.parameter: there}, threads=self.threads)
+        flow = replace(flow, scale=np.maximum(flow.scale, spread(self.sample, flow.angles)))
         while abs(step) > least:
             value = there + step if abs(end - there) > 1.5 * abs(step) else end
-            places, flow = self._at(attractor, value)
-            away = [_apart(flow, points, attractor.points) for points in places]
+            places, flow = self._at(last, attractor.period, flow_at(flow, {self.parameter: value}))
+            away = [_apart(flow, points, last) for points in places]
             if away and min(away) < NEAR:
-                there, attractor = value, replace(attractor, points=places[int(np.argmin(away))])
+                there, last = value, places[int(np.argmin(away))]
                 if value == end:
-                    return there, None, attractor
+                    return there, None, last
             else:
                 step *= 0.5  # gone, or too far for Newton's method
-        return there, there + 2.0 * step, attractor
+        return there, there + 2.0 * step, last
 
-    def _at(self, attractor: Attractor, value: float) -> tuple[list[Floats], Flow]:
-        """Points of the attractors that are found from it at a value."""
-        system, seeds = self.system.replace(**{self.parameter: value}), _seeds(attractor)
-        search = Search(flow_of(system, self.sample, {}, threads=self.threads))
-        search.seek(seeds[:1], attractor.period)
+    @staticmethod
+    def _at(points: Floats, period: float | None, flow: Flow) -> tuple[list[Floats], Flow]:
+        """Points of a flow's attractors that are found from one with such points and period."""
+        seeds = points[np.unique(np.linspace(0, len(points) - 1, SEEDS).astype(np.int64))]
+        search = Search(flow)
+        search.seek(seeds[:1], period)
         if not search.count:
             search.look(seeds)
         return [o.points for o, _ in search.orbits] + [c.points for c in search.clouds], search.flow
-
-
-def _seeds(attractor: Attractor) -> Floats:
-    points = attractor.points
-    return points[np.unique(np.linspace(0, len(points) - 1, SEEDS).astype(np.int64))]
 
 
 def _apart(flow: Flow, a: Floats, b: Floats) -> float:

@@ -66,8 +66,7 @@ def newton(flow: Flow, guesses: Floats, periods: int) -> tuple[Floats, Floats, F
         for k in np.flatnonzero(better):
             i = active[k]
             step[i] = _solution(jacobian[k] - identity, -error[k])
-            limit = np.abs(step[i] / flow.scale).max()
-            step[i] *= min(1.0, 0.5 / limit) if limit > 0.0 else 1.0
+            step[i] *= 0.5 / max(0.5, np.abs(step[i] / flow.scale).max())
             y[i] += step[i]
         done = (best[active] < 1e-13) | (np.abs(step[active] / flow.scale).max(axis=1) < 1e-14)
         active = active[~done]
@@ -138,7 +137,7 @@ def cycle(flow: Flow, guess: Floats, periods: float) -> Orbit | None:
         matrix = np.block([[J[0] - np.eye(dim), rate[:, None]], [direction[None], np.zeros((1, 1))]])
         step = _solution(matrix, -np.append(error, direction @ flow.away(y, guess)))
         limit = max(np.abs(step[:dim] / flow.scale).max(), abs(step[dim]) / (0.25 * T))
-        step *= min(1.0, 0.5 / limit) if limit > 0.0 else 1.0
+        step *= 0.5 / max(0.5, limit)
         y, T = y + step[:dim], T + step[dim]
         if not 0.25 * periods < T < 4.0 * periods:
             return None

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.attractors.find import starts_of
+from fastmech.attractors.find import SHOWN
 from fastmech.attractors.flow import DIFFERENCE, Flow, flow_of
 from fastmech.attractors.orbits import RESIDUAL, SAME, Orbit, cycle, periodic, same, visits
 from fastmech.attractors.search import DENSE, time_back
@@ -18,7 +18,7 @@ from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Field, Printed, Result
-from fastmech.samplers import Sampler
+from fastmech.samplers import Starts
 
 #: Starts by default; periods after which motions are guesses too, and those in which cycles may close.
 STARTS, RUN_IN, WINDOWS = 128, (8.0, 64.0), (2, 4, 16, 64)
@@ -53,7 +53,8 @@ class PeriodicOrbit(Printed):
     @property
     def name(self) -> str:
         """Stability, period and place in a few words."""
-        where = ", ".join(f"{x:.6g}" for x in np.round(self.points[0], 9) + 0.0)
+        where = ", ".join(f"{x:.6g}" for x in np.round(self.points[0, :SHOWN], 9) + 0.0)
+        where += ", ..." * (self.points.shape[1] > SHOWN)
         kind = "rests" if self.period is None else f"period {self.period:.6g} s"
         if self.forcing_periods is not None:
             kind = f"period {self.forcing_periods} of the forcing"
@@ -98,11 +99,11 @@ class PeriodicOrbits(Result, Sequence[PeriodicOrbit]):
 
 def periodic_orbits(
     system: System | Mechanism,
-    starts: Sampler | Mapping[str, ArrayLike] | ArrayLike,
-    n: int = STARTS,
+    starts: Starts,
+    n: int | None = None,
     *,
     periods: int = 1,
-    seed: int = 0,
+    seed: int | None = None,
     threads: int | None = None,
 ) -> PeriodicOrbits:
     """Periodic orbits that Newton's method finds from many starts together, on lanes.
@@ -111,10 +112,10 @@ def periodic_orbits(
         system: a system of your own or a mechanism, as for :func:`fastmech.find_attractors`.
         starts: ranges by name, a sampler or states (n, dim): guesses, and so are the states to which they
             have moved a little and a while later.
-        n: how many starts.
+        n: how many starts, by default the sampler's, or 128; of states given all.
         periods: orbits take up to so many periods of the forcing. Of a system that does not depend on the
             time cycles of any period are looked for where motions come back near to themselves.
-        seed: of the sampler.
+        seed: of the sampler, by default its own.
         threads: threads to use, all processors by default.
 
     Returns:
@@ -127,7 +128,7 @@ def periodic_orbits(
     if not isinstance(system, System | Mechanism):
         raise InputError(f"system = {shown(system)}: must be a System or a Mechanism")
     most = checks.whole_number("periods", periods, least=1, most=64)
-    y = starts_of(starts, system.state, n, seed)
+    y = checks.starts("starts", starts, system.state, n=n, seed=seed, default=STARTS)
     y = y[np.isfinite(y).all(axis=1)]
     if not len(y):
         raise InputError("starts: none is finite")

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 
 from fastmech.attractors.arrival import (
     Balls,
@@ -28,7 +28,17 @@ from fastmech.attractors.arrival import (
 )
 from fastmech.attractors.flow import COARSER, Flags, Floats, Flow, statuses
 from fastmech.attractors.flow import MOST as MOST_STEPS
-from fastmech.attractors.orbits import Orbit, attracts, cycle, periodic, returns, same, visits
+from fastmech.attractors.orbits import (
+    RESIDUAL,
+    Orbit,
+    attracts,
+    cycle,
+    newton,
+    periodic,
+    returns,
+    same,
+    visits,
+)
 from fastmech.ensembles.status import Status
 from fastmech.transients.lyapunov import largest_lyapunov
 
@@ -39,6 +49,9 @@ WINDOW, PATIENCE, DENSE = 64, 4096, 8
 
 #: Longest period looked for, in forcing periods; guesses for Newton's method in a window.
 LONGEST, GUESSES = 32, 32
+
+#: Numbers that paths may have: half a gigabyte. Of many states fewer motions are followed, not below so many.
+HELD, FEWEST = 1 << 26, 16
 
 #: Windows before cells are looked at, and periods in which motions must stay in them.
 WINDOWS, STAYS = 3, 512
@@ -52,6 +65,13 @@ FILLED, SHARED = 0.95, 0.3
 
 #: Points of an attractor's cells that are kept.
 MOST_POINTS = 1 << 18
+
+#: Multipliers nearer to 1 than this, and shares of the scale: how far beside a fixed point another is looked
+#: for; cells of such a continuum; places of it by which it goes on.
+NEUTRAL, BESIDE, CONTINUUM, KNOWN = 1e-5, 1 / 32, 1 / 16, 512
+
+#: Fixed points about which steps are tried, and periods for which.
+TRIED, WAITED = 16, 8.0
 
 #: Motions of one attractor that are followed for its exponent, and periods.
 FOLLOWED, EXPONENT_PERIODS = 8, 512
@@ -70,6 +90,7 @@ class Search:
         self.flow = flow
         self.orbits: list[tuple[Orbit, Balls]] = []
         self.clouds: list[Cloud] = []
+        self.changes = 0  #: times that one was found, or more of one
         self.latest = 0  #: periods after which the last motion of a sample had arrived
 
     @property
@@ -94,6 +115,7 @@ class Search:
         flow, y, window, passed, number = self.flow, sample, WINDOW, 0, 0
         dense = 1 if flow.forced else DENSE
         while len(y) and passed < PATIENCE and self.count < MOST:
+            y = y[: max(FEWEST, HELD // (window * dense * y.shape[1]))]
             reached = flow.run(y, np.arange(1, window * dense + 1) / dense)
             passed, number = passed + window, number + 1
             paths = reached.y[:, statuses(reached) == Status.OK]
@@ -166,6 +188,7 @@ class Search:
         if not attracts(orbit) or any(same(self.flow, own, orbit) for own, _ in self.orbits):
             return
         own = balls(self.flow, orbit)
+        self.changes += 1
         self.orbits.append((orbit, own))
         # Steps must be short enough for motions on the orbit to stay in its balls.
         while self.flow.steps < MOST_STEPS:
@@ -186,6 +209,13 @@ class Search:
                 break
         else:
             return
+        resting: Flags = (np.ptp(paths[half:, filling], axis=0) < size).all(axis=1)
+        resting[resting] = self._have_neighbours(paths[-1, filling[resting]])
+        if resting.any():
+            self._add_continua(paths[-1, filling[resting]], size)
+            filling = filling[~resting]
+        if not filling.size:
+            return
         for group in _groups([np.unique(own) for own in keys[:, filling].T]):
             members = filling[group]
             stays = flow.run(paths[-1, members[:16]], np.arange(1, STAYS * dense + 1) / dense).y
@@ -197,6 +227,55 @@ class Search:
                 still = bool((np.ptp(stays, axis=0) < size).all())
                 self._add_cloud(Cloud(points, size, still), stays[-1])
 
+    def _have_neighbours(self, places: Floats) -> Flags:
+        """Which fixed points of the map, near places (n, dim), have others beside them."""
+        flow, n = self.flow, len(places)
+        jacobians = flow.derivative(places, 1.0)[1] * flow.scale / flow.scale[:, None]
+        beside = places.copy()
+        neutral: Flags = np.asarray(np.isfinite(jacobians).all(axis=(1, 2)))
+        for k in np.flatnonzero(neutral):
+            values, vectors = np.linalg.eig(jacobians[k])
+            j = int(np.argmin(np.abs(values - 1.0)))
+            neutral[k] = abs(values[j] - 1.0) < NEUTRAL
+            along = vectors[:, j].real
+            beside[k] += BESIDE * flow.scale * along / max(float(np.abs(along).max()), 1e-300)
+        if neutral.any():
+            y, residual, _ = newton(flow, np.concatenate([places, beside]), 1)
+            neutral &= (residual[:n] < RESIDUAL) & (residual[n:] < RESIDUAL)
+            neutral &= flow.distance(y[:n], y[n:]) > 0.5 * BESIDE
+        return neutral
+
+    def _add_continua(self, places: Floats, size: Floats) -> None:
+        """Add fixed points (n, dim) that have others beside them: those between which others lie are one."""
+        flow = self.flow
+        known = [cloud.points for cloud in self.clouds if cloud.continuum]
+        y = np.concatenate([*(points[:: -(-len(points) // KNOWN)] for points in known), places])
+        tree = minimum_spanning_tree(flow.distance(y[:, None], y) + 1e-12).tocoo()
+        gaps = flow.away(y[tree.col], y[tree.row])
+        middle = y[tree.row] + 0.5 * gaps
+        between, residual, jacobians = newton(flow, middle, 1)
+        residual[np.abs(np.linalg.eigvals(jacobians)).max(axis=1) > 1.0 + NEUTRAL] = np.inf  # unstable
+        joined = (residual < RESIDUAL) & (flow.distance(between, middle) < 0.25 * tree.data)
+        joined |= tree.data < BESIDE
+        links = csr_matrix((tree.data[joined], (tree.row[joined], tree.col[joined])), shape=tree.shape)
+        _, group = connected_components(links, directed=False)
+        self._shorten_steps(places[:TRIED], size)
+        self.clouds = [cloud for cloud in self.clouds if not cloud.continuum]
+        for k in np.unique(group):
+            exponent, error = _exponent(flow, y[group == k])
+            wide = np.maximum(size, CONTINUUM * flow.scale)
+            self.clouds.append(Cloud(y[group == k], wide, True, exponent, error, continuum=True))
+        self.changes += 1
+
+    def _shorten_steps(self, places: Floats, size: Floats) -> None:
+        """Take steps so short that motions near places of rest (n, dim) stay there."""
+        nearby = places + 0.25 * size * np.random.default_rng(0).uniform(-1.0, 1.0, places.shape)
+        while self.flow.steps < MOST_STEPS:
+            away = self.flow.away(self.flow.after(nearby, WAITED, COARSER), places)
+            if (np.abs(away / size) < 1.0).all():
+                break
+            self.flow = replace(self.flow, steps=2 * self.flow.steps)
+
     def _add_cloud(self, new: Cloud, last: Floats) -> None:
         """Add a cloud, or its points to the one with which it has many cells in common."""
         cells = np.unique(keys_of(self.flow, new.size, new.points))
@@ -206,9 +285,15 @@ class Search:
             near = new.still and cloud.still and gap < 2.0
             if near or np.isin(cells, own).sum() > SHARED * min(cells.size, own.size):
                 points = np.concatenate([cloud.points, new.points])
+                self.changes += 1
                 self.clouds[k] = cloud._replace(points=points, size=np.maximum(cloud.size, new.size))
                 return
         exponent, error = _exponent(self.flow, last)
+        if new.still and exponent > 3.0 * error:
+            return  # a saddle, beside which each turn of a heteroclinic cycle takes longer than the last
+        if new.still:
+            self._shorten_steps(last[:1], new.size)
+        self.changes += 1
         self.clouds.append(new._replace(exponent=exponent, error=error))
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fastmech.attractors.arrival import owners
 from fastmech.attractors.flow import COARSER, Flags, Floats, statuses
-from fastmech.attractors.search import Search
+from fastmech.attractors.search import FEWEST, HELD, Search
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import Status
 
@@ -29,7 +29,7 @@ TOGETHER = 0.02
 #: Visits of a cloud's cells in a row after which a motion has arrived there.
 VISITS = 24
 
-#: Motions followed together: their states are all that is held of them.
+#: Motions followed together at most: the states of a piece are all that is held of them.
 CHUNK = 1 << 15
 
 #: Periods of a piece at most, and share of those passed.
@@ -88,8 +88,9 @@ def settle(search: Search, starts: Floats, periods: int, progress: Progress | No
     flow, n = search.flow, len(starts)
     label, status = np.full(n, -1, dtype=np.int64), np.full(n, Status.UNDECIDED, dtype=np.int8)
     time, last, steps = np.full(n, np.nan), [np.empty((0, starts.shape[1]))], 0
-    for first in range(0, n, CHUNK):
-        members = np.arange(first, min(n, first + CHUNK))
+    chunk = max(FEWEST, min(CHUNK, HELD // (PIECE * starts.shape[1])))
+    for first in range(0, n, chunk):
+        members = np.arange(first, min(n, first + chunk))
         done = members.size
         for finer in REPEATED:
             if not members.size:

@@ -40,7 +40,8 @@ from fastmech.errors import InputError, StepWarning
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Field
-from fastmech.scene import Scene
+from fastmech.samplers import Starts
+from fastmech.scene import STATE, Scene
 
 #: By how much excursions by two steps may differ, over the larger coordinate's.
 AGREED = 0.01
@@ -149,6 +150,7 @@ def disturb(
     equilibrium: Equilibrium | RestingPlace,
     n: int = 4096,
     *,
+    disturbances: Starts | None = None,
     radius: float = 0.5,
     seed: int = 0,
     t_end: float = 120.0,
@@ -173,6 +175,8 @@ def disturb(
             dampers and constant loads.
         equilibrium: one of ``find_equilibria(scene)``.
         n: number of disturbances.
+        disturbances: departures of the state from the equilibrium, a sampler or shape (n, states), in place
+            of those that are uniform in the ball; a sampler's number and seed are its own.
         radius: size of the largest disturbance [rad].
         seed: seed of the starts.
         t_end: end of the run [s].
@@ -198,6 +202,11 @@ def disturb(
     certificate = certificate_of(scene)
     n = checks.whole_number("n", n, least=1, most=MOST_TRAJECTORIES)
     seed = checks.whole_number("seed", seed, least=0)
+    away = None
+    if disturbances is not None:
+        names = scene.state if isinstance(scene, Mechanism) else STATE
+        away = checks.starts("disturbances", disturbances, names, default=n)
+        n = len(away)
     if (radius := checks.number("radius", radius, "rad", above=0.0)) > MOST_RADIUS:
         raise InputError(
             f"radius = {radius:g} rad: must not exceed {MOST_RADIUS:g} rad; no step follows that"
@@ -214,7 +223,11 @@ def disturb(
     size = size_of(scene, equilibrium)
     refuse_meeting_balls(scene, equilibria, return_radius, [index])
     chosen = range(*(part or slice(None)).indices(n))
-    starts = center + size.from_ball(radius * _starts_in_ball(seed, index, n, chosen, 2 * coordinates))
+    if away is None:
+        away = size.from_ball(radius * _starts_in_ball(seed, index, n, chosen, 2 * coordinates))
+    else:
+        away = away[chosen.start : chosen.stop]
+    starts = center + away
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StepWarning)  # it has been told

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from fastmech.attractors.find import find_attractors
 from fastmech.attractors.flow import keeps_moving
@@ -39,7 +39,8 @@ from fastmech.ensembles.threads import thread_count
 from fastmech.errors import StepWarning
 from fastmech.integrators.methods import Method, find_method
 from fastmech.models.mechanism import Mechanism
-from fastmech.scene import Scene
+from fastmech.samplers import Starts
+from fastmech.scene import STATE, Scene
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -62,7 +63,7 @@ START_NUMBERS = 20
 
 def label_starts(
     scene: Scene | Mechanism | System,
-    starts: ArrayLike,
+    starts: Starts,
     t_end: float | None = None,
     *,
     dt: float | None = None,
@@ -78,8 +79,9 @@ def label_starts(
             a load that repeats, and of a system of your own without a stopping condition, labels are those
             of :func:`fastmech.find_attractors`, the attractors are in ``tree``, and ``dt`` and
             ``settle_radius`` do not apply; with a stopping condition the label is its code.
-        starts: phi, theta [rad], phi', theta' [rad/s], shape (n, 4) or (4,), of a ``Mechanism`` coordinates,
-            then rates; angles count their turns, and more than four give a warning, if they may be degrees.
+        starts: a sampler of ``fm.samplers``, or phi, theta [rad], phi', theta' [rad/s], shape (n, 4) or
+            (4,), of a ``Mechanism`` coordinates, then rates; angles count their turns, and more than four
+            give a warning, if they may be degrees.
         t_end: end of the run [s], 60 by default (for attractors see there); what is not captured by then is
             undecided.
         dt: coarsest step [s]: each path is computed with it and with two thirds of it, and with less where
@@ -100,13 +102,13 @@ def label_starts(
         return _by_attractors(scene, starts, t_end, method, threads, progress)
     t_end = 60.0 if t_end is None else t_end
     if isinstance(scene, System):
-        states = checks.states("starts", starts, len(scene.state))
+        states = checks.starts("starts", starts, scene.state)
         return label_system_starts(
             scene, states, t_end, dt=dt, method=method or "dop853", threads=threads, progress=progress
         )
     require_damper(scene)
     turning = [c.periodic for c in scene.coordinates] if isinstance(scene, Mechanism) else [True, True]
-    states = checks.states("starts", starts, 2 * len(turning))
+    states = checks.starts("starts", starts, scene.state if isinstance(scene, Mechanism) else STATE)
     angles = np.abs(states[:, : len(turning)][:, turning])
     largest = float(np.max(angles, initial=0.0, where=np.isfinite(angles)))
     if 2.0 * np.pi * FEW_TURNS < largest <= MOST_DEGREES:
@@ -116,7 +118,7 @@ def label_starts(
 
 def _by_attractors(
     scene: Any,
-    starts: ArrayLike,
+    starts: Starts,
     t_end: float | None,
     method: str | None,
     threads: int | None,

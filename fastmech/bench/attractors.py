@@ -18,7 +18,7 @@ from scipy.interpolate import CubicSpline
 
 from fastmech.arrays import Floats
 from fastmech.attractors.arrival import owners
-from fastmech.attractors.find import Attractor, Attractors, find_attractors, starts_of
+from fastmech.attractors.find import Attractor, Attractors, find_attractors
 from fastmech.basins.map import map_basins
 from fastmech.bench.measure import Stage
 from fastmech.bench.own_systems import inverse_cube, spoken
@@ -27,6 +27,7 @@ from fastmech.bench.tables import table
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
 from fastmech.kernels.sincos import cos, sin
+from fastmech.samplers import Uniform
 
 #: Starts that are timed and that others follow; those of SciPy; runs of which the median counts.
 STARTS, FOLLOWED, BY_SCIPY, RUNS = 10_000, 2_000, 200, 5
@@ -168,7 +169,7 @@ def beside(
     system: System, found: Attractors, ranges: dict[str, tuple[float, float]], path: Path, number: int
 ) -> str:
     """Wrong labels of so many starts, of those that have one: ``wrong of compared``."""
-    starts = starts_of(ranges, system.state, number, 1)
+    starts = Uniform(ranges).draw(number, tuple(system.state), 1)
     ends = found.label_starts(starts)
     wrong = compared = 0
     for start, label, status, arrived in zip(starts, ends.label, ends.status, ends.time, strict=True):

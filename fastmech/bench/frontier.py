@@ -30,6 +30,7 @@ from fastmech.integrators.methods import METHODS, ImplicitRungeKutta, Method, fi
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Field
 from fastmech.plots.style import LINES
+from fastmech.samplers import Starts
 from fastmech.scene import Scene
 
 if TYPE_CHECKING:
@@ -130,7 +131,7 @@ def draw_frontier(found: WorkPrecision, axes: Axes) -> None:
 @called_here(t_span="t_end", tol="errors")
 def work_precision(
     scene: Scene | Mechanism | System,
-    y0: ArrayLike,
+    y0: Starts,
     t_end: float,
     *,
     errors: Sequence[float] = ERRORS,
@@ -147,7 +148,7 @@ def work_precision(
 
     Args:
         scene: the mechanism, or a system of your own.
-        y0: starts, shape (n, dim) or (dim,).
+        y0: starts, a sampler or of shape (n, dim) or (dim,).
         t_end: end of the run [s].
         errors: largest errors to look at, in the state's units.
         methods: names from :data:`fastmech.integrators.methods.METHODS`; all explicit ones of order 4 and

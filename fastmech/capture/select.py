@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from numpy.typing import ArrayLike
-
 from fastmech.capture.certificate import Captured, Certificate
 from fastmech.capture.mechanism import mechanism_certificate
 from fastmech.capture.scene import scene_certificate
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
-from fastmech.scene import Scene, require_scene
+from fastmech.samplers import Starts
+from fastmech.scene import STATE, Scene, require_scene
 
 #: Certificates of mechanisms that are kept, the oldest first, by what tells mechanisms apart.
 _kept: dict[tuple[Any, ...], Certificate] = {}
@@ -57,15 +56,15 @@ def require_damper(system: Any) -> None:
         )
 
 
-def trapped(scene: Scene | Mechanism, states: ArrayLike) -> Captured:
+def trapped(scene: Scene | Mechanism, states: Starts) -> Captured:
     """Which states at t = 0 can never leave their well, whatever the damper does: the certificate at once.
 
     Without damper nothing comes to rest, and this is all that can be said about wells.
 
     Args:
         scene: the mechanism. Where its loads fade, the wells are those of what is left.
-        states: phi, theta [rad], phi', theta' [rad/s], shape (n, 4) or (4,); of a ``Mechanism`` coordinates,
-            then rates.
+        states: a sampler, or phi, theta [rad], phi', theta' [rad/s], shape (n, 4) or (4,); of a
+            ``Mechanism`` coordinates, then rates.
 
     Raises:
         InputError: not states, or the wells are not certain.
@@ -73,4 +72,5 @@ def trapped(scene: Scene | Mechanism, states: ArrayLike) -> Captured:
     if not isinstance(scene, Mechanism):
         require_scene(scene)
     certificate = certificate_of(scene)
-    return certificate.captured(checks.states("states", states, 2 * len(certificate.names)))
+    names = scene.state if isinstance(scene, Mechanism) else STATE
+    return certificate.captured(checks.starts("states", states, names))

@@ -26,7 +26,8 @@ from fastmech.mechanism.lagrange import kinetic_energy, metric, potential_energy
 from fastmech.models.equilibria import RestingPlace, find_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Field, Result
-from fastmech.scene import Scene, require_scene
+from fastmech.samplers import Starts
+from fastmech.scene import STATE, Scene, require_scene
 from fastmech.stability.linearize import jacobian
 
 #: Rows of the record, which begins with zeros and ends with the state that the step began with; the
@@ -202,7 +203,7 @@ class DisturbedMotion(Drawn):
 def disturbed_motion(
     scene: Scene | Mechanism,
     equilibrium: Equilibrium | RestingPlace,
-    disturbance: ArrayLike,
+    disturbance: Starts,
     times: ArrayLike,
     *,
     dt: float | None = None,
@@ -211,16 +212,17 @@ def disturbed_motion(
 ) -> DisturbedMotion:
     """Motion after disturbances (n, states) or (states,) of an equilibrium, at ``times`` [s].
 
-    The nonlinear motion is integrated with a fixed step of at most ``dt`` [s], by default
-    :func:`default_step`, and by default with the method of :func:`default_method`; the linearized one is
-    exact: the matrix exponential of the Jacobian at the equilibrium.
+    A sampler draws them too. The nonlinear motion is integrated with a fixed step of at most ``dt`` [s], by
+    default :func:`default_step`, and by default with the method of :func:`default_method`; the linearized
+    one is exact: the matrix exponential of the Jacobian at the equilibrium.
 
     Raises:
         InputError: an argument is wrong, a load changes, or the equilibrium is not the scene's.
     """
     equilibria_to_disturb(scene).index_of(equilibrium)
     center = np.concatenate([equilibrium.position, np.zeros(len(equilibrium.position))])
-    start = checks.states("disturbance", disturbance, center.size)
+    names = scene.state if isinstance(scene, Mechanism) else STATE
+    start = checks.starts("disturbance", disturbance, names)
     t = checks.rising_times("times", times)
     dt = default_step(scene, equilibrium) if dt is None else dt
     dt = checks.number("dt", dt, "s", above=0.0)

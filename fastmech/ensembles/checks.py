@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.errors import InputError, shown
+from fastmech.samplers import Starts, sampler_of
 
 #: Bytes for which the machine is not asked whether it has them: the question takes longer than a small run.
 UNASKED = 2**26
@@ -87,6 +89,37 @@ def states(name: str, values: ArrayLike, columns: int) -> NDArray[np.float64]:
     if array.ndim != 2 or array.shape[1] != columns:
         raise InputError(f"{name}: has shape {np.shape(values)}, must be (n, {columns})")
     return array
+
+
+def starts(
+    name: str,
+    given: Starts,
+    names: Sequence[str],
+    *,
+    n: int | None = None,
+    seed: int | None = None,
+    default: int | None = None,
+) -> NDArray[np.float64]:
+    """States (n, len(names)) of a sampler, of ranges by name, or given ones; the first ``n`` if told.
+
+    ``n`` and ``seed`` are those of the sampler if not told, and ``default`` is how many if it has no number.
+
+    Raises:
+        InputError: none of these, a wrong one, no number, or more than fit into memory.
+    """
+    sampler = sampler_of(given)
+    if n is not None:
+        n = whole_number("n", n, least=1, most=1 << 31)
+    if sampler is None:
+        return states(name, given, len(names))[:n]  # type: ignore[arg-type]
+    asked = next((count for count in (n, sampler.n, default) if count is not None), None)
+    if asked is None:
+        raise InputError(f"{name}: how many starts? such as fastmech.samplers.Uniform(ranges, n=1000)")
+    count = whole_number("n", asked, least=1, most=1 << 31)
+    memory(count * len(names), 2, f"n: {count:,} starts", "fewer")
+    return sampler.draw(
+        count, tuple(names), whole_number("seed", sampler.seed if seed is None else seed, least=0)
+    )
 
 
 def memory(

@@ -29,6 +29,7 @@ from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method
 from fastmech.kernels.select import FORMULATIONS
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Field
+from fastmech.samplers import Starts
 from fastmech.scene import STATE, Scene, nearest
 from fastmech.step_limits.warning import TURN, too_long, warn_of_step
 
@@ -103,7 +104,7 @@ class Trajectories(Drawn):
 @called_here(rtol="tol", atol="tol", t_span="t_end", max_step="dt", h="dt", step="dt", args="parameters")
 def integrate(
     scene: Scene | Mechanism | System,
-    y0: ArrayLike,
+    y0: Starts,
     t_end: float | None = None,
     dt: float | None = None,
     method: str | None = None,
@@ -122,9 +123,9 @@ def integrate(
 
     Args:
         scene: the paper's mechanism, a :class:`fastmech.Mechanism`, or a system of your own.
-        y0: starts, shape (n, dim) or (dim,) at t = 0; a scene's: phi, theta [rad], phi', theta' [rad/s], a
-            mechanism's: coordinates, then rates.
-            Angles are not wrapped.
+        y0: starts at t = 0: a sampler of ``fm.samplers``, or states of shape (n, dim) or (dim,); a scene's:
+            phi, theta [rad], phi', theta' [rad/s], a mechanism's: coordinates, then rates. Angles are not
+            wrapped.
         t_end: end of the run [s]; the last of ``t_eval`` by default.
         dt: longest step [s], 0.01 by default. Each interval between outputs is divided into equal steps not
             longer than it.
@@ -171,8 +172,8 @@ def integrate(
     starts, problem, own = problem_of(scene, y0, {} if parameters is None else parameters, formulation)
     fitted_at = _fit_times(fit, scene, outputs[-1])
     kept = starts.shape[1] * (outputs.size + max(len(fitted_at) - 1, 0) + problem.canonical)
-    beside = BESIDE + OWN * sum(column.ndim for column in problem.params.columns)
-    checks.memory(len(starts) * (kept + (1 if tol is None else 2) * beside), 2 if tol is None else 4)
+    own_columns = sum(column.ndim for column in problem.params.columns)
+    checks.memory(*_needed(len(starts), kept, own_columns, tol))
     if tol is not None:
         if dt is not None or fit is not False or dtype != "float64":
             raise InputError(
@@ -217,6 +218,28 @@ def integrate(
         beyond |= solution.last_term > LAST_TERM
     solution.status[beyond & (solution.status == Status.OK)] = Status.STEP_TOO_LARGE
     return _trajectories(problem, outputs, solution, settings).of(scene)
+
+
+def _needed(n: int, kept: int, own: int, tol: float | None) -> tuple[int, int]:
+    """Numbers of n trajectories with so many states each and coefficients of its own, and copies of them."""
+    runs = 1 if tol is None else 2
+    return n * (kept + runs * (BESIDE + OWN * own)), 2 * runs
+
+
+def memory(scene: Scene | Mechanism | System, n: int, times: int = 1, *, tol: float | None = None) -> int:
+    """Bytes that :func:`integrate` takes at most on the way for n trajectories at so many output times.
+
+    Attractors and labels take as much for one output time, and half a gigabyte, however many starts.
+
+    Raises:
+        InputError: an argument is wrong.
+    """
+    if not isinstance(scene, Scene | Mechanism | System):
+        raise InputError(f"scene = {shown(scene)}: must be a Scene, a Mechanism or a System")
+    n, times = checks.whole_number("n", n, least=1), checks.whole_number("times", times, least=1)
+    dim = len(STATE if isinstance(scene, Scene) else scene.state)
+    numbers, copies = _needed(n, dim * times, 0, tol)
+    return 8 * numbers * copies
 
 
 def _trajectories(
@@ -284,7 +307,7 @@ def _output_times(t_end: float | None, t_eval: ArrayLike | None) -> NDArray[np.f
 
 def problem_of(
     scene: Scene | Mechanism | System,
-    y0: ArrayLike,
+    y0: Starts,
     parameters: Mapping[str, ArrayLike],
     formulation: str | None,
 ) -> tuple[NDArray[np.float64], Problem, dict[str, NDArray[np.float64]]]:
@@ -297,14 +320,14 @@ def problem_of(
             f"formulation = {shown(formulation)}: unknown; {nearest(str(formulation), list(FORMULATIONS))}"
         )
     if isinstance(scene, System):
-        starts = checks.states("y0", y0, len(scene.state))
+        starts = checks.starts("y0", y0, scene.state)
         return starts, system_problem(scene, len(starts), parameters), {}
     if isinstance(scene, Mechanism):
-        starts = checks.states("y0", y0, len(scene.state))
+        starts = checks.starts("y0", y0, scene.state)
         own = own_values(parameters, scene.parameters, len(starts))
         return starts, mechanism_problem(scene, len(starts), own, formulation), own
     if not isinstance(scene, Scene):
         raise InputError(f"scene = {shown(scene)}: must be a Scene, a Mechanism or a System")
-    starts = checks.states("y0", y0, 4)
+    starts = checks.starts("y0", y0, STATE)
     own = own_values(parameters, scene.parameters, len(starts))
     return starts, scene_problem(scene, len(starts), own, formulation), own

@@ -8,12 +8,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
 from numba import float64
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_array, issparse
 
 from fastmech.ensembles import checks
 from fastmech.ensembles.ends import STOP_CODE, STOP_STATE, STOP_TIME
@@ -22,7 +23,7 @@ from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.ensembles.switches import UnclearError, require_noted, watching
 from fastmech.errors import InputError, shown
 from fastmech.generated import new_module, run_module
-from fastmech.jit import VECTOR, called, inlined
+from fastmech.jit import FLAGS, VECTOR, called, inlined
 from fastmech.kernels.attempt import attempted
 from fastmech.kernels.blocks import Rates, block_kernel
 from fastmech.kernels.rebuilding import (
@@ -40,6 +41,19 @@ from fastmech.scene import nearest
 
 #: States of a family at most: a block of an implicit method has the square of it.
 MOST_STATES = 10_000
+
+_WITH_CONSTANTS = """def rates(t, y, p, found):
+    given(t, y, p, found, {names})
+"""
+
+
+class Rows(NamedTuple):
+    """A sparse matrix: row i has ``data[k]`` in column ``indices[k]``, k from ``indptr[i]`` to the next."""
+
+    indptr: NDArray[np.int64]
+    indices: NDArray[np.int64]
+    data: NDArray[np.float64]
+
 
 _OBSERVE = '''"""Made by fastmech: watches {name!r} of a user's own system."""
 
@@ -93,6 +107,10 @@ class System(Printed):
         period: after which the right-hand side repeats, where it depends on the time: a number [s], or a
             function of parameters by their names, ``lambda omega: 2 * math.pi / omega``.
         angles: names of states of which only the value modulo a turn of 2 pi counts.
+        constants: arrays by name that a function of many states takes behind ``rates``, such as weights of
+            each state; of a network its sparse matrix (SciPy's, any format), of which ``links.indices[k]``
+            are row i's columns and ``links.data[k]`` its values, k from ``links.indptr[i]`` up to
+            ``links.indptr[i + 1]``. They are compiled in.
         section: ``section(*state)``: attractors are looked for where it rises through zero, in place of at
             equal times; of a system that does not depend on the time.
 
@@ -108,7 +126,9 @@ class System(Printed):
     period: float | Callable[..., float] | None = None
     angles: Sequence[str] = ()
     section: Callable[..., float] | None = None
+    constants: Mapping[str, ArrayLike] = field(default_factory=dict)
     vector: bool = field(default=False, init=False)  #: whether functions take arrays
+    origin: System | None = field(default=None, init=False)  #: of which it has other values of parameters
 
     def __post_init__(self) -> None:
         vector = isinstance(self.state, tuple) and [type(part) for part in self.state] == [str, int]
@@ -121,7 +141,12 @@ class System(Printed):
         values = [checks.number(f"parameters.{k}", v, "") for k, v in self.parameters.items()]
         object.__setattr__(self, "state", state)
         object.__setattr__(self, "parameters", dict(zip(names, values, strict=True)))
-        _check_function("rhs", self.rhs, ["y", "p", "rates"] if vector else state, [] if vector else names)
+        constants = _constants(self.constants)
+        if constants and not vector:
+            raise InputError("constants: only of a family of states, whose function takes arrays")
+        object.__setattr__(self, "constants", constants)
+        taken = ["y", "p", "rates"] if vector else state
+        _check_function("rhs", self.rhs, taken, list(constants) if vector else names)
         function: Any = self.rhs
         if vector and returns(function):
             raise InputError("rhs: returns something, must write the rates into its last argument")
@@ -168,6 +193,7 @@ class System(Printed):
         made = object.__new__(System)
         made.__dict__.update(self.__dict__)
         known = {name: checks.number(name, value, "") for name, value in values.items()}
+        object.__setattr__(made, "origin", self.origin or self)
         object.__setattr__(made, "parameters", {**self.parameters, **known})
         return made
 
@@ -184,14 +210,30 @@ class System(Printed):
     @property
     def prints(self) -> dict[str, str]:
         """What tells its functions apart from others."""
-        given = {"rhs": self.rhs, "stop": self.stop, "period": self.period, "section": self.section}
+        given = {"rhs": self._right, "stop": self.stop, "period": self.period, "section": self.section}
         return {k: fingerprint(f) if callable(f) else repr(f) for k, f in given.items()}
 
     def __getstate__(self) -> dict[str, Any]:
         """Without what is made again from the rest."""
         return {
-            k: v for k, v in self.__dict__.items() if k not in ("rates", "kernel", "switches", "_observer")
+            k: v
+            for k, v in self.__dict__.items()
+            if k not in ("rates", "kernel", "switches", "_observer", "_right")
         }
+
+    @cached_property
+    def _right(self) -> Any:
+        """The right-hand side with its constants, as a function without them."""
+        function: Any = self.rhs
+        if not self.constants:
+            return function
+        names = list(inspect.signature(function).parameters)[4:]
+        source = _WITH_CONSTANTS.format(names=", ".join(names))
+        prints = [fingerprint(value) for value in (function, *self.constants.values())]
+        module = new_module("system", source, prints)
+        vars(module).update(self.constants)
+        vars(module)["given"] = numba.njit(**FLAGS)(rebuilt(function, module.__name__, {}))
+        return run_module(module, source).rates
 
     @property
     def observation(self) -> Observation:
@@ -221,10 +263,10 @@ class System(Printed):
             UnclearError: it cannot be told where.
         """
         functions: dict[str, Any] = {}
-        given = inspect.signature(self.rhs).parameters
+        given = inspect.signature(self._right).parameters
         depend = {next(iter(given)), *(["y"] if self.vector else self.state)}
         arrays = [VECTOR if self.vector else float64] * (len(given) - 1)
-        if not require_noted(self.rhs, depend, [float64, *arrays]):
+        if not require_noted(self._right, depend, [float64, *arrays]):
             return None
         if self.vector:
             raise UnclearError("decisions on arrays are not located")
@@ -251,15 +293,15 @@ class System(Printed):
     @cached_property
     def rates(self) -> Rates:
         """What the engine's loops are made from."""
-        function: Any = self.rhs
+        function = self._right
         dim, names = len(self.state), list(self.parameters)
         own = () if self.vector else tuple(names.index(name) for name in self.parameter_order)
         return Rates(
             self.name,
             dim,
             own,
-            partial(_array_functions if self.vector else _functions, "rates", self.rhs),
-            (fingerprint(self.rhs),),
+            partial(_array_functions if self.vector else _functions, "rates", function),
+            (fingerprint(function),),
             ranged=not self.vector and reaches(function, _swaps()),
             vector=self.vector,
             looked_at=dim,
@@ -268,11 +310,14 @@ class System(Printed):
     @cached_property
     def kernel(self) -> Any:
         """The compiled block right-hand side, loaded from the disk cache where it is there."""
+        if self.origin is not None:
+            return self.origin.kernel
         self._refuse_raising("rhs", self.rhs)
-        count = 1 + len(self.state) + len(self.parameters)
-        with self._explained(
-            "rhs", self.rhs, 3 if self.vector else count, [] if self.vector else list(self.state)
-        ):
+        kinds: list[Any] = [float64] * (len(self.state) + len(self.parameters))
+        if self.vector:
+            order = list(inspect.signature(self.rhs).parameters)[4:]
+            kinds = [VECTOR] * 3 + [numba.typeof(self.constants[name]) for name in order]  # type: ignore[no-untyped-call]
+        with self._explained("rhs", self.rhs, kinds, [] if self.vector else list(self.state)):
             made = block_kernel(self.rates)
             if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
                 made.make()
@@ -284,7 +329,8 @@ class System(Printed):
         stop: Any = self.stop
         self._refuse_raising("stop", stop)
         taken, dim = self._taken_by_stop, len(self.state)
-        with self._explained("stop", stop, (1 if self.vector else 1 + dim) + len(taken), None):
+        kinds: list[Any] = [VECTOR if self.vector else float64] * ((1 if self.vector else dim) + len(taken))
+        with self._explained("stop", stop, kinds, None):
             own = [
                 f"record[{2 + dim + list(self.parameters).index(name)}, i]" for name in taken if name != "p"
             ]
@@ -309,13 +355,12 @@ class System(Printed):
 
     @contextmanager
     def _explained(
-        self, field: str, function: Any, arguments: int, states: list[str] | None
+        self, field: str, function: Any, kinds: list[Any], states: list[str] | None
     ) -> Iterator[None]:
         """Tell in one line why a function cannot be compiled."""
         try:
             yield
         except Exception as error:  # numba lets those of the code it looks at pass
-            kinds = [VECTOR] * arguments if self.vector else [float64] * (arguments - 1)
             explain(field, rebuilt(function, "fastmech_user", {}), (float64, *kinds), states)
             raise InputError(f"{field}: cannot be compiled: {reason(error)}") from None
 
@@ -368,6 +413,22 @@ def _family(name: str, count: int) -> list[str]:
             f"state = {shown((name, count))}: must be a name and a number from 1 to {MOST_STATES}"
         )
     return [f"{name}{d}" for d in range(count)]
+
+
+def _constants(given: Any) -> dict[str, Any]:
+    """Arrays as compiled code takes them, by name; sparse matrices as :class:`Rows`."""
+    if not isinstance(given, Mapping):
+        raise InputError(f"constants = {shown(given)}: must be a mapping of names to arrays")
+    found: dict[str, Any] = {}
+    for name in _names("constants", given, least=0):
+        value: Any = given[name]
+        if issparse(value):
+            rows = csr_array(value)
+            data = checks.reals(f"constants.{name}", rows.data, "real numbers")
+            found[name] = Rows(rows.indptr.astype(np.int64), rows.indices.astype(np.int64), data)
+        else:
+            found[name] = checks.reals(f"constants.{name}", value, "real numbers", 1)
+    return found
 
 
 def _names(field: str, given: Any, least: int) -> list[str]:

@@ -81,6 +81,21 @@ def draw_fractions(along: Any, ax: Axes) -> None:
     ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
+def draw_numbers(over: Any, ax: Axes) -> None:
+    """Draw how many attractors there are over two parameters, and where one comes or goes."""
+    first = over.lines[0]
+    number = np.isfinite(over.fractions).sum(axis=2)
+    mesh = ax.pcolormesh(first.values, over.values, number, cmap="Blues", vmin=0, shading="nearest")
+    tips = [
+        (0.5 * (t.low + t.high), v)
+        for v, line in zip(over.values, over.lines, strict=True)
+        for t in line.tipping
+    ]
+    ax.plot(*np.reshape(tips, (-1, 2)).T, "k.", ms=4, label="one comes or goes")
+    ax.figure.colorbar(mesh, ax=ax, label="attractors")
+    ax.set(xlabel=first.parameter, ylabel=over.second, title="Attractors")
+
+
 def draw_lines(
     dataset: Dataset, scene: Mapping[str, float], line: Callable[[int], Any], count: int
 ) -> Figure:

@@ -318,7 +318,7 @@ def attractor_table(
                 each,
                 np.array([one.kind for one in found], object),
                 "1",
-                "fixed point, periodic, torus, chaos",
+                "fixed point, periodic, torus, chaos, continuum",
             ),
             **parts("place", each, first, units, "{} of one of its points"),
             "share": Variable(each, count / total, "1", "share of the starts that end there"),

@@ -1,18 +1,19 @@
 """Attractors and their shares of the starts along a parameter, and where they come and go.
 
-Layout: ``share`` over the parameter and ``attractor``; with a second parameter over that first, and
-attractors keep their numbers along the first one only. In a group of its own: ``tipping``.
+Layout: ``share`` over the parameter and ``attractor``; with a second parameter over that first. In a group of
+its own: ``tipping``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field
 
-from fastmech.attractors.follow import BasinsAlong, Tipping, follow_basins
+from fastmech.arrays import Floats
+from fastmech.attractors.follow import BasinsAlong, BasinsOver, Place, Tipping, follow_basins, joined
 from fastmech.ensembles.system import System
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import Dataset, Variable, numbers, told
@@ -22,8 +23,8 @@ from fastmech.scan_types.request import Axis, Tiling
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: The dimension of rows in a tile.
-ROW = ("row",)
+#: Points of an attractor that lines are joined by, at most.
+POINTS = 512
 
 
 class FollowBasins(Starts):
@@ -52,28 +53,33 @@ class FollowBasins(Starts):
         starts = self.drawn(scene, self.n)
 
         def line(changed: Mechanism | System) -> Dataset:
-            return _line(follow_basins(changed, name, values, starts, t_end=self.t_end))
+            found = follow_basins(changed, name, values, starts, t_end=self.t_end)
+            assert isinstance(found, BasinsAlong)
+            return _tile(found)
 
-        return lines_over(scene, self.each, "values of the second parameter", line, self._joined)
+        def join(scene: Mechanism | System, tiles: list[Dataset]) -> Dataset:
+            lines = [_read(tile, name, values) for tile in tiles]
+            for second, axis in self.each.items():
+                lines = list(joined(scene, second, axis.array, lines, starts).lines)
+            return self._joined(scene, lines)
 
-    def _joined(self, scene: Mechanism | System, tiles: list[Dataset]) -> Dataset:
-        ((name, axis),) = self.along.items()
-        values = axis.array
+        return lines_over(scene, self.each, "values of the second parameter", line, join)
+
+    def _joined(self, scene: Mechanism | System, lines: Sequence[BasinsAlong]) -> Dataset:
+        (name,) = self.along
         dims, where = shared_axes(scene, self.along, self.each)
-        most = max(tile.sizes["attractor"] for tile in tiles)
-        share = np.full((len(tiles), values.size, most), np.nan)
-        for k, tile in enumerate(tiles):
-            share[k, :, : tile.sizes["attractor"]] = tile["share"].data
-        rows = np.concatenate([tile["tipping"].data for tile in tiles])
-        line = np.repeat(np.arange(len(tiles), dtype=np.int32), [tile.sizes["row"] for tile in tiles])
-        unlabelled = np.stack([tile["unlabelled"].data for tile in tiles])
+        share = np.stack([one.fractions for one in lines])
+        most = share.shape[2]
+        rows = np.concatenate([_tipping(one) for one in lines])
+        line = np.repeat(np.arange(len(lines), dtype=np.int32), [len(one.tipping) for one in lines])
+        unlabelled = np.stack([one.unlabelled for one in lines])
         shape = tuple(len(where[d].data) for d in dims)
         each, unit = ("tipping",), where[name].units
         kinds = np.where(rows[:, 1] == 1.0, "born", "dies").astype(object)
         return Dataset(
             {
                 **where,
-                **numbers("attractor", most, f"number of the attractor, the same along {name}"),
+                **numbers("attractor", most, "number of the attractor, the same where it goes on"),
                 "share": Variable(
                     (*dims, "attractor"),
                     share.reshape(*shape, most),
@@ -134,17 +140,51 @@ class FollowBasins(Starts):
 def along_dataset(found: BasinsAlong) -> Dataset:
     """The section of attractors along a parameter."""
     along = {found.parameter: Axis(values=found.values.tolist())}
-    made = FollowBasins.model_construct(along=along, each={})._joined(found.system, [_line(found)])
+    return _section(FollowBasins.model_construct(along=along, each={}), found.system, [found])
+
+
+def over_dataset(found: BasinsOver) -> Dataset:
+    """The section of attractors over two parameters."""
+    along = {found.lines[0].parameter: Axis(values=found.lines[0].values.tolist())}
+    each = {found.second: Axis(values=found.values.tolist())}
+    return _section(FollowBasins.model_construct(along=along, each=each), found.system, found.lines)
+
+
+def _section(request: FollowBasins, system: Any, lines: Sequence[BasinsAlong]) -> Dataset:
+    made = request._joined(system, lines)
     attrs = {name: value for name, value in made.attrs.items() if name != "starts"}  # it does not know them
     return Dataset(made.variables, attrs, made.groups)
 
 
-def _line(found: BasinsAlong) -> Dataset:
-    tipping = np.array([[t.attractor, t.kind == "born", t.low, t.high] for t in found.tipping])
+def _tipping(found: BasinsAlong) -> Floats:
+    rows = [[t.attractor, t.kind == "born", t.low, t.high] for t in found.tipping]
+    return np.array(rows, dtype=np.float64).reshape(-1, 4)
+
+
+def _tile(found: BasinsAlong) -> Dataset:
+    """A line; of each attractor so many points as it is told by."""
+    places = [(i, j, one) for i, there in enumerate(found.attractors) for j, one in there.items()]
+    points = [one.points[:: -(-len(one.points) // POINTS)] for *_, one in places]
+    rows = [(i, j, one.period or 0.0, len(own)) for (i, j, one), own in zip(places, points, strict=True)]
     return Dataset(
         {
             "share": Variable((found.parameter, "attractor"), found.fractions),
             "unlabelled": Variable((found.parameter,), found.unlabelled),
-            "tipping": Variable((*ROW, "column"), tipping.reshape(-1, 4)),
+            "tipping": Variable(("row", "column"), _tipping(found)),
+            "places": Variable(("place", "column"), np.array(rows, dtype=np.float64)),
+            "points": Variable(("point", "state"), np.concatenate(points)),
         }
     )
+
+
+def _read(tile: Dataset, name: str, values: Floats) -> BasinsAlong:
+    """The same from a tile."""
+    there: tuple[dict[int, Place], ...] = tuple({} for _ in values)
+    rows = tile["places"].data
+    ends = np.cumsum(rows[:, 3].astype(np.int64))
+    for (i, j, period, count), end in zip(rows.tolist(), ends.tolist(), strict=True):
+        there[int(i)][int(j)] = Place(tile["points"].data[end - int(count) : end], period or None)
+    tipping = tuple(
+        Tipping(int(j), "born" if born else "dies", low, high) for j, born, low, high in tile["tipping"].data
+    )
+    return BasinsAlong(name, values, tile["share"].data, tile["unlabelled"].data, there, tipping)

@@ -34,6 +34,7 @@ from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import JACOBIAN, MATRIX, RHS, VECTOR, kernel, named_tuple
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Field, Printed
+from fastmech.samplers import Starts
 from fastmech.scene import Scene
 from fastmech.stability.linearize import Rest, jacobian, linearized
 from fastmech.step_limits.warning import too_long, warn_of_step
@@ -168,7 +169,7 @@ class LyapunovExponents(Drawn):
 
 def largest_lyapunov(
     scene: Scene | Mechanism | System,
-    y0: ArrayLike,
+    y0: Starts,
     t_end: float,
     dt: float = 0.01,
     *,
@@ -178,7 +179,7 @@ def largest_lyapunov(
 
     Args:
         scene: the mechanism, whose Jacobian is known, or a system of your own (differences).
-        y0: starts, shape (n, dim) or (dim,).
+        y0: starts, a sampler or of shape (n, dim) or (dim,).
         t_end: length of the motion [s]; estimates converge like 1/t.
         dt: longest step [s] of ``dop853``.
         parameters: as in :func:`fastmech.ensembles.integrate.integrate`.

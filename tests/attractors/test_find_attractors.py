@@ -271,6 +271,66 @@ def test_a_place_that_is_approached_ever_more_slowly_is_a_fixed_point() -> None:
     assert found.counts["captured"] == 200
 
 
+def test_saddles_that_motions_linger_at_are_no_attractors() -> None:
+    """May and Leonard's three competitors, SIAM J. Appl. Math. 29 (1975) 243: they win in turn."""
+
+    def competition(t, x, y, z, a, b):  # type: ignore[no-untyped-def]
+        return x * (1.0 - x - a * y - b * z), y * (1.0 - b * x - y - a * z), z * (1.0 - a * x - b * y - z)
+
+    system = fm.System(competition, ["x", "y", "z"], {"a": 0.8, "b": 1.5})
+    ranges = dict.fromkeys(system.state, (0.01, 1.0))
+    found = fm.find_attractors(system, ranges, 200)
+    assert not len(found)
+    assert found.counts["undecided"] == 200
+    settled = fm.find_attractors(system.replace(b=1.1), ranges, 200)  # a + b < 2: they live together
+    assert [one.kind for one in settled] == ["fixed point"]
+    np.testing.assert_allclose(settled[0].points[0], 1.0 / 2.9, rtol=1e-9)
+
+
+def test_fixed_points_side_by_side_are_one_attractor() -> None:
+    """A sliding body with friction, x_end = x + v / d; epidemics, Kermack and McKendrick's final size."""
+
+    def sliding(t, x, v, d):  # type: ignore[no-untyped-def]
+        return v, -d * v
+
+    found = fm.find_attractors(fm.System(sliding, ["x", "v"], {"d": 1.0}), {"x": (-1, 1), "v": (-1, 1)}, 300)
+    assert [one.kind for one in found] == ["continuum"]
+    assert found.counts["captured"] > 295
+
+    def epidemic(t, s, i, b, g):  # type: ignore[no-untyped-def]
+        return -b * s * i, b * s * i - g * i
+
+    system = fm.System(epidemic, ["s", "i"], {"b": 2.0, "g": 1.0})
+    found = fm.find_attractors(system, {"s": (0.0, 1.0), "i": (0.0, 1.0)}, 300)
+    assert [one.kind for one in found] == ["continuum"]
+    assert found.counts["captured"] > 295
+    assert found[0].points[:, 0].max() < 0.5  # below g / b
+
+
+def test_twisted_states_of_a_ring_are_told_apart() -> None:
+    """Each is a continuum, as all may turn; by winding numbers (Wiley, Strogatz, Girvan, Chaos 16 (2006))."""
+
+    def ring(t, a, b, c, d, e):  # type: ignore[no-untyped-def]
+        return (
+            fm.sin(b - a) + fm.sin(e - a),
+            fm.sin(c - b) + fm.sin(a - b),
+            fm.sin(d - c) + fm.sin(b - c),
+            fm.sin(e - d) + fm.sin(c - d),
+            fm.sin(a - e) + fm.sin(d - e),
+        )
+
+    system = fm.System(ring, list("abcde"), {}, angles=list("abcde"))
+    starts = fm.samplers.Uniform(dict.fromkeys("abcde", (-3.14, 3.14)), n=256)
+    found = fm.find_attractors(system, starts)
+    end = fm.integrate(system, starts, 200.0, 0.05).y[0]
+    steps = np.diff(end, axis=1, append=end[:, :1])
+    turns = np.rint((steps - 2.0 * np.pi * np.rint(steps / (2.0 * np.pi))).sum(axis=1) / (2.0 * np.pi))
+    assert [one.kind for one in found] == ["continuum"] * 3
+    for label in range(3):
+        assert np.unique(turns[found.label == label]).size == 1
+    assert found.counts["captured"] > 240
+
+
 def test_the_smallest_shock_out_of_a_place_of_rest_reaches_the_saddle_s_manifold() -> None:
     """Measures take attractors for labels; the boundary is the stable manifold of the saddle, by SciPy."""
     found = fm.find_attractors(PENDULUM, {"x": (-2.6, 3.6), "x_dot": (-10.0, 10.0)}, 500)

@@ -33,6 +33,66 @@ def test_attractors_come_and_go_at_the_folds() -> None:
     assert axes.get_ylabel() == "share of the starts"
 
 
+def shifted(t, x, r, s):  # type: ignore[no-untyped-def]
+    return (r + s + x - x * x * x,)
+
+
+def test_attractors_have_the_same_numbers_over_two_parameters() -> None:
+    """The upper and the lower equilibrium; lines number them by their shares, which change places."""
+    system = fm.System(shifted, ["x"], {"r": 0.0, "s": 0.0})
+    r, s = np.array([-0.3, 0.1, 0.3]), np.array([-0.25, 0.25])
+    found = fm.follow_basins(system, "r", r, {"x": (-2.0, 2.0)}, 60, each={"s": s})
+    assert isinstance(found, fm.BasinsOver)
+    assert found.fractions.shape == (2, 3, 2)
+    upper: dict[int, set[bool]] = {}
+    for line, shift in zip(found.lines, s, strict=True):
+        for value, there, shares in zip(r, line.attractors, line.fractions, strict=True):
+            roots = np.roots([-1.0, 0.0, 1.0, shift + value])
+            assert len(there) == (2 if np.isreal(roots).all() else 1)
+            assert set(np.flatnonzero(np.isfinite(shares))) == set(there)
+            for number, one in there.items():
+                assert np.abs(roots - one.points[0, 0]).min() < 1e-9
+                upper.setdefault(number, set()).add(bool(one.points[0, 0] > 0.0))
+    assert sorted(map(list, upper.values())) == [[False], [True]]
+    tips = {
+        (t.kind, t.attractor): shift for line, shift in zip(found.lines, s, strict=True) for t in line.tipping
+    }
+    assert len(tips) == 2
+    assert found.plot().get_ylabel() == "s"
+    dataset = found.to_xarray()
+    np.testing.assert_array_equal(dataset["share"], found.fractions)
+
+
+def test_around_a_cusp_one_attractor_goes_on_in_two() -> None:
+    """x' = r + s x - x^3: one for s < 0, two between the folds beyond; no point has one number twice."""
+
+    def cusp(t, x, r, s):  # type: ignore[no-untyped-def]
+        return (r + s * x - x * x * x,)
+
+    system = fm.System(cusp, ["x"], {"r": 0.0, "s": 0.0})
+    r, s = np.array([-0.4, 0.0, 0.2]), np.array([-0.6, 1.0])
+    found = fm.follow_basins(system, "r", r, {"x": (-2.0, 2.0)}, 60, each={"s": s})
+    there = np.isfinite(found.fractions)
+    number = [[int((np.roots([-1.0, 0.0, b, a]).imag == 0.0).sum() + 1) // 2 for a in r] for b in s]
+    np.testing.assert_array_equal(there.sum(axis=2), number)
+    assert there.shape[2] == 2
+
+
+@pytest.mark.parametrize(
+    ("each", "told"),
+    [
+        ({"q": [0.0, 1.0]}, "each: "),
+        ({"r": [0.0, 1.0]}, "each = "),
+        ({"s": [0.0]}, "each.s: "),
+        (3, "each = 3"),
+    ],
+)
+def test_a_wrong_second_parameter_gets_one_line(each: object, told: str) -> None:
+    system = fm.System(shifted, ["x"], {"r": 0.0, "s": 0.0})
+    with pytest.raises(fm.InputError, match=f"^{told}"):
+        fm.follow_basins(system, "r", [0.0, 0.1], {"x": (-1.0, 1.0)}, each=each)  # type: ignore[arg-type]
+
+
 def test_tipping_probabilities_are_shares_of_each_basin() -> None:
     before = np.array([[0, 0, 0, 1], [1, 1, -1, 1]])
     after = np.array([[0, 1, -1, 1], [1, 1, 0, 0]])

@@ -13,11 +13,14 @@ from fastmech.basins.disturbed import DisturbedEnsemble, disturb
 from fastmech.basins.label import label_starts
 from fastmech.capture.barriers import barrier_tree
 from fastmech.capture.select import trapped
+from fastmech.disturbance.motion import disturbed_motion
+from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import ENDS, FAILURES, Status
 from fastmech.equilibria.find import find_equilibria
 from fastmech.errors import InputError, StepWarning
 from fastmech.mechanism.lagrange import kinetic_energy, potential_energy
-from fastmech.scene import Scene
+from fastmech.samplers import Gaussian, Sobol
+from fastmech.scene import STATE, Scene
 
 SCENE = known("table_1")[0]
 
@@ -38,6 +41,23 @@ def test_small_disturbances_of_the_stable_equilibrium_return() -> None:
     assert np.all(run.end_index == run.index)
     assert not run.turns.any()
     assert np.all(oracle_size(SCENE, stable, run.final - center(stable)) <= 0.01)
+
+
+def test_samplers_are_taken_where_starts_are() -> None:
+    (stable,) = equilibria("table_1", 0)
+    sampler = Gaussian({"phi": (-0.01, 0.01), "theta_dot": (-0.02, 0.02)}, n=40, seed=5)
+    away = sampler.draw(40, STATE, 5)
+    run = disturb(SCENE, stable, disturbances=sampler)
+    np.testing.assert_array_equal(run.starts, center(stable) + away)
+    part = disturb(SCENE, stable, disturbances=sampler, part=slice(8, 20))
+    np.testing.assert_array_equal(part.final, run.final[8:20])
+    motion, same = (disturbed_motion(SCENE, stable, given, [1.0]) for given in (sampler, away))
+    np.testing.assert_array_equal(motion.linearized, same.linearized)
+    near = Sobol({"phi": (1.0, 2.0), "theta_dot": (-1.0, 1.0)}, n=16, seed=2)
+    about = near.draw(16, STATE, 2)
+    np.testing.assert_array_equal(integrate(SCENE, near, 1.0).y, integrate(SCENE, about, 1.0).y)
+    np.testing.assert_array_equal(label_starts(SCENE, near).time, label_starts(SCENE, about).time)
+    np.testing.assert_array_equal(trapped(SCENE, near).well, trapped(SCENE, about).well)
 
 
 @pytest.mark.parametrize("morse_index", [1, 2])

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 import time
+import tracemalloc
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
 from scipy.linalg import expm
-from scipy.sparse import random_array
+from scipy.sparse import csr_array, random_array
 
 import fastmech as fm
 from fastmech.errors import InputError
@@ -91,23 +93,68 @@ def test_to_a_tolerance_and_with_a_stop() -> None:
     assert (stopped.y[0, :, 0] < 0.5).all()
 
 
-def test_a_network_is_a_sparse_matrix_s_arrays() -> None:
-    """Kuramoto's oscillators on a random graph: the graph Laplacian's, close to synchrony, in closed form."""
-    graph = random_array((60, 60), density=0.1, rng=np.random.default_rng(5), format="csr")
-    graph = ((graph + graph.T) != 0).astype(np.float64).tocsr()
-    first, neighbours = graph.indptr.astype(np.int64), graph.indices.astype(np.int64)
+def graph(n: int = N) -> csr_array:
+    links = random_array((n, n), density=min(0.8, 8.0 / n), rng=np.random.default_rng(5), format="coo")
+    return csr_array(((links + links.T) != 0).astype(np.float64))
 
-    def kuramoto(t: float, y: Any, p: Any, rates: Any) -> None:
-        for i in range(y.size):
-            pull = 0.0
-            for k in range(first[i], first[i + 1]):
-                pull += math.sin(y[neighbours[k]] - y[i])
-            rates[i] = p[0] * pull
 
-    start = 1e-5 * np.random.default_rng(6).standard_normal((4, 60))
-    run = fm.integrate(fm.System(kuramoto, ("x", 60), {"K": 0.3}), start, 2.0, 0.01)
-    laplacian = np.diag(np.asarray(graph.sum(axis=1)).ravel()) - graph.toarray()
-    np.testing.assert_allclose(run.y[0], start @ expm(-0.6 * laplacian), atol=1e-12)
+def kuramoto(t: float, y: Any, p: Any, rates: Any, links: Any, omega: Any) -> None:
+    for i in range(y.size):
+        pull = 0.0
+        for k in range(links.indptr[i], links.indptr[i + 1]):
+            pull += links.data[k] * math.sin(y[links.indices[k]] - y[i])
+        rates[i] = omega[i] + p[0] * pull
+
+
+OMEGA = np.random.default_rng(6).normal(0.0, 0.3, N)
+NETWORK = fm.System(kuramoto, ("x", N), {"K": 0.3}, constants={"omega": OMEGA, "links": graph().tocoo()})
+
+
+def test_a_network_is_a_sparse_matrix() -> None:
+    """Kuramoto's oscillators on a random graph, against SciPy."""
+    starts = fm.samplers.Uniform(dict.fromkeys(NETWORK.state, (-3.0, 3.0)), n=3)
+    run = fm.integrate(NETWORK, starts, 5.0, 0.05, "dop853")
+    pull = graph()
+    rows = np.repeat(np.arange(N), np.diff(pull.indptr))
+
+    def rates(t: float, y: Any) -> Any:
+        each = pull.data * np.sin(y[pull.indices] - y[rows])
+        return OMEGA + 0.3 * np.bincount(rows, each, N)
+
+    for i, start in enumerate(starts.draw(3, NETWORK.state)):
+        right = solve_ivp(rates, (0.0, 5.0), start, "DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
+        np.testing.assert_allclose(run.y[0, i], right, rtol=0, atol=1e-9)
+    assert NETWORK.replace(K=0.1).constants is NETWORK.constants
+
+
+def test_other_constants_are_another_system() -> None:
+    one, two = (
+        fm.System(kuramoto, ("x", 3), {"K": 1.0}, constants={"links": graph(3) * w, "omega": [0.0] * 3})
+        for w in (1.0, 2.0)
+    )
+    assert one.prints != two.prints
+    start = [0.1, 0.2, -0.3]
+    once = fm.integrate(one.replace(K=2.0), start, 1.0, 0.1).y
+    np.testing.assert_allclose(once, fm.integrate(two, start, 1.0, 0.1).y, rtol=1e-13)
+    with pytest.raises(InputError, match=r"^rhs: takes \(t, y, p, rates, links, omega\), must take"):
+        fm.System(kuramoto, ("x", 3), {}, constants={"links": graph(3)})
+    with pytest.raises(InputError, match=r"^constants: only of a family of states"):
+        fm.System(lambda t, x: (x,), ["x"], {}, constants={"links": graph(3)})
+    with pytest.raises(InputError, match=r"^constants.links: must be real numbers"):
+        fm.System(kuramoto, ("x", 3), {}, constants={"links": "all", "omega": [0.0]})
+
+
+def test_memory_is_told_before_the_run() -> None:
+    starts = np.zeros((400, N))
+    fm.integrate(NETWORK, starts[:2], 0.1, 0.1)  # compiled
+    for times in (1, 20):
+        tracemalloc.start()
+        fm.integrate(NETWORK, starts, t_eval=np.linspace(0.0, 0.1, times + 1)[1:], dt=0.1)
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        assert 0.3 * fm.memory(NETWORK, 400, times) < peak < fm.memory(NETWORK, 400, times) + 2**22
+    with pytest.raises(InputError, match=r"^n = 0: must be"):
+        fm.memory(NETWORK, 0)
 
 
 def gives(t: float, y: Any, p: Any, rates: Any) -> Any:

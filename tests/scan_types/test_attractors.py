@@ -79,13 +79,12 @@ def test_attractors_are_followed_over_two_parameters(tmp_path: Path) -> None:
     text = "n = 200\nalong.A = { values = [0.17, 0.18, 0.19] }\neach.delta = { values = [0.08, 0.16] }\n"
     with run(tmp_path, f'kind = "follow_basins"\n{text}{RANGES}') as results:
         section, tipping = results["it"].load(), results["it/tipping"].load()
-    starts = fm.samplers.Uniform(REGION).draw(200, ("x", "x_dot"))
-    for k, delta in enumerate((0.08, 0.16)):
-        expected = fm.follow_basins(SYSTEM.replace(delta=delta), "A", [0.17, 0.18, 0.19], starts)
-        there = expected.fractions.shape[1]
-        np.testing.assert_array_equal(section["share"].data[k, :, :there], expected.fractions)
-        own = tipping["tipping_line"].data == k
-        np.testing.assert_array_equal(tipping["tipping_low"].data[own], [t.low for t in expected.tipping])
+    each = {"delta": [0.08, 0.16]}
+    expected = fm.follow_basins(SYSTEM, "A", [0.17, 0.18, 0.19], REGION, 200, each=each)
+    assert isinstance(expected, fm.BasinsOver)
+    np.testing.assert_array_equal(section["share"].data, expected.fractions)
+    low = [t.low for line in expected.lines for t in line.tipping]
+    np.testing.assert_array_equal(tipping["tipping_low"].data, low)
     assert section["share"].dims == ("delta", "A", "attractor")
     assert {p.name for p in draw_results(tmp_path / "scan.h5")} == {"it_shares.png"}
 
