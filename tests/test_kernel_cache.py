@@ -171,7 +171,7 @@ def test_an_edited_source_gives_a_new_directory_and_the_new_answer(
     assert edited["answer"][2] == pytest.approx(2 * first["answer"][2], rel=1e-14)
 
 
-@pytest.mark.parametrize("loaded", ["fastmech.mechanism.reduced", "fastmech.jit"])
+@pytest.mark.parametrize("loaded", ["fastmech.slider.reduced", "fastmech.jit"])
 def test_an_edit_while_a_process_compiles_spoils_nothing(loaded: str, tmp_path: Path) -> None:
     """Whether the process has read the edited file before the edit or reads it after it.
 

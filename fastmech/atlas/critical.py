@@ -17,11 +17,11 @@ from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats
 from fastmech.atlas.resting_map import RestingMap, map_resting_places, resting_places_at
-from fastmech.equilibria.certificate import Outcome
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import VERDICTS
 from fastmech.objects import Field, Printed, Result
+from fastmech.outcome import Outcome
 
 #: Relative width at which a value is located, and halvings at most.
 WIDTH, HALVINGS = 4.0 * 2.0**-52, 120

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from fastmech.arrays import Floats, Integers
 from fastmech.basins.label import How, label_states
 from fastmech.basins.measures.fractions import Shares, basin_stability
+from fastmech.capture.certificate import MOST_OCTAVES, TURNING
 from fastmech.capture.select import certificate_of, require_damper
-from fastmech.capture.steps import MOST_OCTAVES, TURNING
 from fastmech.disturbance.motion import (
     EXCURSION,
     LAST_OUTSIDE,
@@ -35,12 +35,12 @@ from fastmech.ensembles import checks
 from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.run import Ensemble, Observation, Progress, run_ensemble
 from fastmech.ensembles.status import ENDS, FAILURES, Status, failure_counts, failure_line
-from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError, StepWarning
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Field
 from fastmech.scene import Scene
+from fastmech.slider.equilibria import Equilibrium
 
 #: By how much excursions by two steps may differ, over the larger coordinate's.
 AGREED = 0.01

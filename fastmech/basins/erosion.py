@@ -1,7 +1,7 @@
 """Erosion profiles: how basins lose stability, integrity and the shock that they survive along a parameter.
 
 After Soliman and Thompson, J. Sound Vib. 135 (1989) 453, and Rega and Lenci, Nonlinear Analysis 63 (2005)
-902. A well keeps its identity along the parameter: its sheet in :func:`fastmech.atlas.map.map_equilibria`.
+902. A well keeps its identity along the parameter: its sheet in :func:`fastmech.map_equilibria`.
 Every value is measured by itself, so that it does not matter which others are asked for.
 """
 
@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Floats, Integers
-from fastmech.atlas.map import map_equilibria
 from fastmech.atlas.resting_map import follow_wells
 from fastmech.basins.label import label_states
 from fastmech.basins.measures.fractions import basin_stability
@@ -40,6 +39,7 @@ from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn
 from fastmech.scene import Scene
+from fastmech.slider.atlas.map import map_equilibria
 
 #: Relative tolerance of shocks: what a profile shows.
 TOLERANCE = 1e-3

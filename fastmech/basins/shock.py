@@ -18,12 +18,12 @@ from fastmech.basins.measures.labels import LabelOf, ask
 from fastmech.basins.measures.norm import norm_on
 from fastmech.basins.well_numbers import with_defaults
 from fastmech.ensembles import checks
-from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Printed
 from fastmech.scene import Scene
+from fastmech.slider.equilibria import Equilibrium
 
 #: Radii at which a ray is looked at before its first way out is narrowed down: at first, and once turned.
 LEVELS, TURNED_LEVELS = 24, 8

@@ -17,7 +17,6 @@ from itertools import count
 import numpy as np
 
 from fastmech.arrays import Floats, Integers
-from fastmech.atlas.map import ROUNDING
 from fastmech.basins.convergence import SUBSTEPS
 from fastmech.basins.label import How, label_states
 from fastmech.basins.well_numbers import number_wells, well_of_number
@@ -25,16 +24,17 @@ from fastmech.capture.certificate import Certificate
 from fastmech.capture.select import certificate_of
 from fastmech.disturbance.motion import equilibria_to_disturb, require_constant_force, state_jacobian
 from fastmech.ensembles import checks
-from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError, shown
-from fastmech.mechanism.coefficients import reduce
-from fastmech.mechanism.impulse import POINTS, Mobility, impulse_for, mobility, rates_after
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import require_own
 from fastmech.objects import Printed
 from fastmech.scene import Scene
-from fastmech.stability.linearize import require_rest
+from fastmech.slider.atlas.map import ROUNDING
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.equilibria import Equilibrium
+from fastmech.slider.impulse import POINTS, Mobility, impulse_for, mobility, rates_after
+from fastmech.slider.linearize import require_rest
 
 #: The first grid: directions all around, and by how much an impulse is larger than the one before, where
 #: directions are searched and where there is one alone. Each further grid is twice as fine, or four times.

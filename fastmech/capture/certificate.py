@@ -20,6 +20,18 @@ from fastmech.disturbance.motion import Size
 from fastmech.ensembles.run import CALL_STEPS_WITH_STOPS, Observation
 from fastmech.integrators.methods import Method
 
+#: Coarse step times the highest frequency [rad], and times the fastest turning that the energy allows. With
+#: ``dop853`` the error of such a step is some 1e-3 by the time of capture; half of it makes that 1e-5.
+PHASE, TURNING = 1.0, 2.5
+
+#: Octaves below a mechanism's own step that a start may take: rates of some thousand rad/s. A start that is
+#: faster still comes out as what that step makes of it.
+MOST_OCTAVES = 7.0
+
+#: Share of a start's coarse step, at which labels begin, that measuring takes by default (an implicit method,
+#: whose error constant is larger, takes half of it).
+MEASURING = 0.6
+
 #: Code of a motion that has left the range of a coordinate, beside wells' numbers from 1.
 OUT = 127
 

@@ -24,9 +24,16 @@ from numpy.typing import NDArray
 from fastmech.arrays import Floats, Integers
 from fastmech.callee import callee
 from fastmech.capture.cells import bound_cells, bound_states, convex_box, fill_component, first_exits
-from fastmech.capture.certificate import Certificate, Early, Noted
+from fastmech.capture.certificate import (
+    MEASURING,
+    MOST_OCTAVES,
+    PHASE,
+    TURNING,
+    Certificate,
+    Early,
+    Noted,
+)
 from fastmech.capture.observe import HEAD, RECORD, TABLE_ROWS
-from fastmech.capture.steps import MEASURING, MOST_OCTAVES, PHASE, TURNING
 from fastmech.disturbance.motion import Size, confining_energy, size_of
 from fastmech.ensembles.ends import STOP_CODE
 from fastmech.ensembles.problem import system_of

@@ -8,11 +8,11 @@ from numpy.typing import ArrayLike
 
 from fastmech.capture.certificate import Captured, Certificate
 from fastmech.capture.mechanism import mechanism_certificate
-from fastmech.capture.scene import scene_certificate
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene, require_scene
+from fastmech.slider.capture.certificate import scene_certificate
 
 #: Certificates of mechanisms that are kept, the oldest first, by what tells mechanisms apart.
 _kept: dict[tuple[Any, ...], Certificate] = {}

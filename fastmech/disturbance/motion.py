@@ -16,18 +16,18 @@ from fastmech.ensembles import checks
 from fastmech.ensembles.fitting import damping_rate
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import Status
-from fastmech.equilibria.find import Equilibrium, degenerate_sentence
-from fastmech.equilibria.search import pulls, vanishing
 from fastmech.errors import InputError
 from fastmech.integrators.methods import ImplicitRungeKutta, find_method
 from fastmech.jit import OBSERVER_SIGNATURE, kernel
-from fastmech.mechanism.coefficients import reduce
-from fastmech.mechanism.lagrange import kinetic_energy, metric, potential_energy, potential_hessian, unit
 from fastmech.models.equilibria import RestingPlace, find_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Field, Result
 from fastmech.scene import Scene, require_scene
-from fastmech.stability.linearize import jacobian
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.equilibria import Equilibrium, degenerate_sentence
+from fastmech.slider.lagrange import kinetic_energy, metric, potential_energy, potential_hessian, unit
+from fastmech.slider.linearize import jacobian
+from fastmech.slider.theorem import pulls, vanishing
 
 #: Rows of the record, which begins with zeros and ends with the state that the step began with; the
 #: excursions' rows go on with the other coordinates, and SWUNG is when the last of them was reached.

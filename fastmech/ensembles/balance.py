@@ -13,9 +13,9 @@ from fastmech.ensembles import checks
 from fastmech.ensembles.run import run_ensemble
 from fastmech.errors import InputError
 from fastmech.integrators.methods import find_method
-from fastmech.mechanism.coefficients import reduce
-from fastmech.mechanism.lagrange import kinetic_energy, potential_energy, potential_gradient, unit
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.lagrange import kinetic_energy, potential_energy, potential_gradient, unit
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Right-hand sides of the mechanism: Lagrange's (13) and the canonical equations (14), by their terms.
 
 States are (phi, theta, phi', theta') and (phi, theta, p_phi, p_theta), momenta over m2 l^2; parameters are
-the lanes' reduced coefficients (:class:`fastmech.mechanism.coefficients.Coefficients`). Every combination of
+the lanes' reduced coefficients (:class:`fastmech.slider.coefficients.Coefficients`). Every combination of
 terms is a kernel of its own: an ensemble is given the one of the terms that its scenes have.
 """
 
@@ -17,8 +17,8 @@ from fastmech.jit import inlined, rounded_to
 from fastmech.kernels.blocks import Rates, block_kernel
 from fastmech.kernels.exponential import exp
 from fastmech.kernels.sincos import cos, reduction_limit, sin, sincos, turned
-from fastmech.mechanism.coefficients import Coefficients
-from fastmech.mechanism.equations import canonical_rates, lagrange_accelerations
+from fastmech.slider.coefficients import Coefficients
+from fastmech.slider.equations import canonical_rates, lagrange_accelerations
 
 #: Rows of the parameters that belong to terms which a scene may lack.
 FORCE, DAMPING, DECAY = 5, 6, 7

@@ -11,7 +11,7 @@ from fastmech.kernels.blocks import Block
 from fastmech.kernels.jacobians import lagrange_jacobian
 from fastmech.kernels.select import DAMPING, DECAY, FORCE, force_now, with_terms
 from fastmech.kernels.sincos import sincos
-from fastmech.mechanism.reduced import slider_ratio
+from fastmech.slider.reduced import slider_ratio
 
 _LAGRANGE = with_terms("lagrange", "damped_decaying")
 

@@ -15,8 +15,8 @@ from fastmech.intervals.arithmetic import Interval, add, div, mul, sub
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Linear, Mechanism
 from fastmech.objects import Printed
-from fastmech.stability import classify as of_scene
-from fastmech.stability.classify import Finding
+from fastmech.slider import stability as of_scene
+from fastmech.slider.stability import Finding
 
 #: Matrices are taken to be wrong by so many units of rounding of their largest entry.
 _ROUNDING = 32.0 * 2.0**-52

@@ -12,7 +12,7 @@ from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import require_own, spectra
 from fastmech.scene import Scene
-from fastmech.stability.linearize import Rest, jacobian
+from fastmech.slider.linearize import Rest, jacobian
 from fastmech.step_limits.amplification import amplifies, first_crossing
 
 #: Error of a mode's growth, a radian, that is let pass. A mode without damping sits on the edge of every

@@ -23,13 +23,13 @@ from numpy.typing import ArrayLike, NDArray
 from fastmech.arrays import Floats
 from fastmech.errors import InputError, StepWarning, shown
 from fastmech.integrators.methods import METHODS, Adams, ImplicitRungeKutta, Method, RungeKutta, find_method
-from fastmech.mechanism.coefficients import Coefficients, reduce
-from fastmech.mechanism.lagrange import potential_energy, potential_gradient, potential_hessian
 from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import assess
 from fastmech.scene import Scene
-from fastmech.stability.linearize import fill_state_matrix, require_scene, small_motion
+from fastmech.slider.coefficients import Coefficients, reduce
+from fastmech.slider.lagrange import potential_energy, potential_gradient, potential_hessian
+from fastmech.slider.linearize import fill_state_matrix, require_scene, small_motion
 from fastmech.step_limits.amplification import amplifies, first_crossing
 from fastmech.step_limits.predict import (
     GROWTH_PER_RADIAN,
@@ -89,7 +89,7 @@ def resting_eigenvalues(scene: Scene, force: float) -> NDArray[np.complex128]:
     """Eigenvalues [1/s] at the minima of the potential energy under a constant force, shape (4 minima,).
 
     A minimum is looked for from every configuration of the grid that lies lower than its neighbours: quick,
-    and enough for a warning; :func:`fastmech.equilibria.find.find_equilibria` proves that none is missing.
+    and enough for a warning; :func:`fastmech.slider.equilibria.find_equilibria` proves that none is missing.
     """
     grid = _grid()
     energy = potential_energy(scene, np.stack(grid, axis=-1), force)

@@ -35,7 +35,7 @@ from fastmech.jit import JACOBIAN, MATRIX, RHS, VECTOR, kernel, named_tuple
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Field, Printed
 from fastmech.scene import Scene
-from fastmech.stability.linearize import Rest, jacobian, linearized
+from fastmech.slider.linearize import Rest, jacobian, linearized
 from fastmech.step_limits.warning import too_long, warn_of_step
 
 

@@ -16,8 +16,8 @@ from fastmech.ensembles.run import run_ensemble
 from fastmech.errors import InputError
 from fastmech.integrators.methods import METHODS
 from fastmech.kernels.select import right_hand_side
-from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
 
 pytestmark = pytest.mark.nojit
 

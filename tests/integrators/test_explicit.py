@@ -12,8 +12,8 @@ from fastmech.integrators.methods import METHODS, Adams, RungeKutta
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import RHS_SIGNATURE, interpreted, kernel
 from fastmech.kernels.select import with_terms
-from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
 
 pytestmark = pytest.mark.nojit
 

@@ -24,8 +24,8 @@ from fastmech.jit import MATRIX, VECTOR
 from fastmech.kernels.select import DAMPING, DECAY, FORCE, FORMULATIONS
 from fastmech.kernels.steps import whole_steps
 from fastmech.kernels.work import lagrange_work
-from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
 
 pytestmark = pytest.mark.skipif(
     not llvm.get_host_cpu_features().get("fma", False),

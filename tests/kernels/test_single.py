@@ -25,8 +25,8 @@ from fastmech.jit import FLAGS
 from fastmech.kernels.blocks import in_single
 from fastmech.kernels.select import FORMULATIONS, right_hand_side
 from fastmech.kernels.sincos import REDUCTION_LIMIT_SINGLE, cos, sin, sincos
-from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
 
 Singles = NDArray[np.float32]
 SCENE = Scene(alpha=0.0)

@@ -15,13 +15,13 @@ from numpy.typing import ArrayLike
 from fastmech.arrays import Floats
 from fastmech.disturbance.motion import size_of
 from fastmech.ensembles import checks
-from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import require_own
 from fastmech.scene import STATE, Scene, nearest
-from fastmech.stability.linearize import require_rest
+from fastmech.slider.equilibria import Equilibrium
+from fastmech.slider.linearize import require_rest
 
 #: Angles lie within so many turns of zero: what is beyond was meant in degrees.
 FEW_TURNS = 4

@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats
 from fastmech.ensembles.checks import one_way
-from fastmech.equilibria.search import HALF_PI, angles, normal_form, pulls, vanishing, wrap
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.jit import MATRIX, VECTOR, kernel
-from fastmech.mechanism.coefficients import reduce
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import PARAMETERS, Scene, nearest, require_scene
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.theorem import HALF_PI, angles, normal_form, pulls, vanishing, wrap
 
 
 def check_axes(scene: Scene, axes: Mapping[str, ArrayLike], most: int = 3) -> dict[str, Floats]:
@@ -138,25 +138,12 @@ def grid_coefficients(scene: Scene, axes: Mapping[str, Floats]) -> tuple[Floats,
     )
 
 
-def check_pair(x: Any, y: Any) -> None:
-    """Refuse what are no two parameters' names with their values.
-
-    Raises:
-        InputError: they are not.
-    """
-    for name, given in (("x", x), ("y", y)):
-        if not isinstance(given, tuple | list) or len(given) != 2 or not isinstance(given[0], str):
-            raise InputError(f"{name} = {shown(given)}: must be a parameter's name and its values")
-    if x[0] == y[0]:
-        raise InputError(f"axes: {x[0]} is given twice; two different parameters are needed")
-
-
 @kernel(types.void(MATRIX, VECTOR, VECTOR, VECTOR, VECTOR))
 def fold_margins(coefficients: Floats, margin: Floats, symmetry: Floats, phi: Floats, theta: Floats) -> None:
     """Margin to the fold, and the place that becomes an equilibrium where it vanishes.
 
     Args:
-        coefficients: (n, 8) rows of ``fastmech.mechanism.coefficients.Coefficients``, the force frozen.
+        coefficients: (n, 8) rows of ``fastmech.slider.coefficients.Coefficients``, the force frozen.
         margin: (n,) [rad], positive with six equilibria (see ``balance``); NaN if degenerate; written.
         symmetry: (n,) |cos D|, zero where the scene is its own mirror image; written.
         phi, theta: (n,) [rad]: where two equilibria merge once the margin is zero; written.

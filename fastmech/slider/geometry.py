@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
-from fastmech.mechanism.coefficients import force
-from fastmech.mechanism.lagrange import angular_accelerations
-from fastmech.mechanism.reduced import slider_ratio
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import force
+from fastmech.slider.lagrange import angular_accelerations
+from fastmech.slider.reduced import slider_ratio
 
 
 class Points(NamedTuple):

@@ -1,7 +1,7 @@
 """Curves on which damping stops reaching a mode at a stable equilibrium: settling takes forever there.
 
 The slider's damper misses a mode where sin phi = 0, where sin(phi + theta) = 0 and where U_theta,theta = C
-(see ``fastmech.stability.linearize.reach``): the Hurwitz test is silent and the decay is algebraic.
+(see ``fastmech.slider.linearize.reach``): the Hurwitz test is silent and the decay is algebraic.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Floats
-from fastmech.atlas.continuation import LONGEST, distance, newton, regular, trace
-from fastmech.atlas.cover import System, apart
-from fastmech.atlas.folds import MOST_POINTS, checked_plane, finish_on_edge, inside, plane_of
-from fastmech.atlas.map import EquilibriumMap, map_equilibria
-from fastmech.atlas.systems import Plane, dead_centre, point_at, straight, unloaded
+from fastmech.atlas.continuation import LONGEST, distance, finish_on_edge, inside, newton, regular, trace
 from fastmech.objects import Drawn
 from fastmech.scene import Scene
-from fastmech.stability.linearize import SIN_PHI, SIN_PSI, UNLOADED
+from fastmech.slider.atlas.cover import System, apart
+from fastmech.slider.atlas.folds import MOST_POINTS, checked_plane, plane_of
+from fastmech.slider.atlas.map import EquilibriumMap, map_equilibria
+from fastmech.slider.atlas.systems import Plane, dead_centre, point_at, straight, unloaded
+from fastmech.slider.linearize import SIN_PHI, SIN_PSI, UNLOADED
 
 SYSTEMS: dict[str, Callable[[Plane], System]] = {
     SIN_PHI: dead_centre,

@@ -14,11 +14,11 @@ import numpy as np
 from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
 from fastmech.jit import inlined
-from fastmech.mechanism.coefficients import Coefficients, reduce
-from fastmech.mechanism.lagrange import potential_gradient, unit
-from fastmech.mechanism.reduced import metric_11, metric_determinant, potential_hessian, slider_ratio
 from fastmech.scene import Scene
 from fastmech.scene import require_scene as require_scene
+from fastmech.slider.coefficients import Coefficients, reduce
+from fastmech.slider.lagrange import potential_gradient, unit
+from fastmech.slider.reduced import metric_11, metric_determinant, potential_hessian, slider_ratio
 
 #: What an equilibrium has: its place, its proof and its force.
 ENTRIES = ("phi", "theta", "morse_index", "radius", "force")
@@ -62,7 +62,7 @@ def require_rest(scene: Any, equilibrium: Any) -> None:
 
 
 class Rest(Protocol):
-    """What is needed of an equilibrium; ``fastmech.equilibria.find.Equilibrium`` has it."""
+    """What is needed of an equilibrium; ``fastmech.slider.equilibria.Equilibrium`` has it."""
 
     @property
     def phi(self) -> float:

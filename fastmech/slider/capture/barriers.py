@@ -14,12 +14,12 @@ from enum import IntEnum
 import numpy as np
 
 from fastmech.arrays import Floats
-from fastmech.equilibria.descent import convex_radius, descend, step_off
-from fastmech.equilibria.find import Equilibria, find_equilibria
 from fastmech.errors import InputError
-from fastmech.mechanism.coefficients import reduce
 from fastmech.objects import Printed
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.descent import convex_radius, descend, step_off
+from fastmech.slider.equilibria import Equilibria, find_equilibria
 
 Turns = tuple[int, int]
 

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats
-from fastmech.mechanism import reduced
-from fastmech.mechanism.coefficients import Coefficients, force, reduce
-from fastmech.mechanism.equations import lagrange_accelerations
 from fastmech.scene import Scene
+from fastmech.slider import reduced
+from fastmech.slider.coefficients import Coefficients, force, reduce
+from fastmech.slider.equations import lagrange_accelerations
 
 
 def unit(scene: Scene) -> float:

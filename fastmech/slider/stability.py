@@ -20,14 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.equilibria.certificate import existence_radius
-from fastmech.equilibria.search import EPS, pulls
-from fastmech.equilibria.solve import morse_index
 from fastmech.jit import inlined
-from fastmech.mechanism.lagrange import unit
 from fastmech.objects import Printed
 from fastmech.scene import Scene
-from fastmech.stability.linearize import (
+from fastmech.slider.lagrange import unit
+from fastmech.slider.linearize import (
     MEANING,
     Rest,
     SmallMotion,
@@ -38,6 +35,9 @@ from fastmech.stability.linearize import (
     small_motion,
     squares,
 )
+from fastmech.slider.proof import existence_radius
+from fastmech.slider.solve import morse_index
+from fastmech.slider.theorem import EPS, pulls
 
 #: Relative rounding of a quantity made from the coefficients in some ten operations, each within EPS/2.
 ROUNDING = 16.0 * EPS
@@ -359,7 +359,7 @@ def assess_one(
     the linear damping misses a mode (LaSalle).
 
     Args:
-        coefficients: (8,) ``fastmech.mechanism.coefficients.Coefficients``, the force frozen.
+        coefficients: (8,) ``fastmech.slider.coefficients.Coefficients``, the force frozen.
         place: phi, theta [rad], within how many rad the true equilibrium is, and its Morse index (negative:
             not proved).
         roots: (4,) eigenvalues [1/s], largest real part first; written.
@@ -439,7 +439,7 @@ def classify(scene: Scene, equilibrium: Rest) -> Classification:
     negative direction is unstable, damped or not (Kelvin-Tait-Chetaev); a minimum is stable without damping
     and asymptotically stable with it, also where the linear damping misses a mode: no motion near a
     minimum keeps the slider at rest, so by LaSalle's principle all come to rest, only slowly. Verdicts are
-    those of ``map_equilibria``: both come from ``fastmech.stability.classify.assess_one``.
+    those of ``map_equilibria``: both come from ``fastmech.slider.stability.assess_one``.
 
     Raises:
         InputError: an argument is wrong, or the scene is not at rest there, for example because the

@@ -7,23 +7,15 @@ from functools import lru_cache
 import numpy as np
 
 from fastmech.arrays import Floats
+from fastmech.capture.certificate import MOST_OCTAVES, PHASE, TURNING
 from fastmech.disturbance.motion import default_method
 from fastmech.ensembles.fitting import energies
-from fastmech.mechanism.coefficients import Coefficients, reduce
-from fastmech.mechanism.reduced import metric_11, metric_determinant, potential_hessian, slider_ratio
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import Coefficients, reduce
+from fastmech.slider.reduced import metric_11, metric_determinant, potential_hessian, slider_ratio
 
-#: Coarse step times the highest frequency [rad], and times the fastest turning that the energy allows. With
-#: ``dop853`` the error of such a step is some 1e-3 by the time of capture; half of it makes that 1e-5.
-PHASE, TURNING = 1.0, 2.5
-
-#: Octaves below the scene's own step that a start may take: rates of some thousand rad/s. A start that is
-#: faster still comes out as what that step makes of it.
-MOST_OCTAVES = 7.0
-
-#: Share of a start's coarse step, at which labels begin, that measuring takes by default (an implicit method,
-#: whose error constant is larger, takes half of it), and the least share: that of the finest labels.
-MEASURING, FINEST = 0.6, 0.05
+#: Least share of a start's coarse step that measuring takes by default: that of the finest labels.
+FINEST = 0.05
 
 #: A force whose decay rate is so many times the scene's highest frequency is gone at once: while it acts, it
 #: falls by ``exp(-FALL)`` in the coarsest step.

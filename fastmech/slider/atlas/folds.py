@@ -11,12 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from fastmech.arrays import Floats
-from fastmech.atlas.axes import check_axis, check_pair, coefficient_columns, grid_coefficients, margins
-from fastmech.atlas.continuation import LONGEST, Curve, newton, trace
-from fastmech.atlas.cover import TURNS, Found, System, apart, solutions, wrapped
-from fastmech.atlas.systems import Plane, Point, cusp, families, point_at, rest, suited
+from fastmech.atlas.continuation import LONGEST, Curve, finish_on_edge, inside, newton, trace
+from fastmech.ensembles.checks import check_pair
 from fastmech.objects import Drawn, Printed
 from fastmech.scene import Scene
+from fastmech.slider.atlas.axes import check_axis, coefficient_columns, grid_coefficients, margins
+from fastmech.slider.atlas.cover import TURNS, Found, System, apart, solutions, wrapped
+from fastmech.slider.atlas.systems import Plane, Point, cusp, families, point_at, rest, suited
 
 #: Points after which no further curve is begun.
 MOST_POINTS = 40_000
@@ -26,9 +27,6 @@ PIECE, HALVINGS = 1 << 18, 24
 
 #: Scaled residual of a fold; solutions of the equations of a symmetry that are none have much larger ones.
 RESIDUAL = 1e-9
-
-#: How near to a side that it touches a curve ends.
-TOUCHING = 1e-9
 
 #: Third derivative over the loads at an end of a curve below which a cusp is looked for there.
 NEARLY = 1e-2
@@ -90,8 +88,8 @@ class FoldSet(Drawn):
 def trace_folds(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike]) -> FoldSet:
     """All fold curves of ``scene`` in a rectangle of two parameters, with their cusps.
 
-    They are found by branch and prune over positions and parameters (``fastmech.atlas.cover``), which proves
-    that none is missing; so the grid of the values does not matter. That every change of the number of
+    They are found by branch and prune over positions and parameters (``fastmech.slider.atlas.cover``), which
+    proves that none is missing; so the grid of the values does not matter. That every change of the number of
     equilibria between neighbours of the grid is crossed by a curve is checked besides.
 
     Args:
@@ -217,43 +215,10 @@ def told(plane: Plane, z: Floats) -> str:
     return ", ".join(f"{name} = {value:.6g} {units[name][1]}" for name, value in values)
 
 
-def inside(z: Floats) -> bool:
-    """Within the rectangle of the two parameters."""
-    return bool(((z[-2:] >= 0.0) & (z[-2:] <= 1.0)).all())
-
-
-def finish_on_edge(
-    equations: Callable[[Floats], tuple[Floats, Floats]], inside: Callable[[Floats], bool] = inside
-) -> Callable[[Floats, Floats], Floats]:
-    """How a curve ends: on the side of the rectangle that it crosses, or where else it is not inside."""
-
-    def finish(last: Floats, beyond: Floats) -> Floats:
-        for k in (-2, -1):
-            if 0.0 <= beyond[k] <= 1.0 or last[k] == beyond[k]:
-                continue
-            side = 0.0 if beyond[k] < 0.0 else 1.0
-            guess = last + (beyond - last) * (side - last[k]) / (beyond[k] - last[k])
-            normal = np.zeros(last.size)
-            normal[k] = 1.0
-            end = newton(equations, guess, 0.5 * LONGEST, normal)
-            if end is not None and inside(np.where(np.arange(last.size) == last.size + k, side, end)):
-                end[k] = side
-                return end
-        # Where the curve only touches the side its end is halved down to rounding.
-        while np.linalg.norm(beyond - last) > TOUCHING:
-            middle = newton(equations, 0.5 * (last + beyond), LONGEST)
-            if middle is None or np.linalg.norm(middle - last) > 0.9 * np.linalg.norm(beyond - last):
-                break
-            last, beyond = (middle, beyond) if inside(middle) else (last, middle)
-        return last
-
-    return finish
-
-
 def with_cusps(plane: Plane, line: Curve, found: list[Floats]) -> Floats:
     """The curve's points with its cusps among them; new ones are added to ``found``.
 
-    At a cusp the pulls change their sign, or two of the three xk (see ``fastmech.atlas.systems``).
+    At a cusp the pulls change their sign, or two of the three xk (see ``fastmech.slider.atlas.systems``).
     """
     p = point_at(plane, line.points.T)
     sides = np.array([*p.bent, p.pulls[2]]) >= 0.0
@@ -399,7 +364,7 @@ class FoldPoints(Drawn, tuple[FoldPoint, ...]):
 def find_folds(scene: Scene, name: str, values: ArrayLike) -> FoldPoints:
     """All folds of ``scene`` over a range of one parameter, in rising order.
 
-    They are found by branch and prune (``fastmech.atlas.cover``), which proves that none is missing.
+    They are found by branch and prune (``fastmech.slider.atlas.cover``), which proves that none is missing.
 
     Args:
         scene: gives every other parameter.

@@ -9,8 +9,11 @@ from numba import boolean, types
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.equilibria.certificate import AT_FOLD, COMPLETE, UNPROVED, Outcome, apart, certify, unbalance
-from fastmech.equilibria.search import (
+from fastmech.jit import MATRIX, STATUSES, VECTOR, inlined, interpreted, kernel, named_tuple
+from fastmech.outcome import Outcome
+from fastmech.slider.proof import AT_FOLD, COMPLETE, UNPROVED, apart, certify, unbalance
+from fastmech.slider.reduced import potential
+from fastmech.slider.theorem import (
     EPS,
     LAPS,
     MOST,
@@ -24,8 +27,6 @@ from fastmech.equilibria.search import (
     vanishing,
     wrap,
 )
-from fastmech.jit import MATRIX, STATUSES, VECTOR, inlined, interpreted, kernel, named_tuple
-from fastmech.mechanism.reduced import potential
 
 DEGENERATE = int(Outcome.DEGENERATE)
 
@@ -133,7 +134,7 @@ def solve(coefficients: Floats, inherit: bool, out: Solution) -> None:
     """Equilibria of every row of ``coefficients``, deepest first, with the outcome of the proof.
 
     Args:
-        coefficients: (n, 8) rows of ``fastmech.mechanism.coefficients.Coefficients``, the force frozen.
+        coefficients: (n, 8) rows of ``fastmech.slider.coefficients.Coefficients``, the force frozen.
         inherit: whether a row first tries Newton's method from the row before; what that gives counts only
             if its completeness is proved, else the row is searched afresh.
         out: written.

@@ -6,7 +6,7 @@ one Morse index. A branch may pass over a point more than once. Between the two 
 there are two minima that are one and the same when continued round the cusp. A **sheet** is a part of a
 branch with at most one equilibrium at a point:
 
-- Regions (see ``fastmech.atlas.sheets``) continue one another across folds by what survives there.
+- Regions (see ``fastmech.slider.atlas.sheets``) continue one another across folds by what survives there.
 - Where a branch is twice over a region, these two are sheets of their own there, and the branch's other
   sheets end at the region's border. So nothing jumps at a fold, and neither of the two is preferred.
 
@@ -41,14 +41,15 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from fastmech.arrays import Codes, Floats, Integers
-from fastmech.atlas.axes import coefficient_columns, margins
-from fastmech.equilibria.certificate import Outcome, apart
-from fastmech.equilibria.descent import slope
-from fastmech.equilibria.search import EPS, MOST
-from fastmech.equilibria.solve import INDICES, Solution, solve_rows
 from fastmech.jit import INTEGERS, MATRIX, STATUSES, inlined, kernel, named_tuple
-from fastmech.mechanism.reduced import potential_hessian
+from fastmech.outcome import Outcome
 from fastmech.scene import Scene
+from fastmech.slider.atlas.axes import coefficient_columns, margins
+from fastmech.slider.descent import slope
+from fastmech.slider.proof import apart
+from fastmech.slider.reduced import potential_hessian
+from fastmech.slider.solve import INDICES, Solution, solve_rows
+from fastmech.slider.theorem import EPS, MOST
 
 #: A partner is plain if the next candidate is this many times as far, and if both Hessians stay regular
 #: (see ``trust``) that many times as far around.

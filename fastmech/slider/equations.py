@@ -1,19 +1,19 @@
 """Equations of motion (13), (14), solved for the highest derivatives, and their derivatives by the state.
 
-Reduced quantities throughout (see :mod:`fastmech.mechanism.reduced`): forces and momenta over m2 l^2.
+Reduced quantities throughout (see :mod:`fastmech.slider.reduced`): forces and momenta over m2 l^2.
 ``force`` is the reduced force at this instant; ``None`` for it or for ``damping`` leaves the term out of
 the compiled code.
 
 Derivatives of the equations of motion with respect to the state, reduced quantities (over m2 l^2). Both
-follow from the metric and the forces of :mod:`fastmech.mechanism.reduced` by implicit differentiation: M a =
+follow from the metric and the forces of :mod:`fastmech.slider.reduced` by implicit differentiation: M a =
 r gives M da = dr - dM a, so nothing but the derivatives of M and r is written down here. Arguments as those
-of :mod:`fastmech.mechanism.equations`; ``force`` and ``damping`` are numbers, zero where absent.
+of :mod:`fastmech.slider.equations`; ``force`` and ``damping`` are numbers, zero where absent.
 """
 
 from __future__ import annotations
 
 from fastmech.jit import inlined, multiply_add
-from fastmech.mechanism.reduced import (
+from fastmech.slider.reduced import (
     Values,
     metric_11,
     metric_determinant,

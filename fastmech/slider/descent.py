@@ -12,7 +12,7 @@ import numpy as np
 
 from fastmech.arrays import Floats
 from fastmech.jit import inlined
-from fastmech.mechanism.reduced import potential_gradient, potential_hessian
+from fastmech.slider.reduced import potential_gradient, potential_hessian
 
 TURN = 2.0 * np.pi
 

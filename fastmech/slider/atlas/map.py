@@ -18,23 +18,23 @@ from numba import types
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Codes, Floats
-from fastmech.atlas.axes import check_axes, grid_coefficients
 from fastmech.atlas.resting_map import map_resting_places, told_map
-from fastmech.atlas.sheets import SheetBuilder
 from fastmech.ensembles import checks
 from fastmech.ensembles.threads import thread_count
-from fastmech.equilibria.certificate import Outcome
-from fastmech.equilibria.descent import convex_radius, descend, step_off
-from fastmech.equilibria.search import MOST, wrap
-from fastmech.equilibria.solve import INDICES, MERGE, SINGULAR, SOLUTION, Solution, solve
 from fastmech.errors import InputError
 from fastmech.jit import CUBE, MATRIX, STATUSES, kernel, named_tuple
-from fastmech.mechanism.impulse import POINTS, impulse_for, mobility
-from fastmech.mechanism.reduced import potential_hessian
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn
+from fastmech.outcome import Outcome
 from fastmech.scene import Scene
-from fastmech.stability.classify import assess_one
+from fastmech.slider.atlas.axes import check_axes, grid_coefficients
+from fastmech.slider.atlas.sheets import SheetBuilder
+from fastmech.slider.descent import convex_radius, descend, step_off
+from fastmech.slider.impulse import POINTS, impulse_for, mobility
+from fastmech.slider.reduced import potential_hessian
+from fastmech.slider.solve import INDICES, MERGE, SINGULAR, SOLUTION, Solution, solve
+from fastmech.slider.stability import assess_one
+from fastmech.slider.theorem import MOST, wrap
 
 
 class Coincidence(IntEnum):
@@ -209,7 +209,7 @@ def least_impulses(
         phi, theta: minima (n,) [rad].
         depth: (n,), over m2 l^2 [1/s^2].
         masses: m2 [kg] and m2 l^2 [kg m2], (n,).
-        on: one of :data:`fastmech.mechanism.impulse.POINTS`.
+        on: one of :data:`fastmech.slider.impulse.POINTS`.
     """
     mass, slider, lift, spring, gravity, force, *_ = coefficients.T
     rounding = ROUNDING * (np.abs(lift) + spring + gravity + 2.0 * np.abs(force))
@@ -279,14 +279,14 @@ class Slab:
 class EquilibriumMap(Drawn, Slab):
     """Equilibria over a grid; the arrays of ``Slab`` with the axes' lengths in place of n.
 
-    ``sheet`` keeps the identity of an equilibrium across the map (see ``fastmech.atlas.sheets``).
+    ``sheet`` keeps the identity of an equilibrium across the map (see ``fastmech.slider.atlas.sheets``).
     """
 
     axes: dict[str, Floats]
     sheet: NDArray[np.int32]  #: grid + (6,), -1 where there is none
     sheet_morse_index: Codes  #: (sheets,)
     sheet_branch: NDArray[np.int32]  #: (sheets,): sheets of one branch continue one another round a cusp
-    sheet_discontinuities: NDArray[np.int32]  #: (breaks, axes + 2): see ``fastmech.atlas.sheets``
+    sheet_discontinuities: NDArray[np.int32]  #: (breaks, axes + 2): see ``fastmech.slider.atlas.sheets``
 
     KIND = "equilibrium_map"
     LAYOUT = "scan_types.map_layout:map_dataset"

@@ -10,10 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.atlas.map import ROUNDING
-from fastmech.capture.barriers import BarrierTree, barrier_tree, frozen_coefficients
-from fastmech.capture.certificate import Certificate, Early, Noted
-from fastmech.capture.observe import (
+from fastmech.capture.certificate import MEASURING, PHASE, Certificate, Early, Noted
+from fastmech.disturbance.motion import Size, confining_energy, damped_times, size_of
+from fastmech.ensembles.ends import STOP_CODE
+from fastmech.ensembles.fitting import breaks_energy_bounds
+from fastmech.ensembles.run import CALL_STEPS_WITH_STOPS, Observation
+from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method, with_jacobian
+from fastmech.kernels.jacobians import lagrange_inverse, lagrange_jacobian
+from fastmech.kernels.select import right_hand_side
+from fastmech.scene import STATE, Scene
+from fastmech.slider.atlas.map import ROUNDING
+from fastmech.slider.capture.barriers import BarrierTree, barrier_tree, frozen_coefficients
+from fastmech.slider.capture.observe import (
     CAPTURE_TIME,
     FIRST_WELL,
     INTERVAL,
@@ -27,10 +35,8 @@ from fastmech.capture.observe import (
     observe_capture_decaying,
     pack,
 )
-from fastmech.capture.steps import (
+from fastmech.slider.capture.steps import (
     FINEST,
-    MEASURING,
-    PHASE,
     coarse_steps,
     gone_at_once,
     highest_frequency,
@@ -38,17 +44,9 @@ from fastmech.capture.steps import (
     shortest_step,
     step_of_fading,
 )
-from fastmech.disturbance.motion import Size, confining_energy, damped_times, size_of
-from fastmech.ensembles.ends import STOP_CODE
-from fastmech.ensembles.fitting import breaks_energy_bounds
-from fastmech.ensembles.run import CALL_STEPS_WITH_STOPS, Observation
-from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method, with_jacobian
-from fastmech.kernels.jacobians import lagrange_inverse, lagrange_jacobian
-from fastmech.kernels.select import right_hand_side
-from fastmech.mechanism.coefficients import Coefficients, reduce
-from fastmech.mechanism.lagrange import unit
-from fastmech.mechanism.reduced import metric_11, slider_ratio
-from fastmech.scene import STATE, Scene
+from fastmech.slider.coefficients import Coefficients, reduce
+from fastmech.slider.lagrange import unit
+from fastmech.slider.reduced import metric_11, slider_ratio
 from fastmech.step_limits.warning import drives_rest, is_beyond, step_limit, warn_of_step
 
 
@@ -253,6 +251,6 @@ def scene_certificate(scene: Scene) -> SceneCertificate:
     """The capture certificate of a scene, kept for the next starts of the same scene.
 
     Raises:
-        InputError: the scene's wells are not certain (see :func:`fastmech.capture.barriers.barrier_tree`).
+        InputError: the scene's wells are not certain (see :func:`fastmech.barrier_tree`).
     """
     return SceneCertificate(scene, barrier_tree(scene))

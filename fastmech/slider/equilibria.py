@@ -24,14 +24,15 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.equilibria.certificate import Outcome, existence_radius
-from fastmech.equilibria.search import EPS, pulls
-from fastmech.equilibria.solve import explain, solve_rows
 from fastmech.errors import InputError, shown
-from fastmech.mechanism.coefficients import Coefficients, force, reduce
-from fastmech.mechanism.reduced import potential_gradient, potential_hessian
 from fastmech.objects import Drawn, Field, Printed
+from fastmech.outcome import Outcome
 from fastmech.scene import Scene, require_scene
+from fastmech.slider.coefficients import Coefficients, force, reduce
+from fastmech.slider.proof import existence_radius
+from fastmech.slider.reduced import potential_gradient, potential_hessian
+from fastmech.slider.solve import explain, solve_rows
+from fastmech.slider.theorem import EPS, pulls
 
 #: How far a double root may lie from its place in |z|: the square root of rounding, and some.
 NEAR_CIRCLE = 1e-5

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats
-from fastmech.mechanism.geometry import velocities
-from fastmech.mechanism.lagrange import metric
-from fastmech.mechanism.reduced import metric_determinant, slider_ratio
 from fastmech.scene import Scene
+from fastmech.slider.geometry import velocities
+from fastmech.slider.lagrange import metric
+from fastmech.slider.reduced import metric_determinant, slider_ratio
 
 #: Points that can be struck.
 POINTS = ("M1", "M2", "M3")

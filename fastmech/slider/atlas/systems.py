@@ -1,7 +1,7 @@
 """The equations of folds, pitchforks, cusps and vanishing damping over one or two parameters.
 
 Unknowns are z = (phi, theta, u) or (phi, theta, u, v), where u and v run from 0 to 1 over the parameters'
-ranges. With the notation of ``fastmech.equilibria.search`` and xk = -Ak sin yk an equilibrium has equal
+ranges. With the notation of ``fastmech.slider.theorem`` and xk = -Ak sin yk an equilibrium has equal
 pulls A1 cos y1 = A2 cos y2 = A3 cos y3, and its Hessian is singular where x1 x2 + x2 x3 + x3 x1 = 0. The null
 vector has the parts 1/x1 : 1/x2 : 1/x3 along y1, y2, y3.
 """
@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from fastmech.arrays import Floats
-from fastmech.atlas.axes import coefficient_columns
-from fastmech.atlas.cover import System
-from fastmech.mechanism.reduced import potential_gradient, potential_hessian
 from fastmech.scene import Scene
+from fastmech.slider.atlas.axes import coefficient_columns
+from fastmech.slider.atlas.cover import System
+from fastmech.slider.reduced import potential_gradient, potential_hessian
 
 #: A part of a load that is this small beside the largest load of a plane is rounding.
 ROUNDING = 1e-14

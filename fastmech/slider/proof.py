@@ -6,30 +6,12 @@ of the reduced coefficients and of every evaluation is inside the bounds.
 
 from __future__ import annotations
 
-from enum import IntEnum
-
 import numpy as np
 
 from fastmech.arrays import Floats
-from fastmech.equilibria.search import EPS, Normal, Pulls, expected_count, gradient, hessian, wrap
 from fastmech.jit import inlined
-
-
-class Outcome(IntEnum):
-    """How far the list of equilibria is proved; kernels write it as int8."""
-
-    COMPLETE = 0
-    """Every listed equilibrium is proved to exist, and their number is the number that there are."""
-
-    AT_FOLD = 1
-    """Equilibria merge here within rounding: the merged one is listed once, as degenerate."""
-
-    DEGENERATE = 2
-    """Equilibria are not isolated (exactly, or not to be told from that within rounding); none is listed."""
-
-    UNPROVED = 3
-    """Nothing is proved; the certificate's sentence says why."""
-
+from fastmech.outcome import Outcome
+from fastmech.slider.theorem import EPS, Normal, Pulls, expected_count, gradient, hessian, wrap
 
 COMPLETE = int(Outcome.COMPLETE)
 AT_FOLD = int(Outcome.AT_FOLD)

@@ -39,7 +39,7 @@ import numpy as np
 
 from fastmech.arrays import Floats
 from fastmech.jit import inlined
-from fastmech.mechanism.reduced import potential_gradient, potential_hessian
+from fastmech.slider.reduced import potential_gradient, potential_hessian
 
 EPS = float(np.finfo(np.float64).eps)
 HALF_PI = 0.5 * np.pi
@@ -93,7 +93,7 @@ def wrap(angle: float) -> float:
 def pulls(mass: float, lift: float, spring: float, gravity: float, force: float) -> Pulls:
     """Amplitudes, phases and rounding bounds of the three sinusoids, for finite coefficients.
 
-    The bounds count the roundings of ``fastmech.mechanism.coefficients.reduce``: lift is a difference of
+    The bounds count the roundings of ``fastmech.slider.coefficients.reduce``: lift is a difference of
     two terms that were rounded before; every other coefficient has less than two relative roundings.
     """
     amplitude_phi = np.hypot(lift, force)
