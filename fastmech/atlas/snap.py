@@ -18,7 +18,7 @@ from fastmech.models.stability import assess
 from fastmech.objects import Printed
 from fastmech.scene import Scene, require_scene
 from fastmech.slider.atlas.snap import branch_of, fold_free, moving, range_of_folds, stable_at
-from fastmech.slider.equilibria import find_equilibria
+from fastmech.slider.equilibria import find_equilibria, held
 
 
 @dataclass(frozen=True, repr=False)
@@ -103,14 +103,14 @@ def find_snap(
     require_scene(system)
     parameter = moving("F0" if parameter is None else parameter)
     found = find_equilibria(system)
-    held = system.replace(F0=found.force, alpha=0.0)
+    scene = held(system, found)
     chosen = stable_at(found, equilibrium)
-    present, unit, _ = held.described()[parameter]
-    low, high = range_of_folds(held, parameter)
+    present, unit, _ = scene.described()[parameter]
+    low, high = range_of_folds(scene, parameter)
     if searched is not None:
-        low, high = _range(held, searched, parameter, present, unit)
-    branch, start = branch_of(held, parameter, chosen, (low, high))
-    below, above = fold_free(held, parameter)
+        low, high = _range(scene, searched, parameter, present, unit)
+    branch, start = branch_of(scene, parameter, chosen, (low, high))
+    below, above = fold_free(scene, parameter)
     exhaustive = low <= below and high >= above
     position = (chosen.phi, chosen.theta)
     return _snap(branch, start, parameter, unit, position, present, (low, high), exhaustive)

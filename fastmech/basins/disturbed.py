@@ -28,6 +28,7 @@ from fastmech.disturbance.motion import (
     equilibria_to_disturb,
     excess_energy,
     observe_departure,
+    short_way,
     size_of,
     uniform_ball,
 )
@@ -167,8 +168,7 @@ def disturb(
     equilibrium's norm, without the energy to leave that ball.
 
     Args:
-        scene: a scene with a damper and a constant force (``alpha = 0`` or ``F0 = 0``), or a mechanism with
-            dampers and constant loads.
+        scene: a scene or a mechanism with dampers and constant loads.
         equilibrium: one of ``find_equilibria(scene)``.
         n: number of disturbances.
         radius: size of the largest disturbance [rad].
@@ -316,10 +316,8 @@ def refuse_meeting_balls(
         InputError: it does.
     """
     places = equilibria.position
-    turning = [c.periodic for c in scene.coordinates] if isinstance(scene, Mechanism) else [True, True]
     for index in which:
-        away = np.delete(places, index, axis=0) - places[index]
-        away[:, turning] -= 2.0 * np.pi * np.round(away[:, turning] / (2.0 * np.pi))
+        away = short_way(np.delete(places, index, axis=0) - places[index], scene.turning)
         size = size_of(scene, equilibria[index])
         sizes = size(np.concatenate([away, np.zeros_like(away)], axis=1))
         if radius > 0.5 * (nearest := float(sizes.min(initial=np.inf))):

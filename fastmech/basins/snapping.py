@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Floats, Integers
-from fastmech.basins.convergence import SUBSTEPS, Indices, climb, near_saddle, tell_the_same
+from fastmech.basins.convergence import SUBSTEPS, Computations, Indices, near_saddle, tell_the_same
 from fastmech.basins.measures.labels import check_point
 from fastmech.basins.runs import Paths
 from fastmech.capture.select import require_damper
@@ -49,7 +49,7 @@ TOGETHER = 1 << 12
 
 
 @dataclass(frozen=True)
-class Switched:
+class Switched(Computations):
     """Motions (n,) from one state under F0 exp(-alpha t).
 
     The certificate is that of the force-free scene. A motion is captured by a well w once it is below B(w) in
@@ -101,16 +101,7 @@ class Switched:
         for first in range(pieces):
             # Each piece takes something of everywhere, so that all take about as long.
             members = np.arange(first, self.F0.size, pieces)
-            climb(
-                self.certificate,
-                members,
-                self.follow,
-                self.agree,
-                self.impossible,
-                self.lingers,
-                found,
-                status,
-            )
+            self.climb(members, found, status)
             if progress is not None:
                 progress(members.size)
         return found, status

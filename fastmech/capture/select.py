@@ -14,6 +14,9 @@ from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene, require_scene
 from fastmech.slider.capture.certificate import scene_certificate
 
+#: What is wrong with a scene that nothing damps.
+NO_DAMPER = "scene.beta = 0: must be greater than 0 N s/m"
+
 #: Certificates of mechanisms that are kept, the oldest first, by what tells mechanisms apart.
 _kept: dict[tuple[Any, ...], Certificate] = {}
 MOST_KEPT = 16
@@ -42,18 +45,13 @@ def require_damper(system: Any) -> None:
     Raises:
         InputError: nothing damps, or it is neither scene nor mechanism.
     """
-    if isinstance(system, Mechanism):
-        if system.damped:
-            return
+    if not isinstance(system, Mechanism):
+        require_scene(system)
+    if not system.damped:
+        lacks = f"{system.name}: has no dampers" if isinstance(system, Mechanism) else NO_DAMPER
         raise InputError(
-            f"{system.name}: has no dampers: without, nothing comes to rest and there is no attractor; "
-            "fastmech.trapped tells which states can never leave their well"
-        )
-    require_scene(system)
-    if system.beta == 0.0:
-        raise InputError(
-            "scene.beta = 0: must be greater than 0 N s/m: without damper nothing comes to rest and there "
-            "is no attractor; fastmech.trapped tells which states can never leave their well"
+            f"{lacks}: without damper nothing comes to rest and there is no attractor; fastmech.trapped "
+            "tells which states can never leave their well"
         )
 
 
@@ -64,8 +62,7 @@ def trapped(scene: Scene | Mechanism, states: ArrayLike) -> Captured:
 
     Args:
         scene: the mechanism. Where its loads fade, the wells are those of what is left.
-        states: phi, theta [rad], phi', theta' [rad/s], shape (n, 4) or (4,); of a ``Mechanism`` coordinates,
-            then rates.
+        states: coordinates [rad or m], then rates, shape (n, states) or (states,).
 
     Raises:
         InputError: not states, or the wells are not certain.

@@ -55,7 +55,7 @@ def energy_balance(
         InputError: an argument is wrong.
     """
     # Its kernel's source is written when the module is imported, which checking a request must not do.
-    from fastmech.kernels.work import lagrange_work
+    from fastmech.slider.kernels.work import lagrange_work
 
     start = checks.states("y0", y0, 4)
     if len(start) != 1:

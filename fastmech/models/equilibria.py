@@ -171,7 +171,7 @@ def find_equilibria(system: Any, at: float = math.inf) -> of_scene.Equilibria | 
 
     Args:
         system: of a ``Scene`` the force is frozen at a time; of a ``Mechanism`` loads are at their means.
-        at: that time [s], for a scene. A constant force (alpha = 0) is F0 at every time. A decaying one is
+        at: that time [s], for a scene. A constant force is the same at every time. A decaying one is
             zero at the default ``inf``, so Table 2 of the paper needs ``alpha = 0`` or ``at=0``.
 
     Where rounding hides how many equilibria there are, near a fold, or where they are not isolated, the

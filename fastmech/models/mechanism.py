@@ -186,6 +186,11 @@ class Mechanism(Printed):
         return tuple(symbol.name for symbol in (*self._symbols, *self._rates))
 
     @property
+    def turning(self) -> tuple[bool, ...]:
+        """Whether each coordinate is an angle that turns fully."""
+        return tuple(coordinate.periodic for coordinate in self.coordinates)
+
+    @property
     def loads(self) -> tuple[Load, ...]:
         """Its loads with the parameters' values."""
         return tuple(load.at(self.parameters) for load, *_ in self._parts.loads)

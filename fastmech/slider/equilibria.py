@@ -29,6 +29,7 @@ from fastmech.objects import Drawn, Field, Printed
 from fastmech.outcome import Outcome
 from fastmech.scene import Scene, require_scene
 from fastmech.slider.coefficients import Coefficients, force, reduce
+from fastmech.slider.lagrange import potential_hessian as stiffness
 from fastmech.slider.proof import existence_radius
 from fastmech.slider.reduced import potential_gradient, potential_hessian
 from fastmech.slider.solve import explain, solve_rows
@@ -379,7 +380,7 @@ def find_equilibria(scene: Scene, at: float = math.inf) -> Equilibria:
             phi=float(solution.phi[0, i]),
             theta=float(solution.theta[0, i]),
             energy=float(solution.energy[0, i]) * scene.m2 * scene.l**2 + (scene.c1 + scene.c2) * scene.l**2,
-            hessian=stiffness(scene, coefficients, solution.phi[0, i], solution.theta[0, i]),
+            hessian=stiffness(scene, (solution.phi[0, i], solution.theta[0, i]), frozen),
             morse_index=int(solution.index[0, i]),
             radius=float(solution.radius[0, i]),
             force=frozen,
@@ -395,6 +396,11 @@ def find_equilibria(scene: Scene, at: float = math.inf) -> Equilibria:
     ).of(scene)
 
 
+def held(scene: Scene, equilibrium: Equilibrium | Equilibria) -> Scene:
+    """The scene under a constant force, the one that an equilibrium holds for."""
+    return scene.replace(F0=equilibrium.force, alpha=0.0)
+
+
 def frozen_force(scene: Scene, at: float) -> float:
     """Force [N] at time ``at`` [s], which may be infinite.
 
@@ -406,23 +412,6 @@ def frozen_force(scene: Scene, at: float) -> float:
     if scene.alpha == 0.0:
         return scene.F0
     return 0.0 if math.isinf(at) else float(force(scene, at))
-
-
-def stiffness(scene: Scene, coefficients: Coefficients, phi: float, theta: float) -> Floats:
-    """Hessian of U (2, 2) [J], paper (19)."""
-    c = coefficients
-    h11, h12, h22 = potential_hessian(
-        np.sin(phi),
-        np.cos(phi),
-        np.sin(theta),
-        np.cos(theta),
-        np.sin(phi + theta),
-        c.lift,
-        c.spring,
-        c.gravity,
-        c.force,
-    )
-    return scene.m2 * scene.l**2 * np.array([[h11, h12], [h12, h22]])
 
 
 def degenerate_sentence(scene: Scene, frozen: float) -> str:

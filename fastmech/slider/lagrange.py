@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from fastmech.arrays import Floats
 from fastmech.scene import Scene
 from fastmech.slider import reduced
-from fastmech.slider.coefficients import Coefficients, force, reduce
+from fastmech.slider.coefficients import force, reduce
 from fastmech.slider.equations import lagrange_accelerations
 
 
@@ -53,32 +53,32 @@ def kinetic_energy(scene: Scene, y: ArrayLike) -> Floats:
 
 def potential_energy(scene: Scene, q: ArrayLike, constant_force: float = 0.0) -> Floats:
     """Potential energy Pi [J], paper (10), or U = Pi - F x2 where a constant force F [N] is given."""
-    trig, coefficients, f = _trigonometry(scene, q, constant_force)
-    s1, c1, s2, c2, s12, _ = trig
-    u = reduced.potential(
-        s1, c1, s2, c2, s12, coefficients.lift, coefficients.spring, coefficients.gravity, f
-    )
+    s1, c1, s2, c2, s12, _ = _trigonometry(q)
+    u = reduced.potential(s1, c1, s2, c2, s12, *_loads(scene, constant_force))
     return np.asarray(unit(scene) * u + (scene.c1 + scene.c2) * scene.l**2)
 
 
 def potential_gradient(scene: Scene, q: ArrayLike, constant_force: float = 0.0) -> Floats:
     """Gradient of Pi, or of U = Pi - F x2, with respect to (phi, theta) [J]; shape (..., 2)."""
-    trig, coefficients, f = _trigonometry(scene, q, constant_force)
-    s1, c1, s2, c2, _, c12 = trig
-    u = reduced.potential_gradient(
-        s1, c1, s2, c2, c12, coefficients.lift, coefficients.spring, coefficients.gravity, f
-    )
+    s1, c1, s2, c2, _, c12 = _trigonometry(q)
+    u = reduced.potential_gradient(s1, c1, s2, c2, c12, *_loads(scene, constant_force))
     return unit(scene) * np.stack(u, axis=-1)
 
 
 def potential_hessian(scene: Scene, q: ArrayLike, constant_force: float = 0.0) -> Floats:
     """Hessian c_(alpha beta) of Pi, or of U = Pi - F x2 [J], paper (19); shape (..., 2, 2)."""
-    trig, coefficients, f = _trigonometry(scene, q, constant_force)
-    s1, c1, s2, c2, s12, _ = trig
-    u = reduced.potential_hessian(
-        s1, c1, s2, c2, s12, coefficients.lift, coefficients.spring, coefficients.gravity, f
-    )
+    s1, c1, s2, c2, s12, _ = _trigonometry(q)
+    u = reduced.potential_hessian(s1, c1, s2, c2, s12, *_loads(scene, constant_force))
     return unit(scene) * _symmetric(*u)
+
+
+def linear(scene: Scene, q: ArrayLike) -> tuple[Floats, Floats, Floats]:
+    """Metric, the damper's coefficients and Hessian of U [kg m2, N m s, J], each (..., 2, 2)."""
+    phi = np.asarray(q, dtype=np.float64)[..., 0]
+    k, _ = reduced.slider_ratio(np.sin(phi), np.cos(phi))
+    nothing = np.zeros_like(k)
+    damping = _symmetric(scene.beta * (scene.l * k) ** 2, nothing, nothing)
+    return metric(scene, q), damping, potential_hessian(scene, q, scene.F0)
 
 
 def generalized_forces(scene: Scene, y: ArrayLike, t: ArrayLike) -> Floats:
@@ -116,13 +116,15 @@ def _symmetric(a11: Floats, a12: Floats, a22: Floats) -> Floats:
     return np.stack([np.stack([a11, a12], axis=-1), np.stack([a12, a22], axis=-1)], axis=-2)
 
 
-def _trigonometry(
-    scene: Scene, q: ArrayLike, constant_force: float
-) -> tuple[tuple[Floats, ...], Coefficients, float]:
+def _trigonometry(q: ArrayLike) -> tuple[Floats, ...]:
     phi, theta = _split(q, 2)
     total = phi + theta
-    trig = (np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta), np.sin(total), np.cos(total))
-    return trig, reduce(scene), constant_force / (scene.m2 * scene.l)
+    return np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta), np.sin(total), np.cos(total)
+
+
+def _loads(scene: Scene, constant_force: float) -> tuple[float, float, float, float]:
+    c = reduce(scene)
+    return c.lift, c.spring, c.gravity, constant_force / (scene.m2 * scene.l)
 
 
 def momenta(scene: Scene, y: ArrayLike) -> Floats:

@@ -104,52 +104,15 @@ class SmallMotion(NamedTuple):
 
 
 @inlined
-def small_motion(
-    phi: float,
-    theta: float,
-    mass: float,
-    slider: float,
-    lift: float,
-    spring: float,
-    gravity: float,
-    force: float,
-    damping: float,
-) -> SmallMotion:
-    """Matrices of the small motion about (phi, theta) from the reduced coefficients."""
-    return small_motion_at(
-        np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta),
-        mass, slider, lift, spring, gravity, force, damping,
-    )  # fmt: skip
-
-
-@inlined
-def small_motion_at(
-    s1: float,
-    c1: float,
-    s2: float,
-    c2: float,
-    mass: float,
-    slider: float,
-    lift: float,
-    spring: float,
-    gravity: float,
-    force: float,
-    damping: float,
-) -> SmallMotion:
-    """The same from sines and cosines: ``s1, c1`` of phi, ``s2, c2`` of theta."""
+def small_motion(phi: Any, theta: Any, c: Any) -> SmallMotion:
+    """Matrices of the small motion about (phi, theta); ``c`` are reduced coefficients, the force frozen."""
+    mass, slider, lift, spring, gravity, force, damping, _ = c
+    s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
     s12, c12 = s1 * c2 + c1 * s2, c1 * c2 - s1 * s2
     k = slider_ratio(s1, c1)[0]
     k11, k12, k22 = potential_hessian(s1, c1, s2, c2, s12, lift, spring, gravity, force)
-    return SmallMotion(
-        metric_11(mass, slider, k),
-        s12,
-        metric_determinant(mass, slider, k, c12),
-        k,
-        damping * k * k,
-        k11,
-        k12,
-        k22,
-    )
+    m11, determinant = metric_11(mass, slider, k), metric_determinant(mass, slider, k, c12)
+    return SmallMotion(m11, s12, determinant, k, damping * k * k, k11, k12, k22)
 
 
 @inlined
@@ -183,9 +146,7 @@ def linearized(scene: Scene, equilibrium: Rest) -> tuple[Coefficients, SmallMoti
     """
     require_rest(scene, equilibrium)
     c = reduce(scene)._replace(force=equilibrium.force / (scene.m2 * scene.l))
-    motion = small_motion(
-        equilibrium.phi, equilibrium.theta, c.mass, c.slider, c.lift, c.spring, c.gravity, c.force, c.damping
-    )
+    motion = small_motion(equilibrium.phi, equilibrium.theta, c)
     return c, SmallMotion(*(float(value) for value in motion))
 
 

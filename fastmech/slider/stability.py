@@ -366,7 +366,7 @@ def assess_one(
     """
     mass, slider, lift, spring, gravity, force, damping, _ = coefficients
     phi, theta, radius, index = place
-    s = small_motion(phi, theta, mass, slider, lift, spring, gravity, force, damping)
+    s = small_motion(phi, theta, coefficients)
     # Third derivatives of U are at most 2 loads, so an angle's error changes the Hessian by no more.
     loads = abs(lift) + (mass + 2.0) * gravity + 2.0 * spring + 2.0 * abs(force)
     e = loads * (ROUNDING + 2.0 * min(radius, 1.0))

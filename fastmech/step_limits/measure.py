@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from fastmech.arrays import Floats
 from fastmech.integrators.explicit import Batch, observe_nothing
 from fastmech.integrators.methods import Adams, Method, find_method, with_jacobian
-from fastmech.kernels.jacobians import lagrange_inverse, lagrange_jacobian
-from fastmech.kernels.select import right_hand_side
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import reduce
+from fastmech.slider.kernels.jacobians import lagrange_inverse, lagrange_jacobian
+from fastmech.slider.kernels.select import right_hand_side
 from fastmech.slider.linearize import Rest, jacobian
 from fastmech.step_limits.amplification import first_crossing
 

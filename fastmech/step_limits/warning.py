@@ -25,7 +25,7 @@ from fastmech.errors import InputError, StepWarning, shown
 from fastmech.integrators.methods import METHODS, Adams, ImplicitRungeKutta, Method, RungeKutta, find_method
 from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism
-from fastmech.models.stability import assess
+from fastmech.models.stability import assess, state_matrix
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import Coefficients, reduce
 from fastmech.slider.lagrange import potential_energy, potential_gradient, potential_hessian
@@ -35,7 +35,6 @@ from fastmech.step_limits.predict import (
     GROWTH_PER_RADIAN,
     UNDAMPED,
     is_stable,
-    small_eigenvalues,
     stable_step,
 )
 
@@ -80,8 +79,7 @@ def local_eigenvalues(scene: Scene, force: float, phi: Any, theta: Any) -> NDArr
     """Eigenvalues [1/s] of the motion linearized at rest in configurations (n,), shape (n, 4)."""
     c = reduce(scene)._replace(force=force / (scene.m2 * scene.l))
     matrices = np.empty((4, 4, phi.size))
-    own = c.mass, c.slider, c.lift, c.spring, c.gravity, c.force, c.damping
-    fill_state_matrix(small_motion(phi, theta, *own), matrices)
+    fill_state_matrix(small_motion(phi, theta, c), matrices)
     return np.asarray(np.linalg.eigvals(np.moveaxis(matrices, -1, 0)), dtype=np.complex128)
 
 
@@ -170,7 +168,7 @@ def step_warning(
     Raises:
         InputError: an argument is wrong.
     """
-    turning = [True, True]
+    turning: Sequence[bool] = (True, True)
     if isinstance(scene, Mechanism):
         turning = [str(c.symbol) not in scene.lengths for c in scene.coordinates]
     else:
@@ -187,7 +185,9 @@ def _limit_of_mechanism(mechanism: Mechanism, dt: float, method: str, fastest: f
     for place in find_equilibria(mechanism):
         if assess(mechanism.linear(place.position), place.morse_index).verdict != "unstable":
             reason = GROWS if mechanism.damped else UNDAMPED_GROWS
-            limits.append(Limit(stable_step(formula, small_eigenvalues(mechanism, place)), reason))
+            limits.append(
+                Limit(stable_step(formula, np.linalg.eigvals(state_matrix(mechanism, place))), reason)
+            )
     return min([*limits, *_turning(dt, fastest)])
 
 

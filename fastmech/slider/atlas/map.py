@@ -17,7 +17,7 @@ import numpy as np
 from numba import types
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.arrays import Codes, Floats
+from fastmech.arrays import Codes, Floats, Integers
 from fastmech.atlas.resting_map import map_resting_places, told_map
 from fastmech.ensembles import checks
 from fastmech.ensembles.threads import thread_count
@@ -29,10 +29,9 @@ from fastmech.outcome import Outcome
 from fastmech.scene import Scene
 from fastmech.slider.atlas.axes import check_axes, grid_coefficients
 from fastmech.slider.atlas.sheets import SheetBuilder
-from fastmech.slider.descent import convex_radius, descend, step_off
+from fastmech.slider.descent import convex_radius, descend, slope, step_off
 from fastmech.slider.impulse import POINTS, impulse_for, mobility
-from fastmech.slider.reduced import potential_hessian
-from fastmech.slider.solve import INDICES, MERGE, SINGULAR, SOLUTION, Solution, solve
+from fastmech.slider.solve import MERGE, SINGULAR, SOLUTION, Solution, solve
 from fastmech.slider.stability import assess_one
 from fastmech.slider.theorem import MOST, wrap
 
@@ -56,49 +55,34 @@ AT_FOLD = int(Outcome.AT_FOLD)
 COMPLETE = int(Outcome.COMPLETE)
 
 
-@kernel(types.void(MATRIX, MATRIX, MATRIX, MATRIX, INDICES, STATUSES, STATUSES, STATUSES))
-def coincidences(
-    coefficients: Floats,
-    phi: Floats,
-    theta: Floats,
-    radius: Floats,
-    index: Codes,
-    count: Codes,
-    outcome: Codes,
-    special: Codes,
-) -> None:
-    """Write the ``Coincidence`` of every row into ``special``; arguments as in ``solve``.
+@kernel(types.void(MATRIX, SOLUTION, STATUSES))
+def coincidences(coefficients: Floats, found: Solution, special: Codes) -> None:
+    """Write the ``Coincidence`` of every row into ``special``.
 
     At a fold with null direction v of the Hessian the third derivative of U along v is 3 P v1 v2 (v1 + v2),
     where P is the common pull of paper (17); it vanishes at a cusp. Rounding leaves the merged equilibrium's
     place uncertain by ``MERGE`` rad, hence the third derivative by as much of the loads.
     """
+    phi, theta, index, count = found.phi, found.theta, found.index, found.count
     for row in range(coefficients.shape[0]):
         special[row] = NONE
         _, _, lift, spring, gravity, force, _, _ = coefficients[row]
-        if outcome[row] == AT_FOLD:
+        if found.outcome[row] == AT_FOLD:
             special[row] = FOLD
             for i in range(count[row]):
                 if index[row, i] != SINGULAR:
                     continue
-                s1, c1, s2, c2 = (
-                    np.sin(phi[row, i]),
-                    np.cos(phi[row, i]),
-                    np.sin(theta[row, i]),
-                    np.cos(theta[row, i]),
-                )
-                s12, c12 = s1 * c2 + c1 * s2, c1 * c2 - s1 * s2
-                h11, h12, h22 = potential_hessian(s1, c1, s2, c2, s12, lift, spring, gravity, force)
+                _, _, h11, h12, h22 = slope(coefficients[row], phi[row, i], theta[row, i])
                 v1, v2 = (h12, -h11) if abs(h11) > abs(h22) else (h22, -h12)
                 size = np.hypot(v1, v2)
-                third = 3.0 * spring * c12 * v1 * v2 * (v1 + v2)
+                third = 3.0 * spring * np.cos(phi[row, i] + theta[row, i]) * v1 * v2 * (v1 + v2)
                 loads = abs(lift) + gravity + 2.0 * spring + 2.0 * abs(force)
                 if abs(third) <= MERGE * loads * size**3:
                     special[row] = CUSP
-        elif outcome[row] == COMPLETE:
+        elif found.outcome[row] == COMPLETE:
             for i in range(count[row]):
                 for j in range(i):
-                    if abs(wrap(phi[row, i] - phi[row, j])) <= radius[row, i] + radius[row, j]:
+                    if abs(wrap(phi[row, i] - phi[row, j])) <= found.radius[row, i] + found.radius[row, j]:
                         special[row] = DOUBLE_PROJECTION
 
 
@@ -147,28 +131,20 @@ def assess(coefficients: Floats, found: Solution, out: Assessed) -> None:
 ROUNDING = 1e-12
 
 
-@kernel(types.void(MATRIX, MATRIX, MATRIX, MATRIX, INDICES, STATUSES, STATUSES, MATRIX))
-def barriers(
-    coefficients: Floats,
-    phi: Floats,
-    theta: Floats,
-    energy: Floats,
-    index: Codes,
-    count: Codes,
-    outcome: Codes,
-    barrier: Floats,
-) -> None:
+@kernel(types.void(MATRIX, SOLUTION, MATRIX))
+def barriers(coefficients: Floats, found: Solution, barrier: Floats) -> None:
     """Write the energy of the lowest way out of every minimum into ``barrier`` (n, 6), NaN elsewhere.
 
-    Equilibria come deepest first, and energies and barriers are in the same unit; other arguments as in
-    ``solve``. Saddles are taken in rising order. One whose two sides lead down to different minima (or to
-    copies of one minimum, some turns apart) opens both wells. With four equilibria each saddle does: the
-    torus has two independent turns, and two saddles for them.
+    Equilibria come deepest first, and energies and barriers are in the same unit. Saddles are taken in rising
+    order. One whose two sides lead down to different minima (or to copies of one minimum, some turns apart)
+    opens both wells. With four equilibria each saddle does: the torus has two independent turns, and two
+    saddles for them.
     """
+    phi, theta, energy, index, count = found.phi, found.theta, found.energy, found.index, found.count
     phis, thetas, radii, slot = np.empty(6), np.empty(6), np.empty(6), np.empty(6, dtype=np.int64)
     for row in range(coefficients.shape[0]):
         barrier[row] = np.nan
-        if outcome[row] != COMPLETE:
+        if found.outcome[row] != COMPLETE:
             continue
         n, minima = int(count[row]), 0
         for i in range(n):
@@ -356,6 +332,17 @@ def map_equilibria(
     ).of(scene)
 
 
+def sheets_of_wells(scene: Scene, parameter: str, values: Floats) -> tuple[Integers, Floats]:
+    """Sheets of all wells along a parameter (wells,), and where they are [rad] (values, wells, 2), or NaN."""
+    atlas = map_equilibria(scene, {parameter: values})
+    wells = np.flatnonzero(atlas.sheet_morse_index == 0)
+    places = np.full((values.size, wells.size, 2), np.nan)
+    for w, sheet in enumerate(wells):
+        at, slot = np.nonzero(atlas.sheet == sheet)
+        places[at, w] = np.column_stack([atlas.phi[at, slot], atlas.theta[at, slot]])
+    return wells.astype(np.int64), places
+
+
 def solve_in_slabs(
     scene: Scene,
     axes: Mapping[str, Floats],
@@ -384,23 +371,13 @@ def solve_in_slabs(
         def submit(part: slice) -> tuple[Floats, Slab, list[Future[None]]]:
             coefficients, weight, constant, mass = grid_coefficients(scene, {**axes, name: axes[name][part]})
             slab = place(slice(part.start * plane, part.stop * plane))
-            blocks = [slice(k, k + BLOCK) for k in range(0, len(coefficients), BLOCK)]
-            return (
-                coefficients,
-                slab,
-                [
-                    pool.submit(
-                        solve_block,
-                        coefficients[rows],
-                        weight[rows],
-                        constant[rows],
-                        mass[rows],
-                        wells,
-                        slab.rows(rows),
-                    )
-                    for rows in blocks
-                ],
-            )
+
+            def solve_some(rows: slice) -> None:
+                own = slab.rows(rows)
+                solve_block(coefficients[rows], weight[rows], constant[rows], mass[rows], wells, own)
+
+            starts = range(0, len(coefficients), BLOCK)
+            return coefficients, slab, [pool.submit(solve_some, slice(k, k + BLOCK)) for k in starts]
 
         ahead = submit(parts[0])
         for number, part in enumerate(parts):
@@ -422,7 +399,6 @@ def solve_block(
 
     ``mass`` is m2 [kg].
     """
-    places = (coefficients, out.phi, out.theta)
     expected = np.empty(len(coefficients), dtype=np.int8)
     found = Solution(
         out.phi, out.theta, out.energy, out.radius, out.morse_index, out.count, expected, out.outcome,
@@ -432,12 +408,12 @@ def solve_block(
     out.count_stable[:] = np.count_nonzero(out.morse_index == 0, axis=1)
     own = out.hessian, out.eigenvalues, out.frequency, out.decay_time, out.verdict
     assess(coefficients, found, Assessed(*own))
-    coincidences(*places, out.radius, out.morse_index, out.count, out.outcome, out.coincidence)
+    coincidences(coefficients, found, out.coincidence)
     limits = out.shock_limit_m1, out.shock_limit_m2, out.shock_limit_m3
     for array in (out.depth, *limits):
         array[:] = np.nan
     if wells:
-        barriers(*places, out.energy, out.morse_index, out.count, out.outcome, out.depth)
+        barriers(coefficients, found, out.depth)
         out.depth[:] = out.depth - out.energy
         known = np.nonzero(np.isfinite(out.depth))
         wells_at = coefficients[known[0]], out.phi[known], out.theta[known], out.depth[known]

@@ -47,7 +47,6 @@ from fastmech.scene import Scene
 from fastmech.slider.atlas.axes import coefficient_columns, margins
 from fastmech.slider.descent import slope
 from fastmech.slider.proof import apart
-from fastmech.slider.reduced import potential_hessian
 from fastmech.slider.solve import INDICES, Solution, solve_rows
 from fastmech.slider.theorem import EPS, MOST
 
@@ -77,8 +76,7 @@ def trust(c: Floats, phi: float, theta: float) -> float:
     Each stiffness changes by at most its amplitude a radian, so the least eigenvalue outlives |det|/(|H| L),
     L the sum of the amplitudes. What has not moved this far has met no fold.
     """
-    s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
-    h11, h12, h22 = potential_hessian(s1, c1, s2, c2, s1 * c2 + c1 * s2, c[2], c[3], c[4], c[5])
+    _, _, h11, h12, h22 = slope(c, phi, theta)
     size = abs(h11) + 2.0 * abs(h12) + abs(h22)
     change = np.hypot(c[2], c[5]) + np.hypot(c[4], c[5]) + 2.0 * c[3]
     distance: float = abs(h11 * h22 - h12 * h12) / (size * change)
@@ -136,58 +134,6 @@ def nearest(
             elif distance < second:
                 second = distance
     return best, first, second
-
-
-@inlined
-def match(
-    start: Floats,
-    end: Floats,
-    phi: Floats,
-    theta: Floats,
-    index: Codes,
-    regular: Floats,
-    count: int,
-    phis: Floats,
-    thetas: Floats,
-    indices: Codes,
-    regulars: Floats,
-    counts: int,
-    between: Floats,
-    partner: Codes,
-) -> int:
-    """Write the slot in ``end`` that each equilibrium in ``start`` continues to into ``partner``, -1: none.
-
-    ``regular`` and ``regulars`` are the distances by ``trust``.
-
-    Returns:
-        the number of pairs; no slot is given twice.
-    """
-    pairs = 0
-    for i in range(count):
-        partner[i] = -1
-        if index[i] < 0:
-            continue
-        j, first, second = nearest(phi[i], theta[i], index[i], phis, thetas, indices, counts)
-        if j < 0:
-            continue
-        steady = PLAIN * first < min(regular[i], regulars[j])
-        if not (steady and first < LEAP and second > PLAIN * first):
-            x, y, reached = follow(start, end, between, phi[i], theta[i])
-            if not reached:
-                continue
-            j, first, second = nearest(x, y, index[i], phis, thetas, indices, counts)
-            if first > LEAP:
-                continue
-        taken = False
-        for k in range(i):
-            if partner[k] == j:
-                taken = True
-                partner[k] = -1
-                pairs -= 1
-        if not taken:
-            partner[i] = j
-            pairs += 1
-    return pairs
 
 
 Labels = NDArray[np.int32]
@@ -257,6 +203,44 @@ class Points(NamedTuple):
     count: Codes  # type: ignore[assignment]  #: (n,)
 
 
+@inlined
+def match(points: Points, regular: Floats, q: int, p: int, between: Floats, partner: Codes) -> int:
+    """Write the slot in row ``p`` that each equilibrium in row ``q`` continues to into ``partner``, -1: none.
+
+    ``regular`` (n, 6) are the distances by ``trust``; ``between`` (8,) is for working in.
+
+    Returns:
+        the number of pairs; no slot is given twice.
+    """
+    coefficients, phi, theta, index, count = points
+    pairs = 0
+    for i in range(count[q]):
+        partner[i] = -1
+        if index[q, i] < 0:
+            continue
+        j, first, second = nearest(phi[q, i], theta[q, i], index[q, i], phi[p], theta[p], index[p], count[p])
+        if j < 0:
+            continue
+        steady = PLAIN * first < min(regular[q, i], regular[p, j])
+        if not (steady and first < LEAP and second > PLAIN * first):
+            x, y, reached = follow(coefficients[q], coefficients[p], between, phi[q, i], theta[q, i])
+            if not reached:
+                continue
+            j, first, second = nearest(x, y, index[q, i], phi[p], theta[p], index[p], count[p])
+            if first > LEAP:
+                continue
+        taken = False
+        for k in range(i):
+            if partner[k] == j:
+                taken = True
+                partner[k] = -1
+                pairs -= 1
+        if not taken:
+            partner[i] = j
+            pairs += 1
+    return pairs
+
+
 class Place(NamedTuple):
     """Where points lie in their grid."""
 
@@ -322,22 +306,7 @@ def label_points(
                 continue
             q = p - place.strides[axis]
             m = int(count[q])
-            pairs = match(
-                coefficients[q],
-                coefficients[p],
-                phi[q],
-                theta[q],
-                index[q],
-                regular[q],
-                m,
-                phi[p],
-                theta[p],
-                index[p],
-                regular[p],
-                n,
-                between,
-                partner[axis],
-            )
+            pairs = match(points, regular, q, p, between, partner[axis])
             border[axis] = True
             if pairs > 0 and m == n and pairs == known[p] and pairs == known[q]:
                 if settled:
@@ -434,24 +403,13 @@ class Borders:
     label: list[Any] = field(default_factory=lambda: _none(2, MOST, dtype=np.int32))  #: (edges, 2, 6)
     angles: list[Any] = field(default_factory=lambda: _none(2, 2, MOST, dtype=np.float64))  #: phi and theta
 
-    def add(
-        self,
-        offset: int,
-        second: Integers,
-        first: Integers,
-        axis: Integers,
-        partner: Codes,
-        label: Labels,
-        phi: Floats,
-        theta: Floats,
-    ) -> None:
-        """Keep edges between rows of ``label``, ``phi`` and ``theta``; row 0 is point ``offset``."""
-        ends = np.stack([first, second], axis=1)
+    def add(self, offset: int, ends: Integers, edges: Edges, points: Points, label: Labels) -> None:
+        """Keep edges between rows ``ends`` (edges, 2) of points and labels; row 0 is point ``offset``."""
         self.point.append(ends + offset)
-        self.axis.append(axis)
-        self.partner.append(partner.copy())
+        self.axis.append(edges.borders[: len(ends), 1])
+        self.partner.append(edges.partners[: len(ends)].copy())
         self.label.append(label[ends])
-        self.angles.append(np.stack([phi[ends], theta[ends]], axis=2))
+        self.angles.append(np.stack([points.phi[ends], points.theta[ends]], axis=2))
 
     def joined(self) -> Borders:
         """The same in one array each."""
@@ -713,19 +671,12 @@ class SheetBuilder:
         partners = np.empty((n * len(lengths), MOST), dtype=np.int8)
         filled = np.zeros(1, dtype=np.int64)
         own: Any = arrays
-        place, edges = Place(ghosts, self._done - ghosts, strides, lengths), Edges(borders, partners, filled)
-        forest.regions = label_points(Points(*own), place, forest.regions, forest.trees, label, edges)
+        points, edges = Points(*own), Edges(borders, partners, filled)
+        place = Place(ghosts, self._done - ghosts, strides, lengths)
+        forest.regions = label_points(points, place, forest.regions, forest.trees, label, edges)
         rows, axis = borders[: filled[0]].T
-        self._borders.add(
-            self._done - ghosts,
-            rows,
-            rows - strides[axis],
-            axis,
-            partners[: filled[0]],
-            label,
-            np.asarray(arrays[1], dtype=np.float64),
-            np.asarray(arrays[2], dtype=np.float64),
-        )
+        ends = np.stack([rows - strides[axis], rows], axis=1)
+        self._borders.add(self._done - ghosts, ends, edges, points, label)
         plane = int(strides[0])
         self._tail = (*(array[-plane:].copy() for array in arrays), label[-plane:].copy())
         self._labels.append(label[ghosts:].copy() if ghosts else label)

@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
 from fastmech.capture.certificate import MEASURING, PHASE, Certificate, Early, Noted
-from fastmech.disturbance.motion import Size, confining_energy, damped_times, size_of
+from fastmech.disturbance.motion import damped_times
 from fastmech.ensembles.ends import STOP_CODE
 from fastmech.ensembles.fitting import breaks_energy_bounds
 from fastmech.ensembles.run import CALL_STEPS_WITH_STOPS, Observation
 from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method, with_jacobian
-from fastmech.kernels.jacobians import lagrange_inverse, lagrange_jacobian
-from fastmech.kernels.select import right_hand_side
 from fastmech.scene import STATE, Scene
 from fastmech.slider.atlas.map import ROUNDING
 from fastmech.slider.capture.barriers import BarrierTree, barrier_tree, frozen_coefficients
@@ -45,6 +43,9 @@ from fastmech.slider.capture.steps import (
     step_of_fading,
 )
 from fastmech.slider.coefficients import Coefficients, reduce
+from fastmech.slider.equilibria import held
+from fastmech.slider.kernels.jacobians import lagrange_inverse, lagrange_jacobian
+from fastmech.slider.kernels.select import right_hand_side
 from fastmech.slider.lagrange import unit
 from fastmech.slider.reduced import metric_11, slider_ratio
 from fastmech.step_limits.warning import drives_rest, is_beyond, step_limit, warn_of_step
@@ -68,7 +69,7 @@ class SceneCertificate(Certificate):
     @property
     def held(self) -> Scene:
         """The scene with the force that its equilibria hold for."""
-        return self.system.replace(F0=self.tree.equilibria.force, alpha=0.0)
+        return held(self.system, self.tree.equilibria)
 
     @property
     def joule(self) -> float:  # type: ignore[override]
@@ -160,10 +161,6 @@ class SceneCertificate(Certificate):
         """See the base class."""
         return shortest_step(reduce(self.system))
 
-    def damped_times(self, method: str, until: float, ratio: float = 2.0) -> Floats:
-        """By the damper's rate."""
-        return damped_times(self.system, method, until, ratio)
-
     def early(self, method: Method) -> Early | None:
         """A force that dies out at once, and what a strong damper stops."""
         scene, rest, c = self.system, self, reduce(self.system)
@@ -186,24 +183,6 @@ class SceneCertificate(Certificate):
         c = reduce(self.system)
         most = (c.force if self.decays else 0.0) if push is None else push
         return energy_change(c, np.abs(most), states, apart)
-
-    def size(self, equilibrium: int) -> Size:
-        """See :func:`fastmech.disturbance.motion.size_at`."""
-        e = self.tree.equilibria[equilibrium]
-        return size_of(self.held, e)
-
-    @property
-    def places(self) -> Floats:
-        """See the base class."""
-        places = np.zeros((len(self.tree.equilibria), 4))
-        places[:, 0], places[:, 1] = self.tree.equilibria.phi, self.tree.equilibria.theta
-        return places
-
-    def confining(self, radius: float) -> Floats:
-        """See the base class."""
-        held, wells = self.held, [self.tree.equilibria[w] for w in self.tree.wells]
-        floor = self.energies[list(self.tree.wells)]
-        return np.asarray(floor + np.array([confining_energy(held, e, radius) for e in wells]) / unit(held))
 
     def measuring_steps(self, starts: Floats, method: str) -> Floats:
         """A share of the coarse step, and no longer than is stable, as far down as labels go."""

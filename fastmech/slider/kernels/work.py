@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from fastmech.jit import JACOBIAN_SIGNATURE, RHS_SIGNATURE, kernel
 from fastmech.kernels.blocks import Block
-from fastmech.kernels.jacobians import lagrange_jacobian
-from fastmech.kernels.select import DAMPING, DECAY, FORCE, force_now, with_terms
 from fastmech.kernels.sincos import sincos
+from fastmech.slider.kernels.jacobians import lagrange_jacobian
+from fastmech.slider.kernels.select import DAMPING, DECAY, FORCE, force_now, with_terms
 from fastmech.slider.reduced import slider_ratio
 
 _LAGRANGE = with_terms("lagrange", "damped_decaying")
@@ -42,6 +42,6 @@ def counting_lagrange(t: float, Y: Block, dY: Block, p: Block) -> None:
 
 @kernel(JACOBIAN_SIGNATURE)
 def counting_jacobian(t: float, Y: Block, J: Block, p: Block) -> None:
-    """As :func:`fastmech.kernels.jacobians.lagrange_jacobian`; counts a call."""
+    """As :func:`fastmech.slider.kernels.jacobians.lagrange_jacobian`; counts a call."""
     p[JACOBIANS, 0] += 1.0
     lagrange_jacobian(t, Y, J, p)

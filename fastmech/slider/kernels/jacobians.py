@@ -11,9 +11,9 @@ import numpy as np
 
 from fastmech.jit import INVERSE_SIGNATURE, JACOBIAN_SIGNATURE, inlined, kernel
 from fastmech.kernels.blocks import Block
-from fastmech.kernels.select import DAMPING, DECAY, FORCE, force_now
 from fastmech.kernels.sincos import REDUCTION_LIMIT, sincos
 from fastmech.slider.equations import canonical_tangent, lagrange_tangent
+from fastmech.slider.kernels.select import DAMPING, DECAY, FORCE, force_now
 
 
 @inlined
