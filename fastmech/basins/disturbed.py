@@ -28,7 +28,6 @@ from fastmech.disturbance.motion import (
     equilibria_to_disturb,
     excess_energy,
     observe_departure,
-    short_way,
     size_of,
     uniform_ball,
 )
@@ -38,7 +37,7 @@ from fastmech.ensembles.run import Ensemble, Observation, Progress, run_ensemble
 from fastmech.ensembles.status import ENDS, FAILURES, Status, failure_counts, failure_line
 from fastmech.errors import InputError, StepWarning
 from fastmech.models.equilibria import RestingPlace
-from fastmech.models.mechanism import Mechanism
+from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.objects import Drawn, Field
 from fastmech.scene import Scene
 from fastmech.slider.equilibria import Equilibrium

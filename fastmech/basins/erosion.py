@@ -30,12 +30,12 @@ from fastmech.basins.measures.norm import (
 )
 from fastmech.basins.shock import minimal_shock
 from fastmech.capture.select import require_damper
-from fastmech.disturbance.motion import require_constant_force, short_way
+from fastmech.disturbance.motion import require_constant_force
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
 from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import find_equilibria
-from fastmech.models.mechanism import Mechanism
+from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.objects import Drawn
 from fastmech.scene import Scene
 from fastmech.slider.atlas.map import sheets_of_wells

@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.disturbance.motion import Size, confining_energy, damped_times, short_way, size_of
+from fastmech.disturbance.motion import Size, confining_energy, damped_times, size_of
 from fastmech.ensembles.run import CALL_STEPS_WITH_STOPS, Observation
 from fastmech.integrators.methods import Method, find_method
+from fastmech.models.mechanism import short_way
 
 #: Coarse step times the highest frequency [rad], and times the fastest turning that the energy allows. With
 #: ``dop853`` the error of such a step is some 1e-3 by the time of capture; half of it makes that 1e-5.

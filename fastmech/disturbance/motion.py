@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -114,14 +113,6 @@ def size_at(system: Scene | Mechanism, *position: float) -> Size:
 def size_of(system: Scene | Mechanism, e: Equilibrium | RestingPlace) -> Size:
     """The norm at an equilibrium of a scene with a constant force, or of a mechanism."""
     return size_at(system, *e.position)
-
-
-def short_way(away: Floats, turning: Sequence[bool]) -> Floats:
-    """Departures (..., n or states) with angles, of which ``turning`` (n,) tells, the short way."""
-    own = away[..., : len(turning)]
-    with np.errstate(invalid="ignore"):
-        turns = np.where(turning, np.round(own / (2.0 * np.pi)), 0.0)
-    return np.concatenate([own - 2.0 * np.pi * turns, away[..., len(turning) :]], axis=-1)
 
 
 def excess_energy(system: Scene | Mechanism, e: Equilibrium | RestingPlace, y: Floats) -> Floats:

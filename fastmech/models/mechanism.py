@@ -457,3 +457,11 @@ def _parameters(given: Any) -> tuple[dict[str, float], dict[str, str]]:
             raise InputError(f"parameters.{name}: is given twice")
         values[name] = float(value)
     return values, units
+
+
+def short_way(away: Floats, turning: Sequence[bool]) -> Floats:
+    """Departures (..., n or states) with angles, of which ``turning`` (n,) tells, the short way."""
+    own = away[..., : len(turning)]
+    with np.errstate(invalid="ignore"):
+        turns = np.where(turning, np.round(own / (2.0 * np.pi)), 0.0)
+    return np.concatenate([own - 2.0 * np.pi * turns, away[..., len(turning) :]], axis=-1)

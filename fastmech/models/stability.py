@@ -130,7 +130,7 @@ def state_matrix(system: Scene | Mechanism, equilibrium: Any) -> Floats:
     Raises:
         InputError: the equilibrium is none, or another system's.
     """
-    if isinstance(system, Scene):
+    if not isinstance(system, Mechanism):
         return jacobian(system, equilibrium)
     mass, damping, stiffness = require_own(system, equilibrium)
     rates = np.linalg.solve(mass, np.concatenate([-stiffness, -damping], axis=1))

@@ -270,20 +270,12 @@ def too_long(method: Method, c: Coefficients, starts: Floats, dt: Floats) -> NDA
     return beyond
 
 
-def is_beyond(scene: Scene, dt: float, steps: float, method: str) -> bool:
-    """Whether so many steps of dt [s] make damped motion grow that rests, or one step motion that passes.
+def grows(scene: Scene, dt: float, steps: float, method: str, damped: bool = True) -> bool:
+    """Whether so many steps of dt [s] make motion grow that rests, or one step motion that passes.
 
-    It is asked at the minima and all over the torus.
+    It is asked at the minima and all over the torus, of motion that is ``damped`` or else of any.
     """
-    return _grows_in(scene, dt, steps, method, -GROWTH_PER_RADIAN)
-
-
-def drives_rest(scene: Scene, dt: float, steps: float, method: str) -> bool:
-    """Whether so many steps of dt [s] make motion grow, damped or not: where it rests is then their doing."""
-    return _grows_in(scene, dt, steps, method, UNDAMPED)
-
-
-def _grows_in(scene: Scene, dt: float, steps: float, method: str, direction: float) -> bool:
+    direction = -GROWTH_PER_RADIAN if damped else UNDAMPED
     formula = find_method(method)
     if isinstance(formula, ImplicitRungeKutta) or dt == 0.0:
         return False

@@ -48,7 +48,7 @@ from fastmech.slider.kernels.jacobians import lagrange_inverse, lagrange_jacobia
 from fastmech.slider.kernels.select import right_hand_side
 from fastmech.slider.lagrange import unit
 from fastmech.slider.reduced import metric_11, slider_ratio
-from fastmech.step_limits.warning import drives_rest, is_beyond, step_limit, warn_of_step
+from fastmech.step_limits.warning import grows, step_limit, warn_of_step
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,7 @@ class SceneCertificate(Certificate):
 
     def is_beyond(self, dt: float, steps: float, method: str) -> bool:
         """By linear theory."""
-        return is_beyond(self.system, dt, steps, method)
+        return grows(self.system, dt, steps, method)
 
     def coarse_steps(self, starts: Floats) -> Floats:
         """From frequencies and energies."""
@@ -203,7 +203,7 @@ class SceneCertificate(Certificate):
 
     def drives_rest(self, dt: float, steps: float, method: str) -> bool:
         """By linear theory."""
-        return drives_rest(self.system, dt, steps, method)
+        return grows(self.system, dt, steps, method, damped=False)
 
 
 def energy_change(c: Coefficients, push: Floats | float, states: Floats, apart: Floats) -> Floats:
