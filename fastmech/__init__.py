@@ -52,9 +52,6 @@ if TYPE_CHECKING:
     from fastmech import samplers as samplers
     from fastmech.atlas.critical import CriticalValues, critical_values
     from fastmech.atlas.critical_curves import CriticalCurves, critical_curves
-    from fastmech.atlas.damping import UndampedSet, trace_undamped
-    from fastmech.atlas.folds import FoldPoints, FoldSet, find_folds, trace_folds
-    from fastmech.atlas.map import EquilibriumMap, map_equilibria
     from fastmech.atlas.resting_map import RestingMap
     from fastmech.atlas.snap import Snap, find_snap
     from fastmech.attractors.branches import FrequencyResponse, frequency_response
@@ -86,17 +83,14 @@ if TYPE_CHECKING:
     from fastmech.basins.snapping import SnappingMap, critical_forces, map_snapping
     from fastmech.basins.well_numbers import well_numbers, well_of_number
     from fastmech.bench.frontier import WorkPrecision, work_precision
-    from fastmech.capture.barriers import barrier_tree
     from fastmech.capture.select import trapped
     from fastmech.device_report import report
     from fastmech.disturbance.motion import DisturbedMotion, LinearRange, disturbed_motion, linear_range
     from fastmech.ensembles.integrate import Trajectories, integrate, memory
     from fastmech.ensembles.status import Status
     from fastmech.ensembles.system import System
-    from fastmech.equilibria.find import Equilibria, Equilibrium
     from fastmech.errors import InputError, StepWarning
     from fastmech.kernels.sincos import cos, sin
-    from fastmech.mechanism.geometry import reactions
     from fastmech.models.coordinates import angles, lengths
     from fastmech.models.elements import Body, Damper, Force, Spring, Torque, TorsionDamper, TorsionSpring
     from fastmech.models.equilibria import RestingPlace, RestingPlaces, find_equilibria
@@ -104,7 +98,13 @@ if TYPE_CHECKING:
     from fastmech.models.stability import Stability, classify
     from fastmech.plots.animation import animate
     from fastmech.scene import Scene
-    from fastmech.stability.classify import Classification
+    from fastmech.slider.atlas.damping import UndampedSet, trace_undamped
+    from fastmech.slider.atlas.folds import FoldPoints, FoldSet, find_folds, trace_folds
+    from fastmech.slider.atlas.map import EquilibriumMap, map_equilibria
+    from fastmech.slider.capture.barriers import barrier_tree
+    from fastmech.slider.equilibria import Equilibria, Equilibrium
+    from fastmech.slider.geometry import reactions
+    from fastmech.slider.stability import Classification
     from fastmech.step_limits.predict import largest_stable_step
     from fastmech.step_limits.warning import step_warning
     from fastmech.store.read import Results, open_results
@@ -120,9 +120,9 @@ except metadata.PackageNotFoundError:  # run from its sources, not installed
 _NAMES = {
     "atlas.critical": "CriticalValues critical_values",
     "atlas.critical_curves": "CriticalCurves critical_curves",
-    "atlas.damping": "UndampedSet trace_undamped",
-    "atlas.folds": "FoldPoints FoldSet find_folds trace_folds",
-    "atlas.map": "EquilibriumMap map_equilibria",
+    "slider.atlas.damping": "UndampedSet trace_undamped",
+    "slider.atlas.folds": "FoldPoints FoldSet find_folds trace_folds",
+    "slider.atlas.map": "EquilibriumMap map_equilibria",
     "atlas.resting_map": "RestingMap",
     "atlas.snap": "Snap find_snap",
     "attractors.branches": "FrequencyResponse frequency_response",
@@ -148,17 +148,17 @@ _NAMES = {
     "basins.snapping": "SnappingMap critical_forces map_snapping",
     "basins.well_numbers": "well_numbers well_of_number",
     "bench.frontier": "WorkPrecision work_precision",
-    "capture.barriers": "barrier_tree",
+    "slider.capture.barriers": "barrier_tree",
     "capture.select": "trapped",
     "device_report": "report",
     "disturbance.motion": "DisturbedMotion LinearRange disturbed_motion linear_range",
     "ensembles.integrate": "Trajectories integrate memory",
     "ensembles.status": "Status",
     "ensembles.system": "System",
-    "equilibria.find": "Equilibria Equilibrium",
+    "slider.equilibria": "Equilibria Equilibrium",
     "errors": "InputError StepWarning",
     "kernels.sincos": "cos sin",
-    "mechanism.geometry": "reactions",
+    "slider.geometry": "reactions",
     "models.coordinates": "angles lengths",
     "models.elements": "Body Damper Force Spring Torque TorsionDamper TorsionSpring",
     "models.equilibria": "RestingPlace RestingPlaces find_equilibria",
@@ -166,7 +166,7 @@ _NAMES = {
     "models.stability": "Stability classify",
     "plots.animation": "animate",
     "scene": "Scene",
-    "stability.classify": "Classification",
+    "slider.stability": "Classification",
     "step_limits.predict": "largest_stable_step",
     "step_limits.warning": "step_warning",
     "store.read": "Results open_results",

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from fastmech.arrays import Floats
-from fastmech.atlas.snap import MOVING, Snap, find_snap
+from fastmech.atlas.snap import Snap, find_snap
 from fastmech.basins.disturbed import disturb, return_quantile
 from fastmech.basins.erosion import wells_along
 from fastmech.basins.label import label_starts
@@ -30,7 +30,6 @@ from fastmech.basins.map import map_basins
 from fastmech.basins.measures.fractions import basin_stability
 from fastmech.basins.shock_limit import Blow, proved_limit, shock_limit
 from fastmech.errors import InputError, shown
-from fastmech.mechanism.impulse import POINTS
 from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import classify
@@ -41,6 +40,8 @@ from fastmech.reports import Stage, no_stage, table, to_html, to_pdf
 from fastmech.results import Dataset, coordinate_units
 from fastmech.scan_types.map_layout import drawing_group
 from fastmech.scene import Scene, nearest, path_of
+from fastmech.slider.atlas.snap import MOVING
+from fastmech.slider.impulse import POINTS
 from fastmech.store.provenance import history_line
 
 if TYPE_CHECKING:

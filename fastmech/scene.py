@@ -135,6 +135,21 @@ class Scene:
         """Values of the parameters by name."""
         return {name: getattr(self, name) for name in PARAMETERS}
 
+    @property
+    def state(self) -> tuple[str, ...]:
+        """Names of the states: coordinates, then rates."""
+        return STATE
+
+    @property
+    def turning(self) -> tuple[bool, ...]:
+        """Whether each coordinate is an angle that turns fully."""
+        return True, True
+
+    @property
+    def damped(self) -> bool:
+        """Whether the damper takes energy."""
+        return self.beta > 0.0
+
     def replace(self, **changes: Any) -> Self:
         """A scene with some parameters changed, validated again."""
         return type(self)(**(self.parameters | changes))

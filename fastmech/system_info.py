@@ -11,7 +11,7 @@ from numba.core import config
 from fastmech.ensembles.threads import thread_count
 from fastmech.jit import compiled_anew
 from fastmech.kernel_cache import cache_directory
-from fastmech.kernels.select import with_terms
+from fastmech.slider.kernels.select import with_terms
 from fastmech.store.provenance import processor_name
 
 LIBRARIES = ("numba", "llvmlite", "numpy", "scipy", "h5py")

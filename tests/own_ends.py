@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fastmech as fm
-from fastmech.mechanism.lagrange import (
+from fastmech.slider.lagrange import (
     kinetic_energy,
     potential_energy,
     potential_gradient,

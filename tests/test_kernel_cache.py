@@ -18,7 +18,7 @@ import pytest
 from numba import types
 
 from fastmech import jit, kernel_cache
-from fastmech.kernels.select import with_terms
+from fastmech.slider.kernels.select import with_terms
 
 pytestmark = pytest.mark.skipif(
     numba.config.DISABLE_JIT, reason="nothing is compiled where the just-in-time compiler is off"
@@ -53,7 +53,7 @@ import numba, numpy as np
 before = numba.config.CACHE_DIR
 import fastmech
 from fastmech.kernel_cache import cache_directory
-from fastmech.kernels.select import with_terms
+from fastmech.slider.kernels.select import with_terms
 rhs = with_terms("lagrange", "free")
 sys.path.insert(0, sys.argv[1])
 import users_module
@@ -77,7 +77,7 @@ from fastmech import kernel_cache
 kernel_cache.cache_directory()
 importlib.import_module(sys.argv[1])
 shutil.copyfile(sys.argv[3], sys.argv[2])
-from fastmech.kernels.select import with_terms
+from fastmech.slider.kernels.select import with_terms
 rhs = with_terms("lagrange", "free")
 Y = np.array([[0.7], [0.3], [0.0], [0.0]])
 dY = np.zeros((4, 1))
@@ -171,7 +171,7 @@ def test_an_edited_source_gives_a_new_directory_and_the_new_answer(
     assert edited["answer"][2] == pytest.approx(2 * first["answer"][2], rel=1e-14)
 
 
-@pytest.mark.parametrize("loaded", ["fastmech.mechanism.reduced", "fastmech.jit"])
+@pytest.mark.parametrize("loaded", ["fastmech.slider.reduced", "fastmech.jit"])
 def test_an_edit_while_a_process_compiles_spoils_nothing(loaded: str, tmp_path: Path) -> None:
     """Whether the process has read the edited file before the edit or reads it after it.
 

@@ -1,1 +1,1 @@
-"""Equilibria over parameters: certified maps, sheets, folds, wells, and the load at which one snaps."""
+"""Equilibria over parameters: maps, critical values and curves, and the load at which a position ends."""

@@ -28,6 +28,9 @@ CLOSED, LEFT, CUT_SHORT = "closed", "left the rectangle", "cut short"
 #: Newton's method ends when a step is this short.
 SETTLED = 1e-14
 
+#: How near to a side that it touches a curve ends.
+TOUCHING = 1e-9
+
 MOST_STEPS = 20_000
 
 #: Singular values below this part of the largest one are zero within rounding.
@@ -159,3 +162,36 @@ def distance(curve: Floats, point: Floats, apart: Callable[[Floats, Floats], Flo
     gaps = np.linalg.norm(here[:-1] - share[:, None] * along, axis=1)
     nearest = int(np.argmin(gaps))
     return float(gaps[nearest]), nearest
+
+
+def inside(z: Floats) -> bool:
+    """Within the rectangle of the two parameters."""
+    return bool(((z[-2:] >= 0.0) & (z[-2:] <= 1.0)).all())
+
+
+def finish_on_edge(
+    equations: Equations, inside: Callable[[Floats], bool] = inside
+) -> Callable[[Floats, Floats], Floats]:
+    """How a curve ends: on the side of the rectangle that it crosses, or where else it is not inside."""
+
+    def finish(last: Floats, beyond: Floats) -> Floats:
+        for k in (-2, -1):
+            if 0.0 <= beyond[k] <= 1.0 or last[k] == beyond[k]:
+                continue
+            side = 0.0 if beyond[k] < 0.0 else 1.0
+            guess = last + (beyond - last) * (side - last[k]) / (beyond[k] - last[k])
+            normal = np.zeros(last.size)
+            normal[k] = 1.0
+            end = newton(equations, guess, 0.5 * LONGEST, normal)
+            if end is not None and inside(np.where(np.arange(last.size) == last.size + k, side, end)):
+                end[k] = side
+                return end
+        # Where the curve only touches the side its end is halved down to rounding.
+        while np.linalg.norm(beyond - last) > TOUCHING:
+            middle = newton(equations, 0.5 * (last + beyond), LONGEST)
+            if middle is None or np.linalg.norm(middle - last) > 0.9 * np.linalg.norm(beyond - last):
+                break
+            last, beyond = (middle, beyond) if inside(middle) else (last, middle)
+        return last
+
+    return finish

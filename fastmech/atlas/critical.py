@@ -17,11 +17,11 @@ from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats
 from fastmech.atlas.resting_map import RestingMap, map_resting_places, resting_places_at
-from fastmech.equilibria.certificate import Outcome
 from fastmech.errors import InputError, shown
-from fastmech.models.mechanism import Mechanism
+from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.models.stability import VERDICTS
 from fastmech.objects import Field, Printed, Result
+from fastmech.outcome import Outcome
 
 #: Relative width at which a value is located, and halvings at most.
 WIDTH, HALVINGS = 4.0 * 2.0**-52, 120
@@ -186,13 +186,9 @@ def narrowed(
 def named(mechanism: Mechanism, names: Iterable[str], a: Known, b: Known) -> tuple[Any, Floats, float]:
     """What changes between two lists that are next to each other, where, and the frequency [rad/s] there."""
     less, more = (a, b) if len(a.position) <= len(b.position) else (b, a)
-    turning = np.array([c.periodic for c in mechanism.coordinates])
 
     def apart(one: Floats, other: Floats) -> Floats:
-        away = one[:, None] - other
-        return np.asarray(
-            np.abs(np.where(turning, np.remainder(away + np.pi, 2 * np.pi) - np.pi, away)).max(2)
-        )
+        return np.asarray(np.abs(short_way(one[:, None] - other, mechanism.turning)).max(2))
 
     unknown = np.full(len(mechanism.coordinates), np.nan)
     left = list(range(len(more.position)))
@@ -205,9 +201,7 @@ def named(mechanism: Mechanism, names: Iterable[str], a: Known, b: Known) -> tup
     if len(left) == 2:
         one, other = more.position[left]
         size = float(apart(one[None], other[None])[0, 0])
-        middle = one + 0.5 * np.where(
-            turning, np.remainder(other - one + np.pi, 2 * np.pi) - np.pi, other - one
-        )
+        middle = one + 0.5 * short_way(other - one, mechanism.turning)
         beside = apart(middle[None], less.position).min(initial=np.inf)
         changed = [(i, j) for i, j in pairs if less.index[i] != more.index[j]]
         return "pitchfork" if beside < EVENLY * size and changed else "fold", middle, 0.0

@@ -17,16 +17,15 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from fastmech.arrays import Floats
-from fastmech.atlas.axes import check_pair
-from fastmech.atlas.continuation import LONGEST, Curve, Equations, distance, newton, trace
+from fastmech.atlas.continuation import LONGEST, Curve, Equations, distance, finish_on_edge, newton, trace
 from fastmech.atlas.critical import Known, Pairs, changes, named, narrowed
 from fastmech.atlas.defining import Balance
-from fastmech.atlas.folds import finish_on_edge
 from fastmech.atlas.resting_map import map_resting_places
-from fastmech.equilibria.certificate import Outcome
+from fastmech.ensembles.checks import check_pair
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Field
+from fastmech.outcome import Outcome
 
 #: Halvings of an edge of the grid before Newton's method is tried.
 HALVINGS = 10

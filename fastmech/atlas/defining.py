@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
 from fastmech.atlas.continuation import newton
-from fastmech.models.mechanism import Linear, Mechanism
+from fastmech.models.mechanism import Linear, Mechanism, short_way
 from fastmech.models.stability import spectra
 
 #: How far Newton's method may go to where flutter begins.
@@ -61,7 +61,7 @@ class Balance:
         self.size = np.array(
             [1.0 if c.periodic else (c.high - c.low) / (2.0 * np.pi) for c in mechanism.coordinates]
         )
-        self.turning = np.array([c.periodic for c in mechanism.coordinates])
+        self.turning = np.array(mechanism.turning)
         self._by = np.concatenate([self.size, self.span])
         self.energy, self.rate = 1.0, 1.0  # units of what follows
 
@@ -80,10 +80,7 @@ class Balance:
 
     def apart(self, a: Floats, b: Floats) -> Floats:
         """Difference of points, angles the short way."""
-        gap = np.array(a - b)
-        own = gap[..., : self.n]
-        own[:] = np.where(self.turning, np.remainder(own + np.pi, 2.0 * np.pi) - np.pi, own)
-        return gap
+        return short_way(a - b, self.mechanism.turning)
 
     def in_range(self, z: Floats) -> bool:
         """Whether coordinates and parameters are within their ranges."""

@@ -15,13 +15,13 @@ from fastmech.atlas.continuation import newton
 from fastmech.atlas.defining import Balance
 from fastmech.ensembles import checks
 from fastmech.ensembles.threads import in_parts
-from fastmech.equilibria.certificate import Outcome
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.intervals.search import Found
 from fastmech.models.equilibria import DIGITS, alike, outcome_of_row, search_rows, wrapped
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import VERDICTS, spectra, verdicts
 from fastmech.objects import Drawn
+from fastmech.outcome import Outcome
 from fastmech.scene import nearest
 
 #: Points that a thread proves at a time, and the numbers of 8 bytes that each takes meanwhile.
@@ -51,7 +51,7 @@ class RestingMap(Drawn):
     axes: dict[str, Floats]
     names: tuple[str, ...]  #: of the coordinates
     count: NDArray[np.int16]  #: equilibria, proved each
-    outcome: Codes  #: :class:`fastmech.equilibria.certificate.Outcome`: COMPLETE where there are no others
+    outcome: Codes  #: :class:`fastmech.slider.proof.Outcome`: COMPLETE where there are no others
     position: Floats  #: [rad or m], (..., slots, n); angles in (-pi, pi]
     radius: Floats  #: each is proved to be within so many rad or m
     energy: Floats  #: U [J], loads at their means; NaN where forces are not known to have a potential

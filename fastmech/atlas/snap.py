@@ -2,47 +2,23 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from fastmech.arrays import Floats
-from fastmech.atlas.continuation import Equations, newton, tangent_at
+from fastmech.atlas.branch import NEAR, Branch, How, ending
 from fastmech.atlas.defining import Balance
-from fastmech.atlas.systems import Plane, fold, point_at, rest
-from fastmech.equilibria.find import Equilibria, Equilibrium, find_equilibria
 from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.equilibria import find_equilibria as resting_places
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import assess
 from fastmech.objects import Printed
-from fastmech.scene import Scene, nearest, require_scene
-
-#: Longest step along the branch [rad, and parts of the range], and the shortest.
-STEP, SHORTEST = 0.02, 1e-9
-
-#: How far past a branch that turns back its successor is looked for [parts of the range].
-PAST = 2e-3
-
-#: Parameters that move equilibria; the others (m3, beta, alpha) do not.
-MOVING = ("F0", "c1", "c2", "m1", "m2", "l", "g")
-
-#: A position that is given by its angles is the stable one within so many rad.
-NEAR = 0.1
-
-#: A range by default ends so many times the present value (or one as large as the weights') above zero.
-FAR = 100.0
-
-#: Part of the largest singular value below which the fold's equations are singular: the branch goes on there.
-CROSSING = 1e-3
-
-
-#: What a position does at an end of its branch.
-How = Literal["disappears", "turns unstable", "begins to flutter", "leaves its range"]
+from fastmech.scene import Scene, require_scene
+from fastmech.slider.atlas.snap import branch_of, fold_free, moving, range_of_folds, stable_at
+from fastmech.slider.equilibria import find_equilibria, held
 
 
 @dataclass(frozen=True, repr=False)
@@ -125,35 +101,19 @@ def find_snap(
     if isinstance(system, Mechanism):
         return _of_mechanism(system, equilibrium, searched, parameter)
     require_scene(system)
-    parameter = "F0" if parameter is None else parameter
-    if parameter not in MOVING:
-        hint = (
-            nearest(parameter, list(MOVING))
-            if isinstance(parameter, str)
-            else f"allowed: {', '.join(MOVING)}"
-        )
-        raise InputError(f"parameter = {shown(parameter)}: must be one that moves equilibria; {hint}")
+    parameter = moving("F0" if parameter is None else parameter)
     found = find_equilibria(system)
-    held = system.replace(F0=found.force, alpha=0.0)
+    scene = held(system, found)
     chosen = stable_at(found, equilibrium)
-    present, unit, _ = held.described()[parameter]
-    below, above = fold_free(held, parameter)
-    if searched is None:
-        far = FAR * max(abs(present), _natural(held, parameter))
-        high = min(1.01 * max(above, abs(present)) + (parameter == "F0"), max(far, 1.01 * abs(present)))
-        low = -high if parameter == "F0" else 1e-6 * present if below > 0.0 else 0.0
-    else:
-        low, high = _range(held, searched, parameter, present, unit)
-    plane = Plane(held, (parameter,), (low,), (high,))
-    start = np.array([chosen.phi, chosen.theta, *plane.parts([present])])
-    branch = _Branch(
-        rest(plane),
-        fold(plane),
-        lambda z: float(point_at(plane, z[:, None]).determinant[0]),
-        lambda z: float(plane.values(z[2:])[parameter]),
-    )
+    present, unit, _ = scene.described()[parameter]
+    low, high = range_of_folds(scene, parameter)
+    if searched is not None:
+        low, high = _range(scene, searched, parameter, present, unit)
+    branch, start = branch_of(scene, parameter, chosen, (low, high))
+    below, above = fold_free(scene, parameter)
     exhaustive = low <= below and high >= above
-    return _snap(branch, start, parameter, unit, (chosen.phi, chosen.theta), present, (low, high), exhaustive)
+    position = (chosen.phi, chosen.theta)
+    return _snap(branch, start, parameter, unit, position, present, (low, high), exhaustive)
 
 
 def _of_mechanism(
@@ -170,7 +130,7 @@ def _of_mechanism(
     balance.rescale(start)
     side = np.sign(balance.determinant(start))
     follows = not mechanism.statics().conservative
-    branch = _Branch(
+    branch = Branch(
         balance.rest,
         balance.singular,
         lambda z: float(side * balance.determinant(z)),
@@ -218,54 +178,12 @@ def _stable_place(balance: Balance, wanted: Any, present: float) -> RestingPlace
 
 
 def _snap(
-    branch: _Branch, start: Floats, parameter: str, unit: str, position: tuple[float, ...],
+    branch: Branch, start: Floats, parameter: str, unit: str, position: tuple[float, ...],
     present: float, searched: tuple[float, float], exhaustive: bool,
 ) -> Snap:  # fmt: skip
-    below, above = (_ending(branch, start, direction) for direction in (-1.0, 1.0))
+    below, above = (ending(branch, start, direction) for direction in (-1.0, 1.0))
     how = below[1], above[1]
     return Snap(parameter, unit, position, present, below[0], above[0], how, searched, exhaustive)
-
-
-def fold_free(scene: Scene, parameter: str) -> tuple[float, float]:
-    """Values of a parameter beyond which, on either side, the scene has no fold; the force is constant.
-
-    With the amplitudes of ``fastmech.equilibria.search`` over m2 l, B1 = |((m1 + m2) g - c2 l, F)|,
-    B2 = |(m2 g, F)| and B3 = c1 l, there is none where one of 1/B1, 1/B2, 1/B3 is at least the sum of the
-    others. The lower value is 0 where the parameter may be 0, and more than 0 where it may not: what is
-    between is for the search.
-    """
-    weight, pull, spring = (scene.m1 + scene.m2) * scene.g, scene.c2 * scene.l, scene.c1 * scene.l
-    one, two = math.hypot(weight - pull, scene.F0), math.hypot(scene.m2 * scene.g, scene.F0)
-
-    def apart(a: float, b: float) -> float:
-        """The third amplitude from which on its inverse is less than the difference of the others'."""
-        return a * b / abs(a - b) if a != b else math.inf
-
-    def over(a: float, b: float) -> float:
-        return a / b if b > 0.0 else math.inf if a > 0.0 else 0.0
-
-    if parameter == "F0":
-        return -2.0 * spring, 2.0 * spring
-    if parameter == "c1":
-        return 0.0, apart(one, two) / scene.l
-    if parameter == "c2":
-        return 0.0, (weight + apart(two, spring)) / scene.l
-    if parameter == "g":
-        return 0.0, max(over(2.0 * spring, scene.m2), over(pull + 2.0 * spring, scene.m1 + scene.m2))
-    tiny = np.nextafter(0.0, 1.0)
-    if parameter == "m1":
-        return tiny, over(pull + apart(two, spring), scene.g) - scene.m2
-    if parameter == "m2":
-        return tiny, max(over(2.0 * spring, scene.g), over(pull + 2.0 * spring, scene.g) - scene.m1)
-    return tiny, max(over(2.0 * two, scene.c1), over(weight + 2.0 * two, scene.c2))
-
-
-def _natural(scene: Scene, parameter: str) -> float:
-    """A value of a parameter that may be 0 at which it matters as much as the weights, or the spring."""
-    weight = (scene.m1 + scene.m2) * scene.g
-    return {"F0": 2.0 * scene.c1 * scene.l, "c1": weight / scene.l, "c2": weight / scene.l, "g": 10.0}.get(
-        parameter, 0.0
-    )
 
 
 def _range(
@@ -283,123 +201,3 @@ def _range(
             return low, high
     told = f"{present:g} {unit}"
     raise InputError(f"searched = {shown(searched)}: must be a range of {parameter} that holds {told}")
-
-
-def stable_at(found: Equilibria, wanted: Equilibrium | Sequence[float] | None) -> Equilibrium:
-    """The stable equilibrium that is given, or that is about (phi, theta) [rad]; by default the deepest.
-
-    Raises:
-        InputError: it is none of them, or not stable.
-    """
-    stable = [item for item in found if item.morse_index == 0]
-    if not stable:
-        raise InputError("equilibrium: the scene has no stable one")
-    if wanted is None:
-        return stable[0]
-    if isinstance(wanted, Equilibrium):
-        chosen = found[found.index_of(wanted)]
-        if chosen.morse_index == 0:
-            return chosen
-        raise InputError(
-            f"equilibrium = ({chosen.phi:.6g}, {chosen.theta:.6g}) rad: "
-            f"is a {chosen.kind}, must be a stable one"
-        )
-    try:
-        phi, theta = (float(angle) for angle in wanted)
-    except (TypeError, ValueError):
-        raise InputError(
-            f"equilibrium = {shown(wanted)}: must be one of fastmech.find_equilibria, or (phi, theta) in rad"
-        ) from None
-    away = [math.hypot(2 * math.sin((e.phi - phi) / 2), 2 * math.sin((e.theta - theta) / 2)) for e in stable]
-    if min(away) <= NEAR:
-        return stable[away.index(min(away))]
-    places = ", ".join(f"({e.phi:.4f}, {e.theta:.4f})" for e in stable)
-    raise InputError(f"equilibrium = ({phi:g}, {theta:g}) rad: is near no stable one; they are at {places}")
-
-
-class _Branch(NamedTuple):
-    """What is known of the equilibria over one parameter; points are (coordinates, part of its range)."""
-
-    rest: Equations
-    fold: Equations
-    determinant: Callable[[Floats], float]  #: of the stiffness, positive where the position is stable
-    value: Callable[[Floats], float]  #: of the parameter
-    flutters: Callable[[Floats], bool] = lambda z: False
-    flutter: Callable[[Floats], Floats] = lambda z: z  #: where it begins, from very near
-    in_range: Callable[[Floats], bool] = lambda z: bool(0.0 <= z[-1] <= 1.0)
-
-
-def _ending(branch: _Branch, start: Floats, direction: float) -> tuple[float | None, How]:
-    """Value at which the branch from ``start`` ceases to be stable, and what it does there.
-
-    None if it leaves the parameter's range before. A minimum can always be followed a little further. Where
-    no step succeeds, the branch has come as near to its end as a step is short, and what Newton's method
-    cannot polish there is that end. Where a symmetric position takes over from two tilted ones, their branch
-    turns back and is stable on both sides: the symmetric one is followed on.
-    """
-    along = np.zeros(start.size)
-    along[-1] = direction
-    z, step, flutters, outside = start, 0.25 * STEP, False, False
-    tangent = tangent_at(branch.rest, z)
-    tangent = tangent * math.copysign(1.0, tangent @ along)
-    while step > SHORTEST:
-        there = newton(branch.rest, z + step * tangent, 0.3 * step, tangent)
-        ahead = None if there is None else tangent_at(branch.rest, there)
-        inside = there is not None and branch.in_range(there)
-        if there is None or ahead is None or abs(ahead @ tangent) < 0.985 or not inside:
-            outside = there is not None and not inside
-            step *= 0.5
-            continue
-        if branch.flutters(there):
-            flutters, step = True, 0.5 * step
-            continue
-        ahead = ahead * math.copysign(1.0, ahead @ tangent)
-        unstable = branch.determinant(there) <= 0.0
-        if unstable or ahead @ along < 0.0:
-            turn = newton(branch.fold, 0.5 * (z + there), 4.0 * step) if unstable else z
-            if turn is None or (not unstable and step > PAST):
-                step *= 0.5
-                continue
-            z = turn
-            beyond = _successor(branch, z, direction) if _crosses(branch.fold, z) else None
-            if beyond is None:
-                break
-            there, ahead = beyond, tangent_at(branch.rest, beyond)
-            ahead = ahead * math.copysign(1.0, ahead @ along)
-        z, tangent, step, flutters = there, ahead, min(STEP, 1.5 * step), False
-    if min(z[-1], 1.0 - z[-1]) < 10.0 * SHORTEST:
-        return None, "disappears"
-    if flutters:
-        return branch.value(branch.flutter(z)), "begins to flutter"
-    if outside:
-        return branch.value(z), "leaves its range"
-    crosses = _crosses(branch.fold, z)
-    if crosses:
-        # Newton's method stops short of where branches meet; the determinant passes through zero there.
-        after, before = branch.determinant(z + PAST * tangent), branch.determinant(z - PAST * tangent)
-        rest_of_it = 2.0 * PAST * branch.determinant(z) / (before - after) if before != after else math.inf
-        z = z + rest_of_it * tangent if abs(rest_of_it) < 0.01 * PAST else z
-    return branch.value(z), "turns unstable" if crosses else "disappears"
-
-
-def _successor(branch: _Branch, z: Floats, direction: float) -> Floats | None:
-    """The stable position a little past z that Newton's method finds from there, if it does.
-
-    So near to where equilibria meet, rounding in the gradient moves them by far more than rounding.
-    """
-    z, far = z.copy(), math.inf
-    z[-1] = min(max(z[-1] + PAST * direction, 0.0), 1.0)
-    for _ in range(30):
-        value, jacobian = branch.rest(z)
-        if not np.isfinite(value).all():
-            return None
-        step = np.linalg.lstsq(jacobian[:, :-1], value)[0]
-        z[:-1] -= step
-        far = float(np.linalg.norm(step))
-    return z if far < 1e-8 and branch.determinant(z) > 0.0 else None
-
-
-def _crosses(folds: Equations, z: Floats) -> bool:
-    """Whether other equilibria pass through an end, so that there is more than one branch."""
-    sizes = np.linalg.svd(folds(z)[1], compute_uv=False)
-    return bool(sizes[-1] < CROSSING * sizes[0])

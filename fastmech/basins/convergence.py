@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
+from abc import ABC, abstractmethod
 from typing import TypeAlias
 
 import numpy as np
@@ -30,56 +30,59 @@ AT_SADDLE = 1e-3
 #: Seconds between looks at whether a path is there, and how many are kept at a time.
 LOOK, MOST_LOOKS = 0.25, 1 << 20
 
-#: ``compute(members, substeps)``: one computation of some of the starts.
-Compute: TypeAlias = Callable[[Indices, int], Paths]
-#: ``agree(members, coarse, fine)``: which of them tell the same with both steps.
-Agree: TypeAlias = Callable[[Indices, Paths, Paths], NDArray[np.bool_]]
-#: ``impossible(members, states)``: which have come to states that their motion cannot have.
-Impossible: TypeAlias = Callable[[Indices, Floats], NDArray[np.bool_]]
-#: ``lingers(members)``: which come to an unstable equilibrium on their way.
-Lingers: TypeAlias = Callable[[Indices], NDArray[np.bool_]]
 
+class Computations(ABC):
+    """Computations of the same starts with different steps; members are starts' numbers."""
 
-def climb(
-    certificate: Certificate,
-    members: Indices,
-    compute: Compute,
-    agree: Agree,
-    impossible: Impossible,
-    lingers: Lingers,
-    found: Paths,
-    status: NDArray[np.int8],
-    ladder: tuple[int, ...] = SUBSTEPS,
-) -> None:
-    """Find labels and statuses of some starts, and write them where ``members`` says."""
-    coarse = compute(members, ladder[0])
-    for substeps in ladder[1:]:
-        fine = compute(members, substeps)
-        settled = agree(members, coarse, fine)
-        done = np.flatnonzero(settled | (substeps == ladder[-1]))
-        ends, last = members[done], fine.take(done)
-        found.put(ends, last)
-        captured = settled[done] & (last.code > 0)
-        status[ends] = np.where(captured, Status.CAPTURED, Status.UNDECIDED)
-        status[ends[captured & (last.code == OUT)]] = Status.OUT_OF_RANGE
-        free = np.flatnonzero(last.code == 0)
-        status[ends[free[near_saddle(certificate, last.state[free])]]] = Status.AT_SADDLE
-        # Steps that do not agree: a stable manifold between the paths leads them to its equilibrium first.
-        torn = ends[~settled[done]]
-        if torn.size:
-            status[torn[lingers(torn)]] = Status.AT_SADDLE
-        bad = free[impossible(ends[free], last.state[free])]
-        status[ends[bad]] = Status.STEP_TOO_LARGE
-        status[ends[free[~finite_rows(last.state[free])]]] = Status.NOT_FINITE
-        for kind in (Status.NOT_CONVERGED, Status.STEP_TOO_LARGE):
-            status[ends[free[last.status[free] == kind]]] = kind
-        # The finest step alone is within the limit: nothing bears it out.
-        alone = ~settled[done] & (coarse.status[done] == Status.STEP_TOO_LARGE) & (last.status == Status.OK)
-        status[ends[alone]] = Status.STEP_TOO_LARGE
-        rest = np.flatnonzero(~settled)
-        members, coarse = members[rest], fine.take(rest)
-        if not members.size:
-            break
+    certificate: Certificate  #: of the system
+    ladder: tuple[int, ...] = SUBSTEPS  #: numbers of substeps, one computation after the other
+
+    @abstractmethod
+    def follow(self, members: Indices, substeps: int) -> Paths:
+        """One computation of some of the starts."""
+
+    @abstractmethod
+    def agree(self, members: Indices, coarse: Paths, fine: Paths) -> NDArray[np.bool_]:
+        """Which tell the same with both steps."""
+
+    @abstractmethod
+    def impossible(self, members: Indices, states: Floats) -> NDArray[np.bool_]:
+        """Which have come to states that their motion cannot have."""
+
+    @abstractmethod
+    def lingers(self, members: Indices) -> NDArray[np.bool_]:
+        """Which come to an unstable equilibrium on their way."""
+
+    def climb(self, members: Indices, found: Paths, status: NDArray[np.int8]) -> None:
+        """Find labels and statuses of some starts, and write them where ``members`` says."""
+        coarse = self.follow(members, self.ladder[0])
+        for substeps in self.ladder[1:]:
+            fine = self.follow(members, substeps)
+            settled = self.agree(members, coarse, fine)
+            done = np.flatnonzero(settled | (substeps == self.ladder[-1]))
+            ends, last = members[done], fine.take(done)
+            found.put(ends, last)
+            captured = settled[done] & (last.code > 0)
+            status[ends] = np.where(captured, Status.CAPTURED, Status.UNDECIDED)
+            status[ends[captured & (last.code == OUT)]] = Status.OUT_OF_RANGE
+            free = np.flatnonzero(last.code == 0)
+            status[ends[free[near_saddle(self.certificate, last.state[free])]]] = Status.AT_SADDLE
+            # Where steps do not agree: a stable manifold between the paths leads them to its saddle first.
+            torn = ends[~settled[done]]
+            if torn.size:
+                status[torn[self.lingers(torn)]] = Status.AT_SADDLE
+            bad = free[self.impossible(ends[free], last.state[free])]
+            status[ends[bad]] = Status.STEP_TOO_LARGE
+            status[ends[free[~finite_rows(last.state[free])]]] = Status.NOT_FINITE
+            for kind in (Status.NOT_CONVERGED, Status.STEP_TOO_LARGE):
+                status[ends[free[last.status[free] == kind]]] = kind
+            # The finest step alone is within the limit: nothing bears it out.
+            alone = ~settled[done] & (coarse.status[done] == Status.STEP_TOO_LARGE)
+            status[ends[alone & (last.status == Status.OK)]] = Status.STEP_TOO_LARGE
+            rest = np.flatnonzero(~settled)
+            members, coarse = members[rest], fine.take(rest)
+            if not members.size:
+                break
 
 
 def tell_the_same(

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from fastmech.arrays import Floats, Integers
 from fastmech.basins.label import How, label_states
 from fastmech.basins.measures.fractions import Shares, basin_stability
+from fastmech.capture.certificate import MOST_OCTAVES, TURNING
 from fastmech.capture.select import certificate_of, require_damper
-from fastmech.capture.steps import MOST_OCTAVES, TURNING
 from fastmech.disturbance.motion import (
     EXCURSION,
     LAST_OUTSIDE,
@@ -35,13 +35,13 @@ from fastmech.ensembles import checks
 from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.run import Ensemble, Observation, Progress, run_ensemble
 from fastmech.ensembles.status import ENDS, FAILURES, Status, failure_counts, failure_line
-from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError, StepWarning
 from fastmech.models.equilibria import RestingPlace
-from fastmech.models.mechanism import Mechanism
+from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.objects import Drawn, Field
 from fastmech.samplers import Starts
-from fastmech.scene import STATE, Scene
+from fastmech.scene import Scene
+from fastmech.slider.equilibria import Equilibrium
 
 #: By how much excursions by two steps may differ, over the larger coordinate's.
 AGREED = 0.01
@@ -171,8 +171,7 @@ def disturb(
     equilibrium's norm, without the energy to leave that ball.
 
     Args:
-        scene: a scene with a damper and a constant force (``alpha = 0`` or ``F0 = 0``), or a mechanism with
-            dampers and constant loads.
+        scene: a scene or a mechanism with dampers and constant loads.
         equilibrium: one of ``find_equilibria(scene)``.
         n: number of disturbances.
         disturbances: departures of the state from the equilibrium, a sampler or shape (n, states), in place
@@ -204,8 +203,7 @@ def disturb(
     seed = checks.whole_number("seed", seed, least=0)
     away = None
     if disturbances is not None:
-        names = scene.state if isinstance(scene, Mechanism) else STATE
-        away = checks.starts("disturbances", disturbances, names, default=n)
+        away = checks.starts("disturbances", disturbances, scene.state, default=n)
         n = len(away)
     if (radius := checks.number("radius", radius, "rad", above=0.0)) > MOST_RADIUS:
         raise InputError(
@@ -339,10 +337,8 @@ def refuse_meeting_balls(
         InputError: it does.
     """
     places = equilibria.position
-    turning = [c.periodic for c in scene.coordinates] if isinstance(scene, Mechanism) else [True, True]
     for index in which:
-        away = np.delete(places, index, axis=0) - places[index]
-        away[:, turning] -= 2.0 * np.pi * np.round(away[:, turning] / (2.0 * np.pi))
+        away = short_way(np.delete(places, index, axis=0) - places[index], scene.turning)
         size = size_of(scene, equilibria[index])
         sizes = size(np.concatenate([away, np.zeros_like(away)], axis=1))
         if radius > 0.5 * (nearest := float(sizes.min(initial=np.inf))):

@@ -22,12 +22,12 @@ from fastmech.disturbance.motion import equilibria_to_disturb
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.system import System
-from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Field, Result
 from fastmech.scene import Scene
+from fastmech.slider.equilibria import Equilibrium
 
 #: Points between two starts whose labels are asked for at once.
 SECTIONS = 15

@@ -1,7 +1,7 @@
 """Erosion profiles: how basins lose stability, integrity and the shock that they survive along a parameter.
 
 After Soliman and Thompson, J. Sound Vib. 135 (1989) 453, and Rega and Lenci, Nonlinear Analysis 63 (2005)
-902. A well keeps its identity along the parameter: its sheet in :func:`fastmech.atlas.map.map_equilibria`.
+902. A well keeps its identity along the parameter: its sheet in :func:`fastmech.map_equilibria`.
 Every value is measured by itself, so that it does not matter which others are asked for.
 """
 
@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Floats, Integers
-from fastmech.atlas.map import map_equilibria
 from fastmech.atlas.resting_map import follow_wells
 from fastmech.basins.label import label_states
 from fastmech.basins.measures.fractions import basin_stability
@@ -28,7 +27,6 @@ from fastmech.basins.measures.norm import (
     kinetic_norm,
     norm_on,
     state_index,
-    states_of,
 )
 from fastmech.basins.shock import minimal_shock
 from fastmech.capture.select import require_damper
@@ -37,9 +35,10 @@ from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
 from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import find_equilibria
-from fastmech.models.mechanism import Mechanism
+from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.objects import Drawn
 from fastmech.scene import Scene
+from fastmech.slider.atlas.map import sheets_of_wells
 
 #: Relative tolerance of shocks: what a profile shows.
 TOLERANCE = 1e-3
@@ -137,11 +136,11 @@ class Survey:
         """
         measured: dict[str, NDArray[Any]] = {
             name: np.zeros(len(places), dtype=bool) if name in FLAGS else np.full(len(places), np.nan)
-            for name in (*states_of(scene)[: places.shape[1]], *MEASURES)
+            for name in (*scene.state[: places.shape[1]], *MEASURES)
         }
         equilibria = find_equilibria(scene)
         for w in np.flatnonzero(np.isfinite(places[:, 0])):
-            apart = np.linalg.norm(_less_turns(equilibria.position - places[w], scene), axis=1)
+            apart = np.linalg.norm(short_way(equilibria.position - places[w], scene.turning), axis=1)
             for name, number in self._of_well(scene, equilibria, int(apart.argmin())).items():
                 measured[name][w] = number
         return measured
@@ -174,7 +173,7 @@ class Survey:
         guess = np.concatenate([kick.shock[None], _saddles_from(scene, equilibria, place)])
         shock = search(guess=guess[np.isfinite(guess).all(axis=1)])
         return {
-            **dict(zip(states_of(scene)[:n], e.position.tolist(), strict=True)),
+            **dict(zip(scene.state[:n], e.position.tolist(), strict=True)),
             "stability": float(share.fraction),
             "stability_at_most": float(share.at_most),
             "lower": float(share.lower),
@@ -234,10 +233,10 @@ def erosion(
 
     Args:
         scene: with constant loads; gives every other parameter.
-        parameter: name of a parameter, such as "F0", "c1" or "c2".
+        parameter: its name.
         values: of it, rising.
-        axes: the map and its window: names of states (of a scene phi, theta [rad], phi_dot, theta_dot
-            [rad/s]) with their values, rising in equal steps. States that are no axis are the well's own.
+        axes: the map and its window: names of states, as ``scene.state`` has them, with their values
+            [rad or m, and per s], rising in equal steps. States that are no axis are the well's own.
         most_shock: largest shock to look for [rad].
         t_end: end of the runs [s]; what is not captured by then has no label.
         label_starts: where starts of a scene end, if not :func:`fastmech.label_starts` shall tell.
@@ -271,7 +270,7 @@ def erosion(
         if progress is not None:
             progress(1)
     profile: Any = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
-    position = {name: profile.pop(name) for name in states_of(scene)[: places.shape[2]]}
+    position = {name: profile.pop(name) for name in scene.state[: places.shape[2]]}
     return ErosionProfile(parameter, along, sheets, position, **profile).of(scene)
 
 
@@ -289,7 +288,7 @@ def survey_of(
     """What to measure, checked; arguments and errors as for :func:`erosion`."""
     if not isinstance(axes, Mapping) or not axes:
         raise InputError(f"axes = {shown(axes)}: must map at least one state to its values")
-    states = tuple(state_index(name, states_of(scene)) for name in axes)
+    states = tuple(state_index(name, scene.state) for name in axes)
     lines = check_axes(axes, tuple(np.size(line) for line in axes.values()))
     for name, line in zip(axes, lines, strict=True):
         check_angles(f"axes.{name}", name, line, angles_of(scene))
@@ -318,23 +317,11 @@ def wells_along(scene: Scene | Mechanism, parameter: str, values: Floats) -> tup
     if isinstance(scene, Mechanism):
         places = follow_wells(scene, parameter, values)
         return np.arange(places.shape[1]), places
-    atlas = map_equilibria(scene, {parameter: values})
-    wells = np.flatnonzero(atlas.sheet_morse_index == 0)
-    places = np.full((values.size, wells.size, 2), np.nan)
-    for w, sheet in enumerate(wells):
-        at, slot = np.nonzero(atlas.sheet == sheet)
-        places[at, w] = np.column_stack([atlas.phi[at, slot], atlas.theta[at, slot]])
-    return wells.astype(np.int64), places
+    return sheets_of_wells(scene, parameter, values)
 
 
 def _saddles_from(scene: Scene | Mechanism, equilibria: Any, place: Floats) -> Floats:
     """Disturbances (k, states) that lead from a state onto the nearest copies of the saddles."""
     index = np.array([e.morse_index for e in equilibria])
-    away = _less_turns(equilibria.position[index == 1] - place[: place.size // 2], scene)
+    away = short_way(equilibria.position[index == 1] - place[: place.size // 2], scene.turning)
     return np.concatenate([away, np.zeros_like(away)], axis=1)
-
-
-def _less_turns(away: Floats, scene: Scene | Mechanism) -> Floats:
-    """Differences of positions (k, n) with angles the short way."""
-    turning = [name in angles_of(scene) for name in states_of(scene)[: away.shape[1]]]
-    return np.where(turning, away - 2.0 * np.pi * np.round(away / (2.0 * np.pi)), away)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from fastmech.attractors.find import find_attractors
 from fastmech.attractors.flow import keeps_moving
 from fastmech.attractors.settle import Ends
-from fastmech.basins.convergence import SUBSTEPS, climb, lingering, tell_the_same
+from fastmech.basins.convergence import SUBSTEPS, Computations, Indices, lingering, tell_the_same
 from fastmech.basins.labels import Labels, of_attractors, pieces_of
 from fastmech.basins.measures.norm import FEW_TURNS, beyond_turns
 from fastmech.basins.runs import Paths, follow, rounds_until
@@ -40,7 +40,7 @@ from fastmech.errors import StepWarning
 from fastmech.integrators.methods import Method, find_method
 from fastmech.models.mechanism import Mechanism
 from fastmech.samplers import Starts
-from fastmech.scene import STATE, Scene
+from fastmech.scene import Scene
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -79,9 +79,9 @@ def label_starts(
             a load that repeats, and of a system of your own without a stopping condition, labels are those
             of :func:`fastmech.find_attractors`, the attractors are in ``tree``, and ``dt`` and
             ``settle_radius`` do not apply; with a stopping condition the label is its code.
-        starts: a sampler of ``fm.samplers``, or phi, theta [rad], phi', theta' [rad/s], shape (n, 4) or
-            (4,), of a ``Mechanism`` coordinates, then rates; angles count their turns, and more than four
-            give a warning, if they may be degrees.
+        starts: a sampler of ``fm.samplers``, or coordinates [rad or m], then rates, as ``scene.state`` names
+            them, shape (n, states) or (states,); angles count their turns, and more than four give a
+            warning, if they may be degrees.
         t_end: end of the run [s], 60 by default (for attractors see there); what is not captured by then is
             undecided.
         dt: coarsest step [s]: each path is computed with it and with two thirds of it, and with less where
@@ -107,8 +107,8 @@ def label_starts(
             scene, states, t_end, dt=dt, method=method or "dop853", threads=threads, progress=progress
         )
     require_damper(scene)
-    turning = [c.periodic for c in scene.coordinates] if isinstance(scene, Mechanism) else [True, True]
-    states = checks.starts("starts", starts, scene.state if isinstance(scene, Mechanism) else STATE)
+    turning = list(scene.turning)
+    states = checks.starts("starts", starts, scene.state)
     angles = np.abs(states[:, : len(turning)][:, turning])
     largest = float(np.max(angles, initial=0.0, where=np.isfinite(angles)))
     if 2.0 * np.pi * FEW_TURNS < largest <= MOST_DEGREES:
@@ -177,10 +177,10 @@ def label_states(
         while again.size:
             for step in np.unique(coarse[again]):
                 members = again[coarse[again] == step]
-                followed = Ladder(certificate, t_end, float(step), formula, threads, prelude, ladder)
-                followed.label(begin, members, found, status)
+                followed = Ladder(certificate, begin, t_end, float(step), formula, threads, prelude, ladder)
+                followed.climb(members, found, status)
                 if settle is not None and settle_radius is not None:
-                    settle[members] = followed.settle_times(begin, members, found, status, settle_radius)
+                    settle[members] = followed.settle_times(members, found, status, settle_radius)
                 found.steps += followed.steps
             again = again[np.isin(status[again], FAILURES) & (coarse[again] > shortest)]
             coarse[again] *= 0.0625
@@ -251,10 +251,11 @@ class Prelude:
 
 
 @dataclass
-class Ladder:
-    """Computations of the same starts with ever smaller steps."""
+class Ladder(Computations):
+    """Computations of starts (n, states), with a prelude or without."""
 
     certificate: Certificate
+    starts: Floats
     t_end: float
     coarse: float  #: s
     method: Method
@@ -265,22 +266,22 @@ class Ladder:
 
     def __post_init__(self) -> None:
         self.rounds = rounds_until(self.t_end, SUBSTEPS[0] * self.coarse)
-        self.observer = self.certificate.packed
 
     def grows(self, substeps: int) -> bool:
         """Whether so many substeps let damped motion grow."""
         step = SUBSTEPS[0] * self.coarse / substeps
         return self.certificate.is_beyond(step, self.t_end / step, self.method.name)
 
-    def follow(self, starts: Floats, substeps: int, observer: Floats) -> Paths:
+    def follow(self, members: Indices, substeps: int, observer: Floats | None = None) -> Paths:
         """One computation; none where its step lets damped motion grow."""
         if self.grows(substeps):
-            paths = Paths.empty(len(starts), len(self.certificate.names))
+            paths = Paths.empty(len(members), len(self.certificate.names))
             paths.status[:] = Status.STEP_TOO_LARGE
             return paths
-        begin, status = self.begin(starts, substeps)
+        begin, status = self.begin(members, substeps)
+        own = self.certificate.packed if observer is None else observer
         paths = follow(
-            self.certificate, observer, begin, self.t_end, self.rounds, substeps, self.method, self.threads
+            self.certificate, own, begin, self.t_end, self.rounds, substeps, self.method, self.threads
         )
         if self.prelude is not None:
             paths.time += self.prelude.span
@@ -289,43 +290,35 @@ class Ladder:
         self.steps += paths.steps
         return paths
 
-    def begin(self, starts: Floats, substeps: int) -> tuple[Floats, NDArray[np.int8]]:
+    def begin(self, members: Indices, substeps: int) -> tuple[Floats, NDArray[np.int8]]:
         """States from which on the certificate holds, and the statuses of the motions until then."""
         if self.prelude is None:
-            return starts, np.zeros(len(starts), dtype=np.int8)
-        return self.prelude.after(starts, self.coarse, substeps)
+            return self.starts[members], np.zeros(len(members), dtype=np.int8)
+        return self.prelude.after(self.starts[members], self.coarse, substeps)
 
-    def label(self, begin: Floats, members: NDArray[np.intp], found: Paths, status: NDArray[np.int8]) -> None:
-        """Find labels and statuses of some starts."""
+    def agree(self, members: Indices, coarse: Paths, fine: Paths) -> NDArray[np.bool_]:
+        """Which tell the same with both steps."""
+        return tell_the_same(self.certificate, coarse, fine, 0.5 * self.coarse)
+
+    def impossible(self, members: Indices, states: Floats) -> NDArray[np.bool_]:
+        """Which have more energy than they can have."""
         first = self.certificate if self.prelude is None else self.prelude.first
-        climb(
-            self.certificate,
-            members,
-            lambda some, substeps: self.follow(begin[some], substeps, self.observer),
-            lambda _, coarse, fine: tell_the_same(self.certificate, coarse, fine, 0.5 * self.coarse),
-            lambda some, states: first.impossible(begin[some], states),
-            lambda some: self.lingers(begin[some]),
-            found,
-            status,
-            self.ladder,
-        )
+        return first.impossible(self.starts[members], states)
 
-    def lingers(self, starts: Floats) -> NDArray[np.bool_]:
+    def lingers(self, members: Indices) -> NDArray[np.bool_]:
         """Which motions come to an unstable equilibrium, with the finest step."""
         finest = self.coarse * SUBSTEPS[0] / self.ladder[-1]
         if self.ladder != SUBSTEPS or self.grows(self.ladder[-1]):  # few substeps leave it undecided
-            return np.zeros(len(starts), dtype=np.bool_)
-        begin, _ = self.begin(starts, self.ladder[-1])
+            return np.zeros(len(members), dtype=np.bool_)
+        begin, _ = self.begin(members, self.ladder[-1])
         return lingering(self.certificate, begin, self.t_end, finest, self.method.name, self.threads)
 
-    def settle_times(
-        self, begin: Floats, members: NDArray[np.intp], found: Paths, status: NDArray[np.int8], radius: float
-    ) -> Floats:
+    def settle_times(self, members: Indices, found: Paths, status: NDArray[np.int8], radius: float) -> Floats:
         """Times [s] from which on captured starts have no energy to leave the ball about their well."""
         levels = np.minimum(self.certificate.confining(radius), self.certificate.levels)
         times = np.full(members.size, np.nan)
         captured = np.flatnonzero(status[members] == Status.CAPTURED)
-        paths = self.follow(begin[members[captured]], SUBSTEPS[1], self.certificate.params(levels))
+        paths = self.follow(members[captured], SUBSTEPS[1], self.certificate.params(levels))
         same = paths.code == found.code[members[captured]]
         times[captured[same]] = paths.time[same]
         return times

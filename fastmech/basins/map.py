@@ -104,8 +104,8 @@ def map_basins(
             code is the label. Without one, and of a mechanism under loads that repeat, starts are labelled
             by the attractors that a sample of the grid finds, see :func:`fastmech.find_attractors`: they are
             in ``tree``.
-        axes: values along two, three or four of phi, theta [rad], phi_dot, theta_dot [rad/s], rising (of a
-            system: names of its states, one or more).
+        axes: values along two, three or four of the states that ``scene.state`` names [rad or m, and per s],
+            rising (of a system one or more).
         t_end: end of the run [s], 60 by default (for attractors see there); what is not captured by then is
             undecided.
         fixed: values of the other coordinates, 0 by default.
@@ -127,7 +127,7 @@ def map_basins(
     """
     if not isinstance(scene, Scene | Mechanism | System):
         raise InputError(f"scene = {shown(scene)}: must be a Scene, a Mechanism or a System")
-    names = STATE if isinstance(scene, Scene) else tuple(scene.state)
+    names = tuple(scene.state)
     values = _checked_axes(axes, names, least=2 if isinstance(scene, Scene) else 1)
     checks.progress_function(progress, "starts")
     held = _checked_fixed({} if fixed is None else fixed, values, names)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,13 +18,14 @@ from fastmech.arrays import Floats, Integers
 from fastmech.basins.measures.labels import LabelOf, ask
 from fastmech.basins.measures.norm import norm_on
 from fastmech.basins.well_numbers import with_defaults
+from fastmech.disturbance.motion import unit_directions
 from fastmech.ensembles import checks
-from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Printed
 from fastmech.scene import Scene
+from fastmech.slider.equilibria import Equilibrium
 
 #: Radii at which a ray is looked at before its first way out is narrowed down: at first, and once turned.
 LEVELS, TURNED_LEVELS = 24, 8
@@ -88,13 +90,11 @@ def minimal_shock(
     Raises:
         InputError: an argument is wrong or missing, or the attractor itself has no label.
     """
-    rays, most = _rays_in_a_norm(label_of, attractor, norm, coordinates, most, tolerance)
-    rng = np.random.default_rng(checks.whole_number("seed", seed, least=0))
-    number = checks.whole_number("directions", directions, least=1, most=MOST_DIRECTIONS)
-    units = _random_units(rng, number, len(rays.to_state))
+    rays = Rays.of(label_of, attractor, norm, coordinates, tolerance)
+    units, rng = rays.random_units(directions, seed)
     if guess is not None:
-        units = np.concatenate([_directions_of(guess, rays), units])
-    return rays.result(*rays.turned(units, most, rng))
+        units = np.concatenate([rays.directions(guess), units])
+    return rays.result(*rays.turned(units, checks.number("most", most, "", above=0.0), rng))
 
 
 def brute_force_shock(
@@ -113,42 +113,11 @@ def brute_force_shock(
     Arguments, result and errors as :func:`minimal_shock`. It approaches the minimum from above as the number
     of directions grows.
     """
-    rays, most = _rays_in_a_norm(label_of, attractor, norm, coordinates, most, tolerance)
-    rng = np.random.default_rng(checks.whole_number("seed", seed, least=0))
-    number = checks.whole_number("directions", directions, least=1, most=MOST_DIRECTIONS)
-    units = _random_units(rng, number, len(rays.to_state))
-    sizes, labels = rays.first_exits(units[None], np.array([most]), LEVELS, 1)
+    rays = Rays.of(label_of, attractor, norm, coordinates, tolerance)
+    units, _ = rays.random_units(directions, seed)
+    limit = np.array([checks.number("most", most, "", above=0.0)])
+    sizes, labels = rays.first_exits(units[None], limit, LEVELS, 1)
     return rays.result(units, sizes[0], labels[0])
-
-
-def _rays_in_a_norm(
-    label_of: LabelOf | Scene | Mechanism,
-    attractor: ArrayLike | Equilibrium | RestingPlace,
-    norm: ArrayLike | None,
-    coordinates: Sequence[int] | None,
-    most: float,
-    tolerance: float,
-) -> tuple[Rays, float]:
-    """Rays of all disturbances of some coordinates in a norm, and the largest size."""
-    label_of, place, norm = with_defaults(label_of, attractor, norm)
-    matrix = norm_on(norm, place.size, coordinates)
-    to_state = np.zeros((len(matrix), place.size))
-    to_state[:, list(range(place.size) if coordinates is None else coordinates)] = np.linalg.inv(matrix)
-    most = checks.number("most", most, "", above=0.0)
-    tolerance = checks.number("tolerance", tolerance, "", above=0.0)
-    own = int(ask(label_of, place[None])[0])
-    if own < 0:
-        raise InputError("attractor: has no label itself; it must be in a basin")
-    return Rays(label_of, place, own, to_state, tolerance), most
-
-
-def _directions_of(guess: ArrayLike, rays: Rays) -> Floats:
-    """Unit points (n, k) in the directions of disturbances (n, dim)."""
-    given = checks.states("guess", guess, rays.place.size) @ np.linalg.pinv(rays.to_state)
-    length = np.linalg.norm(given, axis=1, keepdims=True)
-    if not (np.isfinite(length) & (length > 0.0)).all():
-        raise InputError("guess: must be finite and differ from 0 in the chosen coordinates")
-    return np.asarray(given / length)
 
 
 @dataclass
@@ -162,6 +131,35 @@ class Rays:
     tolerance: float  #: relative, of the size along a ray
     trajectories: int = 1
     undecided: float = np.inf  #: smallest size tried whose end is not known
+
+    @classmethod
+    def of(
+        cls, label_of: Any, attractor: Any, norm: Any, coordinates: Sequence[int] | None, tolerance: float
+    ) -> Rays:
+        """Of all disturbances of some coordinates in a norm."""
+        label_of, place, norm = with_defaults(label_of, attractor, norm)
+        matrix = norm_on(norm, place.size, coordinates)
+        to_state = np.zeros((len(matrix), place.size))
+        to_state[:, list(range(place.size) if coordinates is None else coordinates)] = np.linalg.inv(matrix)
+        tolerance = checks.number("tolerance", tolerance, "", above=0.0)
+        own = int(ask(label_of, place[None])[0])
+        if own < 0:
+            raise InputError("attractor: has no label itself; it must be in a basin")
+        return cls(label_of, place, own, to_state, tolerance)
+
+    def directions(self, guess: ArrayLike) -> Floats:
+        """Unit points (n, k) in the directions of disturbances (n, dim)."""
+        given = checks.states("guess", guess, self.place.size) @ np.linalg.pinv(self.to_state)
+        length = np.linalg.norm(given, axis=1, keepdims=True)
+        if not (np.isfinite(length) & (length > 0.0)).all():
+            raise InputError("guess: must be finite and differ from 0 in the chosen coordinates")
+        return np.asarray(given / length)
+
+    def random_units(self, n: int, seed: int) -> tuple[Floats, np.random.Generator]:
+        """Random directions (n, k), and what drew them."""
+        rng = np.random.default_rng(checks.whole_number("seed", seed, least=0))
+        n = checks.whole_number("directions", n, least=1, most=MOST_DIRECTIONS)
+        return unit_directions(rng, n, len(self.to_state)), rng
 
     def turned(self, units: Floats, most: float, rng: np.random.Generator) -> tuple[Floats, Floats, Integers]:
         """The rays that leave first, turned for as long as it helps; their sizes and labels."""
@@ -259,8 +257,3 @@ class Rays:
             undecided_from=self.undecided if np.isfinite(self.undecided) else np.nan,
             trajectories=self.trajectories,
         )
-
-
-def _random_units(rng: np.random.Generator, n: int, dim: int) -> Floats:
-    normal = rng.standard_normal((n, dim))
-    return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))

@@ -17,24 +17,24 @@ from itertools import count
 import numpy as np
 
 from fastmech.arrays import Floats, Integers
-from fastmech.atlas.map import ROUNDING
 from fastmech.basins.convergence import SUBSTEPS
 from fastmech.basins.label import How, label_states
 from fastmech.basins.well_numbers import number_wells, well_of_number
 from fastmech.capture.certificate import Certificate
 from fastmech.capture.select import certificate_of
-from fastmech.disturbance.motion import equilibria_to_disturb, require_constant_force, state_jacobian
+from fastmech.disturbance.motion import equilibria_to_disturb, require_constant_force
 from fastmech.ensembles import checks
-from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError, shown
-from fastmech.mechanism.coefficients import reduce
-from fastmech.mechanism.impulse import POINTS, Mobility, impulse_for, mobility, rates_after
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
-from fastmech.models.stability import require_own
+from fastmech.models.stability import require_own, state_matrix
 from fastmech.objects import Printed
 from fastmech.scene import Scene
-from fastmech.stability.linearize import require_rest
+from fastmech.slider.atlas.map import ROUNDING
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.equilibria import Equilibrium
+from fastmech.slider.impulse import POINTS, Mobility, impulse_for, mobility, rates_after
+from fastmech.slider.linearize import require_rest
 
 #: The first grid: directions all around, and by how much an impulse is larger than the one before, where
 #: directions are searched and where there is one alone. Each further grid is twice as fine, or four times.
@@ -99,7 +99,7 @@ class ShockLimit(Printed):
     found: Blow  #: the least that was found to leave; NaN: none was found
     end: (
         tuple[int, tuple[int, ...]] | None
-    )  #: equilibrium and turns of phi and theta where the found one ends
+    )  #: equilibrium and turns of the coordinates where the found one ends
     undecided_from: float  #: least impulse tried whose end is not known [N s]; NaN: none
     tried_to: float  #: largest impulse of the search [N s]: beyond it nothing is known; NaN: no search
     trajectories: int  #: blows that were followed
@@ -167,7 +167,7 @@ def shock_limit(
     alone = ShockLimit(on, proved, nothing, None, math.nan, math.nan, 0, math.nan, math.nan)
     if math.isnan(proved.impulse):
         return replace(alone, proved=nothing)
-    if not (scene.damped if isinstance(scene, Mechanism) else scene.beta):
+    if not scene.damped:
         return alone
     amplitudes = certificate.amplitudes * certificate.joule
     # Where rounding leaves nothing of the depth, the search begins where rounding ends.
@@ -377,7 +377,7 @@ def _require_point(on: str) -> None:
 def _long_enough(certificate: Certificate, place: Floats) -> float:
     """For how long a blow is followed [s]."""
     equilibria = certificate.tree.equilibria
-    states = [state_jacobian(certificate.system, e) for e in equilibria if e.morse_index < 2]
+    states = [state_matrix(certificate.system, e) for e in equilibria if e.morse_index < 2]
     slowest = float(np.abs(np.linalg.eigvals(states).real).min())
     longest = STEPS * float(certificate.coarse_steps(place[None])[0])
     return LONG / max(slowest, LONG / longest)
@@ -390,7 +390,7 @@ def impulse_start(
     on: str = "M2",
     direction: float = 0.0,
 ) -> Floats:
-    """State (states,) after a blow at rest; on M2 along +x that of F0 exp(-alpha t), the faster it decays.
+    """State (states,) after a blow at rest; on M2 along +x that of a force, the faster it decays.
 
     The generalized momenta are B^T J, the rates a^-1 of them, paper (11).
 

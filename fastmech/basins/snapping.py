@@ -20,23 +20,23 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Floats, Integers
-from fastmech.basins.convergence import SUBSTEPS, Indices, climb, near_saddle, tell_the_same
+from fastmech.basins.convergence import SUBSTEPS, Computations, Indices, near_saddle, tell_the_same
 from fastmech.basins.measures.labels import check_point
 from fastmech.basins.runs import Paths
-from fastmech.capture.scene import SceneCertificate, scene_certificate
 from fastmech.capture.select import require_damper
-from fastmech.capture.steps import coarse_steps, method_for
 from fastmech.ensembles import checks
 from fastmech.ensembles.fitting import breaks_energy_bounds, energies
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import LABELS, Status, counts
-from fastmech.equilibria.find import Equilibria, Equilibrium, find_equilibria
 from fastmech.errors import InputError, shown
 from fastmech.integrators.methods import find_method
-from fastmech.mechanism.coefficients import reduce
 from fastmech.objects import Drawn
 from fastmech.scene import Scene
+from fastmech.slider.capture.certificate import SceneCertificate, scene_certificate
+from fastmech.slider.capture.steps import coarse_steps, method_for
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.equilibria import Equilibria, Equilibrium, find_equilibria
 
 #: Time between looks at what is captured [s].
 PIECE = 1.0
@@ -49,7 +49,7 @@ TOGETHER = 1 << 12
 
 
 @dataclass(frozen=True)
-class Switched:
+class Switched(Computations):
     """Motions (n,) from one state under F0 exp(-alpha t).
 
     The certificate is that of the force-free scene. A motion is captured by a well w once it is below B(w) in
@@ -101,16 +101,7 @@ class Switched:
         for first in range(pieces):
             # Each piece takes something of everywhere, so that all take about as long.
             members = np.arange(first, self.F0.size, pieces)
-            climb(
-                self.certificate,
-                members,
-                self.follow,
-                self.agree,
-                self.impossible,
-                self.lingers,
-                found,
-                status,
-            )
+            self.climb(members, found, status)
             if progress is not None:
                 progress(members.size)
         return found, status

@@ -14,11 +14,11 @@ from fastmech.basins.measures.labels import LabelOf, check_point
 from fastmech.basins.measures.norm import kinetic_norm
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.ensembles import checks
-from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
+from fastmech.slider.equilibria import Equilibrium
 
 #: Bits for the well (there are at most 128 equilibria), and for the turns of all coordinates together.
 WELL_BITS, TURN_BITS = 7, 56

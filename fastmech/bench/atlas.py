@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from scipy import optimize
 
 from fastmech.arrays import Floats
-from fastmech.atlas.folds import trace_folds
-from fastmech.atlas.map import EquilibriumMap, map_equilibria
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.threads import thread_count
-from fastmech.equilibria.certificate import Outcome
+from fastmech.outcome import Outcome
 from fastmech.reports import Stage, in_turns, table
 from fastmech.scene import Scene
+from fastmech.slider.atlas.folds import trace_folds
+from fastmech.slider.atlas.map import EquilibriumMap, map_equilibria
 
 SCENE = Scene(c1=294.9, c2=92.85, F0=85.3, alpha=0.0)
 F0_RANGE, C1_RANGE = (-400.0, 400.0), (0.0, 400.0)

@@ -19,13 +19,13 @@ from fastmech.basins.label import label_starts
 from fastmech.bench.plain import scalar_rhs
 from fastmech.disturbance.motion import confining_energy, excess_energy
 from fastmech.ensembles.threads import thread_count
-from fastmech.equilibria.find import find_equilibria
 from fastmech.jit import FLAGS
-from fastmech.mechanism.coefficients import reduce
-from fastmech.mechanism.lagrange import unit
-from fastmech.mechanism.reduced import metric_11, potential, slider_ratio
 from fastmech.reports import Stage, in_turns, table
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.equilibria import find_equilibria
+from fastmech.slider.lagrange import unit
+from fastmech.slider.reduced import metric_11, potential, slider_ratio
 
 SCENE = Scene(alpha=0.0)
 REST, T_END, REPEATS = 1e-3, 300.0, 3

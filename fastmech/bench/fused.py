@@ -20,7 +20,7 @@ from fastmech.integrators.tableau import Tableau
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import FLAGS
 from fastmech.kernels.sincos import sincos
-from fastmech.mechanism.equations import lagrange_accelerations
+from fastmech.slider.equations import lagrange_accelerations
 
 METHODS = ("rk4", "dop853")
 

@@ -14,9 +14,9 @@ from fastmech.bench.measure import Problem
 from fastmech.ensembles.integrate import integrate
 from fastmech.integrators.methods import find_method
 from fastmech.jit import FLAGS
-from fastmech.kernels.select import right_hand_side
 from fastmech.reports import TURNS, Stage, in_turns
 from fastmech.scene import Scene
+from fastmech.slider.kernels.select import right_hand_side
 
 #: Independent chains of multiply-adds in a lane, and their length: enough to hide each one's latency.
 CHAINS, LENGTH = 8, 32

@@ -23,10 +23,10 @@ import numpy as np
 from fastmech.arrays import Floats
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.system import System
-from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.models.mechanism import Mechanism
 from fastmech.reports import Stage as Stage
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import Coefficients, reduce
 
 #: Starts of a problem that have a reference; larger ensembles repeat them.
 STARTS = 1024

@@ -12,11 +12,11 @@ import numpy as np
 from fastmech.bench.frontier import EXPLICIT, WorkPrecision, work_precision
 from fastmech.ensembles.fitting import vibration_frequency
 from fastmech.errors import InputError, one_line, shown, shown_name
-from fastmech.mechanism.coefficients import reduce
 from fastmech.plots.style import new_figure, save, style
 from fastmech.reports import Stage, no_stage, table
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import read_request
+from fastmech.slider.coefficients import reduce
 
 #: Starts at rest anywhere, of a request's scene, and the end in its vibrations' time scale.
 STARTS, UNTIL = 512, 50.0

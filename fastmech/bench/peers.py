@@ -29,8 +29,8 @@ from fastmech.bench.plain import accelerations, scalar_rhs
 from fastmech.ensembles.system import System
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import FLAGS
-from fastmech.mechanism.coefficients import Coefficients
 from fastmech.models.mechanism import Mechanism
+from fastmech.slider.coefficients import Coefficients
 
 _COUNT = len(Coefficients._fields)
 _POINTER = types.CPointer(types.float64)  # type: ignore[no-untyped-call]

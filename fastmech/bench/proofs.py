@@ -14,10 +14,10 @@ from fastmech.arrays import Floats
 from fastmech.bench.devices import KINDS
 from fastmech.bench.measure import Stage
 from fastmech.bench.tables import table
-from fastmech.equilibria.certificate import Outcome
 from fastmech.models.equilibria import RestingPlaces, prove_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.statics import Statics
+from fastmech.outcome import Outcome
 
 #: Mechanisms of the study, and starts of Newton's method for each; of a quick one.
 NUMBER, STARTS = 2000, 10_000

@@ -14,9 +14,9 @@ from fastmech.arrays import Floats
 from fastmech.bench.measure import rest_starts
 from fastmech.bench.plain import scalar_rhs
 from fastmech.ensembles.integrate import integrate
-from fastmech.mechanism.coefficients import reduce
 from fastmech.reports import Stage, in_turns, table
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
 
 BETAS, T_END = (1e4, 1e6), 2.0
 

@@ -25,9 +25,9 @@ from numpy.typing import NDArray
 from fastmech.arrays import Floats
 from fastmech.bench.plain import accelerations
 from fastmech.ensembles.integrate import integrate
-from fastmech.mechanism.coefficients import reduce
 from fastmech.reports import Stage, table
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
 
 Extended = NDArray[np.longdouble]
 

@@ -26,7 +26,6 @@ ENLARGED = 1e-9
 HALVINGS, WITHIN = 40, 0.999
 
 _FLAGS = types.Array(types.int8, 1, "C")
-_TURNS = types.Array(types.int8, 2, "C")
 
 
 @kernel(types.void(ENERGY, FORCES, MATRIX, MATRIX, INTEGERS, MATRIX), **EXACT)

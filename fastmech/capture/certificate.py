@@ -16,9 +16,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.disturbance.motion import Size
+from fastmech.disturbance.motion import Size, confining_energy, damped_times, size_of
 from fastmech.ensembles.run import CALL_STEPS_WITH_STOPS, Observation
-from fastmech.integrators.methods import Method
+from fastmech.integrators.methods import Method, find_method
+from fastmech.models.mechanism import short_way
+
+#: Coarse step times the highest frequency [rad], and times the fastest turning that the energy allows. With
+#: ``dop853`` the error of such a step is some 1e-3 by the time of capture; half of it makes that 1e-5.
+PHASE, TURNING = 1.0, 2.5
+
+#: Octaves below a mechanism's own step that a start may take: rates of some thousand rad/s. A start that is
+#: faster still comes out as what that step makes of it.
+MOST_OCTAVES = 7.0
+
+#: Share of a start's coarse step, at which labels begin, that measuring takes by default (an implicit method,
+#: whose error constant is larger, takes half of it).
+MEASURING = 0.6
 
 #: Code of a motion that has left the range of a coordinate, beside wells' numbers from 1.
 OUT = 127
@@ -102,17 +115,22 @@ class Certificate(ABC):
     def motion(self) -> tuple[Any, Floats]:
         """Right-hand side and parameters for :func:`fastmech.ensembles.run.run_ensemble`."""
 
-    @abstractmethod
+    @property
+    def held(self) -> Any:
+        """The system with the loads that its equilibria hold for."""
+        return self.system
+
     def method(self, name: str | None) -> str:
         """The method of this name, or the one by default."""
+        return find_method(name or "dop853").name
 
-    @abstractmethod
     def warn_of_step(self, dt: float, method: str) -> None:
-        """Warn, in the caller's caller, if a step [s] cannot be right."""
+        """Warn, in the caller's caller, if a step [s] cannot be right; where energies tell later, of none."""
+        return
 
-    @abstractmethod
     def is_beyond(self, dt: float, steps: float, method: str) -> bool:
-        """Whether so many steps of dt [s] make motion grow that should die out."""
+        """Whether so many steps of dt [s] make motion grow that should die out, if that is known before."""
+        return False
 
     @abstractmethod
     def coarse_steps(self, starts: Floats) -> Floats:
@@ -123,9 +141,9 @@ class Certificate(ABC):
     def shortest_step(self) -> float:
         """Shortest of the coarse steps by default [s]."""
 
-    @abstractmethod
     def damped_times(self, method: str, until: float, ratio: float = 2.0) -> Floats:
         """Times [s] before ``until`` at which an implicit method's first steps end."""
+        return damped_times(self.system, method, until, ratio)
 
     def early(self, method: Method) -> Early | None:
         """What is over at once, if anything is."""
@@ -139,31 +157,34 @@ class Certificate(ABC):
     def change(self, states: Floats, apart: Floats, push: Floats | None = None) -> Floats:
         """Bound on how much the bounding energy changes from states over boxes of these half-widths (n,)."""
 
-    @abstractmethod
     def size(self, equilibrium: int) -> Size:
         """The kinetic-energy norm at one of the equilibria."""
+        return size_of(self.held, self.tree.equilibria[equilibrium])
 
     @property
-    @abstractmethod
     def places(self) -> Floats:
         """States of rest at the equilibria (count, states)."""
+        position = self.tree.equilibria.position
+        return np.concatenate([position, np.zeros_like(position)], axis=1)
 
-    @abstractmethod
     def confining(self, radius: float) -> Floats:
         """Energies with which motions stay in the ball of a radius about each well, to second order."""
+        wells, e = list(self.tree.wells), self.tree.equilibria
+        more = np.array([confining_energy(self.held, e[well], radius) for well in wells])
+        return np.asarray(self.energies[wells] + more / self.joule)
 
-    @abstractmethod
     def measuring_steps(self, starts: Floats, method: str) -> Floats:
         """Longest steps [s] of starts (n, states) for what is measured on the way, shape (n,)."""
+        return MEASURING * self.coarse_steps(starts)
 
     @property
     @abstractmethod
     def slow_step(self) -> float:
         """Coarse step of slow motions [s]."""
 
-    @abstractmethod
     def formula(self, method: str) -> Method:
         """A method that knows the Jacobian, if it needs one and there is one."""
+        return find_method(method)
 
     def drives_rest(self, dt: float, steps: float, method: str) -> bool:
         """Whether so many steps of dt [s] make motion grow, damped or not."""
@@ -180,9 +201,4 @@ class Certificate(ABC):
 
     def away(self, states: Floats, place: Floats) -> Floats:
         """Departures (n, states) from the copy of a place that is nearest."""
-        away, n = states - place, len(self.periods)
-        turning = self.periods > 0.0
-        with np.errstate(invalid="ignore"):
-            turns = np.round(away[:, :n][:, turning] / (2.0 * np.pi))
-            away[:, np.flatnonzero(turning)] -= 2.0 * np.pi * turns
-        return away
+        return short_way(states - place, self.system.turning)

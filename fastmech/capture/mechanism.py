@@ -24,16 +24,21 @@ from numpy.typing import NDArray
 from fastmech.arrays import Floats, Integers
 from fastmech.callee import callee
 from fastmech.capture.cells import bound_cells, bound_states, convex_box, fill_component, first_exits
-from fastmech.capture.certificate import Certificate, Early, Noted
+from fastmech.capture.certificate import (
+    MOST_OCTAVES,
+    PHASE,
+    TURNING,
+    Certificate,
+    Early,
+    Noted,
+)
 from fastmech.capture.observe import HEAD, RECORD, TABLE_ROWS
-from fastmech.capture.steps import MEASURING, MOST_OCTAVES, PHASE, TURNING
-from fastmech.disturbance.motion import Size, confining_energy, size_of
 from fastmech.ensembles.ends import STOP_CODE
 from fastmech.ensembles.problem import system_of
 from fastmech.ensembles.run import CALL_STEPS_WITH_STOPS, Observation
 from fastmech.errors import InputError, shown
 from fastmech.generated import new_module, run_module
-from fastmech.integrators.methods import Method, find_method
+from fastmech.integrators.methods import Method
 from fastmech.models.balance import balance_kernel, energy_kernel, range_of
 from fastmech.models.equilibria import Place, RestingPlaces, domain_of, find_equilibria
 from fastmech.models.mechanism import Mechanism, in_precision
@@ -391,17 +396,6 @@ class MechanismCertificate(Certificate):
         system, known = system_of(mechanism, "lagrange"), mechanism.coefficients()
         return system.kernel, np.array([known[name] for name in system.parameters], dtype=np.float64)
 
-    def method(self, name: str | None) -> str:
-        """By default ``dop853``."""
-        return find_method(name or "dop853").name
-
-    def warn_of_step(self, dt: float, method: str) -> None:
-        """Nothing is known before the run; energies tell after it."""
-
-    def is_beyond(self, dt: float, steps: float, method: str) -> bool:
-        """Energies tell."""
-        return False
-
     @cached_property
     def _paces(self) -> tuple[float, Floats]:
         """Coarse step of slow motions [s], and the squared rates that an energy allows, by phase [1/J s2].
@@ -449,10 +443,6 @@ class MechanismCertificate(Certificate):
         """See the base class."""
         return float(0.5**MOST_OCTAVES * self._paces[0])
 
-    def damped_times(self, method: str, until: float, ratio: float = 2.0) -> Floats:
-        """None: steps are short enough for the dampers."""
-        return np.zeros(0)
-
     def early(self, method: Method) -> Early | None:
         """What happens until loads have no more kinks, which no step may cross."""
         kinks = self.system.kinks(math.inf)
@@ -484,34 +474,10 @@ class MechanismCertificate(Certificate):
         found[known] = over[:, 1] - at[:, 0]
         return found
 
-    def size(self, equilibrium: int) -> Size:
-        """The norm in units of the last coordinate."""
-        return size_of(self.system, self.tree.equilibria[equilibrium])
-
-    @property
-    def places(self) -> Floats:
-        """See the base class."""
-        found = np.zeros((len(self.tree.equilibria), 2 * len(self.names)))
-        found[:, : len(self.names)] = self.tree.equilibria.position
-        return found
-
-    def confining(self, radius: float) -> Floats:
-        """See the base class."""
-        wells = [self.tree.equilibria[well] for well in self.tree.wells]
-        return np.array([e.energy + confining_energy(self.system, e, radius) for e in wells])
-
-    def measuring_steps(self, starts: Floats, method: str) -> Floats:
-        """A share of the coarse step."""
-        return MEASURING * self.coarse_steps(starts)
-
     @property
     def slow_step(self) -> float:
         """See the base class."""
         return self._paces[0]
-
-    def formula(self, method: str) -> Method:
-        """It takes differences."""
-        return find_method(method)
 
 
 def mechanism_certificate(mechanism: Mechanism) -> MechanismCertificate:

@@ -6,12 +6,15 @@ from typing import Any
 
 from fastmech.capture.certificate import Captured, Certificate
 from fastmech.capture.mechanism import mechanism_certificate
-from fastmech.capture.scene import scene_certificate
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
 from fastmech.samplers import Starts
-from fastmech.scene import STATE, Scene, require_scene
+from fastmech.scene import Scene, require_scene
+from fastmech.slider.capture.certificate import scene_certificate
+
+#: What is wrong with a scene that nothing damps.
+NO_DAMPER = "scene.beta = 0: must be greater than 0 N s/m"
 
 #: Certificates of mechanisms that are kept, the oldest first, by what tells mechanisms apart.
 _kept: dict[tuple[Any, ...], Certificate] = {}
@@ -41,18 +44,13 @@ def require_damper(system: Any) -> None:
     Raises:
         InputError: nothing damps, or it is neither scene nor mechanism.
     """
-    if isinstance(system, Mechanism):
-        if system.damped:
-            return
+    if not isinstance(system, Mechanism):
+        require_scene(system)
+    if not system.damped:
+        lacks = f"{system.name}: has no dampers" if isinstance(system, Mechanism) else NO_DAMPER
         raise InputError(
-            f"{system.name}: has no dampers: without, nothing comes to rest and there is no attractor; "
-            "fastmech.trapped tells which states can never leave their well"
-        )
-    require_scene(system)
-    if system.beta == 0.0:
-        raise InputError(
-            "scene.beta = 0: must be greater than 0 N s/m: without damper nothing comes to rest and there "
-            "is no attractor; fastmech.trapped tells which states can never leave their well"
+            f"{lacks}: without damper nothing comes to rest and there is no attractor; fastmech.trapped "
+            "tells which states can never leave their well"
         )
 
 
@@ -63,8 +61,7 @@ def trapped(scene: Scene | Mechanism, states: Starts) -> Captured:
 
     Args:
         scene: the mechanism. Where its loads fade, the wells are those of what is left.
-        states: a sampler, or phi, theta [rad], phi', theta' [rad/s], shape (n, 4) or (4,); of a
-            ``Mechanism`` coordinates, then rates.
+        states: a sampler, or coordinates [rad or m], then rates, shape (n, states) or (states,).
 
     Raises:
         InputError: not states, or the wells are not certain.
@@ -72,5 +69,4 @@ def trapped(scene: Scene | Mechanism, states: Starts) -> Captured:
     if not isinstance(scene, Mechanism):
         require_scene(scene)
     certificate = certificate_of(scene)
-    names = scene.state if isinstance(scene, Mechanism) else STATE
-    return certificate.captured(checks.starts("states", states, names))
+    return certificate.captured(checks.starts("states", states, scene.state))

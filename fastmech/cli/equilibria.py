@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from fastmech.atlas.snap import Snap
-    from fastmech.equilibria.find import Equilibrium
     from fastmech.scene import Scene
-    from fastmech.stability.classify import Classification
+    from fastmech.slider.equilibria import Equilibrium
+    from fastmech.slider.stability import Classification
 
 
 class Position(NamedTuple):
@@ -96,10 +96,11 @@ def equilibria(
     scene = scene.replace(**{name: value for name, value in parameters.items() if value is not None})
     with account("equilibria", quiet, as_json) as told:
         with told.bars.preparing():
-            from fastmech.atlas.snap import find_snap, stable_at
+            from fastmech.atlas.snap import find_snap
             from fastmech.basins.shock_limit import proved_limits
-            from fastmech.equilibria.find import find_equilibria
-            from fastmech.stability.classify import classify
+            from fastmech.slider.atlas.snap import stable_at
+            from fastmech.slider.equilibria import find_equilibria
+            from fastmech.slider.stability import classify
         found = find_equilibria(scene, at)
         advance = told.bars.stage("stability of equilibria", len(found))
         results = []

@@ -21,7 +21,7 @@ import numpy as np
 import fastmech as fm
 from fastmech import jit
 from fastmech.ensembles.threads import thread_count
-from fastmech.equilibria.find import find_equilibria
+from fastmech.slider.equilibria import find_equilibria
 
 _SCENES = {"constant": fm.Scene(alpha=0.0), "decaying": fm.Scene()}
 _STARTS = np.array([[1.0, 0.2, 0.0, 0.0], [0.9, -0.3, 0.5, 0.0]])

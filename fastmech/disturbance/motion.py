@@ -13,22 +13,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Floats
 from fastmech.ensembles import checks
-from fastmech.ensembles.fitting import damping_rate
+from fastmech.ensembles.fitting import damping_rate as fastest_damping
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import Status
-from fastmech.equilibria.find import Equilibrium, degenerate_sentence
-from fastmech.equilibria.search import pulls, vanishing
 from fastmech.errors import InputError
 from fastmech.integrators.methods import ImplicitRungeKutta, find_method
 from fastmech.jit import OBSERVER_SIGNATURE, kernel
-from fastmech.mechanism.coefficients import reduce
-from fastmech.mechanism.lagrange import kinetic_energy, metric, potential_energy, potential_hessian, unit
 from fastmech.models.equilibria import RestingPlace, find_equilibria
 from fastmech.models.mechanism import Mechanism
+from fastmech.models.stability import linear_of, state_matrix
 from fastmech.objects import Drawn, Field, Result
 from fastmech.samplers import Starts
-from fastmech.scene import STATE, Scene, require_scene
-from fastmech.stability.linearize import jacobian
+from fastmech.scene import Scene, require_scene
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.equilibria import Equilibrium, degenerate_sentence
+from fastmech.slider.lagrange import kinetic_energy, potential_energy
+from fastmech.slider.theorem import pulls, vanishing
 
 #: Rows of the record, which begins with zeros and ends with the state that the step began with; the
 #: excursions' rows go on with the other coordinates, and SWUNG is when the last of them was reached.
@@ -103,24 +103,17 @@ class Size:
         return np.asarray(points @ np.linalg.inv(self.to_ball))
 
 
-def size_at(scene: Scene, phi: float, theta: float) -> Size:
-    """The norm at the equilibrium (phi, theta) [rad] of a scene with a constant force."""
-    q = (phi, theta)
-    return _size(metric(scene, q), potential_hessian(scene, q, scene.F0), unit(scene))
-
-
-def _size(a: Floats, hessian: Floats, inertia: float) -> Size:
-    curvature = np.max(np.abs(scipy.linalg.eigvalsh(hessian, a)))
+def size_at(system: Scene | Mechanism, *position: float) -> Size:
+    """The norm at a position [rad or m] of a scene with a constant force, or of a mechanism."""
+    mass, _, stiffness = linear_of(system, position)
+    curvature = np.max(np.abs(scipy.linalg.eigvalsh(0.5 * (stiffness + stiffness.T), mass)))
     # Without any stiffness (all curvature gone) there is no frequency; 1 rad/s keeps the norm defined.
-    return Size(a / inertia, float(np.sqrt(curvature)) or 1.0)
+    return Size(mass / mass[-1, -1], float(np.sqrt(curvature)) or 1.0)
 
 
 def size_of(system: Scene | Mechanism, e: Equilibrium | RestingPlace) -> Size:
     """The norm at an equilibrium of a scene with a constant force, or of a mechanism."""
-    if isinstance(system, Scene):
-        return size_at(system, *e.position)
-    linear = system.linear(e.position)
-    return _size(linear.mass, 0.5 * (linear.stiffness + linear.stiffness.T), linear.mass[-1, -1])
+    return size_at(system, *e.position)
 
 
 def excess_energy(system: Scene | Mechanism, e: Equilibrium | RestingPlace, y: Floats) -> Floats:
@@ -137,14 +130,9 @@ def confining_energy(system: Scene | Mechanism, e: Equilibrium | RestingPlace, r
     With the lowest squared frequency s the energy is at least s m2 l^2 size^2 / 2 (the norm's omega is the
     highest frequency), to second order.
     """
-    if isinstance(e, RestingPlace):
-        assert isinstance(system, Mechanism)
-        a = system.metric(e.position)
-        stiffness, inertia = 0.5 * (e.stiffness + e.stiffness.T), float(a[-1, -1])
-    else:
-        assert isinstance(system, Scene)
-        a, stiffness, inertia = metric(system, (e.phi, e.theta)), e.hessian, unit(system)
-    return 0.5 * float(scipy.linalg.eigvalsh(stiffness, a)[0]) * inertia * radius * radius
+    mass, _, stiffness = linear_of(system, e.position)
+    lowest = float(scipy.linalg.eigvalsh(0.5 * (stiffness + stiffness.T), mass)[0])
+    return 0.5 * lowest * float(mass[-1, -1]) * radius * radius
 
 
 def uniform_ball(rng: np.random.Generator, n: int, dim: int = 4) -> Floats:
@@ -221,27 +209,16 @@ def disturbed_motion(
     """
     equilibria_to_disturb(scene).index_of(equilibrium)
     center = np.concatenate([equilibrium.position, np.zeros(len(equilibrium.position))])
-    names = scene.state if isinstance(scene, Mechanism) else STATE
-    start = checks.starts("disturbance", disturbance, names)
+    start = checks.starts("disturbance", disturbance, scene.state)
     t = checks.rising_times("times", times)
     dt = default_step(scene, equilibrium) if dt is None else dt
     dt = checks.number("dt", dt, "s", above=0.0)
     method = method or default_method(scene, dt)
     passed = np.union1d(t, damped_times(scene, method, min(dt, float(t[-1]))))
     run = integrate(scene, center + start, dt=dt, method=method, t_eval=passed, threads=threads)
-    linearized = start @ propagators(state_jacobian(scene, equilibrium), t).mT
+    linearized = start @ propagators(state_matrix(scene, equilibrium), t).mT
     away = run.y[np.searchsorted(passed, t)] - center
     return DisturbedMotion(t, away, linearized, run.status).of(scene)
-
-
-def state_jacobian(system: Scene | Mechanism, equilibrium: Equilibrium | RestingPlace) -> Floats:
-    """Of the rates of states, by states, at an equilibrium (states, states)."""
-    if isinstance(equilibrium, Equilibrium) and isinstance(system, Scene):
-        return jacobian(system, equilibrium)
-    assert isinstance(system, Mechanism)
-    mass, damping, stiffness = system.linear(equilibrium.position)
-    rates = np.linalg.solve(mass, np.concatenate([-stiffness, -damping], axis=1))
-    return np.concatenate([np.eye(len(mass), 2 * len(mass), len(mass)), rates])
 
 
 def default_step(scene: Scene | Mechanism, equilibrium: Equilibrium | RestingPlace) -> float:
@@ -249,11 +226,14 @@ def default_step(scene: Scene | Mechanism, equilibrium: Equilibrium | RestingPla
     return PHASE / size_of(scene, equilibrium).omega
 
 
+def damping_rate(system: Scene | Mechanism) -> float:
+    """How fast the damper stops motion [1/s]; 0 for a ``Mechanism``, whose steps are short enough."""
+    return 0.0 if isinstance(system, Mechanism) else float(fastest_damping(reduce(system)))
+
+
 def default_method(scene: Scene | Mechanism, step: float) -> str:
     """``dop853``, or ``radau5`` where the damper makes damped motion grow with explicit steps [s] so long."""
-    if isinstance(scene, Mechanism):
-        return "dop853"
-    return "radau5" if float(damping_rate(reduce(scene))) * step > STABLE else "dop853"
+    return "radau5" if damping_rate(scene) * step > STABLE else "dop853"
 
 
 def damped_times(scene: Scene | Mechanism, method: str, until: float, ratio: float = 2.0) -> Floats:
@@ -263,9 +243,7 @@ def damped_times(scene: Scene | Mechanism, method: str, until: float, ratio: flo
     the time that it takes and grow by ``ratio`` at most (Hairer, Wanner, *Solving ODEs II*, section VI.1).
     Nothing of an explicit method, whose steps are that short in any case, nor of a ``Mechanism``.
     """
-    if isinstance(scene, Mechanism):
-        return np.zeros(0)
-    rate = float(damping_rate(reduce(scene)))
+    rate = damping_rate(scene)
     if not isinstance(find_method(method), ImplicitRungeKutta) or not rate * until > LAYER:
         return np.zeros(0)
     first = (ratio - 1.0) * LAYER / rate

@@ -13,9 +13,9 @@ from fastmech.ensembles import checks
 from fastmech.ensembles.run import run_ensemble
 from fastmech.errors import InputError
 from fastmech.integrators.methods import find_method
-from fastmech.mechanism.coefficients import reduce
-from fastmech.mechanism.lagrange import kinetic_energy, potential_energy, potential_gradient, unit
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.lagrange import kinetic_energy, potential_energy, potential_gradient, unit
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def energy_balance(
         InputError: an argument is wrong.
     """
     # Its kernel's source is written when the module is imported, which checking a request must not do.
-    from fastmech.kernels.work import lagrange_work
+    from fastmech.slider.kernels.work import lagrange_work
 
     start = checks.states("y0", y0, 4)
     if len(start) != 1:

@@ -194,3 +194,16 @@ def rising_times(name: str, values: ArrayLike) -> NDArray[np.float64]:
             f"{name}[{k}] = {times[k]:g}: must be finite, not negative and strictly rising times in s"
         )
     return times
+
+
+def check_pair(x: Any, y: Any) -> None:
+    """Refuse what are no two parameters' names with their values.
+
+    Raises:
+        InputError: they are not.
+    """
+    for name, given in (("x", x), ("y", y)):
+        if not isinstance(given, tuple | list) or len(given) != 2 or not isinstance(given[0], str):
+            raise InputError(f"{name} = {shown(given)}: must be a parameter's name and its values")
+    if x[0] == y[0]:
+        raise InputError(f"axes: {x[0]} is given twice; two different parameters are needed")

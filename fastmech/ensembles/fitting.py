@@ -34,8 +34,8 @@ from fastmech.ensembles.threads import in_parts
 from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method
 from fastmech.jit import MATRIX, kernel
 from fastmech.kernels.sincos import REDUCTION_LIMIT, sincos
-from fastmech.mechanism.coefficients import Coefficients
-from fastmech.mechanism.reduced import kinetic, metric_11, potential, slider_ratio
+from fastmech.slider.coefficients import Coefficients
+from fastmech.slider.reduced import kinetic, metric_11, potential, slider_ratio
 from fastmech.step_limits.amplification import amplifies, first_crossing
 
 #: States (n, 4), which a user may have locked.

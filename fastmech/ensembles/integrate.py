@@ -26,11 +26,11 @@ from fastmech.ensembles.system import System, stop_codes
 from fastmech.ensembles.tolerance import solve_to_tolerance
 from fastmech.errors import InputError, called_here, shown
 from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method
-from fastmech.kernels.select import FORMULATIONS
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Field
 from fastmech.samplers import Starts
 from fastmech.scene import STATE, Scene, nearest
+from fastmech.slider.kernels.select import FORMULATIONS
 from fastmech.step_limits.warning import TURN, too_long, warn_of_step
 
 #: Longest step [s] where neither a step nor a tolerance is given.

@@ -27,15 +27,15 @@ from fastmech.integrators.methods import Method, with_jacobian
 from fastmech.jit import inlined, rounded_to
 from fastmech.kernels.blocks import Rates
 from fastmech.kernels.exponential import exp
-from fastmech.kernels.jacobians import canonical_jacobian, lagrange_inverse, lagrange_jacobian
 from fastmech.kernels.rebuilding import rebuilt
-from fastmech.kernels.select import right_hand_side
 from fastmech.kernels.sincos import cos, reduction_limit, sin, sincos, turned
-from fastmech.mechanism.coefficients import Coefficients, reduce
-from fastmech.mechanism.equations import momenta_from_rates, rates_from_momenta
-from fastmech.mechanism.reduced import metric_determinant, slider_ratio
 from fastmech.models.mechanism import Mechanism, in_precision
 from fastmech.scene import Scene, nearest
+from fastmech.slider.coefficients import Coefficients, reduce
+from fastmech.slider.equations import momenta_from_rates, rates_from_momenta
+from fastmech.slider.kernels.jacobians import canonical_jacobian, lagrange_inverse, lagrange_jacobian
+from fastmech.slider.kernels.select import right_hand_side
+from fastmech.slider.reduced import metric_determinant, slider_ratio
 
 #: What the text of a right-hand side calls.
 _CALLED = {

@@ -32,7 +32,7 @@ from fastmech.ensembles.run import Ensemble, Observation, Progress, run_ensemble
 from fastmech.ensembles.status import Status
 from fastmech.integrators.methods import Method
 from fastmech.jit import OBSERVER_SIGNATURE, kernel
-from fastmech.mechanism.coefficients import Coefficients
+from fastmech.slider.coefficients import Coefficients
 from fastmech.step_limits.warning import TURN
 
 #: By how much rounding may make a step longer than the dt that it was to be.

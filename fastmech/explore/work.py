@@ -135,8 +135,8 @@ def _basins(device: Device, message: Any) -> Iterator[bytes]:
 
 def _atlas(device: Device, message: Any) -> Iterator[bytes]:
     from fastmech.atlas.critical_curves import critical_curves
-    from fastmech.atlas.folds import trace_folds
-    from fastmech.atlas.map import map_equilibria
+    from fastmech.slider.atlas.folds import trace_folds
+    from fastmech.slider.atlas.map import map_equilibria
 
     system = device.at(message.parameters)
     for halving in range(message.halvings + 1):

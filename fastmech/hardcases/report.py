@@ -25,7 +25,6 @@ from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import FAILURES, Status
 from fastmech.ensembles.system import System
 from fastmech.ensembles.threads import thread_count
-from fastmech.equilibria.find import Equilibrium, find_equilibria
 from fastmech.errors import InputError, StepWarning
 from fastmech.hardcases.cases import (
     algebraic,
@@ -52,6 +51,7 @@ from fastmech.plots.style import save
 from fastmech.reports import Stage, columns, in_turns, no_stage, table
 from fastmech.results import Dataset, Variable, flags, scene_parameters
 from fastmech.scene import Scene
+from fastmech.slider.equilibria import Equilibrium, find_equilibria
 from fastmech.step_limits.amplification import imaginary_limit, real_limit
 from fastmech.step_limits.measure import measured_stable_step
 from fastmech.step_limits.predict import largest_stable_step, limiting_eigenvalues

@@ -26,11 +26,11 @@ from fastmech.errors import InputError
 from fastmech.integrators.explicit import Batch, observe_nothing
 from fastmech.integrators.methods import METHODS, Adams, ImplicitRungeKutta, find_method
 from fastmech.integrators.tableaus.implicit import IMPLICIT_TABLEAUS
-from fastmech.kernels.jacobians import lagrange_inverse, lagrange_jacobian
-from fastmech.kernels.work import CALLS, JACOBIANS, counting_jacobian, counting_lagrange
-from fastmech.mechanism.coefficients import reduce
-from fastmech.mechanism.lagrange import kinetic_energy, potential_energy
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.kernels.jacobians import lagrange_inverse, lagrange_jacobian
+from fastmech.slider.kernels.work import CALLS, JACOBIANS, counting_jacobian, counting_lagrange
+from fastmech.slider.lagrange import kinetic_energy, potential_energy
 from fastmech.step_limits.predict import stable_step
 from fastmech.step_limits.warning import step_limit, step_warning
 

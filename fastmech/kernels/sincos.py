@@ -80,9 +80,9 @@ def sincos_single(x: float) -> tuple[float, float]:
     sign = one - two * (half - two * np.floor(half_of * half))
     z = r * r
     s1, s2, s3 = rounded_to(x, _S1_SINGLE), rounded_to(x, _S2_SINGLE), rounded_to(x, _S3_SINGLE)
-    c1, c2, c3 = rounded_to(x, _C1_SINGLE), rounded_to(x, _C2_SINGLE), rounded_to(x, _C3_SINGLE)
+    d1, d2, d3 = rounded_to(x, _C1_SINGLE), rounded_to(x, _C2_SINGLE), rounded_to(x, _C3_SINGLE)
     s = r + r * z * (s1 + z * (s2 + z * s3))
-    c = one - half_of * z + z * z * (c1 + z * (c2 + z * c3))
+    c = one - half_of * z + z * z * (d1 + z * (d2 + z * d3))
     sine = sign * (c if odd > half_of else s)
     cosine = sign * (-s if odd > half_of else c)
     return sine, cosine

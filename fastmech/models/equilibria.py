@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
 from fastmech.callee import callee
-from fastmech.equilibria import find
-from fastmech.equilibria.certificate import Outcome
 from fastmech.errors import InputError, shown
 from fastmech.intervals.search import AT_END, LIMIT, TWO_PI, UNCLEAR, UNDEFINED, Found, search, work
 from fastmech.loads import Constant
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.statics import Statics
 from fastmech.objects import Drawn, Printed
+from fastmech.outcome import Outcome
 from fastmech.scene import Scene
+from fastmech.slider import equilibria as of_scene
 
 #: Boxes that are treated at most, by the number of coordinates; a chain of four pendulums takes 9,600.
 LIMITS = {1: 10_000, 2: 50_000, 3: 300_000, 4: 1_000_000}
@@ -110,7 +110,7 @@ class RestingPlaces(Drawn, Sequence[RestingPlace]):
     KIND = "equilibria"
     LAYOUT = "scan_types.equilibria:equilibria_dataset"
     PICTURE = "plots.objects:draw_resting"
-    told = find.told_places
+    told = of_scene.told_places
 
     def __len__(self) -> int:
         return len(self.items)
@@ -161,17 +161,17 @@ class RestingPlaces(Drawn, Sequence[RestingPlace]):
 
 
 @overload
-def find_equilibria(system: Scene, at: float = ...) -> find.Equilibria: ...
+def find_equilibria(system: Scene, at: float = ...) -> of_scene.Equilibria: ...
 @overload
 def find_equilibria(system: Mechanism) -> RestingPlaces: ...
 @overload
-def find_equilibria(system: Scene | Mechanism, at: float = ...) -> find.Equilibria | RestingPlaces: ...
-def find_equilibria(system: Any, at: float = math.inf) -> find.Equilibria | RestingPlaces:
+def find_equilibria(system: Scene | Mechanism, at: float = ...) -> of_scene.Equilibria | RestingPlaces: ...
+def find_equilibria(system: Any, at: float = math.inf) -> of_scene.Equilibria | RestingPlaces:
     """All equilibria of a scene or a mechanism, with a proof that none is missing.
 
     Args:
         system: of a ``Scene`` the force is frozen at a time; of a ``Mechanism`` loads are at their means.
-        at: that time [s], for a scene. A constant force (alpha = 0) is F0 at every time. A decaying one is
+        at: that time [s], for a scene. A constant force is the same at every time. A decaying one is
             zero at the default ``inf``, so Table 2 of the paper needs ``alpha = 0`` or ``at=0``.
 
     Where rounding hides how many equilibria there are, near a fold, or where they are not isolated, the
@@ -182,7 +182,7 @@ def find_equilibria(system: Any, at: float = math.inf) -> find.Equilibria | Rest
             which no bounds are known.
     """
     if not isinstance(system, Mechanism):
-        return find.find_equilibria(system, at)
+        return of_scene.find_equilibria(system, at)
     if at != math.inf:
         raise InputError(f"at = {shown(at)}: is for a Scene; equilibria of a mechanism hold for mean loads")
     found = prove_equilibria(system.statics(), list(system.parameters.values()))

@@ -186,6 +186,11 @@ class Mechanism(Printed):
         return tuple(symbol.name for symbol in (*self._symbols, *self._rates))
 
     @property
+    def turning(self) -> tuple[bool, ...]:
+        """Whether each coordinate is an angle that turns fully."""
+        return tuple(coordinate.periodic for coordinate in self.coordinates)
+
+    @property
     def loads(self) -> tuple[Load, ...]:
         """Its loads with the parameters' values."""
         return tuple(load.at(self.parameters) for load, *_ in self._parts.loads)
@@ -452,3 +457,11 @@ def _parameters(given: Any) -> tuple[dict[str, float], dict[str, str]]:
             raise InputError(f"parameters.{name}: is given twice")
         values[name] = float(value)
     return values, units
+
+
+def short_way(away: Floats, turning: Sequence[bool]) -> Floats:
+    """Departures (..., n or states) with angles, of which ``turning`` (n,) tells, the short way."""
+    own = away[..., : len(turning)]
+    with np.errstate(invalid="ignore"):
+        turns = np.where(turning, np.round(own / (2.0 * np.pi)), 0.0)
+    return np.concatenate([own - 2.0 * np.pi * turns, away[..., len(turning) :]], axis=-1)

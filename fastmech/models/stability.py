@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
@@ -15,8 +15,11 @@ from fastmech.intervals.arithmetic import Interval, add, div, mul, sub
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Linear, Mechanism
 from fastmech.objects import Printed
-from fastmech.stability import classify as of_scene
-from fastmech.stability.classify import Finding
+from fastmech.scene import Scene
+from fastmech.slider import stability as of_scene
+from fastmech.slider.lagrange import linear
+from fastmech.slider.linearize import jacobian
+from fastmech.slider.stability import Finding
 
 #: Matrices are taken to be wrong by so many units of rounding of their largest entry.
 _ROUNDING = 32.0 * 2.0**-52
@@ -112,6 +115,26 @@ def assess(linear: Linear, morse_index: int | None) -> Stability:
         instability=instability,
         explanation=explanation,
     )
+
+
+def linear_of(system: Scene | Mechanism, position: ArrayLike) -> Linear:
+    """Mass, damping and stiffness (..., n, n) about positions (..., n), loads at what they come to."""
+    if isinstance(system, Mechanism):
+        return system.linear(position)
+    return Linear(*linear(system, position))
+
+
+def state_matrix(system: Scene | Mechanism, equilibrium: Any) -> Floats:
+    """Of the rates of states by states, at an equilibrium (states, states).
+
+    Raises:
+        InputError: the equilibrium is none, or another system's.
+    """
+    if not isinstance(system, Mechanism):
+        return jacobian(system, equilibrium)
+    mass, damping, stiffness = require_own(system, equilibrium)
+    rates = np.linalg.solve(mass, np.concatenate([-stiffness, -damping], axis=1))
+    return np.concatenate([np.eye(len(mass), 2 * len(mass), len(mass)), rates])
 
 
 class Spectra(NamedTuple):

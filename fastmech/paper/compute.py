@@ -10,11 +10,11 @@ from fastmech.arrays import Floats
 from fastmech.disturbance.motion import DisturbedMotion, disturbed_motion, size_at
 from fastmech.ensembles.balance import EnergyBalance, energy_balance
 from fastmech.ensembles.integrate import integrate
-from fastmech.equilibria.find import Certificate, Equilibria, Equilibrium, find_equilibria
-from fastmech.mechanism.lagrange import momenta
 from fastmech.paper.compare import CASES, Printed
 from fastmech.scene import Scene
-from fastmech.stability.classify import Classification, classify
+from fastmech.slider.equilibria import Certificate, Equilibria, Equilibrium, find_equilibria
+from fastmech.slider.lagrange import momenta
+from fastmech.slider.stability import Classification, classify
 
 PAPER_SCENE = Scene(c2=1100.0 / 3.0)
 """Table 1 with the stiffness c2 = 1100/3 N/m, of which the table prints the rounding 366.67 N/m.

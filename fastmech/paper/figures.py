@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.mechanism.geometry import constraints, positions
-from fastmech.mechanism.lagrange import potential_energy, potential_gradient
 from fastmech.paper.compare import HEADINGS, Row, Verdict
 from fastmech.paper.compute import DISTURBED_SPAN, MOTION_SPAN, PAPER_SCENE, STATIC_SCENE, Case, Computed
 from fastmech.plots.equilibria import draw_mechanism, drawing_of, legend_handles
 from fastmech.plots.style import LINES, PALETTE, legend_below, new_figure, style
 from fastmech.reports import columns
 from fastmech.results import Dataset, Variable
+from fastmech.slider.geometry import constraints, positions
+from fastmech.slider.lagrange import potential_energy, potential_gradient
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

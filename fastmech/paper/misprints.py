@@ -18,8 +18,11 @@ from scipy.integrate import solve_ivp
 
 from fastmech.arrays import Floats
 from fastmech.ensembles.balance import EnergyBalance
-from fastmech.mechanism.geometry import positions, velocities
-from fastmech.mechanism.lagrange import (
+from fastmech.paper.compare import CASES, Printed, agrees_legibly, evaluate, half_unit
+from fastmech.paper.compute import PAPER_SCENE, START, Case, Computed
+from fastmech.scene import Scene
+from fastmech.slider.geometry import positions, velocities
+from fastmech.slider.lagrange import (
     angular_accelerations,
     christoffel,
     generalized_forces,
@@ -30,9 +33,6 @@ from fastmech.mechanism.lagrange import (
     potential_gradient,
     rates,
 )
-from fastmech.paper.compare import CASES, Printed, agrees_legibly, evaluate, half_unit
-from fastmech.paper.compute import PAPER_SCENE, START, Case, Computed
-from fastmech.scene import Scene
 
 Terms = list[dict[str, str]]
 

@@ -8,8 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from fastmech.arrays import Floats
-from fastmech.equilibria.find import find_equilibria
-from fastmech.mechanism.geometry import Points, constraints, positions
 from fastmech.paper.compare import CASES, Judge, Printed, Row, Verdict, agrees
 from fastmech.paper.compute import (
     DISTURBANCE,
@@ -25,6 +23,8 @@ from fastmech.paper.compute import (
 )
 from fastmech.paper.misprints import Terms, equilibrium_20, hamiltonian_16, printed_polynomial
 from fastmech.scene import Scene
+from fastmech.slider.equilibria import find_equilibria
+from fastmech.slider.geometry import Points, constraints, positions
 
 
 class Check(NamedTuple):

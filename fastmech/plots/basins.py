@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.mechanism.lagrange import kinetic_energy, potential_energy
 from fastmech.plots.style import (
     ANGLES,
     FIELD,
@@ -28,6 +27,7 @@ from fastmech.plots.style import (
 )
 from fastmech.results import Dataset
 from fastmech.scene import Scene
+from fastmech.slider.lagrange import kinetic_energy, potential_energy
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.mechanism.lagrange import potential_energy
 from fastmech.models.drawing import Drawing, Element, drawing
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots.style import (
@@ -26,6 +25,7 @@ from fastmech.plots.style import (
 )
 from fastmech.results import Dataset
 from fastmech.scene import Scene
+from fastmech.slider.lagrange import potential_energy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -16,9 +16,7 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from fastmech.basins.map import BasinMap, map_basins
-from fastmech.capture.barriers import BarrierTree
 from fastmech.capture.select import certificate_of, require_damper
-from fastmech.capture.steps import method_for
 from fastmech.ensembles.status import FAILURES, LABELS, Status
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
@@ -39,6 +37,8 @@ from fastmech.scan_types.request import (
     failures,
 )
 from fastmech.scene import STATE, Number, Scene, nearest
+from fastmech.slider.capture.barriers import BarrierTree
+from fastmech.slider.capture.steps import method_for
 from fastmech.step_limits.warning import step_warning
 from fastmech.store.objects import dataset_of
 

@@ -6,8 +6,8 @@ of the section has a row for each trajectory of each equilibrium; what has other
 
 Disturbed ensembles of every equilibrium at every point of a grid of parameters, one tile an equilibrium.
 Layout: arrays over the grid and ``sheet``, NaN where the sheet has no equilibrium; a sheet is one
-equilibrium, continued, as the atlas of these axes numbers them (:mod:`fastmech.atlas.sheets`). Each ensemble
-is that of ``fm.disturb`` with the scene of its point. The group ``quantiles`` holds those of times to return.
+equilibrium, continued, as the atlas of these axes numbers them (:mod:`fastmech.slider.atlas.sheets`). Each
+ensemble is that of ``fm.disturb`` with the scene of its point. ``quantiles`` holds those of times to return.
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from fastmech.arrays import Floats
-from fastmech.atlas.map import map_equilibria
 from fastmech.basins.disturbed import (
     MOST_RADIUS,
     STREAM,
@@ -34,7 +33,6 @@ from fastmech.basins.disturbed import (
 )
 from fastmech.basins.measures.fractions import wilson
 from fastmech.capture.select import certificate_of, require_damper
-from fastmech.capture.steps import method_for, shortest_step
 from fastmech.disturbance.motion import (
     damped_times,
     equilibria_to_disturb,
@@ -46,10 +44,8 @@ from fastmech.disturbance.motion import (
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.status import ENDS, FAILURES, failure_counts
-from fastmech.equilibria.find import Equilibrium, find_equilibria
 from fastmech.errors import InputError, shown
 from fastmech.integrators.methods import find_method
-from fastmech.mechanism.coefficients import reduce
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import (
     NO_CODE,
@@ -82,6 +78,10 @@ from fastmech.scan_types.request import (
     known_parameters,
 )
 from fastmech.scene import Scene, nearest
+from fastmech.slider.atlas.map import map_equilibria
+from fastmech.slider.capture.steps import method_for, shortest_step
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.equilibria import Equilibrium, find_equilibria
 from fastmech.step_limits.warning import step_warning
 from fastmech.store.write import Piece, Stream
 

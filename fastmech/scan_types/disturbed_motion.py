@@ -10,7 +10,6 @@ from pydantic import Field
 
 from fastmech.arrays import Floats
 from fastmech.basins.disturbed import MOST_RADIUS
-from fastmech.capture.steps import highest_frequency
 from fastmech.disturbance.motion import (
     PHASE,
     default_method,
@@ -22,12 +21,13 @@ from fastmech.disturbance.motion import (
 from fastmech.ensembles import checks
 from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.status import FAILURES
-from fastmech.equilibria.find import Equilibria, Equilibrium
-from fastmech.equilibria.search import MOST
-from fastmech.mechanism.coefficients import reduce
 from fastmech.results import STATE_UNITS, Dataset, Variable, numbers, parts
 from fastmech.scan_types.request import HALVING, Each, Scan, Tiling, UsualMethod, check_steps, failures
 from fastmech.scene import Scene
+from fastmech.slider.capture.steps import highest_frequency
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.equilibria import Equilibria, Equilibrium
+from fastmech.slider.theorem import MOST
 from fastmech.step_limits.warning import step_warning
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from fastmech.results import Dataset, Variable, coordinate_units, flags, numbers
 from fastmech.scan_types.map_layout import HESSIAN, about_of, drawing_group, eigenvalue_variables
 from fastmech.scan_types.request import Each, Scan, Tiling
 from fastmech.scene import Scene
-from fastmech.stability.classify import Verdict
+from fastmech.slider.stability import Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -26,15 +26,11 @@ import numpy as np
 from pydantic import Field
 
 from fastmech.arrays import Floats
-from fastmech.atlas.axes import grid_coefficients, refuse_decaying_load
-from fastmech.atlas.map import BLOCK, Slab, solve_block
 from fastmech.atlas.resting_map import RestingMap, map_resting_places
-from fastmech.atlas.sheets import SheetBuilder
 from fastmech.ensembles.threads import thread_count
-from fastmech.equilibria.certificate import Outcome
-from fastmech.equilibria.search import MOST
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
+from fastmech.outcome import Outcome
 from fastmech.results import Dataset, Variable, coordinate_units, numbers, told
 from fastmech.scan_types.map_layout import (
     RESTING,
@@ -59,6 +55,10 @@ from fastmech.scan_types.request import (
     known_parameters,
 )
 from fastmech.scene import Scene, nearest
+from fastmech.slider.atlas.axes import grid_coefficients, refuse_decaying_load
+from fastmech.slider.atlas.map import BLOCK, Slab, solve_block
+from fastmech.slider.atlas.sheets import SheetBuilder
+from fastmech.slider.theorem import MOST
 from fastmech.store.write import Piece, Stream
 
 if TYPE_CHECKING:

@@ -10,19 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.atlas.damping import UndampedSet, trace_undamped
-from fastmech.atlas.folds import FoldPoints, FoldSet, find_folds, trace_folds
-from fastmech.atlas.map import Coincidence, Slab
 from fastmech.atlas.resting_map import RestingMap
-from fastmech.equilibria.certificate import Outcome
-from fastmech.mechanism.impulse import POINTS
 from fastmech.models.drawing import Element, drawing
 from fastmech.models.mechanism import Mechanism
+from fastmech.outcome import Outcome
 from fastmech.results import NO_CODE, Dataset, Variable, coordinate_units, flags, numbers, parts, told
 from fastmech.scan_types.request import axis_variables
 from fastmech.scene import Scene
-from fastmech.stability.classify import Verdict
-from fastmech.stability.linearize import SIN_PHI, SIN_PSI, UNLOADED
+from fastmech.slider.atlas.damping import UndampedSet, trace_undamped
+from fastmech.slider.atlas.folds import FoldPoints, FoldSet, find_folds, trace_folds
+from fastmech.slider.atlas.map import Coincidence, Slab
+from fastmech.slider.impulse import POINTS
+from fastmech.slider.linearize import SIN_PHI, SIN_PSI, UNLOADED
+from fastmech.slider.stability import Verdict
 
 CRITERIA = {
     "verdict_sylvester": "verdict: Lagrange-Dirichlet",

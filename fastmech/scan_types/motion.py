@@ -15,9 +15,6 @@ from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.status import FAILURES
 from fastmech.errors import InputError, shown
-from fastmech.mechanism.coefficients import force
-from fastmech.mechanism.geometry import constraints, positions, reactions
-from fastmech.mechanism.lagrange import momenta
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import Dataset, Variable, parts, state_units, told
 from fastmech.scan_types.request import (
@@ -30,6 +27,9 @@ from fastmech.scan_types.request import (
     failures,
 )
 from fastmech.scene import Scene, nearest
+from fastmech.slider.coefficients import force
+from fastmech.slider.geometry import constraints, positions, reactions
+from fastmech.slider.lagrange import momenta
 from fastmech.step_limits.warning import step_warning
 
 if TYPE_CHECKING:

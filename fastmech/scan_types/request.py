@@ -18,17 +18,17 @@ from fastmech.arrays import Floats
 from fastmech.basins.convergence import SUBSTEPS
 from fastmech.basins.measures.norm import check_angles
 from fastmech.basins.runs import rounds_until
-from fastmech.capture.steps import fastest_followed, shortest_step
 from fastmech.ensembles import checks
 from fastmech.ensembles.lanes import MOST_STEPS
 from fastmech.ensembles.status import failure_counts, failure_line
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.integrators.methods import find_method
-from fastmech.mechanism.coefficients import reduce
 from fastmech.models.mechanism import MOST_COORDINATES, Mechanism
 from fastmech.results import Dataset, Variable, check_name, scene_parameters
 from fastmech.scene import PARAMETERS, STATE, Number, Scene, explain, nearest, parse_toml, read_text
+from fastmech.slider.capture.steps import fastest_followed, shortest_step
+from fastmech.slider.coefficients import reduce
 from fastmech.store.write import Stream, in_memory
 
 if TYPE_CHECKING:

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import numpy as np
 from pydantic import AfterValidator, Field
 
-from fastmech.atlas.snap import MOVING, find_snap, stable_at
-from fastmech.equilibria.find import Equilibrium, find_equilibria
+from fastmech.atlas.snap import find_snap
 from fastmech.errors import InputError
 from fastmech.results import Dataset, Variable
 from fastmech.scan_types.request import Each, Scan, Tiling
 from fastmech.scene import Number, Scene, nearest
+from fastmech.slider.atlas.snap import MOVING, stable_at
+from fastmech.slider.equilibria import Equilibrium, find_equilibria
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -17,7 +17,6 @@ from pydantic import Field
 from fastmech.basins.shock_limit import shock_limit
 from fastmech.basins.snapping import SnappingMap, critical_forces, default_end, force_free, map_snapping
 from fastmech.capture.select import require_damper
-from fastmech.capture.steps import method_for
 from fastmech.ensembles.status import FAILURES, LABELS, Status
 from fastmech.errors import InputError
 from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers
@@ -36,6 +35,7 @@ from fastmech.scan_types.request import (
     failures,
 )
 from fastmech.scene import Scene
+from fastmech.slider.capture.steps import method_for
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from fastmech.arrays import Floats
 from fastmech.integrators.explicit import Batch, observe_nothing
 from fastmech.integrators.methods import Adams, Method, find_method, with_jacobian
-from fastmech.kernels.jacobians import lagrange_inverse, lagrange_jacobian
-from fastmech.kernels.select import right_hand_side
-from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
-from fastmech.stability.linearize import Rest, jacobian
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.kernels.jacobians import lagrange_inverse, lagrange_jacobian
+from fastmech.slider.kernels.select import right_hand_side
+from fastmech.slider.linearize import Rest, jacobian
 from fastmech.step_limits.amplification import first_crossing
 
 #: Half width of the differences [rad, rad/s]: its square and the rounding over it are both near 1e-11.

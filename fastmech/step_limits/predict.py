@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import cast
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
-from fastmech.models.stability import require_own, spectra
+from fastmech.models.stability import state_matrix
 from fastmech.scene import Scene
-from fastmech.stability.linearize import Rest, jacobian
+from fastmech.slider.linearize import Rest, jacobian
 from fastmech.step_limits.amplification import amplifies, first_crossing
 
 #: Error of a mode's growth, a radian, that is let pass. A mode without damping sits on the edge of every
@@ -83,18 +81,7 @@ def largest_stable_step(scene: Scene | Mechanism, equilibrium: Rest | RestingPla
     Raises:
         InputError: an argument is wrong.
     """
-    if isinstance(scene, Mechanism):
-        require_own(scene, equilibrium)
-        assert isinstance(equilibrium, RestingPlace)
-        return stable_step(find_method(method), small_eigenvalues(scene, equilibrium))
-    values = np.linalg.eigvals(jacobian(scene, cast(Rest, equilibrium)))
-    return stable_step(find_method(method), values)
-
-
-def small_eigenvalues(mechanism: Mechanism, place: RestingPlace) -> NDArray[np.complex128]:
-    """Eigenvalues [1/s] of the small motion about a resting place (2 n,)."""
-    own, _, _ = spectra(mechanism.linear(place.position[None]))
-    return np.asarray(own.roots[0] * own.rate[0])
+    return stable_step(find_method(method), np.linalg.eigvals(state_matrix(scene, equilibrium)))
 
 
 def limiting_eigenvalues(scene: Scene, equilibrium: Rest) -> NDArray[np.complex128]:

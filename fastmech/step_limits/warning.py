@@ -23,19 +23,18 @@ from numpy.typing import ArrayLike, NDArray
 from fastmech.arrays import Floats
 from fastmech.errors import InputError, StepWarning, shown
 from fastmech.integrators.methods import METHODS, Adams, ImplicitRungeKutta, Method, RungeKutta, find_method
-from fastmech.mechanism.coefficients import Coefficients, reduce
-from fastmech.mechanism.lagrange import potential_energy, potential_gradient, potential_hessian
 from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism
-from fastmech.models.stability import assess
+from fastmech.models.stability import assess, state_matrix
 from fastmech.scene import Scene
-from fastmech.stability.linearize import fill_state_matrix, require_scene, small_motion
+from fastmech.slider.coefficients import Coefficients, reduce
+from fastmech.slider.lagrange import potential_energy, potential_gradient, potential_hessian
+from fastmech.slider.linearize import fill_state_matrix, require_scene, small_motion
 from fastmech.step_limits.amplification import amplifies, first_crossing
 from fastmech.step_limits.predict import (
     GROWTH_PER_RADIAN,
     UNDAMPED,
     is_stable,
-    small_eigenvalues,
     stable_step,
 )
 
@@ -80,8 +79,7 @@ def local_eigenvalues(scene: Scene, force: float, phi: Any, theta: Any) -> NDArr
     """Eigenvalues [1/s] of the motion linearized at rest in configurations (n,), shape (n, 4)."""
     c = reduce(scene)._replace(force=force / (scene.m2 * scene.l))
     matrices = np.empty((4, 4, phi.size))
-    own = c.mass, c.slider, c.lift, c.spring, c.gravity, c.force, c.damping
-    fill_state_matrix(small_motion(phi, theta, *own), matrices)
+    fill_state_matrix(small_motion(phi, theta, c), matrices)
     return np.asarray(np.linalg.eigvals(np.moveaxis(matrices, -1, 0)), dtype=np.complex128)
 
 
@@ -89,7 +87,7 @@ def resting_eigenvalues(scene: Scene, force: float) -> NDArray[np.complex128]:
     """Eigenvalues [1/s] at the minima of the potential energy under a constant force, shape (4 minima,).
 
     A minimum is looked for from every configuration of the grid that lies lower than its neighbours: quick,
-    and enough for a warning; :func:`fastmech.equilibria.find.find_equilibria` proves that none is missing.
+    and enough for a warning; :func:`fastmech.slider.equilibria.find_equilibria` proves that none is missing.
     """
     grid = _grid()
     energy = potential_energy(scene, np.stack(grid, axis=-1), force)
@@ -170,7 +168,7 @@ def step_warning(
     Raises:
         InputError: an argument is wrong.
     """
-    turning = [True, True]
+    turning: Sequence[bool] = (True, True)
     if isinstance(scene, Mechanism):
         turning = [str(c.symbol) not in scene.lengths for c in scene.coordinates]
     else:
@@ -187,7 +185,9 @@ def _limit_of_mechanism(mechanism: Mechanism, dt: float, method: str, fastest: f
     for place in find_equilibria(mechanism):
         if assess(mechanism.linear(place.position), place.morse_index).verdict != "unstable":
             reason = GROWS if mechanism.damped else UNDAMPED_GROWS
-            limits.append(Limit(stable_step(formula, small_eigenvalues(mechanism, place)), reason))
+            limits.append(
+                Limit(stable_step(formula, np.linalg.eigvals(state_matrix(mechanism, place))), reason)
+            )
     return min([*limits, *_turning(dt, fastest)])
 
 
@@ -270,20 +270,12 @@ def too_long(method: Method, c: Coefficients, starts: Floats, dt: Floats) -> NDA
     return beyond
 
 
-def is_beyond(scene: Scene, dt: float, steps: float, method: str) -> bool:
-    """Whether so many steps of dt [s] make damped motion grow that rests, or one step motion that passes.
+def grows(scene: Scene, dt: float, steps: float, method: str, damped: bool = True) -> bool:
+    """Whether so many steps of dt [s] make motion grow that rests, or one step motion that passes.
 
-    It is asked at the minima and all over the torus.
+    It is asked at the minima and all over the torus, of motion that is ``damped`` or else of any.
     """
-    return _grows_in(scene, dt, steps, method, -GROWTH_PER_RADIAN)
-
-
-def drives_rest(scene: Scene, dt: float, steps: float, method: str) -> bool:
-    """Whether so many steps of dt [s] make motion grow, damped or not: where it rests is then their doing."""
-    return _grows_in(scene, dt, steps, method, UNDAMPED)
-
-
-def _grows_in(scene: Scene, dt: float, steps: float, method: str, direction: float) -> bool:
+    direction = -GROWTH_PER_RADIAN if damped else UNDAMPED
     formula = find_method(method)
     if isinstance(formula, ImplicitRungeKutta) or dt == 0.0:
         return False

@@ -36,7 +36,7 @@ from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Field, Printed
 from fastmech.samplers import Starts
 from fastmech.scene import Scene
-from fastmech.stability.linearize import Rest, jacobian, linearized
+from fastmech.slider.linearize import Rest, jacobian, linearized
 from fastmech.step_limits.warning import too_long, warn_of_step
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fastmech.atlas.damping import trace_undamped
-from fastmech.equilibria.find import find_equilibria
 from fastmech.scene import Scene
-from fastmech.stability.classify import classify
-from fastmech.stability.linearize import SIN_PHI, SIN_PSI, UNLOADED
+from fastmech.slider.atlas.damping import trace_undamped
+from fastmech.slider.equilibria import find_equilibria
+from fastmech.slider.linearize import SIN_PHI, SIN_PSI, UNLOADED
+from fastmech.slider.stability import classify
 
 #: The design's verified sets, otherwise Table 1: F0, c1, c2 and (phi, theta).
 VERIFIED = {
@@ -105,7 +105,7 @@ def test_what_cannot_be_traced_is_counted(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr("fastmech.atlas.continuation.MOST_STEPS", 7)
     assert trace_undamped(scene, *axes).unfinished > 0
     monkeypatch.undo()
-    monkeypatch.setattr("fastmech.atlas.damping.MOST_POINTS", 0)
+    monkeypatch.setattr("fastmech.slider.atlas.damping.MOST_POINTS", 0)
     none = trace_undamped(scene, *axes)
     assert none.curves == ()
     assert none.unexplained == none.crossings == whole.crossings > 0

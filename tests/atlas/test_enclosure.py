@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from fastmech.atlas import cover
-from fastmech.atlas.continuation import trace
-from fastmech.atlas.cover import System, apart, solutions
-from fastmech.atlas.folds import finish_on_edge, inside
-from fastmech.atlas.systems import Plane, fold
+from fastmech.atlas.continuation import finish_on_edge, inside, trace
 from fastmech.scene import Scene
+from fastmech.slider.atlas.cover import System, apart, solutions
+from fastmech.slider.atlas.systems import Plane, fold
 
 PLANE = Plane(Scene(c1=294.9, alpha=0.0), ("F0", "l"), (-400.0, 0.3), (400.0, 2.0))
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from fastmech.atlas.folds import FoldSet, find_folds, trace_folds
-from fastmech.atlas.map import Coincidence, map_equilibria
-from fastmech.equilibria.certificate import Outcome
 from fastmech.errors import InputError
+from fastmech.outcome import Outcome
 from fastmech.scene import Scene
+from fastmech.slider.atlas.folds import FoldSet, find_folds, trace_folds
+from fastmech.slider.atlas.map import Coincidence, map_equilibria
 
 DATA = tomllib.loads((Path(__file__).parents[2] / "data" / "folds.toml").read_text())
 LINES = {entry["name"]: entry for entry in DATA["line"]}

@@ -7,16 +7,16 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fastmech.atlas.damping import trace_undamped
-from fastmech.atlas.folds import find_folds, trace_folds
-from fastmech.atlas.map import EquilibriumMap, map_equilibria
 from fastmech.atlas.snap import find_snap
-from fastmech.equilibria.certificate import Outcome
-from fastmech.equilibria.find import find_equilibria
 from fastmech.errors import InputError
+from fastmech.outcome import Outcome
 from fastmech.scan_types.equilibrium_map import EquilibriumMap as EquilibriumMapScan
 from fastmech.scene import Scene
-from fastmech.stability.classify import classify
+from fastmech.slider.atlas.damping import trace_undamped
+from fastmech.slider.atlas.folds import find_folds, trace_folds
+from fastmech.slider.atlas.map import EquilibriumMap, map_equilibria
+from fastmech.slider.equilibria import find_equilibria
+from fastmech.slider.stability import classify
 
 PAPER = Scene(c2=1100 / 3, alpha=0.0)
 AXES = {

@@ -7,12 +7,12 @@ import pytest
 from scenes import exact_unit_roots
 from test_folds import PAPER, PLANES, WEIGHT
 
-from fastmech.atlas.axes import coefficient_columns
-from fastmech.atlas.folds import trace_folds
-from fastmech.atlas.map import Coincidence, map_equilibria
-from fastmech.equilibria.certificate import Outcome
-from fastmech.equilibria.solve import Solution, solve_rows
+from fastmech.outcome import Outcome
 from fastmech.scene import Scene
+from fastmech.slider.atlas.axes import coefficient_columns
+from fastmech.slider.atlas.folds import trace_folds
+from fastmech.slider.atlas.map import Coincidence, map_equilibria
+from fastmech.slider.solve import Solution, solve_rows
 
 Floats = np.typing.NDArray[np.float64]
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scenes import exact_unit_roots, loads, polynomial, random_scenes, roots
 
-from fastmech.atlas.axes import coefficient_columns
-from fastmech.equilibria.certificate import Outcome
-from fastmech.equilibria.solve import Solution, solve_rows
+from fastmech.outcome import Outcome
 from fastmech.scene import Scene
+from fastmech.slider.atlas.axes import coefficient_columns
+from fastmech.slider.solve import Solution, solve_rows
 
 N = 10_000
 SCENES = random_scenes(N, seed=2026)

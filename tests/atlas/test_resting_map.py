@@ -9,8 +9,8 @@ import pytest
 import sympy
 
 import fastmech as fm
-from fastmech.equilibria.certificate import Outcome
 from fastmech.models.stability import VERDICTS
+from fastmech.outcome import Outcome
 
 
 def test_the_papers_mechanism_has_the_scenes_map() -> None:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import scipy.optimize
 
-from fastmech.atlas.map import EquilibriumMap, map_equilibria
 from fastmech.scene import Scene
+from fastmech.slider.atlas.map import EquilibriumMap, map_equilibria
 
 PAPER = Scene(c2=1100 / 3, alpha=0.0)
 BISTABLE = PAPER.replace(c1=294.9)
@@ -177,7 +177,7 @@ def test_the_papers_plane_has_the_sheets_that_its_folds_say() -> None:
 def test_islands_of_a_narrow_wedge_are_joined(monkeypatch: pytest.MonkeyPatch) -> None:
     axes = {"F0": np.linspace(-400.0, 400.0, 201), "c1": np.linspace(0.0, 400.0, 201)}
     joined = map_equilibria(PAPER, axes)
-    monkeypatch.setattr("fastmech.atlas.sheets.join_islands", lambda *_: None)
+    monkeypatch.setattr("fastmech.slider.atlas.sheets.join_islands", lambda *_: None)
     apart = map_equilibria(PAPER, axes)
     assert len(joined.sheet_branch) == 14 < len(apart.sheet_branch)
 
@@ -196,7 +196,7 @@ def test_sheets_of_one_branch_are_the_minima_round_a_cusp(atlas: EquilibriumMap)
 def test_one_call_or_many_pieces_give_the_same_sheets(monkeypatch: pytest.MonkeyPatch) -> None:
     axes = {"F0": np.linspace(-400.0, 400.0, 40), "c2": np.linspace(0.0, 500.0, 31)}
     whole = map_equilibria(BISTABLE, axes)
-    monkeypatch.setattr("fastmech.atlas.map.SLAB", 100)
+    monkeypatch.setattr("fastmech.slider.atlas.map.SLAB", 100)
     pieces = map_equilibria(BISTABLE, axes)
     np.testing.assert_array_equal(whole.sheet_morse_index, pieces.sheet_morse_index)
     np.testing.assert_array_equal(np.sort(whole.sheet, axis=-1), np.sort(pieces.sheet, axis=-1))

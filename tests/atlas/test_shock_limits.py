@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import fastmech as fm
-from fastmech.mechanism.geometry import velocities
-from fastmech.mechanism.lagrange import metric
+from fastmech.slider.geometry import velocities
+from fastmech.slider.lagrange import metric
 
 LIGHT = fm.Scene(m1=0.5, m2=0.2, l=0.4, c1=12.0, c2=9.0, F0=1.5, alpha=0.0)
 

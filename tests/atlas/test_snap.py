@@ -13,11 +13,12 @@ import pytest
 import sympy
 
 import fastmech as fm
-from fastmech.atlas.folds import find_folds
-from fastmech.atlas.snap import find_snap, fold_free
-from fastmech.equilibria.find import find_equilibria
+from fastmech.atlas.snap import find_snap
 from fastmech.errors import InputError
 from fastmech.scene import Scene
+from fastmech.slider.atlas.folds import find_folds
+from fastmech.slider.atlas.snap import fold_free
+from fastmech.slider.equilibria import find_equilibria
 
 DATA = tomllib.loads((Path(__file__).parents[2] / "data" / "folds.toml").read_text())
 BISTABLE = Scene(F0=85.3, c1=294.9, c2=92.85, alpha=0.0)

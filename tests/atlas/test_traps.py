@@ -8,9 +8,9 @@ import mpmath
 import numpy as np
 import pytest
 
-from fastmech.atlas.map import Coincidence, map_equilibria
-from fastmech.equilibria.certificate import Outcome
+from fastmech.outcome import Outcome
 from fastmech.scene import Scene
+from fastmech.slider.atlas.map import Coincidence, map_equilibria
 
 PAPER = Scene(c2=1100 / 3, alpha=0.0)
 WEIGHT = 9.80665

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from fastmech.atlas.map import EquilibriumMap, map_equilibria
-from fastmech.mechanism.lagrange import potential_energy
 from fastmech.scene import Scene
+from fastmech.slider.atlas.map import EquilibriumMap, map_equilibria
+from fastmech.slider.lagrange import potential_energy
 
 TILES, POINTS = 5, 180
 

@@ -11,16 +11,16 @@ from disturbance.known import center, equilibria, known, oracle_size, scipy_moti
 
 from fastmech.basins.disturbed import DisturbedEnsemble, disturb
 from fastmech.basins.label import label_starts
-from fastmech.capture.barriers import barrier_tree
 from fastmech.capture.select import trapped
 from fastmech.disturbance.motion import disturbed_motion
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import ENDS, FAILURES, Status
-from fastmech.equilibria.find import find_equilibria
 from fastmech.errors import InputError, StepWarning
-from fastmech.mechanism.lagrange import kinetic_energy, potential_energy
 from fastmech.samplers import Gaussian, Sobol
 from fastmech.scene import STATE, Scene
+from fastmech.slider.capture.barriers import barrier_tree
+from fastmech.slider.equilibria import find_equilibria
+from fastmech.slider.lagrange import kinetic_energy, potential_energy
 
 SCENE = known("table_1")[0]
 

@@ -9,10 +9,10 @@ from disturbance.known import stiff_motion
 from scan_types.values import scipy_motion
 
 import fastmech as fm
-from fastmech.atlas.folds import find_folds
 from fastmech.basins.well_numbers import well_numbers, well_of_number
 from fastmech.ensembles.status import Status
-from fastmech.mechanism.lagrange import metric
+from fastmech.slider.atlas.folds import find_folds
+from fastmech.slider.lagrange import metric
 
 TURN = 2.0 * np.pi
 CONSTANT = fm.Scene(alpha=0.0)

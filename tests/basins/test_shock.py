@@ -11,7 +11,7 @@ import fastmech as fm
 from fastmech.basins.measures.norm import kinetic_norm
 from fastmech.basins.shock import Shock, brute_force_shock, minimal_shock
 from fastmech.basins.well_numbers import number_wells, well_numbers, well_of_number
-from fastmech.mechanism.lagrange import kinetic_energy
+from fastmech.slider.lagrange import kinetic_energy
 
 PLACE = np.array([0.2, -0.1, 0.3])
 AXES = np.array([1.0, 0.5, 2.0])

@@ -13,10 +13,10 @@ from scan_types.values import motion_rates, scipy_motion
 from scipy.integrate import solve_ivp
 
 import fastmech as fm
-from fastmech.atlas.folds import find_folds
 from fastmech.basins.shock_limit import ShockLimit
-from fastmech.mechanism.geometry import positions
-from fastmech.mechanism.lagrange import kinetic_energy, metric, potential_energy
+from fastmech.slider.atlas.folds import find_folds
+from fastmech.slider.geometry import positions
+from fastmech.slider.lagrange import kinetic_energy, metric, potential_energy
 
 Floats = NDArray[np.float64]
 

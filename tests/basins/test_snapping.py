@@ -11,7 +11,7 @@ from fastmech.basins.shock_limit import impulse_start
 from fastmech.basins.snapping import SnappingMap, Window, critical_forces, map_snapping
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import Status
-from fastmech.mechanism.lagrange import angular_accelerations, kinetic_energy, metric, potential_energy
+from fastmech.slider.lagrange import angular_accelerations, kinetic_energy, metric, potential_energy
 
 #: Forces about the known changes at alpha = 5, and whether each leaves.
 FORCES = np.array([800.0, 1545.0, 1550.0, 2500.0, 4200.0, 4205.0, 4330.0, 4335.0, 6000.0])

@@ -8,8 +8,8 @@ from scipy.integrate import solve_ivp
 
 from fastmech.bench.measure import fast_starts
 from fastmech.bench.tolerances import Estimate, estimates, extended_truth, random_case, report, scene_rates
-from fastmech.mechanism.lagrange import angular_accelerations
 from fastmech.scene import Scene
+from fastmech.slider.lagrange import angular_accelerations
 
 
 @pytest.mark.skipif(np.finfo(np.longdouble).eps > 1e-18, reason="longdouble is no more than double here")

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from fastmech.capture.barriers import Effect, _lattice, barrier_tree
 from fastmech.errors import InputError
-from fastmech.mechanism.lagrange import potential_energy
 from fastmech.scene import Scene
+from fastmech.slider.capture.barriers import Effect, _lattice, barrier_tree
+from fastmech.slider.lagrange import potential_energy
 
 TURN = 2.0 * np.pi
 TILES, POINTS = 5, 160

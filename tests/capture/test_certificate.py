@@ -7,8 +7,8 @@ import pytest
 from scipy import ndimage
 
 from fastmech.capture.select import trapped
-from fastmech.mechanism.lagrange import kinetic_energy, potential_energy
 from fastmech.scene import Scene
+from fastmech.slider.lagrange import kinetic_energy, potential_energy
 
 TURN = 2.0 * np.pi
 

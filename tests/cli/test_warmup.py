@@ -30,8 +30,8 @@ print(jit.compiled)
 #: Makes one kernel and says whether it had to compile.
 ONE = """
 from fastmech import jit
-from fastmech.mechanism import coefficients
-from fastmech.atlas.sheets import resolve_all
+from fastmech.slider import coefficients
+from fastmech.slider.atlas.sheets import resolve_all
 resolve_all.make()
 print(len(jit.compiled))
 """

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from oracles import oracle
 from scipy.integrate import solve_ivp
 
-from fastmech.equilibria.find import Equilibrium, find_equilibria
-from fastmech.mechanism.lagrange import angular_accelerations
 from fastmech.scene import Scene
+from fastmech.slider.equilibria import Equilibrium, find_equilibria
+from fastmech.slider.lagrange import angular_accelerations
 
 Floats = NDArray[np.float64]
 

@@ -6,8 +6,8 @@ from disturbance.known import center, equilibria, known, oracle_jacobian, scipy_
 from scipy.integrate import solve_ivp
 
 from fastmech.disturbance.motion import disturbed_motion
-from fastmech.equilibria.find import find_equilibria
 from fastmech.errors import InputError
+from fastmech.slider.equilibria import find_equilibria
 
 SCENE = known("table_1")[0]
 TIMES = np.array([0.0, 0.1, 0.5, 1.0, 2.0])

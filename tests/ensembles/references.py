@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
-from fastmech.mechanism.lagrange import angular_accelerations
 from fastmech.scene import Scene
+from fastmech.slider.lagrange import angular_accelerations
 
 Floats = NDArray[np.float64]
 

@@ -9,9 +9,9 @@ from integrators.systems import paper_motion
 from scipy.integrate import solve_ivp
 
 from fastmech.ensembles.integrate import integrate
-from fastmech.mechanism.geometry import constraints, positions
-from fastmech.mechanism.lagrange import angular_accelerations
 from fastmech.scene import Scene
+from fastmech.slider.geometry import constraints, positions
+from fastmech.slider.lagrange import angular_accelerations
 
 FORMULATIONS = pytest.mark.parametrize("formulation", ["lagrange", "hamilton"])
 

@@ -10,9 +10,9 @@ from scipy.integrate import quad
 from fastmech.ensembles.balance import energy_balance, lowest_potential
 from fastmech.ensembles.integrate import integrate
 from fastmech.errors import InputError
-from fastmech.mechanism.coefficients import force
-from fastmech.mechanism.geometry import velocities
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import force
+from fastmech.slider.geometry import velocities
 
 #: Terms in every combination, and the sign of the force.
 SCENES = [

@@ -12,10 +12,10 @@ from ensembles.starts import Floats, random_starts
 from fastmech.ensembles import threads
 from fastmech.ensembles.fitting import LANES, SLACK, breaks_energy_bounds, energies, speed_bound
 from fastmech.kernels.sincos import REDUCTION_LIMIT
-from fastmech.mechanism.coefficients import Coefficients, reduce
-from fastmech.mechanism.geometry import positions, velocities
-from fastmech.mechanism.lagrange import unit
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import Coefficients, reduce
+from fastmech.slider.geometry import positions, velocities
+from fastmech.slider.lagrange import unit
 
 pytestmark = pytest.mark.nojit
 

@@ -14,8 +14,8 @@ import fastmech as fm
 from fastmech.ensembles.fitting import fit_steps, fitted_steps, speed_bound, vibration_frequency
 from fastmech.ensembles.problem import scene_problem
 from fastmech.errors import InputError
-from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import Coefficients, reduce
 
 SCENE = Scene(alpha=0.0)
 #: Only weights pull on phi and theta, one each: U is least at (-pi/2, 0), and known there.

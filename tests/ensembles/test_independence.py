@@ -15,9 +15,9 @@ from fastmech.ensembles.run import run_ensemble
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.threads import thread_count
 from fastmech.integrators.methods import METHODS
-from fastmech.kernels.select import right_hand_side
-from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.kernels.select import right_hand_side
 
 SCENE = Scene()
 STARTS = random_starts(1001)

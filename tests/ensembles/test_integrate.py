@@ -15,9 +15,9 @@ from fastmech.ensembles.problem import extreme_scenes, scene_problem
 from fastmech.ensembles.run import run_ensemble
 from fastmech.errors import InputError
 from fastmech.integrators.methods import METHODS
-from fastmech.kernels.select import right_hand_side
-from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.kernels.select import right_hand_side
 
 pytestmark = pytest.mark.nojit
 

@@ -10,9 +10,9 @@ from scipy.integrate import solve_ivp
 import fastmech as fm
 from fastmech.ensembles.fitting import damping_rate, stability_radius
 from fastmech.hardcases.walk import motion
-from fastmech.mechanism.coefficients import reduce
-from fastmech.mechanism.lagrange import angular_accelerations
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.lagrange import angular_accelerations
 from fastmech.step_limits.warning import configuration_eigenvalues
 
 

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from oracles import oracle
 from scipy import optimize
 
-from fastmech.equilibria.search import corner_cosine_squared, normal_form, pulls, wrap
-from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.theorem import corner_cosine_squared, normal_form, pulls, wrap
 
 PAPER = Scene(c2=1100 / 3, alpha=0.0)
 

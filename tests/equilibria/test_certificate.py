@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fastmech.equilibria.certificate import Outcome, certify, existence_radius
-from fastmech.equilibria.find import find_equilibria
-from fastmech.equilibria.search import EPS, expected_count, normal_form, pulls
-from fastmech.equilibria.solve import Solution, solve_rows
-from fastmech.mechanism.coefficients import reduce
+from fastmech.outcome import Outcome
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.equilibria import find_equilibria
+from fastmech.slider.proof import certify, existence_radius
+from fastmech.slider.solve import Solution, solve_rows
+from fastmech.slider.theorem import EPS, expected_count, normal_form, pulls
 
 PAPER = Scene(c2=1100 / 3, alpha=0.0)
 SCENES = 2000

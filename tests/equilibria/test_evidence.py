@@ -10,10 +10,10 @@ import mpmath
 import numpy as np
 import pytest
 
-from fastmech.equilibria.certificate import Outcome
-from fastmech.equilibria.find import find_equilibria, gather, rest_polynomial
-from fastmech.mechanism.coefficients import reduce
+from fastmech.outcome import Outcome
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.equilibria import find_equilibria, gather, rest_polynomial
 
 DATA = Path(__file__).parents[2] / "data" / "equilibria.toml"
 REFERENCE: list[dict[str, Any]] = tomllib.loads(DATA.read_text())["scene"]

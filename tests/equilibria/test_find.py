@@ -13,10 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles import oracle
 
-from fastmech.equilibria.certificate import Outcome
-from fastmech.equilibria.find import Equilibria, find_equilibria
 from fastmech.errors import InputError
+from fastmech.outcome import Outcome
 from fastmech.scene import Scene
+from fastmech.slider.equilibria import Equilibria, find_equilibria
 
 DATA = Path(__file__).parents[2] / "data" / "equilibria.toml"
 REFERENCE = {entry["name"]: entry for entry in tomllib.loads(DATA.read_text())["scene"]}

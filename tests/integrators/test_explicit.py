@@ -11,9 +11,9 @@ from fastmech.ensembles.run import run_ensemble
 from fastmech.integrators.methods import METHODS, Adams, RungeKutta
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import RHS_SIGNATURE, interpreted, kernel
-from fastmech.kernels.select import with_terms
-from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.kernels.select import with_terms
 
 pytestmark = pytest.mark.nojit
 

@@ -8,10 +8,10 @@ import numpy as np
 from mechanism.draws import canonical_equations
 from numpy.typing import NDArray
 
-from fastmech.kernels.select import FORMULATIONS, with_terms
-from fastmech.mechanism.coefficients import reduce
-from fastmech.mechanism.lagrange import angular_accelerations, unit
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.kernels.select import FORMULATIONS, with_terms
+from fastmech.slider.lagrange import angular_accelerations, unit
 
 Floats = NDArray[np.float64]
 

@@ -46,7 +46,7 @@ import fastmech as fm
 from fastmech.integrators.methods import METHODS
 from fastmech.jit import compiled_anew
 from fastmech.kernels.blocks import in_single
-from fastmech.kernels.select import with_terms
+from fastmech.slider.kernels.select import with_terms
 from fastmech.kernels.steps import whole_steps
 
 def pendulum(t, x, v, damping):

@@ -10,11 +10,11 @@ from kernels.blocks_of_lanes import COMBINATIONS, TERMS, evaluate, expected, ker
 from oracles import oracle
 
 from fastmech.kernels.sincos import REDUCTION_LIMIT
-from fastmech.kernels.work import lagrange_work
-from fastmech.mechanism.coefficients import force
-from fastmech.mechanism.geometry import velocities
-from fastmech.mechanism.lagrange import unit
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import force
+from fastmech.slider.geometry import velocities
+from fastmech.slider.kernels.work import lagrange_work
+from fastmech.slider.lagrange import unit
 
 pytestmark = pytest.mark.nojit
 

@@ -21,11 +21,11 @@ from fastmech.integrators.explicit import WEIGHTS, add_rows
 from fastmech.integrators.methods import METHODS as REGISTRY
 from fastmech.integrators.methods import Adams, RungeKutta
 from fastmech.jit import MATRIX, VECTOR
-from fastmech.kernels.select import DAMPING, DECAY, FORCE, FORMULATIONS
 from fastmech.kernels.steps import whole_steps
-from fastmech.kernels.work import lagrange_work
-from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.kernels.select import DAMPING, DECAY, FORCE, FORMULATIONS
+from fastmech.slider.kernels.work import lagrange_work
 
 pytestmark = pytest.mark.skipif(
     not llvm.get_host_cpu_features().get("fma", False),

@@ -9,10 +9,10 @@ import pytest
 from kernels.blocks_of_lanes import Floats, evaluate, kernel, lanes
 from oracles import oracle
 
-from fastmech.kernels.jacobians import canonical_jacobian, lagrange_jacobian
-from fastmech.mechanism.coefficients import reduce
-from fastmech.mechanism.equations import canonical_rates
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.equations import canonical_rates
+from fastmech.slider.kernels.jacobians import canonical_jacobian, lagrange_jacobian
 
 SCENE = Scene(c2=1100 / 3)
 

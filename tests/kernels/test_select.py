@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from kernels.blocks_of_lanes import COMBINATIONS, TERMS, kernel
 
-from fastmech.kernels.select import right_hand_side, terms
-from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.kernels.select import right_hand_side, terms
 
 pytestmark = pytest.mark.nojit
 

@@ -23,10 +23,10 @@ from fastmech.errors import InputError
 from fastmech.integrators.methods import METHODS
 from fastmech.jit import FLAGS
 from fastmech.kernels.blocks import in_single
-from fastmech.kernels.select import FORMULATIONS, right_hand_side
 from fastmech.kernels.sincos import REDUCTION_LIMIT_SINGLE, cos, sin, sincos
-from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.kernels.select import FORMULATIONS, right_hand_side
 
 Singles = NDArray[np.float32]
 SCENE = Scene(alpha=0.0)

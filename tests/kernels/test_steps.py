@@ -18,8 +18,8 @@ from fastmech.integrators.methods import METHODS, Adams, RungeKutta, bashforth
 from fastmech.kernels.blocks import VECTOR_LANES, Rates
 from fastmech.kernels.sincos import REDUCTION_LIMIT
 from fastmech.kernels.steps import EVERY, MOST_STATES, Lanes, Steps, term_weights, whole_steps
-from fastmech.mechanism.coefficients import reduce
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
 
 ADAMS = {name: method for name, method in METHODS.items() if isinstance(method, Adams)}
 EXPLICIT = {name: method for name, method in METHODS.items() if isinstance(method, Adams | RungeKutta)}

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from oracles import TABLE_1, oracle
 
-from fastmech.mechanism.coefficients import force, reduce
-from fastmech.mechanism.equations import canonical_rates
-from fastmech.mechanism.lagrange import unit
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import force, reduce
+from fastmech.slider.equations import canonical_rates
+from fastmech.slider.lagrange import unit
 
 Floats = NDArray[np.float64]
 

@@ -11,8 +11,8 @@ from mechanism import draws
 from mechanism.draws import Draw, doubles
 from oracles import oracle
 
-from fastmech.mechanism import coefficients, geometry, lagrange
-from fastmech.mechanism.geometry import reactions
+from fastmech.slider import coefficients, geometry, lagrange
+from fastmech.slider.geometry import reactions
 
 pytestmark = pytest.mark.nojit
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from mechanism.draws import draws
 
-from fastmech.mechanism.coefficients import Coefficients, force, reduce
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import Coefficients, force, reduce
 
 pytestmark = pytest.mark.nojit
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from mechanism.draws import acceleration_scale, draws
 
-from fastmech.mechanism import equations, lagrange, reduced
-from fastmech.mechanism.coefficients import reduce
+from fastmech.slider import equations, lagrange, reduced
+from fastmech.slider.coefficients import reduce
 
 pytestmark = pytest.mark.nojit
 

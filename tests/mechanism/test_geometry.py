@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from mechanism.draws import draws
 
-from fastmech.mechanism import geometry
 from fastmech.scene import Scene
+from fastmech.slider import geometry
 
 pytestmark = pytest.mark.nojit
 

@@ -10,9 +10,9 @@ from mechanism.draws import doubles, draws
 from numpy.typing import NDArray
 from oracles import oracle
 
-from fastmech.mechanism.coefficients import reduce
-from fastmech.mechanism.impulse import POINTS, impulse_for, mobility, rates_after
 from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.impulse import POINTS, impulse_for, mobility, rates_after
 
 pytestmark = pytest.mark.nojit
 

@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fastmech.mechanism.geometry import reactions
 from fastmech.scene import Scene
+from fastmech.slider.geometry import reactions
 
 pytestmark = pytest.mark.nojit
 

@@ -11,7 +11,8 @@ import sympy
 from oracles import TABLE_1, oracle
 
 import fastmech as fm
-from fastmech.mechanism.lagrange import (
+from fastmech.models.mechanism import Mechanism
+from fastmech.slider.lagrange import (
     angular_accelerations,
     kinetic_energy,
     momenta,
@@ -20,7 +21,6 @@ from fastmech.mechanism.lagrange import (
     potential_hessian,
     unit,
 )
-from fastmech.models.mechanism import Mechanism
 
 pytestmark = pytest.mark.nojit
 

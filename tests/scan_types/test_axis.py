@@ -10,13 +10,13 @@ import pytest
 from pydantic import ValidationError
 
 import fastmech as fm
-from fastmech.capture.steps import coarse_steps, fastest_followed, shortest_step
 from fastmech.ensembles import checks
-from fastmech.mechanism.coefficients import reduce
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.equilibrium_map import EquilibriumMap
 from fastmech.scan_types.request import Axis, RunContext, read_request
 from fastmech.scan_types.snapping import Rates
+from fastmech.slider.capture.steps import coarse_steps, fastest_followed, shortest_step
+from fastmech.slider.coefficients import reduce
 
 
 @pytest.mark.parametrize(

@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from oracles import oracle
 
 import fastmech as fm
-from fastmech.equilibria.find import Equilibrium, find_equilibria
 from fastmech.errors import InputError
 from fastmech.scene import Scene
-from fastmech.stability.classify import Classification, classify
-from fastmech.stability.linearize import SIN_PHI, SIN_PSI, UNLOADED, jacobian
+from fastmech.slider.equilibria import Equilibrium, find_equilibria
+from fastmech.slider.linearize import SIN_PHI, SIN_PSI, UNLOADED, jacobian
+from fastmech.slider.stability import Classification, classify
 from fastmech.step_limits.measure import measured_stable_step
 
 PAPER = Scene(c2=1100 / 3, alpha=0.0)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from oracles import oracle
 
-from fastmech.equilibria.find import find_equilibria
 from fastmech.scene import Scene
-from fastmech.stability.linearize import jacobian, linearized, polynomial
+from fastmech.slider.equilibria import find_equilibria
+from fastmech.slider.linearize import jacobian, linearized, polynomial
 
 SCENES = [
     Scene(c2=1100 / 3, alpha=0.0),

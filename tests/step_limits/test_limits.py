@@ -12,9 +12,9 @@ import sympy
 
 import fastmech as fm
 from fastmech.ensembles.status import Status
-from fastmech.equilibria.find import find_equilibria
 from fastmech.errors import InputError
 from fastmech.integrators.methods import METHODS, ImplicitRungeKutta, RungeKutta
+from fastmech.slider.equilibria import find_equilibria
 from fastmech.step_limits.amplification import (
     amplification,
     imaginary_limit,

@@ -8,9 +8,9 @@ import scipy.linalg
 from scipy.integrate import solve_ivp
 
 import fastmech as fm
-from fastmech.equilibria.find import find_equilibria
 from fastmech.errors import InputError
-from fastmech.stability.linearize import jacobian
+from fastmech.slider.equilibria import find_equilibria
+from fastmech.slider.linearize import jacobian
 from fastmech.transients.lyapunov import largest_lyapunov, transient_growth
 
 CONSERVATIVE = fm.Scene(c2=1100 / 3, beta=0.0, F0=0.0)

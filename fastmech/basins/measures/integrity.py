@@ -27,12 +27,12 @@ from fastmech.arrays import Floats
 from fastmech.basins.measures.labels import LabelsLike, check_axes, check_map, check_point
 from fastmech.basins.measures.norm import kinetic_norm, norm_on, state_index, states_of
 from fastmech.ensembles import checks
-from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Printed
 from fastmech.scene import Scene
+from fastmech.slider.equilibria import Equilibrium
 
 
 @dataclass(frozen=True, repr=False)

@@ -8,6 +8,7 @@ it is a matrix that you state, the identity if all its states have one unit.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import compress
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,13 +16,13 @@ from numpy.typing import ArrayLike
 from fastmech.arrays import Floats
 from fastmech.disturbance.motion import size_of
 from fastmech.ensembles import checks
-from fastmech.equilibria.find import Equilibrium
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import require_own
 from fastmech.scene import STATE, Scene, nearest
-from fastmech.stability.linearize import require_rest
+from fastmech.slider.equilibria import Equilibrium, held
+from fastmech.slider.linearize import require_rest
 
 #: Angles lie within so many turns of zero: what is beyond was meant in degrees.
 FEW_TURNS = 4
@@ -45,14 +46,12 @@ def beyond_turns(largest: float) -> str:
 
 def states_of(system: Scene | Mechanism | None) -> tuple[str, ...]:
     """Names of the states, a scene's by default: coordinates, then rates."""
-    return system.state if isinstance(system, Mechanism) else STATE
+    return STATE if system is None else system.state
 
 
-def angles_of(system: Scene | Mechanism | None) -> tuple[str, ...]:
+def angles_of(system: Scene | Mechanism) -> tuple[str, ...]:
     """Names of the coordinates that turn fully."""
-    if not isinstance(system, Mechanism):
-        return STATE[:2]
-    return tuple(str(c.symbol) for c in system.coordinates if c.periodic)
+    return tuple(compress(system.state, system.turning))
 
 
 def state_index(name: str, names: Sequence[str] = STATE) -> int:
@@ -81,7 +80,7 @@ def kinetic_norm(scene: Scene | Mechanism, equilibrium: Equilibrium | RestingPla
         return size_of(scene, equilibrium).to_ball
     require_rest(scene, equilibrium)
     assert isinstance(equilibrium, Equilibrium)
-    return size_of(scene.replace(F0=equilibrium.force, alpha=0.0), equilibrium).to_ball
+    return size_of(held(scene, equilibrium), equilibrium).to_ball
 
 
 def norm_on(norm: ArrayLike, dim: int, coordinates: Sequence[int] | None = None) -> Floats:

@@ -11,11 +11,11 @@ from fastmech.arrays import Floats
 from fastmech.basins.label import label_starts
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.ensembles.status import Status
-from fastmech.equilibria.find import find_equilibria
 from fastmech.hardcases.walk import WITHIN, HardCase, Row, energy, labellers, labels_row, row_of, walked
 from fastmech.integrators.methods import find_method
 from fastmech.scene import Scene
-from fastmech.stability.linearize import jacobian
+from fastmech.slider.equilibria import find_equilibria
+from fastmech.slider.linearize import jacobian
 from fastmech.step_limits.amplification import amplification
 from fastmech.step_limits.warning import beyond_stability, step_limit
 

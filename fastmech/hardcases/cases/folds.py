@@ -15,11 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from fastmech.arrays import Floats
-from fastmech.atlas.folds import find_folds
 from fastmech.basins.label import label_starts
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import Status
-from fastmech.equilibria.find import Equilibria, find_equilibria
 from fastmech.hardcases.walk import (
     DRIVEN,
     HardCase,
@@ -31,7 +29,9 @@ from fastmech.hardcases.walk import (
     walked,
 )
 from fastmech.scene import Scene
-from fastmech.stability.linearize import jacobian
+from fastmech.slider.atlas.folds import find_folds
+from fastmech.slider.equilibria import Equilibria, find_equilibria
+from fastmech.slider.linearize import jacobian
 
 SCENE = Scene(c1=294.9, c2=92.85, alpha=0.0)
 

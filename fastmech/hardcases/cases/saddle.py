@@ -12,10 +12,10 @@ from fastmech.arrays import Floats
 from fastmech.basins.label import label_starts
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.ensembles.status import Status
-from fastmech.equilibria.find import find_equilibria
 from fastmech.hardcases.walk import HardCase, Row, admitted_step, labellers, labels_row, row_of, without_euler
 from fastmech.scene import Scene
-from fastmech.stability.linearize import jacobian
+from fastmech.slider.equilibria import find_equilibria
+from fastmech.slider.linearize import jacobian
 
 SCENE = Scene(c1=294.9, c2=92.85, F0=85.3, alpha=0.0)
 DT, CLOSEST = 0.02, 1e-12

@@ -9,10 +9,10 @@ import numpy as np
 from fastmech.arrays import Floats
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import Status
-from fastmech.equilibria.find import find_equilibria
 from fastmech.hardcases.walk import HardCase, Row, claimed_row, motion, row_of, walked, worst
 from fastmech.integrators.methods import find_method
 from fastmech.scene import Scene
+from fastmech.slider.equilibria import find_equilibria
 from fastmech.step_limits.predict import largest_stable_step
 from fastmech.step_limits.warning import impulse_ratio, step_warning
 

@@ -6,7 +6,7 @@ from oracles import oracle
 
 import fastmech as fm
 from fastmech.basins.measures.norm import kinetic_norm, norm_on
-from fastmech.mechanism.lagrange import kinetic_energy
+from fastmech.slider.lagrange import kinetic_energy
 
 
 def test_the_kinetic_norm_is_the_oracle_s() -> None:

@@ -1,1 +1,0 @@
-"""Every resting position of a scene, with a proof that none is missing, for one scene or over a grid."""

@@ -1,0 +1,1 @@
+"""Equilibria of scenes over parameters: certified maps, sheets, all folds, wells, vanishing damping."""

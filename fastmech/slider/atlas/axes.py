@@ -1,0 +1,172 @@
+"""The axes of a map, checked, with the reduced coefficients and the margin to the fold at their points."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from numba import types
+from numpy.typing import ArrayLike
+
+from fastmech.arrays import Floats
+from fastmech.ensembles.checks import one_way
+from fastmech.errors import InputError, shown, shown_name
+from fastmech.jit import MATRIX, VECTOR, kernel
+from fastmech.models.mechanism import Mechanism
+from fastmech.scene import PARAMETERS, Scene, nearest, require_scene
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.theorem import HALF_PI, angles, normal_form, pulls, vanishing, wrap
+
+
+def check_axes(scene: Scene, axes: Mapping[str, ArrayLike], most: int = 3) -> dict[str, Floats]:
+    """The axes as float64 vectors, every value one that the scene accepts.
+
+    Raises:
+        InputError: no scene or no mapping, none or more than ``most`` axes, an unknown name, values that are
+            no numbers, that neither rise nor fall throughout or that the scene refuses, or F0 where the
+            scene's force decays.
+    """
+    require_scene(scene)
+    if not isinstance(axes, Mapping):
+        raise InputError(f"axes = {shown(axes)}: must map parameter names to their values")
+    if not 1 <= len(axes) <= most:
+        raise InputError(f"axes: {len(axes)} given; one to {_WORDS[most]} parameters are allowed")
+    checked = {name: _check_values(scene, name, values) for name, values in axes.items()}
+    refuse_decaying_load(scene, checked)
+    return checked
+
+
+_WORDS = {2: "two", 3: "three"}
+
+
+def refuse_decaying_load(scene: Scene, names: Collection[str]) -> None:
+    """F0 is a load at rest only where it is constant.
+
+    Raises:
+        InputError: F0 is one of the parameters that vary, and the scene's force decays.
+    """
+    if "F0" in names and scene.alpha > 0.0 and "alpha" not in names:
+        raise InputError(
+            f"scene.alpha = {scene.alpha:g}: must be 0 1/s where F0 is an axis, or no force is left at rest"
+        )
+
+
+def check_axis(scene: Scene, name: str, values: ArrayLike) -> Floats:
+    """One axis of a search for folds as a float64 vector.
+
+    Raises:
+        InputError: as ``check_axes``, the parameter is alpha, which moves no fold, or there is one value.
+    """
+    hint = "; fm.critical_values and fm.critical_curves are for a Mechanism"
+    require_scene(scene, hint if isinstance(scene, Mechanism) else "")
+    vector = _check_values(scene, name, values)
+    if name == "alpha":
+        raise InputError("axes.alpha: equilibria do not depend on how fast a force decays; choose another")
+    refuse_decaying_load(scene, (name,))
+    if vector.size < 2:
+        raise InputError(f"axes.{name} = {shown(values)}: must be two or more values")
+    return vector
+
+
+def _check_values(scene: Scene, name: str, values: ArrayLike) -> Floats:
+    names = list(PARAMETERS)
+    if not isinstance(name, str) or name not in names:
+        hint = nearest(name, names) if isinstance(name, str) else f"allowed: {', '.join(names)}"
+        raise InputError(f"axes.{shown_name(name)}: unknown parameter; {hint}")
+    try:
+        array = np.asarray(values)
+    except (TypeError, ValueError):
+        array = np.array(None)
+    if array.size and array.dtype.kind not in "iuf":
+        raise InputError(f"axes.{name} = {shown(values)}: must be a sequence of numbers")
+    vector = np.ascontiguousarray(array, dtype=np.float64)
+    if array.ndim != 1 or array.size == 0:
+        raise InputError(f"axes.{name}: shape {array.shape}: must be one-dimensional and not empty")
+    for value in (vector.min(), vector.max()):
+        # What a scene allows of a parameter is an interval of finite numbers.
+        try:
+            scene.replace(**{name: float(value)})
+        except InputError:
+            _name_the_value(scene, name, vector)
+    one_way(f"axes.{name}", values, vector)
+    return vector
+
+
+def _name_the_value(scene: Scene, name: str, vector: Floats) -> None:
+    for value in vector:
+        try:
+            scene.replace(**{name: float(value)})
+        except InputError as error:
+            raise InputError(f"axes.{name}: {error}") from None
+
+
+def coefficient_columns(scene: Scene, values: Mapping[str, Any]) -> Any:
+    """``Coefficients`` of arrays: ``values`` are parameters that differ from the scene's, in any shapes.
+
+    The force is the one at rest: F0 where alpha = 0, else its limit 0. The formulas are plain arithmetic, so
+    vectors, and complex numbers for derivatives, go through them as floats do.
+    """
+    fields: dict[str, Any] = {**scene.parameters, **values}
+    fields["F0"] = fields["F0"] * np.where(np.real(fields["alpha"]) == 0.0, 1.0, 0.0)
+    point: Any = SimpleNamespace(**fields)
+    return reduce(point)
+
+
+def grid_coefficients(scene: Scene, axes: Mapping[str, Floats]) -> tuple[Floats, Floats, Floats, Floats]:
+    """Of all points of a grid, in memory order: reduced coefficients (n, 8); m2 l^2 and (c1 + c2) l^2 (n,).
+
+    The last array is m2 (n,) [kg].
+    """
+    grid = tuple(len(values) for values in axes.values())
+    spread = {
+        name: values.reshape([-1 if k == dimension else 1 for k in range(len(grid))])
+        for dimension, (name, values) in enumerate(axes.items())
+    }
+
+    def full(value: Any) -> Floats:
+        return np.ravel(np.broadcast_to(np.asarray(value, dtype=np.float64), grid))
+
+    columns = [full(column) for column in coefficient_columns(scene, spread)]
+    fields: Any = {**scene.parameters, **spread}
+    return (
+        np.ascontiguousarray(np.stack(columns, axis=1)),
+        full(fields["m2"] * fields["l"] ** 2),
+        full((fields["c1"] + fields["c2"]) * fields["l"] ** 2),
+        full(fields["m2"]),
+    )
+
+
+@kernel(types.void(MATRIX, VECTOR, VECTOR, VECTOR, VECTOR))
+def fold_margins(coefficients: Floats, margin: Floats, symmetry: Floats, phi: Floats, theta: Floats) -> None:
+    """Margin to the fold, and the place that becomes an equilibrium where it vanishes.
+
+    Args:
+        coefficients: (n, 8) rows of ``fastmech.slider.coefficients.Coefficients``, the force frozen.
+        margin: (n,) [rad], positive with six equilibria (see ``balance``); NaN if degenerate; written.
+        symmetry: (n,) |cos D|, zero where the scene is its own mirror image; written.
+        phi, theta: (n,) [rad]: where two equilibria merge once the margin is zero; written.
+    """
+    for row in range(coefficients.shape[0]):
+        mass, _, lift, spring, gravity, force, _, _ = coefficients[row]
+        p = pulls(mass, lift, spring, gravity, force)
+        if vanishing(p) >= 2:
+            margin[row], symmetry[row], phi[row], theta[row] = np.nan, np.nan, np.nan, np.nan
+            continue
+        n = normal_form(p)
+        margin[row] = n.peak - n.distance
+        symmetry[row] = np.sin(n.distance)
+        sign = 1.0 if abs(wrap(n.turn - HALF_PI)) <= abs(wrap(n.turn + HALF_PI)) else -1.0
+        target = wrap(n.turn - sign * HALF_PI)
+        d = -n.corner if target > 0.0 else n.corner
+        if sign < 0.0:
+            d += np.pi
+        phi[row], theta[row] = angles(p, n, d, sign, sign)
+
+
+def margins(coefficients: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Margin, symmetry, phi and theta of rows of reduced coefficients; see ``fold_margins``."""
+    out = np.empty((4, len(coefficients)))
+    fold_margins(coefficients, *out)
+    return out[0], out[1], out[2], out[3]

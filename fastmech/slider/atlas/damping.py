@@ -1,0 +1,233 @@
+"""Curves on which damping stops reaching a mode at a stable equilibrium: settling takes forever there.
+
+The slider's damper misses a mode where sin phi = 0, where sin(phi + theta) = 0 and where U_theta,theta = C
+(see ``fastmech.slider.linearize.reach``): the Hurwitz test is silent and the decay is algebraic.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastmech.arrays import Floats
+from fastmech.atlas.continuation import LONGEST, distance, finish_on_edge, inside, newton, regular, trace
+from fastmech.objects import Drawn
+from fastmech.scene import Scene
+from fastmech.slider.atlas.cover import System, apart
+from fastmech.slider.atlas.folds import MOST_POINTS, checked_plane, plane_of
+from fastmech.slider.atlas.map import EquilibriumMap, map_equilibria
+from fastmech.slider.atlas.systems import Plane, dead_centre, point_at, straight, unloaded
+from fastmech.slider.linearize import SIN_PHI, SIN_PSI, UNLOADED
+
+SYSTEMS: dict[str, Callable[[Plane], System]] = {
+    SIN_PHI: dead_centre,
+    SIN_PSI: straight,
+    UNLOADED: unloaded,
+}
+
+#: A quantity this small, over its own scale, is zero within rounding.
+ZERO = 1e-9
+
+#: A seed this near to a traced curve is explained by it: a tenth of the longest step.
+EXPLAINED = 0.1 * LONGEST
+
+#: A curve ends this near to where its equilibrium stops being stable [rad and parts of the ranges].
+END = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class UndampedCurve:
+    """A curve on which the damper misses a mode of a stable equilibrium; arrays over its points, in order."""
+
+    vanishes: str  #: ``sin phi``, ``sin(phi+theta)`` or ``U_theta,theta - C``
+    x: Floats  #: values of the first parameter
+    y: Floats  #: values of the second one
+    phi: Floats  #: [rad]
+    theta: Floats  #: [rad]
+    residual: float  #: largest scaled residual on the curve
+
+
+@dataclass(frozen=True, eq=False)
+class UndampedSheet:
+    """Stable equilibria of which the damper misses a mode all over a part of the plane, not on a curve."""
+
+    vanishes: str  #: as for ``UndampedCurve``
+    x: float  #: one of the points
+    y: float
+    phi: float  #: the stable equilibrium there [rad]
+    theta: float  #: [rad]
+    share: float  #: of the grid's points
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class UndampedSet(Drawn):
+    """Where, in a plane of two parameters, the damper misses a mode of a stable equilibrium."""
+
+    curves: tuple[UndampedCurve, ...]
+    everywhere: tuple[UndampedSheet, ...]
+    crossings: int  #: edges of the grid along which one of the quantities changes sign on a stable sheet
+    unexplained: int  #: of these, how many have no curve, because none was found or ``MOST_POINTS`` was met
+    unfinished: int  #: curves that end where they could not be followed any further
+    names: tuple[str, str] = ("x", "y")  #: of the parameters
+
+    KIND = "undamped_curves"
+    LAYOUT = "scan_types.map_layout:undamped_curves"
+    PICTURE = "plots.objects:draw_curves_of"
+
+    def told(self) -> str:
+        """How many curves of which kind, and what none explains."""
+        kinds = Counter(curve.vanishes for curve in self.curves)
+        each = ", ".join(f"{count} of {what} = 0" for what, count in kinds.items())
+        return (
+            f"where damping misses a mode, over {self.names[0]} and {self.names[1]}: {each or 'no curve'}\n"
+            f"  of {self.crossings:,} changes on the grid {self.unexplained:,} lie on no curve; "
+            f"{len(self.everywhere)} sheets miss one throughout"
+        )
+
+
+def trace_undamped(
+    scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike], *, threads: int | None = None
+) -> UndampedSet:
+    """Vanishing-damping curves of ``scene`` in the plane of two parameters.
+
+    The values are the grid of the map that seeds them: a curve passes wherever one of the three quantities
+    changes sign between neighbours of one stable sheet. Where a quantity vanishes all over a sheet (with
+    c2 = m1 g / l the rod is unloaded whatever F0 and c1 are) there is no curve, and the sheet is named
+    instead. A curve along which a quantity touches zero without changing sign (the symmetric positions along
+    F0 = 0) is not found, unless grid points lie on it: then it counts as unexplained. Nothing is found
+    without a damper (beta = 0).
+
+    Raises:
+        InputError: as ``trace_folds``.
+    """
+    axes = checked_plane(scene, x, y)
+    plane = plane_of(scene, axes)
+    if scene.beta == 0.0 and "beta" not in axes:
+        return UndampedSet((), (), 0, 0, 0, (x[0], y[0])).of(scene)
+    atlas = map_equilibria(scene, axes, threads=threads)
+    curves: list[UndampedCurve] = []
+    everywhere: list[UndampedSheet] = []
+    crossings = unexplained = unfinished = traced = 0
+    for name, make in SYSTEMS.items():
+        equations = make(plane)
+        lines: list[Floats] = []
+        places, sheets = seeds(plane, atlas, name)
+        everywhere += sheets
+        crossings += len(places)
+        for seed in places:
+            if any(distance(line, seed, apart)[0] < LONGEST for line in lines):
+                continue
+            start = newton(equations, seed, reach=0.2) if traced < MOST_POINTS else None
+            if (
+                start is None
+                or not regular(equations, start)
+                or not stable(plane, start)
+                or not inside(start)
+            ):
+                unexplained += 1
+                continue
+            if any(distance(line, start, apart)[0] < EXPLAINED for line in lines):
+                continue
+            line = trace(
+                equations, start, lambda z: inside(z) and stable(plane, z), finish(plane, equations), apart
+            )
+            lines.append(line.points)
+            traced += len(line.points)
+            unfinished += not line.finished
+        curves += [curve_of(plane, name, equations, line) for line in lines if len(line) > 1]
+    found = UndampedSet(tuple(curves), tuple(everywhere), crossings, unexplained, unfinished, (x[0], y[0]))
+    return found.of(scene)
+
+
+def stable(plane: Plane, z: Floats) -> bool:
+    """Whether U has a minimum."""
+    p = point_at(plane, z[:, None])
+    return bool(p.determinant[0] > 0.0 and p.hessian[0][0] > 0.0)
+
+
+def finish(plane: Plane, equations: System) -> Callable[[Floats, Floats], Floats]:
+    """How a curve ends: on the rectangle's side, or just before the minimum is lost at a fold."""
+    on_edge = finish_on_edge(equations)
+
+    def end(last: Floats, beyond: Floats) -> Floats:
+        if stable(plane, beyond):
+            return on_edge(last, beyond)
+        kept, lost = last, beyond
+        while np.linalg.norm(lost - kept) > END:
+            middle = newton(equations, 0.5 * (kept + lost), LONGEST)
+            if middle is None or np.linalg.norm(middle - kept) > 0.9 * np.linalg.norm(lost - kept):
+                break
+            kept, lost = (middle, lost) if stable(plane, middle) and inside(middle) else (kept, middle)
+        return kept
+
+    return end
+
+
+def seeds(plane: Plane, atlas: EquilibriumMap, name: str) -> tuple[Floats, list[UndampedSheet]]:
+    """Points (n, 4) near which the quantity vanishes, by linear interpolation between neighbours.
+
+    Cells of the grid at whose four corners it vanishes are no place of a curve: their sheets are told apart.
+    """
+    first, second = (np.asarray(values) for values in atlas.axes.values())
+    u, v = np.meshgrid(
+        plane.parts(np.stack([first, np.full_like(first, plane.low[1])], axis=-1))[:, 0],
+        plane.parts(np.stack([np.full_like(second, plane.low[0]), second], axis=-1))[:, 1],
+        indexing="ij",
+    )
+    found, everywhere = [], []
+    for sheet in np.flatnonzero(atlas.sheet_morse_index == 0):
+        there = atlas.sheet == sheet
+
+        def on_sheet(values: Floats, there: NDArray[np.bool_] = there) -> Floats:
+            return np.where(there.any(axis=-1), np.where(there, values, 0.0).sum(axis=-1), np.nan)
+
+        phi, theta = on_sheet(atlas.phi), on_sheet(atlas.theta)
+        z = np.stack([phi, theta, u, v], axis=-1)
+        p = point_at(plane, np.where(np.isnan(z), 0.0, z).reshape(-1, 4).T)
+        size = {
+            SIN_PHI: np.sin(phi),
+            SIN_PSI: np.sin(phi + theta),
+            UNLOADED: np.where(np.isnan(phi), np.nan, (p.hessian[2] - p.loads[1]).reshape(phi.shape)),
+        }[name]
+        flat = all_over(np.abs(size) < ZERO)
+        if flat.any():
+            everywhere.append(sheet_of(plane, name, z[flat], flat.mean()))
+        for one, two in (
+            ((slice(None, -1), slice(None)), (slice(1, None), slice(None))),
+            ((slice(None), slice(None, -1)), (slice(None), slice(1, None))),
+        ):
+            change = (size[one] * size[two] <= 0.0) & ~flat[one] & ~flat[two]
+            start, gap = z[one][change], apart(z[two][change], z[one][change])
+            a, b = size[one][change], size[two][change]
+            found.append(start + (a / np.where(a == b, 1.0, a - b))[:, None] * gap)
+    return np.concatenate(found) if found else np.empty((0, 4)), everywhere
+
+
+def all_over(zero: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The corners of the cells of which all four corners are zero."""
+    cell = zero[1:, 1:] & zero[1:, :-1] & zero[:-1, 1:] & zero[:-1, :-1]
+    flat = np.zeros_like(zero)
+    for rows in (slice(1, None), slice(None, -1)):
+        for columns in (slice(1, None), slice(None, -1)):
+            flat[rows, columns] |= cell
+    return flat
+
+
+def sheet_of(plane: Plane, name: str, places: Floats, share: float) -> UndampedSheet:
+    """A sheet that vanishes at these places (n, 4), told by the middle one, in the parameters' units."""
+    phi, theta, u, v = places[len(places) // 2]
+    x, y = (float(value) for value in plane.values((u, v)).values())
+    return UndampedSheet(name, x, y, float(phi), float(theta), float(share))
+
+
+def curve_of(plane: Plane, name: str, equations: System, points: Floats) -> UndampedCurve:
+    """A traced curve in the parameters' units."""
+    residual = max(float(np.max(np.abs(equations(z)[0]))) for z in points)
+    values = plane.values(points[:, 2:].T)
+    x, y = (np.asarray(values[key]) for key in plane.names)
+    phi, theta = (np.mod(points[:, k] + np.pi, 2.0 * np.pi) - np.pi for k in (0, 1))
+    return UndampedCurve(name, x, y, phi, theta, residual)

@@ -1,0 +1,1 @@
+"""The capture certificate of scenes: barrier tree, proved cells, observers, steps."""

@@ -1,0 +1,1 @@
+"""The right-hand sides of scenes, their Jacobians and works, compiled for lanes."""

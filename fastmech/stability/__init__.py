@@ -1,1 +1,0 @@
-"""Stability of an equilibrium: linearization, three criteria and their joint verdict."""
