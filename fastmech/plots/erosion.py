@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fastmech.plots.style import LINES, entry, new_figure, style, symbol
+from fastmech.plots.style import LINES, entry, legend_below, new_figure, style, swatch, symbol
 from fastmech.results import STATE_UNITS, Dataset
 
 if TYPE_CHECKING:
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
 def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
     """Picture of a dataset of the scan type ``erosion`` about the scene with these parameters."""
-    from matplotlib.patches import Patch
-
     name = str(dataset.attrs["along"])
     with style():
         figure = new_figure(8.2, 10.0)
@@ -33,7 +31,7 @@ def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figu
             handles.append(entry(_name(dataset, well), color=color, lw=3.0))
         _axes(panels, dataset, name)
         handles += [
-            Patch(facecolor="#bdbdbd", label="95 % Wilson interval, undecided starts as none or all"),
+            swatch("95 % Wilson interval, undecided starts as none or all", "#bdbdbd"),
             entry("if all undecided starts ended there", lw=1.0, ls=":"),
             entry("about the well: LIM; shock of all four states", marker="o", ms=5),
             entry("anywhere: IF; kick of the rates alone", ls="--", marker="s", ms=5),
@@ -43,7 +41,7 @@ def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figu
         if _limited(dataset):
             look: dict[str, Any] = {"marker": "^", "mfc": "white", "ms": 6, "lw": 1.0, "ls": ":"}
             handles.append(entry("radius, if all undecided starts ended there", **look))
-        figure.legend(handles=handles, loc="outside lower center", ncols=2)
+        legend_below(figure, handles)
         figure.suptitle(_title(dataset, scene, name))
         return {"profile": figure}
 
@@ -51,13 +49,11 @@ def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figu
 def draw_stability(axes: Axes, dataset: Dataset) -> list[Artist]:
     """Draw the wells' shares of the starts; returns the legend's entries."""
     name = str(dataset.attrs["along"])
-    for well in range(dataset.sizes["well"]):
-        _stability(axes, dataset, well, LINES[well % len(LINES)])
+    colors = {well: LINES[well % len(LINES)] for well in range(dataset.sizes["well"])}
+    for well, color in colors.items():
+        _stability(axes, dataset, well, color)
     axes.set(xlabel=_along(dataset, name), ylabel="share of the starts [%]", ylim=(0.0, 102.0))
-    return [
-        entry(_name(dataset, well), color=LINES[well % len(LINES)], lw=3.0)
-        for well in range(dataset.sizes["well"])
-    ]
+    return [entry(_name(dataset, well), color=color, lw=3.0) for well, color in colors.items()]
 
 
 def _along(dataset: Dataset, name: str) -> str:
@@ -77,17 +73,11 @@ def _name(dataset: Dataset, well: int) -> str:
 
 def _stability(axes: Axes, dataset: Dataset, well: int, color: str) -> None:
     x = dataset[str(dataset.attrs["along"])].data
-    share = 100.0 * dataset["well_stability"].data[:, well]
-    axes.fill_between(
-        x,
-        100.0 * dataset["well_lower"].data[:, well],
-        100.0 * dataset["well_upper"].data[:, well],
-        color=color,
-        alpha=0.3,
-        lw=0,
-    )
+    names = ("stability", "lower", "upper", "undecided")
+    share, lower, upper, undecided = (100.0 * dataset[f"well_{name}"].data[:, well] for name in names)
+    axes.fill_between(x, lower, upper, color=color, alpha=0.3, lw=0)
     axes.plot(x, share, color=color, marker="o", ms=4)
-    axes.plot(x, share + 100.0 * dataset["well_undecided"].data[:, well], color=color, lw=1.0, ls=":")
+    axes.plot(x, share + undecided, color=color, lw=1.0, ls=":")
 
 
 def _lines(axes: Axes, dataset: Dataset, well: int, color: str, looks: Mapping[str, tuple[str, str]]) -> None:

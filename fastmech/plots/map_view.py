@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.plots.style import PALETTE, coordinates_of, flag_codes, setting_of
+from fastmech.plots.style import PALETTE, coordinates_of, flag_codes, setting_of, shade
 from fastmech.results import Dataset, Variable
 from fastmech.scene import Scene
 from fastmech.store.read import Section
@@ -72,6 +72,11 @@ class View:
     def axis(self, name: str) -> Floats:
         """Values along an axis."""
         return np.asarray(self.variable(name).data, dtype=np.float64)
+
+    def shade(self, axes: Axes, values: Floats, **look: Any) -> Any:
+        """A field over two parameters in colours."""
+        x, y = map(self.axis, self.axes)
+        return shade(axes, x, y, values, **look)
 
     def variable(self, name: str) -> Variable:
         """A variable of the map or of a group in it."""

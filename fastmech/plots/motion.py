@@ -27,7 +27,7 @@ _REACTIONS = {
 }
 
 
-def draw_motion(dataset: Dataset) -> dict[str, Figure]:
+def draw_motion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
     """Pictures of a dataset of the scan type ``motion``."""
     names = coordinates_of(dataset)
     states = (*names, *(f"{name}_dot" for name in names))

@@ -12,7 +12,7 @@ from fastmech.plots.equilibrium_map import LEAST_SPAN, draw_branches, draw_count
 from fastmech.plots.erosion import draw_stability
 from fastmech.plots.map_view import draw_curves, make_view
 from fastmech.plots.motion import TIME, draw_states
-from fastmech.plots.style import LINES, coordinates_of, legend_under, quantity, symbol
+from fastmech.plots.style import LINES, coordinates_of, legend_under, paint, quantity, swatch, symbol
 from fastmech.results import coordinate_units, state_units
 from fastmech.scene import Scene
 
@@ -159,20 +159,14 @@ def draw_basin_map(found: Any, axes: Axes) -> None:
         legend_under(axes, draw_labels(axes, view))
         describe(axes, view, _parameters(found.system))
         return
-    from matplotlib.colors import ListedColormap
-    from matplotlib.patches import Patch
-
     names = [*found.axes][:2]
     well = found.well.reshape(*(found.axes[n].size for n in names), -1)
     well = well[..., well.shape[-1] // 2].reshape(found.axes[names[0]].size, -1)
     there = np.unique(well)
     colors = ["#ffffff" if k < 0 else COLORS[i % len(COLORS)] for i, k in enumerate(there)]
     y = found.axes[names[1]] if len(names) > 1 else np.zeros(1)
-    picture = np.searchsorted(there, well)
-    limits: Any = {"vmin": -0.5, "vmax": there.size - 0.5, "cmap": ListedColormap(colors)}
-    axes.pcolormesh(found.axes[names[0]], y, picture.T, shading="nearest", rasterized=True, **limits)
+    paint(axes, found.axes[names[0]], y, np.searchsorted(there, well), colors)
     axes.set(xlabel=names[0], ylabel=names[1] if len(names) > 1 else "")
     told = ["no label" if k < 0 else f"code {k}" if found.tree is None else found.tree[k].name for k in there]
     shares = [f"{text}: {np.mean(well == k):.1%}" for k, text in zip(there, told, strict=True)]
-    patches = [Patch(facecolor=c, edgecolor="black", label=t) for c, t in zip(colors, shares, strict=True)]
-    legend_under(axes, patches, 1)
+    legend_under(axes, [swatch(t, c, "black") for c, t in zip(colors, shares, strict=True)], 1)

@@ -80,10 +80,16 @@ def new_figure(width: float = 7.2, height: float = 4.2) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def legend_below(figure: Figure, axes: Axes, columns: int) -> None:
-    """A legend under the whole figure, where it covers nothing."""
-    handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=columns)
+def new_panel(width: float = 7.2, height: float = 4.2) -> tuple[Figure, Axes]:
+    """A figure of one panel, with its axes."""
+    figure = new_figure(width, height)
+    return figure, figure.subplots()
+
+
+def legend_below(figure: Figure, of: Axes | Sequence[Artist], columns: int = 2) -> None:
+    """A legend of what axes have, or of some entries, under the whole figure, where it covers nothing."""
+    handles = of if isinstance(of, Sequence) else of.get_legend_handles_labels()[0]
+    figure.legend(handles=list(handles), loc="outside lower center", ncols=columns)
 
 
 def legend_under(axes: Axes, handles: Sequence[Artist] | None = None, columns: int = 2) -> None:
@@ -139,6 +145,11 @@ def setting_of(dataset: Dataset, parameters: Mapping[str, float]) -> str:
     each = ", ".join(f"{name} = {value:g}" for name, value in list(parameters.items())[:MOST_TOLD])
     name = dataset.attrs.get("mechanism", dataset.attrs.get("system", ""))
     return f"{name}: {each}{', ...' * (len(parameters) > MOST_TOLD)}"
+
+
+def with_unit(name: str, unit: str) -> str:
+    """A name with its unit, for an axis; nothing of a pure number."""
+    return name if unit == "1" else f"{name} [{unit}]"
 
 
 def quantity(dataset: Dataset, name: str) -> str:
@@ -197,3 +208,27 @@ def entry(label: str, **look: Any) -> Artist:
     from matplotlib.lines import Line2D
 
     return Line2D([], [], **{"color": "black", "label": label, **look})
+
+
+def swatch(label: str, color: str, edge: str | None = None) -> Artist:
+    """A patch of colour of a legend."""
+    from matplotlib.patches import Patch
+
+    return Patch(facecolor=color, edgecolor=edge, label=label)
+
+
+def shade(axes: Axes, x: Any, y: Any, values: Any, **look: Any) -> Any:
+    """A field (x, y) in colours, over the middles or the edges of its cells."""
+    return axes.pcolormesh(x, y, values.T, rasterized=True, **look)
+
+
+def paint(axes: Axes, x: Any, y: Any, numbers: Any, colors: Sequence[str]) -> None:
+    """Cells (x, y) in the colours of these numbers; -1: none."""
+    from matplotlib.colors import ListedColormap
+
+    shade(axes, x, y, numbers, cmap=ListedColormap(colors), vmin=-0.5, vmax=len(colors) - 0.5)
+
+
+def share(where: Any) -> str:
+    """The share of cells, in words."""
+    return f"{100.0 * np.mean(where):.3g} %"

@@ -6,30 +6,25 @@ attractors keep their numbers along the first one only. In a group of its own: `
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
 
-from fastmech.attractors.follow import BasinsAlong, Tipping, follow_basins
+from fastmech.attractors.follow import BasinsAlong, follow_basins
 from fastmech.ensembles.system import System
 from fastmech.models.mechanism import Mechanism
-from fastmech.results import Dataset, Variable, numbers, told
+from fastmech.plots.response import draw_shares
+from fastmech.results import Dataset, Variable, columns, numbers, told
 from fastmech.scan_types.attractors import Starts, lines_over, parameter_of, shared_axes
-from fastmech.scan_types.request import Axis, Tiling
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-#: The dimension of rows in a tile.
-ROW = ("row",)
+from fastmech.scan_types.request import Axis, Tiling, tile_of
 
 
 class FollowBasins(Starts):
     """Attractors along a parameter, matched from value to value."""
 
     kind: ClassVar[str] = "follow_basins"
+    draw = staticmethod(draw_shares)
     taken = frozenset({"share", "attractor", "tipping"})
 
     along: Annotated[dict[str, Axis], Field(min_length=1, max_length=1)] = Field(
@@ -60,75 +55,34 @@ class FollowBasins(Starts):
         ((name, axis),) = self.along.items()
         values = axis.array
         dims, where = shared_axes(scene, self.along, self.each)
-        most = max(tile.sizes["attractor"] for tile in tiles)
+        most = max(tile["share"].data.shape[1] for tile in tiles)
         share = np.full((len(tiles), values.size, most), np.nan)
         for k, tile in enumerate(tiles):
-            share[k, :, : tile.sizes["attractor"]] = tile["share"].data
+            share[k, :, : tile["share"].data.shape[1]] = tile["share"].data
         rows = np.concatenate([tile["tipping"].data for tile in tiles])
-        line = np.repeat(np.arange(len(tiles), dtype=np.int32), [tile.sizes["row"] for tile in tiles])
+        line = np.repeat(np.arange(len(tiles), dtype=np.int32), [len(t["tipping"].data) for t in tiles])
         unlabelled = np.stack([tile["unlabelled"].data for tile in tiles])
         shape = tuple(len(where[d].data) for d in dims)
         each, unit = ("tipping",), where[name].units
         kinds = np.where(rows[:, 1] == 1.0, "born", "dies").astype(object)
-        return Dataset(
-            {
-                **where,
-                **numbers("attractor", most, f"number of the attractor, the same along {name}"),
-                "share": Variable(
-                    (*dims, "attractor"),
-                    share.reshape(*shape, most),
-                    "1",
-                    "share of the starts that end there, NaN: it is not there",
-                ),
-                "unlabelled": Variable(
-                    dims, unlabelled.reshape(shape), "1", "share of the starts without a label"
-                ),
-            },
-            {"along": name, "starts": self.n, **told(scene)},
-            {
-                "tipping": Dataset(
-                    {
-                        **numbers("tipping", len(rows), "number of the change"),
-                        "tipping_line": Variable(each, line, "1", "index of the second parameter's value"),
-                        "tipping_attractor": Variable(
-                            each, rows[:, 0].astype(np.int32), "1", "number of the attractor"
-                        ),
-                        "tipping_kind": Variable(each, kinds, "1", f"born or dies as {name} rises"),
-                        "tipping_low": Variable(each, rows[:, 2], unit, "it happens above"),
-                        "tipping_high": Variable(each, rows[:, 3], unit, "it happens below"),
-                    }
-                )
-            },
-        )
-
-    @staticmethod
-    def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
-        """Shares stacked over the parameter; of a second one's first, middle and last values."""
-        from fastmech.plots.response import draw_lines
-
-        name = str(dataset.attrs["along"])
-        share, unlabelled = dataset["share"].data, dataset["unlabelled"].data
-        if share.ndim == 2:
-            share, unlabelled = share[None], unlabelled[None]
-        tips, owner = dataset.groups["tipping"], dataset.groups["tipping"]["tipping_line"].data
-
-        def line(k: int) -> BasinsAlong:
-            rows = np.flatnonzero(owner == k)
-            tipping = [
-                Tipping(
-                    int(tips["tipping_attractor"].data[i]),
-                    str(tips["tipping_kind"].data[i]),
-                    float(tips["tipping_low"].data[i]),
-                    float(tips["tipping_high"].data[i]),
-                )
-                for i in rows
-            ]
-            there = np.isfinite(share[k]).any(axis=0)
-            return BasinsAlong(
-                name, dataset[name].data, share[k][:, there], unlabelled[k], (), tuple(tipping)
-            )
-
-        return {"shares": draw_lines(dataset, scene, line, len(share))}
+        changes = {
+            "tipping_line": (line, "1", "index of the second parameter's value"),
+            "tipping_attractor": (rows[:, 0].astype(np.int32), "1", "number of the attractor"),
+            "tipping_kind": (kinds, "1", f"born or dies as {name} rises"),
+            "tipping_low": (rows[:, 2], unit, "it happens above"),
+            "tipping_high": (rows[:, 3], unit, "it happens below"),
+        }
+        tipping = numbers("tipping", len(rows), "number of the change") | columns(each, changes)
+        ends, about = share.reshape(*shape, most), "share of the starts that end there, NaN: it is not there"
+        none = unlabelled.reshape(shape)
+        variables = {
+            **where,
+            **numbers("attractor", most, f"number of the attractor, the same along {name}"),
+            "share": Variable((*dims, "attractor"), ends, "1", about),
+            "unlabelled": Variable(dims, none, "1", "share of the starts without a label"),
+        }
+        attrs = {"along": name, "starts": self.n, **told(scene)}
+        return Dataset(variables, attrs, {"tipping": Dataset(tipping)})
 
 
 def along_dataset(found: BasinsAlong) -> Dataset:
@@ -141,10 +95,5 @@ def along_dataset(found: BasinsAlong) -> Dataset:
 
 def _line(found: BasinsAlong) -> Dataset:
     tipping = np.array([[t.attractor, t.kind == "born", t.low, t.high] for t in found.tipping])
-    return Dataset(
-        {
-            "share": Variable((found.parameter, "attractor"), found.fractions),
-            "unlabelled": Variable((found.parameter,), found.unlabelled),
-            "tipping": Variable((*ROW, "column"), tipping.reshape(-1, 4)),
-        }
-    )
+    arrays = {"share": found.fractions, "unlabelled": found.unlabelled, "tipping": tipping.reshape(-1, 4)}
+    return tile_of(arrays)
