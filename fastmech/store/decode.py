@@ -64,11 +64,7 @@ class TooMuchError(InputError):
 
 
 class Allowance:
-    """What a file may ask for: its groups, its variables and the bytes of their values are taken off it.
-
-    Args:
-        path: the file.
-    """
+    """What a file may ask for: its groups, its variables and the bytes of their values are taken off it."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -149,17 +145,11 @@ def own_dimensions(stored: h5py.Dataset, dims: Mapping[int, str]) -> tuple[str, 
 
 @dataclass(frozen=True)
 class About:
-    """A stored variable without its values.
+    """A stored variable without its values."""
 
-    Attributes:
-        sizes: length of each of its dimensions.
-        dtype: type of the values, object for texts.
-        units, long_name, attrs: as of `fastmech.results.Variable`.
-    """
-
-    sizes: dict[str, int]
-    dtype: np.dtype[Any]
-    units: str
+    sizes: dict[str, int]  #: length of each of its dimensions
+    dtype: np.dtype[Any]  #: type of the values, object for texts
+    units: str  #: as of `fastmech.results.Variable`
     long_name: str
     attrs: dict[str, Any]
 

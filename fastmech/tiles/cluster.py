@@ -43,12 +43,7 @@ _LOGGERS = ("distributed", "distributed.client", "distributed.core", "tornado.ap
 
 
 class ClusterWorkers:
-    """The workers of a Dask cluster, of which some may come or go.
-
-    Args:
-        client: connected to the scheduler.
-        executor: the client's.
-    """
+    """The workers of a Dask cluster, of which some may come or go."""
 
     deaths: tuple[type[Exception], ...]
 
@@ -88,11 +83,7 @@ class ClusterWorkers:
 
 
 class ClusterHiring:
-    """Hires whoever is in a Dask cluster.
-
-    Args:
-        client: connected to the scheduler.
-    """
+    """Hires whoever is in a Dask cluster."""
 
     together = True
 
