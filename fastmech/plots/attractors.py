@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,15 +11,12 @@ from fastmech.ensembles.status import LABELS
 from fastmech.plots import style
 from fastmech.results import Dataset
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 #: Attractors that have a colour of their own, and the colour of the others; greys of starts without a label.
 NAMED, OTHERS = len(style.LINES) - 1, "#999999"
 UNLABELLED = {"unsure": "#ffffff", "undecided": "#e6e6e6", "escaped": "#404040", "not_finite": "#606060"}
 
 
-def draw_attractors(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
+def draw_attractors(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Pictures of a dataset of the scan type ``attractors`` of the system with these parameters."""
     with style.style():
         figures = {"shares": _shares(dataset, scene)}
@@ -42,7 +39,7 @@ def _color(k: int) -> str:
     return style.LINES[k] if k < NAMED else OTHERS
 
 
-def _shares(dataset: Dataset, scene: Mapping[str, float]) -> Figure:
+def _shares(dataset: Dataset, scene: Mapping[str, float]) -> style.Figure:
     table, total = dataset.groups["attractors"], dataset["label"].data.size
     shares, low, high = (100.0 * table[name].data for name in ("share", "share_low", "share_high"))
     n, other = len(shares), 100.0 * float(np.mean(dataset["label"].data < 0))
@@ -57,7 +54,7 @@ def _shares(dataset: Dataset, scene: Mapping[str, float]) -> Figure:
     return figure
 
 
-def _labels(dataset: Dataset, scene: Mapping[str, float]) -> Figure:
+def _labels(dataset: Dataset, scene: Mapping[str, float]) -> style.Figure:
     label, status, table = dataset["label"].data, dataset["status"].data, dataset.groups["attractors"]
     names, n = dataset["label"].dims, table["share"].data.size
     picture, colors = np.minimum(label, NAMED), [_color(k) for k in range(min(n, NAMED + 1))]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +13,6 @@ from fastmech.mechanism.lagrange import kinetic_energy, potential_energy
 from fastmech.plots import style
 from fastmech.results import Dataset
 from fastmech.scene import Scene
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 #: Wells and turns of each angle, either way, whose basins have a colour of their own.
 WELLS, TURNS = 2, 2
@@ -132,14 +126,14 @@ class Slice:
         return x, y, kinetic_energy(scene, states) + potential_energy(scene, states[..., :2], force)
 
 
-def mark(marker: str, text: str, face: str = "white") -> Artist:
+def mark(marker: str, text: str, face: str = "white") -> style.Artist:
     """What a marker in a legend means."""
     return style.entry(text, marker=marker, mfc=face, ms=8, ls="none")
 
 
-def decisive(axes: Axes, view: Slice) -> list[Artist]:
+def decisive(axes: style.Axes, view: Slice) -> list[style.Artist]:
     """Equilibria in the slice, and where the energy is that of each well's barrier."""
-    handles: list[Artist] = []
+    handles: list[style.Artist] = []
     data = view.dataset
     wells = np.flatnonzero(data["equilibrium_morse_index"].data == 0)
     barriers = data["barrier"].data[wells]
@@ -178,30 +172,20 @@ def _places(view: Slice, index: int, inside: bool, only: int | None = None) -> F
     data, found = view.dataset, []
     if not inside and not set(view.coordinates) & set(view.axes):
         return np.zeros((0, 2))
-    reach = [(view.axis(k)[0], view.axis(k)[-1]) for k in (0, 1)]
+    reach = {name: (view.axis(k)[0], view.axis(k)[-1]) for k, name in enumerate(view.axes)}
     for i in np.flatnonzero(data["equilibrium_morse_index"].data == index):
-        if only is not None and i != only:
-            continue
         place = {name: data[f"equilibrium_{name}"].data[i] for name in view.coordinates}
-        away = [
-            (held - place[n] + np.pi) % (2.0 * np.pi) - np.pi
-            if n in view.turning
-            else held - place.get(n, 0.0)
-            for n, held in view.held.items()
-        ]
-        if bool(np.abs(away).max(initial=0.0) <= IN_SLICE) != inside:
+        away = [held - place.get(name, 0.0) for name, held in view.held.items()]
+        turning = [name in view.turning for name in view.held]
+        apart = np.where(turning, np.remainder(np.add(away, np.pi), 2.0 * np.pi) - np.pi, away)
+        if only not in (None, i) or bool(np.abs(apart).max(initial=0.0) <= IN_SLICE) != inside:
             continue
         copies = []
-        for name, (low, high) in zip(view.axes, reach, strict=True):
+        for name, (low, high) in reach.items():
             at = place.get(name, 0.0)
-            turns = np.arange(
-                np.ceil((low - at) / (2.0 * np.pi)), np.floor((high - at) / (2.0 * np.pi)) + 1.0
-            )
-            copies.append(
-                at + 2.0 * np.pi * turns
-                if name in view.turning
-                else np.array([at] if low <= at <= high else [])
-            )
+            first, last = np.ceil((low - at) / (2.0 * np.pi)), np.floor((high - at) / (2.0 * np.pi))
+            every = at + 2.0 * np.pi * np.arange(first, last + 1.0)
+            copies.append(every if name in view.turning else [at] * bool(low <= at <= high))
         found += [(a, b) for a in copies[0] for b in copies[1]]
     return np.array(found).reshape(-1, 2)
 
@@ -230,7 +214,7 @@ SKIPPED = "#d9d9d9"
 FEW = 400
 
 
-def draw_basins(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
+def draw_basins(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Pictures of a dataset of the scan type ``basins`` about the scene with these parameters."""
     dataset = dataset.merged
     with style.style():
@@ -246,7 +230,7 @@ def draw_basins(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figur
         return figures
 
 
-def draw_labels(axes: Axes, view: Slice) -> list[Artist]:
+def draw_labels(axes: style.Axes, view: Slice) -> list[style.Artist]:
     """Draw who ends where; returns the legend's entries."""
     label, status = view.data("label").astype(int), view.data("status")
     codes = style.flag_codes(view.dataset["status"])
@@ -286,7 +270,7 @@ def draw_labels(axes: Axes, view: Slice) -> list[Artist]:
     return handles + decisive(axes, view)
 
 
-def _mark(axes: Axes, x: Floats, y: Floats, where: NDArray[np.bool_], marker: str) -> None:
+def _mark(axes: style.Axes, x: Floats, y: Floats, where: NDArray[np.bool_], marker: str) -> None:
     """Mark single cells."""
     i, j = np.nonzero(where)
     axes.plot(x[i], y[j], marker, color="black", ms=5, ls="none", zorder=4)
@@ -305,7 +289,7 @@ def _copy(view: Slice, basin: int) -> tuple[int, tuple[int, ...]]:
     return int(data["basin_well"].data[basin]), turns
 
 
-def _times(view: Slice, name: str, title: str) -> Figure:
+def _times(view: Slice, name: str, title: str) -> style.Figure:
     from matplotlib.colors import LogNorm, Normalize
 
     figure, axes = style.new_panel(8.2, 7.0)
@@ -338,7 +322,7 @@ def _times(view: Slice, name: str, title: str) -> Figure:
     return figure
 
 
-def describe(axes: Axes, view: Slice, parameters: Mapping[str, float]) -> None:
+def describe(axes: style.Axes, view: Slice, parameters: Mapping[str, float]) -> None:
     """Labels with units, the decisive parameters, and what is held."""
     if view.scene is not None:
         scene = view.scene
@@ -347,23 +331,21 @@ def describe(axes: Axes, view: Slice, parameters: Mapping[str, float]) -> None:
     else:
         told = style.setting_of(view.dataset, parameters)
     at_rest = all(value == 0.0 for value in view.held.values()) and not set(view.coordinates) & set(view.held)
-    held = "starts at rest" if at_rest and set(view.axes) == set(view.coordinates) else _held(view)
+    each = ", ".join(f"{style.symbol(name)} = {value:.4g}" for name, value in view.held.items())
+    held = f"starts with {each}" if each else ""
+    if at_rest and set(view.axes) == set(view.coordinates):
+        held = "starts at rest"
     axes.set_title(f"{axes.get_title()}\n{told}; {held}" if held else f"{axes.get_title()}\n{told}")
     for axis, name in (("x", view.axes[0]), ("y", view.axes[1])):
         getattr(axes, f"set_{axis}label")(style.quantity(view.dataset, name).replace(" [", " at the start ["))
     axes.grid(visible=False)
 
 
-def _held(view: Slice) -> str:
-    each = ", ".join(f"{style.symbol(name)} = {value:.4g}" for name, value in view.held.items())
-    return f"starts with {each}" if each else ""
-
-
 #: Where the mechanism comes back to its well.
 BACK = "#e6e6e6"
 
 
-def draw_snapping(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
+def draw_snapping(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Picture of a dataset of the scan type ``snapping`` about the scene with these parameters."""
     with style.style():
         figure, axes = style.new_panel(8.2, 6.6)
@@ -371,7 +353,7 @@ def draw_snapping(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Fig
         return {"map": figure}
 
 
-def draw_ends(axes: Axes, dataset: Dataset, scene: Mapping[str, float]) -> list[Artist]:
+def draw_ends(axes: style.Axes, dataset: Dataset, scene: Mapping[str, float]) -> list[style.Artist]:
     """Draw who ends where over force and decay rate; returns the legend's entries."""
     picture, colors, handles = _ends(dataset)
     x, y = np.exp(_edges(np.log(dataset["alpha"].data))), _edges(dataset["F0"].data)
@@ -390,7 +372,7 @@ def draw_ends(axes: Axes, dataset: Dataset, scene: Mapping[str, float]) -> list[
     return handles
 
 
-def _ends(dataset: Dataset) -> tuple[np.ndarray, list[str], list[Artist]]:
+def _ends(dataset: Dataset) -> tuple[np.ndarray, list[str], list[style.Artist]]:
     """Numbers of colours over (alpha, F0), the colours, and what they mean; what stays comes first."""
     well, left = dataset["well"].data, dataset["left"].data.astype(np.bool_)
     ends = np.stack([well, dataset["turns_phi"].data, dataset["turns_theta"].data], axis=-1)
@@ -422,10 +404,10 @@ def _ends(dataset: Dataset) -> tuple[np.ndarray, list[str], list[Artist]]:
     return picture, colors, handles
 
 
-def _unlabelled(axes: Axes, dataset: Dataset) -> list[Artist]:
+def _unlabelled(axes: style.Axes, dataset: Dataset) -> list[style.Artist]:
     """Motions without a label, each marked where they are few."""
     status, codes = dataset["status"].data, style.flag_codes(dataset["status"])
-    handles: list[Artist] = []
+    handles: list[style.Artist] = []
     for name, (_, marker, meaning) in unlabelled(codes).items():
         where = status == codes[name]
         number = int(np.count_nonzero(where))
@@ -440,9 +422,9 @@ def _unlabelled(axes: Axes, dataset: Dataset) -> list[Artist]:
     return handles
 
 
-def _curves(axes: Axes, dataset: Dataset) -> list[Artist]:
+def _curves(axes: style.Axes, dataset: Dataset) -> list[style.Artist]:
     """The critical curve, and its limit for fast decay."""
-    handles: list[Artist] = []
+    handles: list[style.Artist] = []
     if "critical_F0" not in dataset:
         return handles
     alpha, critical = dataset["alpha"].data, dataset["critical_F0"].data

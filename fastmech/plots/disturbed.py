@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +13,6 @@ from fastmech.arrays import Flags, Floats
 from fastmech.plots import style
 from fastmech.plots.map_view import View, make_view
 from fastmech.results import Dataset
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 UNSTABLE = ("still at an unstable one", "#8c8c8c")
 LEFT_OVER = {
@@ -47,7 +41,7 @@ SHOWN_QUANTILES = (0.5, 0.95, 0.99)
 POINTS = 1001
 
 
-def draw_disturbed(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
+def draw_disturbed(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Outcomes, times to return, excursions and the linearized motion's range; those of a map over it."""
     dataset = dataset.merged
     if "axes" in dataset.attrs:
@@ -65,7 +59,7 @@ def draw_disturbed(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Fi
         return {name: draw(dataset) for name, (draw, needed) in pictures.items() if needed <= set(dataset)}
 
 
-def _outcomes(dataset: Dataset) -> Figure:
+def _outcomes(dataset: Dataset) -> style.Figure:
     figure, axes = _rows_of_equilibria(dataset, 0.7)
     names = style.equilibrium_names(dataset)
     for row in range(len(names)):
@@ -106,9 +100,7 @@ def _segments(dataset: Dataset, row: int) -> list[tuple[float, str, dict[str, An
     codes = style.flag_codes(dataset["outcome"])
     outcome = dataset["outcome"].data[row]
     elsewhere = outcome == codes["elsewhere"]
-    parts = [
-        (outcome == codes["returned"], f"rest at {row + 1}", {"color": style.LINES[row % len(style.LINES)]})
-    ]
+    parts = [(outcome == codes["returned"], f"rest at {row + 1}", {"color": style.color(row)})]
     if "end_equilibrium" in dataset:
         parts += _resting_elsewhere(dataset, row, elsewhere)
     else:
@@ -132,15 +124,13 @@ def _resting_elsewhere(
     parts: list[tuple[Flags, str, dict[str, Any]]] = []
     for other in range(dataset.sizes["equilibrium"]):
         there = elsewhere & (end == other)
-        further = {"color": style.LINES[other % len(style.LINES)], "hatch": "//"}
-        parts.append(
-            (there & ~turned, f"rest at {other + 1}", {"color": style.LINES[other % len(style.LINES)]})
-        )
+        further = {"color": style.color(other), "hatch": "//"}
+        parts.append((there & ~turned, f"rest at {other + 1}", {"color": style.color(other)}))
         parts.append((there & turned, f"rest at {other + 1}, full turns further", further))
     return parts
 
 
-def _time_to_return(dataset: Dataset) -> Figure:
+def _time_to_return(dataset: Dataset) -> style.Figure:
     figure, axes = style.new_panel(7.2, 4.8)
     marked = [int(np.argmin(np.abs(dataset["quantile"].data - q))) for q in SHOWN_QUANTILES]
     level = dataset["quantile"].data[marked]
@@ -156,10 +146,8 @@ def _time_to_return(dataset: Dataset) -> Figure:
         label = f"{name}, {_returned(dataset, row)} return\n({texts})"
         # Who returns after the run's end counts, so that a curve may end below 100 %.
         known = 100.0 * min(1.0, times.size / (returned * every.size))
-        axes.plot(
-            np.quantile(times, share), known * share, color=style.LINES[row % len(style.LINES)], label=label
-        )
-        axes.plot(at, 100.0 * level, "o", color=style.LINES[row % len(style.LINES)], mec="white", ms=7)
+        axes.plot(np.quantile(times, share), known * share, color=style.color(row), label=label)
+        axes.plot(at, 100.0 * level, "o", color=style.color(row), mec="white", ms=7)
     axes.set(xlabel="time to return t [s]", ylabel="share of those that return [%]", ylim=(0.0, 103.0))
     axes.set_xlim(left=0.0)
     if axes.lines:
@@ -185,7 +173,7 @@ def _returned(dataset: Dataset, row: int) -> str:
     return f"{share:.3g} %" if most == share else f"{share:.3g} to {most:.3g} %"
 
 
-def _excursions(dataset: Dataset) -> Figure:
+def _excursions(dataset: Dataset) -> style.Figure:
     figure, axes = _rows_of_equilibria(dataset, 0.85)
     names = style.coordinates_of(dataset)
     units = {dataset[name].units for name in names}
@@ -206,7 +194,7 @@ def _excursions(dataset: Dataset) -> Figure:
     return figure
 
 
-def _linear_range(dataset: Dataset) -> Figure:
+def _linear_range(dataset: Dataset) -> style.Figure:
     figure, axes = _rows_of_equilibria(dataset, 0.85)
     limit = dataset["linear_limit"].data
     tolerance, horizon = dataset.attrs["linear_tolerance"], dataset.attrs["linear_horizon"]
@@ -236,7 +224,7 @@ def _linear_range(dataset: Dataset) -> Figure:
     return figure
 
 
-def _rows_of_equilibria(dataset: Dataset, height: float) -> tuple[Figure, Axes]:
+def _rows_of_equilibria(dataset: Dataset, height: float) -> tuple[style.Figure, style.Axes]:
     """A figure with a row for each equilibrium, the first on top."""
     names = style.equilibrium_names(dataset)
     figure, axes = style.new_panel(8.4, height * len(names) + 1.9)
@@ -246,11 +234,11 @@ def _rows_of_equilibria(dataset: Dataset, height: float) -> tuple[Figure, Axes]:
     return figure, axes
 
 
-def _beside(axes: Axes, row: int, text: str) -> None:
+def _beside(axes: style.Axes, row: int, text: str) -> None:
     axes.annotate(text, (1.01, row), xycoords=("axes fraction", "data"), va="center", fontsize=9)
 
 
-def _box(axes: Axes, place: float, quantiles: Floats, color: str) -> None:
+def _box(axes: style.Axes, place: float, quantiles: Floats, color: str) -> None:
     names = ("whislo", "q1", "med", "q3", "whishi")
     axes.bxp(
         [dict(zip(names, quantiles, strict=True), fliers=[])],
@@ -278,7 +266,7 @@ ABOUT_UNTOLD = "failed numerically in part, or not computed"
 KINDS = {0: "stable", 1: "saddle", 2: "maximum"}
 
 
-def _draw_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
+def _draw_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     view = make_view(dataset, scene)
     every = np.arange(dataset.sizes["sheet"])
     stable = every[dataset["sheet_morse_index"].data == 0]
@@ -311,7 +299,9 @@ def _draw_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]
         }
 
 
-def _panels(view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[str, Floats, str]]) -> Figure:
+def _panels(
+    view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[str, Floats, str]]
+) -> style.Figure:
     """A row for each field, a column for each sheet."""
     figure = style.new_figure(2.2 + 3.5 * len(sheets), 1.7 + 3.0 * len(fields))
     panels = figure.subplots(len(fields), len(sheets), squeeze=False, sharex=True, sharey=True)
@@ -341,7 +331,9 @@ def _panels(view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[
     return figure
 
 
-def _lines(view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[str, Floats, str]]) -> Figure:
+def _lines(
+    view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[str, Floats, str]]
+) -> style.Figure:
     """A panel for each field, a line for each sheet."""
     figure = style.new_figure(7.6, 1.9 + 2.7 * len(fields))
     panels = figure.subplots(len(fields), 1, squeeze=False, sharex=True)[:, 0]
@@ -349,17 +341,15 @@ def _lines(view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[s
     for axes, (title, field, label) in zip(panels, fields, strict=True):
         for k, sheet in enumerate(sheets):
             shown = np.where(np.isinf(field[..., sheet]), np.nan, field[..., sheet])
-            axes.plot(
-                x, shown, "o-", ms=4, color=style.LINES[k % len(style.LINES)], label=_name(view, int(sheet))
-            )
+            axes.plot(x, shown, "o-", ms=4, color=style.color(k), label=_name(view, int(sheet)))
             if name == "share_returned" and title == fields[0][0]:
                 low, high = (
                     _percent(view, f"share_returned_{end}")[..., sheet] for end in ("lower", "upper")
                 )
-                axes.fill_between(x, low, high, color=style.LINES[k % len(style.LINES)], alpha=0.25, lw=0)
+                axes.fill_between(x, low, high, color=style.color(k), alpha=0.25, lw=0)
             later = x[np.isinf(field[..., sheet])]
             if later.size:  # on the upper edge
-                look = {"color": style.LINES[k % len(style.LINES)], "transform": axes.get_xaxis_transform()}
+                look = {"color": style.color(k), "transform": axes.get_xaxis_transform()}
                 axes.plot(later, np.full(later.size, 0.97), "^", **look)
             untold = x[_untold(view, int(sheet))]
             if untold.size:  # on the lower edge
@@ -385,7 +375,7 @@ def _lines(view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[s
     return figure
 
 
-def _title(figure: Figure, text: str) -> None:
+def _title(figure: style.Figure, text: str) -> None:
     """Over all panels, in as many lines as it takes."""
     width = int(12 * figure.get_figwidth())
     figure.suptitle("\n".join(fill(line, width) for line in text.splitlines()), fontsize=10.0)
@@ -414,8 +404,8 @@ def _untold(view: View, sheet: int) -> Flags:
     return there & ~(view.data("share_failed")[..., sheet] == 0.0)
 
 
-def _marks(view: View, sheets: NDArray[np.int_], fields: list[tuple[str, Floats, str]]) -> list[Artist]:
-    handles: list[Artist] = []
+def _marks(view: View, sheets: NDArray[np.int_], fields: list[tuple[str, Floats, str]]) -> list[style.Artist]:
+    handles: list[style.Artist] = []
     absent = ~np.isfinite(view.data("phi")[..., sheets])
     if absent.any():
         handles.append(style.swatch("no such equilibrium", ABSENT, "#808080"))
@@ -448,7 +438,7 @@ TIME = "time t [s]"
 MOTIONS = ("nonlinear", "linearized")
 
 
-def draw_disturbed_motion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
+def draw_disturbed_motion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Pictures of a dataset of the scan type ``disturbed_motion``; none where there is no equilibrium."""
     if not dataset.sizes["equilibrium"]:
         return {}
@@ -456,7 +446,7 @@ def draw_disturbed_motion(dataset: Dataset, scene: Mapping[str, float]) -> dict[
         return {"angles": _angles(dataset), "norm": _norm(dataset)}
 
 
-def _angles(dataset: Dataset) -> Figure:
+def _angles(dataset: Dataset) -> style.Figure:
     count = dataset.sizes["equilibrium"]
     figure = style.new_figure(8.4, 1.9 * count + 0.8)
     panels = figure.subplots(count, 2, sharex=True, squeeze=False)
@@ -474,7 +464,7 @@ def _angles(dataset: Dataset) -> Figure:
     return figure
 
 
-def _norm(dataset: Dataset) -> Figure:
+def _norm(dataset: Dataset) -> style.Figure:
     nonlinear, linearized = (
         np.hypot(*(dataset[f"{which}_{angle}"].data for angle in ("phi", "theta"))) for which in MOTIONS
     )
@@ -502,12 +492,12 @@ def _norm(dataset: Dataset) -> Figure:
     return figure
 
 
-def _plot_pair(axes: Axes, t: Floats, nonlinear: Floats, linearized: Floats) -> None:
+def _plot_pair(axes: style.Axes, t: Floats, nonlinear: Floats, linearized: Floats) -> None:
     axes.plot(t, nonlinear, color=style.LINES[0], label="nonlinear")
     axes.plot(t, linearized, "--", color=style.LINES[1], lw=1.2, label="linearized")
 
 
-def _limit(axes: Axes, nonlinear: Floats) -> None:
+def _limit(axes: style.Axes, nonlinear: Floats) -> None:
     """The nonlinear motion sets the scale: an unstable linearized one would hide it."""
     low, high = np.nanmin(nonlinear, initial=0.0), np.nanmax(nonlinear, initial=0.0)
     margin = 0.25 * (high - low) or 1.0

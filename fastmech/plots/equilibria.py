@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,10 +15,6 @@ from fastmech.models.mechanism import Mechanism
 from fastmech.plots import style
 from fastmech.results import Dataset
 from fastmech.scene import Scene
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 Points = NDArray[np.float64]
 
@@ -51,12 +47,14 @@ def drawing_of(system: Scene | Mechanism | Dataset, q: ArrayLike = (), force: fl
     return drawing(system, q)
 
 
-def draw_mechanism(axes: Axes, drawn: Drawing, which: int = 0) -> None:
+def draw_mechanism(axes: style.Axes, drawn: Drawing, which: int = 0) -> None:
     """Draw one of the positions of a mechanism.
 
     Lengths are to scale; masses have areas in proportion to them; an arrow has one length for every load.
     The axes cover all positions, so that drawings of one mechanism can be compared.
     """
+    from matplotlib.patches import Circle
+
     tied = ~np.isin(drawn.kind, (Element.GUIDE, Element.LOAD))
     corners = drawn.ends[:, tied].reshape(-1, 2)
     low, high = corners.min(axis=0), corners.max(axis=0)
@@ -74,7 +72,8 @@ def draw_mechanism(axes: Axes, drawn: Drawing, which: int = 0) -> None:
         elif kind == Element.FIXED:
             axes.plot(*a, ls="none", marker="s", ms=7, color=GROUND, zorder=4)
         elif kind == Element.MASS:
-            _mass(axes, a, LARGEST_MASS * size * np.sqrt(mass / heaviest))
+            radius = LARGEST_MASS * size * np.sqrt(mass / heaviest)
+            axes.add_patch(Circle(tuple(a), radius, color=MASS, zorder=5))
         elif kind == Element.LOAD:
             b = a + ARROW * size * (b - a)
             arrow: Any = {"arrowstyle": "-|>", "color": FORCE, "lw": 2.4, "mutation_scale": 14}
@@ -94,7 +93,7 @@ def draw_mechanism(axes: Axes, drawn: Drawing, which: int = 0) -> None:
             _label(axes, name, place, np.array(others).reshape(-1, 2), 1.4 * LARGEST_MASS * size, colour)
 
 
-def _label(axes: Axes, name: str, place: Points, ties: Points, distance: float, colour: str) -> None:
+def _label(axes: style.Axes, name: str, place: Points, ties: Points, distance: float, colour: str) -> None:
     """Name a point on the side where nothing is tied to it, above where nothing is."""
     lengths = np.hypot(*ties.T)
     tied = lengths > 1e-9
@@ -110,12 +109,6 @@ def _label(axes: Axes, name: str, place: Points, ties: Points, distance: float, 
     axes.text(x, y, text, ha=ha, va=va, color=colour, fontsize=10, zorder=7)
 
 
-def _mass(axes: Axes, center: Points, radius: float) -> None:
-    from matplotlib.patches import Circle
-
-    axes.add_patch(Circle(tuple(center), radius, color=MASS, zorder=5))
-
-
 def _zigzag(start: Points, end: Points, width: float) -> tuple[Points, Points]:
     """Coordinates of a spring's line between two points."""
     along = end - start
@@ -128,7 +121,7 @@ def _zigzag(start: Points, end: Points, width: float) -> tuple[Points, Points]:
     return line[:, 0], line[:, 1]
 
 
-def _damper(axes: Axes, start: Points, end: Points, half: float) -> None:
+def _damper(axes: style.Axes, start: Points, end: Points, half: float) -> None:
     """Piston rod from the start into a housing that is tied to the end."""
     along = end - start
     across = half * np.array([-along[1], along[0]]) / max(float(np.hypot(*along)), 1e-12)
@@ -162,7 +155,7 @@ SHAPES = ["o", "s", "^", "D", "v", "P"]
 GRID = 241
 
 
-def draw_equilibria(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
+def draw_equilibria(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Pictures of a dataset of the scan type ``equilibria`` of the scene with these parameters."""
     of_paper = "mechanism" not in dataset.attrs
     with style.style():
@@ -185,7 +178,7 @@ def draw_equilibria(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, F
     return figures
 
 
-def draw_potential(axes: Axes, dataset: Dataset, scene: Scene) -> None:
+def draw_potential(axes: style.Axes, dataset: Dataset, scene: Scene) -> None:
     """Draw the potential over both angles, with the equilibria."""
     angle = np.linspace(-np.pi, np.pi, GRID)
     q = np.stack(np.meshgrid(angle, angle), axis=-1)
@@ -201,7 +194,7 @@ def draw_potential(axes: Axes, dataset: Dataset, scene: Scene) -> None:
     axes.grid(visible=False)
 
 
-def mark_kinds(axes: Axes, dataset: Dataset, names: Sequence[str]) -> None:
+def mark_kinds(axes: style.Axes, dataset: Dataset, names: Sequence[str]) -> None:
     """Mark equilibria by their kind in the plane of two variables, with their numbers."""
     codes = style.flag_codes(dataset["kind"])
     for kind, marker in {**dict.fromkeys(codes.others(MARKERS), "P"), **MARKERS}.items():
@@ -218,12 +211,12 @@ def mark_kinds(axes: Axes, dataset: Dataset, names: Sequence[str]) -> None:
         )
 
 
-def _eigenvalues(dataset: Dataset) -> Figure:
+def _eigenvalues(dataset: Dataset) -> style.Figure:
     figure, axes = style.new_panel(7.2, 5.4)
     ranks = [name.rpartition("_")[2] for name in dataset if name.startswith("eigenvalue_re_")]
     for i, name in enumerate(style.equilibrium_names(dataset)):
         x, y = ([dataset[f"eigenvalue_{part}_{k}"].data[i] for k in ranks] for part in ("re", "im"))
-        look: Any = {"color": style.LINES[i % len(style.LINES)], "mec": "white", "ms": 9, "label": name}
+        look: Any = {"color": style.color(i), "mec": "white", "ms": 9, "label": name}
         axes.plot(x, y, SHAPES[i % len(SHAPES)], **look)
     left, right = axes.get_xlim()
     axes.set_xlim(min(left, -0.1 * right), max(right, -0.1 * left))
@@ -238,7 +231,7 @@ def _eigenvalues(dataset: Dataset) -> Figure:
     return figure
 
 
-def _positions(dataset: Dataset, drawn: Drawing, setting: str) -> Figure:
+def _positions(dataset: Dataset, drawn: Drawing, setting: str) -> style.Figure:
     names = style.equilibrium_names(dataset)
     told = [
         {code: word.replace("_", " ") for word, code in style.flag_codes(dataset[of]).items()}

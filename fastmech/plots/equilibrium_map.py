@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +12,6 @@ from fastmech.arrays import Floats
 from fastmech.plots import style
 from fastmech.plots.map_view import View, draw_curves, make_view, not_proved
 from fastmech.results import Dataset
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 #: How sheets look, by their Morse index.
 LOOKS = {
@@ -51,7 +45,7 @@ SLOWEST_SHOWN = 1e6
 TOLD = 4
 
 
-def draw_bifurcation(view: View) -> Figure:
+def draw_bifurcation(view: View) -> style.Figure:
     """phi, theta and the slowest decay time of the stable ones over one parameter."""
     (name,) = view.axes
     third = view.has("decay_time")
@@ -68,7 +62,7 @@ def draw_bifurcation(view: View) -> Figure:
     return figure
 
 
-def draw_branches(axes: Axes, view: View, variable: str, folds: dict[str, Floats]) -> None:
+def draw_branches(axes: style.Axes, view: View, variable: str, folds: dict[str, Floats]) -> None:
     """Draw an angle of all equilibria over one parameter."""
     (name,), labelled = view.axes, set[str]()
     for (color, dash, width, label), x, y in _looks(_sheets(view, name, variable, folds)):
@@ -89,7 +83,7 @@ def draw_branches(axes: Axes, view: View, variable: str, folds: dict[str, Floats
     _own(axes, view)
 
 
-def draw_places(view: View) -> Figure:
+def draw_places(view: View) -> style.Figure:
     """All coordinates and the slowest decay time over one parameter, of maps with equilibria not joined."""
     (name,) = view.axes
     timed = view.has("decay_time") and np.isfinite(view.data("decay_time").astype(np.float64)).any()
@@ -104,7 +98,7 @@ def draw_places(view: View) -> Figure:
     return figure
 
 
-def draw_verdicts(axes: Axes, view: View, variable: str) -> None:
+def draw_verdicts(axes: style.Axes, view: View, variable: str) -> None:
     """Draw a coordinate or the decay time of all equilibria over one parameter, by their verdicts."""
     codes, verdict = style.flag_codes(view.variable("verdict")), view.data("verdict")
     values = np.asarray(view.data(variable), dtype=np.float64)
@@ -124,7 +118,7 @@ def draw_verdicts(axes: Axes, view: View, variable: str) -> None:
     _own(axes, view)
 
 
-def _widen(axes: Axes, low: float, high: float) -> None:
+def _widen(axes: style.Axes, low: float, high: float) -> None:
     """Rounding shall not look like structure."""
     bottom, top = axes.get_ylim()
     middle = 0.5 * (bottom + top)
@@ -150,7 +144,7 @@ def _looks(
         seen += 1
 
 
-def _decay_times(axes: Axes, view: View, name: str) -> None:
+def _decay_times(axes: style.Axes, view: View, name: str) -> None:
     sheets = [sheet for sheet in _sheets(view, name, "decay_time", {}) if sheet[0] == 0]
     for (color, dash, width, _), x, y in _looks(sheets):
         axes.semilogy(x, y, color=color, ls=dash, lw=width, marker="." if np.isfinite(y).sum() < 2 else "")
@@ -184,7 +178,7 @@ def _told(view: View, folds: dict[str, Floats], name: str) -> str:
     return told + not_proved(view)
 
 
-def _own(axes: Axes, view: View) -> None:
+def _own(axes: style.Axes, view: View) -> None:
     point = view.own()
     if point is not None:
         axes.axvline(point[0], color="black", lw=1.0, ls="-.", label="the scene")
@@ -265,7 +259,7 @@ UNSETTLED = {"at_fold": "|", "degenerate": "x", "unproved": "+"}
 _ORDER = ("deepest", "second", "third")
 
 
-def draw_equilibrium_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
+def draw_equilibrium_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Pictures of a dataset of the scan type ``equilibrium_map`` about the scene with these parameters."""
     view = make_view(dataset, scene)
     with style.style():
@@ -290,7 +284,7 @@ def draw_equilibrium_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[s
         return figures
 
 
-def _counts(view: View) -> Figure:
+def _counts(view: View) -> style.Figure:
     figure = style.new_figure(9.6, 5.6)
     titles = {"count": "Number of equilibria", "count_stable": "Number of stable equilibria"}
     for axes, (name, title) in zip(figure.subplots(1, 2), titles.items(), strict=True):
@@ -299,7 +293,7 @@ def _counts(view: View) -> Figure:
     return figure
 
 
-def draw_count(axes: Axes, view: View, name: str, title: str) -> list[Artist]:
+def draw_count(axes: style.Axes, view: View, name: str, title: str) -> list[style.Artist]:
     """Draw a number of equilibria over two parameters; returns the curves' entries of a legend."""
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
@@ -319,10 +313,10 @@ def draw_count(axes: Axes, view: View, name: str, title: str) -> list[Artist]:
     return curves
 
 
-def _mark_unsettled(axes: Axes, view: View) -> list[Artist]:
+def _mark_unsettled(axes: style.Axes, view: View) -> list[style.Artist]:
     x, y = np.meshgrid(*map(view.axis, view.axes), indexing="ij")
     codes = style.flag_codes(view.dataset["outcome"])
-    handles: list[Artist] = []
+    handles: list[style.Artist] = []
     for name, marker in {**dict.fromkeys(codes.others({"complete"}), "P"), **UNSETTLED}.items():
         where = view.data("outcome") == codes[name]
         if where.any():
@@ -331,14 +325,14 @@ def _mark_unsettled(axes: Axes, view: View) -> list[Artist]:
     return handles
 
 
-def _mark_own(axes: Axes, view: View) -> list[Artist]:
+def _mark_own(axes: style.Axes, view: View) -> list[style.Artist]:
     point = view.own()
     if point is None:
         return []
     return list(axes.plot(*point, "*", color="white", mec="black", ms=15, ls="none", label="the scene"))
 
 
-def _angles(view: View) -> Figure:
+def _angles(view: View) -> style.Figure:
     names = style.coordinates_of(view.dataset)
     figure = style.new_figure(1.6 + 4.6 * len(view.ranks), 0.4 + 3.8 * len(names))
     panels = figure.subplots(len(names), len(view.ranks), squeeze=False, sharex=True, sharey=True)
@@ -364,14 +358,14 @@ def _angle_look(fields: list[Floats], unit: str) -> dict[str, object]:
     return {"cmap": style.FIELD, "vmin": middle - half, "vmax": middle + half}
 
 
-def _barrier(view: View) -> Figure:
+def _barrier(view: View) -> style.Figure:
     """Depth of each well, and the impulse on M2 that a blow needs at least to leave it."""
     rows = [("depth", "Energy to leave the {} well", "depth [J]")]
     if view.has("shock_limit_m2"):
         rows.append(("shock_limit_m2", "No smaller blow on M2 leaves the {} well", "impulse on M2 [N s]"))
     figure = style.new_figure(0.6 + 5.4 * len(view.ranks), 1.4 + 4.2 * len(rows))
     panels = figure.subplots(len(rows), len(view.ranks), squeeze=False, sharex=True, sharey=True)
-    handles: list[Artist] = []
+    handles: list[style.Artist] = []
     for row, (name, title, label) in zip(panels, rows, strict=True):
         for rank, axes in zip(view.ranks, row, strict=True):
             field = view.stable(rank, view.data(name))
@@ -386,7 +380,7 @@ def _barrier(view: View) -> Figure:
     return figure
 
 
-def _decay(view: View) -> Figure:
+def _decay(view: View) -> style.Figure:
     """Time in which the slowest linear mode of each stable equilibrium falls to 1/e."""
     fields = [view.stable(rank, view.data("decay_time")) for rank in view.ranks]
     known = np.concatenate([field[np.isfinite(field)] for field in fields])
@@ -403,7 +397,7 @@ def _decay(view: View) -> Figure:
     return figure
 
 
-def _field(axes: Axes, view: View, field: Floats, low: float, high: float) -> Any:
+def _field(axes: style.Axes, view: View, field: Floats, low: float, high: float) -> Any:
     """A field in logarithmic colours; values beyond the limits have the colour of the nearer one."""
     from matplotlib.colors import LogNorm
 
@@ -411,26 +405,26 @@ def _field(axes: Axes, view: View, field: Floats, low: float, high: float) -> An
     return view.shade(axes, np.clip(field, low, high), norm=norm, cmap=style.FIELD)
 
 
-def _bar(figure: Figure, mesh: Any, panels: list[Axes], label: str, extend: str) -> None:
+def _bar(figure: style.Figure, mesh: Any, panels: list[style.Axes], label: str, extend: str) -> None:
     """A colour bar with an arrow at the end beyond which there are values."""
     bar = figure.colorbar(mesh, ax=panels, label=label, extend=extend)
     style.in_fifths(bar.ax.yaxis, mesh.norm.vmax <= 3.0 * mesh.norm.vmin / SHALLOWEST)
 
 
-def _nothing(view: View) -> list[Artist]:
+def _nothing(view: View) -> list[style.Artist]:
     """What white means where not every point has as many stable equilibria as panels."""
     if int(view.data("count_stable").min()) == len(view.ranks):
         return []
     return [style.swatch("white: no such equilibrium", "white", "#808080")]
 
 
-def _label(axes: Axes, view: View, title: str) -> None:
+def _label(axes: style.Axes, view: View, title: str) -> None:
     axes.set(xlabel=view.label(view.axes[0]), ylabel=view.label(view.axes[1]))
     axes.set_title(title, fontsize=10.5)
     axes.grid(visible=False)
 
 
-def _finish(figure: Figure, view: View, handles: list[Artist]) -> None:
+def _finish(figure: style.Figure, view: View, handles: list[style.Artist]) -> None:
     """The scene above everything, the legend below."""
     figure.suptitle(view.setting + not_proved(view), fontsize=10.0)
     for axes in figure.axes:

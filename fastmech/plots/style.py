@@ -12,13 +12,14 @@ import numpy as np
 
 from fastmech.results import Dataset, Variable
 
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
+if TYPE_CHECKING:  # matplotlib is loaded where something is drawn
+    from matplotlib.artist import Artist as Artist
+    from matplotlib.axes import Axes as Axes
     from matplotlib.axis import Axis
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Figure
 
     from fastmech.store.read import Section
+
 
 #: Okabe and Ito's colours, told apart by colour-blind readers too.
 PALETTE = {
@@ -34,6 +35,12 @@ PALETTE = {
 
 #: Colours of lines in their order (without yellow, which is too pale for a line on white).
 LINES = [PALETTE[name] for name in ("blue", "vermillion", "green", "purple", "orange", "sky", "black")]
+
+
+def color(number: int) -> str:
+    """The colour of a line by its number, from 0."""
+    return LINES[number % len(LINES)]
+
 
 #: Colour map of fields: equal steps look equal, in grey and to colour-blind readers too.
 FIELD = "cividis"

@@ -158,6 +158,9 @@ def _turns(system: Scene | Mechanism) -> dict[str, str]:
     return dict.fromkeys(coordinate_units(system), "1")
 
 
+_RETURN = "end of the first step from which on every step ended in the ball of return, NaN: none by t_end"
+_EXCURSION = "largest departure of {} at the ends of steps, NaN: not followed to its end"
+
 #: What is known of every trajectory: type, what stands for one that is not computed yet, unit, meaning. What
 #: has several units is a variable for each of them.
 _TRAJECTORY: dict[str, tuple[str, float, str | Units, str]] = {
@@ -167,18 +170,8 @@ _TRAJECTORY: dict[str, tuple[str, float, str | Units, str]] = {
     "outcome": ("i1", -1, "1", "where it ends"),
     "end_equilibrium": ("i1", -1, "1", "stable equilibrium at which it is proved to end"),
     "turns": ("i8", 0, _turns, "full turns of {} made on the way there"),
-    "time_to_return": (
-        "f8",
-        np.nan,
-        "s",
-        "end of the first step from which on every step ended in the ball of return, NaN: none by t_end",
-    ),
-    "excursion": (
-        "f8",
-        np.nan,
-        coordinate_units,
-        "largest departure of {} at the ends of steps, NaN: not followed to its end",
-    ),
+    "time_to_return": ("f8", np.nan, "s", _RETURN),
+    "excursion": ("f8", np.nan, coordinate_units, _EXCURSION),
 }
 
 #: Names of what is known of every trajectory.

@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
 from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism
@@ -68,65 +67,42 @@ def equilibria_dataset(equilibria: Any) -> Dataset:
         array = np.array(values, dtype=np.float64).reshape(len(found), len(entries))
         return parts(name, each, array, entries, about)
 
-    def verdicts(criterion: str) -> NDArray[np.int8]:
+    def verdicts(criterion: str, about: str) -> tuple[Any, ...]:
         words = [attrgetter(criterion)(one).upper().replace(" ", "_") for one in found]
-        return np.array([Verdict[word] for word in words], dtype=np.int8)
+        codes = np.array([Verdict[word] for word in words], dtype=np.int8)
+        return codes, "1", f"verdict: {about}", flags(list(Verdict)[1:])
 
-    criteria = {"sylvester": "Lagrange-Dirichlet"} if of_paper else {}
-    criteria |= {"hurwitz": "Hurwitz", "spectrum": "eigenvalues"}
-    meanings = flags(list(Verdict)[1:])
-    verdict_rows = {
-        f"verdict_{how if how != 'spectrum' else 'eigenvalues'}": (
-            verdicts(f"{how}.verdict"),
-            "1",
-            f"verdict: {criterion}",
-            meanings,
-        )
-        for how, criterion in criteria.items()
-    }
     kinds = np.array([Kind[name.upper()] for name in equilibria.kind], dtype=np.int8)
-    index = [-1 if e.morse_index is None else e.morse_index for e in equilibria]
+    index = np.array([-1 if e.morse_index is None else e.morse_index for e in equilibria], dtype=np.int8)
     energy = "potential energy Pi - F x2" if of_paper else "potential energy, loads at their means"
     swings = [_swings(scene, e, f) for e, f in zip(equilibria, found, strict=True)]
-    times = np.array([time for _, time in swings])
     why = np.array([f.explanation for f in found], dtype=object)
+    ranks, about = range(1, 2 * n + 1), "undamped natural frequency {}, NaN for a direction that grows"
+    polynomial = f"monic characteristic polynomial of degree {2 * n}: coefficient of power {2 * n} - {{}}"
+    determinants = [f.hurwitz_determinants for f in found], [f"s-{k * (k + 1) // 2}" for k in ranks]
+    rows = {
+        "energy": (equilibria.energy, "J", energy),
+        "kind": (kinds, "1", "kind of equilibrium", flags(list(Kind)[: 4 if of_paper else None])),
+        "morse_index": (index, "1", "negative eigenvalues of the Hessian, -1: no potential"),
+    }
+    judged = {
+        "decay_time": ([time for _, time in swings], "s", "slowest linear mode falls to 1/e; NaN: unstable"),
+        **({"verdict_sylvester": verdicts("sylvester.verdict", "Lagrange-Dirichlet")} if of_paper else {}),
+        "verdict_hurwitz": verdicts("hurwitz.verdict", "Hurwitz"),
+        "verdict_eigenvalues": verdicts("spectrum.verdict", "eigenvalues"),
+        "verdict": verdicts("verdict", "joint"),
+        "explanation": (why, "1", "why, and what disagrees"),
+    }
     variables = {
         **numbers("equilibrium", len(found), "number of the equilibrium"),
         **parts("", each, equilibria.position, coordinates, "{1} {0}"),
-        "energy": Variable(each, equilibria.energy, "J", energy),
-        "kind": Variable(
-            each, kinds, "1", "kind of equilibrium", flags(list(Kind)[: 4 if of_paper else None])
-        ),
-        "morse_index": Variable(
-            each,
-            np.array(index, dtype=np.int8),
-            "1",
-            "negative eigenvalues of the Hessian, -1: no potential",
-        ),
+        **columns(each, rows),
         **_stiffness(scene, equilibria, found),
-        **numbered(
-            "polynomial",
-            [f.polynomial[1:] for f in found],
-            [f"s-{k}" for k in range(1, 2 * n + 1)],
-            f"monic characteristic polynomial of degree {2 * n}: coefficient of power {2 * n} - {{}}",
-        ),
-        **numbered(
-            "hurwitz",
-            [f.hurwitz_determinants for f in found],
-            [f"s-{k * (k + 1) // 2}" for k in range(1, 2 * n + 1)],
-            "Hurwitz determinant {}",
-        ),
+        **numbered("polynomial", [f.polynomial[1:] for f in found], [f"s-{k}" for k in ranks], polynomial),
+        **numbered("hurwitz", *determinants, "Hurwitz determinant {}"),
         **eigenvalue_variables(each, np.array([f.eigenvalues for f in found]).reshape(-1, 2 * n)),
-        **numbered(
-            "natural_frequency",
-            [frequencies for frequencies, _ in swings],
-            ["rad/s"] * n,
-            "undamped natural frequency {}, NaN for a direction that grows",
-        ),
-        "decay_time": Variable(each, times, "s", "slowest linear mode falls to 1/e; NaN: unstable"),
-        **columns(each, verdict_rows),
-        "verdict": Variable(each, verdicts("verdict"), "1", "verdict: joint", meanings),
-        "explanation": Variable(each, why, "1", "why, and what disagrees"),
+        **numbered("natural_frequency", [undamped for undamped, _ in swings], ["rad/s"] * n, about),
+        **columns(each, judged),
     }
     attrs = {
         **({"force": equilibria.force} if of_paper else told(scene)),

@@ -20,7 +20,7 @@ from fastmech.mechanism.geometry import constraints, positions, reactions
 from fastmech.mechanism.lagrange import momenta
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots.motion import draw_motion
-from fastmech.results import Dataset, Variable, coordinate_units, parts, state_units, told
+from fastmech.results import Dataset, Variable, columns, coordinate_units, parts, state_units, told
 from fastmech.scan_types import request as scans
 from fastmech.scene import Scene
 from fastmech.step_limits.warning import step_warning
@@ -152,26 +152,19 @@ class Motion(scans.Scan):
         """What is known of the paper's mechanism: momenta, points, constraints, reactions and works."""
         along, t = ("time",), self._times
         p, points = momenta(scene, canonical), positions(scene, y)
-        about = "generalized momentum of {}, canonical equations"
+        about, residuals = "generalized momentum of {}, canonical equations", constraints(scene, points)
+        units = {"2": "m2", "3": "m2", "4": "m", "5": "m2"}
+        places = points._asdict().items()
+        rows = {name: (value, "m", f"coordinate {name[0]} of M{name[1]}") for name, value in places}
+        forces = {"force": (force(scene, t), "N", "force on M2 along +x")}
+        forces |= {n: (value, "N", _REACTIONS[n]) for n, value in reactions(scene, y, t)._asdict().items()}
+        works = {name: (balance[name].data, "J", told) for name, told in _BALANCE.items()}
+        left = np.moveaxis(residuals, 0, -1)
         return {
             **parts("p", along, p, dict.fromkeys(("phi", "theta"), "kg m2/s"), about),
-            **{
-                name: Variable(along, value, "m", f"coordinate {name[0]} of M{name[1]}")
-                for name, value in points._asdict().items()
-            },
-            **parts(
-                "constraint_residual",
-                along,
-                np.moveaxis(constraints(scene, points), 0, -1),
-                {"2": "m2", "3": "m2", "4": "m", "5": "m2"},
-                "left side of the constraint ({})",
-            ),
-            "force": Variable(along, force(scene, t), "N", "force on M2 along +x"),
-            **{
-                name: Variable(along, value, "N", _REACTIONS[name])
-                for name, value in reactions(scene, y, t)._asdict().items()
-            },
-            **{name: Variable(along, balance[name].data, "J", about) for name, about in _BALANCE.items()},
+            **columns(along, rows),
+            **parts("constraint_residual", along, left, units, "left side of the constraint ({})"),
+            **columns(along, forces | works),
         }
 
 

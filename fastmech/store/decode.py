@@ -134,7 +134,9 @@ def is_dimension_only(stored: h5py.Dataset) -> bool:
 
 def dimensions(stored: Iterable[h5py.Dataset]) -> dict[int, str]:
     """The dimensions among the arrays of a group: number and name."""
-    return {int(scale.attrs[DIM_NUMBER]): _own_name(scale) for scale in stored if scale.is_scale}
+    return {
+        int(scale.attrs[DIM_NUMBER]): str(scale.name).rpartition("/")[2] for scale in stored if scale.is_scale
+    }
 
 
 def own_dimensions(stored: h5py.Dataset, dims: Mapping[int, str]) -> tuple[str, ...]:
@@ -248,10 +250,6 @@ def _python_value(value: Any) -> Any:
     if isinstance(value, np.ndarray) and value.dtype.kind == "S":
         return tuple(text.decode() for text in value)
     return value.item() if isinstance(value, np.generic) else value
-
-
-def _own_name(stored: h5py.Dataset) -> str:
-    return str(stored.name).rpartition("/")[2]
 
 
 def _check_storage(stored: h5py.Dataset) -> None:

@@ -44,7 +44,9 @@ class Chosen:
         return slice(int(self.places.min()), int(self.places.max()) + 1)
 
     def of(self, data: NDArray[Any], axis: int) -> NDArray[Any]:
-        """The places themselves of what was read."""
+        """The places themselves of what was read; one place is no dimension any more."""
+        if not self.is_range:
+            return data.take(0, axis)
         inside = self.places - self.hull.start
         return data if len(inside) == data.shape[axis] else data.take(inside, axis)
 
@@ -100,11 +102,9 @@ def take(section: Section, chosen: Mapping[str, Chosen], names: Collection[str] 
 def _narrowed(variable: Variable, chosen: Mapping[str, Chosen]) -> Variable:
     """A variable at what was chosen, without the dimensions along which that is one value."""
     data = variable.data
-    for axis, dim in enumerate(variable.dims):
-        if dim in chosen:
-            data = chosen[dim].of(data, axis)
+    for axis, dim in reversed(list(enumerate(variable.dims))):
+        data = chosen[dim].of(data, axis) if dim in chosen else data
     left = tuple(dim for dim in variable.dims if dim not in chosen or chosen[dim].is_range)
-    data = data.squeeze(tuple(axis for axis, dim in enumerate(variable.dims) if dim not in left))
     return Variable(left, data, variable.units, variable.long_name, variable.attrs)
 
 

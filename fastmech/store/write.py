@@ -147,7 +147,7 @@ def check_writable(path: str | Path, replace: bool = False) -> None:
     Raises:
         InputError: the folder is unwritable, the path is a folder, or the file exists and `replace` is False.
     """
-    with _readable_reasons(path):
+    with readable_reasons(path):
         target = _target(path, replace)
         probe = _aside(target)
         probe.touch(exist_ok=False)
@@ -186,7 +186,7 @@ def write_results(
             `replace` is False, or the content does not fit the schema.
     """
     root = _checked_root(scene_parameters, sections)
-    with _readable_reasons(path):
+    with readable_reasons(path):
         target = _target(path, replace)
         temporary = _aside(aside / target.name if aside is not None else target)
         try:
@@ -285,12 +285,12 @@ def _already_exists(path: str | Path) -> InputError:
 
 
 @contextlib.contextmanager
-def _readable_reasons(path: str | Path) -> Iterator[None]:
+def readable_reasons(path: str | Path, what: str = "written") -> Iterator[None]:
     """Turn the failures of a file system into one line with the path and the system's reason."""
     try:
         yield
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+        raise InputError(f"{path}: cannot be {what}: {error.strerror or error}") from error
 
 
 class GuardedFile(io.RawIOBase):

@@ -31,6 +31,7 @@ from filelock import FileLock, Timeout
 
 from fastmech.errors import InputError
 from fastmech.results import Dataset
+from fastmech.store.write import readable_reasons
 from fastmech.tiles.section import TiledSection
 from fastmech.tiles.tile_file import (
     UNFINISHED,
@@ -248,7 +249,5 @@ class Parts:
             shutil.rmtree(self.folder, ignore_errors=True)
 
     def _make(self, folder: Path) -> None:
-        try:
+        with readable_reasons(self.target):
             folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"{self.target}: cannot be written: {error.strerror}") from None
