@@ -240,7 +240,7 @@ def columns(dims: tuple[str, ...], rows: Mapping[str, tuple[Any, ...]]) -> dict[
     return {name: Variable(dims, *row) for name, row in rows.items()}
 
 
-def described(
+def columns_of(
     found: Any, dims: tuple[str, ...], rows: Mapping[str, tuple[Any, ...]], name: str = "{}"
 ) -> dict[str, Variable]:
     """What an object has under these names; a row is unit, meaning and attributes if there are any.

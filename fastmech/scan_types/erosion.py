@@ -19,7 +19,7 @@ from fastmech.capture.select import require_damper
 from fastmech.disturbance.motion import require_constant_force
 from fastmech.errors import InputError, shown
 from fastmech.plots.erosion import draw_erosion
-from fastmech.results import Dataset, Variable, coordinate_units, described, parts, told
+from fastmech.results import Dataset, Variable, columns_of, coordinate_units, parts, told
 from fastmech.scan_types import request as scans
 from fastmech.scene import PARAMETERS, STATE, Scene, nearest
 
@@ -121,7 +121,7 @@ def profile_dataset(found: ErosionProfile) -> Dataset:
         **scans.axis_variables(found.system, {name: found.values}),
         "sheet": Variable(("well",), found.sheet.astype(np.int32), "1", about),
         **parts("well", (name, "well"), places, units, "{1} {0} of the well"),
-        **described(found, (name, "well"), _ABOUT, "well_{}"),
+        **columns_of(found, (name, "well"), _ABOUT, "well_{}"),
     }
     return Dataset(variables, {**told(found.system), "along": name})
 

@@ -23,8 +23,8 @@ from fastmech.results import (
     Dataset,
     Variable,
     columns,
+    columns_of,
     coordinate_units,
-    described,
     flags,
     numbers,
     parts,
@@ -81,12 +81,12 @@ def point_variables(grid: tuple[str, ...], found: Slab) -> dict[str, Variable]:
     roots = (*grid, "root")
     verdicts = enumerate(CRITERIA.items())
     return {
-        **described(found, grid, _POINT),
-        **described(found, roots, _ROOT),
+        **columns_of(found, grid, _POINT),
+        **columns_of(found, roots, _ROOT),
         **parts("hessian", roots, found.hessian, HESSIAN, "Hessian, paper (19): {}"),
         **eigenvalue_variables(roots, found.eigenvalues),
         **columns(roots, {n: (found.verdict[..., k], "1", about, VERDICTS) for k, (n, about) in verdicts}),
-        **described(found, roots, _MOTION),
+        **columns_of(found, roots, _MOTION),
     }
 
 
@@ -118,7 +118,7 @@ def resting_variables(mechanism: Mechanism, grid: tuple[str, ...], found: Restin
         "count_stable": Variable(grid, stable, "1", "number of stable equilibria"),
         "outcome": Variable(grid, found.outcome, *_POINT["outcome"]),
         **parts("", roots, found.position, units, "{1} {0}"),
-        **described(
+        **columns_of(
             found,
             roots,
             {

@@ -26,7 +26,7 @@ from fastmech.results import (
     Dataset,
     Variable,
     columns,
-    described,
+    columns_of,
     flags,
     numbers,
     parts,
@@ -217,5 +217,5 @@ def _equilibria(found: SnappingMap) -> dict[str, Variable]:
     return {
         **numbers("equilibrium", len(equilibria), "number of the force-free equilibrium"),
         **parts("equilibrium", each, angles, ANGLE_UNITS, about),
-        **described(equilibria, each, rows, "equilibrium_{}"),
+        **columns_of(equilibria, each, rows, "equilibrium_{}"),
     }

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from numbers import Real
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, NoReturn, Self, TypeAlias
+from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
 import h5py
 import numpy as np
@@ -235,7 +235,7 @@ def open_results(path: str | Path) -> Results:
     return Results(path)
 
 
-class Results:
+class Results(AbstractContextManager["Results"]):
     """An open result file.
 
     `results["equilibria"]` is the `Section` of that name, `results["map/curves"]` the group `curves` within
@@ -334,12 +334,7 @@ class Results:
         """Close the file; what was read stays usable."""
         self._file.close()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 

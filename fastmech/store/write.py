@@ -37,14 +37,9 @@ from fastmech.store import schema
 
 
 def put_dataset(group: h5py.Group, dataset: Dataset, numbers: Iterator[int]) -> None:
-    """Write a dataset with its groups into an empty group.
+    """Write a dataset with its groups into an empty group, dimensions first, to which variables refer.
 
-    Its dimensions come first, so that all variables can refer to them.
-
-    Args:
-        group: where to.
-        dataset: what.
-        numbers: gives a number to each dimension, unique in the file.
+    ``numbers`` gives a number to each dimension, unique in the file.
     """
     forms = {name: _form(variable) for name, variable in dataset.variables.items()}
     sizes = {d: n for dims, data in forms.values() for d, n in zip(dims, data.shape, strict=True)}
@@ -139,10 +134,6 @@ def _create_compact(
 
 def check_writable(path: str | Path, replace: bool = False) -> None:
     """Find out before a long run whether its result can be written; missing parent folders are made.
-
-    Args:
-        path: the result file to be.
-        replace: whether a file of that name may be replaced.
 
     Raises:
         InputError: the folder is unwritable, the path is a folder, or the file exists and `replace` is False.

@@ -135,11 +135,7 @@ def _silent() -> Iterator[None]:
 
 @contextmanager
 def cluster(workers: int | None, scheduler: str | None) -> Iterator[ClusterHiring]:
-    """A cluster to compute tiles.
-
-    Args:
-        workers: number of processes of one thread on this machine, or
-        scheduler: address of a scheduler that runs already, such as ``tcp://host:8786``.
+    """A cluster to compute tiles: processes of one thread here, or a ``scheduler`` such as tcp://host:8786.
 
     Raises:
         InputError: Dask is not installed, or no scheduler answers.

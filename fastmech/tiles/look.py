@@ -197,15 +197,9 @@ def compute_alone(
     text: str | None = None,
     mechanism: Mechanism | System | None = None,
 ) -> LoneTile:
-    """Compute one tile.
+    """Compute one tile, ``SECTION:INDEX``, and compare it with that of the result file ``target`` to be.
 
-    Args:
-        path: request file.
-        tile: ``SECTION:INDEX``.
-        context: threads to use.
-        target: the request's result file, whose finished tiles it is compared with.
-        text: of the request, by default that of the file.
-        mechanism: one of the user's own that the request is about.
+    ``text`` of the request is that of the file by default; ``mechanism`` is one of the user's own.
 
     Raises:
         InputError: the request is wrong or has no such tile.

@@ -118,12 +118,7 @@ class TiledSection:
         return _tiling(self)
 
     def compute(self, index: int, context: RunContext, share: float = 1.0) -> Tile:
-        """Compute a tile.
-
-        Args:
-            index: which.
-            context: threads to use and where progress is told.
-            share: part of the machine that it has to itself, for the account of the wall time.
+        """Compute a tile; ``share`` of the machine is its own, for the account of the wall time.
 
         Raises:
             InputError: the scan refuses.
@@ -159,14 +154,7 @@ IN_MEMORY_BYTES = 64 << 20
 def assembled(
     section: TiledSection, tile: Tiles, seconds: float, notes: Mapping[str, str] | None = None
 ) -> Dataset | Stream:
-    """A section of its tiles, with the attributes that every section has.
-
-    Args:
-        section: which.
-        tile: gives its tiles.
-        seconds: wall time that they took [s].
-        notes: further attributes.
-    """
+    """A section of its tiles, which took so many seconds, with the attributes that every section has."""
     result = section.tiling.assemble(tile)
     if isinstance(result, Stream) and result.nbytes <= IN_MEMORY_BYTES:
         result = in_memory(result)
