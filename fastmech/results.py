@@ -65,23 +65,17 @@ _FALSE_TRUE: dict[str, Attribute] = {
 class Variable:
     """An array with named dimensions.
 
-    Attributes:
-        dims: one name for each axis of `data`.
-        data: the values, anything that `numpy.asarray` takes: floats of 32 or 64 bits, integers, booleans,
-            strings.
-        units: unit of the values, "1" for a pure number.
-        long_name: what the values are, in a few words.
-        attrs: further attributes: strings, numbers, short 1-D arrays of numbers, tuples of strings; of
-            integers also `_FillValue`.
-
     Raises:
         InputError: the dimensions do not match the shape, or a type or a name that result files cannot hold.
     """
 
-    dims: tuple[str, ...]
+    dims: tuple[str, ...]  #: one name for each axis of `data`
+    #: the values, anything that `numpy.asarray` takes: floats of 32 or 64 bits, integers, booleans, strings
     data: npt.NDArray[Any]
-    units: str = "1"
-    long_name: str = ""
+    units: str = "1"  #: unit of the values, "1" for a pure number
+    long_name: str = ""  #: what the values are, in a few words
+    #: further attributes: strings, numbers, short 1-D arrays of numbers, tuples of strings; of integers also
+    #: `_FillValue`
     attrs: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -125,18 +119,14 @@ class Variable:
 class Dataset:
     """Variables that share dimensions, with attributes of the whole.
 
-    Attributes:
-        variables: by name.
-        attrs: of the whole.
-        groups: further datasets by name, with dimensions of their own.
-
     Raises:
         InputError: two variables disagree on the length of a dimension, a variable is named like a dimension
             without being its coordinate, or a name or attribute that result files cannot hold.
     """
 
-    variables: Mapping[str, Variable]
-    attrs: Mapping[str, Any] = field(default_factory=dict)
+    variables: Mapping[str, Variable]  #: by name
+    attrs: Mapping[str, Any] = field(default_factory=dict)  #: of the whole
+    #: further datasets by name, with dimensions of their own
     groups: Mapping[str, Dataset] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -221,22 +211,43 @@ def cf_attrs(units: str, long_name: str, attrs: Mapping[str, Any], dtype: np.dty
     return {"units": units, "long_name": long_name, **attrs, **own}
 
 
+#: What a quantity of a unit is.
+KINDS = {"rad": "angle", "m": "length"}
+
+
 def parts(
     name: str, dims: tuple[str, ...], data: npt.NDArray[Any], units: Mapping[str, str], about: str
 ) -> dict[str, Variable]:
     """An array along whose last axis the unit changes as one variable for each of its entries, `NAME_ENTRY`.
 
     Args:
-        name: what the variables' names begin with.
+        name: what the variables' names begin with; empty: they are the entries' names.
         dims: dimensions of all axes but the last.
         data: shape (..., entries).
         units: names of the entries, with their units.
-        about: the variables' long name, with `{}` for the entry's name.
+        about: the variables' long name, with `{}` for the entry's name or `{1} {0}` for its kind and name.
     """
     return {
-        f"{name}_{entry}": Variable(dims, data[..., k], unit, about.format(entry))
+        f"{name}_{entry}" if name else entry: Variable(
+            dims, data[..., k], unit, about.format(entry, KINDS.get(unit, "rate"))
+        )
         for k, (entry, unit) in enumerate(units.items())
     }
+
+
+def columns(dims: tuple[str, ...], rows: Mapping[str, tuple[Any, ...]]) -> dict[str, Variable]:
+    """Variables over the same dimensions; a row is values, unit, meaning and attributes if there are any."""
+    return {name: Variable(dims, *row) for name, row in rows.items()}
+
+
+def columns_of(
+    found: Any, dims: tuple[str, ...], rows: Mapping[str, tuple[Any, ...]], name: str = "{}"
+) -> dict[str, Variable]:
+    """What an object has under these names; a row is unit, meaning and attributes if there are any.
+
+    ``name`` makes the variable's name of it.
+    """
+    return columns(dims, {name.format(key): (getattr(found, key), *row) for key, row in rows.items()})
 
 
 def scene_parameters(system: Any) -> dict[str, Variable]:

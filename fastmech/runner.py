@@ -14,6 +14,7 @@ from fastmech.plots.style import save
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import RunContext, read_request
 from fastmech.store.read import as_today, open_results
+from fastmech.store.write import readable_reasons
 from fastmech.tiles.run import RunReport, ScanRun, default_output
 from fastmech.tiles.work import Hiring, ThreadHiring
 
@@ -98,7 +99,8 @@ def draw_results(
                     f"{path}: {name}: kind = {shown(kind)} is unknown; known: {', '.join(kinds)}"
                 )
         folder = Path(out) if out is not None else Path(path).with_suffix("")
-        _make_folder(folder)
+        with readable_reasons(folder, "made"):
+            folder.mkdir(parents=True, exist_ok=True)
         for name in names:
             kind, scene = kinds[results[name].attrs["kind"]], results.scene_of(name)
             dataset = as_today(kind.read(results[name], scene), int(results.attrs["schema_version"]))
@@ -109,16 +111,7 @@ def draw_results(
             advance = stage(f"{name}: pictures", len(figures))
             for what, figure in figures.items():
                 picture = folder / f"{name}_{what}.{form}"
-                try:
+                with readable_reasons(picture):
                     save(figure, picture)
-                except OSError as error:
-                    raise InputError(f"{picture}: cannot be written: {error.strerror}") from None
                 advance(1)
                 yield picture
-
-
-def _make_folder(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be made: {error.strerror}") from None

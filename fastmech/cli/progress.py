@@ -30,13 +30,7 @@ LOADING = "loading"
 
 
 class Stage:
-    """One piece of work: how far it is and how long it has taken, loading and compiling apart.
-
-    Args:
-        name: the piece of work.
-        total: its items.
-        clock: seconds that go on while work is done.
-    """
+    """One piece of work: how far it is and how long it has taken, loading and compiling apart."""
 
     def __init__(self, name: str, total: int, clock: Callable[[], float]) -> None:
         self.name, self.total, self.done, self._clock = name, total, 0, clock

@@ -180,7 +180,7 @@ def _run_tile(
         check_writable(keep)
     alone = compute_alone(request_file, tile, context, target, text, mechanism)
     told.facts |= {"tile": tile, "content": alone.content, "same": alone.same}
-    told.say(f"{alone.seconds:9.2f} s  {tile}: {alone.items:,} {alone.what}")
+    told.say(f"{alone.seconds:9.2f} s  {tile}: {alone.work}")
     told.say(f"Content: {alone.content}")
     if alone.same is not None:
         told.say("The tile kept beside the result is " + ("the same." if alone.same else "ANOTHER ONE."))

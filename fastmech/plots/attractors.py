@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from fastmech.ensembles.status import LABELS
-from fastmech.plots.style import LINES, entry, flag_codes, new_figure, setting_of, style, symbol
-from fastmech.results import Dataset, Variable
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.figure import Figure
+from fastmech.plots import style
+from fastmech.results import Dataset
 
 #: Attractors that have a colour of their own, and the colour of the others; greys of starts without a label.
-NAMED, OTHERS = len(LINES) - 1, "#999999"
+NAMED, OTHERS = len(style.LINES) - 1, "#999999"
 UNLABELLED = {"unsure": "#ffffff", "undecided": "#e6e6e6", "escaped": "#404040", "not_finite": "#606060"}
 
 
-def draw_attractors(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
+def draw_attractors(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Pictures of a dataset of the scan type ``attractors`` of the system with these parameters."""
-    with style():
+    with style.style():
         figures = {"shares": _shares(dataset, scene)}
         if len(dataset["label"].dims) == 2:
             figures["labels"] = _labels(dataset, scene)
@@ -40,76 +36,61 @@ def _name(table: Dataset, k: int) -> str:
 
 
 def _color(k: int) -> str:
-    return LINES[k] if k < NAMED else OTHERS
+    return style.LINES[k] if k < NAMED else OTHERS
 
 
-def _shares(dataset: Dataset, scene: Mapping[str, float]) -> Figure:
+def _shares(dataset: Dataset, scene: Mapping[str, float]) -> style.Figure:
     table, total = dataset.groups["attractors"], dataset["label"].data.size
-    share = 100.0 * table["share"].data
-    low, high = 100.0 * table["share_low"].data, 100.0 * table["share_high"].data
-    names = [_name(table, k) for k in range(len(share))]
-    other = 100.0 * float(np.mean(dataset["label"].data < 0))
-    figure = new_figure(8.0, 1.8 + 0.42 * (len(share) + 1))
-    axes = figure.subplots()
-    y = np.arange(len(share))
-    axes.barh(
-        y, share, color=[_color(k) for k in range(len(share))], xerr=[share - low, high - share], capsize=3
-    )
-    axes.barh(len(share), other, color="#d9d9d9", edgecolor="black")
-    axes.set_yticks([*y, len(share)], [*names, "without a label"])
+    shares, low, high = (100.0 * table[name].data for name in ("share", "share_low", "share_high"))
+    n, other = len(shares), 100.0 * float(np.mean(dataset["label"].data < 0))
+    figure, axes = style.new_panel(8.0, 1.8 + 0.42 * (n + 1))
+    bars: Any = {"color": [_color(k) for k in range(n)], "xerr": [shares - low, high - shares]}
+    axes.barh(np.arange(n), shares, capsize=3, **bars)
+    axes.barh(n, other, color="#d9d9d9", edgecolor="black")
+    axes.set_yticks(range(n + 1), [*(_name(table, k) for k in range(n)), "without a label"])
     axes.invert_yaxis()
     axes.set_xlabel(f"share of the {total:,} starts [%], with 95 % Wilson interval")
-    figure.suptitle(f"Where motions settle\n{setting_of(dataset, scene)}")
+    figure.suptitle(f"Where motions settle\n{style.setting_of(dataset, scene)}")
     return figure
 
 
-def _labels(dataset: Dataset, scene: Mapping[str, float]) -> Figure:
-    from matplotlib.colors import ListedColormap
-    from matplotlib.patches import Patch
-
+def _labels(dataset: Dataset, scene: Mapping[str, float]) -> style.Figure:
     label, status, table = dataset["label"].data, dataset["status"].data, dataset.groups["attractors"]
     names, n = dataset["label"].dims, table["share"].data.size
     picture, colors = np.minimum(label, NAMED), [_color(k) for k in range(min(n, NAMED + 1))]
-    handles: list[Artist] = [
-        Patch(facecolor=_color(k), label=f"{_name(table, k)}: {100.0 * table['share'].data[k]:.3g} %")
+    handles = [
+        style.swatch(f"{_name(table, k)}: {100.0 * table['share'].data[k]:.3g} %", _color(k))
         for k in range(min(n, NAMED))
     ]
     if n > NAMED:
         rest = 100.0 * float(table["share"].data[NAMED:].sum())
-        handles.append(Patch(facecolor=OTHERS, label=f"{n - NAMED} more: {rest:.3g} %"))
-    codes = flag_codes(dataset["status"])
+        handles.append(style.swatch(f"{n - NAMED} more: {rest:.3g} %", OTHERS))
+    codes = style.flag_codes(dataset["status"])
     for code in LABELS:
         meaning = code.name.lower()
         where = (label < 0) & (status == codes[meaning])
         if where.any():
             colors.append(UNLABELLED.get(meaning, "#bfbfbf"))
             picture[where] = len(colors) - 1
-            told = f"{meaning.replace('_', ' ')}: {100.0 * float(where.mean()):.3g} %"
-            handles.append(Patch(facecolor=colors[-1], edgecolor="black", label=told))
-    figure = new_figure(7.6, 7.0)
-    axes = figure.subplots()
+            handles.append(
+                style.swatch(f"{meaning.replace('_', ' ')}: {style.share(where)}", colors[-1], "black")
+            )
+    figure, axes = style.new_panel(7.6, 7.0)
     x, y = (dataset[name].data for name in names)
-    axes.pcolormesh(
-        x, y, picture.T, cmap=ListedColormap(colors), vmin=-0.5, vmax=len(colors) - 0.5,
-        shading="nearest", rasterized=True,
-    )  # fmt: skip
+    style.paint(axes, x, y, picture, colors)
     points = dataset.groups["points"]
     owner = points["point_attractor"].data
     few = np.isin(owner, np.flatnonzero(np.bincount(owner, minlength=n) <= 32))
     where = [points[f"point_{name}"].data[few] for name in names]
-    axes.plot(*where, "o", mfc="white", mec="black", ms=5, ls="none", zorder=3)
+    look: Any = {"marker": "o", "mfc": "white", "mec": "black", "ms": 5, "ls": "none"}
+    axes.plot(*where, zorder=3, **look)
     if ((where[0] >= x[0]) & (where[0] <= x[-1]) & (where[1] >= y[0]) & (where[1] <= y[-1])).any():
-        handles.append(entry("points of attractors", marker="o", mfc="white", mec="black", ms=5, ls="none"))
-    axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
-    axes.set_xlabel(f"{_told(dataset[names[0]], names[0])} at the start")
-    axes.set_ylabel(f"{_told(dataset[names[1]], names[1])} at the start")
+        handles.append(style.entry("points of attractors", **look))
+    told = [f"{style.with_unit(style.symbol(name), dataset[name].units)} at the start" for name in names]
+    axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]), xlabel=told[0], ylabel=told[1])
     held = {k.removeprefix("fixed_"): v for k, v in dataset.attrs.items() if k.startswith("fixed_")}
-    fixed = "".join(f"; {symbol(k)} = {v:g}" for k, v in held.items())
-    axes.set_title(f"Where each start ends\n{setting_of(dataset, scene)}{fixed}")
+    fixed = "".join(f"; {style.symbol(k)} = {v:g}" for k, v in held.items())
+    axes.set_title(f"Where each start ends\n{style.setting_of(dataset, scene)}{fixed}")
     axes.grid(visible=False)
-    figure.legend(handles=handles, loc="outside lower center", ncols=2)
+    style.legend_below(figure, handles)
     return figure
-
-
-def _told(variable: Variable, name: str) -> str:
-    return symbol(name) if variable.units == "1" else f"{symbol(name)} [{variable.units}]"

@@ -4,35 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.plots.style import (
-    ANGLES,
-    FIELD,
-    PALETTE,
-    Codes,
-    coordinates_of,
-    entry,
-    flag_codes,
-    in_fifths,
-    new_figure,
-    quantity,
-    setting_of,
-    style,
-    symbol,
-)
+from fastmech.plots import style
 from fastmech.results import Dataset
 from fastmech.scene import Scene
 from fastmech.slider.lagrange import kinetic_energy, potential_energy
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 #: Wells and turns of each angle, either way, whose basins have a colour of their own.
 WELLS, TURNS = 2, 2
@@ -44,7 +24,9 @@ OTHERS = 8
 #: before it in OKLab (Ottosson 2020), and from white, black and the greys of :mod:`fastmech.plots.basins`, as
 #: seen by normal, protanopic and deuteranopic eyes (Machado, Oliveira, Fernandes, IEEE Trans. Visualization
 #: and Computer Graphics 15 (2009) 1291); none too dark for black marks on top.
-COLORS = [PALETTE[name] for name in ("sky", "orange", "green", "yellow", "purple", "blue", "vermillion")]
+COLORS = [
+    style.PALETTE[name] for name in ("sky", "orange", "green", "yellow", "purple", "blue", "vermillion")
+]
 COLORS += [
     "#a7d8ba", "#6200ff", "#4e89ff", "#3b766c", "#a7ffb1", "#62d8ff", "#a7450a", "#76c480", "#ce00a7",
     "#c4d880", "#62c4c4", "#4e6ce2", "#009dd8", "#baebeb", "#ebc400", "#eb763b", "#6c5889", "#ce3b45",
@@ -86,7 +68,7 @@ def basin_name(dataset: Dataset, well: int, turns: tuple[int, ...]) -> str:
     """Name of a copy of a well; ``well`` is an index among the dataset's equilibria."""
     wells = int(np.count_nonzero(dataset["equilibrium_morse_index"].data == 0))
     text = f"well {well_number(dataset, well) + 1}" if wells > 1 else "the well"
-    names = map(symbol, coordinates_of(dataset))
+    names = map(style.symbol, style.coordinates_of(dataset))
     made = [f"{t:+d} {name}" for t, name in zip(turns, names, strict=True) if t]
     return f"{text}, {', '.join(made)} turn{'s' * (len(made) > 1 or abs(sum(turns)) > 1)}" if made else text
 
@@ -106,8 +88,8 @@ class Slice:
 
     def __init__(self, dataset: Dataset, scene: Scene | None) -> None:
         self.dataset, self.scene = dataset, scene
-        self.coordinates = coordinates_of(dataset)
-        self.turning = ANGLES if scene is not None else tuple(dataset.attrs.get("turning_names", ()))
+        self.coordinates = style.coordinates_of(dataset)
+        self.turning = style.ANGLES if scene is not None else tuple(dataset.attrs.get("turning_names", ()))
         self.states = (*self.coordinates, *(f"{name}_dot" for name in self.coordinates))
         names = tuple(dataset.attrs["axes"])
         self.axes = (*[n for n in names if dataset.sizes[n] > 1], *names)[:2]
@@ -144,14 +126,14 @@ class Slice:
         return x, y, kinetic_energy(scene, states) + potential_energy(scene, states[..., :2], force)
 
 
-def mark(marker: str, text: str, face: str = "white") -> Artist:
+def mark(marker: str, text: str, face: str = "white") -> style.Artist:
     """What a marker in a legend means."""
-    return entry(text, marker=marker, mfc=face, ms=8, ls="none")
+    return style.entry(text, marker=marker, mfc=face, ms=8, ls="none")
 
 
-def decisive(axes: Axes, view: Slice) -> list[Artist]:
+def decisive(axes: style.Axes, view: Slice) -> list[style.Artist]:
     """Equilibria in the slice, and where the energy is that of each well's barrier."""
-    handles: list[Artist] = []
+    handles: list[style.Artist] = []
     data = view.dataset
     wells = np.flatnonzero(data["equilibrium_morse_index"].data == 0)
     barriers = data["barrier"].data[wells]
@@ -163,7 +145,7 @@ def decisive(axes: Axes, view: Slice) -> list[Artist]:
             axes.contour(x, y, energy.T, levels=[level], colors="black", linewidths=1.6, linestyles=look)
             which = " and ".join(str(i + 1) for i in np.flatnonzero(barriers == level))
             of = f" of well{'s' * (' ' in which)} {which}" if wells.size > 1 else ""
-            handles.append(entry(f"barrier energy{of}, {level:.4g} J", lw=1.6, ls=look))
+            handles.append(style.entry(f"barrier energy{of}, {level:.4g} J", lw=1.6, ls=look))
     for index, (marker, name) in MARKERS.items():
         for inside in (True, False):
             places = _places(view, index, inside)
@@ -190,30 +172,20 @@ def _places(view: Slice, index: int, inside: bool, only: int | None = None) -> F
     data, found = view.dataset, []
     if not inside and not set(view.coordinates) & set(view.axes):
         return np.zeros((0, 2))
-    reach = [(view.axis(k)[0], view.axis(k)[-1]) for k in (0, 1)]
+    reach = {name: (view.axis(k)[0], view.axis(k)[-1]) for k, name in enumerate(view.axes)}
     for i in np.flatnonzero(data["equilibrium_morse_index"].data == index):
-        if only is not None and i != only:
-            continue
         place = {name: data[f"equilibrium_{name}"].data[i] for name in view.coordinates}
-        away = [
-            (held - place[n] + np.pi) % (2.0 * np.pi) - np.pi
-            if n in view.turning
-            else held - place.get(n, 0.0)
-            for n, held in view.held.items()
-        ]
-        if bool(np.abs(away).max(initial=0.0) <= IN_SLICE) != inside:
+        away = [held - place.get(name, 0.0) for name, held in view.held.items()]
+        turning = [name in view.turning for name in view.held]
+        apart = np.where(turning, np.remainder(np.add(away, np.pi), 2.0 * np.pi) - np.pi, away)
+        if only not in (None, i) or bool(np.abs(apart).max(initial=0.0) <= IN_SLICE) != inside:
             continue
         copies = []
-        for name, (low, high) in zip(view.axes, reach, strict=True):
+        for name, (low, high) in reach.items():
             at = place.get(name, 0.0)
-            turns = np.arange(
-                np.ceil((low - at) / (2.0 * np.pi)), np.floor((high - at) / (2.0 * np.pi)) + 1.0
-            )
-            copies.append(
-                at + 2.0 * np.pi * turns
-                if name in view.turning
-                else np.array([at] if low <= at <= high else [])
-            )
+            first, last = np.ceil((low - at) / (2.0 * np.pi)), np.floor((high - at) / (2.0 * np.pi))
+            every = at + 2.0 * np.pi * np.arange(first, last + 1.0)
+            copies.append(every if name in view.turning else [at] * bool(low <= at <= high))
         found += [(a, b) for a in copies[0] for b in copies[1]]
     return np.array(found).reshape(-1, 2)
 
@@ -242,17 +214,15 @@ SKIPPED = "#d9d9d9"
 FEW = 400
 
 
-def draw_basins(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
+def draw_basins(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Pictures of a dataset of the scan type ``basins`` about the scene with these parameters."""
-    with style():
+    dataset = dataset.merged
+    with style.style():
         slice_ = Slice(dataset, None if "mechanism" in dataset.attrs else Scene(**scene))
-        figures = {"labels": new_figure(8.2, 8.0)}
-        handles = draw_labels(figures["labels"].subplots(), slice_)
-        figures["labels"].legend(handles=handles, loc="outside lower center", ncols=2)
-        for name, title in (
-            ("capture_time", "Time until capture is proved"),
-            ("settle_time", "Time to settle"),
-        ):
+        figure, axes = style.new_panel(8.2, 8.0)
+        style.legend_below(figure, draw_labels(axes, slice_))
+        figures, titles = {"labels": figure}, {"capture_time": "Time until capture is proved"}
+        for name, title in {**titles, "settle_time": "Time to settle"}.items():
             if name in dataset and np.isfinite(slice_.data(name)).any():
                 figures[name] = _times(slice_, name, title)
         for figure in figures.values():
@@ -260,66 +230,53 @@ def draw_basins(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figur
         return figures
 
 
-def draw_labels(axes: Axes, view: Slice) -> list[Artist]:
+def draw_labels(axes: style.Axes, view: Slice) -> list[style.Artist]:
     """Draw who ends where; returns the legend's entries."""
-    from matplotlib.colors import ListedColormap
-    from matplotlib.patches import Patch
-
     label, status = view.data("label").astype(int), view.data("status")
-    codes = flag_codes(view.dataset["status"])
+    codes = style.flag_codes(view.dataset["status"])
     present, number = np.unique(label[label >= 0], return_counts=True)
     order = present[np.argsort(-number, kind="stable")]
-    colors: list[str] = []
-    handles: list[Artist] = []
     picture = np.full(label.shape, -1)
-    own = [basin_color(view.dataset, *_copy(view, basin)) for basin in order]
-    named = [(basin, color) for basin, color in zip(order, own, strict=True) if color != FURTHER][:NAMED]
-    for basin, color in zip(order, own, strict=True):
-        picture[label == basin] = len(colors)
-        colors.append(color)
-    handles += [
-        Patch(
-            facecolor=color,
-            label=f"{basin_name(view.dataset, *_copy(view, basin))}: {_share(label == basin)}",
+    colors = [basin_color(view.dataset, *_copy(view, basin)) for basin in order]
+    for k, basin in enumerate(order):
+        picture[label == basin] = k
+    grey = np.array([color == FURTHER for color in colors], dtype=np.bool_)
+    named = np.flatnonzero(~grey)[:NAMED]
+    handles = [
+        style.swatch(
+            f"{basin_name(view.dataset, *_copy(view, order[k]))}: {style.share(label == order[k])}", colors[k]
         )
-        for basin, color in named
+        for k in named
     ]
-    grey = np.array([color == FURTHER for color in own], dtype=np.bool_)
-    smaller = np.setdiff1d(order[~grey], [basin for basin, _ in named])
+    smaller = np.setdiff1d(order[~grey], order[named])
     if smaller.size:
-        text = f"smaller, in own colours (basins: {smaller.size}): {_share(np.isin(label, smaller))}"
-        handles.append(Patch(facecolor="none", label=text))
+        text = f"smaller, in own colours (basins: {smaller.size}): {style.share(np.isin(label, smaller))}"
+        handles.append(style.swatch(text, "none"))
     if grey.any():
-        text = f"further away (basins: {np.count_nonzero(grey)}): {_share(np.isin(label, order[grey]))}"
-        handles.append(Patch(facecolor=FURTHER, label=text))
+        text = f"further away (basins: {np.count_nonzero(grey)}): {style.share(np.isin(label, order[grey]))}"
+        handles.append(style.swatch(text, FURTHER))
     for name, (color, marker, meaning) in unlabelled(codes).items():
         where = status == codes[name]
         if where.any():
             picture[where] = len(colors)
             colors.append(color)
+            text = f"{meaning}: {np.count_nonzero(where)} ({style.share(where)})"
             few = np.count_nonzero(where) <= FEW
             if few:
-                x, y = np.meshgrid(view.axis(0), view.axis(1), indexing="ij")
-                axes.plot(x[where], y[where], marker, color="black", ms=5, ls="none", zorder=4)
-            text = f"{meaning}: {np.count_nonzero(where)} ({_share(where)})"
-            handles.append(
-                mark(marker, text) if few else Patch(facecolor=color, edgecolor="black", label=text)
-            )
-    axes.pcolormesh(
-        view.axis(0),
-        view.axis(1),
-        picture.T,
-        cmap=ListedColormap(colors),
-        vmin=-0.5,
-        vmax=len(colors) - 0.5,
-        shading="nearest",
-        rasterized=True,
-    )
+                _mark(axes, view.axis(0), view.axis(1), where, marker)
+            handles.append(mark(marker, text) if few else style.swatch(text, color, "black"))
+    style.paint(axes, view.axis(0), view.axis(1), picture, colors)
     axes.set_title("Where starts come to rest")
     return handles + decisive(axes, view)
 
 
-def unlabelled(codes: Codes) -> dict[str, tuple[str, str, str]]:
+def _mark(axes: style.Axes, x: Floats, y: Floats, where: NDArray[np.bool_], marker: str) -> None:
+    """Mark single cells."""
+    i, j = np.nonzero(where)
+    axes.plot(x[i], y[j], marker, color="black", ms=5, ls="none", zorder=4)
+
+
+def unlabelled(codes: style.Codes) -> dict[str, tuple[str, str, str]]:
     """Colour, marker and meaning of every status without a label, also of those that only the file knows."""
     others = codes.others({"captured", *UNLABELLED})
     return {**UNLABELLED, **{name: ("#b3a2c7", "P", name.replace("_", " ")) for name in others}}
@@ -332,16 +289,10 @@ def _copy(view: Slice, basin: int) -> tuple[int, tuple[int, ...]]:
     return int(data["basin_well"].data[basin]), turns
 
 
-def _share(where: NDArray[np.bool_]) -> str:
-    return f"{100.0 * np.mean(where):.3g} %"
+def _times(view: Slice, name: str, title: str) -> style.Figure:
+    from matplotlib.colors import LogNorm, Normalize
 
-
-def _times(view: Slice, name: str, title: str) -> Figure:
-    from matplotlib.colors import ListedColormap, LogNorm, Normalize
-    from matplotlib.patches import Patch
-
-    figure = new_figure(8.2, 7.0)
-    axes = figure.subplots()
+    figure, axes = style.new_panel(8.2, 7.0)
     times = np.asarray(view.data(name), dtype=np.float64)
     known = times[np.isfinite(times)]
     positive = known[known > 0.0]
@@ -351,94 +302,66 @@ def _times(view: Slice, name: str, title: str) -> Figure:
     computed = view.data("computed").astype(np.bool_)
     without = {"white": computed & ~np.isfinite(times), SKIPPED: ~computed & ~np.isfinite(times)}
     axes.set_facecolor("white")
-    axes.pcolormesh(
-        view.axis(0),
-        view.axis(1),
-        np.where(without[SKIPPED], 0.0, np.nan).T,
-        cmap=ListedColormap([SKIPPED]),
-        shading="nearest",
-        rasterized=True,
-    )
-    mesh = axes.pcolormesh(
-        view.axis(0),
-        view.axis(1),
-        np.maximum(times, low).T,
-        norm=norm,
-        cmap=FIELD,
-        shading="nearest",
-        rasterized=True,
-    )
+    x, y = view.axis(0), view.axis(1)
+    style.paint(axes, x, y, np.where(without[SKIPPED], 0.0, np.nan), [SKIPPED])
+    mesh = style.shade(axes, x, y, np.maximum(times, low), norm=norm, cmap=style.FIELD)
     bar = figure.colorbar(mesh, ax=axes, label=f"{name.replace('_', ' ')} [s]")
     if isinstance(norm, LogNorm):
-        in_fifths(bar.ax.yaxis)
+        style.in_fifths(bar.ax.yaxis)
     handles = decisive(axes, view)
     meanings = {"white": WITHOUT_TIME[name], SKIPPED: "not computed: filled in between equal labels"}
     handles[:0] = [
-        Patch(facecolor=color, edgecolor="black", label=f"{meanings[color]}: {_share(where)}")
+        style.swatch(f"{meanings[color]}: {style.share(where)}", color, "black")
         for color, where in without.items()
         if where.any()
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=2)
+    style.legend_below(figure, handles)
     if view.data("computed").all():  # else those near boundaries are over-represented
         title += f" (median {np.median(known):.3g} s, 99 % within {np.quantile(known, 0.99):.3g} s)"
     axes.set_title(title)
     return figure
 
 
-def describe(axes: Axes, view: Slice, parameters: Mapping[str, float]) -> None:
+def describe(axes: style.Axes, view: Slice, parameters: Mapping[str, float]) -> None:
     """Labels with units, the decisive parameters, and what is held."""
     if view.scene is not None:
         scene = view.scene
         force = f"F0 = {scene.F0:g} N" + (f" exp(-{scene.alpha:g} t)" if scene.F0 and scene.alpha else "")
         told = f"{force}, c1 = {scene.c1:g} N/m, c2 = {scene.c2:g} N/m"
     else:
-        told = setting_of(view.dataset, parameters)
+        told = style.setting_of(view.dataset, parameters)
     at_rest = all(value == 0.0 for value in view.held.values()) and not set(view.coordinates) & set(view.held)
-    held = "starts at rest" if at_rest and set(view.axes) == set(view.coordinates) else _held(view)
+    each = ", ".join(f"{style.symbol(name)} = {value:.4g}" for name, value in view.held.items())
+    held = f"starts with {each}" if each else ""
+    if at_rest and set(view.axes) == set(view.coordinates):
+        held = "starts at rest"
     axes.set_title(f"{axes.get_title()}\n{told}; {held}" if held else f"{axes.get_title()}\n{told}")
     for axis, name in (("x", view.axes[0]), ("y", view.axes[1])):
-        getattr(axes, f"set_{axis}label")(quantity(view.dataset, name).replace(" [", " at the start ["))
+        getattr(axes, f"set_{axis}label")(style.quantity(view.dataset, name).replace(" [", " at the start ["))
     axes.grid(visible=False)
-
-
-def _held(view: Slice) -> str:
-    each = ", ".join(f"{symbol(name)} = {value:.4g}" for name, value in view.held.items())
-    return f"starts with {each}" if each else ""
 
 
 #: Where the mechanism comes back to its well.
 BACK = "#e6e6e6"
 
 
-def draw_snapping(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
+def draw_snapping(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Picture of a dataset of the scan type ``snapping`` about the scene with these parameters."""
-    with style():
-        figure = new_figure(8.2, 6.6)
-        handles = draw_ends(figure.subplots(), dataset, scene)
-        figure.legend(handles=handles, loc="outside lower center", ncols=2)
+    with style.style():
+        figure, axes = style.new_panel(8.2, 6.6)
+        style.legend_below(figure, draw_ends(axes, dataset.merged, scene))
         return {"map": figure}
 
 
-def draw_ends(axes: Axes, dataset: Dataset, scene: Mapping[str, float]) -> list[Artist]:
+def draw_ends(axes: style.Axes, dataset: Dataset, scene: Mapping[str, float]) -> list[style.Artist]:
     """Draw who ends where over force and decay rate; returns the legend's entries."""
-    from matplotlib.colors import ListedColormap
-
     picture, colors, handles = _ends(dataset)
-    force, alpha = dataset["F0"].data, dataset["alpha"].data
-    axes.pcolormesh(
-        _edges(np.log(alpha), exponential=True),
-        _edges(force),
-        picture.T,
-        cmap=ListedColormap(colors),
-        vmin=-0.5,
-        vmax=len(colors) - 0.5,
-        rasterized=True,
-    )
+    x, y = np.exp(_edges(np.log(dataset["alpha"].data))), _edges(dataset["F0"].data)
+    style.paint(axes, x, y, picture, colors)
     axes.set_xscale("log")
     handles += _unlabelled(axes, dataset) + _curves(axes, dataset)
-    axes.set_xlim(*_edges(np.log(alpha), exponential=True)[[0, -1]])
-    axes.set_ylim(*_edges(force)[[0, -1]])
-    in_fifths(axes.xaxis)
+    axes.set(xlim=x[[0, -1]], ylim=y[[0, -1]])
+    style.in_fifths(axes.xaxis)
     axes.set_xlabel("rate α at which the force decays [1/s]")
     axes.set_ylabel("force F0 when it is switched on [N]")
     axes.set_title(
@@ -449,10 +372,8 @@ def draw_ends(axes: Axes, dataset: Dataset, scene: Mapping[str, float]) -> list[
     return handles
 
 
-def _ends(dataset: Dataset) -> tuple[np.ndarray, list[str], list[Artist]]:
+def _ends(dataset: Dataset) -> tuple[np.ndarray, list[str], list[style.Artist]]:
     """Numbers of colours over (alpha, F0), the colours, and what they mean; what stays comes first."""
-    from matplotlib.patches import Patch
-
     well, left = dataset["well"].data, dataset["left"].data.astype(np.bool_)
     ends = np.stack([well, dataset["turns_phi"].data, dataset["turns_theta"].data], axis=-1)
     gone, inverse, number = np.unique(ends[left], axis=0, return_inverse=True, return_counts=True)
@@ -460,25 +381,22 @@ def _ends(dataset: Dataset) -> tuple[np.ndarray, list[str], list[Artist]]:
     picture = np.full(well.shape, -1)
     picture[(well >= 0) & ~left] = 0
     colors = [BACK]
-    back = np.mean((well >= 0) & ~left)
-    handles: list[Artist] = [Patch(facecolor=BACK, label=f"comes back to its well: {100.0 * back:.3g} %")]
+    handles = [style.swatch(f"comes back to its well: {style.share((well >= 0) & ~left)}", BACK)]
     flat = picture[left]
     named, others, other_share = 0, 0, 0.0
     for end in order:
         copy = int(gone[end, 0]), (int(gone[end, 1]), int(gone[end, 2]))
-        color, share = basin_color(dataset, *copy), 100.0 * number[end] / well.size
+        color, part = basin_color(dataset, *copy), 100.0 * number[end] / well.size
         flat[inverse.ravel() == end] = len(colors)
         colors.append(color)
         if color != FURTHER and named < NAMED:
             named += 1
-            handles.append(
-                Patch(facecolor=color, label=f"leaves to {basin_name(dataset, *copy)}: {share:.3g} %")
-            )
+            handles.append(style.swatch(f"leaves to {basin_name(dataset, *copy)}: {part:.3g} %", color))
         else:
-            others, other_share = others + 1, other_share + share
+            others, other_share = others + 1, other_share + part
     if others:
         text = f"leaves elsewhere, grey or small ({others} ends): {other_share:.3g} %"
-        handles.append(Patch(facecolor=FURTHER, label=text))
+        handles.append(style.swatch(text, FURTHER))
     picture[left] = flat
     if (well < 0).any():
         picture[well < 0] = len(colors)
@@ -486,12 +404,10 @@ def _ends(dataset: Dataset) -> tuple[np.ndarray, list[str], list[Artist]]:
     return picture, colors, handles
 
 
-def _unlabelled(axes: Axes, dataset: Dataset) -> list[Artist]:
+def _unlabelled(axes: style.Axes, dataset: Dataset) -> list[style.Artist]:
     """Motions without a label, each marked where they are few."""
-    from matplotlib.patches import Patch
-
-    status, codes = dataset["status"].data, flag_codes(dataset["status"])
-    handles: list[Artist] = []
+    status, codes = dataset["status"].data, style.flag_codes(dataset["status"])
+    handles: list[style.Artist] = []
     for name, (_, marker, meaning) in unlabelled(codes).items():
         where = status == codes[name]
         number = int(np.count_nonzero(where))
@@ -499,19 +415,16 @@ def _unlabelled(axes: Axes, dataset: Dataset) -> list[Artist]:
             continue
         text = f"{meaning}: {number}"
         if number > FEW:
-            handles.append(Patch(facecolor="white", edgecolor="black", label=text))
+            handles.append(style.swatch(text, "white", "black"))
             continue
-        k, j = np.nonzero(where)
-        axes.plot(
-            dataset["alpha"].data[k], dataset["F0"].data[j], marker, color="black", ms=5, ls="none", zorder=4
-        )
-        handles.append(entry(text, marker=marker, ms=6, ls="none"))
+        _mark(axes, dataset["alpha"].data, dataset["F0"].data, where, marker)
+        handles.append(style.entry(text, marker=marker, ms=6, ls="none"))
     return handles
 
 
-def _curves(axes: Axes, dataset: Dataset) -> list[Artist]:
+def _curves(axes: style.Axes, dataset: Dataset) -> list[style.Artist]:
     """The critical curve, and its limit for fast decay."""
-    handles: list[Artist] = []
+    handles: list[style.Artist] = []
     if "critical_F0" not in dataset:
         return handles
     alpha, critical = dataset["alpha"].data, dataset["critical_F0"].data
@@ -526,8 +439,7 @@ def _curves(axes: Axes, dataset: Dataset) -> list[Artist]:
     return handles
 
 
-def _edges(middles: np.ndarray, exponential: bool = False) -> np.ndarray:
+def _edges(middles: Floats) -> Floats:
     """Edges of cells about evenly spaced middles."""
     half = 0.5 * (middles[1] - middles[0]) if middles.size > 1 else 0.5 * max(abs(float(middles[0])), 1e-3)
-    edges = np.append(middles - half, middles[-1] + half)
-    return np.exp(edges) if exponential else edges
+    return np.append(middles - half, middles[-1] + half)

@@ -4,35 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Flags, Floats
+from fastmech.plots import style
 from fastmech.plots.map_view import View, make_view
-from fastmech.plots.style import (
-    ANGLES,
-    FIELD,
-    LINES,
-    PALETTE,
-    coordinates_of,
-    entry,
-    equilibrium_names,
-    flag_codes,
-    legend_below,
-    logarithmic,
-    new_figure,
-    style,
-    symbol,
-)
 from fastmech.results import Dataset
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 UNSTABLE = ("still at an unstable one", "#8c8c8c")
 LEFT_OVER = {
@@ -53,7 +33,7 @@ NOT_KEPT = {
     "turns": "(full turns on the way to another equilibrium were not kept)",
 }
 #: Without ``end_equilibrium``; yellow is no equilibrium's colour.
-ANOTHER = ("rest at another, or full turns further", {"color": PALETTE["yellow"]})
+ANOTHER = ("rest at another, or full turns further", {"color": style.PALETTE["yellow"]})
 BOX = (0.05, 0.25, 0.5, 0.75, 0.95)
 SHOWN_QUANTILES = (0.5, 0.95, 0.99)
 
@@ -61,24 +41,27 @@ SHOWN_QUANTILES = (0.5, 0.95, 0.99)
 POINTS = 1001
 
 
-def draw_disturbed(dataset: Dataset) -> dict[str, Figure]:
-    """Pictures of a dataset of the scan type ``disturbed``, of what was kept of the trajectories."""
+def draw_disturbed(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
+    """Outcomes, times to return, excursions and the linearized motion's range; those of a map over it."""
+    dataset = dataset.merged
+    if "axes" in dataset.attrs:
+        return _draw_map(dataset, scene)
     if not dataset.sizes["equilibrium"]:
         return {}
-    names = coordinates_of(dataset)
+    names = style.coordinates_of(dataset)
     pictures = {
         "outcomes": (_outcomes, {"outcome"}),
         "time_to_return": (_time_to_return, {"time_to_return"}),
         "excursions": (_excursions, {f"excursion_{name}" for name in names}),
         "linear_range": (_linear_range, {"linear_limit"}),
     }
-    with style():
+    with style.style():
         return {name: draw(dataset) for name, (draw, needed) in pictures.items() if needed <= set(dataset)}
 
 
-def _outcomes(dataset: Dataset) -> Figure:
+def _outcomes(dataset: Dataset) -> style.Figure:
     figure, axes = _rows_of_equilibria(dataset, 0.7)
-    names = equilibrium_names(dataset)
+    names = style.equilibrium_names(dataset)
     for row in range(len(names)):
         left = 0.0
         for share, label, look in _segments(dataset, row):
@@ -86,36 +69,27 @@ def _outcomes(dataset: Dataset) -> Figure:
             look = {"height": 0.62, "edgecolor": "white", **look}
             axes.barh(row, share, left=left, label=None if known else label, **look)
             if share >= 8.0:
-                dark = look["color"] in (LINES[0], LINES[1], LINES[2])
+                dark = look["color"] in (style.LINES[0], style.LINES[1], style.LINES[2])
                 box = {"facecolor": look["color"], "edgecolor": "none", "pad": 1.5}
-                axes.text(
-                    left + share / 2,
-                    row,
-                    f"{share:.3g} %",
-                    ha="center",
-                    va="center",
-                    color="white" if dark else "black",
-                    bbox=box,
-                )
+                text: Any = {"ha": "center", "va": "center", "color": "white" if dark else "black"}
+                axes.text(left + share / 2, row, f"{share:.3g} %", bbox=box, **text)
             left += share
-        axes.annotate(
-            _failed(dataset, row), (1.01, row), xycoords=("axes fraction", "data"), va="center", fontsize=9
-        )
+        _beside(axes, row, _failed(dataset, row))
     axes.set(xlim=(0.0, 100.0), xlabel="share of the disturbed trajectories [%]")
     axes.grid(visible=False)
-    elsewhere = (dataset["outcome"].data == flag_codes(dataset["outcome"])["elsewhere"]).any()
+    elsewhere = (dataset["outcome"].data == style.flag_codes(dataset["outcome"])["elsewhere"]).any()
     kept = {"turns" if name.startswith("turns_") else name for name in dataset}
     unknown = [text for name, text in NOT_KEPT.items() if elsewhere and name not in kept]
     axes.set_title("\n".join(["Where disturbances of each equilibrium end", *unknown[:1]]))
     labelled = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
     order = sorted(labelled, key=lambda label: (not label.startswith("rest"), label))
-    figure.legend([labelled[label] for label in order], order, loc="outside lower center", ncols=3)
+    style.legend_below(figure, [labelled[label] for label in order], 3)
     return figure
 
 
 def _failed(dataset: Dataset, row: int) -> str:
     """How much of an equilibrium's bar is missing, and why; empty where nothing has failed."""
-    codes, outcome = flag_codes(dataset["outcome"]), dataset["outcome"].data[row]
+    codes, outcome = style.flag_codes(dataset["outcome"]), dataset["outcome"].data[row]
     counts = {text: np.count_nonzero(outcome == codes[name]) for name, text in FAILED.items()}
     lines = [f"{100.0 * count / outcome.size:.3g} % {text}" for text, count in counts.items() if count]
     return "\n".join(["failed, no end known:", *lines]) if lines else ""
@@ -123,10 +97,10 @@ def _failed(dataset: Dataset, row: int) -> str:
 
 def _segments(dataset: Dataset, row: int) -> list[tuple[float, str, dict[str, Any]]]:
     """Share [%], label and look of each part of an equilibrium's bar; who has failed has none."""
-    codes = flag_codes(dataset["outcome"])
+    codes = style.flag_codes(dataset["outcome"])
     outcome = dataset["outcome"].data[row]
     elsewhere = outcome == codes["elsewhere"]
-    parts = [(outcome == codes["returned"], f"rest at {row + 1}", {"color": LINES[row % len(LINES)]})]
+    parts = [(outcome == codes["returned"], f"rest at {row + 1}", {"color": style.color(row)})]
     if "end_equilibrium" in dataset:
         parts += _resting_elsewhere(dataset, row, elsewhere)
     else:
@@ -150,19 +124,18 @@ def _resting_elsewhere(
     parts: list[tuple[Flags, str, dict[str, Any]]] = []
     for other in range(dataset.sizes["equilibrium"]):
         there = elsewhere & (end == other)
-        further = {"color": LINES[other % len(LINES)], "hatch": "//"}
-        parts.append((there & ~turned, f"rest at {other + 1}", {"color": LINES[other % len(LINES)]}))
+        further = {"color": style.color(other), "hatch": "//"}
+        parts.append((there & ~turned, f"rest at {other + 1}", {"color": style.color(other)}))
         parts.append((there & turned, f"rest at {other + 1}, full turns further", further))
     return parts
 
 
-def _time_to_return(dataset: Dataset) -> Figure:
-    figure = new_figure(7.2, 4.8)
-    axes = figure.subplots()
+def _time_to_return(dataset: Dataset) -> style.Figure:
+    figure, axes = style.new_panel(7.2, 4.8)
     marked = [int(np.argmin(np.abs(dataset["quantile"].data - q))) for q in SHOWN_QUANTILES]
     level = dataset["quantile"].data[marked]
     share = np.linspace(0.0, 1.0, POINTS)
-    for row, name in enumerate(equilibrium_names(dataset)):
+    for row, name in enumerate(style.equilibrium_names(dataset)):
         every = dataset["time_to_return"].data[row]
         times = every[np.isfinite(every)]
         if not times.size:
@@ -173,12 +146,12 @@ def _time_to_return(dataset: Dataset) -> Figure:
         label = f"{name}, {_returned(dataset, row)} return\n({texts})"
         # Who returns after the run's end counts, so that a curve may end below 100 %.
         known = 100.0 * min(1.0, times.size / (returned * every.size))
-        axes.plot(np.quantile(times, share), known * share, color=LINES[row % len(LINES)], label=label)
-        axes.plot(at, 100.0 * level, "o", color=LINES[row % len(LINES)], mec="white", ms=7)
+        axes.plot(np.quantile(times, share), known * share, color=style.color(row), label=label)
+        axes.plot(at, 100.0 * level, "o", color=style.color(row), mec="white", ms=7)
     axes.set(xlabel="time to return t [s]", ylabel="share of those that return [%]", ylim=(0.0, 103.0))
     axes.set_xlim(left=0.0)
     if axes.lines:
-        legend_below(figure, axes, 1)
+        style.legend_below(figure, axes, 1)
     else:
         axes.text(
             0.5, 0.5, "no trajectory was back by the end of the run", transform=axes.transAxes, ha="center"
@@ -200,53 +173,50 @@ def _returned(dataset: Dataset, row: int) -> str:
     return f"{share:.3g} %" if most == share else f"{share:.3g} to {most:.3g} %"
 
 
-def _excursions(dataset: Dataset) -> Figure:
+def _excursions(dataset: Dataset) -> style.Figure:
     figure, axes = _rows_of_equilibria(dataset, 0.85)
-    names = coordinates_of(dataset)
+    names = style.coordinates_of(dataset)
     units = {dataset[name].units for name in names}
     for column, name in enumerate(names):
         shift = 0.36 * (column - 0.5 * (len(names) - 1)) / max(1, len(names) - 1)
-        told = symbol(name) if len(units) == 1 else f"{symbol(name)} [{dataset[name].units}]"
+        told = style.symbol(name) if len(units) == 1 else f"{style.symbol(name)} [{dataset[name].units}]"
         for row, values in enumerate(dataset[f"excursion_{name}"].data):
             values = values[np.isfinite(values)]
             if values.size:
-                _box(axes, row + shift, np.quantile(values, BOX), LINES[column])
-                axes.plot(values.max(), row + shift, "|", color=LINES[column], ms=9, mew=2)
-        axes.plot([], [], "s", color=LINES[column], label=f"largest departure of {told}")
+                _box(axes, row + shift, np.quantile(values, BOX), style.LINES[column])
+                axes.plot(values.max(), row + shift, "|", color=style.LINES[column], ms=9, mew=2)
+        axes.plot([], [], "s", color=style.LINES[column], label=f"largest departure of {told}")
     axes.plot([], [], "|", color="black", mew=2, ms=9, label="median")
     axes.set(xscale="log", xlabel=f"excursion [{units.pop()}]" if len(units) == 1 else "excursion")
-    logarithmic(axes.xaxis)
+    style.logarithmic(axes.xaxis)
     axes.set_title("How far trajectories go (box: 25-75 %, line: 5-95 %, coloured tick: the farthest)")
-    legend_below(figure, axes, 3)
+    style.legend_below(figure, axes, 3)
     return figure
 
 
-def _linear_range(dataset: Dataset) -> Figure:
+def _linear_range(dataset: Dataset) -> style.Figure:
     figure, axes = _rows_of_equilibria(dataset, 0.85)
     limit = dataset["linear_limit"].data
     tolerance, horizon = dataset.attrs["linear_tolerance"], dataset.attrs["linear_horizon"]
     positive = limit[limit > 0.0]
     low, high = (positive.min(), positive.max()) if positive.size else (1e-3, np.pi)
-    for row, values in enumerate(limit):
+    for row, ordered in enumerate(limit):
         # NaN stands for more than the largest size tried, 0 for less than the smallest.
-        ordered = values
         beyond, never = 100.0 * np.mean(np.isinf(ordered)), 100.0 * np.mean(ordered == 0.0)
-        texts = [f"{beyond:.3g} % beyond all tried"] * bool(beyond) + [
-            f"{never:.3g} % below all tried"
-        ] * bool(never)
-        axes.annotate(
-            "\n".join(texts), (1.01, row), xycoords=("axes fraction", "data"), va="center", fontsize=9
+        told = {"beyond": beyond, "below": never}
+        _beside(
+            axes, row, "\n".join(f"{part:.3g} % {where} all tried" for where, part in told.items() if part)
         )
         if 100.0 in (beyond, never):
             continue
         shown = np.clip(ordered[:: -(-ordered.size // POINTS)], 0.9 * low, 1.1 * high)
         jitter = np.random.default_rng(row).uniform(0.22, 0.42, shown.size)
-        axes.plot(shown, row + jitter, ".", color=LINES[5], ms=3)
+        axes.plot(shown, row + jitter, ".", color=style.LINES[5], ms=3)
         # The lower value at each quantile, because no mean can be taken with infinity.
         quantiles = np.quantile(ordered, BOX, method="lower")
-        _box(axes, row, np.clip(quantiles, 0.9 * low, 1.1 * high), LINES[0])
+        _box(axes, row, np.clip(quantiles, 0.9 * low, 1.1 * high), style.LINES[0])
     axes.set(xscale="log", xlabel=f"size of the disturbance [{dataset['linear_limit'].units}]")
-    logarithmic(axes.xaxis)
+    style.logarithmic(axes.xaxis)
     axes.set_title(
         f"Size up to which the linearized motion is within {100.0 * tolerance:g} % for {horizon:g} s\n"
         "(dots: directions, box: 25-75 %, line: 5-95 %)"
@@ -254,18 +224,21 @@ def _linear_range(dataset: Dataset) -> Figure:
     return figure
 
 
-def _rows_of_equilibria(dataset: Dataset, height: float) -> tuple[Figure, Axes]:
+def _rows_of_equilibria(dataset: Dataset, height: float) -> tuple[style.Figure, style.Axes]:
     """A figure with a row for each equilibrium, the first on top."""
-    names = equilibrium_names(dataset)
-    figure = new_figure(8.4, height * len(names) + 1.9)
-    axes = figure.subplots()
+    names = style.equilibrium_names(dataset)
+    figure, axes = style.new_panel(8.4, height * len(names) + 1.9)
     axes.set_yticks(range(len(names)), [name.replace(", ", ",\n", 1) for name in names])
     axes.set_ylim(len(names) - 0.4, -0.6)
     axes.grid(visible=False, axis="y")
     return figure, axes
 
 
-def _box(axes: Axes, place: float, quantiles: Floats, color: str) -> None:
+def _beside(axes: style.Axes, row: int, text: str) -> None:
+    axes.annotate(text, (1.01, row), xycoords=("axes fraction", "data"), va="center", fontsize=9)
+
+
+def _box(axes: style.Axes, place: float, quantiles: Floats, color: str) -> None:
     names = ("whislo", "q1", "med", "q3", "whishi")
     axes.bxp(
         [dict(zip(names, quantiles, strict=True), fliers=[])],
@@ -286,47 +259,39 @@ def _box(axes: Axes, place: float, quantiles: Floats, color: str) -> None:
 MOST_SHEETS = 4
 
 #: Colours where there is no value, and of times later than the run's end; the mark of what is not whole.
-ABSENT, LATER, UNTOLD = "#e3e3e3", PALETTE["vermillion"], "x"
+ABSENT, LATER, UNTOLD = "#e3e3e3", style.PALETTE["vermillion"], "x"
 
 ABOUT_UNTOLD = "failed numerically in part, or not computed"
 
 KINDS = {0: "stable", 1: "saddle", 2: "maximum"}
 
 
-def draw_disturbed_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
-    """Pictures of a dataset of the scan type ``disturbed`` over parameters."""
+def _draw_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     view = make_view(dataset, scene)
     every = np.arange(dataset.sizes["sheet"])
     stable = every[dataset["sheet_morse_index"].data == 0]
     median, late = (int(np.argmin(np.abs(dataset["quantile"].data - q))) for q in (0.5, 0.95))
     share = _percent(view, "share_returned")
     time = view.data("time_to_return_quantile").astype(np.float64)
+    times = [
+        ("median time to return", time[..., median], "time [s]"),
+        ("95 % are back after", time[..., late], "time [s]"),
+    ]
+    farthest = {angle: view.data(f"largest_excursion_{angle}").astype(np.float64) for angle in style.ANGLES}
+    excursions = [
+        (f"farthest |{style.symbol(angle)} - {style.symbol(angle)} there|", field, "excursion [rad]")
+        for angle, field in farthest.items()
+    ]
     rows = {
         "share_returned": (stable, [("proved to return", share, "share that returns [%]")]),
-        "time_to_return": (
-            stable,
-            [
-                ("median time to return", time[..., median], "time [s]"),
-                ("95 % are back after", time[..., late], "time [s]"),
-            ],
-        ),
-        "excursions": (
-            every,
-            [
-                (
-                    f"farthest |{symbol} - {symbol} there|",
-                    view.data(f"largest_excursion_{angle}").astype(np.float64),
-                    "excursion [rad]",
-                )
-                for angle, symbol in (("phi", "φ"), ("theta", "θ"))
-            ],
-        ),
+        "time_to_return": (stable, times),
+        "excursions": (every, excursions),
     }
     most = _percent(view, "share_returned_at_most")
     if (most > share).any():
         rows["share_returned"][1].append(("if all undecided returned", most, "share that returns [%]"))
     draw = _lines if len(view.axes) == 1 else _panels
-    with style():
+    with style.style():
         return {
             name: draw(view, name, sheets[:MOST_SHEETS], fields)
             for name, (sheets, fields) in rows.items()
@@ -334,9 +299,11 @@ def draw_disturbed_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[str
         }
 
 
-def _panels(view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[str, Floats, str]]) -> Figure:
+def _panels(
+    view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[str, Floats, str]]
+) -> style.Figure:
     """A row for each field, a column for each sheet."""
-    figure = new_figure(2.2 + 3.5 * len(sheets), 1.7 + 3.0 * len(fields))
+    figure = style.new_figure(2.2 + 3.5 * len(sheets), 1.7 + 3.0 * len(fields))
     panels = figure.subplots(len(fields), len(sheets), squeeze=False, sharex=True, sharey=True)
     x, y = (view.axis(axis) for axis in view.axes)
     for row, (title, field, label) in zip(panels, fields, strict=True):
@@ -345,7 +312,7 @@ def _panels(view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[
             axes.set_facecolor(ABSENT)
             # Infinity is beyond every colour, and so has the one for that.
             shown = np.ma.masked_where(np.isnan(field[..., sheet]), np.minimum(field[..., sheet], 1e300))
-            mesh = axes.pcolormesh(x, y, shown.T, shading="nearest", rasterized=True, **look)
+            mesh = style.shade(axes, x, y, shown, **look)
             untold = _untold(view, sheet)
             if untold.any():
                 i, j = np.nonzero(untold)
@@ -357,30 +324,32 @@ def _panels(view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[
         if np.isfinite(field[..., sheets]).any():
             bar = figure.colorbar(mesh, ax=list(row), label=label)
             if name != "share_returned":
-                logarithmic(bar.ax.yaxis)
+                style.logarithmic(bar.ax.yaxis)
     if handles := _marks(view, sheets, fields):
-        figure.legend(handles=handles, loc="outside lower center", ncols=2)
+        style.legend_below(figure, handles)
     _title(figure, _setting(view))
     return figure
 
 
-def _lines(view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[str, Floats, str]]) -> Figure:
+def _lines(
+    view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[str, Floats, str]]
+) -> style.Figure:
     """A panel for each field, a line for each sheet."""
-    figure = new_figure(7.6, 1.9 + 2.7 * len(fields))
+    figure = style.new_figure(7.6, 1.9 + 2.7 * len(fields))
     panels = figure.subplots(len(fields), 1, squeeze=False, sharex=True)[:, 0]
     x = view.axis(view.axes[0])
     for axes, (title, field, label) in zip(panels, fields, strict=True):
         for k, sheet in enumerate(sheets):
             shown = np.where(np.isinf(field[..., sheet]), np.nan, field[..., sheet])
-            axes.plot(x, shown, "o-", ms=4, color=LINES[k % len(LINES)], label=_name(view, int(sheet)))
+            axes.plot(x, shown, "o-", ms=4, color=style.color(k), label=_name(view, int(sheet)))
             if name == "share_returned" and title == fields[0][0]:
                 low, high = (
                     _percent(view, f"share_returned_{end}")[..., sheet] for end in ("lower", "upper")
                 )
-                axes.fill_between(x, low, high, color=LINES[k % len(LINES)], alpha=0.25, lw=0)
+                axes.fill_between(x, low, high, color=style.color(k), alpha=0.25, lw=0)
             later = x[np.isinf(field[..., sheet])]
             if later.size:  # on the upper edge
-                look = {"color": LINES[k % len(LINES)], "transform": axes.get_xaxis_transform()}
+                look = {"color": style.color(k), "transform": axes.get_xaxis_transform()}
                 axes.plot(later, np.full(later.size, 0.97), "^", **look)
             untold = x[_untold(view, int(sheet))]
             if untold.size:  # on the lower edge
@@ -390,7 +359,7 @@ def _lines(view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[s
             axes.set_ylim(0.0, 102.0)
         elif np.isfinite(field[..., sheets]).any():
             axes.set_yscale("log")
-            logarithmic(axes.yaxis)
+            style.logarithmic(axes.yaxis)
         axes.set(ylabel=label)
         axes.set_title(title[0].upper() + title[1:])
     panels[-1].set_xlabel(view.label(view.axes[0]))
@@ -400,13 +369,13 @@ def _lines(view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[s
         panels[0].plot([], [], "^", color="#808080", label="later than the end of the run")
     if any(_untold(view, int(sheet)).any() for sheet in sheets):
         panels[0].plot([], [], UNTOLD, color="black", label=ABOUT_UNTOLD)
-    legend_below(figure, panels[0], 2)
+    style.legend_below(figure, panels[0], 2)
     band = "\nband: 95 % Wilson interval, undecided ones as none or all" if name == "share_returned" else ""
     _title(figure, _setting(view) + band)
     return figure
 
 
-def _title(figure: Figure, text: str) -> None:
+def _title(figure: style.Figure, text: str) -> None:
     """Over all panels, in as many lines as it takes."""
     width = int(12 * figure.get_figwidth())
     figure.suptitle("\n".join(fill(line, width) for line in text.splitlines()), fontsize=10.0)
@@ -417,7 +386,7 @@ def _look(name: str, field: Floats) -> dict[str, Any]:
     from matplotlib import colormaps
     from matplotlib.colors import LogNorm, Normalize
 
-    colors = colormaps[FIELD].with_extremes(over=LATER)
+    colors = colormaps[style.FIELD].with_extremes(over=LATER)
     if name == "share_returned":
         return {"cmap": colors, "norm": Normalize(0.0, 100.0)}
     known = field[np.isfinite(field) & (field > 0.0)]
@@ -435,19 +404,17 @@ def _untold(view: View, sheet: int) -> Flags:
     return there & ~(view.data("share_failed")[..., sheet] == 0.0)
 
 
-def _marks(view: View, sheets: NDArray[np.int_], fields: list[tuple[str, Floats, str]]) -> list[Artist]:
-    from matplotlib.patches import Patch
-
-    handles: list[Artist] = []
+def _marks(view: View, sheets: NDArray[np.int_], fields: list[tuple[str, Floats, str]]) -> list[style.Artist]:
+    handles: list[style.Artist] = []
     absent = ~np.isfinite(view.data("phi")[..., sheets])
     if absent.any():
-        handles.append(Patch(facecolor=ABSENT, edgecolor="#808080", label="no such equilibrium"))
+        handles.append(style.swatch("no such equilibrium", ABSENT, "#808080"))
     if any((np.isnan(field[..., sheets]) & ~absent).any() for _, field, _ in fields):
-        handles[:] = [Patch(facecolor=ABSENT, edgecolor="#808080", label="no such equilibrium, or no value")]
+        handles[:] = [style.swatch("no such equilibrium, or no value", ABSENT, "#808080")]
     if any(np.isinf(field[..., sheets]).any() for _, field, _ in fields):
-        handles.append(Patch(facecolor=LATER, label="later than the end of the run"))
+        handles.append(style.swatch("later than the end of the run", LATER))
     if any(_untold(view, int(sheet)).any() for sheet in sheets):
-        handles.append(entry(ABOUT_UNTOLD, marker=UNTOLD, ms=5, ls="none"))
+        handles.append(style.entry(ABOUT_UNTOLD, marker=UNTOLD, ms=5, ls="none"))
     return handles
 
 
@@ -471,42 +438,42 @@ TIME = "time t [s]"
 MOTIONS = ("nonlinear", "linearized")
 
 
-def draw_disturbed_motion(dataset: Dataset) -> dict[str, Figure]:
+def draw_disturbed_motion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Pictures of a dataset of the scan type ``disturbed_motion``; none where there is no equilibrium."""
     if not dataset.sizes["equilibrium"]:
         return {}
-    with style():
+    with style.style():
         return {"angles": _angles(dataset), "norm": _norm(dataset)}
 
 
-def _angles(dataset: Dataset) -> Figure:
+def _angles(dataset: Dataset) -> style.Figure:
     count = dataset.sizes["equilibrium"]
-    figure = new_figure(8.4, 1.9 * count + 0.8)
+    figure = style.new_figure(8.4, 1.9 * count + 0.8)
     panels = figure.subplots(count, 2, sharex=True, squeeze=False)
-    for row, name in enumerate(equilibrium_names(dataset)):
-        for column, angle in enumerate(ANGLES):
+    for row, name in enumerate(style.equilibrium_names(dataset)):
+        for column, angle in enumerate(style.ANGLES):
             axes = panels[row, column]
             nonlinear, linearized = (dataset[f"{which}_{angle}"].data[row] for which in MOTIONS)
             _plot_pair(axes, dataset["time"].data, nonlinear, linearized)
             _limit(axes, nonlinear)
-            axes.set_ylabel(f"ξ of {symbol(angle)} [rad]")
+            axes.set_ylabel(f"ξ of {style.symbol(angle)} [rad]")
         panels[row, 0].set_title(f"Equilibrium {name}", loc="left")
     for axes in panels[-1]:
         axes.set_xlabel(TIME)
-    legend_below(figure, panels[0, 0], 2)
+    style.legend_below(figure, panels[0, 0], 2)
     return figure
 
 
-def _norm(dataset: Dataset) -> Figure:
+def _norm(dataset: Dataset) -> style.Figure:
     nonlinear, linearized = (
         np.hypot(*(dataset[f"{which}_{angle}"].data for angle in ("phi", "theta"))) for which in MOTIONS
     )
     rows = -(-len(nonlinear) // 2)
-    figure = new_figure(8.4, 2.5 * rows + 0.5)
+    figure = style.new_figure(8.4, 2.5 * rows + 0.5)
     panels = figure.subplots(rows, 2, sharex=True, squeeze=False)
     for axes in panels.flat[len(nonlinear) :]:
         axes.remove()
-    for i, name in enumerate(equilibrium_names(dataset)):
+    for i, name in enumerate(style.equilibrium_names(dataset)):
         axes = panels.flat[i]
         _plot_pair(axes, dataset["time"].data, nonlinear[i], linearized[i])
         axes.set_yscale("log")
@@ -514,23 +481,23 @@ def _norm(dataset: Dataset) -> Figure:
         known = nonlinear[i][nonlinear[i] > 0.0]
         if known.size:
             axes.set_ylim(known.min() / 3.0, 10.0 * known.max())
-        logarithmic(axes.yaxis)
+        style.logarithmic(axes.yaxis)
         axes.set_title(name, loc="left", fontsize=10)
         axes.set_ylabel("|ξ| [rad]")
         if i >= len(nonlinear) - 2:
             axes.set_xlabel(TIME)
             axes.tick_params(labelbottom=True)
     figure.suptitle("Size of the disturbance of the angles")
-    legend_below(figure, panels[0, 0], 2)
+    style.legend_below(figure, panels[0, 0], 2)
     return figure
 
 
-def _plot_pair(axes: Axes, t: Floats, nonlinear: Floats, linearized: Floats) -> None:
-    axes.plot(t, nonlinear, color=LINES[0], label="nonlinear")
-    axes.plot(t, linearized, "--", color=LINES[1], lw=1.2, label="linearized")
+def _plot_pair(axes: style.Axes, t: Floats, nonlinear: Floats, linearized: Floats) -> None:
+    axes.plot(t, nonlinear, color=style.LINES[0], label="nonlinear")
+    axes.plot(t, linearized, "--", color=style.LINES[1], lw=1.2, label="linearized")
 
 
-def _limit(axes: Axes, nonlinear: Floats) -> None:
+def _limit(axes: style.Axes, nonlinear: Floats) -> None:
     """The nonlinear motion sets the scale: an unstable linearized one would hide it."""
     low, high = np.nanmin(nonlinear, initial=0.0), np.nanmax(nonlinear, initial=0.0)
     margin = 0.25 * (high - low) or 1.0

@@ -4,37 +4,27 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.models.drawing import Drawing, Element, drawing
 from fastmech.models.mechanism import Mechanism
-from fastmech.plots.style import (
-    ANGLES,
-    LINES,
-    PALETTE,
-    PI_TICKS,
-    equilibrium_names,
-    flag_codes,
-    legend_below,
-    new_figure,
-    setting_of,
-    style,
-)
+from fastmech.plots import style
 from fastmech.results import Dataset
 from fastmech.scene import Scene
 from fastmech.slider.lagrange import potential_energy
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 Points = NDArray[np.float64]
 
-ROD, SPRING, DAMPER, FORCE = PALETTE["black"], PALETTE["green"], PALETTE["purple"], PALETTE["vermillion"]
-MASS, GROUND, INK = PALETTE["blue"], "#8c8c8c", "#404040"
+ROD, SPRING, DAMPER, FORCE = (
+    style.PALETTE["black"],
+    style.PALETTE["green"],
+    style.PALETTE["purple"],
+    style.PALETTE["vermillion"],
+)
+MASS, GROUND, INK = style.PALETTE["blue"], "#8c8c8c", "#404040"
 
 #: Sizes over the extent of all that is drawn.
 LARGEST_MASS, ARROW, COIL, HOUSING, MARGIN, TURNS = 0.035, 0.17, 0.014, 0.02, 0.12, 9
@@ -57,12 +47,14 @@ def drawing_of(system: Scene | Mechanism | Dataset, q: ArrayLike = (), force: fl
     return drawing(system, q)
 
 
-def draw_mechanism(axes: Axes, drawn: Drawing, which: int = 0) -> None:
+def draw_mechanism(axes: style.Axes, drawn: Drawing, which: int = 0) -> None:
     """Draw one of the positions of a mechanism.
 
     Lengths are to scale; masses have areas in proportion to them; an arrow has one length for every load.
     The axes cover all positions, so that drawings of one mechanism can be compared.
     """
+    from matplotlib.patches import Circle
+
     tied = ~np.isin(drawn.kind, (Element.GUIDE, Element.LOAD))
     corners = drawn.ends[:, tied].reshape(-1, 2)
     low, high = corners.min(axis=0), corners.max(axis=0)
@@ -80,17 +72,12 @@ def draw_mechanism(axes: Axes, drawn: Drawing, which: int = 0) -> None:
         elif kind == Element.FIXED:
             axes.plot(*a, ls="none", marker="s", ms=7, color=GROUND, zorder=4)
         elif kind == Element.MASS:
-            _mass(axes, a, LARGEST_MASS * size * np.sqrt(mass / heaviest))
+            radius = LARGEST_MASS * size * np.sqrt(mass / heaviest)
+            axes.add_patch(Circle(tuple(a), radius, color=MASS, zorder=5))
         elif kind == Element.LOAD:
             b = a + ARROW * size * (b - a)
-            arrow = {
-                "arrowstyle": "-|>",
-                "color": FORCE,
-                "lw": 2.4,
-                "mutation_scale": 14,
-                "shrinkA": 0,
-                "shrinkB": 0,
-            }
+            arrow: Any = {"arrowstyle": "-|>", "color": FORCE, "lw": 2.4, "mutation_scale": 14}
+            arrow |= {"shrinkA": 0, "shrinkB": 0}
             axes.annotate("", xy=tuple(b), xytext=tuple(a), arrowprops=arrow, zorder=6)
         elif kind == Element.ROD:
             axes.plot(*np.transpose([a, b]), color=ROD, lw=2.6, solid_capstyle="round", zorder=3)
@@ -106,7 +93,7 @@ def draw_mechanism(axes: Axes, drawn: Drawing, which: int = 0) -> None:
             _label(axes, name, place, np.array(others).reshape(-1, 2), 1.4 * LARGEST_MASS * size, colour)
 
 
-def _label(axes: Axes, name: str, place: Points, ties: Points, distance: float, colour: str) -> None:
+def _label(axes: style.Axes, name: str, place: Points, ties: Points, distance: float, colour: str) -> None:
     """Name a point on the side where nothing is tied to it, above where nothing is."""
     lengths = np.hypot(*ties.T)
     tied = lengths > 1e-9
@@ -122,12 +109,6 @@ def _label(axes: Axes, name: str, place: Points, ties: Points, distance: float, 
     axes.text(x, y, text, ha=ha, va=va, color=colour, fontsize=10, zorder=7)
 
 
-def _mass(axes: Axes, center: Points, radius: float) -> None:
-    from matplotlib.patches import Circle
-
-    axes.add_patch(Circle(tuple(center), radius, color=MASS, zorder=5))
-
-
 def _zigzag(start: Points, end: Points, width: float) -> tuple[Points, Points]:
     """Coordinates of a spring's line between two points."""
     along = end - start
@@ -140,7 +121,7 @@ def _zigzag(start: Points, end: Points, width: float) -> tuple[Points, Points]:
     return line[:, 0], line[:, 1]
 
 
-def _damper(axes: Axes, start: Points, end: Points, half: float) -> None:
+def _damper(axes: style.Axes, start: Points, end: Points, half: float) -> None:
     """Piston rod from the start into a housing that is tied to the end."""
     along = end - start
     across = half * np.array([-along[1], along[0]]) / max(float(np.hypot(*along)), 1e-12)
@@ -157,24 +138,16 @@ def _damper(axes: Axes, start: Points, end: Points, half: float) -> None:
 
 def legend_handles(drawn: Drawing, load: str = "load") -> list[Any]:
     """What a drawing's colours mean, for a legend; ``load`` says which one it is."""
-    from matplotlib.lines import Line2D
-
-    looks: dict[Element, dict[str, Any]] = {
-        Element.ROD: {"color": ROD, "lw": 2.6, "label": "rod"},
-        Element.MASS: {
-            "color": MASS,
-            "marker": "o",
-            "ms": 9,
-            "ls": "none",
-            "label": "mass, its area in proportion",
-        },
-        Element.SPRING: {"color": SPRING, "lw": 1.4, "label": "spring"},
-        Element.DAMPER: {"color": DAMPER, "lw": 1.8, "label": "damper"},
-        Element.LOAD: {"color": FORCE, "marker": ">", "lw": 2.4, "label": load},
-        Element.FIXED: {"color": GROUND, "marker": "s", "ls": "none", "label": "fixed point"},
-        Element.GUIDE: {"color": GROUND, "lw": 1.2, "ls": "--", "label": "guide"},
+    entries = {
+        Element.ROD: style.entry("rod", color=ROD, lw=2.6),
+        Element.MASS: style.entry("mass, its area in proportion", color=MASS, marker="o", ms=9, ls="none"),
+        Element.SPRING: style.entry("spring", color=SPRING, lw=1.4),
+        Element.DAMPER: style.entry("damper", color=DAMPER, lw=1.8),
+        Element.LOAD: style.entry(load, color=FORCE, marker=">", lw=2.4),
+        Element.FIXED: style.entry("fixed point", color=GROUND, marker="s", ls="none"),
+        Element.GUIDE: style.entry("guide", color=GROUND, lw=1.2, ls="--"),
     }
-    return [Line2D([], [], **look) for kind, look in looks.items() if kind in drawn.kind]
+    return [one for kind, one in entries.items() if kind in drawn.kind]
 
 
 MARKERS = {"minimum": "o", "saddle": "D", "maximum": "^", "degenerate": "X"}
@@ -182,32 +155,30 @@ SHAPES = ["o", "s", "^", "D", "v", "P"]
 GRID = 241
 
 
-def draw_equilibria(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
+def draw_equilibria(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Pictures of a dataset of the scan type ``equilibria`` of the scene with these parameters."""
     of_paper = "mechanism" not in dataset.attrs
-    with style():
+    with style.style():
         figures = {}
         if of_paper:
-            figures["potential"] = new_figure(7.4, 6.4)
-            draw_potential(figures["potential"].subplots(), dataset, Scene(**scene))
+            figures["potential"], axes = style.new_panel(7.4, 6.4)
+            draw_potential(axes, dataset, Scene(**scene))
             if dataset.sizes["equilibrium"]:
-                legend_below(figures["potential"], figures["potential"].axes[0], 4)
+                style.legend_below(figures["potential"], axes, 4)
         if dataset.sizes["equilibrium"]:
             figures["eigenvalues"] = _eigenvalues(dataset)
             if of_paper:
                 force = float(dataset.attrs["force"])
                 places = np.stack([dataset["phi"].data, dataset["theta"].data], axis=-1)
-                figures["positions"] = _positions(
-                    dataset, drawing_of(Scene(**scene), places, force), f"force F = {force:g} N on M2"
-                )
+                drawn = drawing_of(Scene(**scene), places, force)
+                figures["positions"] = _positions(dataset, drawn, f"force F = {force:g} N on M2")
             elif "drawing" in dataset.groups:
-                figures["positions"] = _positions(
-                    dataset, drawing_of(dataset.groups["drawing"]), setting_of(dataset, scene)
-                )
+                drawn = drawing_of(dataset.groups["drawing"])
+                figures["positions"] = _positions(dataset, drawn, style.setting_of(dataset, scene))
     return figures
 
 
-def draw_potential(axes: Axes, dataset: Dataset, scene: Scene) -> None:
+def draw_potential(axes: style.Axes, dataset: Dataset, scene: Scene) -> None:
     """Draw the potential over both angles, with the equilibria."""
     angle = np.linspace(-np.pi, np.pi, GRID)
     q = np.stack(np.meshgrid(angle, angle), axis=-1)
@@ -215,17 +186,17 @@ def draw_potential(axes: Axes, dataset: Dataset, scene: Scene) -> None:
     filled = axes.contourf(angle, angle, energy, levels=24)
     axes.contour(angle, angle, energy, levels=24, colors="white", linewidths=0.4, alpha=0.6)
     axes.figure.colorbar(filled, ax=axes, label="potential energy Π - F x2 [J]")
-    mark_kinds(axes, dataset, ANGLES)
-    axes.set_xticks(*PI_TICKS)
-    axes.set_yticks(*PI_TICKS)
+    mark_kinds(axes, dataset, style.ANGLES)
+    axes.set_xticks(*style.PI_TICKS)
+    axes.set_yticks(*style.PI_TICKS)
     axes.set(xlabel="angle φ [rad]", ylabel="angle θ [rad]")
     axes.set_title(f"Equilibria and potential, force F = {dataset.attrs['force']:g} N")
     axes.grid(visible=False)
 
 
-def mark_kinds(axes: Axes, dataset: Dataset, names: Sequence[str]) -> None:
+def mark_kinds(axes: style.Axes, dataset: Dataset, names: Sequence[str]) -> None:
     """Mark equilibria by their kind in the plane of two variables, with their numbers."""
-    codes = flag_codes(dataset["kind"])
+    codes = style.flag_codes(dataset["kind"])
     for kind, marker in {**dict.fromkeys(codes.others(MARKERS), "P"), **MARKERS}.items():
         of_kind = dataset["kind"].data == codes[kind]
         if of_kind.any():
@@ -240,19 +211,13 @@ def mark_kinds(axes: Axes, dataset: Dataset, names: Sequence[str]) -> None:
         )
 
 
-def _eigenvalues(dataset: Dataset) -> Figure:
-    figure = new_figure(7.2, 5.4)
-    axes = figure.subplots()
+def _eigenvalues(dataset: Dataset) -> style.Figure:
+    figure, axes = style.new_panel(7.2, 5.4)
     ranks = [name.rpartition("_")[2] for name in dataset if name.startswith("eigenvalue_re_")]
-    for i, name in enumerate(equilibrium_names(dataset)):
-        axes.plot(
-            *([dataset[f"eigenvalue_{part}_{k}"].data[i] for k in ranks] for part in ("re", "im")),
-            SHAPES[i % len(SHAPES)],
-            color=LINES[i % len(LINES)],
-            mec="white",
-            ms=9,
-            label=name,
-        )
+    for i, name in enumerate(style.equilibrium_names(dataset)):
+        x, y = ([dataset[f"eigenvalue_{part}_{k}"].data[i] for k in ranks] for part in ("re", "im"))
+        look: Any = {"color": style.color(i), "mec": "white", "ms": 9, "label": name}
+        axes.plot(x, y, SHAPES[i % len(SHAPES)], **look)
     left, right = axes.get_xlim()
     axes.set_xlim(min(left, -0.1 * right), max(right, -0.1 * left))
     axes.axvline(0.0, color="black", lw=1.0, zorder=1.0)
@@ -262,18 +227,18 @@ def _eigenvalues(dataset: Dataset) -> Figure:
     axes.set(xlabel="real part [1/s]", ylabel="imaginary part [rad/s]")
     axes.set_title("Eigenvalues of the linearized motion")
     axes.margins(y=0.12)
-    legend_below(figure, axes, 2)
+    style.legend_below(figure, axes, 2)
     return figure
 
 
-def _positions(dataset: Dataset, drawn: Drawing, setting: str) -> Figure:
-    names = equilibrium_names(dataset)
+def _positions(dataset: Dataset, drawn: Drawing, setting: str) -> style.Figure:
+    names = style.equilibrium_names(dataset)
     told = [
-        {code: word.replace("_", " ") for word, code in flag_codes(dataset[of]).items()}
+        {code: word.replace("_", " ") for word, code in style.flag_codes(dataset[of]).items()}
         for of in ("verdict", "kind")
     ]
     rows, columns = -(-len(names) // 2), min(2, len(names))
-    figure = new_figure(1.2 + 4.2 * columns, 3.9 * rows + 0.6)
+    figure = style.new_figure(1.2 + 4.2 * columns, 3.9 * rows + 0.6)
     figure.suptitle("Positions of rest, " + setting.replace(": ", ":\n" if columns == 1 else ": "))
     panels = figure.subplots(rows, columns, squeeze=False)
     for axes in panels.flat[len(names) :]:
@@ -286,5 +251,5 @@ def _positions(dataset: Dataset, drawn: Drawing, setting: str) -> Figure:
             for words, of in zip(told, ("verdict", "kind"), strict=True)
         )
         axes.set_title(f"{name}\n{verdict} ({kind})", fontsize=10)
-    figure.legend(handles=legend_handles(drawn), loc="outside lower center", ncols=2 * columns)
+    style.legend_below(figure, legend_handles(drawn), 2 * columns)
     return figure

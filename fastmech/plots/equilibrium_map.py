@@ -3,45 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
+from fastmech.plots import style
 from fastmech.plots.map_view import View, draw_curves, make_view, not_proved
-from fastmech.plots.style import (
-    ANGLES,
-    FIELD,
-    PALETTE,
-    PI_TICKS,
-    coordinates_of,
-    flag_codes,
-    in_fifths,
-    legend_below,
-    legend_under,
-    logarithmic,
-    new_figure,
-    quantity,
-    style,
-    symbol,
-)
 from fastmech.results import Dataset
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 #: How sheets look, by their Morse index.
 LOOKS = {
-    1: (PALETTE["vermillion"], "--", 1.3, "unstable: saddle"),
-    2: (PALETTE["purple"], ":", 1.6, "unstable: maximum"),
+    1: (style.PALETTE["vermillion"], "--", 1.3, "unstable: saddle"),
+    2: (style.PALETTE["purple"], ":", 1.6, "unstable: maximum"),
 }
 
 #: Colours of stable sheets, all of the first one where there are more.
-STABLE = (PALETTE["blue"], PALETTE["green"], PALETTE["orange"])
+STABLE = (style.PALETTE["blue"], style.PALETTE["green"], style.PALETTE["orange"])
 
 #: Marks and names of what is special on the branches.
 MARKS = {
@@ -53,10 +32,10 @@ MARKS = {
 
 #: Colours and marks of equilibria by their verdict.
 VERDICTS = {
-    "asymptotically_stable": (PALETTE["blue"], "o"),
-    "stable": (PALETTE["green"], "s"),
-    "unstable": (PALETTE["vermillion"], "x"),
-    "critical": (PALETTE["black"], "D"),
+    "asymptotically_stable": (style.PALETTE["blue"], "o"),
+    "stable": (style.PALETTE["green"], "s"),
+    "unstable": (style.PALETTE["vermillion"], "x"),
+    "critical": (style.PALETTE["black"], "D"),
 }
 
 #: How many times the least decay time the picture shows; beyond, damping misses a mode.
@@ -66,24 +45,24 @@ SLOWEST_SHOWN = 1e6
 TOLD = 4
 
 
-def draw_bifurcation(view: View) -> Figure:
+def draw_bifurcation(view: View) -> style.Figure:
     """phi, theta and the slowest decay time of the stable ones over one parameter."""
     (name,) = view.axes
     third = view.has("decay_time")
-    figure = new_figure(7.6, 8.4 if third else 6.2)
+    figure = style.new_figure(7.6, 8.4 if third else 6.2)
     panels = figure.subplots(3 if third else 2, 1, sharex=True)
     folds = folds_of(view, name)
-    for axes, variable in zip(panels, ANGLES, strict=False):
+    for axes, variable in zip(panels, style.ANGLES, strict=False):
         draw_branches(axes, view, variable, folds)
     if third:
         _decay_times(panels[2], view, name)
     panels[-1].set_xlabel(view.label(name))
     panels[0].set_title(f"Equilibria over {name}{_told(view, folds, name)}\n{view.setting}")
-    legend_below(figure, panels[0], 4)
+    style.legend_below(figure, panels[0], 4)
     return figure
 
 
-def draw_branches(axes: Axes, view: View, variable: str, folds: dict[str, Floats]) -> None:
+def draw_branches(axes: style.Axes, view: View, variable: str, folds: dict[str, Floats]) -> None:
     """Draw an angle of all equilibria over one parameter."""
     (name,), labelled = view.axes, set[str]()
     for (color, dash, width, label), x, y in _looks(_sheets(view, name, variable, folds)):
@@ -99,54 +78,47 @@ def draw_branches(axes: Axes, view: View, variable: str, folds: dict[str, Floats
             axes.plot(*places, marker, color="white", mec="black", ms=6, ls="none", label=label)
         for value in folds["at"]:
             axes.axvline(value, color="black", lw=0.6, ls=":", zorder=0)
-    axes.set(ylabel=f"angle {symbol(variable)} [rad]", ylim=(-3.4, 3.4))
-    axes.set_yticks(*PI_TICKS)
+    axes.set(ylabel=f"angle {style.symbol(variable)} [rad]", ylim=(-3.4, 3.4))
+    axes.set_yticks(*style.PI_TICKS)
     _own(axes, view)
 
 
-def draw_places(view: View) -> Figure:
+def draw_places(view: View) -> style.Figure:
     """All coordinates and the slowest decay time over one parameter, of maps with equilibria not joined."""
     (name,) = view.axes
     timed = view.has("decay_time") and np.isfinite(view.data("decay_time").astype(np.float64)).any()
-    rows = [*coordinates_of(view.dataset), *(["decay_time"] if timed else [])]
-    figure = new_figure(7.6, 2.0 + 2.4 * len(rows))
+    rows = [*style.coordinates_of(view.dataset), *(["decay_time"] if timed else [])]
+    figure = style.new_figure(7.6, 2.0 + 2.4 * len(rows))
     panels = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
     for axes, variable in zip(panels, rows, strict=True):
         draw_verdicts(axes, view, variable)
     panels[-1].set_xlabel(view.label(name))
     panels[0].set_title(f"Equilibria over {name}\n{view.setting}")
-    legend_below(figure, panels[0], 4)
+    style.legend_below(figure, panels[0], 4)
     return figure
 
 
-def draw_verdicts(axes: Axes, view: View, variable: str) -> None:
+def draw_verdicts(axes: style.Axes, view: View, variable: str) -> None:
     """Draw a coordinate or the decay time of all equilibria over one parameter, by their verdicts."""
-    codes, verdict = flag_codes(view.variable("verdict")), view.data("verdict")
+    codes, verdict = style.flag_codes(view.variable("verdict")), view.data("verdict")
     values = np.asarray(view.data(variable), dtype=np.float64)
     x = np.broadcast_to(view.axis(view.axes[0])[:, None], values.shape)
     for word, (color, marker) in VERDICTS.items():
         there = (verdict == codes[word]) & np.isfinite(values)
         if there.any():
-            axes.plot(
-                x[there],
-                values[there],
-                marker,
-                color=color,
-                ms=3,
-                ls="none",
-                label=word.replace("_", " "),
-            )
+            look: Any = {"color": color, "ms": 3, "ls": "none", "label": word.replace("_", " ")}
+            axes.plot(x[there], values[there], marker, **look)
     if variable == "decay_time":
         axes.set(ylabel="slowest decay time\nof the stable [s]", yscale="log")
         _widen(axes, 0.9, 1.1)
-        logarithmic(axes.yaxis)
+        style.logarithmic(axes.yaxis)
     else:
         _widen(axes, -LEAST_SPAN, LEAST_SPAN)
-        axes.set_ylabel(quantity(view.dataset, variable))
+        axes.set_ylabel(style.quantity(view.dataset, variable))
     _own(axes, view)
 
 
-def _widen(axes: Axes, low: float, high: float) -> None:
+def _widen(axes: style.Axes, low: float, high: float) -> None:
     """Rounding shall not look like structure."""
     bottom, top = axes.get_ylim()
     middle = 0.5 * (bottom + top)
@@ -172,7 +144,7 @@ def _looks(
         seen += 1
 
 
-def _decay_times(axes: Axes, view: View, name: str) -> None:
+def _decay_times(axes: style.Axes, view: View, name: str) -> None:
     sheets = [sheet for sheet in _sheets(view, name, "decay_time", {}) if sheet[0] == 0]
     for (color, dash, width, _), x, y in _looks(sheets):
         axes.semilogy(x, y, color=color, ls=dash, lw=width, marker="." if np.isfinite(y).sum() < 2 else "")
@@ -180,7 +152,7 @@ def _decay_times(axes: Axes, view: View, name: str) -> None:
     if known.size:
         if known.max() > SLOWEST_SHOWN * known.min():
             axes.set_ylim(0.5 * known.min(), SLOWEST_SHOWN * known.min())
-        logarithmic(axes.yaxis)
+        style.logarithmic(axes.yaxis)
     axes.set_ylabel("slowest decay time\nof the stable [s]")
     _own(axes, view)
 
@@ -189,7 +161,7 @@ def _kinds(view: View, folds: dict[str, Floats]) -> dict[str, NDArray[np.bool_]]
     """Which folds are of which kind; files of older versions tell none."""
     if not view.has("fold_kind"):
         return {"fold": np.ones(folds["at"].size, dtype=bool)}
-    codes, kind = flag_codes(view.variable("fold_kind")), view.variable("fold_kind").data
+    codes, kind = style.flag_codes(view.variable("fold_kind")), view.variable("fold_kind").data
     found = {name: kind == codes[name] for name in (*MARKS, *codes.others(MARKS))}
     return {name: there for name, there in found.items() if there.any()}
 
@@ -206,7 +178,7 @@ def _told(view: View, folds: dict[str, Floats], name: str) -> str:
     return told + not_proved(view)
 
 
-def _own(axes: Axes, view: View) -> None:
+def _own(axes: style.Axes, view: View) -> None:
     point = view.own()
     if point is not None:
         axes.axvline(point[0], color="black", lw=1.0, ls="-.", label="the scene")
@@ -233,7 +205,7 @@ def _sheets(
         curves.append((int(index), x.copy(), np.asarray(line, dtype=np.float64)))
     for at, angle in zip(folds.get("at", ()), folds.get(f"fold_{variable}", ()), strict=True):
         _lead_to_fold(curves, float(at), float(angle))
-    goes_round = variable in ANGLES
+    goes_round = variable in style.ANGLES
     return [
         (index, *(_cut(xs, ys) if goes_round else (xs, ys)))
         for index, xs, ys in curves
@@ -264,12 +236,12 @@ def _cut(x: Floats, y: Floats) -> tuple[Floats, Floats]:
 #: Colours of counts, the same in both maps.
 COUNT_COLORS = {
     0: "#bdbdbd",
-    1: PALETTE["sky"],
-    2: PALETTE["orange"],
-    3: PALETTE["purple"],
+    1: style.PALETTE["sky"],
+    2: style.PALETTE["orange"],
+    3: style.PALETTE["purple"],
     4: "#d5e3ec",
-    5: PALETTE["green"],
-    6: PALETTE["yellow"],
+    5: style.PALETTE["green"],
+    6: style.PALETTE["yellow"],
 }
 
 #: Half of the smallest range of an axis or a colour bar [rad or m]: rounding shall not look like structure.
@@ -287,12 +259,12 @@ UNSETTLED = {"at_fold": "|", "degenerate": "x", "unproved": "+"}
 _ORDER = ("deepest", "second", "third")
 
 
-def draw_equilibrium_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
+def draw_equilibrium_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Pictures of a dataset of the scan type ``equilibrium_map`` about the scene with these parameters."""
     view = make_view(dataset, scene)
-    with style():
+    with style.style():
         if len(view.axes) == 1:
-            if not view.has(*coordinates_of(dataset)):
+            if not view.has(*style.coordinates_of(dataset)):
                 return {}
             if "mechanism" in dataset.attrs:
                 return {"branches": draw_places(view)} if view.has("verdict") else {}
@@ -300,64 +272,51 @@ def draw_equilibrium_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[s
         figures = {}
         if view.has("count", "count_stable", "outcome"):
             figures["count"] = _counts(view)
-        first, *others = coordinates_of(dataset)
-        needed = (
-            "count_stable",
-            "energy",
-            first,
-            "verdict" if "mechanism" in dataset.attrs else "morse_index",
-        )
-        if not view.has(*needed) or not view.ranks:
+        first, *others = style.coordinates_of(dataset)
+        stability = "verdict" if "mechanism" in dataset.attrs else "morse_index"
+        if not view.has("count_stable", "energy", first, stability) or not view.ranks:
             return figures
         if view.has(*others):
             figures["angles"] = _angles(view)
-        if view.has("depth") and np.isfinite(view.stable(0, view.data("depth"))).any():
-            figures["barrier"] = _barrier(view)
-        if view.has("decay_time") and np.isfinite(view.stable(0, view.data("decay_time"))).any():
-            figures["decay"] = _decay(view)
+        for name, variable, draw in (("barrier", "depth", _barrier), ("decay", "decay_time", _decay)):
+            if view.has(variable) and np.isfinite(view.stable(0, view.data(variable))).any():
+                figures[name] = draw(view)
         return figures
 
 
-def _counts(view: View) -> Figure:
-    figure = new_figure(9.6, 5.6)
-    for axes, name, title in zip(
-        figure.subplots(1, 2),
-        ("count", "count_stable"),
-        ("Number of equilibria", "Number of stable equilibria"),
-        strict=True,
-    ):
+def _counts(view: View) -> style.Figure:
+    figure = style.new_figure(9.6, 5.6)
+    titles = {"count": "Number of equilibria", "count_stable": "Number of stable equilibria"}
+    for axes, (name, title) in zip(figure.subplots(1, 2), titles.items(), strict=True):
         curves = draw_count(axes, view, name, title)
     _finish(figure, view, curves)
     return figure
 
 
-def draw_count(axes: Axes, view: View, name: str, title: str) -> list[Artist]:
+def draw_count(axes: style.Axes, view: View, name: str, title: str) -> list[style.Artist]:
     """Draw a number of equilibria over two parameters; returns the curves' entries of a legend."""
     from matplotlib import colormaps
-    from matplotlib.colors import ListedColormap, to_hex
-    from matplotlib.patches import Patch
+    from matplotlib.colors import to_hex
 
     most = max(6, int(view.data("count").max()))
     more = colormaps["tab20c"](np.linspace(0.0, 1.0, max(1, most - 6)))
     looks = {**COUNT_COLORS, **{n: to_hex(more[n - 7]) for n in range(7, most + 1)}}
-    colors = ListedColormap(list(looks.values()))
-    counts = view.data(name)
-    axes.pcolormesh(
-        *map(view.axis, view.axes), counts.T, cmap=colors, vmin=-0.5, vmax=most + 0.5, shading="nearest"
-    )
-    handles: list[Artist] = [
-        Patch(color=looks[int(n)], label=f"{n} ({np.mean(counts == n):.1%})") for n in np.unique(counts)
+    counts, (x, y) = view.data(name), map(view.axis, view.axes)
+    style.paint(axes, x, y, counts, list(looks.values()))
+    handles = [
+        style.swatch(f"{n} ({np.mean(counts == n):.1%})", looks[int(n)], looks[int(n)])
+        for n in np.unique(counts)
     ]
     curves = draw_curves(axes, view)
-    legend_under(axes, handles + _mark_unsettled(axes, view) + _mark_own(axes, view), 3)
+    style.legend_under(axes, handles + _mark_unsettled(axes, view) + _mark_own(axes, view), 3)
     _label(axes, view, title)
     return curves
 
 
-def _mark_unsettled(axes: Axes, view: View) -> list[Artist]:
+def _mark_unsettled(axes: style.Axes, view: View) -> list[style.Artist]:
     x, y = np.meshgrid(*map(view.axis, view.axes), indexing="ij")
-    codes = flag_codes(view.dataset["outcome"])
-    handles: list[Artist] = []
+    codes = style.flag_codes(view.dataset["outcome"])
+    handles: list[style.Artist] = []
     for name, marker in {**dict.fromkeys(codes.others({"complete"}), "P"), **UNSETTLED}.items():
         where = view.data("outcome") == codes[name]
         if where.any():
@@ -366,26 +325,26 @@ def _mark_unsettled(axes: Axes, view: View) -> list[Artist]:
     return handles
 
 
-def _mark_own(axes: Axes, view: View) -> list[Artist]:
+def _mark_own(axes: style.Axes, view: View) -> list[style.Artist]:
     point = view.own()
     if point is None:
         return []
     return list(axes.plot(*point, "*", color="white", mec="black", ms=15, ls="none", label="the scene"))
 
 
-def _angles(view: View) -> Figure:
-    names = coordinates_of(view.dataset)
-    figure = new_figure(1.6 + 4.6 * len(view.ranks), 0.4 + 3.8 * len(names))
+def _angles(view: View) -> style.Figure:
+    names = style.coordinates_of(view.dataset)
+    figure = style.new_figure(1.6 + 4.6 * len(view.ranks), 0.4 + 3.8 * len(names))
     panels = figure.subplots(len(names), len(view.ranks), squeeze=False, sharex=True, sharey=True)
     for row, name in enumerate(names):
         fields = [view.stable(rank, view.data(name)) for rank in view.ranks]
         look = _angle_look(fields, view.dataset[name].units)
         for rank, field in enumerate(fields):
             axes = panels[row, rank]
-            mesh = axes.pcolormesh(*map(view.axis, view.axes), field.T, shading="nearest", **look)
+            mesh = view.shade(axes, field, **look)
             curves = draw_curves(axes, view) + _mark_own(axes, view)
-            _label(axes, view, f"{symbol(name)} of the {_ORDER[rank]} stable equilibrium")
-        figure.colorbar(mesh, ax=panels[row, :], label=quantity(view.dataset, name))
+            _label(axes, view, f"{style.symbol(name)} of the {_ORDER[rank]} stable equilibrium")
+        figure.colorbar(mesh, ax=panels[row, :], label=style.quantity(view.dataset, name))
     _finish(figure, view, curves + _nothing(view))
     return figure
 
@@ -396,17 +355,17 @@ def _angle_look(fields: list[Floats], unit: str) -> dict[str, object]:
     if unit == "rad" and np.ptp(known) > 1.5 * np.pi:
         return {"cmap": "twilight", "vmin": -np.pi, "vmax": np.pi}
     middle, half = 0.5 * (known.min() + known.max()), max(0.5 * np.ptp(known), LEAST_SPAN)
-    return {"cmap": FIELD, "vmin": middle - half, "vmax": middle + half}
+    return {"cmap": style.FIELD, "vmin": middle - half, "vmax": middle + half}
 
 
-def _barrier(view: View) -> Figure:
+def _barrier(view: View) -> style.Figure:
     """Depth of each well, and the impulse on M2 that a blow needs at least to leave it."""
     rows = [("depth", "Energy to leave the {} well", "depth [J]")]
     if view.has("shock_limit_m2"):
         rows.append(("shock_limit_m2", "No smaller blow on M2 leaves the {} well", "impulse on M2 [N s]"))
-    figure = new_figure(0.6 + 5.4 * len(view.ranks), 1.4 + 4.2 * len(rows))
+    figure = style.new_figure(0.6 + 5.4 * len(view.ranks), 1.4 + 4.2 * len(rows))
     panels = figure.subplots(len(rows), len(view.ranks), squeeze=False, sharex=True, sharey=True)
-    handles: list[Artist] = []
+    handles: list[style.Artist] = []
     for row, (name, title, label) in zip(panels, rows, strict=True):
         for rank, axes in zip(view.ranks, row, strict=True):
             field = view.stable(rank, view.data(name))
@@ -421,12 +380,12 @@ def _barrier(view: View) -> Figure:
     return figure
 
 
-def _decay(view: View) -> Figure:
+def _decay(view: View) -> style.Figure:
     """Time in which the slowest linear mode of each stable equilibrium falls to 1/e."""
     fields = [view.stable(rank, view.data("decay_time")) for rank in view.ranks]
     known = np.concatenate([field[np.isfinite(field)] for field in fields])
     low, high = float(known.min()), min(float(known.max()), SLOWEST * float(known.min()))
-    figure = new_figure(1.9 + 4.6 * len(fields), 5.4)
+    figure = style.new_figure(1.9 + 4.6 * len(fields), 5.4)
     panels = figure.subplots(1, len(fields), squeeze=False, sharey=True)[0]
     for rank, (axes, field) in enumerate(zip(panels, fields, strict=True)):
         mesh = _field(axes, view, field, low, high)
@@ -438,42 +397,38 @@ def _decay(view: View) -> Figure:
     return figure
 
 
-def _field(axes: Axes, view: View, field: Floats, low: float, high: float) -> Any:
+def _field(axes: style.Axes, view: View, field: Floats, low: float, high: float) -> Any:
     """A field in logarithmic colours; values beyond the limits have the colour of the nearer one."""
     from matplotlib.colors import LogNorm
 
     norm = LogNorm(low, high if high > low else low * 1.0001)
-    shown = np.clip(field, low, high)
-    return axes.pcolormesh(*map(view.axis, view.axes), shown.T, shading="nearest", norm=norm, cmap=FIELD)
+    return view.shade(axes, np.clip(field, low, high), norm=norm, cmap=style.FIELD)
 
 
-def _bar(figure: Figure, mesh: Any, panels: list[Axes], label: str, extend: str) -> None:
+def _bar(figure: style.Figure, mesh: Any, panels: list[style.Axes], label: str, extend: str) -> None:
     """A colour bar with an arrow at the end beyond which there are values."""
     bar = figure.colorbar(mesh, ax=panels, label=label, extend=extend)
-    in_fifths(bar.ax.yaxis, mesh.norm.vmax <= 3.0 * mesh.norm.vmin / SHALLOWEST)
+    style.in_fifths(bar.ax.yaxis, mesh.norm.vmax <= 3.0 * mesh.norm.vmin / SHALLOWEST)
 
 
-def _nothing(view: View) -> list[Artist]:
+def _nothing(view: View) -> list[style.Artist]:
     """What white means where not every point has as many stable equilibria as panels."""
-    from matplotlib.patches import Patch
-
     if int(view.data("count_stable").min()) == len(view.ranks):
         return []
-    return [Patch(facecolor="white", edgecolor="#808080", label="white: no such equilibrium")]
+    return [style.swatch("white: no such equilibrium", "white", "#808080")]
 
 
-def _label(axes: Axes, view: View, title: str) -> None:
+def _label(axes: style.Axes, view: View, title: str) -> None:
     axes.set(xlabel=view.label(view.axes[0]), ylabel=view.label(view.axes[1]))
     axes.set_title(title, fontsize=10.5)
     axes.grid(visible=False)
 
 
-def _finish(figure: Figure, view: View, handles: list[Artist]) -> None:
+def _finish(figure: style.Figure, view: View, handles: list[style.Artist]) -> None:
     """The scene above everything, the legend below."""
     figure.suptitle(view.setting + not_proved(view), fontsize=10.0)
     for axes in figure.axes:
         if axes.get_subplotspec() is not None:
             axes.label_outer()
     if handles:
-        columns = 2 if figure.get_figwidth() > 8.0 else 1
-        figure.legend(handles=handles, loc="outside lower center", ncols=columns)
+        style.legend_below(figure, handles, 2 if figure.get_figwidth() > 8.0 else 1)

@@ -3,61 +3,52 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from fastmech.plots.style import LINES, entry, new_figure, style, symbol
+from fastmech.plots import style
 from fastmech.results import STATE_UNITS, Dataset
 
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
-
-def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
+def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Picture of a dataset of the scan type ``erosion`` about the scene with these parameters."""
-    from matplotlib.patches import Patch
-
     name = str(dataset.attrs["along"])
-    with style():
-        figure = new_figure(8.2, 10.0)
+    with style.style():
+        figure = style.new_figure(8.2, 10.0)
         panels = figure.subplots(3, 1, sharex=True)
-        handles: list[Artist] = []
+        handles: list[style.Artist] = []
         for well in range(dataset.sizes["well"]):
-            color = LINES[well % len(LINES)]
+            color = style.color(well)
             _stability(panels[0], dataset, well, color)
             _lines(panels[1], dataset, well, color, {"lim": ("-", "o"), "factor": ("--", "s")})
             _lines(panels[2], dataset, well, color, {"shock": ("-", "o"), "kick": ("--", "s")})
-            handles.append(entry(_name(dataset, well), color=color, lw=3.0))
+            handles.append(style.entry(_name(dataset, well), color=color, lw=3.0))
         _axes(panels, dataset, name)
         handles += [
-            Patch(facecolor="#bdbdbd", label="95 % Wilson interval, undecided starts as none or all"),
-            entry("if all undecided starts ended there", lw=1.0, ls=":"),
-            entry("about the well: LIM; shock of all four states", marker="o", ms=5),
-            entry("anywhere: IF; kick of the rates alone", ls="--", marker="s", ms=5),
-            entry("limited by the window", marker="o", mfc="white", ms=5, ls="none"),
-            entry("smaller one tried is undecided", marker="x", ms=6, ls="none"),
+            style.swatch("95 % Wilson interval, undecided starts as none or all", "#bdbdbd"),
+            style.entry("if all undecided starts ended there", lw=1.0, ls=":"),
+            style.entry("about the well: LIM; shock of all four states", marker="o", ms=5),
+            style.entry("anywhere: IF; kick of the rates alone", ls="--", marker="s", ms=5),
+            style.entry("limited by the window", marker="o", mfc="white", ms=5, ls="none"),
+            style.entry("smaller one tried is undecided", marker="x", ms=6, ls="none"),
         ]
         if _limited(dataset):
             look: dict[str, Any] = {"marker": "^", "mfc": "white", "ms": 6, "lw": 1.0, "ls": ":"}
-            handles.append(entry("radius, if all undecided starts ended there", **look))
-        figure.legend(handles=handles, loc="outside lower center", ncols=2)
+            handles.append(style.entry("radius, if all undecided starts ended there", **look))
+        style.legend_below(figure, handles)
         figure.suptitle(_title(dataset, scene, name))
         return {"profile": figure}
 
 
-def draw_stability(axes: Axes, dataset: Dataset) -> list[Artist]:
+def draw_stability(axes: style.Axes, dataset: Dataset) -> list[style.Artist]:
     """Draw the wells' shares of the starts; returns the legend's entries."""
     name = str(dataset.attrs["along"])
-    for well in range(dataset.sizes["well"]):
-        _stability(axes, dataset, well, LINES[well % len(LINES)])
+    colors = {well: style.color(well) for well in range(dataset.sizes["well"])}
+    for well, color in colors.items():
+        _stability(axes, dataset, well, color)
     axes.set(xlabel=_along(dataset, name), ylabel="share of the starts [%]", ylim=(0.0, 102.0))
-    return [
-        entry(_name(dataset, well), color=LINES[well % len(LINES)], lw=3.0)
-        for well in range(dataset.sizes["well"])
-    ]
+    return [style.entry(_name(dataset, well), color=color, lw=3.0) for well, color in colors.items()]
 
 
 def _along(dataset: Dataset, name: str) -> str:
@@ -75,22 +66,18 @@ def _name(dataset: Dataset, well: int) -> str:
     return f"well {well + 1}, seen from {values[0]:g} to {values[-1]:g} {dataset[name].units}"
 
 
-def _stability(axes: Axes, dataset: Dataset, well: int, color: str) -> None:
+def _stability(axes: style.Axes, dataset: Dataset, well: int, color: str) -> None:
     x = dataset[str(dataset.attrs["along"])].data
-    share = 100.0 * dataset["well_stability"].data[:, well]
-    axes.fill_between(
-        x,
-        100.0 * dataset["well_lower"].data[:, well],
-        100.0 * dataset["well_upper"].data[:, well],
-        color=color,
-        alpha=0.3,
-        lw=0,
-    )
+    names = ("stability", "lower", "upper", "undecided")
+    share, lower, upper, undecided = (100.0 * dataset[f"well_{name}"].data[:, well] for name in names)
+    axes.fill_between(x, lower, upper, color=color, alpha=0.3, lw=0)
     axes.plot(x, share, color=color, marker="o", ms=4)
-    axes.plot(x, share + 100.0 * dataset["well_undecided"].data[:, well], color=color, lw=1.0, ls=":")
+    axes.plot(x, share + undecided, color=color, lw=1.0, ls=":")
 
 
-def _lines(axes: Axes, dataset: Dataset, well: int, color: str, looks: Mapping[str, tuple[str, str]]) -> None:
+def _lines(
+    axes: style.Axes, dataset: Dataset, well: int, color: str, looks: Mapping[str, tuple[str, str]]
+) -> None:
     x = dataset[str(dataset.attrs["along"])].data
     for measure, (dashes, marker) in looks.items():
         y = dataset[f"well_{measure}"].data[:, well]
@@ -135,6 +122,6 @@ def _title(dataset: Dataset, scene: Mapping[str, float], name: str) -> str:
     spans = []
     for axis in dataset.attrs["axes"]:
         low, high = dataset.attrs[f"window_{axis}"]
-        spans.append(f"{symbol(axis)} from {low:.3g} to {high:.3g} {STATE_UNITS[axis]}")
+        spans.append(f"{style.symbol(axis)} from {low:.3g} to {high:.3g} {STATE_UNITS[axis]}")
     window = f"window: {', '.join(spans)}; runs to {dataset.attrs['t_end']:g} s"
     return f"Erosion of the wells along {name}; {held}\n{window}"

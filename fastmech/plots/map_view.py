@@ -4,21 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.plots.style import PALETTE, coordinates_of, flag_codes, setting_of
+from fastmech.plots import style
 from fastmech.results import Dataset, Variable
 from fastmech.scene import Scene
 from fastmech.store.read import Section
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-
 
 #: Points of an axis that are drawn at most; of longer ones every n-th is read.
 MOST_DRAWN = 1000
@@ -54,7 +49,7 @@ class View:
         own |= {name: float(self.axis(name)[i]) for name, i in self.held.items()}
         left_out = str(self.dataset.attrs.get("drawn", ""))
         if "mechanism" in self.dataset.attrs:
-            return setting_of(self.dataset, own) + left_out
+            return style.setting_of(self.dataset, own) + left_out
         decayed = own.get("alpha", self.scene["alpha"]) > 0.0 and "alpha" not in self.axes
         told = [
             f"{name} = {own[name]:.6g} {unit}"
@@ -72,6 +67,11 @@ class View:
     def axis(self, name: str) -> Floats:
         """Values along an axis."""
         return np.asarray(self.variable(name).data, dtype=np.float64)
+
+    def shade(self, axes: style.Axes, values: Floats, **look: Any) -> Any:
+        """A field over two parameters in colours."""
+        x, y = map(self.axis, self.axes)
+        return style.shade(axes, x, y, values, **look)
 
     def variable(self, name: str) -> Variable:
         """A variable of the map or of a group in it."""
@@ -103,7 +103,7 @@ class View:
         deepest = energy.min(axis=-1, keepdims=True)
         tied = energy <= deepest + ROUNDING * np.abs(deepest)
         order = np.lexsort(
-            (self.data(coordinates_of(self.dataset)[0]), np.where(tied, deepest, energy)), axis=-1
+            (self.data(style.coordinates_of(self.dataset)[0]), np.where(tied, deepest, energy)), axis=-1
         )
         chosen = (np.argsort(order, axis=-1) == rank) & np.isfinite(energy)
         return np.where(chosen.any(axis=-1), np.where(chosen, values, 0.0).sum(axis=-1), np.nan)
@@ -150,19 +150,12 @@ def load_drawn(section: Section, scene: Mapping[str, float]) -> Dataset:
             step = -(-section.sizes[name] // MOST_DRAWN)
             part[name] = slice(None, None, step)
             left_out += f"; 1 in {step} values of {name}"
-    wanted = [
-        name
-        for name in section
-        if name in (*DRAWN, *coordinates_of(section)) or not _over_equilibria(section, name)
-    ]
+    shown = {*DRAWN, *style.coordinates_of(section)}
+    wanted = [name for name in section if name in shown or "root" not in section.dims(name)]
     dataset = section.load(wanted, part)
     attrs = {**dataset.attrs, **({"drawn": left_out} if left_out else {})}
     groups = {name: group.load() for name, group in section.groups.items()}
     return Dataset(dataset.variables, attrs, groups)
-
-
-def _over_equilibria(section: Section, name: str) -> bool:
-    return "root" in section.dims(name)
 
 
 #: How fold curves look, by their kind and what merges with a saddle.
@@ -175,17 +168,17 @@ FOLDS = {
 
 #: How vanishing-damping curves look, by what vanishes.
 UNREACHED = {
-    "sin_phi": (PALETTE["vermillion"], "-", "damping misses a mode: sin φ = 0"),
-    "sin_phi_theta": (PALETTE["vermillion"], "--", "damping misses a mode: sin(φ+θ) = 0"),
-    "unloaded_rod": (PALETTE["vermillion"], ":", "damping misses a mode: rod M1M2 unloaded"),
+    "sin_phi": (style.PALETTE["vermillion"], "-", "damping misses a mode: sin φ = 0"),
+    "sin_phi_theta": (style.PALETTE["vermillion"], "--", "damping misses a mode: sin(φ+θ) = 0"),
+    "unloaded_rod": (style.PALETTE["vermillion"], ":", "damping misses a mode: rod M1M2 unloaded"),
 }
 
 
-def draw_curves(axes: Axes, view: View) -> list[Artist]:
+def draw_curves(axes: style.Axes, view: View) -> list[style.Artist]:
     """Draw what the map has of curves; returns one handle a legend entry."""
     if len(view.dataset.attrs["axes"]) != 2 or not (view.has("fold_curve") or view.has("unreached_curve")):
         return []
-    handles: list[Artist] = []
+    handles: list[style.Artist] = []
     merges, kinds = _codes(view, "fold_merges"), _codes(view, "fold_kind")
     # Files of older versions tell no kind; those of others may know kinds that this one does not.
     shown = [(kind, name) for kind in kinds or ["fold"] for name in merges]
@@ -222,12 +215,12 @@ def _codes(view: View, name: str) -> dict[str, NDArray[np.bool_]]:
     if not view.has(name):
         return {}
     variable = view.variable(name)
-    return {code: variable.data == value for code, value in flag_codes(variable).items()}
+    return {code: variable.data == value for code, value in style.flag_codes(variable).items()}
 
 
 def _line(
-    axes: Axes, view: View, what: str, chosen: NDArray[np.bool_], look: tuple[str, Any, float, str]
-) -> list[Artist]:
+    axes: style.Axes, view: View, what: str, chosen: NDArray[np.bool_], look: tuple[str, Any, float, str]
+) -> list[style.Artist]:
     """Some of the curves in one look, each one with a point more that breaks the line."""
     from matplotlib.patheffects import Normal, Stroke
 

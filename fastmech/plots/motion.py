@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from fastmech.arrays import Floats
-from fastmech.plots.style import LINES, coordinates_of, logarithmic, new_figure, style, symbol
+from fastmech.plots import style
 from fastmech.results import Dataset
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 TIME = "time t [s]"
 KINDS = {"rad": "angle", "m": "position"}
@@ -27,12 +22,12 @@ _REACTIONS = {
 }
 
 
-def draw_motion(dataset: Dataset) -> dict[str, Figure]:
+def draw_motion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Pictures of a dataset of the scan type ``motion``."""
-    names = coordinates_of(dataset)
+    names = style.coordinates_of(dataset)
     states = (*names, *(f"{name}_dot" for name in names))
     points = _points(dataset)
-    with style():
+    with style.style():
         figures = {"angles": _states(dataset, states)}
         if points:
             figures["coordinates"] = _coordinates(dataset, points)
@@ -41,7 +36,7 @@ def draw_motion(dataset: Dataset) -> dict[str, Figure]:
         return figures | {"energies": _energies(dataset), "residuals": _residuals(dataset, states)}
 
 
-def _states(dataset: Dataset, states: tuple[str, ...]) -> Figure:
+def _states(dataset: Dataset, states: tuple[str, ...]) -> style.Figure:
     """A panel for each unit."""
     t = dataset["time"].data
     units = list(dict.fromkeys(dataset[name].units for name in states))
@@ -53,13 +48,13 @@ def _states(dataset: Dataset, states: tuple[str, ...]) -> Figure:
     return figure
 
 
-def draw_states(axes: Axes, t: Floats, values: Mapping[str, Floats], unit: str) -> None:
+def draw_states(axes: style.Axes, t: Floats, values: Mapping[str, Floats], unit: str) -> None:
     """Draw states of one unit over time, each (times,) or (times, trajectories), in one look a state."""
     for k, (name, states) in enumerate(values.items()):
-        look: Any = {"color": LINES[k % len(LINES)], "ls": ("-", "--", "-.", ":")[k % 4]}
+        look: Any = {"color": style.color(k), "ls": ("-", "--", "-.", ":")[k % 4]}
         look["marker"] = "o" if t.size == 1 else ""
         first, *_ = axes.plot(t, states, **look)
-        first.set_label(symbol(name))
+        first.set_label(style.symbol(name))
     kind = KINDS.get(unit, "rate" if "/s" in unit else "state")
     axes.set_ylabel(kind if unit == "1" else f"{kind} [{unit}]")
 
@@ -72,9 +67,9 @@ def _points(dataset: Dataset) -> dict[str, tuple[str, str | None]]:
     return {name.removeprefix("point_"): (f"{name}_x", f"{name}_y") for name in found}
 
 
-def _coordinates(dataset: Dataset, points: dict[str, tuple[str, str | None]]) -> Figure:
+def _coordinates(dataset: Dataset, points: dict[str, tuple[str, str | None]]) -> style.Figure:
     t = dataset["time"].data
-    figure = new_figure(7.2, 7.4)
+    figure = style.new_figure(7.2, 7.4)
     over_time, paths = figure.subplots(2, 1, height_ratios=[1.0, 1.3])
     for point, (along, up) in points.items():
         for axis, name, line in (("x", along, "-"), ("y", up, "--")):
@@ -94,7 +89,7 @@ def _coordinates(dataset: Dataset, points: dict[str, tuple[str, str | None]]) ->
     return figure
 
 
-def _reactions(dataset: Dataset) -> Figure:
+def _reactions(dataset: Dataset) -> style.Figure:
     t = dataset["time"].data
     figure, panels = _rows(len(_REACTIONS), 1.9)
     for axes, (name, title) in zip(panels, _REACTIONS.items(), strict=True):
@@ -107,7 +102,7 @@ def _reactions(dataset: Dataset) -> Figure:
     return figure
 
 
-def _mark_extremes(axes: Axes, t: Floats, values: Floats) -> None:
+def _mark_extremes(axes: style.Axes, t: Floats, values: Floats) -> None:
     texts = []
     for name, i, marker in (("max", np.nanargmax(values), "^"), ("min", np.nanargmin(values), "v")):
         axes.plot(t[i], values[i], marker, color="black", ms=6)
@@ -116,7 +111,7 @@ def _mark_extremes(axes: Axes, t: Floats, values: Floats) -> None:
     axes.margins(y=0.12)
 
 
-def _energies(dataset: Dataset) -> Figure:
+def _energies(dataset: Dataset) -> style.Figure:
     t = dataset["time"].data
     kinetic, potential = dataset["kinetic_energy"].data, dataset["potential_energy"].data
     figure, (energies, works) = _rows(2)
@@ -137,13 +132,13 @@ def _energies(dataset: Dataset) -> Figure:
     return figure
 
 
-def _residuals(dataset: Dataset, states: tuple[str, ...]) -> Figure:
+def _residuals(dataset: Dataset, states: tuple[str, ...]) -> style.Figure:
     t = dataset["time"].data
     of_paper = "energy_residual" in dataset
     figure, panels = _rows(3 if of_paper else 1)
     for name in states:
         difference = dataset[f"formulation_difference_{name}"]
-        _log_plot(panels[0], t, difference.data, f"{symbol(name)} [{difference.units}]")
+        _log_plot(panels[0], t, difference.data, f"{style.symbol(name)} [{difference.units}]")
     panels[0].set(ylabel="difference [SI]", title="Canonical equations less Lagrange's")
     if of_paper:
         _, constraints, energy = panels
@@ -154,28 +149,28 @@ def _residuals(dataset: Dataset, states: tuple[str, ...]) -> Figure:
         _log_plot(energy, t, dataset["energy_residual"].data, "[J]")
         energy.set(ylabel="residual [J]", title="Change of T + Π less the works of damper and force")
     for axes in panels:
-        logarithmic(axes.yaxis)
+        style.logarithmic(axes.yaxis)
     for axes in panels[:2]:
         _legend(axes)
     return figure
 
 
-def _log_plot(axes: Axes, t: Floats, values: Floats, label: str) -> None:
+def _log_plot(axes: style.Axes, t: Floats, values: Floats, label: str) -> None:
     """Magnitudes on a logarithmic axis; exact zeros have no place there and are left out."""
     size = np.abs(values)
     size = np.where(size > 0.0, size, np.nan)
     axes.semilogy(t, size, ".", ms=2.0, label=label if np.isfinite(size).any() else f"{label}: all 0")
 
 
-def _legend(axes: Axes) -> None:
+def _legend(axes: style.Axes) -> None:
     axes.legend(
         loc="center left", bbox_to_anchor=(1.0, 0.5), markerscale=2.0 if axes.get_yscale() == "log" else 1.0
     )
 
 
-def _rows(count: int, height: float = 2.4) -> tuple[Figure, list[Axes]]:
+def _rows(count: int, height: float = 2.4) -> tuple[style.Figure, list[style.Axes]]:
     """A figure with panels over one axis of time."""
-    figure = new_figure(7.2, count * height + 0.4)
+    figure = style.new_figure(7.2, count * height + 0.4)
     panels = list(figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0])
     panels[-1].set_xlabel(TIME)
     return figure, panels

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from fastmech.plots import style
 from fastmech.plots.basins import COLORS, Slice, describe, draw_ends, draw_labels
 from fastmech.plots.equilibria import draw_potential, mark_kinds
 from fastmech.plots.equilibrium_map import LEAST_SPAN, draw_branches, draw_count, draw_verdicts, folds_of
 from fastmech.plots.erosion import draw_stability
 from fastmech.plots.map_view import draw_curves, make_view
 from fastmech.plots.motion import TIME, draw_states
-from fastmech.plots.style import LINES, coordinates_of, legend_under, quantity, symbol
 from fastmech.results import coordinate_units, state_units
 from fastmech.scene import Scene
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 #: Trajectories that are drawn at most: evenly chosen ones.
 MOST_LINES = 50
@@ -28,7 +25,7 @@ def _parameters(system: Any) -> dict[str, float]:
     return {name: value for name, (value, *_) in system.described().items()}
 
 
-def draw_trajectories(found: Any, axes: Axes) -> None:
+def draw_trajectories(found: Any, axes: style.Axes) -> None:
     """Coordinates over time, of at most 50 trajectories; of a system of one's own all states."""
     units = state_units(found.system)
     kept = list(dict.fromkeys(np.linspace(0, found.y.shape[1] - 1, MOST_LINES).astype(int)))
@@ -39,47 +36,48 @@ def draw_trajectories(found: Any, axes: Axes) -> None:
     axes.legend()
 
 
-def draw_disturbances(found: Any, axes: Axes) -> None:
+def draw_disturbances(found: Any, axes: style.Axes) -> None:
     """Share of all disturbances that are back for good, over time."""
     times = np.sort(found.time_to_return[np.isfinite(found.time_to_return)])
     share = 100.0 * np.arange(1, times.size + 1) / found.outcome.size
     axes.step(
         np.append(times, found.t_end), np.append(share, share[-1:] if times.size else 0.0), where="post"
     )
-    axes.axhline(100.0 * found.share_returned, color=LINES[1], ls="--", label="proved to return")
+    axes.axhline(100.0 * found.share_returned, color=style.LINES[1], ls="--", label="proved to return")
     axes.set(xlabel=TIME, ylabel="share of the disturbances back [%]", xlim=(0.0, None), ylim=(0.0, 103.0))
     axes.legend()
 
 
-def draw_departures(found: Any, axes: Axes) -> None:
+def draw_departures(found: Any, axes: style.Axes) -> None:
     """Departures of the coordinates, nonlinear solid and linearized dashed."""
     names = list(coordinate_units(found.system).items())
     for k, (name, unit) in enumerate(names):
         nonlinear, linearized = (motion[:, :MOST_LINES, k] for motion in (found.nonlinear, found.linearized))
-        axes.plot(found.t, nonlinear, color=LINES[k])[0].set_label(f"{symbol(name)} [{unit}]")
-        axes.plot(found.t, linearized, color=LINES[k], ls="--")
+        axes.plot(found.t, nonlinear, color=style.LINES[k])[0].set_label(f"{style.symbol(name)} [{unit}]")
+        axes.plot(found.t, linearized, color=style.LINES[k], ls="--")
     axes.plot([], [], color="black", ls="--", label="linearized")
     axes.set(xlabel=TIME, ylabel="departure from the equilibrium")
     axes.legend()
 
 
-def draw_resting(found: Any, axes: Axes) -> None:
+def draw_resting(found: Any, axes: style.Axes) -> None:
     """Equilibria by kind: on a scene's potential, else over two coordinates, or one and the energy."""
     dataset = found.dataset()
     if isinstance(found.system, Scene):
         draw_potential(axes, dataset, found.system)
     else:
-        x, y = (*coordinates_of(dataset), "energy")[:2]
+        x, y = (*style.coordinates_of(dataset), "energy")[:2]
         mark_kinds(axes, dataset, (x, y))
-        axes.set(xlabel=quantity(dataset, x), ylabel="energy [J]" if y == "energy" else quantity(dataset, y))
+        told = [style.quantity(dataset, name) if name != "energy" else "energy [J]" for name in (x, y)]
+        axes.set(xlabel=told[0], ylabel=told[1])
         for axis, name in (("x", x), ("y", y)):
             low, high = dataset[name].data.min(), dataset[name].data.max()
             room = 0.15 * (high - low) + LEAST_SPAN
             getattr(axes, f"set_{axis}lim")(low - room, high + room)
-    legend_under(axes, columns=4)
+    style.legend_under(axes, columns=4)
 
 
-def draw_map(found: Any, axes: Axes) -> None:
+def draw_map(found: Any, axes: style.Axes) -> None:
     """Numbers of equilibria over two parameters; over one phi, or the coordinate that varies most."""
     view = make_view(found.dataset(), _parameters(found.system))
     if len(view.axes) == 2:
@@ -88,13 +86,13 @@ def draw_map(found: Any, axes: Axes) -> None:
     if isinstance(found.system, Scene):
         draw_branches(axes, view, "phi", folds_of(view, view.axes[0]))
     else:
-        names = coordinates_of(view.dataset)
+        names = style.coordinates_of(view.dataset)
         draw_verdicts(axes, view, max(names, key=lambda name: np.ptp(np.nan_to_num(view.axis(name)))))
     axes.set_xlabel(view.label(view.axes[0]))
-    legend_under(axes)
+    style.legend_under(axes)
 
 
-def draw_curves_of(found: Any, axes: Axes) -> None:
+def draw_curves_of(found: Any, axes: style.Axes) -> None:
     """Fold curves, and where damping misses a mode; folds over one parameter as places of the first angle."""
     dataset = found.dataset()
     units = found.system.described()
@@ -107,72 +105,72 @@ def draw_curves_of(found: Any, axes: Axes) -> None:
 
     handles = draw_curves(axes, View(dataset, {}, names, {}))
     axes.set(**{f"{k}label": f"{n} [{units[n][1]}]" for k, n in zip("xy", names, strict=True)})
-    legend_under(axes, handles)
+    style.legend_under(axes, handles)
 
 
-def draw_critical_curves(found: Any, axes: Axes) -> None:
+def draw_critical_curves(found: Any, axes: style.Axes) -> None:
     """Critical curves by their kind, and cusps."""
     kinds = list(dict.fromkeys(curve.kind for curve in found.curves))
     for curve in found.curves:
         k = kinds.index(curve.kind)
-        (line,) = axes.plot(curve.x, curve.y, color=LINES[k], ls=("-", "--", "-.", ":")[k % 4])
+        (line,) = axes.plot(curve.x, curve.y, color=style.LINES[k], ls=("-", "--", "-.", ":")[k % 4])
         line.set_label(curve.kind if curve is next(c for c in found.curves if c.kind == curve.kind) else "")
     if len(found.cusps):
         axes.plot(*found.cusps[:, :2].T, "D", color="white", mec="black", ls="none", label="cusp")
     units = found.system.described()
     axes.set(**{f"{k}label": f"{n} [{units[n][1]}]" for k, n in zip("xy", found.names, strict=True)})
-    legend_under(axes)
+    style.legend_under(axes)
 
 
-def draw_erosion_profile(found: Any, axes: Axes) -> None:
+def draw_erosion_profile(found: Any, axes: style.Axes) -> None:
     """Shares of the starts that end in each well, with their intervals."""
-    legend_under(axes, draw_stability(axes, found.dataset()), 1)
+    style.legend_under(axes, draw_stability(axes, found.dataset()), 1)
 
 
-def draw_snapping_map(found: Any, axes: Axes) -> None:
+def draw_snapping_map(found: Any, axes: style.Axes) -> None:
     """Where motions end over force and decay rate."""
-    legend_under(axes, draw_ends(axes, found.dataset().merged, _parameters(found.system)))
+    style.legend_under(axes, draw_ends(axes, found.dataset().merged, _parameters(found.system)))
 
 
-def draw_exponents(found: Any, axes: Axes) -> None:
+def draw_exponents(found: Any, axes: style.Axes) -> None:
     """Estimates of the largest Lyapunov exponent over time."""
-    axes.plot(found.t, found.exponents[:, :MOST_LINES], color=LINES[0])
+    axes.plot(found.t, found.exponents[:, :MOST_LINES], color=style.LINES[0])
     axes.set(xlabel=TIME, ylabel="largest Lyapunov exponent [1/s]")
 
 
-def draw_attractors(found: Any, axes: Axes) -> None:
+def draw_attractors(found: Any, axes: style.Axes) -> None:
     """Points of the attractors over the first two states."""
     columns = [0, min(1, len(found.names) - 1)]
     for k, one in enumerate(found.attractors):
         look: Any = {"marker": "o", "ms": 8} if len(one.points) == 1 else {"marker": ".", "ms": 3}
-        axes.plot(*one.points[:, columns].T, ls="none", color=LINES[k % len(LINES)], label=one.name, **look)
+        axes.plot(
+            *one.points[:, columns].T,
+            ls="none",
+            color=style.color(k),
+            label=one.name,
+            **look,
+        )
     axes.set(**{f"{x}label": found.names[c] for x, c in zip("xy", columns, strict=True)})
-    legend_under(axes, columns=1)
+    style.legend_under(axes, columns=1)
 
 
-def draw_basin_map(found: Any, axes: Axes) -> None:
+def draw_basin_map(found: Any, axes: style.Axes) -> None:
     """Who ends where over the first two axes that vary."""
     dataset = found.dataset()
     if "equilibria" in dataset.groups:
         scene = found.system if isinstance(found.system, Scene) else None
         view = Slice(dataset.merged, scene)
-        legend_under(axes, draw_labels(axes, view))
+        style.legend_under(axes, draw_labels(axes, view))
         describe(axes, view, _parameters(found.system))
         return
-    from matplotlib.colors import ListedColormap
-    from matplotlib.patches import Patch
-
     names = [*found.axes][:2]
     well = found.well.reshape(*(found.axes[n].size for n in names), -1)
     well = well[..., well.shape[-1] // 2].reshape(found.axes[names[0]].size, -1)
     there = np.unique(well)
     colors = ["#ffffff" if k < 0 else COLORS[i % len(COLORS)] for i, k in enumerate(there)]
     y = found.axes[names[1]] if len(names) > 1 else np.zeros(1)
-    picture = np.searchsorted(there, well)
-    limits: Any = {"vmin": -0.5, "vmax": there.size - 0.5, "cmap": ListedColormap(colors)}
-    axes.pcolormesh(found.axes[names[0]], y, picture.T, shading="nearest", rasterized=True, **limits)
+    style.paint(axes, found.axes[names[0]], y, np.searchsorted(there, well), colors)
     axes.set(xlabel=names[0], ylabel=names[1] if len(names) > 1 else "")
     told = ["no label" if k < 0 else f"code {k}" if found.tree is None else found.tree[k].name for k in there]
     shares = [f"{text}: {np.mean(well == k):.1%}" for k, text in zip(there, told, strict=True)]
-    patches = [Patch(facecolor=c, edgecolor="black", label=t) for c, t in zip(colors, shares, strict=True)]
-    legend_under(axes, patches, 1)
+    style.legend_under(axes, [style.swatch(t, c, "black") for c, t in zip(colors, shares, strict=True)], 1)

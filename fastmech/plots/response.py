@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from fastmech.errors import InputError
-from fastmech.plots.style import LINES, new_figure, setting_of, style
+from fastmech.plots import style
 from fastmech.results import Dataset
 from fastmech.scene import nearest
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 #: What tells areas of the same colour apart.
 HATCHES = ("", "//", "..", "xx")
@@ -23,65 +19,87 @@ HATCHES = ("", "//", "..", "xx")
 MARKERS = {"fold": "o", "period doubling": "s", "Neimark-Sacker": "D"}
 
 
-def draw_response(response: Any, ax: Axes, state: str | None = None) -> None:
-    """Draw the amplitude of a state, the first by default, over the parameter: stable solid, unstable dashed.
+def draw_frequency_response(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
+    """Amplitudes of the first coordinate over the parameter; stable solid, unstable dashed."""
+    lines = max((v.data.size for v in dataset.variables.values()), default=1)
+    return {"response": _lines(dataset, scene, _response, lines)}
+
+
+def draw_response(response: Any, ax: style.Axes, state: str | None = None) -> None:
+    """Draw the amplitude of a state, the first by default, over the parameter.
 
     Raises:
         InputError: there is no such state.
     """
-    state = response.names[0] if state is None else state
-    if state not in response.names:
+    if state is not None and state not in response.names:
         raise InputError(f"state: {nearest(str(state), list(response.names))}")
-    column = response.names.index(state)
-    for k, branch in enumerate(response.branches):
-        color = LINES[k % len(LINES)]
-        stable = branch.stable
-        change = np.flatnonzero(np.diff(stable.astype(int))) + 1
-        for part in np.split(np.arange(len(stable)), change):
-            joined = np.append(part, part[-1] + 1) if part[-1] + 1 < len(stable) else part
-            look: dict[str, Any] = {"ls": "-", "lw": 1.8} if stable[part[0]] else {"ls": "--", "lw": 1.2}
-            ax.plot(branch.values[joined], branch.amplitudes[joined, column], color=color, **look)
+    _response(response.dataset(), ax, 0, state)
+
+
+def _response(dataset: Dataset, ax: style.Axes, line: int, state: str | None = None) -> None:
+    points, special = dataset.groups["points"], dataset.groups["special"]
+    prefix = "amplitude_"
+    states = [n.removeprefix(f"point_{prefix}") for n in points if n.startswith(f"point_{prefix}")]
+    amplitude = f"{prefix}{state or states[0]}"
+    mine, own = points["point_line"].data == line, points["point_branch"].data
+    multipliers = points["point_multiplier_re"].data + 1j * points["point_multiplier_im"].data
+    stable = np.all(np.abs(multipliers) < 1.0, axis=1, keepdims=False)
+    for k, branch in enumerate(np.unique(own[mine])):
+        at = np.flatnonzero(mine & (own == branch))
+        for part in np.split(np.arange(at.size), np.flatnonzero(np.diff(stable[at].astype(int))) + 1):
+            joined = at[part[0] : part[-1] + 2]
+            look: dict[str, Any] = {"ls": "-", "lw": 1.8} if stable[joined[0]] else {"ls": "--", "lw": 1.2}
+            x, y = points["point_value"].data[joined], points[f"point_{amplitude}"].data[joined]
+            ax.plot(x, y, color=style.color(k), **look)
     for kind, marker in MARKERS.items():
-        points = [s for s in response.special if s.kind == kind]
-        if points:
-            x, y = [s.value for s in points], [s.amplitude[column] for s in points]
+        there = (special["special_line"].data == line) & (special["special_kind"].data == kind)
+        if there.any():
+            x, y = special["special_value"].data[there], special[f"special_{amplitude}"].data[there]
             ax.plot(x, y, marker, ls="none", mfc="white", mec="black", ms=5, label=kind, zorder=4)
     ax.plot([], [], "-", color="black", lw=1.8, label="stable")
     ax.plot([], [], "--", color="black", lw=1.2, label="unstable")
-    ax.set(
-        xlabel=_with_unit(response, response.parameter),
-        ylabel=f"amplitude of {_with_unit(response, state)}",
-        title=f"Periodic motion, period {response.periods} of the forcing",
-    )
+    parameter = style.with_unit(str(dataset.attrs["parameter"]), points["point_value"].units)
+    about = style.with_unit(amplitude.removeprefix(prefix), points[f"point_{amplitude}"].units)
+    ax.set(xlabel=parameter, ylabel=f"amplitude of {about}")
+    ax.set_title(f"Periodic motion, period {dataset.attrs['periods']} of the forcing")
     ax.legend()
 
 
-def _with_unit(response: Any, name: str) -> str:
-    unit = response.units.get(name)
-    return f"{name} [{unit}]" if unit else name
+def draw_shares(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
+    """Shares stacked over the parameter; of a second one's first, middle and last values."""
+    share = dataset["share"].data
+    return {"shares": _lines(dataset, scene, _fractions, len(share) if share.ndim == 3 else 1)}
 
 
-def draw_fractions(along: Any, ax: Axes) -> None:
+def draw_fractions(along: Any, ax: style.Axes) -> None:
     """Draw shares stacked over the parameter."""
-    shares = np.nan_to_num(along.fractions).T
+    _fractions(along.dataset(), ax, 0)
+
+
+def _fractions(dataset: Dataset, ax: style.Axes, line: int) -> None:
+    name, tips = str(dataset.attrs["along"]), dataset.groups["tipping"]
+    values, every = dataset[name].data, dataset["share"].data
+    share = every.reshape(-1, *every.shape[-2:])[line]
+    shares = np.nan_to_num(share[:, np.isfinite(share).any(axis=0)]).T
     number = len(shares)
     names = [f"attractor {k}" for k in range(number)]
-    colors = [LINES[k % len(LINES)] for k in range(number)]
-    rest = np.maximum(along.unlabelled, 0.0)
+    colors = [style.color(k) for k in range(number)]
+    rest = np.maximum(dataset["unlabelled"].data.reshape(-1, values.size)[line], 0.0)
     if (rest > 0.0).any():
         shares, names, colors = np.vstack([shares, rest]), [*names, "without a label"], [*colors, "#d9d9d9"]
-    areas = ax.stackplot(along.values, shares, labels=names, colors=colors, alpha=0.85)
+    areas = ax.stackplot(values, shares, labels=names, colors=colors, alpha=0.85)
     for k, area in enumerate(areas[:number]):
-        area.set_hatch(HATCHES[k // len(LINES) % len(HATCHES)])
-    for tipping in along.tipping:
-        ax.axvline(0.5 * (tipping.low + tipping.high), color="black", lw=0.8, ls=":")
-    low, high = sorted((along.values[0], along.values[-1]))
-    ax.set(xlabel=along.parameter, ylabel="share of the starts", xlim=(low, high), ylim=(0.0, 1.0))
+        area.set_hatch(HATCHES[k // len(style.LINES) % len(HATCHES)])
+    there = tips["tipping_line"].data == line
+    for change in 0.5 * (tips["tipping_low"].data + tips["tipping_high"].data)[there]:
+        ax.axvline(change, color="black", lw=0.8, ls=":")
+    low, high = sorted((values[0], values[-1]))
+    ax.set(xlabel=name, ylabel="share of the starts", xlim=(low, high), ylim=(0.0, 1.0))
     ax.set_title("Where starts end")
     ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
-def draw_numbers(over: Any, ax: Axes) -> None:
+def draw_numbers(over: Any, ax: style.Axes) -> None:
     """Draw how many attractors there are over two parameters, and where one comes or goes."""
     first = over.lines[0]
     number = np.isfinite(over.fractions).sum(axis=2)
@@ -96,21 +114,24 @@ def draw_numbers(over: Any, ax: Axes) -> None:
     ax.set(xlabel=first.parameter, ylabel=over.second, title="Attractors")
 
 
-def draw_lines(
-    dataset: Dataset, scene: Mapping[str, float], line: Callable[[int], Any], count: int
-) -> Figure:
-    """What ``line`` gives at the first, middle and last of so many values of a second parameter."""
+def _lines(
+    dataset: Dataset,
+    scene: Mapping[str, float],
+    draw: Callable[[Dataset, style.Axes, int], None],
+    count: int,
+) -> style.Figure:
+    """The first, middle and last of so many values of a second parameter, a panel each."""
     shown = sorted({0, count // 2, count - 1})
-    with style():
-        figure = new_figure(8.0, 1.2 + 3.8 * len(shown))
+    with style.style():
+        figure = style.new_figure(8.0, 1.2 + 3.8 * len(shown))
         panels = figure.subplots(len(shown), 1, squeeze=False)[:, 0]
         for k, ax in zip(shown, panels, strict=True):
-            line(k).plot(ax=ax)
+            draw(dataset, ax, k)
             second = [(n, v) for n, v in dataset.variables.items() if v.dims == (n,) and v.data.size == count]
             if count > 1:
                 name, values = second[0]
                 unit = "" if values.units == "1" else f" {values.units}"
                 ax.set_title(f"{ax.get_title()}; {name} = {values.data[k]:g}{unit}")
         changes = {*dataset.variables, dataset.attrs.get("parameter")}
-        figure.suptitle(setting_of(dataset, {k: v for k, v in scene.items() if k not in changes}))
+        figure.suptitle(style.setting_of(dataset, {k: v for k, v in scene.items() if k not in changes}))
     return figure

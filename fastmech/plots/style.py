@@ -12,13 +12,14 @@ import numpy as np
 
 from fastmech.results import Dataset, Variable
 
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
+if TYPE_CHECKING:  # matplotlib is loaded where something is drawn
+    from matplotlib.artist import Artist as Artist
+    from matplotlib.axes import Axes as Axes
     from matplotlib.axis import Axis
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Figure
 
     from fastmech.store.read import Section
+
 
 #: Okabe and Ito's colours, told apart by colour-blind readers too.
 PALETTE = {
@@ -34,6 +35,12 @@ PALETTE = {
 
 #: Colours of lines in their order (without yellow, which is too pale for a line on white).
 LINES = [PALETTE[name] for name in ("blue", "vermillion", "green", "purple", "orange", "sky", "black")]
+
+
+def color(number: int) -> str:
+    """The colour of a line by its number, from 0."""
+    return LINES[number % len(LINES)]
+
 
 #: Colour map of fields: equal steps look equal, in grey and to colour-blind readers too.
 FIELD = "cividis"
@@ -80,10 +87,16 @@ def new_figure(width: float = 7.2, height: float = 4.2) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def legend_below(figure: Figure, axes: Axes, columns: int) -> None:
-    """A legend under the whole figure, where it covers nothing."""
-    handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=columns)
+def new_panel(width: float = 7.2, height: float = 4.2) -> tuple[Figure, Axes]:
+    """A figure of one panel, with its axes."""
+    figure = new_figure(width, height)
+    return figure, figure.subplots()
+
+
+def legend_below(figure: Figure, of: Axes | Sequence[Artist], columns: int = 2) -> None:
+    """A legend of what axes have, or of some entries, under the whole figure, where it covers nothing."""
+    handles = of if isinstance(of, Sequence) else of.get_legend_handles_labels()[0]
+    figure.legend(handles=list(handles), loc="outside lower center", ncols=columns)
 
 
 def legend_under(axes: Axes, handles: Sequence[Artist] | None = None, columns: int = 2) -> None:
@@ -139,6 +152,11 @@ def setting_of(dataset: Dataset, parameters: Mapping[str, float]) -> str:
     each = ", ".join(f"{name} = {value:g}" for name, value in list(parameters.items())[:MOST_TOLD])
     name = dataset.attrs.get("mechanism", dataset.attrs.get("system", ""))
     return f"{name}: {each}{', ...' * (len(parameters) > MOST_TOLD)}"
+
+
+def with_unit(name: str, unit: str) -> str:
+    """A name with its unit, for an axis; nothing of a pure number."""
+    return name if unit == "1" else f"{name} [{unit}]"
 
 
 def quantity(dataset: Dataset, name: str) -> str:
@@ -197,3 +215,27 @@ def entry(label: str, **look: Any) -> Artist:
     from matplotlib.lines import Line2D
 
     return Line2D([], [], **{"color": "black", "label": label, **look})
+
+
+def swatch(label: str, color: str, edge: str | None = None) -> Artist:
+    """A patch of colour of a legend."""
+    from matplotlib.patches import Patch
+
+    return Patch(facecolor=color, edgecolor=edge, label=label)
+
+
+def shade(axes: Axes, x: Any, y: Any, values: Any, **look: Any) -> Any:
+    """A field (x, y) in colours, over the middles or the edges of its cells."""
+    return axes.pcolormesh(x, y, values.T, rasterized=True, **look)
+
+
+def paint(axes: Axes, x: Any, y: Any, numbers: Any, colors: Sequence[str]) -> None:
+    """Cells (x, y) in the colours of these numbers; -1: none."""
+    from matplotlib.colors import ListedColormap
+
+    shade(axes, x, y, numbers, cmap=ListedColormap(colors), vmin=-0.5, vmax=len(colors) - 0.5)
+
+
+def share(where: Any) -> str:
+    """The share of cells, in words."""
+    return f"{100.0 * np.mean(where):.3g} %"

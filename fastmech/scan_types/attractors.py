@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from threading import Lock
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,27 +25,22 @@ from fastmech.basins.map import grid_starts
 from fastmech.basins.measures.fractions import wilson
 from fastmech.ensembles.status import FAILURES, LABELS, Status, counts
 from fastmech.ensembles.system import System
-from fastmech.errors import InputError, shown
+from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
-from fastmech.results import FILL, NO_CODE, Dataset, Variable, flags, numbers, parts, state_units, told
-from fastmech.scan_types.request import (
-    Axis,
-    Each,
-    MethodName,
-    RunContext,
-    Scan,
-    Seed,
-    Tiles,
-    Tiling,
-    arrays,
-    axis_variables,
-    check_rising,
-    failures,
+from fastmech.plots.attractors import draw_attractors
+from fastmech.results import (
+    NO_CODE,
+    Dataset,
+    Variable,
+    columns,
+    flags,
+    numbers,
+    parts,
+    state_units,
+    told,
 )
+from fastmech.scan_types import request as scans
 from fastmech.scene import Scene, nearest
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: Starts of a scan and of a tile at most; those that attractors are looked for from; points kept of each.
 MOST_STARTS, TILE_STARTS, SEARCHED, POINTS = 20_000_000, 1 << 16, 4096, 1024
@@ -62,7 +57,7 @@ SAMPLERS = {
 Range = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
-class Starts(Scan):
+class Starts(scans.Scan):
     """What scans of attractors ask for: where motions begin, and how long they have."""
 
     of_mechanisms = of_systems = True
@@ -72,7 +67,7 @@ class Starts(Scan):
     )
     n: Annotated[int, Field(ge=1, le=MOST_STARTS)] = Field(10_000, description="how many starts")
     sampler: Literal["uniform", "sobol", "latin_hypercube", "gaussian", "ball"] = "uniform"
-    seed: Seed = 0
+    seed: scans.Seed = 0
     t_end: Annotated[float, Field(gt=0)] | None = Field(
         None, description="how long a motion has to arrive [s]"
     )
@@ -84,10 +79,7 @@ class Starts(Scan):
 
     def drawn(self, scene: Mechanism | System, n: int) -> Floats:
         """The first n starts (n, dim)."""
-        try:
-            return SAMPLERS[self.sampler](self.ranges).draw(n, tuple(scene.state), self.seed)
-        except InputError as error:
-            raise InputError(str(error)) from None
+        return SAMPLERS[self.sampler](self.ranges).draw(n, tuple(scene.state), self.seed)
 
 
 def moving(scene: Scene | Mechanism | System) -> None:
@@ -103,18 +95,15 @@ def moving(scene: Scene | Mechanism | System) -> None:
         )
 
 
-def parameter_of(scene: Mechanism | System, along: Mapping[str, Axis]) -> tuple[str, Floats]:
+def parameter_of(scene: Mechanism | System, along: Mapping[str, scans.Axis]) -> tuple[str, Floats]:
     """Name and values of the one parameter that changes.
 
     Raises:
         InputError: it is unknown, or its values fall or are too few.
     """
     name, axis = next(iter(along.items()))
-    if name not in scene.parameters:
-        raise InputError(
-            f"along.{name}: unknown parameter {shown(name)}; {nearest(name, list(scene.parameters))}"
-        )
-    check_rising(f"along.{name}", axis)
+    scans.check_names("along.", along, scene.parameters, "unknown parameter")
+    scans.check_rising(f"along.{name}", axis)
     if axis.size < 2:
         raise InputError(f"along.{name}: must have two values or more")
     return name, axis.array
@@ -124,13 +113,14 @@ class AttractorScan(Starts):
     """Attractors, found without being told, and the label of every start."""
 
     kind: ClassVar[str] = "attractors"
+    draw = staticmethod(draw_attractors)
     taken = frozenset({"label", "status", "time", "start", "attractor", "point"})
 
-    axes: Annotated[dict[str, Axis], Field(max_length=4)] = Field(
+    axes: Annotated[dict[str, scans.Axis], Field(max_length=4)] = Field(
         default={}, description="a grid of starts by states, in place of random ones"
     )
     fixed: dict[str, float] = Field(default={}, description="the other states on the grid, 0 by default")
-    method: MethodName = "dop853"
+    method: scans.MethodName = "dop853"
 
     @model_validator(mode="after")
     def _one_of_both(self) -> AttractorScan:
@@ -141,49 +131,38 @@ class AttractorScan(Starts):
     def check(self, scene: Mechanism | System) -> None:  # type: ignore[override]
         """Names must be those of states."""
         super().check(scene)
-        for where, entries in (("axes", self.axes), ("fixed", self.fixed)):
-            for name in entries:
-                if name not in scene.state:
-                    raise InputError(
-                        f"{where}.{name}: unknown state {shown(name)}; {nearest(name, list(scene.state))}"
-                    )
+        scans.check_names("axes.", self.axes, scene.state, "unknown state")
+        scans.check_names("fixed.", self.fixed, scene.state, "unknown state")
         for name, axis in self.axes.items():
-            check_rising(f"axes.{name}", axis)
+            scans.check_rising(f"axes.{name}", axis)
         total = math.prod(axis.size for axis in self.axes.values())
         if total > MOST_STARTS:
             raise InputError(f"axes: ask for {total:.3g} starts, at most {MOST_STARTS:.0e} are allowed")
 
-    def tiling(self, scene: Mechanism | System) -> Tiling:  # type: ignore[override]
+    def tiling(self, scene: Mechanism | System) -> scans.Tiling:  # type: ignore[override]
         """So many starts a tile."""
         return AttractorTiling(self, scene)
 
-    @staticmethod
-    def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
-        """Shares of the attractors, and of a grid the labels."""
-        from fastmech.plots.attractors import draw_attractors
 
-        return draw_attractors(dataset, scene)
-
-
-class AttractorTiling(Tiling):
+class AttractorTiling(scans.Planes):
     """Every tile holds every so-manieth start; all look for attractors from the same few of all of them."""
 
     what = "starts to be labelled"
 
     def __init__(self, request: AttractorScan, scene: Mechanism | System) -> None:
-        self.request, self.scene, self.axes = request, scene, arrays(request.axes)
-        self.total = math.prod(map(len, self.axes.values())) if self.axes else request.n
-        self.count = -(-self.total // TILE_STARTS)
+        self.request, self.scene, self.slice = request, scene, scans.values_of(request.axes)
+        self.total = math.prod(map(len, self.slice.values())) if self.slice else request.n
+        super().__init__({"start": np.arange(self.total)}, TILE_STARTS, spread=True)
         self._lock = Lock()
         self._found: Attractors | None = None
 
     def starts(self, which: NDArray[np.intp]) -> Floats:
         """Starts (n, dim) by their numbers."""
-        if not self.axes:
+        if not self.slice:
             return self._drawn[which]
         names = tuple(self.scene.state)
         held = {name: self.request.fixed.get(name, 0.0) for name in names}
-        return grid_starts(self.axes, held, names, which)
+        return grid_starts(self.slice, held, names, which)
 
     @cached_property
     def _drawn(self) -> Floats:
@@ -194,81 +173,56 @@ class AttractorTiling(Tiling):
         with self._lock:
             if self._found is None:
                 few = np.unique(np.linspace(0, self.total - 1, SEARCHED).astype(np.intp))
-                how: dict[str, Any] = {"t_end": self.request.t_end, "method": self.request.method}
+                how = self.request.asked("t_end", "method")
                 self._found = find_attractors(self.scene, self.starts(few), threads=threads, **how)
             return self._found
 
-    def _part(self, index: int) -> NDArray[np.intp]:
-        return np.arange(index, self.total, self.count)
-
-    def items(self, index: int) -> int:
-        """Starts."""
-        return self._part(index).size
-
-    def compute(self, index: int, context: RunContext) -> Dataset:
+    def compute(self, index: int, context: scans.RunContext) -> Dataset:
         """Label some starts."""
         found = self.found(context.threads)
-        ends = found.label_starts(self.starts(self._part(index)), lambda finished: context.check())
-        each = ("start",)
-        return Dataset(
-            {
-                "label": Variable(each, ends.label.astype(np.int32)),
-                "status": Variable(each, ends.status),
-                "time": Variable(each, ends.time),
-            },
+        ends = found.label_starts(self.starts(self.axes_of(index)["start"]), lambda finished: context.check())
+        return scans.tile_of(
+            {"label": ends.label.astype(np.int32), "status": ends.status, "time": ends.time},
             {"steps": ends.steps},
         )
 
     def missing(self, index: int) -> Dataset:
         """Starts without a label."""
-        n, each = self.items(index), ("start",)
-        return Dataset(
-            {
-                "label": Variable(each, np.full(n, -1, np.int32)),
-                "status": Variable(each, np.full(n, Status.UNDECIDED, np.int8)),
-                "time": Variable(each, np.full(n, np.nan)),
-            },
-            {"steps": 0},
-        )
+        n = self.items(index)
+        status = np.full(n, Status.UNDECIDED, np.int8)
+        arrays = {"label": np.full(n, -1, np.int32), "status": status, "time": np.full(n, np.nan)}
+        return scans.tile_of(arrays, {"steps": 0})
 
-    def assemble(self, tile: Tiles) -> Dataset:
+    def assemble(self, tile: scans.Tiles) -> Dataset:
         """Join the starts; number the attractors by their shares."""
-        label = np.empty(self.total, np.int32)
-        status, time, steps = np.empty(self.total, np.int8), np.empty(self.total), 0
-        for index in range(self.count):
-            part, of = self._part(index), tile(index)
-            label[part], status[part], time[part] = of["label"].data, of["status"].data, of["time"].data
-            steps += int(of.attrs["steps"])
+        tiles = [tile(index) for index in range(self.count)]
+        label, status, time = (self.joined(tiles, name) for name in ("label", "status", "time"))
         found = self.found()
         share = np.bincount(label[label >= 0], minlength=len(found))
         order = np.argsort(-share, kind="stable")
         rank = np.append(np.argsort(order), -1).astype(np.int32)
         units = state_units(self.scene)
-        dims, shape = tuple(self.axes) or ("start",), tuple(map(len, self.axes.values())) or (self.total,)
-        if self.axes:
-            where = {k: Variable((k,), v, units[k], f"state {k} at the start") for k, v in self.axes.items()}
+        dims, shape = tuple(self.slice) or ("start",), tuple(map(len, self.slice.values())) or (self.total,)
+        if self.slice:
+            where = {k: Variable((k,), v, units[k], f"state {k} at the start") for k, v in self.slice.items()}
         else:
             where = numbers("start", self.total, "number of the start")
             where |= parts("start", dims, self.starts(np.arange(self.total)), units, "state {} at the start")
-        variables = where | {
-            "label": Variable(dims, rank[label].reshape(shape), "1", "attractor at which it ends", NO_CODE),
-            "status": Variable(dims, status.reshape(shape), "1", "what is known of the start", flags(LABELS)),
-            "time": Variable(dims, time.reshape(shape), "s", "time of arrival, NaN: it has not arrived"),
-        }
+        variables = where | _ends(dims, *(a.reshape(shape) for a in (rank[label], status, time)))
         attrs = {
-            "axes": tuple(self.axes) or dims,
+            "axes": dims,
             "t_end": found.t_end,
             "method": self.request.method,
             "dt": found.dt,
             "looks": found.looks,
-            "steps": steps,
+            "steps": sum(int(one.attrs["steps"]) for one in tiles),
             **told(self.scene),
             **({"cell": found.cell} if found.cell is not None else {}),
         }
         attrs |= {f"fixed_{k}": v for k, v in self.request.fixed.items()}
         return Dataset(
             variables,
-            attrs | counts(status, LABELS) | failures(status, FAILURES),
+            attrs | counts(status, LABELS) | scans.failures(status, FAILURES),
             {
                 "attractors": attractor_table([found[k] for k in order], share[order], status.size, units),
                 "points": _points([found[k] for k in order], units),
@@ -281,22 +235,24 @@ def attractor_dataset(found: Attractors) -> Dataset:
     n, units = found.status.size, state_units(found.system)
     variables = {
         **numbers("start", n, "number of the start"),
-        "label": Variable(
-            ("start",), found.label.astype(np.int32), "1", "attractor at which it ends", NO_CODE
-        ),
-        "status": Variable(("start",), found.status, "1", "what is known of the start", flags(LABELS)),
-        "time": Variable(("start",), found.time, "s", "time of arrival, NaN: it has not arrived"),
+        **_ends(("start",), found.label.astype(np.int32), found.status, found.time),
     }
-    attrs = {
-        "axes": ("start",),
-        "t_end": found.t_end,
-        "dt": found.dt,
-        "looks": found.looks,
-        **told(found.system),
-    }
+    attrs: dict[str, Any] = {"axes": ("start",), "t_end": found.t_end, "dt": found.dt, "looks": found.looks}
+    attrs |= told(found.system)
     count = np.array([one.found for one in found.attractors], dtype=np.int64)
     table = attractor_table(list(found.attractors), count, n, units)
     return Dataset(variables, attrs, {"attractors": table, "points": _points(list(found.attractors), units)})
+
+
+def _ends(dims: tuple[str, ...], *ends: NDArray[Any]) -> dict[str, Variable]:
+    """Labels, statuses and times of starts."""
+    label, status, time = ends
+    rows = {
+        "label": (label, "1", "attractor at which it ends", NO_CODE),
+        "status": (status, "1", "what is known of the start", flags(LABELS)),
+        "time": (time, "s", "time of arrival, NaN: it has not arrived"),
+    }
+    return columns(dims, rows)
 
 
 def attractor_table(
@@ -304,38 +260,31 @@ def attractor_table(
 ) -> Dataset:
     """One row for each attractor, at which ``count`` of ``total`` starts end."""
     each = ("attractor",)
-
-    def numbers_of(name: str) -> Floats:
-        return np.array([getattr(one, name) for one in found], dtype=np.float64)
-
     low, high = wilson(count.astype(np.int64), total)
     forcing = np.array([one.forcing_periods or -1 for one in found], dtype=np.int32)
+    kinds = np.array([one.kind for one in found], object)
     first = np.array([one.points[0] for one in found]).reshape(len(found), len(units))
+    period, exponent, error, residual, radius = (
+        np.array([getattr(one, name) for one in found], dtype=np.float64)
+        for name in ("period", "exponent", "exponent_error", "residual", "radius")
+    )
+    rows = {
+        "share": (count / total, "1", "share of the starts that end there"),
+        "share_low": (low, "1", "lower end of its 95 % Wilson interval"),
+        "share_high": (high, "1", "upper end of its 95 % Wilson interval"),
+        "period": (period, "s", "period, NaN: it has none"),
+        "forcing_periods": (forcing, "1", "its period in periods of the forcing", NO_CODE),
+        "exponent": (exponent, "1/s", "largest Lyapunov exponent"),
+        "exponent_error": (error, "1/s", "error of the exponent"),
+        "residual": (residual, "1", "of the map over its period, over the typical state"),
+        "radius": (radius, "1", "of the ball in which the map was measured to contract"),
+    }
     return Dataset(
         {
             **numbers("attractor", len(found), "number of the attractor, by its share"),
-            "kind": Variable(
-                each,
-                np.array([one.kind for one in found], object),
-                "1",
-                "fixed point, periodic, torus, chaos, continuum",
-            ),
+            "kind": Variable(each, kinds, "1", "fixed point, periodic, torus, chaos, continuum"),
             **parts("place", each, first, units, "{} of one of its points"),
-            "share": Variable(each, count / total, "1", "share of the starts that end there"),
-            "share_low": Variable(each, low, "1", "lower end of its 95 % Wilson interval"),
-            "share_high": Variable(each, high, "1", "upper end of its 95 % Wilson interval"),
-            "period": Variable(each, numbers_of("period"), "s", "period, NaN: it has none"),
-            "forcing_periods": Variable(
-                each, forcing, "1", "its period in periods of the forcing", {FILL: -1}
-            ),
-            "exponent": Variable(each, numbers_of("exponent"), "1/s", "largest Lyapunov exponent"),
-            "exponent_error": Variable(each, numbers_of("exponent_error"), "1/s", "error of the exponent"),
-            "residual": Variable(
-                each, numbers_of("residual"), "1", "of the map over its period, over the typical state"
-            ),
-            "radius": Variable(
-                each, numbers_of("radius"), "1", "of the ball in which the map was measured to contract"
-            ),
+            **columns(each, rows),
         }
     )
 
@@ -353,7 +302,7 @@ def _points(found: list[Attractor], units: Mapping[str, str]) -> Dataset:
 
 
 def shared_axes(
-    scene: Mechanism | System, along: Mapping[str, Axis], each: Mapping[str, Axis]
+    scene: Mechanism | System, along: Mapping[str, scans.Axis], each: Mapping[str, scans.Axis]
 ) -> tuple[tuple[str, ...], dict[str, Variable]]:
     """Dimensions and coordinates of a second parameter and of the first.
 
@@ -364,22 +313,22 @@ def shared_axes(
         if name not in scene.parameters or name in along:
             others = [other for other in scene.parameters if other not in along]
             raise InputError(f"each.{name}: must be another parameter; {nearest(name, others)}")
-    both = arrays({**each, **along})
-    return tuple(both), axis_variables(scene, both)
+    both = scans.values_of({**each, **along})
+    return tuple(both), scans.axis_variables(scene, both)
 
 
 def lines_over(
     scene: Mechanism | System,
-    each: Mapping[str, Axis],
+    each: Mapping[str, scans.Axis],
     what: str,
     line: Callable[[Mechanism | System], Dataset],
     join: Callable[[Mechanism | System, list[Dataset]], Dataset],
-) -> Tiling:
+) -> scans.Tiling:
     """A tile for each value of a second parameter, or one."""
     changes: list[dict[str, float]] = [{}]
     for name, axis in each.items():
         changes = [{name: float(value)} for value in axis.array]
-    return Each(
+    return scans.Each(
         what,
         len(changes),
         lambda k: line(scene.replace(**changes[k])),

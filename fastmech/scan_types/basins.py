@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,32 +18,28 @@ from pydantic import AfterValidator, Field
 from fastmech.basins.map import BasinMap, map_basins
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.ensembles.status import FAILURES, LABELS, Status
-from fastmech.errors import InputError, shown
+from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
-from fastmech.results import NO_CODE, Dataset, Variable, coordinate_units, flags, numbers, told
-from fastmech.scan_types.request import (
-    Axis,
-    Planes,
-    RunContext,
-    Scan,
-    Tiles,
-    Tiling,
-    UsualMethod,
-    arrays,
-    check_duration,
-    check_rising,
-    check_size,
-    check_starts,
-    failures,
+from fastmech.plots.basins import draw_basins
+from fastmech.results import (
+    KINDS,
+    NO_CODE,
+    Dataset,
+    Variable,
+    columns,
+    coordinate_units,
+    flags,
+    numbers,
+    parts,
+    state_units,
+    told,
 )
-from fastmech.scene import STATE, Number, Scene, nearest
+from fastmech.scan_types import request as scans
+from fastmech.scene import STATE, Number, Scene
 from fastmech.slider.capture.barriers import BarrierTree
 from fastmech.slider.capture.steps import method_for
 from fastmech.step_limits.warning import step_warning
 from fastmech.store.objects import dataset_of
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: Starts of the largest map that is held in memory with its labels, and the numbers of 8 bytes of each.
 MOST_POINTS, POINT_NUMBERS = 20_000_000, 20
@@ -51,9 +47,6 @@ MOST_POINTS, POINT_NUMBERS = 20_000_000, 20
 #: Starts of a tile, about, and of one whose motions may be longer the fewer: a second or two of one thread.
 TILE_POINTS = 1 << 14
 USUAL_END = 60.0
-
-#: The dimension of turns in a tile.
-TURNED = "turned_coordinate"
 
 #: What a tile knows of every start, by the names in `fastmech.basins.map.BasinMap`.
 _ARRAYS = ("well", "turns", "time", "settle_time", "status", "computed")
@@ -65,16 +58,15 @@ def _power_of_two(value: int | None) -> int | None:
     return value
 
 
-class Basins(Scan):
+class Basins(scans.Scan):
     """A basin map of a slice of state space, labels proved by capture."""
 
     kind: ClassVar[str] = "basins"
+    draw = staticmethod(draw_basins)
     of_mechanisms = True
-    taken = frozenset(
-        {TURNED, "label", "well", "turns", "time", "capture_time", "settle_time", "status", "computed"}
-    )
+    taken = frozenset({"label", "well", "turns", "time", "capture_time", "settle_time", "status", "computed"})
 
-    axes: Annotated[dict[str, Axis], Field(min_length=2, max_length=4)]
+    axes: Annotated[dict[str, scans.Axis], Field(min_length=2, max_length=4)]
     fixed: dict[str, float] = Field(
         default={}, description="the other coordinates of the starts [rad, rad/s], 0 by default"
     )
@@ -86,27 +78,25 @@ class Basins(Scan):
         None, description="also the time from which on a motion stays so near to its well [rad]"
     )
     dt: Annotated[float | None, Field(gt=0)] = Field(None, description="coarsest step [s]")
-    method: UsualMethod = None
+    method: scans.UsualMethod = None
 
     def check(self, scene: Scene | Mechanism) -> None:
         """Without a damper there are no basins; and a map has its limits."""
         require_damper(scene)
-        names = _states(scene)
-        for where, entries in (("axes", self.axes), ("fixed", self.fixed)):
-            for name in entries:
-                if name not in names:
-                    told = nearest(name, list(names))
-                    raise InputError(f"{where}.{name}: unknown coordinate {shown(name)}; {told}")
-        check_size("axes", self.axes, "starts", MOST_POINTS, POINT_NUMBERS)
+        scans.check_names("axes.", self.axes, _states(scene), "unknown coordinate")
+        scans.check_names("fixed.", self.fixed, _states(scene), "unknown coordinate")
+        scans.check_size("axes", self.axes, "starts", MOST_POINTS, POINT_NUMBERS)
         for name, axis in self.axes.items():
             if name in self.fixed:
                 raise InputError(f"fixed.{name}: is an axis of the map; give one or the other")
-            check_rising(f"axes.{name}", axis)
+            scans.check_rising(f"axes.{name}", axis)
         if isinstance(scene, Mechanism):
             return
         starts = {f"axes.{name}": axis.array for name, axis in self.axes.items()}
-        check_starts(scene, starts | {f"fixed.{name}": np.array(value) for name, value in self.fixed.items()})
-        check_duration(scene, self.t_end, self.dt)
+        scans.check_starts(
+            scene, starts | {f"fixed.{name}": np.array(value) for name, value in self.fixed.items()}
+        )
+        scans.check_duration(scene, self.t_end, self.dt)
 
     def step_warning(self, scene: Scene | Mechanism) -> str | None:
         """By the scene's limit and the decaying force; without ``dt`` each start's step is chosen."""
@@ -114,38 +104,23 @@ class Basins(Scan):
             return None
         return step_warning(scene, self.dt, method_for(scene, self.method))
 
-    def tiling(self, scene: Scene | Mechanism) -> Tiling:
+    def tiling(self, scene: Scene | Mechanism) -> scans.Tiling:
         """Planes of the first axis; a refined map is one tile, because it follows boundaries anywhere."""
-        return BasinTiling(self, scene, arrays(self.axes))
-
-    @staticmethod
-    def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
-        """Labels, with equilibria and the wells' energy contours on top, and times."""
-        from fastmech.plots.basins import draw_basins
-
-        return draw_basins(dataset.merged, scene)
+        return BasinTiling(self, scene)
 
 
-class BasinTiling(Planes):
-    """Every tile holds some planes of the first axis, each so many apart.
-
-    Args:
-        request: how to compute.
-        scene: the mechanism.
-        axes: coordinates of the starts with their values.
-    """
+class BasinTiling(scans.Planes):
+    """Every tile holds some planes of the first axis, each so many apart."""
 
     what = "starts of the basin map"
 
-    def __init__(
-        self, request: Basins, scene: Scene | Mechanism, axes: dict[str, NDArray[np.float64]]
-    ) -> None:
+    def __init__(self, request: Basins, scene: Scene | Mechanism) -> None:
         self.request, self.scene, self.names = request, scene, _states(scene)
-        usual = int(TILE_POINTS * min(1.0, USUAL_END / request.t_end))
+        axes, usual = scans.values_of(request.axes), int(TILE_POINTS * min(1.0, USUAL_END / request.t_end))
         points = usual if request.refine is None else math.prod(map(len, axes.values()))
         super().__init__(axes, points, spread=True)
 
-    def compute(self, index: int, context: RunContext) -> Dataset:
+    def compute(self, index: int, context: scans.RunContext) -> Dataset:
         """Label some planes."""
         advance = context.stage(self.what, self.items(index)) if self.count == 1 else None
 
@@ -158,17 +133,13 @@ class BasinTiling(Planes):
             self.scene,
             self.axes_of(index),
             self.request.t_end,
-            fixed=self.request.fixed,
-            refine=self.request.refine,
-            dt=self.request.dt,
-            method=self.request.method,
-            settle_radius=self.request.settle_radius,
+            **self.request.asked("fixed", "refine", "dt", "method", "settle_radius"),
             threads=context.threads,
             progress=told,
         )
-        return self._tile({name: getattr(found, name) for name in _ARRAYS}, found.steps)
+        return scans.tile_of({name: getattr(found, name) for name in _ARRAYS}, {"steps": found.steps})
 
-    def assemble(self, tile: Tiles) -> Dataset:
+    def assemble(self, tile: scans.Tiles) -> Dataset:
         """Join the planes and number the basins."""
         tiles = [tile(index) for index in range(self.count)]
         certificate = certificate_of(self.scene)
@@ -196,19 +167,12 @@ class BasinTiling(Planes):
             "computed": np.zeros(grid, dtype=np.bool_),
             "settle_time": None if self.request.settle_radius is None else nothing,
         }
-        return self._tile(arrays, 0)
+        return scans.tile_of(arrays, {"steps": 0})
 
     def _known(self, tiles: list[Dataset], name: str) -> Any:
         """An array of all tiles; None where they have none."""
         array = self.joined(tiles, name) if name in tiles[0] else None
         return array.astype(np.bool_) if array is not None and name == "computed" else array
-
-    def _tile(self, arrays: dict[str, NDArray[Any] | None], steps: int) -> Dataset:
-        dims = (*self.axes, TURNED)
-        there = {name: array for name, array in arrays.items() if array is not None}
-        return Dataset(
-            {name: Variable(dims[: array.ndim], array) for name, array in there.items()}, {"steps": steps}
-        )
 
 
 def basin_dataset(found: BasinMap) -> Dataset:
@@ -222,7 +186,7 @@ def basin_dataset(found: BasinMap) -> Dataset:
         attrs |= {"turning_names": tuple(turning)} if turning else {}
     units = coordinate_units(found.system)
     groups = {"basins": Dataset(_basins(found, units)), "equilibria": Dataset(_wells(found, units))}
-    attrs |= found.counts | failures(found.status, FAILURES)
+    attrs |= found.counts | scans.failures(found.status, FAILURES)
     return Dataset(_variables(found, units), attrs, groups)
 
 
@@ -231,64 +195,47 @@ def _states(scene: Scene | Mechanism) -> tuple[str, ...]:
     return STATE if isinstance(scene, Scene) else scene.state
 
 
-def _kind(unit: str) -> str:
-    return "angle" if unit == "rad" else "length"
-
-
 def _variables(found: BasinMap, coordinates: Mapping[str, str]) -> dict[str, Variable]:
     """What is known of every start; ``coordinates`` are names with their units."""
-    units, described = dict(coordinates), {name: f"{_kind(u)} {name}" for name, u in coordinates.items()}
-    for name, unit in coordinates.items():
-        units[f"{name}_dot"], described[f"{name}_dot"] = f"{unit}/s", f"rate of {name}"
-    names = tuple(found.axes)
+    names, units = tuple(found.axes), state_units(found.system)
+    about = {name: f"{KINDS[unit]} {name}" for name, unit in coordinates.items()}
+    about |= {f"{name}_dot": f"rate of {name}" for name in coordinates}
     variables = {
-        name: Variable((name,), values, units[name], f"{described[name]} at the start")
+        name: Variable((name,), values, units[name], f"{about[name]} at the start")
         for name, values in found.axes.items()
     }
+    turns = dict.fromkeys(coordinates, "1")
     variables |= {
         "label": Variable(names, found.labels[0].astype(np.int32), "1", "basin of the start", NO_CODE),
         "well": Variable(names, found.well, "1", "equilibrium that captures the start", NO_CODE),
-        **{
-            f"turns_{name}": Variable(names, found.turns[..., k], "1", f"full turns of {name} of that well")
-            for k, name in enumerate(coordinates)
-        },
+        **parts("turns", names, found.turns, turns, "full turns of {} of that well"),
         "capture_time": Variable(
             names, found.time, "s", "time of capture, NaN: not captured or not computed"
         ),
         "status": Variable(names, found.status, "1", "what is known of the start", flags(LABELS)),
         "computed": Variable(names, found.computed, "1", "computed, not filled in between equal labels"),
     }
-    assert found.tree is not None  # a scene's map has one
     if isinstance(found.tree, BarrierTree):
         force = np.array(found.tree.equilibria.force)
         variables["force"] = Variable((), force, "N", "constant force that the wells hold for")
     if found.settle_time is not None:
-        variables["settle_time"] = Variable(
-            names,
-            found.settle_time,
-            "s",
-            "time from which on the motion stays in the settling ball, NaN: none",
-        )
+        settling = "time from which on the motion stays in the settling ball, NaN: none"
+        variables["settle_time"] = Variable(names, found.settle_time, "s", settling)
     return variables
 
 
 def _basins(found: BasinMap, coordinates: Mapping[str, str]) -> dict[str, Variable]:
     """Every well and turns that occur."""
     label, table = found.labels
-    share = np.array([np.mean(label == i) for i in range(len(table))])
-    unknown = np.mean(label < 0)
+    share, each = np.array([np.mean(label == i) for i in range(len(table))]), ("basin",)
+    most, turns = share + np.mean(label < 0), dict.fromkeys(coordinates, "1")
     return {
         **numbers("basin", len(table), "number of the basin"),
-        "basin_well": Variable(("basin",), table[:, 0].astype(np.int8), "1", "equilibrium of the basin"),
-        **{
-            f"basin_turns_{name}": Variable(
-                ("basin",), table[:, 1 + k].astype(np.int32), "1", f"its full turns of {name}"
-            )
-            for k, name in enumerate(coordinates)
-        },
-        "basin_share": Variable(("basin",), share, "1", "share of the starts"),
+        "basin_well": Variable(each, table[:, 0].astype(np.int8), "1", "equilibrium of the basin"),
+        **parts("basin_turns", each, table[:, 1:].astype(np.int32), turns, "its full turns of {}"),
+        "basin_share": Variable(each, share, "1", "share of the starts"),
         "basin_share_at_most": Variable(
-            ("basin",), share + unknown, "1", "share of the starts if all without a label ended there"
+            each, most, "1", "share of the starts if all without a label ended there"
         ),
     }
 
@@ -300,20 +247,13 @@ def _wells(found: BasinMap, coordinates: Mapping[str, str]) -> dict[str, Variabl
     index = np.array([e.morse_index for e in equilibria], dtype=np.int8)
     barrier = np.full(len(equilibria), np.nan)
     barrier[list(found.tree.wells)] = found.tree.barrier
+    rows = {
+        "equilibrium_energy": (equilibria.energy, "J", "potential energy of the equilibrium"),
+        "equilibrium_morse_index": (index, "1", "unstable directions, 0: a well"),
+        "barrier": (barrier, "J", "energy at which the well first meets another, NaN: no well"),
+    }
     return {
         **numbers("equilibrium", len(equilibria), "number of the equilibrium"),
-        **{
-            f"equilibrium_{name}": Variable(
-                each, equilibria.position[:, k], unit, f"{_kind(unit)} {name} of the equilibrium"
-            )
-            for k, (name, unit) in enumerate(coordinates.items())
-        },
-        "equilibrium_energy": Variable(each, equilibria.energy, "J", "potential energy of the equilibrium"),
-        "equilibrium_morse_index": Variable(
-            each,
-            index,
-            "1",
-            "unstable directions, 0: a well",
-        ),
-        "barrier": Variable(each, barrier, "J", "energy at which the well first meets another, NaN: no well"),
+        **parts("equilibrium", each, equilibria.position, coordinates, "{1} {0} of the equilibrium"),
+        **columns(each, rows),
     }

@@ -47,7 +47,9 @@ from fastmech.ensembles.status import ENDS, FAILURES, failure_counts
 from fastmech.errors import InputError, shown
 from fastmech.integrators.methods import find_method
 from fastmech.models.mechanism import Mechanism
+from fastmech.plots.disturbed import draw_disturbed
 from fastmech.results import (
+    ANGLE_UNITS,
     NO_CODE,
     Dataset,
     Variable,
@@ -58,25 +60,8 @@ from fastmech.results import (
     state_units,
     told,
 )
-from fastmech.scan_types.map_layout import about_of, one_of
-from fastmech.scan_types.request import (
-    HALVING,
-    Axis,
-    RunContext,
-    Scan,
-    Seed,
-    Tiles,
-    Tiling,
-    UsualMethod,
-    arrays,
-    axis_variables,
-    check_duration,
-    check_parameters,
-    check_size,
-    check_steps,
-    counted_failures,
-    known_parameters,
-)
+from fastmech.scan_types import request as scans
+from fastmech.scan_types.map_layout import one_of
 from fastmech.scene import Scene, nearest
 from fastmech.slider.atlas.map import map_equilibria
 from fastmech.slider.capture.steps import method_for, shortest_step
@@ -86,8 +71,6 @@ from fastmech.step_limits.warning import step_warning
 from fastmech.store.write import Piece, Stream
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from fastmech.store.read import Section
 
 
@@ -96,15 +79,11 @@ _ENDED = "ended_"
 
 @dataclass
 class Tally:
-    """How many trajectories end where, and when they were back: times are ends of steps, so few differ.
+    """How many trajectories end where, and when they were back: times are ends of steps, so few differ."""
 
-    Attributes:
-        ended: trajectories by the name of their outcome.
-        times, counts: the times to return that occur [s], rising, and how often. Who returns later than the
-            end of the run is not among them.
-    """
-
-    ended: Counter[str] = field(default_factory=Counter)
+    ended: Counter[str] = field(default_factory=Counter)  #: trajectories by the name of their outcome
+    #: the times to return that occur [s], rising, and how often. Who returns later than the end of the run is
+    #: not among them.
     times: Floats = field(default_factory=lambda: np.zeros(0))
     counts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
@@ -114,14 +93,10 @@ class Tally:
         times, counts = np.unique(time_to_return[np.isfinite(time_to_return)], return_counts=True)
         return cls(Counter(failure_counts(outcome, ENDS)), times, counts.astype(np.int64))
 
-    def variables(self) -> dict[str, Variable]:
-        """The times and counts as a tile keeps them."""
-        each = ("returned",)
-        return {"returned_time": Variable(each, self.times), "returned_count": Variable(each, self.counts)}
-
-    def attrs(self) -> dict[str, int]:
-        """The rest of what a tile keeps."""
-        return {f"{_ENDED}{name}": count for name, count in self.ended.items()}
+    def tile(self, arrays: Mapping[str, Any]) -> Dataset:
+        """A tile of these arrays that keeps the tally too."""
+        ended = {f"{_ENDED}{name}": count for name, count in self.ended.items()}
+        return scans.tile_of({**arrays, "returned_time": self.times, "returned_count": self.counts}, ended)
 
     def add(self, tile: Dataset) -> None:
         """Count a tile's trajectories too."""
@@ -183,6 +158,9 @@ def _turns(system: Scene | Mechanism) -> dict[str, str]:
     return dict.fromkeys(coordinate_units(system), "1")
 
 
+_RETURN = "end of the first step from which on every step ended in the ball of return, NaN: none by t_end"
+_EXCURSION = "largest departure of {} at the ends of steps, NaN: not followed to its end"
+
 #: What is known of every trajectory: type, what stands for one that is not computed yet, unit, meaning. What
 #: has several units is a variable for each of them.
 _TRAJECTORY: dict[str, tuple[str, float, str | Units, str]] = {
@@ -192,18 +170,8 @@ _TRAJECTORY: dict[str, tuple[str, float, str | Units, str]] = {
     "outcome": ("i1", -1, "1", "where it ends"),
     "end_equilibrium": ("i1", -1, "1", "stable equilibrium at which it is proved to end"),
     "turns": ("i8", 0, _turns, "full turns of {} made on the way there"),
-    "time_to_return": (
-        "f8",
-        np.nan,
-        "s",
-        "end of the first step from which on every step ended in the ball of return, NaN: none by t_end",
-    ),
-    "excursion": (
-        "f8",
-        np.nan,
-        coordinate_units,
-        "largest departure of {} at the ends of steps, NaN: not followed to its end",
-    ),
+    "time_to_return": ("f8", np.nan, "s", _RETURN),
+    "excursion": ("f8", np.nan, coordinate_units, _EXCURSION),
 }
 
 #: Names of what is known of every trajectory.
@@ -241,42 +209,23 @@ def share_variables(shares: Mapping[str, Floats]) -> dict[str, Variable]:
     return {name: Variable(_EACH, shares[name], "1", about) for name, about in ABOUT_SHARES.items()}
 
 
-def quantile_variables(quantiles: Floats) -> dict[str, Variable]:
-    """Quantiles of the times to return to each equilibrium."""
-    dims = ("equilibrium", "quantile")
-    return {"quantile": QUANTILE, "time_to_return_quantile": Variable(dims, quantiles, "s", ABOUT_QUANTILES)}
-
-
-def halving_variables(errors: Floats, units: Mapping[str, str]) -> dict[str, Variable]:
-    """How far final states of some trajectories are from those of half the step."""
-    unit = one_of(units.values())
-    what = "angle" if unit == "rad" else "position"
-    return parts(
-        "halving_difference",
-        ("equilibrium", "sample"),
-        errors,
-        {what: unit, "rate": f"{unit}/s" * (unit != "1") or "1"},
-        "largest difference of a final {} from that with half the step, first trajectories; NaN: failed",
-    )
-
-
-def linear_variables(system: Scene | Mechanism, directions: Floats, limit: Floats) -> dict[str, Variable]:
-    """How far the linearized motion can be trusted."""
-    *_, unit = coordinate_units(system).values()
+def _groups(
+    system: Scene | Mechanism, quantiles: Floats, errors: Floats, directions: Floats, limit: Floats
+) -> dict[str, dict[str, Variable]]:
+    """What has other dimensions than trajectories: the linearized motion's range, times, halved steps."""
+    coordinates = coordinate_units(system)
+    *_, size = coordinates.values()
+    ray, about = (*_EACH, "direction"), f"{{}} of a disturbance of size 1 {size}"
+    beyond = "size up to which the linearized motion keeps the tolerance, inf: beyond all tried, 0: below"
+    unit = one_of(coordinates.values())
+    units = {"angle" if unit == "rad" else "position": unit, "rate": f"{unit}/s" * (unit != "1") or "1"}
+    halved = "largest difference of a final {} from that with half the step, first trajectories; NaN: failed"
+    times = Variable((*_EACH, "quantile"), quantiles, "s", ABOUT_QUANTILES)
     return {
-        **parts(
-            "linear_direction",
-            ("equilibrium", "direction"),
-            directions,
-            state_units(system),
-            f"{{}} of a disturbance of size 1 {unit}",
-        ),
-        "linear_limit": Variable(
-            ("equilibrium", "direction"),
-            limit,
-            unit,
-            "size up to which the linearized motion keeps the tolerance, inf: beyond all tried, 0: below",
-        ),
+        "linear": parts("linear_direction", ray, directions, state_units(system), about)
+        | {"linear_limit": Variable(ray, limit, size, beyond)},
+        "quantiles": {"quantile": QUANTILE, "time_to_return_quantile": times},
+        "halving": parts("halving_difference", (*_EACH, "sample"), errors, units, halved),
     }
 
 
@@ -293,14 +242,10 @@ DIRECTIONS = 256
 PIECE_BYTES = 1 << 25
 
 
-class DisturbedTiling(Tiling):
+class DisturbedTiling(scans.Tiling):
     """First blocks of directions for the linearized motion, then blocks of trajectories.
 
     Equilibria alternate, so that a partial result knows something of each.
-
-    Args:
-        request: how to compute and what to keep.
-        scene: the mechanism.
     """
 
     what = "disturbed trajectories"
@@ -323,7 +268,7 @@ class DisturbedTiling(Tiling):
         part = self._part(index)
         return 0 if part is None else part.stop - part.start
 
-    def compute(self, index: int, context: RunContext) -> Dataset:
+    def compute(self, index: int, context: scans.RunContext) -> Dataset:
         """Try some directions, or follow some trajectories, of one equilibrium."""
         part, request = self._part(index), self.request
         equilibrium = self.equilibria[index % len(self.equilibria)]
@@ -338,22 +283,20 @@ class DisturbedTiling(Tiling):
                 part=self.rays[index // len(self.equilibria)],
                 threads=context.threads,
             )
-            rays = {"directions": Variable(("ray", "component"), found.directions)}
-            return Dataset(rays | {"limit": Variable(("ray",), found.limit)})
+            return scans.tile_of({"directions": found.directions, "limit": found.limit})
         ensemble = request.ensemble(self.scene, equilibrium, context, part)
         errors = _sampled_errors(self.scene, ensemble, self.method) if part.start == 0 else np.zeros((0, 2))
         arrays = {name: getattr(ensemble, _FIELDS.get(name, name)) for name in request.kept}
-        tally = Tally.of(ensemble.outcome, ensemble.time_to_return)
-        return self._tile(arrays, errors, tally, [ensemble.dt.min(), ensemble.dt.max()])
+        arrays |= {"error": errors, "step": [ensemble.dt.min(), ensemble.dt.max()]}
+        return Tally.of(ensemble.outcome, ensemble.time_to_return).tile(arrays)
 
-    def assemble(self, tile: Tiles) -> Stream:
+    def assemble(self, tile: scans.Tiles) -> Stream:
         """Join the blocks and count."""
         each = list(self.equilibria)
         omega = np.array([size_of(self.scene, e).omega for e in each])
         fixed = numbers("equilibrium", len(each), "number of the equilibrium")
-        for k, (name, unit) in enumerate(coordinate_units(self.scene).items()):
-            about = f"{about_of(unit)} {name} of the disturbed equilibrium"
-            fixed[name] = Variable(_EACH, self.equilibria.position[:, k], unit, about)
+        about, units = "{1} {0} of the disturbed equilibrium", coordinate_units(self.scene)
+        fixed |= parts("", _EACH, self.equilibria.position, units, about)
         fixed["omega"] = Variable(_EACH, omega, "rad/s", "frequency in the norm")
         fixed |= numbers("trajectory", self.request.trajectories, "number of the trajectory")
         count, request = len(each), self.request
@@ -373,16 +316,11 @@ class DisturbedTiling(Tiling):
         part = self._part(index)
         if part is None:
             block = self.rays[index // len(self.equilibria)]
-            rays = block.stop - block.start
-            arrays = {
-                "directions": Variable(
-                    ("ray", "component"), np.full((rays, 2 * self.equilibria.position.shape[1]), np.nan)
-                )
-            }
-            return Dataset(arrays | {"limit": Variable(("ray",), np.full(rays, np.nan))})
+            nothing = np.full((block.stop - block.start, 2 * self.equilibria.position.shape[1]), np.nan)
+            return scans.tile_of({"directions": nothing, "limit": nothing[:, 0]})
         sample = min(SAMPLE, self.request.trajectories) if part.start == 0 else 0
-        nothing = empty_trajectories(self.scene, self.request.kept, self.items(index))
-        return self._tile(nothing, np.full((sample, 2), np.nan), Tally())
+        arrays = empty_trajectories(self.scene, self.request.kept, self.items(index))
+        return Tally().tile(arrays | {"error": np.full((sample, 2), np.nan), "step": np.zeros(0)})
 
     def _tile_length(self, dt: float) -> int:
         """Trajectories of a tile, by their cost: a power of two, which divides a stream of random numbers."""
@@ -395,20 +333,7 @@ class DisturbedTiling(Tiling):
         block = index // len(self.equilibria) - len(self.rays)
         return None if block < 0 else self.parts[block]
 
-    def _tile(
-        self, arrays: dict[str, NDArray[Any]], errors: Floats, tally: Tally, steps: list[float] | None = None
-    ) -> Dataset:
-        columns = {
-            name: Variable(("trajectory", *(f"{name}_entry" for _ in a.shape[1:])), a)
-            for name, a in arrays.items()
-        }
-        columns |= {
-            "error": Variable(("sample", "error_entry"), errors),
-            "step": Variable(("step_end",), np.array(steps or [])),
-        }
-        return Dataset(columns | tally.variables(), tally.attrs())
-
-    def _pieces(self, tile: Tiles, count: int) -> Iterator[Piece]:
+    def _pieces(self, tile: scans.Tiles, count: int) -> Iterator[Piece]:
         limits = [[tile(number * count + e) for number in range(len(self.rays))] for e in range(count)]
         directions, limit = (
             np.stack([np.concatenate([f[name].data for f in found]) for found in limits])
@@ -428,30 +353,25 @@ class DisturbedTiling(Tiling):
             held.append({n: np.stack([one[n].data for one in found]) for n in self.request.kept})
             if part is self.parts[-1] or sum(a.nbytes for h in held for a in h.values()) >= PIECE_BYTES:
                 joined = {n: np.concatenate([h[n] for h in held], axis=1) for n in self.request.kept}
-                yield (
-                    (slice(0, count), slice(begun, part.stop)),
-                    _data(trajectory_variables(self.scene, joined)),
-                )
+                place = slice(0, count), slice(begun, part.stop)
+                yield place, _data(trajectory_variables(self.scene, joined))
                 begun, held = part.stop, []
         each = [t.shares() for t in tallies]
         shares = {name: np.array([share[name] for share in each]) for name in SHARES}
         quantiles = np.array([t.quantiles(QUANTILES) for t in tallies])
         each_one = numbers("equilibrium", count, "number of the equilibrium")
-        groups = {
-            "linear": Dataset(each_one | linear_variables(self.scene, directions, limit)),
-            "quantiles": Dataset(each_one | quantile_variables(quantiles)),
-            "halving": Dataset(each_one | halving_variables(np.stack(errors), coordinate_units(self.scene))),
-        }
+        made = _groups(self.scene, quantiles, np.stack(errors), directions, limit)
+        groups = {name: Dataset(each_one | variables) for name, variables in made.items()}
         attrs: dict[str, Any] = {
             "error_estimate": float(np.max(errors)),
             "error_estimate_median": float(np.median(errors)),
-            "error_estimate_is": f"{HALVING}; final states of the first {len(errors[0])} of each",
+            "error_estimate_is": f"{scans.HALVING}; final states of the first {len(errors[0])} of each",
         }
         attrs |= {"shortest_step": min(steps), "longest_step": max(steps)} if steps else {}
         ended = sum((t.ended for t in tallies), Counter[str]())
         failed = {k.name.lower(): ended[k.name.lower()] for k in FAILURES if ended[k.name.lower()]}
         yield slice(0, count), _data(share_variables(shares))
-        yield Dataset({}, attrs | counted_failures(failed, ended.total()), groups)
+        yield Dataset({}, attrs | scans.counted_failures(failed, ended.total()), groups)
 
 
 #: Names of variables in `fastmech.basins.disturbed.DisturbedEnsemble`, where they are others.
@@ -491,22 +411,17 @@ _MEASURED: dict[str, tuple[tuple[str, ...], str, str]] = {
     "share_failed": ((), "1", "share whose motion could not be computed"),
 }
 _LENGTHS = {"quantile": len(QUANTILES)}
+_NOTHING = {n: np.full([_LENGTHS[dim] for dim in dims], np.nan) for n, (dims, *_) in _MEASURED.items()}
 
 
-class DisturbedMap(Tiling):
-    """A tile is one equilibrium at one point; those of a point follow each other.
-
-    Args:
-        request: how to compute.
-        scene: gives every parameter that is no axis.
-        axes: parameter names with their values.
-    """
+class DisturbedMap(scans.Tiling):
+    """A tile is one equilibrium at one point; those of a point follow each other."""
 
     what = "disturbed trajectories"
 
-    def __init__(self, request: Disturbed, scene: Scene, axes: Mapping[str, Floats]) -> None:
-        self.request, self.scene, self.axes = request, scene, dict(axes)
-        self.atlas = map_equilibria(scene, axes)
+    def __init__(self, request: Disturbed, scene: Scene) -> None:
+        self.request, self.scene, self.axes = request, scene, scans.values_of(request.axes)
+        self.atlas = map_equilibria(scene, self.axes)
         self.entries = np.argwhere(self.atlas.sheet >= 0)
         self.count = len(self.entries)
 
@@ -514,13 +429,13 @@ class DisturbedMap(Tiling):
         """Trajectories."""
         return self.request.trajectories
 
-    def compute(self, index: int, context: RunContext) -> Dataset:
+    def compute(self, index: int, context: scans.RunContext) -> Dataset:
         """Disturb one equilibrium; where its scene is refused, all that is kept is the reason."""
         request, (scene, equilibrium) = self.request, self._place(index)
         try:
             found = request.ensemble(scene, equilibrium, context)
         except InputError as refused:
-            return self._tile({}, {"refused": str(refused)})
+            return scans.tile_of(_NOTHING, {"refused": str(refused)})
         tally, failed = Tally.of(found.outcome, found.time_to_return), np.isin(found.outcome, FAILURES)
         farthest = np.full(2, np.nan) if failed.all() else found.excursion[~failed].max(axis=0)
         measured: dict[str, Any] = {
@@ -530,9 +445,9 @@ class DisturbedMap(Tiling):
             "largest_excursion_theta": farthest[1],
             "share_failed": failed.mean(),
         }
-        return self._tile(measured, failure_counts(found.outcome, FAILURES))
+        return scans.tile_of(measured, failure_counts(found.outcome, FAILURES))
 
-    def assemble(self, tile: Tiles) -> Dataset:
+    def assemble(self, tile: scans.Tiles) -> Dataset:
         """Put every equilibrium in its sheet's place."""
         atlas, names = self.atlas, tuple(self.axes)
         grid = (*atlas.sheet.shape[:-1], atlas.sheet_morse_index.size)
@@ -546,14 +461,13 @@ class DisturbedMap(Tiling):
             array[place] = values
             return Variable((*names, "sheet", *dims), array, unit, about)
 
-        variables = axis_variables(self.scene, self.axes)
+        variables = scans.axis_variables(self.scene, self.axes)
         about = "equilibrium, continued, as the atlas of these axes numbers them"
         variables |= numbers("sheet", grid[-1], about)
-        about = "negative eigenvalues of the Hessian all over a sheet, 0: stable"
-        sheet_index = Variable(("sheet",), atlas.sheet_morse_index, "1", about)
         quantiles = {**variables, "quantile": QUANTILE}
-        variables["sheet_morse_index"] = sheet_index
-        for angle in ("phi", "theta"):
+        about = "negative eigenvalues of the Hessian all over a sheet, 0: stable"
+        variables["sheet_morse_index"] = Variable(("sheet",), atlas.sheet_morse_index, "1", about)
+        for angle in ANGLE_UNITS:
             about = f"angle {angle} of the disturbed equilibrium"
             variables[angle] = over_map(getattr(atlas, angle)[slot], (), "rad", about)
         for name, (dims, unit, about) in _MEASURED.items():
@@ -566,12 +480,12 @@ class DisturbedMap(Tiling):
         attrs = {**self.request.settings, "axes": names, "refused": len(refused)}
         attrs |= {"refused_first": refused[0]} if refused else {}
         followed = self.request.trajectories * (len(tiles) - len(refused))
-        attrs |= counted_failures({k: n for k, n in counts.items() if n}, followed)
+        attrs |= scans.counted_failures({k: n for k, n in counts.items() if n}, followed)
         return Dataset(variables, attrs, {"quantiles": Dataset(quantiles)})
 
     def missing(self, index: int) -> Dataset:
         """An equilibrium that has not been disturbed."""
-        return self._tile({}, {})
+        return scans.tile_of(_NOTHING)
 
     def _place(self, index: int) -> tuple[Scene, Equilibrium]:
         """The scene of a tile's point, and which of its equilibria is the tile's."""
@@ -584,18 +498,6 @@ class DisturbedMap(Tiling):
             np.sin(0.5 * (equilibria.theta - self.atlas.theta[entry])),
         )
         return scene, equilibria[int(apart.argmin())]
-
-    @staticmethod
-    def _tile(measured: Mapping[str, Any], attrs: Mapping[str, Any]) -> Dataset:
-        return Dataset(
-            {
-                name: Variable(
-                    dims, np.broadcast_to(measured.get(name, np.nan), [_LENGTHS[dim] for dim in dims])
-                )
-                for name, (dims, _, _) in _MEASURED.items()
-            },
-            attrs,
-        )
 
 
 #: Right-hand sides of the largest ensemble: a year of a hundred cores.
@@ -619,14 +521,15 @@ def _known_variables(names: list[str]) -> list[str]:
 _NOT_OF_A_MAP = ("variables", "linear_horizon", "linear_tolerance", "linear_directions")
 
 
-class Disturbed(Scan):
+class Disturbed(scans.Scan):
     """Ensembles about every equilibrium, uniform in a ball of the kinetic-energy norm."""
 
     kind: ClassVar[str] = "disturbed"
+    draw = staticmethod(draw_disturbed)
     of_mechanisms = True
     taken = frozenset({"equilibrium", "trajectory", "omega", *TRAJECTORY_VARIABLES, *ABOUT_SHARES})
 
-    axes: dict[str, Axis] = Field(
+    axes: dict[str, scans.Axis] = Field(
         default={}, description="parameters over which all equilibria are disturbed; none: the scene's alone"
     )
 
@@ -635,12 +538,12 @@ class Disturbed(Scan):
         float, Field(gt=0, le=MOST_RADIUS, description="largest size of a disturbance [rad]")
     ] = 0.5
     return_radius: Annotated[float, Field(gt=0, description="radius of the ball of return [rad]")] = 0.01
-    seed: Seed = 0
+    seed: scans.Seed = 0
     t_end: Annotated[float, Field(gt=0)] = 120.0
     dt: Annotated[float | None, Field(gt=0)] = Field(
         None, description="longest step [s]; by default each start's own, from the scene and its energy"
     )
-    method: UsualMethod = None
+    method: scans.UsualMethod = None
     linear_horizon: Annotated[float, Field(gt=0, description="horizon of the comparison [s]")] = 1.0
     linear_tolerance: Annotated[float, Field(gt=0, description="deviation allowed, relative")] = 0.05
     linear_directions: Annotated[int, Field(ge=1, le=1_000_000)] = 256
@@ -651,21 +554,21 @@ class Disturbed(Scan):
 
     def check(self, scene: Scene | Mechanism) -> None:
         """A constant force and a damper all over a map, and no more work than is possible."""
-        known_parameters(scene, self.axes)
+        scans.check_axes(scene, self.axes)
         if isinstance(scene, Mechanism):
             if self.axes:
                 raise InputError("axes: are for the paper's mechanism alone; give a value in [scene] instead")
             require_damper(scene)
             require_isolated(scene)
             if self.dt is not None:
-                check_steps("t_end", self.t_end, self.dt)
+                scans.check_steps("t_end", self.t_end, self.dt)
             return
-        check_parameters(scene, self.axes, "axes")
+        scans.check_parameters(scene, self.axes, "axes")
         for corner in self._corners(scene):
             require_damper(corner)
             (require_constant_force if self.axes else require_isolated)(corner)
-            check_duration(corner, self.t_end, self.dt)
-            check_steps("linear_horizon", self.linear_horizon, shortest_step(reduce(corner)))
+            scans.check_duration(corner, self.t_end, self.dt)
+            scans.check_steps("linear_horizon", self.linear_horizon, shortest_step(reduce(corner)))
         if not self.axes:
             steps = math.ceil(self.t_end / (self.dt or shortest_step(reduce(scene))))
             work = self.trajectories * find_method(method_for(scene, self.method)).evaluations(steps)
@@ -678,7 +581,7 @@ class Disturbed(Scan):
         for name in _NOT_OF_A_MAP:
             if name in self.model_fields_set:
                 raise InputError(f"{name}: is nothing of a map; leave it out, or the axes")
-        check_size("axes", self.axes, "points", MOST_POINTS, POINT_NUMBERS)
+        scans.check_size("axes", self.axes, "points", MOST_POINTS, POINT_NUMBERS)
         if self.trajectories > MOST_TRAJECTORIES:
             raise InputError(
                 f"trajectories = {self.trajectories}: must be at most {MOST_TRAJECTORIES} on a map"
@@ -698,27 +601,22 @@ class Disturbed(Scan):
         ends = [axis.array[[0, -1]].tolist() for axis in self.axes.values()]
         return [scene.replace(**dict(zip(self.axes, values, strict=True))) for values in product(*ends)]
 
-    def tiling(self, scene: Scene | Mechanism) -> Tiling:
+    def tiling(self, scene: Scene | Mechanism) -> scans.Tiling:
         """Blocks of directions and of trajectories; of a map the equilibria one by one."""
         if self.axes:
             assert isinstance(scene, Scene)
-            return DisturbedMap(self, scene, arrays(self.axes))
+            return DisturbedMap(self, scene)
         return DisturbedTiling(self, scene)
 
     def ensemble(
-        self, scene: Scene | Mechanism, equilibrium: Any, context: RunContext, part: slice | None = None
+        self, scene: Scene | Mechanism, equilibrium: Any, context: scans.RunContext, part: slice | None = None
     ) -> DisturbedEnsemble:
         """Disturb one equilibrium, or a part of its trajectories."""
         return disturb(
             scene,
             equilibrium,
             self.trajectories,
-            radius=self.radius,
-            return_radius=self.return_radius,
-            seed=self.seed,
-            t_end=self.t_end,
-            dt=self.dt,
-            method=self.method,
+            **self.asked("radius", "return_radius", "seed", "t_end", "dt", "method"),
             part=part,
             threads=context.threads,
             progress=lambda finished: context.check(),
@@ -748,14 +646,3 @@ class Disturbed(Scan):
         return Dataset(
             found.variables, found.attrs, {name: group.load() for name, group in section.groups.items()}
         )
-
-    @staticmethod
-    def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
-        """Outcomes, times to return, excursions and the linearized motion's range; those of a map over it."""
-        if "axes" in dataset.attrs:
-            from fastmech.plots.disturbed import draw_disturbed_map
-
-            return draw_disturbed_map(dataset.merged, scene)
-        from fastmech.plots.disturbed import draw_disturbed
-
-        return draw_disturbed(dataset.merged)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -21,8 +20,9 @@ from fastmech.disturbance.motion import (
 from fastmech.ensembles import checks
 from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.status import FAILURES
-from fastmech.results import STATE_UNITS, Dataset, Variable, numbers, parts
-from fastmech.scan_types.request import HALVING, Each, Scan, Tiling, UsualMethod, check_steps, failures
+from fastmech.plots.disturbed import draw_disturbed_motion
+from fastmech.results import ANGLE_UNITS, STATE_UNITS, Dataset, Variable, numbers, parts
+from fastmech.scan_types import request as scans
 from fastmech.scene import Scene
 from fastmech.slider.capture.steps import highest_frequency
 from fastmech.slider.coefficients import reduce
@@ -30,17 +30,14 @@ from fastmech.slider.equilibria import Equilibria, Equilibrium
 from fastmech.slider.theorem import MOST
 from fastmech.step_limits.warning import step_warning
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-
 Size = Annotated[float, Field(ge=-MOST_RADIUS, le=MOST_RADIUS)]
 
 
-class DisturbedMotionScan(Scan):
+class DisturbedMotionScan(scans.Scan):
     """The same disturbance of every equilibrium; the default is the paper's: xi1 = 0.1, eta1 = 0.1."""
 
     kind: ClassVar[str] = "disturbed_motion"
+    draw = staticmethod(draw_disturbed_motion)
 
     xi_phi: Size = Field(default=0.1, description="disturbance of phi [rad]")
     xi_theta: Size = Field(default=0.0, description="disturbance of theta [rad]")
@@ -51,29 +48,27 @@ class DisturbedMotionScan(Scan):
     dt: Annotated[float | None, Field(gt=0)] = Field(
         None, description="longest step [s]; by default 0.05 rad of each equilibrium's highest frequency"
     )
-    method: UsualMethod = None
+    method: scans.UsualMethod = None
 
     def check(self, scene: Scene) -> None:
         """The force must be constant, so many steps possible, and the outputs fit into memory."""
         require_isolated(scene)
-        check_steps("t_end", self.t_end, self.dt or PHASE / highest_frequency(reduce(scene)))
+        scans.check_steps("t_end", self.t_end, self.dt or PHASE / highest_frequency(reduce(scene)))
         checks.memory(
             self.outputs * 2 * 4 * MOST, 3, "outputs: the motions about equilibria", "fewer outputs"
         )
 
     def step_warning(self, scene: Scene) -> str | None:
         """By the scene's limit; without ``dt`` each equilibrium's step is chosen."""
-        return (
-            None
-            if self.dt is None
-            else step_warning(scene, self.dt, self.method or default_method(scene, self.dt))
-        )
+        if self.dt is None:
+            return None
+        return step_warning(scene, self.dt, self.method or default_method(scene, self.dt))
 
-    def tiling(self, scene: Scene) -> Tiling:
+    def tiling(self, scene: Scene) -> scans.Tiling:
         """The equilibria one by one."""
         equilibria = equilibria_to_disturb(scene)
         method = self.method or default_method(scene, self.dt or PHASE / highest_frequency(reduce(scene)))
-        return Each(
+        return scans.Each(
             "disturbed motions",
             len(equilibria),
             lambda index: self._one(scene, equilibria[index], method),
@@ -95,23 +90,15 @@ class DisturbedMotionScan(Scan):
             for dt in (step, 0.5 * step)
         )
         difference = np.max(np.abs(halved.nonlinear - motion.nonlinear))
-        return Dataset(
-            {
-                "nonlinear": Variable(("time", "component"), motion.nonlinear[:, 0]),
-                "linearized": Variable(("time", "component"), motion.linearized[:, 0]),
-                "difference": Variable((), difference),
-                "step": Variable((), step),
-                "status": Variable((), motion.status[0]),
-            }
-        )
+        arrays = {"nonlinear": motion.nonlinear[:, 0], "linearized": motion.linearized[:, 0]}
+        return scans.tile_of(arrays | {"difference": difference, "step": step, "status": motion.status[0]})
 
     def _joined(self, equilibria: Equilibria, tiles: list[Dataset], method: str) -> Dataset:
         dims = ("equilibrium", "time")
         variables = {
             **numbers("equilibrium", len(equilibria), "number of the equilibrium"),
             "time": Variable(("time",), self._times, "s", "time"),
-            "phi": Variable(("equilibrium",), equilibria.phi, "rad", "angle phi of the equilibrium"),
-            "theta": Variable(("equilibrium",), equilibria.theta, "rad", "angle theta of the equilibrium"),
+            **parts("", dims[:1], equilibria.position, ANGLE_UNITS, "{1} {0} of the equilibrium"),
         }
         for kind in ("nonlinear", "linearized"):
             motion = np.stack([tile[kind].data for tile in tiles])
@@ -122,13 +109,6 @@ class DisturbedMotionScan(Scan):
             "shortest_step": min(steps),
             "longest_step": max(steps),
             "error_estimate": float(np.max([tile["difference"].data for tile in tiles])),
-            "error_estimate_is": HALVING,
+            "error_estimate_is": scans.HALVING,
         }
-        return Dataset(variables, attrs | failures([tile["status"].data for tile in tiles], FAILURES))
-
-    @staticmethod
-    def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
-        """Nonlinear and linearized disturbances of every equilibrium over time."""
-        from fastmech.plots.disturbed import draw_disturbed_motion
-
-        return draw_disturbed_motion(dataset)
+        return Dataset(variables, attrs | scans.failures([tile["status"].data for tile in tiles], FAILURES))

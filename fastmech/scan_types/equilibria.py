@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from enum import IntEnum
 from itertools import product
-from typing import TYPE_CHECKING, Any, ClassVar
+from operator import attrgetter
+from typing import Any, ClassVar
 
 import numpy as np
 import scipy.linalg
@@ -13,14 +13,12 @@ import scipy.linalg
 from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import classify
-from fastmech.results import Dataset, Variable, coordinate_units, flags, numbers, parts, told
-from fastmech.scan_types.map_layout import HESSIAN, about_of, drawing_group, eigenvalue_variables
+from fastmech.plots.equilibria import draw_equilibria
+from fastmech.results import Dataset, Variable, columns, coordinate_units, flags, numbers, parts, told
+from fastmech.scan_types.map_layout import HESSIAN, drawing_group, eigenvalue_variables
 from fastmech.scan_types.request import Each, Scan, Tiling
 from fastmech.scene import Scene
 from fastmech.slider.stability import Verdict
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 class Kind(IntEnum):
@@ -38,6 +36,7 @@ class EquilibriaScan(Scan):
     """Equilibria with loads at rest: of the paper's force F0 where alpha = 0, else none."""
 
     kind: ClassVar[str] = "equilibria"
+    draw = staticmethod(draw_equilibria)
     of_mechanisms = True
     taken = frozenset(
         {"equilibrium", "energy", "kind", "morse_index", "decay_time", "verdict", "explanation"}
@@ -53,17 +52,7 @@ class EquilibriaScan(Scan):
             q = np.stack([found[name].data for name in coordinate_units(scene)], axis=-1)
             return Dataset(found.variables, found.attrs, drawing_group(scene, q))
 
-        return Each("equilibria", 1, lambda _: self._found(scene), join)
-
-    def _found(self, scene: Scene | Mechanism) -> Dataset:
-        return equilibria_dataset(find_equilibria(scene))
-
-    @staticmethod
-    def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
-        """Potential with the equilibria, their positions, and the eigenvalues in the complex plane."""
-        from fastmech.plots.equilibria import draw_equilibria
-
-        return draw_equilibria(dataset, scene)
+        return Each("equilibria", 1, lambda _: equilibria_dataset(find_equilibria(scene)), join)
 
 
 def equilibria_dataset(equilibria: Any) -> Dataset:
@@ -73,74 +62,47 @@ def equilibria_dataset(equilibria: Any) -> Dataset:
     coordinates, each = coordinate_units(scene), ("equilibrium",)
     n, of_paper = len(coordinates), isinstance(scene, Scene)
 
-    def columns(name: str, values: list[Any], units: Iterable[str], about: str) -> dict[str, Variable]:
+    def numbered(name: str, values: list[Any], units: list[str], about: str) -> dict[str, Variable]:
         entries = {str(k): unit for k, unit in enumerate(units, start=1)}
-        columns = np.array(values, dtype=np.float64).reshape(len(found), len(entries))
-        return parts(name, each, columns, entries, about)
+        array = np.array(values, dtype=np.float64).reshape(len(found), len(entries))
+        return parts(name, each, array, entries, about)
 
-    def verdicts(values: list[str], criterion: str) -> Variable:
-        codes = [Verdict[value.upper().replace(" ", "_")] for value in values]
-        return Variable(
-            each, np.array(codes, dtype=np.int8), "1", f"verdict: {criterion}", flags(list(Verdict)[1:])
-        )
+    def verdicts(criterion: str, about: str) -> tuple[Any, ...]:
+        words = [attrgetter(criterion)(one).upper().replace(" ", "_") for one in found]
+        codes = np.array([Verdict[word] for word in words], dtype=np.int8)
+        return codes, "1", f"verdict: {about}", flags(list(Verdict)[1:])
 
     kinds = np.array([Kind[name.upper()] for name in equilibria.kind], dtype=np.int8)
-    index = [-1 if e.morse_index is None else e.morse_index for e in equilibria]
+    index = np.array([-1 if e.morse_index is None else e.morse_index for e in equilibria], dtype=np.int8)
     energy = "potential energy Pi - F x2" if of_paper else "potential energy, loads at their means"
     swings = [_swings(scene, e, f) for e, f in zip(equilibria, found, strict=True)]
+    why = np.array([f.explanation for f in found], dtype=object)
+    ranks, about = range(1, 2 * n + 1), "undamped natural frequency {}, NaN for a direction that grows"
+    polynomial = f"monic characteristic polynomial of degree {2 * n}: coefficient of power {2 * n} - {{}}"
+    determinants = [f.hurwitz_determinants for f in found], [f"s-{k * (k + 1) // 2}" for k in ranks]
+    rows = {
+        "energy": (equilibria.energy, "J", energy),
+        "kind": (kinds, "1", "kind of equilibrium", flags(list(Kind)[: 4 if of_paper else None])),
+        "morse_index": (index, "1", "negative eigenvalues of the Hessian, -1: no potential"),
+    }
+    judged = {
+        "decay_time": ([time for _, time in swings], "s", "slowest linear mode falls to 1/e; NaN: unstable"),
+        **({"verdict_sylvester": verdicts("sylvester.verdict", "Lagrange-Dirichlet")} if of_paper else {}),
+        "verdict_hurwitz": verdicts("hurwitz.verdict", "Hurwitz"),
+        "verdict_eigenvalues": verdicts("spectrum.verdict", "eigenvalues"),
+        "verdict": verdicts("verdict", "joint"),
+        "explanation": (why, "1", "why, and what disagrees"),
+    }
     variables = {
         **numbers("equilibrium", len(found), "number of the equilibrium"),
-        **{
-            name: Variable(each, equilibria.position[:, k], unit, f"{about_of(unit)} {name}")
-            for k, (name, unit) in enumerate(coordinates.items())
-        },
-        "energy": Variable(each, equilibria.energy, "J", energy),
-        "kind": Variable(
-            each, kinds, "1", "kind of equilibrium", flags(list(Kind)[: 4 if of_paper else None])
-        ),
-        "morse_index": Variable(
-            each,
-            np.array(index, dtype=np.int8),
-            "1",
-            "negative eigenvalues of the Hessian, -1: no potential",
-        ),
+        **parts("", each, equilibria.position, coordinates, "{1} {0}"),
+        **columns(each, rows),
         **_stiffness(scene, equilibria, found),
-        **columns(
-            "polynomial",
-            [f.polynomial[1:] for f in found],
-            [f"s-{k}" for k in range(1, 2 * n + 1)],
-            f"monic characteristic polynomial of degree {2 * n}: coefficient of power {2 * n} - {{}}",
-        ),
-        **columns(
-            "hurwitz",
-            [f.hurwitz_determinants for f in found],
-            [f"s-{k * (k + 1) // 2}" for k in range(1, 2 * n + 1)],
-            "Hurwitz determinant {}",
-        ),
+        **numbered("polynomial", [f.polynomial[1:] for f in found], [f"s-{k}" for k in ranks], polynomial),
+        **numbered("hurwitz", *determinants, "Hurwitz determinant {}"),
         **eigenvalue_variables(each, np.array([f.eigenvalues for f in found]).reshape(-1, 2 * n)),
-        **columns(
-            "natural_frequency",
-            [frequencies for frequencies, _ in swings],
-            ["rad/s"] * n,
-            "undamped natural frequency {}, NaN for a direction that grows",
-        ),
-        "decay_time": Variable(
-            each,
-            np.array([time for _, time in swings]),
-            "s",
-            "slowest linear mode falls to 1/e; NaN: unstable",
-        ),
-        **(
-            {"verdict_sylvester": verdicts([f.sylvester.verdict for f in found], "Lagrange-Dirichlet")}
-            if of_paper
-            else {}
-        ),
-        "verdict_hurwitz": verdicts([f.hurwitz.verdict for f in found], "Hurwitz"),
-        "verdict_eigenvalues": verdicts([f.spectrum.verdict for f in found], "eigenvalues"),
-        "verdict": verdicts([f.verdict for f in found], "joint"),
-        "explanation": Variable(
-            each, np.array([f.explanation for f in found], dtype=object), "1", "why, and what disagrees"
-        ),
+        **numbered("natural_frequency", [undamped for undamped, _ in swings], ["rad/s"] * n, about),
+        **columns(each, judged),
     }
     attrs = {
         **({"force": equilibria.force} if of_paper else told(scene)),

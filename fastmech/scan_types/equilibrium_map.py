@@ -31,29 +31,10 @@ from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.outcome import Outcome
+from fastmech.plots.equilibrium_map import draw_equilibrium_map
 from fastmech.results import Dataset, Variable, coordinate_units, numbers, told
-from fastmech.scan_types.map_layout import (
-    RESTING,
-    TOGETHER,
-    curve_variables,
-    point_variables,
-    resting_variables,
-    sheet_table,
-    sheet_variables,
-)
-from fastmech.scan_types.request import (
-    Axis,
-    Planes,
-    RunContext,
-    Scan,
-    Tiles,
-    Tiling,
-    arrays,
-    axis_variables,
-    check_parameters,
-    check_size,
-    known_parameters,
-)
+from fastmech.scan_types import map_layout
+from fastmech.scan_types import request as scans
 from fastmech.scene import Scene, nearest
 from fastmech.slider.atlas.axes import grid_coefficients, refuse_decaying_load
 from fastmech.slider.atlas.map import BLOCK, Slab, solve_block
@@ -62,8 +43,6 @@ from fastmech.slider.theorem import MOST
 from fastmech.store.write import Piece, Stream
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from fastmech.store.read import Section
 
 #: Points of the largest map: its sheets take 24 bytes a point in memory, its file about 100.
@@ -73,42 +52,43 @@ MOST_POINTS = 50_000_000
 SHEET_NUMBERS, POINT_NUMBERS = 3, 250
 
 
-class EquilibriumMap(Scan):
+class EquilibriumMap(scans.Scan):
     """Every equilibrium at every point of a grid of parameters, with the proof that none is missing."""
 
     kind: ClassVar[str] = "equilibrium_map"
+    draw = staticmethod(draw_equilibrium_map)
     of_mechanisms = True
-    taken = frozenset({"root", *RESTING})
+    taken = frozenset({"root", *map_layout.RESTING})
 
-    axes: Annotated[dict[str, Axis], Field(min_length=1)]
+    axes: Annotated[dict[str, scans.Axis], Field(min_length=1)]
     variables: list[str] | None = Field(
         None, description="what to keep of every point (all by default); large maps are smaller with less"
     )
 
     def check(self, scene: Scene | Mechanism) -> None:
         """Every value of every axis must be one the scene accepts, and every axis must matter."""
-        known_parameters(scene, self.axes)
+        scans.check_axes(scene, self.axes)
         if isinstance(scene, Scene):
             refuse_decaying_load(scene, self.axes)
-            known, most = [*point_variables(("x",), Slab.empty(1)), *TOGETHER], MOST_POINTS
+            known, most = [*map_layout.point_variables(("x",), Slab.empty(1))], MOST_POINTS
         else:
-            known, most = [*coordinate_units(scene), *RESTING, *TOGETHER], MOST_OF_MECHANISMS
+            known, most = [*coordinate_units(scene), *map_layout.RESTING], MOST_OF_MECHANISMS
             for name in self.taken & {*self.axes}:
                 raise InputError(f"axes.{name}: is the name of a variable of the result too")
+        known += map_layout.TOGETHER
         for name in self.variables or ():
             if name not in known:
                 raise InputError(f"variables: unknown variable {shown(name)}; {nearest(name, known)}")
-        check_parameters(scene, self.axes, "axes")
-        check_size("axes", self.axes, "points", most, SHEET_NUMBERS)
+        scans.check_parameters(scene, self.axes, "axes")
+        scans.check_size("axes", self.axes, "points", most, SHEET_NUMBERS)
         first, *others = self.axes
         plane = {name: self.axes[name] for name in others} or {first: self.axes[first]}
         if others:
-            check_size("axes", plane, f"points in a plane of {first}", most, POINT_NUMBERS)
+            scans.check_size("axes", plane, f"points in a plane of {first}", most, POINT_NUMBERS)
 
-    def tiling(self, scene: Scene | Mechanism) -> Tiling:
+    def tiling(self, scene: Scene | Mechanism) -> scans.Tiling:
         """Planes of the first axis, and of a scene the curves as a tile of their own."""
-        axes = arrays(self.axes)
-        return MapTiling(self, scene, axes) if isinstance(scene, Scene) else RestingTiling(self, scene, axes)
+        return MapTiling(self, scene) if isinstance(scene, Scene) else RestingTiling(self, scene)
 
     @property
     def wells(self) -> bool:
@@ -121,7 +101,7 @@ class EquilibriumMap(Scan):
         """Those of the variables that are asked for."""
         if self.variables is None:
             return variables
-        wanted = {one for name in self.variables for one in TOGETHER.get(name, (name,))}
+        wanted = {one for name in self.variables for one in map_layout.TOGETHER.get(name, (name,))}
         return {name: variable for name, variable in variables.items() if name in wanted}
 
     @staticmethod
@@ -130,13 +110,6 @@ class EquilibriumMap(Scan):
         from fastmech.plots.map_view import load_drawn
 
         return load_drawn(section, scene)
-
-    @staticmethod
-    def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
-        """Counts, positions, barriers and slowest decay over the parameters, with the curves on top."""
-        from fastmech.plots.equilibrium_map import draw_equilibrium_map
-
-        return draw_equilibrium_map(dataset, scene)
 
 
 #: Points of a mechanism's largest map, which is joined in memory, and of a tile of one.
@@ -149,19 +122,13 @@ TILE_POINTS = 1 << 15
 _FOR_SHEETS = ("phi", "theta", "morse_index", "count")
 
 
-class MapTiling(Planes):
-    """Tile 0 holds the curves, every other some planes of the first axis.
-
-    Args:
-        request: what to keep.
-        scene: gives every parameter that is no axis.
-        axes: parameter names with their values.
-    """
+class MapTiling(scans.Planes):
+    """Tile 0 holds the curves, every other some planes of the first axis."""
 
     what = "points of the map"
 
-    def __init__(self, request: EquilibriumMap, scene: Scene, axes: dict[str, Floats]) -> None:
-        super().__init__(axes, TILE_POINTS)
+    def __init__(self, request: EquilibriumMap, scene: Scene) -> None:
+        super().__init__(scans.values_of(request.axes), TILE_POINTS)
         self.request, self.scene, self.plane = request, scene, math.prod(self.others)
         self.count += 1
 
@@ -169,39 +136,33 @@ class MapTiling(Planes):
         """Points."""
         return super().items(index - 1) if index else 0
 
-    def compute(self, index: int, context: RunContext) -> Dataset:
+    def compute(self, index: int, context: scans.RunContext) -> Dataset:
         """Solve some planes, or trace the curves."""
         if index == 0:
-            return Dataset(curve_variables(self.scene, self.axes, context.threads))
+            return Dataset(map_layout.curve_variables(self.scene, self.axes, context.threads))
         coefficients, weight, constant, mass = self._coefficients(index)
         slab = Slab.empty(len(coefficients))
 
         def solve(start: int) -> None:
             context.check()
             rows = slice(start, start + BLOCK)
-            solve_block(
-                coefficients[rows],
-                weight[rows],
-                constant[rows],
-                mass[rows],
-                self.request.wells,
-                slab.rows(rows),
-            )
+            point = coefficients[rows], weight[rows], constant[rows], mass[rows]
+            solve_block(*point, self.request.wells, slab.rows(rows))
 
         with ThreadPoolExecutor(thread_count(context.threads)) as pool:
             list(pool.map(solve, range(0, len(coefficients), BLOCK)))
         return Dataset(self._shaped(slab, for_sheets=True))
 
-    def assemble(self, tile: Tiles) -> Stream:
+    def assemble(self, tile: scans.Tiles) -> Stream:
         """Join the planes and find which equilibria of different points are one, continued."""
-        about = axis_variables(self.scene, self.axes)
+        about = scans.axis_variables(self.scene, self.axes)
         attrs = {
             "axes": tuple(self.axes),
             "layout": "six slots along root, the deepest first; beyond count NaN, codes _FillValue",
             "curves": "all fold curves that part neighbouring points; islands between them are not seen",
         }
         one = self._shaped(Slab.empty(self.plane))
-        one |= sheet_variables(tuple(self.axes), np.zeros((1, *self.others, 6), dtype=np.int32))
+        one |= map_layout.sheet_variables(tuple(self.axes), np.zeros((1, *self.others, 6), dtype=np.int32))
         about |= numbers("root", MOST, "rank of the equilibrium by energy")
         curves = tile(0)
         fixed = Dataset(about, attrs, {"curves": curves} if len(curves) else {})
@@ -219,24 +180,19 @@ class MapTiling(Planes):
         slab.count_stable[:] = 0
         return Dataset(self._shaped(slab, for_sheets=True))
 
-    def _pieces(self, tile: Tiles) -> Iterator[Piece]:
+    def _pieces(self, tile: scans.Tiles) -> Iterator[Piece]:
         builder = SheetBuilder(self.scene, self.axes)
         kept = set(self._shaped(Slab.empty(self.plane)))
         for index, part in enumerate(self.parts, start=1):
             variables = tile(index).variables
-            phi, theta, morse_index, count = (variables[name].data for name in _FOR_SHEETS)
-            builder.add(
-                self._coefficients(index)[0],
-                phi.reshape(-1, phi.shape[-1]),
-                theta.reshape(-1, theta.shape[-1]),
-                morse_index.reshape(-1, morse_index.shape[-1]),
-                count.reshape(-1),
-            )
+            *each, count = (variables[name].data for name in _FOR_SHEETS)
+            phi, theta, morse_index = (array.reshape(-1, array.shape[-1]) for array in each)
+            builder.add(self._coefficients(index)[0], phi, theta, morse_index, count.reshape(-1))
             yield part, {name: variables[name].data for name in variables if name in kept}
         sheets = builder.finish()
         for part, sheet in zip(self.parts, sheets.labels, strict=True):
             yield part, {"sheet": sheet.reshape(-1, *self.others, sheet.shape[-1])}
-        table = sheet_table(sheets.morse_index, sheets.branch, sheets.breaks)
+        table = map_layout.sheet_table(sheets.morse_index, sheets.branch, sheets.breaks)
         yield Dataset({}, groups={"sheets": Dataset(table)})
 
     def _coefficients(self, index: int) -> tuple[Floats, ...]:
@@ -244,27 +200,21 @@ class MapTiling(Planes):
 
     def _shaped(self, slab: Slab, for_sheets: bool = False) -> dict[str, Variable]:
         arrays = {name: a.reshape(-1, *self.others, *a.shape[1:]) for name, a in vars(slab).items()}
-        variables = point_variables(tuple(self.axes), Slab(**arrays))
+        variables = map_layout.point_variables(tuple(self.axes), Slab(**arrays))
         kept = self.request.kept(variables)
         return kept | {name: variables[name] for name in _FOR_SHEETS} if for_sheets else kept
 
 
-class RestingTiling(Planes):
-    """Some planes of the first axis of a mechanism's map; slots are as many as the most equilibria.
-
-    Args:
-        request: what to keep.
-        scene: the mechanism, which gives every parameter that is no axis.
-        axes: parameter names with their values.
-    """
+class RestingTiling(scans.Planes):
+    """Some planes of the first axis of a mechanism's map; slots are as many as the most equilibria."""
 
     what = "points of the map"
 
-    def __init__(self, request: EquilibriumMap, scene: Mechanism, axes: dict[str, Floats]) -> None:
-        super().__init__(axes, RESTING_POINTS)
+    def __init__(self, request: EquilibriumMap, scene: Mechanism) -> None:
+        super().__init__(scans.values_of(request.axes), RESTING_POINTS)
         self.request, self.scene = request, scene
 
-    def compute(self, index: int, context: RunContext) -> Dataset:
+    def compute(self, index: int, context: scans.RunContext) -> Dataset:
         """Prove some planes."""
         return self._tile(
             map_resting_places(
@@ -272,11 +222,11 @@ class RestingTiling(Planes):
             )
         )
 
-    def assemble(self, tile: Tiles) -> Dataset:
+    def assemble(self, tile: scans.Tiles) -> Dataset:
         """Join the planes."""
         tiles = [dict(tile(index).variables) for index in range(self.count)]
         slots = max(one["count"].data.max(initial=0) for one in tiles)
-        variables = axis_variables(self.scene, self.axes)
+        variables = scans.axis_variables(self.scene, self.axes)
         variables |= numbers("root", int(slots), "rank of the equilibrium by energy")
         for name, like in self.request.kept(tiles[0]).items():
             arrays = []
@@ -305,4 +255,4 @@ class RestingTiling(Planes):
         )
 
     def _tile(self, found: RestingMap) -> Dataset:
-        return Dataset(resting_variables(self.scene, tuple(self.axes), found))
+        return Dataset(map_layout.resting_variables(self.scene, tuple(self.axes), found))

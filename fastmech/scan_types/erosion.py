@@ -7,8 +7,7 @@ the well; starts are uniform in the window that ``axes`` span, the other states 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import AfterValidator, Field
@@ -19,27 +18,10 @@ from fastmech.basins.label import How, label_states
 from fastmech.capture.select import require_damper
 from fastmech.disturbance.motion import require_constant_force
 from fastmech.errors import InputError, shown
-from fastmech.results import Dataset, Variable, coordinate_units, told
-from fastmech.scan_types.map_layout import about_of
-from fastmech.scan_types.request import (
-    Axis,
-    RunContext,
-    Scan,
-    Seed,
-    Tiles,
-    Tiling,
-    arrays,
-    axis_variables,
-    check_duration,
-    check_parameters,
-    check_rising,
-    check_size,
-    check_starts,
-)
+from fastmech.plots.erosion import draw_erosion
+from fastmech.results import Dataset, Variable, columns_of, coordinate_units, parts, told
+from fastmech.scan_types import request as scans
 from fastmech.scene import PARAMETERS, STATE, Scene, nearest
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: Points of the largest map of a value.
 MOST_POINTS = 1_000_000
@@ -65,7 +47,7 @@ _ABOUT = {
 }
 
 
-def _known_states(axes: dict[str, Axis]) -> dict[str, Axis]:
+def _known_states(axes: dict[str, scans.Axis]) -> dict[str, scans.Axis]:
     for name, axis in axes.items():
         if name not in STATE:
             raise ValueError(f"unknown coordinate {shown(name)}; {nearest(name, list(STATE))}")
@@ -76,24 +58,25 @@ def _known_states(axes: dict[str, Axis]) -> dict[str, Axis]:
     return axes
 
 
-class Erosion(Scan):
+class Erosion(scans.Scan):
     """How much room each well has, along one parameter."""
 
     kind: ClassVar[str] = "erosion"
+    draw = staticmethod(draw_erosion)
 
-    along: Annotated[dict[str, Axis], Field(min_length=1, max_length=1)] = Field(
+    along: Annotated[dict[str, scans.Axis], Field(min_length=1, max_length=1)] = Field(
         description="the parameter and its values"
     )
-    axes: Annotated[dict[str, Axis], Field(min_length=1, max_length=4), AfterValidator(_known_states)] = (
-        Field(description="the window and the map in it")
-    )
+    axes: Annotated[
+        dict[str, scans.Axis], Field(min_length=1, max_length=4), AfterValidator(_known_states)
+    ] = Field(description="the window and the map in it")
     most_shock: Annotated[float, Field(gt=0, le=MOST_RADIUS)] = Field(
         2.0, description="largest shock to look for [rad]"
     )
     t_end: Annotated[float, Field(gt=0)] = 60.0
     starts: Annotated[int, Field(ge=1, le=1_000_000)] = 2048
     directions: Annotated[int, Field(ge=1, le=100_000)] = 64
-    seed: Seed = 0
+    seed: scans.Seed = 0
 
     @property
     def parameter(self) -> str:
@@ -113,50 +96,37 @@ class Erosion(Scan):
         if name not in PARAMETERS or name == "alpha":
             allowed = [field for field in PARAMETERS if field != "alpha"]
             raise InputError(f"along.{name}: unknown parameter; {nearest(name, allowed)}")
-        check_rising(f"along.{name}", axis)
-        check_parameters(scene, self.along, "along")
+        scans.check_rising(f"along.{name}", axis)
+        scans.check_parameters(scene, self.along, "along")
         ends = [scene.replace(**{name: float(value)}) for value in self.values[[0, -1]]]
-        check_size("axes", self.axes, "starts", MOST_POINTS, 1)
+        scans.check_size("axes", self.axes, "starts", MOST_POINTS, 1)
         for end in ends:
             require_damper(end)
-            check_starts(end, {f"axes.{state}": line for state, line in arrays(self.axes).items()})
-            check_duration(end, self.t_end, None)
+            scans.check_starts(
+                end, {f"axes.{state}": line for state, line in scans.values_of(self.axes).items()}
+            )
+            scans.check_duration(end, self.t_end, None)
 
-    def tiling(self, scene: Scene) -> Tiling:
+    def tiling(self, scene: Scene) -> scans.Tiling:
         """Every well at every value is a tile."""
         return ErosionTiling(self, scene)
-
-    @staticmethod
-    def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
-        """Stability, integrity and shocks of every well over the parameter."""
-        from fastmech.plots.erosion import draw_erosion
-
-        return draw_erosion(dataset, scene)
 
 
 def profile_dataset(found: ErosionProfile) -> Dataset:
     """The section of a profile."""
     name, units = found.parameter, coordinate_units(found.system)
-    about = {key: (unit, f"{about_of(unit)} {key} of the well") for key, unit in units.items()} | _ABOUT
-    arrays = found.position | {key: getattr(found, key) for key in MEASURES}
-    return Dataset(
-        {
-            **axis_variables(found.system, {name: found.values}),
-            "sheet": Variable(
-                ("well",), found.sheet.astype(np.int32), "1", "identity of the well in the atlas"
-            ),
-            **{
-                f"well_{key}": Variable(
-                    (name, "well"), data.astype(np.bool_) if key in FLAGS else data, *about[key]
-                )
-                for key, data in arrays.items()
-            },
-        },
-        {**told(found.system), "along": name},
-    )
+    places = np.stack([found.position[key] for key in units], axis=-1)
+    about = "identity of the well in the atlas"
+    variables = {
+        **scans.axis_variables(found.system, {name: found.values}),
+        "sheet": Variable(("well",), found.sheet.astype(np.int32), "1", about),
+        **parts("well", (name, "well"), places, units, "{1} {0} of the well"),
+        **columns_of(found, (name, "well"), _ABOUT, "well_{}"),
+    }
+    return Dataset(variables, {**told(found.system), "along": name})
 
 
-class ErosionTiling(Tiling):
+class ErosionTiling(scans.Tiling):
     """A tile a well and value: none needs another. The wells of a value follow each other."""
 
     what = "wells of the erosion profile"
@@ -165,13 +135,13 @@ class ErosionTiling(Tiling):
         self.request, self.scene, self.values = request, scene, request.values
         self.sheets, self.places = wells_along(scene, request.parameter, self.values)
         self.count = self.values.size * self.sheets.size
-        self.window = arrays(request.axes)
+        self.window = scans.values_of(request.axes)
 
     def items(self, index: int) -> int:
         """One well."""
         return 1
 
-    def compute(self, index: int, context: RunContext) -> Dataset:
+    def compute(self, index: int, context: scans.RunContext) -> Dataset:
         """Measure one well at one value."""
         at, well = divmod(index, self.sheets.size)
 
@@ -182,24 +152,22 @@ class ErosionTiling(Tiling):
         survey = survey_of(
             self.window,
             self.scene,
-            most_shock=self.request.most_shock,
-            t_end=self.request.t_end,
             label_starts=ends,
             n=self.request.starts,
-            directions=self.request.directions,
-            seed=self.request.seed,
+            **self.request.asked("most_shock", "t_end", "directions", "seed"),
         )
         scene = self.scene.replace(**{self.request.parameter: float(self.values[at])})
         found = survey.of_wells(scene, self.places[at, well][None])
-        return Dataset({key: Variable((), array[0]) for key, array in found.items()})
+        return scans.tile_of({key: array[0] for key, array in found.items()})
 
-    def assemble(self, tile: Tiles) -> Dataset:
+    def assemble(self, tile: scans.Tiles) -> Dataset:
         """Join the wells and values."""
         name = self.request.parameter
         tiles = [tile(index) for index in range(self.count)]
         shape = (self.values.size, -1)
         arrays = {key: np.array([part[key].data for part in tiles]).reshape(shape) for key in tiles[0]}
         position = {key: arrays.pop(key) for key in STATE[:2]}
+        arrays |= {key: arrays[key].astype(np.bool_) for key in FLAGS}
         found = ErosionProfile(name, self.values, self.sheets, position, **arrays).of(self.scene)
         attrs: dict[str, Any] = {"axes": tuple(self.window), "t_end": self.request.t_end}
         attrs |= {"starts": self.request.starts, "most_shock": self.request.most_shock}
@@ -211,4 +179,4 @@ class ErosionTiling(Tiling):
     def missing(self, index: int) -> Dataset:
         """A well that has not been measured."""
         keys = (*STATE[:2], *MEASURES)
-        return Dataset({key: Variable((), np.array(False if key in FLAGS else np.nan)) for key in keys})
+        return scans.tile_of({key: False if key in FLAGS else np.nan for key in keys})

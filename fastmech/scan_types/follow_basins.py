@@ -6,8 +6,8 @@ its own: ``tipping``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from collections.abc import Sequence
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -16,12 +16,10 @@ from fastmech.arrays import Floats
 from fastmech.attractors.follow import BasinsAlong, BasinsOver, Place, Tipping, follow_basins, joined
 from fastmech.ensembles.system import System
 from fastmech.models.mechanism import Mechanism
-from fastmech.results import Dataset, Variable, numbers, told
+from fastmech.plots.response import draw_shares
+from fastmech.results import Dataset, Variable, columns, numbers, told
 from fastmech.scan_types.attractors import Starts, lines_over, parameter_of, shared_axes
-from fastmech.scan_types.request import Axis, Tiling
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from fastmech.scan_types.request import Axis, Tiling, tile_of
 
 #: Points of an attractor that lines are joined by, at most.
 POINTS = 512
@@ -31,6 +29,7 @@ class FollowBasins(Starts):
     """Attractors along a parameter, matched from value to value."""
 
     kind: ClassVar[str] = "follow_basins"
+    draw = staticmethod(draw_shares)
     taken = frozenset({"share", "attractor", "tipping"})
 
     along: Annotated[dict[str, Axis], Field(min_length=1, max_length=1)] = Field(
@@ -76,65 +75,24 @@ class FollowBasins(Starts):
         shape = tuple(len(where[d].data) for d in dims)
         each, unit = ("tipping",), where[name].units
         kinds = np.where(rows[:, 1] == 1.0, "born", "dies").astype(object)
-        return Dataset(
-            {
-                **where,
-                **numbers("attractor", most, "number of the attractor, the same where it goes on"),
-                "share": Variable(
-                    (*dims, "attractor"),
-                    share.reshape(*shape, most),
-                    "1",
-                    "share of the starts that end there, NaN: it is not there",
-                ),
-                "unlabelled": Variable(
-                    dims, unlabelled.reshape(shape), "1", "share of the starts without a label"
-                ),
-            },
-            {"along": name, "starts": self.n, **told(scene)},
-            {
-                "tipping": Dataset(
-                    {
-                        **numbers("tipping", len(rows), "number of the change"),
-                        "tipping_line": Variable(each, line, "1", "index of the second parameter's value"),
-                        "tipping_attractor": Variable(
-                            each, rows[:, 0].astype(np.int32), "1", "number of the attractor"
-                        ),
-                        "tipping_kind": Variable(each, kinds, "1", f"born or dies as {name} rises"),
-                        "tipping_low": Variable(each, rows[:, 2], unit, "it happens above"),
-                        "tipping_high": Variable(each, rows[:, 3], unit, "it happens below"),
-                    }
-                )
-            },
-        )
-
-    @staticmethod
-    def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
-        """Shares stacked over the parameter; of a second one's first, middle and last values."""
-        from fastmech.plots.response import draw_lines
-
-        name = str(dataset.attrs["along"])
-        share, unlabelled = dataset["share"].data, dataset["unlabelled"].data
-        if share.ndim == 2:
-            share, unlabelled = share[None], unlabelled[None]
-        tips, owner = dataset.groups["tipping"], dataset.groups["tipping"]["tipping_line"].data
-
-        def line(k: int) -> BasinsAlong:
-            rows = np.flatnonzero(owner == k)
-            tipping = [
-                Tipping(
-                    int(tips["tipping_attractor"].data[i]),
-                    str(tips["tipping_kind"].data[i]),
-                    float(tips["tipping_low"].data[i]),
-                    float(tips["tipping_high"].data[i]),
-                )
-                for i in rows
-            ]
-            there = np.isfinite(share[k]).any(axis=0)
-            return BasinsAlong(
-                name, dataset[name].data, share[k][:, there], unlabelled[k], (), tuple(tipping)
-            )
-
-        return {"shares": draw_lines(dataset, scene, line, len(share))}
+        changes = {
+            "tipping_line": (line, "1", "index of the second parameter's value"),
+            "tipping_attractor": (rows[:, 0].astype(np.int32), "1", "number of the attractor"),
+            "tipping_kind": (kinds, "1", f"born or dies as {name} rises"),
+            "tipping_low": (rows[:, 2], unit, "it happens above"),
+            "tipping_high": (rows[:, 3], unit, "it happens below"),
+        }
+        tipping = numbers("tipping", len(rows), "number of the change") | columns(each, changes)
+        ends, about = share.reshape(*shape, most), "share of the starts that end there, NaN: it is not there"
+        none = unlabelled.reshape(shape)
+        variables = {
+            **where,
+            **numbers("attractor", most, "number of the attractor, the same where it goes on"),
+            "share": Variable((*dims, "attractor"), ends, "1", about),
+            "unlabelled": Variable(dims, none, "1", "share of the starts without a label"),
+        }
+        attrs = {"along": name, "starts": self.n, **told(scene)}
+        return Dataset(variables, attrs, {"tipping": Dataset(tipping)})
 
 
 def along_dataset(found: BasinsAlong) -> Dataset:
@@ -162,19 +120,12 @@ def _tipping(found: BasinsAlong) -> Floats:
 
 
 def _tile(found: BasinsAlong) -> Dataset:
-    """A line; of each attractor so many points as it is told by."""
+    """A line; of each attractor at most so many points as it is recognised by."""
     places = [(i, j, one) for i, there in enumerate(found.attractors) for j, one in there.items()]
     points = [one.points[:: -(-len(one.points) // POINTS)] for *_, one in places]
     rows = [(i, j, one.period or 0.0, len(own)) for (i, j, one), own in zip(places, points, strict=True)]
-    return Dataset(
-        {
-            "share": Variable((found.parameter, "attractor"), found.fractions),
-            "unlabelled": Variable((found.parameter,), found.unlabelled),
-            "tipping": Variable(("row", "column"), _tipping(found)),
-            "places": Variable(("place", "column"), np.array(rows, dtype=np.float64)),
-            "points": Variable(("point", "state"), np.concatenate(points)),
-        }
-    )
+    arrays = {"share": found.fractions, "unlabelled": found.unlabelled, "tipping": _tipping(found)}
+    return tile_of(arrays | {"places": np.array(rows, dtype=np.float64), "points": np.concatenate(points)})
 
 
 def _read(tile: Dataset, name: str, values: Floats) -> BasinsAlong:

@@ -6,24 +6,21 @@ folds, period doublings and Neimark-Sacker points.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from fastmech.attractors.branches import Branch, FrequencyResponse, Special, frequency_response
+from fastmech.attractors.branches import FrequencyResponse, frequency_response
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
-from fastmech.results import Dataset, Variable, numbers, parts, state_units, told
+from fastmech.plots.response import draw_frequency_response
+from fastmech.results import Dataset, Variable, columns, numbers, parts, state_units, told
 from fastmech.scan_types.attractors import Starts, lines_over, shared_axes
-from fastmech.scan_types.request import Axis, Tiling
+from fastmech.scan_types.request import Axis, Tiling, tile_of
 from fastmech.scene import nearest
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 KINDS = ("fold", "period doubling", "Neimark-Sacker")
 
@@ -32,6 +29,7 @@ class FrequencyResponseScan(Starts):
     """Periodic motions, stable and unstable, over a range of a parameter."""
 
     kind: ClassVar[str] = "frequency_response"
+    draw = staticmethod(draw_frequency_response)
     taken = frozenset({"point", "special", "branch", "line"})
 
     parameter: str
@@ -80,89 +78,34 @@ class FrequencyResponseScan(Starts):
         groups = {}
         for name, rows in (("points", points), ("special", special)):
             own = name.removesuffix("s")
-            each = (own,)
+            each, about = (own,), "half of the range of {} over a period"
+            line, branch = rows[:, :2].T.astype(np.int32)
+            table = {
+                f"{own}_line": (line, "1", "index of the second parameter's value"),
+                f"{own}_branch": (branch, "1", "number of the branch"),
+                f"{own}_value": (rows[:, 2], unit, f"value of {self.parameter}"),
+            }
             groups[name] = {
                 **numbers(own, len(rows), "number"),
-                f"{own}_line": Variable(
-                    each, rows[:, 0].astype(np.int32), "1", "index of the second parameter's value"
-                ),
-                f"{own}_branch": Variable(each, rows[:, 1].astype(np.int32), "1", "number of the branch"),
-                f"{own}_value": Variable(each, rows[:, 2], unit, f"value of {self.parameter}"),
+                **columns(each, table),
                 **parts(f"{own}_place", each, rows[:, 3 : 3 + dim], units, "{} when a period begins"),
-                **parts(
-                    f"{own}_amplitude",
-                    each,
-                    rows[:, 3 + dim : 3 + 2 * dim],
-                    units,
-                    "half of the range of {} over a period",
-                ),
+                **parts(f"{own}_amplitude", each, rows[:, 3 + dim : 3 + 2 * dim], units, about),
             }
         rest = points[:, 3 + 2 * dim :]
-        each = ("point",)
         multipliers = rest[:, 2:].reshape(-1, dim, 2)
-        groups["points"] |= {
-            "point_closed": Variable(each, rest[:, 0] == 1.0, "1", "its branch is an isola"),
-            "point_cut": Variable(each, rest[:, 1] == 1.0, "1", "its branch goes on beyond an end"),
-            "point_multiplier_re": Variable(
-                (*each, "multiplier"), multipliers[..., 0], "1", "real part of multipliers"
-            ),
-            "point_multiplier_im": Variable(
-                (*each, "multiplier"), multipliers[..., 1], "1", "imaginary part"
-            ),
+        looks = {
+            "point_closed": (rest[:, 0] == 1.0, "1", "its branch is an isola"),
+            "point_cut": (rest[:, 1] == 1.0, "1", "its branch goes on beyond an end"),
         }
+        both = {
+            "point_multiplier_re": (multipliers[..., 0], "1", "real part of multipliers"),
+            "point_multiplier_im": (multipliers[..., 1], "1", "imaginary part"),
+        }
+        groups["points"] |= columns(("point",), looks) | columns(("point", "multiplier"), both)
         kinds = np.array([KINDS[int(k)] for k in special[:, -1]], dtype=object)
         groups["special"]["special_kind"] = Variable(("special",), kinds, "1", "what happens there")
         attrs = {"parameter": self.parameter, "periods": self.periods, **told(scene)}
         return Dataset(where, attrs, {name: Dataset(group) for name, group in groups.items()})
-
-    @staticmethod
-    def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
-        """Amplitudes of the first coordinate over the parameter; stable solid, unstable dashed."""
-        from fastmech.plots.response import draw_lines
-
-        points, special = dataset.groups["points"], dataset.groups["special"]
-        names = [n.removeprefix("point_place_") for n in points if n.startswith("point_place_")]
-        units = {n: points[f"point_place_{n}"].units for n in names}
-        parameter = str(dataset.attrs["parameter"])
-        units = {k: u for k, u in {**units, parameter: points["point_value"].units}.items() if u != "1"}
-        lines = max(1, *(v.data.size for v in dataset.variables.values()), 1)
-
-        def line(k: int) -> FrequencyResponse:
-            mine = np.flatnonzero(points["point_line"].data == k)
-            own = points["point_branch"].data[mine]
-            branches = []
-            for b in np.unique(own):
-                at = mine[own == b]
-                here = np.flatnonzero(
-                    (special["special_line"].data == k) & (special["special_branch"].data == b)
-                )
-                branches.append(
-                    Branch(
-                        points["point_value"].data[at],
-                        _columns(points, "point_place", names, at),
-                        points["point_multiplier_re"].data[at] + 1j * points["point_multiplier_im"].data[at],
-                        _columns(points, "point_amplitude", names, at),
-                        tuple(
-                            Special(
-                                str(special["special_kind"].data[i]),
-                                float(special["special_value"].data[i]),
-                                _columns(special, "special_place", names, np.array([i]))[0],
-                                _columns(special, "special_amplitude", names, np.array([i]))[0],
-                            )
-                            for i in here
-                        ),
-                        bool(points["point_closed"].data[at[0]]),
-                        bool(points["point_cut"].data[at[0]]),
-                    )
-                )
-            periods = int(dataset.attrs["periods"])
-            return FrequencyResponse(parameter, tuple(names), units, periods, tuple(branches))
-
-        return {"response": draw_lines(dataset, scene, line, lines)}
-
-
-def _columns(of: Dataset, name: str, names: list[str], at: NDArray[np.intp]) -> NDArray[np.float64]:
-    return np.stack([of[f"{name}_{state}"].data[at] for state in names], axis=1)
 
 
 def response_dataset(found: FrequencyResponse) -> Dataset:
@@ -184,9 +127,4 @@ def _table(found: FrequencyResponse) -> Dataset:
         special += [
             np.hstack([k, s.value, s.place, s.amplitude, KINDS.index(s.kind)])[None] for s in b.special
         ]
-    return Dataset(
-        {
-            "points": Variable(("row", "column"), np.concatenate(points)),
-            "special": Variable(("change", "of_change"), np.concatenate(special)),
-        }
-    )
+    return tile_of({"points": np.concatenate(points), "special": np.concatenate(special)})

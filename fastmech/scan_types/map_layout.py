@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from enum import IntEnum
 from typing import Any
 
@@ -14,7 +14,18 @@ from fastmech.atlas.resting_map import RestingMap
 from fastmech.models.drawing import Element, drawing
 from fastmech.models.mechanism import Mechanism
 from fastmech.outcome import Outcome
-from fastmech.results import NO_CODE, Dataset, Variable, coordinate_units, flags, numbers, parts, told
+from fastmech.results import (
+    NO_CODE,
+    Dataset,
+    Variable,
+    columns,
+    columns_of,
+    coordinate_units,
+    flags,
+    numbers,
+    parts,
+    told,
+)
 from fastmech.scan_types.request import axis_variables
 from fastmech.scene import Scene
 from fastmech.slider.atlas.damping import UndampedSet, trace_undamped
@@ -24,67 +35,59 @@ from fastmech.slider.impulse import POINTS
 from fastmech.slider.linearize import SIN_PHI, SIN_PSI, UNLOADED
 from fastmech.slider.stability import Verdict
 
+#: What is known of a point of a map, and of each of its equilibria, named as in
+#: :class:`fastmech.slider.atlas.map.Slab`.
+_POINT: dict[str, tuple[Any, ...]] = {
+    "count": ("1", "number of equilibria"),
+    "count_stable": ("1", "number of stable equilibria (minima)"),
+    "outcome": ("1", "what is proved of the count", flags(Outcome)),
+    "coincidence": ("1", "what meets here within rounding", flags(Coincidence)),
+    "fold_margin": ("rad", "distance to the fold, positive with six equilibria"),
+}
+_ROOT: dict[str, tuple[Any, ...]] = {
+    "phi": ("rad", "angle phi"),
+    "theta": ("rad", "angle theta"),
+    "radius": ("rad", "the true equilibrium is proved to be within; inf: not proved"),
+    "energy": ("J", "potential energy Pi - F x2"),
+    "morse_index": ("1", "negative eigenvalues of the Hessian, -2: Hessian singular", NO_CODE),
+}
 CRITERIA = {
     "verdict_sylvester": "verdict: Lagrange-Dirichlet",
     "verdict_hurwitz": "verdict: Hurwitz",
     "verdict_eigenvalues": "verdict: eigenvalues",
     "verdict": "verdict: joint",
 }
-
+_MOTION: dict[str, tuple[Any, ...]] = {
+    "frequency": ("rad/s", "lowest undamped natural frequency, NaN: a direction grows"),
+    "decay_time": ("s", "slowest linear mode falls to 1/e; inf: never, NaN: no minimum"),
+    "depth": ("J", "energy from a minimum to the lowest way out of its well"),
+} | {
+    f"shock_limit_{on.lower()}": (
+        "N s",
+        f"proved: no smaller impulse on {on} of the resting mechanism leaves the well, in whatever "
+        f"direction{'; NaN: no minimum, or M3 at a dead centre' if on == 'M3' else ''}",
+    )
+    for on in POINTS
+}
 
 #: Entries of a Hessian and their unit.
 HESSIAN = dict.fromkeys(("phi_phi", "phi_theta", "theta_theta"), "J")
+
+#: Attributes of verdicts.
+VERDICTS = flags(Verdict, fill=Verdict.NONE)
 
 
 def point_variables(grid: tuple[str, ...], found: Slab) -> dict[str, Variable]:
     """Everything known at every point; the arrays have the grid's dimensions ``grid`` in front."""
     roots = (*grid, "root")
+    verdicts = enumerate(CRITERIA.items())
     return {
-        "count": Variable(grid, found.count, "1", "number of equilibria"),
-        "count_stable": Variable(grid, found.count_stable, "1", "number of stable equilibria (minima)"),
-        "outcome": Variable(grid, found.outcome, "1", "what is proved of the count", flags(Outcome)),
-        "coincidence": Variable(
-            grid, found.coincidence, "1", "what meets here within rounding", flags(Coincidence)
-        ),
-        "fold_margin": Variable(
-            grid, found.fold_margin, "rad", "distance to the fold, positive with six equilibria"
-        ),
-        "phi": Variable(roots, found.phi, "rad", "angle phi"),
-        "theta": Variable(roots, found.theta, "rad", "angle theta"),
-        "radius": Variable(
-            roots, found.radius, "rad", "the true equilibrium is proved to be within; inf: not proved"
-        ),
-        "energy": Variable(roots, found.energy, "J", "potential energy Pi - F x2"),
-        "morse_index": Variable(
-            roots,
-            found.morse_index,
-            "1",
-            "negative eigenvalues of the Hessian, -2: Hessian singular",
-            NO_CODE,
-        ),
+        **columns_of(found, grid, _POINT),
+        **columns_of(found, roots, _ROOT),
         **parts("hessian", roots, found.hessian, HESSIAN, "Hessian, paper (19): {}"),
         **eigenvalue_variables(roots, found.eigenvalues),
-        **{
-            name: Variable(roots, found.verdict[..., k], "1", about, flags(Verdict, fill=Verdict.NONE))
-            for k, (name, about) in enumerate(CRITERIA.items())
-        },
-        "frequency": Variable(
-            roots, found.frequency, "rad/s", "lowest undamped natural frequency, NaN: a direction grows"
-        ),
-        "decay_time": Variable(
-            roots, found.decay_time, "s", "slowest linear mode falls to 1/e; inf: never, NaN: no minimum"
-        ),
-        "depth": Variable(roots, found.depth, "J", "energy from a minimum to the lowest way out of its well"),
-        **{
-            f"shock_limit_{on.lower()}": Variable(
-                roots,
-                getattr(found, f"shock_limit_{on.lower()}"),
-                "N s",
-                f"proved: no smaller impulse on {on} of the resting mechanism leaves the well, in whatever "
-                f"direction{'; NaN: no minimum, or M3 at a dead centre' if on == 'M3' else ''}",
-            )
-            for on in POINTS
-        },
+        **columns(roots, {n: (found.verdict[..., k], "1", about, VERDICTS) for k, (n, about) in verdicts}),
+        **columns_of(found, roots, _MOTION),
     }
 
 
@@ -104,40 +107,33 @@ RESTING = ("count", "count_stable", "outcome", "radius", "energy", "morse_index"
 
 def resting_variables(mechanism: Mechanism, grid: tuple[str, ...], found: RestingMap) -> dict[str, Variable]:
     """Everything known of a mechanism's equilibria at every point."""
-    roots = (*grid, "root")
-    units = coordinate_units(mechanism)
+    roots, units = (*grid, "root"), coordinate_units(mechanism)
     eigenvalues = np.where(np.isnan(found.eigenvalues), complex(np.nan, np.nan), found.eigenvalues)
-    slowest = -found.eigenvalues[..., 0].real
-    falling = found.verdict == Verdict.ASYMPTOTICALLY_STABLE
-    time = np.where(
-        falling,
-        1.0 / np.where(falling, slowest, 1.0),
-        np.where(found.verdict == Verdict.STABLE, np.inf, np.nan),
-    )
-    stable = np.isin(found.verdict, (Verdict.ASYMPTOTICALLY_STABLE, Verdict.STABLE)).sum(axis=-1)
+    falling, stays = (found.verdict == v for v in (Verdict.ASYMPTOTICALLY_STABLE, Verdict.STABLE))
+    slowest = np.where(falling, -found.eigenvalues[..., 0].real, 1.0)
+    time = np.where(falling, 1.0 / slowest, np.where(stays, np.inf, np.nan))
+    stable = (falling | stays).sum(axis=-1).astype(np.int16)
+    about_time = "slowest linear mode falls to 1/e; inf: never, NaN: not stable"
     return {
-        "count": Variable(grid, found.count, "1", "number of equilibria"),
-        "count_stable": Variable(grid, stable.astype(np.int16), "1", "number of stable equilibria"),
-        "outcome": Variable(grid, found.outcome, "1", "what is proved of the count", flags(Outcome)),
-        **{
-            name: Variable(roots, found.position[..., k], unit, f"{about_of(unit)} {name}")
-            for k, (name, unit) in enumerate(units.items())
-        },
-        "radius": Variable(
+        "count": Variable(grid, found.count, *_POINT["count"]),
+        "count_stable": Variable(grid, stable, "1", "number of stable equilibria"),
+        "outcome": Variable(grid, found.outcome, *_POINT["outcome"]),
+        **parts("", roots, found.position, units, "{1} {0}"),
+        **columns_of(
+            found,
             roots,
-            found.radius,
-            one_of(units.values()),
-            "by each coordinate the equilibrium is proved to be within",
+            {
+                "radius": (
+                    one_of(units.values()),
+                    "by each coordinate the equilibrium is proved to be within",
+                ),
+                "energy": ("J", "potential energy, loads at their means"),
+                "morse_index": ("1", "directions in which the energy falls, -2: not proved", NO_CODE),
+                "verdict": ("1", "stability", VERDICTS),
+            },
         ),
-        "energy": Variable(roots, found.energy, "J", "potential energy, loads at their means"),
-        "morse_index": Variable(
-            roots, found.morse_index, "1", "directions in which the energy falls, -2: not proved", NO_CODE
-        ),
-        "verdict": Variable(roots, found.verdict, "1", "stability", flags(Verdict, fill=Verdict.NONE)),
         **eigenvalue_variables(roots, eigenvalues),
-        "decay_time": Variable(
-            roots, time, "s", "slowest linear mode falls to 1/e; inf: never, NaN: not stable"
-        ),
+        "decay_time": Variable(roots, time, "s", about_time),
     }
 
 
@@ -147,28 +143,19 @@ def one_of(units: Iterable[str]) -> str:
     return different.pop() if len(different) == 1 else "1"
 
 
-def about_of(unit: str) -> str:
-    """What a coordinate of this unit is."""
-    return {"rad": "angle", "m": "length"}[unit]
-
-
 def drawing_group(mechanism: Mechanism, q: Floats) -> dict[str, Dataset]:
     """What is drawn of a mechanism at its equilibria (n, coordinates), as a group of a section."""
     drawn = drawing(mechanism, q)
     if not drawn.kind.size or not len(q):
         return {}
-    each = ("element",)
-    variables = {
-        "element_kind": Variable(each, drawn.kind, "1", "what is drawn", flags(Element)),
-        "element_name": Variable(each, np.array(drawn.name, dtype=object), "1", "name of a point"),
-        "element_mass": Variable(each, drawn.mass, "kg", "mass, NaN of what is no mass"),
-    } | {
-        f"element_{axis}": Variable(
-            ("equilibrium", "element", "end"), drawn.ends[..., k], "m", f"{axis} of both ends of an element"
-        )
-        for k, axis in enumerate("xy")
+    rows = {
+        "element_kind": (drawn.kind, "1", "what is drawn", flags(Element)),
+        "element_name": (np.array(drawn.name, dtype=object), "1", "name of a point"),
+        "element_mass": (drawn.mass, "kg", "mass, NaN of what is no mass"),
     }
-    return {"drawing": Dataset(variables)}
+    dims, axes = ("equilibrium", "element", "end"), {"x": "m", "y": "m"}
+    ends = parts("element", dims, drawn.ends, axes, "{} of both ends of an element")
+    return {"drawing": Dataset(columns(("element",), rows) | ends)}
 
 
 #: Names in requests that stand for several variables.
@@ -201,19 +188,18 @@ def sheet_table(
     morse_index: NDArray[np.int8], branch: NDArray[np.int32], breaks: NDArray[np.int32]
 ) -> dict[str, Variable]:
     """What is known of every sheet, and where a sheet is torn."""
-    each = ("sheet",)
     torn = (
         "where a sheet does not continue between neighbours: index along every axis of the second of them, "
         "the axis along which the first is before it (0: first axis), the sheet"
     )
+    joined = "sheets with equal numbers continue one another round a cusp or across a fold"
+    rows = {
+        "sheet_morse_index": (morse_index, "1", "negative eigenvalues of the Hessian all over a sheet"),
+        "sheet_branch": (branch, "1", joined),
+    }
     return {
         **numbers("sheet", len(branch), "number of the sheet"),
-        "sheet_morse_index": Variable(
-            each, morse_index, "1", "negative eigenvalues of the Hessian all over a sheet"
-        ),
-        "sheet_branch": Variable(
-            each, branch, "1", "sheets with equal numbers continue one another round a cusp or across a fold"
-        ),
+        **columns(("sheet",), rows),
         "sheet_discontinuity": Variable(("break", "break_entry"), breaks, "1", torn),
     }
 
@@ -272,109 +258,86 @@ def curve_variables(scene: Scene, axes: dict[str, Floats], threads: int | None) 
 
 def fold_points(found: FoldPoints) -> Dataset:
     """What files hold of folds over a parameter."""
-    name, each = found.parameter, ("fold",)
-    unit = found.system.described()[name][1]
-    variables = {
-        f"fold_{name}": _numbers(each, [f.value for f in found], unit, f"{name} at the fold"),
-        "fold_phi": _numbers(each, [f.phi for f in found], "rad", "phi where two equilibria merge"),
-        "fold_theta": _numbers(each, [f.theta for f in found], "rad", "theta where two equilibria merge"),
-        "fold_merges": _codes(
-            each, [Merging[f.merges.upper()] for f in found], "merges with a saddle", Merging
-        ),
-        "fold_kind": _codes(each, [Kind[f.kind.upper()] for f in found], "kind of the fold", Kind),
-        "fold_proof": _proof(found.reason),
-    }
-    return Dataset(variables, {"axes": (name,)})
+    name, folds = found.parameter, list(found)
+    about = "{} at the fold", "{} where two equilibria merge"
+    rows = _points("fold", found, {"value": name}, folds, about)
+    rows["fold_merges"] = _codes("merges", folds, "merges with a saddle", Merging)
+    rows["fold_kind"] = _codes("kind", folds, "kind of the fold", Kind)
+    return Dataset(columns(("fold",), rows) | _proof(found.reason), {"axes": (name,)})
 
 
 def fold_curves(found: FoldSet) -> Dataset:
     """What files hold of fold curves over two parameters."""
-    x, y, curves = *found.names, found.curves
-    units = [found.system.described()[name][1] for name in (x, y)]
-    each, cusp = ("fold_point",), ("cusp",)
-    variables = {
-        f"fold_{x}": _joined(each, [c.x for c in curves], units[0], f"{x} along the fold curves"),
-        f"fold_{y}": _joined(each, [c.y for c in curves], units[1], f"{y} along the fold curves"),
-        "fold_phi": _joined(each, [c.phi for c in curves], "rad", "phi where two equilibria merge"),
-        "fold_theta": _joined(each, [c.theta for c in curves], "rad", "theta where two equilibria merge"),
-        "fold_curve": _numbering(each, [c.x.size for c in curves], "number of the fold curve"),
-        "fold_merges": _codes(
-            each,
-            [m for c in curves for m in [Merging[c.merges.upper()]] * c.x.size],
-            "merges with a saddle",
-            Merging,
-        ),
-        "fold_kind": _codes(
-            each, [k for c in curves for k in [Kind[c.kind.upper()]] * c.x.size], "kind of the curve", Kind
-        ),
-        "fold_proof": _proof(found.reason),
-        f"cusp_{x}": _numbers(cusp, [c.x for c in found.cusps], units[0], f"{x} at the cusp"),
-        f"cusp_{y}": _numbers(cusp, [c.y for c in found.cusps], units[1], f"{y} at the cusp"),
-        "cusp_phi": _numbers(cusp, [c.phi for c in found.cusps], "rad", "phi where three equilibria merge"),
-        "cusp_theta": _numbers(cusp, [c.theta for c in found.cusps], "rad", "theta where three merge"),
-    }
-    about = "edges between whose ends the count changes, those that no fold curve crosses, curves cut short"
-    counts = np.array([found.crossings, found.unexplained, found.unfinished])
-    variables["fold_crossings"] = Variable((TALLY,), counts, "1", about)
-    return Dataset(variables, {"axes": found.names})
+    axes, curves = dict(zip("xy", found.names, strict=True)), found.curves
+    about = "{} along the fold curves", "{} where two equilibria merge"
+    rows = _points("fold", found, axes, curves, about)
+    rows["fold_curve"] = _numbering(curves, "number of the fold curve")
+    rows["fold_merges"] = _codes("merges", curves, "merges with a saddle", Merging)
+    rows["fold_kind"] = _codes("kind", curves, "kind of the curve", Kind)
+    cusps = _points("cusp", found, axes, found.cusps, ("{} at the cusp", "{} where three equilibria merge"))
+    tally = "edges between whose ends the count changes, those that no fold curve crosses, curves cut short"
+    return Dataset(
+        columns(("fold_point",), rows)
+        | _proof(found.reason)
+        | columns(("cusp",), cusps)
+        | _tally("fold", found, tally),
+        {"axes": found.names},
+    )
 
 
 def undamped_curves(found: UndampedSet) -> Dataset:
     """What files hold of where damping misses a mode, over two parameters."""
-    x, y, curves, sheets = *found.names, found.curves, found.everywhere
-    one = ("unreached_sheet",)
-    about = "of one of the points of a sheet on which the damper misses a mode everywhere"
-    units = [found.system.described()[name][1] for name in (x, y)]
-    each = ("unreached_point",)
-    what = "where the damper misses a mode"
-    variables = {
-        f"unreached_{x}": _joined(each, [c.x for c in curves], units[0], f"{x} {what}"),
-        f"unreached_{y}": _joined(each, [c.y for c in curves], units[1], f"{y} {what}"),
-        "unreached_phi": _joined(each, [c.phi for c in curves], "rad", f"phi {what}"),
-        "unreached_theta": _joined(each, [c.theta for c in curves], "rad", f"theta {what}"),
-        "unreached_curve": _numbering(each, [c.x.size for c in curves], "number of the curve"),
-        "unreached_vanishes": _codes(
-            each,
-            [v for c in curves for v in [_VANISHING[c.vanishes]] * c.x.size],
-            "what vanishes there",
-            Vanishing,
-        ),
-        f"unreached_sheet_{x}": _numbers(one, [s.x for s in sheets], units[0], f"{x} {about}"),
-        f"unreached_sheet_{y}": _numbers(one, [s.y for s in sheets], units[1], f"{y} {about}"),
-        "unreached_sheet_phi": _numbers(one, [s.phi for s in sheets], "rad", f"phi {about}"),
-        "unreached_sheet_theta": _numbers(one, [s.theta for s in sheets], "rad", f"theta {about}"),
-        "unreached_sheet_share": _numbers(
-            one, [s.share for s in sheets], "1", "share of the map's points at which that sheet has it"
-        ),
-        "unreached_sheet_vanishes": _codes(
-            one, [_VANISHING[s.vanishes] for s in sheets], "what vanishes all over the sheet", Vanishing
-        ),
-        "unreached_crossings": Variable(
-            (TALLY,),
-            np.array([found.crossings, found.unexplained, found.unfinished]),
-            "1",
-            "edges of the seeding grid that such a curve crosses, those without a curve, curves cut short",
-        ),
-    }
-    return Dataset(variables, {"axes": found.names})
+    axes, curves, sheets = dict(zip("xy", found.names, strict=True)), found.curves, found.everywhere
+    rows = _points("unreached", found, axes, curves, ("{} where the damper misses a mode",) * 2)
+    rows["unreached_curve"] = _numbering(curves, "number of the curve")
+    rows["unreached_vanishes"] = _codes("vanishes", curves, "what vanishes there", Vanishing)
+    about = "{} of one of the points of a sheet on which the damper misses a mode everywhere"
+    each = _points("unreached_sheet", found, axes, sheets, (about, about))
+    share = np.array([s.share for s in sheets], dtype=np.float64)
+    each["unreached_sheet_share"] = (share, "1", "share of the map's points at which that sheet has it")
+    words = "what vanishes all over the sheet"
+    each["unreached_sheet_vanishes"] = _codes("vanishes", sheets, words, Vanishing)
+    tally = "edges of the seeding grid that such a curve crosses, those without a curve, curves cut short"
+    return Dataset(
+        columns(("unreached_point",), rows)
+        | columns(("unreached_sheet",), each)
+        | _tally("unreached", found, tally),
+        {"axes": found.names},
+    )
 
 
-def _proof(reason: str) -> Variable:
+def _points(
+    prefix: str, found: Any, axes: Mapping[str, str], items: Sequence[Any], about: tuple[str, str]
+) -> dict[str, tuple[Any, ...]]:
+    """Parameters and angles of curves, or of single points, one after the other."""
+    described = found.system.described()
+    rows: dict[str, tuple[Any, ...]] = {}
+    for attribute, name in {**axes, "phi": "phi", "theta": "theta"}.items():
+        values = np.concatenate([np.zeros(0), *(np.atleast_1d(getattr(one, attribute)) for one in items)])
+        unit, text = (described[name][1], about[0]) if attribute in axes else ("rad", about[1])
+        rows[f"{prefix}_{name}"] = (values, unit, text.format(name))
+    return rows
+
+
+def _numbering(curves: Sequence[Any], about: str) -> tuple[Any, ...]:
+    """Of each point of curves the number of its curve."""
+    return np.repeat(np.arange(len(curves), dtype=np.int32), [c.x.size for c in curves]), "1", about
+
+
+def _codes(attribute: str, items: Sequence[Any], about: str, members: type[IntEnum]) -> tuple[Any, ...]:
+    """A word of each point, or of each point of curves, as a code."""
+    said = [getattr(one, attribute) for one in items]
+    words = [_VANISHING[word] if word in _VANISHING else members[word.upper()] for word in said]
+    sizes = [np.size(getattr(one, "x", 0.0)) for one in items]
+    return np.repeat(np.array(words, dtype=np.int8), sizes), "1", about, flags(members)
+
+
+def _proof(reason: str) -> dict[str, Variable]:
     words = np.array([reason or COMPLETE], dtype=object)
-    return Variable(("statement",), words, "1", "whether it is proved that no other fold is in the map")
+    about = "whether it is proved that no other fold is in the map"
+    return {"fold_proof": Variable(("statement",), words, "1", about)}
 
 
-def _numbers(dims: tuple[str, ...], values: Sequence[float], unit: str, about: str) -> Variable:
-    return Variable(dims, np.array(values, dtype=np.float64), unit, about)
-
-
-def _joined(dims: tuple[str, ...], pieces: Sequence[Floats], unit: str, about: str) -> Variable:
-    return Variable(dims, np.concatenate([np.zeros(0), *pieces]), unit, about)
-
-
-def _numbering(dims: tuple[str, ...], sizes: Sequence[int], about: str) -> Variable:
-    return Variable(dims, np.repeat(np.arange(len(sizes), dtype=np.int32), sizes), "1", about)
-
-
-def _codes(dims: tuple[str, ...], codes: Sequence[Any], about: str, members: type[IntEnum]) -> Variable:
-    return Variable(dims, np.array(codes, dtype=np.int8), "1", about, flags(members))
+def _tally(prefix: str, found: FoldSet | UndampedSet, about: str) -> dict[str, Variable]:
+    counts = np.array([found.crossings, found.unexplained, found.unfinished])
+    return {f"{prefix}_crossings": Variable((TALLY,), counts, "1", about)}

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from collections.abc import Callable
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -14,27 +14,16 @@ from fastmech.ensembles.balance import energy_balance
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.status import FAILURES
-from fastmech.errors import InputError, shown
+from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
-from fastmech.results import Dataset, Variable, parts, state_units, told
-from fastmech.scan_types.request import (
-    HALVING,
-    Each,
-    MethodName,
-    Scan,
-    Tiling,
-    check_steps,
-    failures,
-)
-from fastmech.scene import Scene, nearest
+from fastmech.plots.motion import draw_motion
+from fastmech.results import Dataset, Variable, columns, coordinate_units, parts, state_units, told
+from fastmech.scan_types import request as scans
+from fastmech.scene import Scene
 from fastmech.slider.coefficients import force
 from fastmech.slider.geometry import constraints, positions, reactions
 from fastmech.slider.lagrange import momenta
 from fastmech.step_limits.warning import step_warning
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 #: Numbers of a section for every output.
 OUTPUT_NUMBERS = 30
@@ -57,10 +46,11 @@ _POWERS = {"power_loads": "power that loads bring", "power_lost": "power lost in
 _OF_PAPER = ("phi", "theta", "phi_dot", "theta_dot")
 
 
-class Motion(Scan):
+class Motion(scans.Scan):
     """Motion from one start; of the paper's mechanism the default start is that of Table 1."""
 
     kind: ClassVar[str] = "motion"
+    draw = staticmethod(draw_motion)
     of_mechanisms = True
     taken = frozenset({"time", *_BALANCE, *_POWERS})
 
@@ -74,7 +64,7 @@ class Motion(Scan):
     t_end: Annotated[float, Field(gt=0)] = 20.0
     outputs: Annotated[int, Field(ge=2, le=10_000_000)] = 2001
     dt: Annotated[float, Field(gt=0)] = 0.01
-    method: MethodName = "dop853"
+    method: scans.MethodName = "dop853"
 
     def check(self, scene: Scene | Mechanism) -> None:
         """So many steps must be possible, and what is kept of every output fit into memory."""
@@ -83,22 +73,20 @@ class Motion(Scan):
             there, instead = (name, f"start.{known[0]}") if own else (f"start.{name}", known[0])
             owner = "the paper's" if own else "any other"
             raise InputError(f"{there}: is for {owner} mechanism; give {instead}")
-        for name in self.start:
-            if name not in known:
-                raise InputError(f"start.{name}: unknown coordinate {shown(name)}; {nearest(name, known)}")
-        check_steps("t_end", self.t_end, self.dt)
+        scans.check_names("start.", self.start, known, "unknown coordinate")
+        scans.check_steps("t_end", self.t_end, self.dt)
         checks.memory(self.outputs * OUTPUT_NUMBERS, 3, "outputs: the motion", "fewer outputs")
 
     def step_warning(self, scene: Scene | Mechanism) -> str | None:
         """By the scene's limit, its load and the rates of the start."""
         return step_warning(scene, self.dt, self.method, self._start(scene))
 
-    def tiling(self, scene: Scene | Mechanism) -> Tiling:
+    def tiling(self, scene: Scene | Mechanism) -> scans.Tiling:
         """Integrations of the same motion, none of which needs another."""
         parts: list[Callable[[Any], Dataset]] = [self._lagrangian, self._canonical, self._halved]
         if isinstance(scene, Scene):
             parts.append(self._balance)
-        return Each(
+        return scans.Each(
             "integrations of the motion",
             len(parts),
             lambda index: parts[index](scene),
@@ -116,56 +104,47 @@ class Motion(Scan):
 
     def _lagrangian(self, scene: Scene | Mechanism) -> Dataset:
         run = integrate(scene, self._start(scene), dt=self.dt, method=self.method, t_eval=self._times)
-        return Dataset(_states(run.y), {"steps": run.steps} | failures(run.status, FAILURES))
+        return scans.tile_of({"y": run.y[:, 0]}, {"steps": run.steps} | scans.failures(run.status, FAILURES))
 
     def _canonical(self, scene: Scene | Mechanism) -> Dataset:
         settings: dict[str, Any] = {"dt": self.dt, "method": self.method, "formulation": "hamilton"}
-        return Dataset(_states(integrate(scene, self._start(scene), t_eval=self._times, **settings).y))
+        return scans.tile_of(
+            {"y": integrate(scene, self._start(scene), t_eval=self._times, **settings).y[:, 0]}
+        )
 
     def _balance(self, scene: Scene) -> Dataset:
         balance = energy_balance(scene, self._start(scene), self._times, dt=self.dt, method=self.method)
-        values = (
-            balance.kinetic,
-            balance.potential,
-            balance.work_damper,
-            balance.work_force,
-            balance.residual,
-        )
-        return Dataset({n: Variable(("time",), v) for n, v in zip(_BALANCE, values, strict=True)})
+        attributes = ("kinetic", "potential", "work_damper", "work_force", "residual")
+        return scans.tile_of({n: getattr(balance, a) for n, a in zip(_BALANCE, attributes, strict=True)})
 
     def _halved(self, scene: Scene | Mechanism) -> Dataset:
         t = self._times
         step = float(np.max(np.diff(t) / output_steps(t, self.dt)))  # the step that the others take
-        return Dataset(
-            _states(integrate(scene, self._start(scene), dt=0.5 * step, method=self.method, t_eval=t).y)
-        )
+        run = integrate(scene, self._start(scene), dt=0.5 * step, method=self.method, t_eval=t)
+        return scans.tile_of({"y": run.y[:, 0]})
 
     def _joined(self, scene: Scene | Mechanism, tiles: list[Dataset]) -> Dataset:
         """Derive everything else from the Lagrangian motion."""
         t, y, canonical, halved = self._times, *(tile["y"].data for tile in tiles[:3])
         along, units = ("time",), state_units(scene)
-        kinds = {"rad": "angle {}", "m": "length {}"}
+        coordinates, n = coordinate_units(scene), len(units) // 2
+        rates = parts("", along, y[:, n:], {name: f"{u}/s" for name, u in coordinates.items()}, "rate of {}")
         variables = {
             "time": Variable(along, t, "s", "time"),
-            **{
-                name: Variable(
-                    along, y[:, k], unit, kinds.get(unit, "rate of {}").format(name.removesuffix("_dot"))
-                )
-                for k, (name, unit) in enumerate(units.items())
-            },
+            **parts("", along, y[:, :n], coordinates, "{1} {0}"),
+            **{f"{name}_dot": rate for name, rate in rates.items()},
             **parts("formulation_difference", along, canonical - y, units, "{}, canonical less Lagrangian"),
         }
         if isinstance(scene, Scene):
             variables |= self._of_scene(scene, y, canonical, tiles[3])
         else:
             variables |= _of_mechanism(scene, t, y)
-        left_out = {"scene", "start"} if isinstance(scene, Scene) else {"scene", "start", *_OF_PAPER}
+        of_paper = isinstance(scene, Scene)
+        left_out = {"scene", "start"} if of_paper else {"scene", "start", *_OF_PAPER}
         attrs = self.model_dump(exclude=left_out) | {
             **tiles[0].attrs,
             "error_estimate": float(np.max(np.abs(halved - y))),
-            "error_estimate_is": HALVING
-            if isinstance(scene, Scene)
-            else HALVING.replace("rad or rad/s", "SI"),
+            "error_estimate_is": scans.HALVING if of_paper else scans.HALVING.replace("rad or rad/s", "SI"),
         }
         return Dataset(variables, attrs | told(scene))
 
@@ -173,34 +152,20 @@ class Motion(Scan):
         """What is known of the paper's mechanism: momenta, points, constraints, reactions and works."""
         along, t = ("time",), self._times
         p, points = momenta(scene, canonical), positions(scene, y)
-        about = "generalized momentum of {}, canonical equations"
+        about, residuals = "generalized momentum of {}, canonical equations", constraints(scene, points)
+        units = {"2": "m2", "3": "m2", "4": "m", "5": "m2"}
+        places = points._asdict().items()
+        rows = {name: (value, "m", f"coordinate {name[0]} of M{name[1]}") for name, value in places}
+        forces = {"force": (force(scene, t), "N", "force on M2 along +x")}
+        forces |= {n: (value, "N", _REACTIONS[n]) for n, value in reactions(scene, y, t)._asdict().items()}
+        works = {name: (balance[name].data, "J", told) for name, told in _BALANCE.items()}
+        left = np.moveaxis(residuals, 0, -1)
         return {
             **parts("p", along, p, dict.fromkeys(("phi", "theta"), "kg m2/s"), about),
-            **{
-                name: Variable(along, value, "m", f"coordinate {name[0]} of M{name[1]}")
-                for name, value in points._asdict().items()
-            },
-            **parts(
-                "constraint_residual",
-                along,
-                np.moveaxis(constraints(scene, points), 0, -1),
-                {"2": "m2", "3": "m2", "4": "m", "5": "m2"},
-                "left side of the constraint ({})",
-            ),
-            "force": Variable(along, force(scene, t), "N", "force on M2 along +x"),
-            **{
-                name: Variable(along, value, "N", _REACTIONS[name])
-                for name, value in reactions(scene, y, t)._asdict().items()
-            },
-            **{name: Variable(along, balance[name].data, "J", about) for name, about in _BALANCE.items()},
+            **columns(along, rows),
+            **parts("constraint_residual", along, left, units, "left side of the constraint ({})"),
+            **columns(along, forces | works),
         }
-
-    @staticmethod
-    def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
-        """Angles, reactions and energies over time."""
-        from fastmech.plots.motion import draw_motion
-
-        return draw_motion(dataset)
 
 
 def _of_mechanism(mechanism: Mechanism, t: Floats, y: Floats) -> dict[str, Variable]:
@@ -220,8 +185,3 @@ def _of_mechanism(mechanism: Mechanism, t: Floats, y: Floats) -> dict[str, Varia
             axes = dict.fromkeys(("x", "y"), "m")
             variables |= parts(f"point_{name}", along, place, axes, f"coordinate {{}} of {name}")
     return variables
-
-
-def _states(y: Floats) -> dict[str, Variable]:
-    """States of one motion (time, 1, states) as a tile keeps them."""
-    return {"y": Variable(("time", "component"), y[:, 0])}

@@ -101,7 +101,7 @@ class Axis(BaseModel):
         return self.num or len(self.values or ())
 
 
-def arrays(axes: Mapping[str, Axis]) -> dict[str, Floats]:
+def values_of(axes: Mapping[str, Axis]) -> dict[str, Floats]:
     """The values of axes by their names."""
     return {name: axis.array for name, axis in axes.items()}
 
@@ -112,26 +112,18 @@ def axis_variables(system: Scene | Mechanism | System, axes: Mapping[str, Floats
     return {name: Variable((name,), values, *described[name][1:]) for name, values in axes.items()}
 
 
-def known_parameters(system: Scene | Mechanism, axes: Mapping[str, Axis]) -> None:
-    """Refuse axes that are no parameters, or too many.
+# Checks of requests: each raises an InputError that names the field, the value and what is allowed.
 
-    Raises:
-        InputError: they are.
-    """
-    known = list(system.described())
+
+def check_axes(system: Scene | Mechanism, axes: Mapping[str, Axis]) -> None:
+    """Refuse axes that are no parameters, or too many."""
     if len(axes) > 3:
         raise InputError("axes: must be three axes at most")
-    for name in axes:
-        if name not in known:
-            raise InputError(f"axes.{name}: unknown parameter {shown(name)}; {nearest(name, known)}")
+    check_names("axes.", axes, system.described(), "unknown parameter")
 
 
 def check_size(where: str, axes: Mapping[str, Axis], what: str, most: int, numbers: int) -> None:
-    """Refuse grids of more points than can be, or than fit into memory at so many ``numbers`` a point.
-
-    Raises:
-        InputError: there are too many.
-    """
+    """Refuse grids of more points than can be, or than fit into memory at so many ``numbers`` a point."""
     total = math.prod(axis.size for axis in axes.values())
     if total > most:
         raise InputError(f"{where}: ask for {total:.3g} {what}, at most {most:.0e} are allowed")
@@ -139,11 +131,7 @@ def check_size(where: str, axes: Mapping[str, Axis], what: str, most: int, numbe
 
 
 def check_steps(where: str, t_end: float, dt: float) -> None:
-    """Refuse runs of more fixed steps than are possible, with half the step too.
-
-    Raises:
-        InputError: they take more.
-    """
+    """Refuse runs of more fixed steps than are possible, with half the step too."""
     if not 2.0 * t_end <= MOST_STEPS * dt:
         raise InputError(
             f"{where} = {t_end:g} s: takes {t_end / dt:.3g} steps of {dt:g} s, at most {MOST_STEPS / 2:.0e} "
@@ -152,21 +140,13 @@ def check_steps(where: str, t_end: float, dt: float) -> None:
 
 
 def check_duration(scene: Scene, t_end: float, dt: float | None) -> None:
-    """Refuse runs of basins whose finest computation would take more steps than are possible.
-
-    Raises:
-        InputError: it would.
-    """
+    """Refuse runs of basins whose finest computation would take more steps than are possible."""
     coarse = shortest_step(reduce(scene)) if dt is None else dt
     rounds_until(t_end, coarse * SUBSTEPS[0] / SUBSTEPS[-1])
 
 
 def check_rising(name: str, axis: Axis) -> None:
-    """Refuse an axis whose values fall.
-
-    Raises:
-        InputError: they do.
-    """
+    """Refuse an axis whose values fall."""
     if not axis.rises:
         raise InputError(
             f"{name}: falls from {axis.array[0]:g} to {axis.array[-1]:g}, must rise; "
@@ -175,11 +155,7 @@ def check_rising(name: str, axis: Axis) -> None:
 
 
 def check_parameters(scene: Scene | Mechanism, axes: Mapping[str, Axis], where: str) -> None:
-    """Refuse values that the scene does not accept: what it allows of a parameter is an interval.
-
-    Raises:
-        InputError: it does not.
-    """
+    """Refuse values that the scene does not accept: what it allows of a parameter is an interval."""
     for name, axis in axes.items():
         for value in (axis.array.min(), axis.array.max()):
             try:
@@ -194,9 +170,6 @@ def check_starts(scene: Scene, starts: Mapping[str, Floats]) -> None:
     Args:
         scene: the mechanism.
         starts: values of coordinates [rad, rad/s] by where the request has them, such as ``axes.phi``.
-
-    Raises:
-        InputError: an angle or a rate is too large.
     """
     fastest = fastest_followed(reduce(scene))
     for where, values in starts.items():
@@ -206,8 +179,23 @@ def check_starts(scene: Scene, starts: Mapping[str, Floats]) -> None:
             raise InputError(f"{where} = {largest:g} rad/s: steps follow {fastest:.3g} rad/s here at most")
 
 
+def check_names(where: str, names: Iterable[str], known: Iterable[str], what: str) -> None:
+    """Refuse names that are none of the known ones, ``what`` such as "unknown parameter"."""
+    for name in names:
+        if name not in known:
+            raise InputError(f"{where}{name}: {what} {shown(name)}; {nearest(name, list(known))}")
+
+
 #: Gives a finished tile by its index.
 Tiles: TypeAlias = "Callable[[int], Dataset]"
+
+
+def tile_of(arrays: Mapping[str, Any], attrs: Mapping[str, Any] | None = None) -> Dataset:
+    """Arrays as a tile holds them, without units and meanings; those that are None are left out."""
+    there = {name: np.asarray(array) for name, array in arrays.items() if array is not None}
+    return Dataset(
+        {n: Variable(tuple(f"{n}_{k}" for k in range(a.ndim)), a) for n, a in there.items()}, attrs or {}
+    )
 
 
 @dataclass(frozen=True)
@@ -252,25 +240,14 @@ class Tiling(ABC):
         return None
 
 
+@dataclass
 class Each(Tiling):
-    """Some pieces of work, one a tile.
+    """Some pieces of work, one a tile."""
 
-    Args:
-        what: what the pieces are, for progress.
-        count: how many there are.
-        compute: gives a piece by its number.
-        join: makes the section of all pieces.
-    """
-
-    def __init__(
-        self,
-        what: str,
-        count: int,
-        compute: Callable[[int], Dataset],
-        join: Callable[[list[Dataset]], Dataset],
-    ) -> None:
-        self.what, self.count = what, count
-        self._compute, self._join = compute, join
+    what: str
+    count: int
+    piece: Callable[[int], Dataset]  #: gives a piece by its number
+    join: Callable[[list[Dataset]], Dataset]  #: makes the section of all pieces
 
     def items(self, index: int) -> int:
         """One."""
@@ -278,11 +255,11 @@ class Each(Tiling):
 
     def compute(self, index: int, context: RunContext) -> Dataset:
         """Compute a piece."""
-        return self._compute(index)
+        return self.piece(index)
 
     def assemble(self, tile: Tiles) -> Dataset:
         """Join the pieces."""
-        return self._join([tile(index) for index in range(self.count)])
+        return self.join([tile(index) for index in range(self.count)])
 
 
 class Planes(Tiling):
@@ -295,7 +272,7 @@ class Planes(Tiling):
             so that progress tells the time left. Else they are neighbours.
     """
 
-    def __init__(self, axes: dict[str, Floats], points: int, spread: bool = False) -> None:
+    def __init__(self, axes: dict[str, NDArray[Any]], points: int, spread: bool = False) -> None:
         self.axes = axes
         self.first, *others = axes
         self.others = tuple(len(axes[other]) for other in others)
@@ -309,7 +286,7 @@ class Planes(Tiling):
         """Shape of a tile's part of the grid."""
         return (len(range(len(self.axes[self.first]))[self.parts[index]]), *self.others)
 
-    def axes_of(self, index: int) -> dict[str, Floats]:
+    def axes_of(self, index: int) -> dict[str, NDArray[Any]]:
         """The axes of that part."""
         return {**self.axes, self.first: self.axes[self.first][self.parts[index]]}
 
@@ -374,6 +351,10 @@ class Scan(BaseModel, ABC):
         """One line if the step that is asked for cannot be right for the scene; see ``fm.step_warning``."""
         return None
 
+    def asked(self, *names: str) -> dict[str, Any]:
+        """Some fields of the request, as what computes takes them."""
+        return {name: getattr(self, name) for name in names}
+
     @abstractmethod
     def tiling(self, scene: Scene) -> Tiling:
         """How the work is divided; must be cheap."""
@@ -395,9 +376,9 @@ class Scan(BaseModel, ABC):
         return section.load()
 
     @staticmethod
-    @abstractmethod
     def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
         """Pictures of a result, by name. ``scene`` are the scene's parameters with this scan's changes."""
+        return {}
 
 
 #: What ``error_estimate`` of a section is.

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import AfterValidator, Field
 
 from fastmech.atlas.snap import find_snap
 from fastmech.errors import InputError
-from fastmech.results import Dataset, Variable
-from fastmech.scan_types.request import Each, Scan, Tiling
+from fastmech.results import Dataset, Variable, columns
+from fastmech.scan_types.request import Each, Scan, Tiling, tile_of
 from fastmech.scene import Number, Scene, nearest
 from fastmech.slider.atlas.snap import MOVING, stable_at
 from fastmech.slider.equilibria import Equilibrium, find_equilibria
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def _moving(name: str) -> str:
@@ -27,7 +23,10 @@ def _moving(name: str) -> str:
 
 
 class SnapScan(Scan):
-    """Values of a parameter, below and above the present one, at which a stable position ends."""
+    """Values of a parameter, below and above the present one, at which a stable position ends.
+
+    Nothing is drawn: the bifurcation diagram of an equilibrium map over the parameter shows it.
+    """
 
     kind: ClassVar[str] = "snap"
 
@@ -77,42 +76,32 @@ class SnapScan(Scan):
         ends = [np.nan if value is None else value for value in (found.below, found.above)]
         row = np.array([*found.position, *ends, *found.searched], dtype=np.float64)
         unstable = np.array([how == "turns unstable" for how in found.how])
-        return Dataset(
-            {"row": Variable(("entry",), row), "unstable": Variable(("end",), unstable)},
-            {"sentence": found.sentence, "unit": found.unit},
-        )
+        return tile_of({"row": row, "unstable": unstable}, {"sentence": found.sentence, "unit": found.unit})
 
     def _joined(self, which: list[int], tiles: list[Dataset]) -> Dataset:
         rows = np.array([tile["row"].data for tile in tiles]).reshape(-1, 6)
         unstable = np.array([tile["unstable"].data for tile in tiles], dtype=np.bool_).reshape(-1, 2)
-        each = ("equilibrium",)
         sentences = np.array([tile.attrs["sentence"] for tile in tiles], dtype=object)
         unit = str(tiles[0].attrs["unit"]) if tiles else "1"
-        name = self.parameter
+        name, ends = self.parameter, np.array(["lowest", "highest"], object)
         gone = f"it ends when {name} {{}} to; NaN: at no value searched"
-        return Dataset(
-            {
-                "equilibrium": Variable(each, np.array(which, np.int32), "1", "number of the equilibrium"),
-                "end": Variable(("end",), np.array(["lowest", "highest"], object), "1", "end of the search"),
-                "phi": Variable(each, rows[:, 0], "rad", "angle phi"),
-                "theta": Variable(each, rows[:, 1], "rad", "angle theta"),
-                "snap_below": Variable(each, rows[:, 2], unit, gone.format("falls")),
-                "snap_above": Variable(each, rows[:, 3], unit, gone.format("rises")),
-                "turns_unstable": Variable(
-                    (*each, "end"),
-                    unstable,
-                    "1",
-                    "it goes on there as an unstable one and does not disappear",
-                ),
-                "searched": Variable(
-                    (*each, "end"), rows[:, 4:], unit, f"lowest and highest {name} searched"
-                ),
-                "sentence": Variable(each, sentences, "1", "the answer in words"),
-            },
-            {"parameter": name},
-        )
-
-    @staticmethod
-    def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
-        """Nothing to draw: the bifurcation diagram of an equilibrium map over the parameter shows it."""
-        return {}
+        each = {
+            "phi": (rows[:, 0], "rad", "angle phi"),
+            "theta": (rows[:, 1], "rad", "angle theta"),
+            "snap_below": (rows[:, 2], unit, gone.format("falls")),
+            "snap_above": (rows[:, 3], unit, gone.format("rises")),
+        }
+        both = {
+            "turns_unstable": (unstable, "1", "it goes on there as an unstable one and does not disappear"),
+            "searched": (rows[:, 4:], unit, f"lowest and highest {name} searched"),
+        }
+        about = {"equilibrium": (np.array(which, np.int32), "1", "number of the equilibrium")}
+        words = {"sentence": (sentences, "1", "the answer in words")}
+        variables = {
+            **columns(("equilibrium",), about),
+            "end": Variable(("end",), ends, "1", "end of the search"),
+            **columns(("equilibrium",), each),
+            **columns(("equilibrium", "end"), both),
+            **columns(("equilibrium",), words),
+        }
+        return Dataset(variables, {"parameter": name})

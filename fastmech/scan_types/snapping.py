@@ -7,8 +7,7 @@ forces that end alike, with the alpha they belong to, and ``equilibria``, those 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,26 +18,21 @@ from fastmech.basins.snapping import SnappingMap, critical_forces, default_end, 
 from fastmech.capture.select import require_damper
 from fastmech.ensembles.status import FAILURES, LABELS, Status
 from fastmech.errors import InputError
-from fastmech.results import NO_CODE, Dataset, Variable, flags, numbers
-from fastmech.scan_types.request import (
-    Axis,
-    Planes,
-    RunContext,
-    Scan,
-    Tiles,
-    Tiling,
-    UsualMethod,
-    check_duration,
-    check_parameters,
-    check_rising,
-    check_size,
-    failures,
+from fastmech.plots.basins import draw_snapping
+from fastmech.results import (
+    ANGLE_UNITS,
+    NO_CODE,
+    Dataset,
+    Variable,
+    columns,
+    columns_of,
+    flags,
+    numbers,
+    parts,
 )
+from fastmech.scan_types import request as scans
 from fastmech.scene import Scene
 from fastmech.slider.capture.steps import method_for
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: Motions of the largest map, and numbers of 8 bytes of each in memory.
 MOST_POINTS, POINT_NUMBERS = 5_000_000, 20
@@ -46,28 +40,32 @@ MOST_POINTS, POINT_NUMBERS = 5_000_000, 20
 #: Least tolerance of a critical force over the force: doubles between two such forces.
 ROUNDING = 2.0**-44
 
+#: What a tile knows of every motion, by the names in `fastmech.basins.snapping.SnappingMap`.
+_ENDS = ("label", "turns", "time", "status")
+
 #: Motions of a tile, about.
 TILE_POINTS = 1 << 12
 
 
-class Rates(Axis):
+class Rates(scans.Axis):
     """Values evenly spaced in their logarithm, unless it is said otherwise."""
 
     spacing: Literal["linear", "log"] = "log"
 
 
-class Snapping(Scan):
+class Snapping(scans.Scan):
     """The (F0, alpha) map of dynamic snapping, with the critical curve and its limit."""
 
     kind: ClassVar[str] = "snapping"
+    draw = staticmethod(draw_snapping)
 
-    F0: Axis = Field(description="forces, of one sign [N]")
+    F0: scans.Axis = Field(description="forces, of one sign [N]")
     alpha: Rates = Field(description="decay rates, evenly spaced in their logarithm [1/s]")
     tolerance: Annotated[float, Field(gt=0)] = Field(0.1, description="of the critical forces [N]")
     t_end: Annotated[float, Field(gt=0)] | None = Field(
         None, description="end of the runs [s]; by default 200 s after a millionth of the force is left"
     )
-    method: UsualMethod = None
+    method: scans.UsualMethod = None
 
     @property
     def forces(self) -> np.ndarray:
@@ -83,7 +81,7 @@ class Snapping(Scan):
         """Forces of one sign, rising axes, a damper."""
         require_damper(scene)
         for name, axis in (("F0", self.F0), ("alpha", self.alpha)):
-            check_rising(name, axis)
+            scans.check_rising(name, axis)
         first, last = (float(force) for force in self.forces[[0, -1]])
         if first * last <= 0.0:
             raise InputError(f"F0: goes from {first:g} to {last:g} N: must be of one sign and not be 0 N")
@@ -96,25 +94,18 @@ class Snapping(Scan):
                 f"tolerance = {self.tolerance:g}: must not be less than {least:.2g} N, for rounding"
             )
         axes = {"F0": self.F0, "alpha": self.alpha}
-        check_parameters(scene, axes, "axes")
-        check_size("F0, alpha", axes, "motions", MOST_POINTS, POINT_NUMBERS)
+        scans.check_parameters(scene, axes, "axes")
+        scans.check_size("F0, alpha", axes, "motions", MOST_POINTS, POINT_NUMBERS)
         end = float(default_end(slowest)) if self.t_end is None else self.t_end
         for force in (first, last):
-            check_duration(scene.replace(F0=force, alpha=slowest), end, None)
+            scans.check_duration(scene.replace(F0=force, alpha=slowest), end, None)
 
-    def tiling(self, scene: Scene) -> Tiling:
+    def tiling(self, scene: Scene) -> scans.Tiling:
         """Some decay rates a tile."""
         return SnappingTiling(self, scene)
 
-    @staticmethod
-    def draw(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, Figure]:
-        """The map with the critical curve."""
-        from fastmech.plots.basins import draw_snapping
 
-        return draw_snapping(dataset.merged, scene)
-
-
-class SnappingTiling(Planes):
+class SnappingTiling(scans.Planes):
     """Every tile holds some decay rates with all their forces."""
 
     what = "motions under a fading force"
@@ -124,9 +115,9 @@ class SnappingTiling(Planes):
         self.forces, self.rates = request.forces, request.rates
         super().__init__({"alpha": self.rates, "F0": self.forces}, TILE_POINTS, spread=True)
 
-    def compute(self, index: int, context: RunContext) -> Dataset:
+    def compute(self, index: int, context: scans.RunContext) -> Dataset:
         """Ends and critical forces of some rates."""
-        settings: dict[str, Any] = {"t_end": self.request.t_end, "method": self.request.method}
+        settings = self.request.asked("t_end", "method")
         found = map_snapping(
             self.scene,
             self.forces,
@@ -138,104 +129,93 @@ class SnappingTiling(Planes):
         critical = critical_forces(
             found, self.scene, tolerance=self.request.tolerance, threads=context.threads, **settings
         )
-        return _tile(found.label, found.turns, found.time, found.status, critical)
+        return scans.tile_of({name: getattr(found, name) for name in _ENDS} | {"critical": critical})
 
-    def assemble(self, tile: Tiles) -> Dataset:
+    def assemble(self, tile: scans.Tiles) -> Dataset:
         """Join the rates, in their order."""
         tiles = [tile(index) for index in range(self.count)]
         joined = {name: self.joined(tiles, name) for name in tiles[0]}
         free, equilibria, start = force_free(self.scene, None)
-        ends = (joined[name] for name in ("label", "turns", "time", "status"))
-        found = SnappingMap(self.forces, self.rates, equilibria, start, *ends).of(self.scene)
+        found = SnappingMap(self.forces, self.rates, equilibria, start, *(joined[name] for name in _ENDS)).of(
+            self.scene
+        )
         side = 0.0 if self.forces[0] > 0.0 else np.pi
         limit = np.cos(side) * shock_limit(free, equilibria[start], "M2", side).found.impulse
         dataset = snapping_dataset(found)
         variables = dict(dataset.variables)
-        variables["critical_F0"] = Variable(
-            ("alpha",),
-            joined["critical"],
-            "N",
-            "force of least magnitude that leaves, NaN: none of those tried",
-        )
-        variables["critical_impulse"] = Variable(
-            (), np.array(limit), "N s", "limit of the critical F0/alpha for fast decay, NaN: none was found"
-        )
-        attrs = {
-            "tolerance": self.request.tolerance,
-            "method": method_for(free, self.request.method),
-        }
+        about = "force of least magnitude that leaves, NaN: none of those tried"
+        variables["critical_F0"] = Variable(("alpha",), joined["critical"], "N", about)
+        about = "limit of the critical F0/alpha for fast decay, NaN: none was found"
+        variables["critical_impulse"] = Variable((), np.array(limit), "N s", about)
+        attrs = {"tolerance": self.request.tolerance, "method": method_for(free, self.request.method)}
         return Dataset(variables, {**dataset.attrs, **attrs}, dataset.groups)
 
     def missing(self, index: int) -> Dataset:
         """Rates that have not been computed."""
         shape = self.grid(index)
         nothing, undecided = np.full(shape, np.nan), np.full(shape, Status.UNDECIDED, dtype=np.int8)
-        turns = np.zeros((*shape, 2), dtype=np.int64)
-        return _tile(np.full(shape, -1), turns, nothing, undecided, nothing[:, 0])
+        ends = np.full(shape, -1), np.zeros((*shape, 2), dtype=np.int64), nothing, undecided
+        return scans.tile_of(dict(zip(_ENDS, ends, strict=True)) | {"critical": nothing[:, 0]})
 
 
 def snapping_dataset(found: SnappingMap) -> Dataset:
     """The section of a map, without critical forces."""
     groups = {"windows": Dataset(_windows(found)), "equilibria": Dataset(_equilibria(found))}
-    attrs = {"start": found.start, **found.counts, **failures(found.status, FAILURES)}
+    attrs = {"start": found.start, **found.counts, **scans.failures(found.status, FAILURES)}
     return Dataset(_ends(found), attrs, groups)
 
 
-def _tile(*arrays: NDArray[Any]) -> Dataset:
-    """Labels, turns, times and statuses over (alpha, F0), and critical forces."""
-    dims = ("alpha", "F0", "angle")
-    names = ("label", "turns", "time", "status", "critical")
-    return Dataset({n: Variable(dims[: a.ndim], a) for n, a in zip(names, arrays, strict=True)})
+_TURNS = {"phi": "1", "theta": "1"}
 
 
 def _ends(found: SnappingMap) -> dict[str, Variable]:
-    grid = ("alpha", "F0")
+    label, turns = found.label.astype(np.int8), found.turns.astype(np.int32)
+    grid, time = ("alpha", "F0"), "time at which its capture was found, NaN: not captured"
     return {
         "F0": Variable(("F0",), found.F0, "N", "force on M2 along +x when it is switched on"),
         "alpha": Variable(("alpha",), found.alpha, "1/s", "rate at which the force decays"),
-        "well": Variable(
-            grid, found.label.astype(np.int8), "1", "equilibrium that captures the motion", NO_CODE
-        ),
-        "turns_phi": Variable(grid, found.turns[..., 0].astype(np.int32), "1", "full turns of phi"),
-        "turns_theta": Variable(grid, found.turns[..., 1].astype(np.int32), "1", "full turns of theta"),
+        "well": Variable(grid, label, "1", "equilibrium that captures the motion", NO_CODE),
+        **parts("turns", grid, turns, _TURNS, "full turns of {}"),
         "left": Variable(grid, found.left, "1", "ends in another well or with another number of turns"),
-        "capture_time": Variable(
-            grid, found.time, "s", "time at which its capture was found, NaN: not captured"
-        ),
+        "capture_time": Variable(grid, found.time, "s", time),
         "status": Variable(grid, found.status, "1", "what is known of the motion", flags(LABELS)),
     }
 
 
 def _windows(found: SnappingMap) -> dict[str, Variable]:
-    rows = [(k, window) for k in range(found.alpha.size) for window in found.windows(k)]
-    each = ("window",)
+    rates = [rate for k, rate in enumerate(found.alpha) for _ in found.windows(k)]
+    windows, each = [window for k in range(found.alpha.size) for window in found.windows(k)], ("window",)
 
-    def column(values: list[Any], kind: type, unit: str, *about: Any) -> Variable:
-        return Variable(each, np.array(values, dtype=kind), unit, *about)
+    def column(name: str, kind: type) -> NDArray[Any]:
+        return np.array([getattr(window, name) for window in windows], dtype=kind)
 
+    rows = {
+        "window_alpha": (np.array(rates, dtype=np.float64), "1/s", "alpha of the window"),
+        "window_first": (column("first", np.float64), "N", "least F0 of the window"),
+        "window_last": (column("last", np.float64), "N", "largest F0 of the window"),
+        "window_well": (column("label", np.int8), "1", "where its motions end", NO_CODE),
+    }
+    turns = column("turns", np.int32).reshape(-1, 2)
+    left = Variable(each, column("left", np.bool_), "1", "whether they have left")
     return {
-        "window_alpha": column([found.alpha[k] for k, _ in rows], np.float64, "1/s", "alpha of the window"),
-        "window_first": column([w.first for _, w in rows], np.float64, "N", "least F0 of the window"),
-        "window_last": column([w.last for _, w in rows], np.float64, "N", "largest F0 of the window"),
-        "window_well": column([w.label for _, w in rows], np.int8, "1", "where its motions end", NO_CODE),
-        "window_turns_phi": column([w.turns[0] for _, w in rows], np.int32, "1", "turns of phi they make"),
-        "window_turns_theta": column(
-            [w.turns[1] for _, w in rows], np.int32, "1", "turns of theta they make"
-        ),
-        "window_left": column([w.left for _, w in rows], np.bool_, "1", "whether they have left"),
+        **columns(each, rows),
+        **parts("window_turns", each, turns, _TURNS, "turns of {} they make"),
+        "window_left": left,
     }
 
 
 def _equilibria(found: SnappingMap) -> dict[str, Variable]:
-    each, equilibria = ("equilibrium",), found.equilibria
+    equilibria, each = found.equilibria, ("equilibrium",)
+    angles, about = (
+        np.stack([equilibria.phi, equilibria.theta], axis=-1),
+        "{1} {0} of the force-free equilibrium",
+    )
+    rows = {
+        "energy": ("J", "its potential energy"),
+        "morse_index": ("1", "its unstable directions, 0: a well"),
+    }
     return {
         **numbers("equilibrium", len(equilibria), "number of the force-free equilibrium"),
-        "equilibrium_phi": Variable(each, equilibria.phi, "rad", "angle phi of the force-free equilibrium"),
-        "equilibrium_theta": Variable(
-            each, equilibria.theta, "rad", "angle theta of the force-free equilibrium"
-        ),
-        "equilibrium_energy": Variable(each, equilibria.energy, "J", "its potential energy"),
-        "equilibrium_morse_index": Variable(
-            each, equilibria.morse_index, "1", "its unstable directions, 0: a well"
-        ),
+        **parts("equilibrium", each, angles, ANGLE_UNITS, about),
+        **columns_of(equilibria, each, rows, "equilibrium_{}"),
     }

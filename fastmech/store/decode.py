@@ -64,11 +64,7 @@ class TooMuchError(InputError):
 
 
 class Allowance:
-    """What a file may ask for: its groups, its variables and the bytes of their values are taken off it.
-
-    Args:
-        path: the file.
-    """
+    """What a file may ask for: its groups, its variables and the bytes of their values are taken off it."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -138,7 +134,9 @@ def is_dimension_only(stored: h5py.Dataset) -> bool:
 
 def dimensions(stored: Iterable[h5py.Dataset]) -> dict[int, str]:
     """The dimensions among the arrays of a group: number and name."""
-    return {int(scale.attrs[DIM_NUMBER]): _own_name(scale) for scale in stored if scale.is_scale}
+    return {
+        int(scale.attrs[DIM_NUMBER]): str(scale.name).rpartition("/")[2] for scale in stored if scale.is_scale
+    }
 
 
 def own_dimensions(stored: h5py.Dataset, dims: Mapping[int, str]) -> tuple[str, ...]:
@@ -149,17 +147,11 @@ def own_dimensions(stored: h5py.Dataset, dims: Mapping[int, str]) -> tuple[str, 
 
 @dataclass(frozen=True)
 class About:
-    """A stored variable without its values.
+    """A stored variable without its values."""
 
-    Attributes:
-        sizes: length of each of its dimensions.
-        dtype: type of the values, object for texts.
-        units, long_name, attrs: as of `fastmech.results.Variable`.
-    """
-
-    sizes: dict[str, int]
-    dtype: np.dtype[Any]
-    units: str
+    sizes: dict[str, int]  #: length of each of its dimensions
+    dtype: np.dtype[Any]  #: type of the values, object for texts
+    units: str  #: as of `fastmech.results.Variable`
     long_name: str
     attrs: dict[str, Any]
 
@@ -258,10 +250,6 @@ def _python_value(value: Any) -> Any:
     if isinstance(value, np.ndarray) and value.dtype.kind == "S":
         return tuple(text.decode() for text in value)
     return value.item() if isinstance(value, np.generic) else value
-
-
-def _own_name(stored: h5py.Dataset) -> str:
-    return str(stored.name).rpartition("/")[2]
 
 
 def _check_storage(stored: h5py.Dataset) -> None:

@@ -24,7 +24,7 @@ from fastmech.results import FILL, Dataset, Variable
 from fastmech.store.provenance import history_line
 from fastmech.store.read import Results, choose, open_results, parse_selections, take
 from fastmech.store.schema import CHANGE, CONVENTIONS, OWN_ATTRS
-from fastmech.store.write import _aside, _readable_reasons
+from fastmech.store.write import _aside, readable_reasons
 
 #: Announces a piece of work with its items and gives who is told of finished ones.
 Stages: TypeAlias = "Callable[[str, int], Callable[[int], None]]"
@@ -206,7 +206,7 @@ _WRITERS: dict[str, Callable[[Dataset, Path, Stages], Iterator[tuple[Path, Write
 
 
 def _publish(target: Path, write: Writer, replace: bool) -> None:
-    with _readable_reasons(target):
+    with readable_reasons(target):
         if target.exists() and not replace:
             raise InputError(f"{target}: exists already; --fresh replaces it, --out names another folder")
         target.parent.mkdir(parents=True, exist_ok=True)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from fastmech.ensembles.threads import thread_count
 from fastmech.objects import Field, Result
-from fastmech.results import Dataset, Variable, flags, scene_parameters, state_units
+from fastmech.results import Dataset, Variable, flags, parts, scene_parameters, state_units
 from fastmech.scene import path_of
 from fastmech.store.provenance import provenance
 from fastmech.store.write import write_results
@@ -40,12 +41,8 @@ def _variables(found: Result, name: str, field: Field, value: Any) -> dict[str, 
         value, dtype=object if field.unit == "1" and np.asarray(value).dtype.kind in "UO" else None
     )
     if name.endswith("*"):
-        prefix = name[:-1]
-        entries = list(units.items())[: data.shape[-1]]
-        for k, (entry, unit) in enumerate(entries):
-            about = f"{field.about} {entry}".strip()
-            own[prefix + entry] = Variable(tuple(dims[:-1]), data[..., k], unit, about)
-        return own
+        entries = dict(islice(units.items(), data.shape[-1]))
+        return own | parts(name[:-1].rstrip("_"), tuple(dims[:-1]), data, entries, f"{field.about} {{}}")
     if field.codes is None:
         attrs: dict[str, Any] = {}
     else:

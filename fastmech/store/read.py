@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from numbers import Real
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, NoReturn, Self, TypeAlias
+from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
 import h5py
 import numpy as np
@@ -17,19 +17,7 @@ from numpy.typing import NDArray
 from fastmech.errors import InputError, shown
 from fastmech.results import ANGLE_UNITS, STATE_UNITS, Dataset, Variable, no_xarray, parts
 from fastmech.scene import path_of
-from fastmech.store.decode import (
-    About,
-    Allowance,
-    about_variable,
-    dimensions,
-    get_attrs,
-    get_variable,
-    is_characters,
-    is_dimension_only,
-    members,
-    named_damage,
-    own_dimensions,
-)
+from fastmech.store import decode
 from fastmech.store.schema import CHANGE, DIM_NUMBERS, FORMAT, SCHEMA_VERSION
 
 if TYPE_CHECKING:
@@ -44,17 +32,11 @@ BEYOND = 0.5 * (1.0 + 1e-9)
 
 @dataclass(frozen=True)
 class Chosen:
-    """What a selection takes along one dimension.
+    """What a selection takes along one dimension."""
 
-    Attributes:
-        places: one place, or all those of a range.
-        is_range: whether a range was asked for, which keeps the dimension.
-        told: what is taken, for the user: ``F0 = 96 N (nearest to 100)``.
-    """
-
-    places: NDArray[np.int64]
-    is_range: bool
-    told: str
+    places: NDArray[np.int64]  #: one place, or all those of a range
+    is_range: bool  #: whether a range was asked for, which keeps the dimension
+    told: str  #: what is taken, for the user: ``F0 = 96 N (nearest to 100)``
 
     @property
     def hull(self) -> slice:
@@ -62,7 +44,9 @@ class Chosen:
         return slice(int(self.places.min()), int(self.places.max()) + 1)
 
     def of(self, data: NDArray[Any], axis: int) -> NDArray[Any]:
-        """The places themselves of what was read."""
+        """The places themselves of what was read; one place is no dimension any more."""
+        if not self.is_range:
+            return data.take(0, axis)
         inside = self.places - self.hull.start
         return data if len(inside) == data.shape[axis] else data.take(inside, axis)
 
@@ -109,9 +93,6 @@ def choose(section: Section, wanted: Mapping[str, Any]) -> dict[str, Chosen]:
 def take(section: Section, chosen: Mapping[str, Chosen], names: Collection[str] | None = None) -> Dataset:
     """The variables of these names, all by default, at what was chosen."""
     variables = list(section) if names is None else list(names)
-    for name in variables:
-        if name not in section:
-            section[name]  # says what there is
     dims = chosen.keys() | {dim for name in variables for dim in section.dims(name)}
     read = {*variables, *(dim for dim in dims if dim in section)}
     part = section.load(read, {dim: one.hull for dim, one in chosen.items()})
@@ -121,11 +102,9 @@ def take(section: Section, chosen: Mapping[str, Chosen], names: Collection[str] 
 def _narrowed(variable: Variable, chosen: Mapping[str, Chosen]) -> Variable:
     """A variable at what was chosen, without the dimensions along which that is one value."""
     data = variable.data
-    for axis, dim in enumerate(variable.dims):
-        if dim in chosen:
-            data = chosen[dim].of(data, axis)
+    for axis, dim in reversed(list(enumerate(variable.dims))):
+        data = chosen[dim].of(data, axis) if dim in chosen else data
     left = tuple(dim for dim in variable.dims if dim not in chosen or chosen[dim].is_range)
-    data = data.squeeze(tuple(axis for axis, dim in enumerate(variable.dims) if dim not in left))
     return Variable(left, data, variable.units, variable.long_name, variable.attrs)
 
 
@@ -256,7 +235,7 @@ def open_results(path: str | Path) -> Results:
     return Results(path)
 
 
-class Results:
+class Results(AbstractContextManager["Results"]):
     """An open result file.
 
     `results["equilibria"]` is the `Section` of that name, `results["map/curves"]` the group `curves` within
@@ -273,18 +252,18 @@ class Results:
         self.path = path_of(path)
         self._file = _open_file(self.path)
         try:
-            with named_damage(str(path)):
-                self.attrs = get_attrs(self._file)
+            with decode.named_damage(str(path)):
+                self.attrs = decode.get_attrs(self._file)
             _check_schema(self.attrs, path)
-            left = Allowance(self.path)
-            with named_damage(str(path)):
-                root = members(self._file, str(path), left)
+            left = decode.Allowance(self.path)
+            with decode.named_damage(str(path)):
+                root = decode.members(self._file, str(path), left)
             self.parameters = {
-                name: get_variable(member, {}, f"{path}: parameter {name!r}")
+                name: decode.get_variable(member, {}, f"{path}: parameter {name!r}")
                 for name, member in root.items()
                 if isinstance(member, h5py.Dataset)
             }
-            with named_damage(f"{path}: the scene's parameters"):
+            with decode.named_damage(f"{path}: the scene's parameters"):
                 self.scene = {name: float(parameter.data) for name, parameter in self.parameters.items()}
             self._sections = {
                 name: Section(member, f"{path}: {name}", left)
@@ -348,77 +327,91 @@ class Results:
     def scene_of(self, name: str) -> dict[str, float]:
         """The scene of a section, or of a group in it: the file's with the section's changes."""
         attrs = self[name.partition("/")[0]].attrs
-        with named_damage(f"{self.path}: {name}: its scene"):
+        with decode.named_damage(f"{self.path}: {name}: its scene"):
             return {key: float(attrs.get(f"{CHANGE}{key}", value)) for key, value in self.scene.items()}
 
     def close(self) -> None:
         """Close the file; what was read stays usable."""
         self._file.close()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 
-class Section:
+class Section(Mapping[str, Variable]):
     """One section of a result file, used like a `fastmech.results.Dataset`: `section["phi"]` is a `Variable`.
 
     Attributes:
         where: the file and the section's name, for messages.
         attrs: the section's attributes.
         sizes: length of each dimension.
-        variables: the variables by name, each read anew whenever it is asked for.
         groups: sections within this one, with dimensions of their own.
     """
 
-    def __init__(self, group: h5py.Group, where: str, left: Allowance, inner: bool = False) -> None:
+    def __init__(self, group: h5py.Group, where: str, left: decode.Allowance, inner: bool = False) -> None:
         self.where = where
-        with named_damage(where):
-            all_members = members(group, where, left)
+        with decode.named_damage(where):
+            all_members = decode.members(group, where, left)
             stored = {n: member for n, member in all_members.items() if isinstance(member, h5py.Dataset)}
-            variables = {name: member for name, member in stored.items() if not is_dimension_only(member)}
-            dims = dimensions(stored.values())
-            letters = {dims[m.attrs[DIM_NUMBERS][-1]] for m in variables.values() if is_characters(m)}
+            variables = {
+                name: member for name, member in stored.items() if not decode.is_dimension_only(member)
+            }
+            dims = decode.dimensions(stored.values())
+            letters = {dims[m.attrs[DIM_NUMBERS][-1]] for m in variables.values() if decode.is_characters(m)}
             self.sizes = {dim: int(stored[dim].shape[0]) for dim in dims.values() if dim not in letters}
-            self.attrs: dict[str, Any] = get_attrs(group)
+            self.attrs: dict[str, Any] = decode.get_attrs(group)
         self.groups = {
             name: Section(member, f"{where}/{name}", left, inner=True)
             for name, member in all_members.items()
             if isinstance(member, h5py.Group) and not inner
         }
-        self._stored = _StoredVariables(variables, dims, where)
-        self.variables: Mapping[str, Variable] = self._stored
+        self._stored, self._dims = variables, dims
+
+    @property
+    def variables(self) -> Mapping[str, Variable]:
+        """The variables by name, each read anew whenever it is asked for."""
+        return self
 
     def __getitem__(self, name: str) -> Variable:
-        if name not in self.variables:
-            known = ", ".join(self.variables) or "none"
-            raise InputError(f"variable {shown(name)}: is not in {self.where}; it has {known}")
-        return self.variables[name]
+        return self._read(name)
 
     def __contains__(self, name: object) -> bool:
-        return name in self.variables
+        return name in self._stored
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self.variables)
+        return iter(self._stored)
 
     def __len__(self) -> int:
-        return len(self.variables)
+        return len(self._stored)
 
     def dims(self, name: str) -> tuple[str, ...]:
         """Dimensions of a variable, which is not read."""
-        return self._stored.dims(name)
+        stored, called = self._open(name)
+        with decode.named_damage(called):
+            return decode.own_dimensions(stored, self._dims)
 
-    def about(self, name: str) -> About:
+    def about(self, name: str) -> decode.About:
         """What is said of a variable; its values are not read.
 
         Raises:
             InputError: there is no such variable, or it is damaged.
         """
-        return self._stored.about(name)
+        stored, called = self._open(name)
+        return decode.about_variable(stored, self._dims, called)
+
+    def _read(self, name: str, part: Mapping[str, slice] | None = None) -> Variable:
+        stored, called = self._open(name)
+        return decode.get_variable(stored, self._dims, called, part)
+
+    def _open(self, name: str) -> tuple[h5py.Dataset, str]:
+        """A stored variable, and what messages call it."""
+        if name not in self._stored:
+            known = ", ".join(self._stored) or "none"
+            raise InputError(f"variable {shown(name)}: is not in {self.where}; it has {known}")
+        called = f"{self.where}: variable {name!r}"
+        if not self._stored[name]:
+            raise InputError(f"{called}: the file is closed; read it before")
+        return self._stored[name], called
 
     def load(self, names: Collection[str] | None = None, part: Mapping[str, slice] | None = None) -> Dataset:
         """Read variables.
@@ -430,9 +423,9 @@ class Section:
         Raises:
             InputError: a variable's data are damaged; the message names it.
         """
-        chosen = [name for name in self.variables if names is None or name in names]
+        chosen = [name for name in self if names is None or name in names]
         groups = {name: group.load() for name, group in self.groups.items()} if names is None else {}
-        return Dataset({name: self._stored.read(name, part) for name in chosen}, self.attrs, groups)
+        return Dataset({name: self._read(name, part) for name in chosen}, self.attrs, groups)
 
     def select(self, names: Collection[str] | None = None, **values: Wanted) -> Dataset:
         """The section at one value, or in a range, of some coordinates: ``results["map"].select(F0=100.0)``.
@@ -467,49 +460,6 @@ class Section:
         return lazy_dataset(self)
 
 
-class _StoredVariables(Mapping[str, Variable]):
-    """The variables of a section, each read when it is asked for."""
-
-    def __init__(self, stored: Mapping[str, h5py.Dataset], dims: Mapping[int, str], where: str) -> None:
-        self._stored = stored
-        self._dims = dims
-        self._where = where
-
-    def __getitem__(self, name: str) -> Variable:
-        return self.read(name, None)
-
-    def read(self, name: str, part: Mapping[str, slice] | None) -> Variable:
-        """A variable, or a part of it."""
-        return get_variable(self._open(name), self._dims, self._called(name), part)
-
-    def about(self, name: str) -> About:
-        """What is said of a variable."""
-        return about_variable(self._open(name), self._dims, self._called(name))
-
-    def dims(self, name: str) -> tuple[str, ...]:
-        """Dimensions of a variable."""
-        with named_damage(self._called(name)):
-            return own_dimensions(self._open(name), self._dims)
-
-    def _open(self, name: str) -> h5py.Dataset:
-        stored = self._stored[name]
-        if not stored:
-            raise InputError(f"{self._called(name)}: the file is closed; read it before")
-        return stored
-
-    def _called(self, name: str) -> str:
-        return f"{self._where}: variable {name!r}"
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._stored
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._stored)
-
-    def __len__(self) -> int:
-        return len(self._stored)
-
-
 def _open_file(path: Path) -> h5py.File:
     if path.exists() and not path.is_file() and not path.is_dir():  # reading a pipe would wait for ever
         raise InputError(f"{path}: is not a regular file")
@@ -524,7 +474,7 @@ def _open_file(path: Path) -> h5py.File:
         raise InputError(f"{path}: is empty")
     if not h5py.is_hdf5(path):
         raise InputError(f"{path}: is not an HDF5 file")
-    with named_damage(str(path)):
+    with decode.named_damage(str(path)):
         return h5py.File(path, "r")
 
 

@@ -43,20 +43,8 @@ OWN_ATTRS = ("format", "schema_version", "Conventions")
 CHANGE = "scene_"
 """Prefix of the attributes of a section that hold its changes of the scene."""
 
-PROVENANCE = (
-    "created",
-    "history",
-    "fastmech_version",
-    "python_version",
-    "numba_version",
-    "numpy_version",
-    "scipy_version",
-    "h5py_version",
-    "hdf5_version",
-    "platform",
-    "processor",
-    "threads",
-)
+_VERSIONS = ("fastmech", "python", "numba", "numpy", "scipy", "h5py", "hdf5")
+PROVENANCE = ("created", "history", *(f"{v}_version" for v in _VERSIONS), "platform", "processor", "threads")
 """Root attributes of `fastmech.store.provenance.provenance`."""
 
 REQUIRED_ATTRS = ("title", *PROVENANCE)

@@ -87,9 +87,7 @@ def _flag_counts(variable: Variable) -> str:
 
 
 def _attributes(attrs: dict[str, Any], title: str) -> Table:
-    table = _table(title, show_header=False)
-    table.add_column(no_wrap=True, style="bold")
-    table.add_column(overflow="fold")
+    table = _table(title, {"": {"no_wrap": True, "style": "bold"}, " ": {"overflow": "fold"}}, False)
     for name, value in attrs.items():
         lines = value.strip().count("\n") + 1 if isinstance(value, str) else 1
         table.add_row(_text(name), _text(f"{lines} lines of text" if lines > 1 else value))
@@ -97,11 +95,13 @@ def _attributes(attrs: dict[str, Any], title: str) -> Table:
 
 
 def _parameters(results: Results) -> Table:
-    table = _table("scene")
-    table.add_column("parameter", no_wrap=True, style="bold")
-    table.add_column("value", justify="right", no_wrap=True)
-    table.add_column("units", no_wrap=True)
-    table.add_column("meaning", overflow="fold")
+    columns: dict[str, dict[str, Any]] = {
+        "parameter": {"no_wrap": True, "style": "bold"},
+        "value": {"justify": "right", "no_wrap": True},
+        "units": {"no_wrap": True},
+        "meaning": {"overflow": "fold"},
+    }
+    table = _table("scene", columns)
     for name, parameter in results.parameters.items():
         value = f"{results.scene[name]!r}"
         table.add_row(_text(name), value, _text(parameter.units), _text(parameter.long_name))
@@ -111,32 +111,25 @@ def _parameters(results: Results) -> Table:
 def _section(name: str, section: Section) -> RenderableType:
     from rich.console import Group
 
-    table = _table(name)
-    table.add_column("variable", style="bold", overflow="fold", min_width=8)
-    table.add_column("dimensions", overflow="fold")
-    table.add_column("units", overflow="fold")
-    table.add_column("values", overflow="fold")
-    table.add_column("meaning", overflow="fold")
-    for variable_name in section:
-        variable = section[variable_name]
+    columns: dict[str, dict[str, Any]] = {"variable": {"style": "bold", "min_width": 8}}
+    columns |= {title: {} for title in ("dimensions", "units", "values", "meaning")}
+    table = _table(name, {title: {"overflow": "fold", **how} for title, how in columns.items()})
+    for variable_name, variable in section.items():
         sizes = ", ".join(f"{dim} {size}" for dim, size in variable.sizes.items())
         cells = (variable_name, sizes, variable.units, describe_values(variable), variable.long_name)
-        table.add_row(*(_text(cell) for cell in cells))
+        table.add_row(*map(_text, cells))
     return Group(table, _attributes(section.attrs, "")) if section.attrs else table
 
 
-def _table(title: str, show_header: bool = True) -> Table:
+def _table(title: str, columns: dict[str, dict[str, Any]], show_header: bool = True) -> Table:
     from rich import box
     from rich.table import Table
 
-    return Table(
-        title=_text(title) if title else None,
-        title_justify="left",
-        title_style="bold",
-        show_header=show_header,
-        box=box.SIMPLE_HEAD,
-        pad_edge=False,
-    )
+    look: dict[str, Any] = {"title_justify": "left", "title_style": "bold", "box": box.SIMPLE_HEAD}
+    table = Table(title=_text(title) if title else None, show_header=show_header, pad_edge=False, **look)
+    for head, how in columns.items():
+        table.add_column(head, **how)
+    return table
 
 
 def _text(value: Any) -> Text:

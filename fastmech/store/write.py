@@ -33,53 +33,50 @@ from numpy.typing import NDArray
 
 from fastmech.errors import InputError
 from fastmech.results import Dataset, Variable, cf_attrs, check_name, checked_attrs
-from fastmech.store.schema import (
-    CHARACTERS,
-    COMPACT_BYTES,
-    CONVENTIONS,
-    DIM_NUMBER,
-    DIM_NUMBERS,
-    DIMENSION_ONLY,
-    ENCODING,
-    FORMAT,
-    LIBRARY_VERSIONS,
-    OWN_ATTRS,
-    REQUIRED_ATTRS,
-    SCHEMA_VERSION,
-)
+from fastmech.store import schema
 
 
 def put_dataset(group: h5py.Group, dataset: Dataset, numbers: Iterator[int]) -> None:
-    """Write a dataset with its groups into an empty group.
+    """Write a dataset with its groups into an empty group, dimensions first, to which variables refer.
 
-    Its dimensions come first, so that all variables can refer to them.
-
-    Args:
-        group: where to.
-        dataset: what.
-        numbers: gives a number to each dimension, unique in the file.
+    ``numbers`` gives a number to each dimension, unique in the file.
     """
-    variables = {name: _characters(variable) for name, variable in dataset.variables.items()}
-    sizes = {dim: size for variable in variables.values() for dim, size in variable.sizes.items()}
+    forms = {name: _form(variable) for name, variable in dataset.variables.items()}
+    sizes = {d: n for dims, data in forms.values() for d, n in zip(dims, data.shape, strict=True)}
     dim_numbers = {dim: np.int32(next(numbers)) for dim in sizes}
-    scales = {dim: put_scale(group, dim, size, variables) for dim, size in sizes.items()}
-    for dim, scale in scales.items():
-        scale.attrs[DIM_NUMBER] = dim_numbers[dim]
-    for name, variable in variables.items():
-        if name in scales:
-            stored = scales[name]
+    for dim, size in sizes.items():
+        if dim in forms:
+            _put_variable(group, dim, dataset[dim], forms[dim][1]).make_scale(dim)
         else:
-            stored = _put_variable(group, name, variable)
-            for axis, dim in enumerate(variable.dims):
-                stored.dims[axis].attach_scale(scales[dim])
-        if variable.dims:
-            stored.attrs[DIM_NUMBERS] = np.array([dim_numbers[dim] for dim in variable.dims])
+            put_dimension(group, dim, size)
+        group[dim].attrs[schema.DIM_NUMBER] = dim_numbers[dim]
+    for name, (dims, data) in forms.items():
+        if name not in sizes:
+            _attach(_put_variable(group, name, dataset[name], data), group, dims)
+        elif dims:
+            group[name].attrs[schema.DIM_NUMBERS] = np.array([dim_numbers[dim] for dim in dims])
     put_attrs(group, dataset.attrs)
     for name, inner in dataset.groups.items():
         put_dataset(group.create_group(name, track_order=True), inner, numbers)
 
 
-def put_variable_attrs(stored: h5py.Dataset, variable: Variable | _Characters) -> None:
+def put_dimension(group: h5py.Group, dim: str, size: int) -> h5py.Dataset:
+    """Make a dimension without coordinate."""
+    # never written, so it takes no room: only its shape counts
+    scale = group.create_dataset(dim, shape=(size,), dtype=">f4")
+    scale.make_scale(f"{schema.DIMENSION_ONLY}{size:10d}")
+    return scale
+
+
+def _attach(stored: h5py.Dataset, group: h5py.Group, dims: tuple[str, ...]) -> None:
+    """Tell HDF5 and netCDF the dimensions of a variable."""
+    for axis, dim in enumerate(dims):
+        stored.dims[axis].attach_scale(group[dim])
+    if dims:
+        stored.attrs[schema.DIM_NUMBERS] = np.array([group[dim].attrs[schema.DIM_NUMBER] for dim in dims])
+
+
+def put_variable_attrs(stored: h5py.Dataset, variable: Variable) -> None:
     """Write what is said of a variable."""
     put_attrs(stored, cf_attrs(variable.units, variable.long_name, variable.attrs, variable.data.dtype))
 
@@ -99,66 +96,26 @@ def _encoded(texts: npt.ArrayLike) -> npt.NDArray[np.bytes_]:
     return encoded.astype(f"S{max(1, encoded.dtype.itemsize)}")
 
 
-@dataclass(frozen=True)
-class _Characters:
-    """A variable of texts as its bytes, with one more dimension."""
-
-    dims: tuple[str, ...]
-    data: npt.NDArray[np.bytes_]
-    units: str
-    long_name: str
-    attrs: Mapping[str, Any]
-
-    @property
-    def sizes(self) -> dict[str, int]:
-        """Length of each dimension."""
-        return dict(zip(self.dims, self.data.shape, strict=True))
-
-
-def _characters(variable: Variable) -> Variable | _Characters:
-    """Texts as arrays of characters, which all netCDF readers decode alike; other variables as they are."""
+def _form(variable: Variable) -> tuple[tuple[str, ...], npt.NDArray[Any]]:
+    """Dimensions and values as they are kept: texts as arrays of characters, which all decode alike."""
     if variable.data.dtype != object:
-        return variable
+        return variable.dims, variable.data
     encoded = _encoded(variable.data)
     length = encoded.dtype.itemsize
     data = encoded.reshape(-1).view("S1").reshape(*encoded.shape, length)
-    dims = (*variable.dims, f"{CHARACTERS}{length}")
-    return _Characters(dims, data, variable.units, variable.long_name, variable.attrs)
+    return (*variable.dims, f"{schema.CHARACTERS}{length}"), data
 
 
-def put_scale(
-    group: h5py.Group, dim: str, size: int, variables: Mapping[str, Variable | _Characters]
-) -> h5py.Dataset:
-    """Make a dimension, of the variable of its name if there is one."""
-    if dim in variables:
-        scale = _put_variable(group, dim, variables[dim])
-        scale.make_scale(dim)
-    else:
-        # never written, so it takes no room: only its shape counts
-        scale = group.create_dataset(dim, shape=(size,), dtype=">f4")
-        scale.make_scale(f"{DIMENSION_ONLY}{size:10d}")
-    return scale
-
-
-def _put_variable(group: h5py.Group, name: str, variable: Variable | _Characters) -> h5py.Dataset:
-    data = variable.data
-    if data.nbytes <= COMPACT_BYTES:
+def _put_variable(group: h5py.Group, name: str, variable: Variable, data: npt.NDArray[Any]) -> h5py.Dataset:
+    if data.nbytes <= schema.COMPACT_BYTES:
         stored = _create_compact(group, name, data.shape, data.dtype)
     else:
-        stored = group.create_dataset(
-            name,
-            shape=data.shape,
-            dtype=data.dtype,
-            chunks=True,
-            compression="gzip",
-            compression_opts=4,
-            shuffle=True,
-            fletcher32=True,
-        )
+        packing = {"chunks": True, "compression": "gzip", "compression_opts": 4, "shuffle": True}
+        stored = group.create_dataset(name, data.shape, data.dtype, fletcher32=True, **packing)
     if data.size:
         stored[...] = data
-    if isinstance(variable, _Characters):
-        put_attrs(stored, {ENCODING: "utf-8"})
+    if variable.data.dtype == object:
+        put_attrs(stored, {schema.ENCODING: "utf-8"})
     put_variable_attrs(stored, variable)
     return stored
 
@@ -178,14 +135,10 @@ def _create_compact(
 def check_writable(path: str | Path, replace: bool = False) -> None:
     """Find out before a long run whether its result can be written; missing parent folders are made.
 
-    Args:
-        path: the result file to be.
-        replace: whether a file of that name may be replaced.
-
     Raises:
         InputError: the folder is unwritable, the path is a folder, or the file exists and `replace` is False.
     """
-    with _readable_reasons(path):
+    with readable_reasons(path):
         target = _target(path, replace)
         probe = _aside(target)
         probe.touch(exist_ok=False)
@@ -224,14 +177,14 @@ def write_results(
             `replace` is False, or the content does not fit the schema.
     """
     root = _checked_root(scene_parameters, sections)
-    with _readable_reasons(path):
+    with readable_reasons(path):
         target = _target(path, replace)
         temporary = _aside(aside / target.name if aside is not None else target)
         try:
             with temporary.open("xb+", buffering=0) as disk, ThreadPoolExecutor(threads) as pool:
                 guarded = GuardedFile(disk)
                 try:
-                    with h5py.File(guarded, "w", libver=LIBRARY_VERSIONS, track_order=True) as file:
+                    with h5py.File(guarded, "w", libver=schema.LIBRARY_VERSIONS, track_order=True) as file:
                         numbers = itertools.count()
                         put_dataset(file, root, numbers)
                         for name, section in sections.items():
@@ -266,13 +219,13 @@ def _checked_root(scene_parameters: Mapping[str, Variable], sections: Iterable[s
 
 
 def _checked_root_attrs(attrs: Mapping[str, Any]) -> dict[str, Any]:
-    missing = [name for name in REQUIRED_ATTRS if name not in attrs]
+    missing = [name for name in schema.REQUIRED_ATTRS if name not in attrs]
     if missing:
         raise InputError(f"attrs: lack {', '.join(missing)}; every result file has them")
-    for name in OWN_ATTRS:
+    for name in schema.OWN_ATTRS:
         if name in attrs:
             raise InputError(f"attrs.{name}: is written by the store itself")
-    own = dict(zip(OWN_ATTRS, (FORMAT, SCHEMA_VERSION, CONVENTIONS), strict=True))
+    own = dict(zip(schema.OWN_ATTRS, (schema.FORMAT, schema.SCHEMA_VERSION, schema.CONVENTIONS), strict=True))
     return {**own, **checked_attrs(attrs, "attrs")}
 
 
@@ -323,12 +276,12 @@ def _already_exists(path: str | Path) -> InputError:
 
 
 @contextlib.contextmanager
-def _readable_reasons(path: str | Path) -> Iterator[None]:
+def readable_reasons(path: str | Path, what: str = "written") -> Iterator[None]:
     """Turn the failures of a file system into one line with the path and the system's reason."""
     try:
         yield
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+        raise InputError(f"{path}: cannot be {what}: {error.strerror or error}") from error
 
 
 class GuardedFile(io.RawIOBase):
@@ -392,21 +345,6 @@ class GuardedFile(io.RawIOBase):
             self._failure = error
         return length
 
-    def flush(self) -> None:
-        """Nothing waits here."""
-
-    def readable(self) -> bool:
-        """Yes."""
-        return True
-
-    def writable(self) -> bool:
-        """Yes."""
-        return True
-
-    def seekable(self) -> bool:
-        """Yes."""
-        return True
-
 
 #: Level of deflate: higher ones take many times as long for a few per cent.
 LEVEL = 1
@@ -440,13 +378,7 @@ def fletcher32(data: bytes) -> int:
 
 
 class ChunkWriter:
-    """Writes parts of chunked variables.
-
-    Args:
-        pool: packs chunks.
-        threads: how many it has.
-        deflate: whether chunks are compressed.
-    """
+    """Writes parts of chunked variables."""
 
     def __init__(self, pool: Executor, threads: int, deflate: bool) -> None:
         self._pool, self._most, self._deflate = pool, DEPTH * threads, deflate
@@ -531,21 +463,14 @@ CHUNK_BYTES = 1 << 20
 
 @dataclass(frozen=True, eq=False)
 class Stream:
-    """A dataset that is computed while it is written.
+    """A dataset that is computed while it is written."""
 
-    Attributes:
-        fixed: its attributes and small variables, the coordinates among them.
-        plane: the streamed variables with one entry along their first dimension: types, units, meanings.
-        along: the streamed variables' first dimension, one of ``fixed``.
-        pieces: computes the content.
-        rows: entries along the first dimension that pieces have, about; a chunk has as many.
-    """
-
-    fixed: Dataset
+    fixed: Dataset  #: its attributes and small variables, the coordinates among them
+    #: the streamed variables with one entry along their first dimension: types, units, meanings
     plane: Mapping[str, Variable]
-    along: str
-    pieces: Callable[[], Iterator[Piece]]
-    rows: int = 8
+    along: str  #: the streamed variables' first dimension, one of ``fixed``
+    pieces: Callable[[], Iterator[Piece]]  #: computes the content
+    rows: int = 8  #: entries along the first dimension that pieces have, about; a chunk has as many
 
     @property
     def nbytes(self) -> int:
@@ -590,7 +515,7 @@ def _put_stream(
     length = stream.fixed.sizes[stream.along]
     for dim, size in Dataset(stream.plane).sizes.items():
         if dim not in group:
-            put_scale(group, dim, size, {}).attrs[DIM_NUMBER] = np.int32(next(numbers))
+            put_dimension(group, dim, size).attrs[schema.DIM_NUMBER] = np.int32(next(numbers))
     rows = min(length, stream.rows)
     stored = {name: _create(group, name, v, length, rows, deflate) for name, v in stream.plane.items()}
     for piece in stream.pieces():
@@ -618,9 +543,7 @@ def _create(
         fletcher32=True,
         **packing,
     )
-    for axis, dim in enumerate(variable.dims):
-        stored.dims[axis].attach_scale(group[dim])
-    stored.attrs[DIM_NUMBERS] = np.array([group[dim].attrs[DIM_NUMBER] for dim in variable.dims])
+    _attach(stored, group, variable.dims)
     put_variable_attrs(stored, variable)
     return stored
 

@@ -43,12 +43,7 @@ _LOGGERS = ("distributed", "distributed.client", "distributed.core", "tornado.ap
 
 
 class ClusterWorkers:
-    """The workers of a Dask cluster, of which some may come or go.
-
-    Args:
-        client: connected to the scheduler.
-        executor: the client's.
-    """
+    """The workers of a Dask cluster, of which some may come or go."""
 
     deaths: tuple[type[Exception], ...]
 
@@ -88,11 +83,7 @@ class ClusterWorkers:
 
 
 class ClusterHiring:
-    """Hires whoever is in a Dask cluster.
-
-    Args:
-        client: connected to the scheduler.
-    """
+    """Hires whoever is in a Dask cluster."""
 
     together = True
 
@@ -144,11 +135,7 @@ def _silent() -> Iterator[None]:
 
 @contextmanager
 def cluster(workers: int | None, scheduler: str | None) -> Iterator[ClusterHiring]:
-    """A cluster to compute tiles.
-
-    Args:
-        workers: number of processes of one thread on this machine, or
-        scheduler: address of a scheduler that runs already, such as ``tcp://host:8786``.
+    """A cluster to compute tiles: processes of one thread here, or a ``scheduler`` such as tcp://host:8786.
 
     Raises:
         InputError: Dask is not installed, or no scheduler answers.

@@ -24,42 +24,26 @@ from fastmech.tiles.tile_file import DamagedTileError, dataset_image, dataset_of
 
 @dataclass(frozen=True)
 class SectionProgress:
-    """How far a section is.
+    """How far a section is."""
 
-    Attributes:
-        name: of the section.
-        done, tiles: finished tiles, and all.
-        items_done, items: finished items of work, and all.
-        what: what the items are.
-    """
-
-    name: str
-    done: int
+    name: str  #: of the section
+    done: int  #: finished tiles, and all
     tiles: int
-    items_done: int
+    items_done: int  #: finished items of work, and all
     items: int
-    what: str
+    what: str  #: what the items are
 
 
 @dataclass(frozen=True)
 class ScanProgress:
-    """How far a scan is.
+    """How far a scan is."""
 
-    Attributes:
-        complete: whether the result file is there and nothing is in progress.
-        worker: the process that works on it, in words; None: none does.
-        running: seconds since it began; None: none does.
-        since: tiles finished since then.
-        left: estimated seconds that are left; None: unknown.
-        sections: in the order of the request.
-    """
-
-    complete: bool
-    worker: str | None = None
-    running: float | None = None
-    since: int = 0
-    left: float | None = None
-    sections: tuple[SectionProgress, ...] = ()
+    complete: bool  #: whether the result file is there and nothing is in progress
+    worker: str | None = None  #: the process that works on it, in words; None: none does
+    running: float | None = None  #: seconds since it began; None: none does
+    since: int = 0  #: tiles finished since then
+    left: float | None = None  #: estimated seconds that are left; None: unknown
+    sections: tuple[SectionProgress, ...] = ()  #: in the order of the request
 
 
 class ScanLook:
@@ -104,11 +88,8 @@ class ScanLook:
             names = self.parts.names(section)
             items = {int(path.stem): section.tiling.items(int(path.stem)) for path in names}
             tiles, total = self.manifest.tiles[section.name], self.manifest.items[section.name]
-            sections.append(
-                SectionProgress(
-                    section.name, len(names), tiles, sum(items.values()), total, section.tiling.what
-                )
-            )
+            made = section.name, len(names), tiles, sum(items.values()), total, section.tiling.what
+            sections.append(SectionProgress(*made))
             share = (tiles - len(names)) / tiles
             left += share
             if begun is not None:
@@ -144,16 +125,12 @@ class ScanLook:
                 shown[section.name] = assembled(section, self._tiles(section), self._seconds(section), note)
         if not shown:
             raise InputError(f"{self.parts.target}: no section can be shown yet")
-        notes = {
-            "title": self.request.title,
-            "request": self.manifest.request,
-            "partial": "a scan in progress",
-        }
+        notes = {"title": self.request.title, "request": self.manifest.request}
         write_results(
             out,
             scene_parameters=self.request.parameters,
             sections=shown,
-            attrs={**provenance(1), **notes},
+            attrs={**provenance(1), **notes, "partial": "a scan in progress"},
             replace=replace,
             deflate=False,  # which takes minutes where the rest takes seconds
         )
@@ -182,33 +159,20 @@ class ScanLook:
 
 @dataclass(frozen=True)
 class LoneTile:
-    """A tile that was computed alone.
+    """A tile that was computed alone."""
 
-    Attributes:
-        request, section, index: which it is.
-        dataset: its content.
-        content: SHA-256 of the content, equal for equal bits.
-        seconds: wall time [s].
-        same: whether the tile that a run has kept has the same content; None: there is none.
-    """
-
-    request: Request
+    request: Request  #: which it is
     section: TiledSection
     index: int
-    dataset: Dataset
-    content: str
-    seconds: float
-    same: bool | None
+    dataset: Dataset  #: its content
+    content: str  #: SHA-256 of the content, equal for equal bits
+    seconds: float  #: wall time [s]
+    same: bool | None  #: whether the tile that a run has kept has the same content; None: there is none
 
     @property
-    def items(self) -> int:
-        """Items of work."""
-        return self.section.tiling.items(self.index)
-
-    @property
-    def what(self) -> str:
-        """What the items are."""
-        return self.section.tiling.what
+    def work(self) -> str:
+        """How many items of work it is, and what they are."""
+        return f"{self.section.tiling.items(self.index):,} {self.section.tiling.what}"
 
     def write(self, path: Path) -> None:
         """Write it as a result file.
@@ -233,15 +197,9 @@ def compute_alone(
     text: str | None = None,
     mechanism: Mechanism | System | None = None,
 ) -> LoneTile:
-    """Compute one tile.
+    """Compute one tile, ``SECTION:INDEX``, and compare it with that of the result file ``target`` to be.
 
-    Args:
-        path: request file.
-        tile: ``SECTION:INDEX``.
-        context: threads to use.
-        target: the request's result file, whose finished tiles it is compared with.
-        text: of the request, by default that of the file.
-        mechanism: one of the user's own that the request is about.
+    ``text`` of the request is that of the file by default; ``mechanism`` is one of the user's own.
 
     Raises:
         InputError: the request is wrong or has no such tile.

@@ -31,10 +31,10 @@ from filelock import FileLock, Timeout
 
 from fastmech.errors import InputError
 from fastmech.results import Dataset
+from fastmech.store.write import readable_reasons
 from fastmech.tiles.section import TiledSection
 from fastmech.tiles.tile_file import (
     UNFINISHED,
-    Bytes,
     DamagedTileError,
     Tile,
     TileHead,
@@ -49,23 +49,14 @@ PATIENCE = 0.5
 
 @dataclass(frozen=True)
 class Manifest:
-    """What was asked for.
+    """What was asked for."""
 
-    Attributes:
-        asked: see `fastmech.tiles.section.asked_for`.
-        request_file: name of the request file.
-        request: its text.
-        replace: whether the result may replace an older file.
-        tiles: number of tiles of each section.
-        items: number of items of work of each section.
-    """
-
-    asked: str
-    request_file: str
-    request: str
-    replace: bool
-    tiles: dict[str, int]
-    items: dict[str, int]
+    asked: str  #: see `fastmech.tiles.section.asked_for`
+    request_file: str  #: name of the request file
+    request: str  #: its text
+    replace: bool  #: whether the result may replace an older file
+    tiles: dict[str, int]  #: number of tiles of each section
+    items: dict[str, int]  #: number of items of work of each section
 
 
 def _clear(path: Path) -> None:
@@ -88,11 +79,7 @@ def _checksum(fields: Mapping[str, Any]) -> int:
 
 
 class Parts:
-    """The folder of a scan in progress.
-
-    Args:
-        target: the result file to be.
-    """
+    """The folder of a scan in progress."""
 
     def __init__(self, target: Path) -> None:
         self.target = target
@@ -181,7 +168,7 @@ class Parts:
 
     def begin(self, manifest: Manifest, sections: Sequence[TiledSection]) -> None:
         """Write the manifest, and make the sections' folders."""
-        self._places = {section.name: f"{k:03d}_{section.name}" for k, section in enumerate(sections)}
+        self.look(sections)
         for place in self._places.values():
             self._make(self.folder / place)
         fields = asdict(manifest)
@@ -215,8 +202,7 @@ class Parts:
         Raises:
             DamagedTileError: it is damaged.
         """
-        path, data = self._read(section, index)
-        return None if data is None else self._checked(path, data, section, index)
+        return self._read(section, index)[0]
 
     def load(self, section: TiledSection, index: int) -> Dataset:
         """Read a tile.
@@ -224,10 +210,9 @@ class Parts:
         Raises:
             DamagedTileError: it is damaged or gone.
         """
-        path, data = self._read(section, index)
-        if data is None:
-            raise DamagedTileError(f"{path}: is gone")
-        self._checked(path, data, section, index)
+        head, data = self._read(section, index)
+        if head is None:
+            raise DamagedTileError(f"{self.path(section, index)}: is gone")
         return tile_dataset(data)
 
     def drop(self, section: TiledSection, index: int) -> None:
@@ -244,20 +229,17 @@ class Parts:
     def _lock(self) -> Path:
         return self.folder / "lock"
 
-    def _read(self, section: TiledSection, index: int) -> tuple[Path, memoryview | None]:
+    def _read(self, section: TiledSection, index: int) -> tuple[TileHead | None, memoryview]:
         path = self.path(section, index)
         try:
             with path.open("rb") as file:
                 data = np.empty(os.fstat(file.fileno()).st_size, dtype=np.uint8).data
-                return path, data[: file.readinto(data)]
+                data = data[: file.readinto(data)]
+            return check_tile(data, section.identity, section.name, index), data
         except FileNotFoundError:
-            return path, None
+            return None, memoryview(b"")
         except OSError as error:
             raise DamagedTileError(f"{path}: cannot be read: {error.strerror}") from None
-
-    def _checked(self, path: Path, data: Bytes, section: TiledSection, index: int) -> TileHead:
-        try:
-            return check_tile(data, section.identity, section.name, index)
         except DamagedTileError as error:
             raise DamagedTileError(f"{path}: {error}") from None
 
@@ -267,7 +249,5 @@ class Parts:
             shutil.rmtree(self.folder, ignore_errors=True)
 
     def _make(self, folder: Path) -> None:
-        try:
+        with readable_reasons(self.target):
             folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"{self.target}: cannot be written: {error.strerror}") from None

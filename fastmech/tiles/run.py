@@ -36,23 +36,15 @@ from fastmech.tiles.work import Crash, Hiring, Task, compute_tiles, still_comput
 
 @dataclass
 class RunReport:
-    """What a run has done.
+    """What a run has done."""
 
-    Attributes:
-        path: the result file.
-        tiles: tiles in all.
-        computed: tiles that this run has computed.
-        damaged: files of tiles that were found damaged and computed again.
-        was_complete: whether there was nothing to do.
-        seconds: wall time of this run [s].
-    """
-
-    path: Path
-    tiles: int = 0
-    computed: int = 0
+    path: Path  #: the result file
+    tiles: int = 0  #: tiles in all
+    computed: int = 0  #: tiles that this run has computed
+    #: files of tiles that were found damaged and computed again
     damaged: list[Path] = field(default_factory=list)
-    was_complete: bool = False
-    seconds: float = 0.0
+    was_complete: bool = False  #: whether there was nothing to do
+    seconds: float = 0.0  #: wall time of this run [s]
 
     def summary(self) -> dict[str, str | int | bool | list[str]]:
         """The same as plain values, for other programs."""
@@ -101,16 +93,7 @@ def _inode(path: Path) -> tuple[int, int] | None:
 
 
 class ScanRun:
-    """One run of a request.
-
-    Args:
-        request: what is asked for.
-        request_file: where it was read from, for messages and provenance.
-        target: the result file to be.
-        context: threads to use and where progress is told.
-        hire: who computes tiles.
-        tell: is given lines for the user.
-    """
+    """One run of a request."""
 
     def __init__(
         self,

@@ -6,7 +6,7 @@ import hashlib
 import json
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
 from importlib import metadata
 from pathlib import Path
@@ -29,15 +29,8 @@ TILE_SCHEMA = 1
 
 #: Sources besides the compiled ones that decide a section's values.
 _SOURCES = (
-    *COMPILED,
-    "mechanisms",
-    "samplers.py",
-    "attractors",
-    "basins",
-    "scene.py",
-    "results.py",
-    "scan_types",
-)
+    *COMPILED, "mechanisms", "samplers.py", "attractors", "basins", "scene.py", "results.py", "scan_types",
+)  # fmt: skip
 
 _LIBRARIES = ("numba", "llvmlite", "numpy", "scipy", "sympy")
 
@@ -60,13 +53,8 @@ def asked_for(request: Request) -> str:
     scans = {
         name: {"kind": scan.kind, **scan.model_dump(mode="json")} for name, scan in request.scans.items()
     }
-    content = {
-        "tile schema": TILE_SCHEMA,
-        "code": code_in_use(),
-        "scene": _told(request.scene),
-        "scan": scans,
-    }
-    return json.dumps(content, sort_keys=True)
+    content = {"tile schema": TILE_SCHEMA, "code": code_in_use(), "scene": _told(request.scene)}
+    return json.dumps({**content, "scan": scans}, sort_keys=True)
 
 
 def _told(scene: Scene | Mechanism | System) -> dict[str, Any]:
@@ -115,24 +103,14 @@ def _flat(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
         yield name, value
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class TiledSection:
     """A section: its name, its scan, the scene with the scan's changes and the identity of the request."""
 
     name: str
-    scan: Scan
-    scene: Scene
+    scan: Scan = field(compare=False)
+    scene: Scene = field(compare=False)
     identity: str
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, TiledSection) and self._key == other._key
-
-    def __hash__(self) -> int:
-        return hash(self._key)
-
-    @property
-    def _key(self) -> tuple[str, str]:
-        return self.identity, self.name
 
     @property
     def tiling(self) -> Tiling:
@@ -140,12 +118,7 @@ class TiledSection:
         return _tiling(self)
 
     def compute(self, index: int, context: RunContext, share: float = 1.0) -> Tile:
-        """Compute a tile.
-
-        Args:
-            index: which.
-            context: threads to use and where progress is told.
-            share: part of the machine that it has to itself, for the account of the wall time.
+        """Compute a tile; ``share`` of the machine is its own, for the account of the wall time.
 
         Raises:
             InputError: the scan refuses.
@@ -181,14 +154,7 @@ IN_MEMORY_BYTES = 64 << 20
 def assembled(
     section: TiledSection, tile: Tiles, seconds: float, notes: Mapping[str, str] | None = None
 ) -> Dataset | Stream:
-    """A section of its tiles, with the attributes that every section has.
-
-    Args:
-        section: which.
-        tile: gives its tiles.
-        seconds: wall time that they took [s].
-        notes: further attributes.
-    """
+    """A section of its tiles, which took so many seconds, with the attributes that every section has."""
     result = section.tiling.assemble(tile)
     if isinstance(result, Stream) and result.nbytes <= IN_MEMORY_BYTES:
         result = in_memory(result)
@@ -197,7 +163,6 @@ def assembled(
     told = section.scan.step_warning(section.scene)
     if told is not None:
         own["step_warning"] = told
-    if isinstance(result, Stream):
-        attrs = {**own, **result.fixed.attrs, "wall_time_s": seconds}
-        return replace(result, fixed=replace(result.fixed, attrs=attrs))
-    return replace(result, attrs={**own, **result.attrs, "wall_time_s": seconds})
+    dataset = result.fixed if isinstance(result, Stream) else result
+    dataset = replace(dataset, attrs={**own, **dataset.attrs, "wall_time_s": seconds})
+    return replace(result, fixed=dataset) if isinstance(result, Stream) else dataset

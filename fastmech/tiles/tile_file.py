@@ -43,21 +43,12 @@ def dataset_image(dataset: Dataset) -> list[NDArray[np.uint8]]:
     """
     assert not dataset.groups  # no tile has any
     arrays = {name: _numbers(variable.data) for name, variable in dataset.variables.items()}
-    about = {
-        "attrs": _plain(dataset.attrs),
-        "variables": {
-            name: {
-                "dims": variable.dims,
-                "units": variable.units,
-                "long_name": variable.long_name,
-                "attrs": _plain(variable.attrs),
-                "dtype": arrays[name].dtype.str,
-                "shape": arrays[name].shape,
-            }
-            for name, variable in dataset.variables.items()
-        },
+    variables = {
+        name: {"dims": v.dims, "units": v.units, "long_name": v.long_name, "attrs": v.attrs}
+        | {"dtype": arrays[name].dtype.str, "shape": arrays[name].shape}
+        for name, v in dataset.variables.items()
     }
-    text = json.dumps(about).encode()
+    text = json.dumps({"attrs": dataset.attrs, "variables": variables}, default=_plain).encode()
     first = np.frombuffer(len(text).to_bytes(_LENGTH_BYTES, "little") + text, dtype=np.uint8)
     chunks = []
     for flat in (first, *(array.reshape(-1).view(np.uint8) for array in arrays.values())):
@@ -92,26 +83,16 @@ def _numbers(data: NDArray[Any]) -> NDArray[Any]:
     return np.asarray(data.astype(str) if data.dtype == object else data, order="C")
 
 
-def _plain(attrs: Mapping[str, Any]) -> dict[str, Any]:
-    plain: dict[str, Any] = {}
-    for name, value in attrs.items():
-        if isinstance(value, np.ndarray):
-            plain[name] = {"dtype": value.dtype.str, "values": value.tolist()}
-        elif isinstance(value, tuple):
-            plain[name] = {"texts": value}
-        else:
-            plain[name] = value
-    return plain
+def _plain(array: NDArray[Any]) -> dict[str, Any]:
+    return {"dtype": array.dtype.str, "values": array.tolist()}
 
 
 def _attributes(plain: Mapping[str, Any]) -> dict[str, Any]:
+    """Attributes that were JSON: a list was a tuple of texts, a table an array."""
     attrs: dict[str, Any] = {}
     for name, value in plain.items():
-        if not isinstance(value, dict):
-            attrs[name] = value
-        elif "texts" in value:
-            attrs[name] = tuple(value["texts"])
-        else:
+        attrs[name] = tuple(value) if isinstance(value, list) else value
+        if isinstance(value, dict):
             attrs[name] = np.array(value["values"], dtype=value["dtype"])
     return attrs
 
@@ -155,36 +136,22 @@ class DamagedTileError(InputError):
 
 @dataclass(frozen=True)
 class TileHead:
-    """What a tile is.
+    """What a tile is."""
 
-    Attributes:
-        identity: of the request, see `fastmech.tiles.section`.
-        section: name of the section.
-        index: number of the tile.
-        seconds: share of the wall time that it took [s].
-        length: of the content [bytes].
-        checksum: of the content.
-    """
-
-    identity: str
-    section: str
-    index: int
-    seconds: float
-    length: int
-    checksum: int
+    identity: str  #: of the request, see `fastmech.tiles.section`
+    section: str  #: name of the section
+    index: int  #: number of the tile
+    seconds: float  #: share of the wall time that it took [s]
+    length: int  #: of the content [bytes]
+    checksum: int  #: of the content
 
 
 @dataclass(frozen=True, eq=False)
 class Tile:
-    """A tile that has just been computed, on its way to its file.
+    """A tile that has just been computed, on its way to its file."""
 
-    Attributes:
-        head: what it is.
-        image: its content, see `fastmech.tiles.tile_file`.
-    """
-
-    head: TileHead
-    image: list[NDArray[np.uint8]]
+    head: TileHead  #: what it is
+    image: list[NDArray[np.uint8]]  #: its content, see `fastmech.tiles.tile_file`
 
     @property
     def chunks(self) -> list[Bytes]:

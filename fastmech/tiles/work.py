@@ -152,11 +152,8 @@ def compute_tiles(
     Tiles whose worker died are tried again when all others are done, one at a time: the next death is then
     the fault of the only tile in hand.
 
-    Args:
-        tasks: which, in the order in which they are handed out.
-        workers: who computes.
-        keep: is given every finished tile.
-        crashed: is told of every tile that failed `TRIES` times; the others go on.
+    Tasks are handed out in their order; ``crashed`` is told of every tile that failed `TRIES` times, and the
+    others go on.
 
     Raises:
         InputError: a scan refuses, or the workers are lost.

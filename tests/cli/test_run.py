@@ -130,13 +130,13 @@ def interrupt(*arguments, **options):
     raise KeyboardInterrupt
 
 
-def out_of_luck(self, scene, *context):
+def out_of_luck(*arguments):
     raise RuntimeError("out of luck")
 
 
 def test_a_crash_is_one_line_with_the_command_that_repeats_it(invoke, tiny, monkeypatch):
     with monkeypatch.context() as patched:
-        patched.setattr("fastmech.scan_types.equilibria.EquilibriaScan._found", out_of_luck)
+        patched.setattr("fastmech.scan_types.equilibria.find_equilibria", out_of_luck)
         result = invoke("run", tiny, "--out", "x.h5")
         assert result.exit_code == 1
         assert result.stdout == ""
@@ -167,7 +167,7 @@ def test_a_tile_that_crashes_once_is_tried_again(invoke, tiny, monkeypatch):
 def test_a_crash_leaves_the_older_file(invoke, tiny, monkeypatch):
     Path("x.h5").write_text("older", encoding="utf-8")
     with monkeypatch.context() as patched:
-        patched.setattr("fastmech.scan_types.equilibria.EquilibriaScan._found", out_of_luck)
+        patched.setattr("fastmech.scan_types.equilibria.find_equilibria", out_of_luck)
         assert invoke("run", tiny, "--out", "x.h5", "--fresh").exit_code == 1
     assert Path("x.h5").read_text(encoding="utf-8") == "older"
     result = invoke("run", tiny, "--out", "x.h5")

@@ -34,12 +34,12 @@ def result(invoke) -> Path:
 
 
 def test_status(invoke, tiny, monkeypatch):
-    def interrupt(self, scene):
+    def interrupt(scene):
         raise KeyboardInterrupt
 
     assert_refused(invoke("status", "x.h5"), "x.h5", "neither a result nor a scan in progress")
     with monkeypatch.context() as patch:
-        patch.setattr("fastmech.scan_types.equilibria.EquilibriaScan._found", interrupt)
+        patch.setattr("fastmech.scan_types.equilibria.find_equilibria", interrupt)
         stopped = invoke("run", tiny, "--out", "x.h5")
     assert stopped.exit_code == 130
     assert "interrupted; 4 of 5 tiles are kept in x.h5.parts; the same command goes on" in stopped.stderr

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fastmech.ensembles.status import Status
-from fastmech.results import Dataset
 from fastmech.scan_types.disturbed import Tally
 
 pytestmark = pytest.mark.nojit
@@ -29,7 +28,7 @@ def test_quantiles_and_shares(blocks: list[list[tuple[Status, float | None]]]) -
             [t if end == Status.RETURNED and t is not None else np.nan for end, t in block], dtype=np.float64
         )
         one = Tally.of(outcome, times)
-        tally.add(Dataset(one.variables(), one.attrs()))
+        tally.add(one.tile({}))
     lanes = [lane for block in blocks for lane in block]
     ends = [end for end, _ in lanes]
     back = [np.inf if t is None else t for end, t in lanes if end == Status.RETURNED]

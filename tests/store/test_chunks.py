@@ -75,7 +75,7 @@ def test_pieces_and_threads_do_not_show(
         with open_results(path) as results:
             assert results["one"]["v"].data.tobytes() == VALUES.tobytes()
             assert results["one"]["w"].data.tobytes() == VALUES[:, 0, 0].tobytes()
-            stored = results["one"]._stored._stored["v"]
+            stored = results["one"]._stored["v"]
             chunks = (stored.id.get_chunk_info(n).chunk_offset for n in range(stored.id.get_num_chunks()))
             images.append({corner: stored.id.read_direct_chunk(corner) for corner in chunks})
     assert len(images[0]) > 5

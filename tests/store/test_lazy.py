@@ -97,7 +97,7 @@ def test_one_value_of_a_large_file_takes_little_memory(tmp_path: Path) -> None:
 def test_damage_is_told_when_the_variable_is_read(write: Callable[[], Path]) -> None:
     path = write()
     with open_results(path) as results:
-        stored = results["atlas"]._stored._stored["energy"]
+        stored = results["atlas"]._stored["energy"]
         offset = stored.id.get_chunk_info(0).byte_offset
     image = bytearray(path.read_bytes())
     image[offset + 9] ^= 1
