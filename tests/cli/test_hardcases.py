@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from fastmech import open_results
-from fastmech.hardcases import report
-from fastmech.hardcases.report import CONTAINED, NUMBER, ONE_IN
-from fastmech.hardcases.walk import HardCase, Row
 from fastmech.integrators.methods import METHODS
+from fastmech.studies.hardcases import report
+from fastmech.studies.hardcases.report import CONTAINED, NUMBER, ONE_IN
+from fastmech.studies.hardcases.walk import HardCase, Row
 
 
 @pytest.fixture

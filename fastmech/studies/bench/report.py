@@ -1,0 +1,207 @@
+"""``fastmech bench``: runs every entrant on every problem and writes table, picture and data."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from importlib import metadata
+from pathlib import Path
+
+import numpy as np
+
+from fastmech.ensembles.run import Progress
+from fastmech.ensembles.threads import thread_count
+from fastmech.reports import Stage, no_stage
+from fastmech.results import Dataset, Variable, scene_parameters
+from fastmech.scene import Scene
+from fastmech.store.provenance import processor_name, provenance
+from fastmech.store.write import check_writable, write_results
+from fastmech.studies.bench import peers, tables
+from fastmech.studies.bench.atlas import atlas_study
+from fastmech.studies.bench.attractors import attractors_study
+from fastmech.studies.bench.basins import basins_study
+from fastmech.studies.bench.fused import METHODS
+from fastmech.studies.bench.machine import costs, throughputs
+from fastmech.studies.bench.measure import BUDGET, PROBLEMS, Entrant, Problem, Row, measure
+from fastmech.studies.bench.peers import entrants
+from fastmech.studies.bench.processes import footprints, started, vectors_study
+from fastmech.studies.bench.proofs import proofs_study
+from fastmech.studies.bench.stiff import stiff_study
+from fastmech.studies.bench.systems import systems_study
+from fastmech.studies.bench.tables import draw_bench
+from fastmech.studies.bench.threads import threads_study
+from fastmech.studies.bench.tolerances import tolerances_study
+from fastmech.studies.reporting import columns
+
+#: Starts of ``--quick``, of those that have a reference.
+QUICK_STARTS = 8
+
+#: What ``--quick`` gives each entrant [s].
+QUICK_BUDGET = 0.05
+
+#: Trajectories a call of the engine and its yardstick with ``--quick``: they take milliseconds, and on fewer
+#: not the loops but what stands around a call would be compared.
+QUICK_LEAST = 8192
+
+LIBRARIES = ("numba", "scipy", "heyoka", "torch", "jax", "diffrax", "numbalsoda", "CyRK", "pynamicalsys")
+
+#: Studies with a file of their own, by name: from `quick` and a stage to the lines of Markdown.
+STUDIES: dict[str, Callable[..., list[str]]] = {
+    "atlas": atlas_study,
+    "attractors": attractors_study,
+    "basins": basins_study,
+    "proofs": proofs_study,
+    "stiff": stiff_study,
+    "systems": systems_study,
+    "threads": threads_study,
+    "tolerances": tolerances_study,
+    "vectors": vectors_study,
+}
+
+
+def run_study(
+    name: str,
+    out: Path,
+    *,
+    quick: bool = False,
+    stage: Stage = no_stage,
+    **chosen: int,
+) -> Path:
+    """Measure and write a study's ``NAME.md`` into the folder ``out``; ``chosen`` are its own settings."""
+    lines = STUDIES[name](quick, stage, **chosen)
+    out.mkdir(parents=True, exist_ok=True)
+    path = out / f"{name}.md"
+    path.write_text("\n".join(lines).rstrip("\n") + "\n", encoding="utf-8")
+    return path
+
+
+def run_bench(
+    out: Path,
+    *,
+    quick: bool = False,
+    stage: Stage = no_stage,
+) -> list[Path]:
+    """Measure and write ``bench.md``, ``bench.png`` and ``bench.h5`` into the folder ``out``.
+
+    ``quick`` takes few trajectories, every third setting and no libraries beyond SciPy: for trying the
+    command, not for quoting.
+    """
+    data = out / "bench.h5"
+    check_writable(data, replace=True)
+    began = time.perf_counter()
+    problems = [make(QUICK_STARTS) if quick else make() for make in PROBLEMS.values()]
+    rows: list[Row] = []
+    failures: list[str] = []
+    for problem in problems:
+        found = [enlarged(entrant) if quick else entrant for entrant in entrants(problem, quick)]
+        everyone = [(entrant, n) for entrant in found for n in _threads(entrant)]
+        advance = stage(f"{problem.name}: prepare and time", 2 * len(everyone))
+
+        def failed(entrant: Entrant, error: Exception, advance: Progress = advance) -> None:
+            failures.append(f"{entrant.family}, {entrant.setting}: {type(error).__name__}: {error}")
+            advance(1)
+
+        rows += measure(problem, everyone, advance, failed, QUICK_BUDGET if quick else BUDGET)
+    peak, rhs = throughputs(problems[0], stage)
+    prices = costs(problems[0], stage)
+    starts = [] if quick else list(started(stage))
+    memory = [] if quick else footprints(stage)
+    table, picture = out / "bench.md", out / "bench.png"
+    lines = _preamble(quick, failures)
+    for problem in problems:
+        lines += tables.problem_section(problem, rows)
+    lines += tables.machine_sections(peak, rhs, prices, starts, memory)
+    table.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    draw_bench(rows, picture)
+    fused = Variable((), np.array(peak), "1/s", "fused multiply-adds of doubles of one core, measured")
+    sections = {
+        "speed": speed_dataset(rows, problems),
+        "rhs": Dataset({"peak": fused} | columns("place", rhs, _PLACES)),
+        "terms": Dataset(columns("kind", prices, _KINDS)),
+    }
+    if starts:
+        sections["starts"] = Dataset(columns("entrant", starts, _STARTS))
+    write_results(
+        data,
+        scene_parameters=scene_parameters(Scene(alpha=0.0)),
+        sections=sections,
+        attrs={"title": "Speed against error", "wall_time_s": time.perf_counter() - began}
+        | provenance(thread_count(None)),
+        replace=True,
+    )
+    return [table, picture, data, *(run_study(name, out, quick=quick, stage=stage) for name in STUDIES)]
+
+
+def enlarged(entrant: Entrant) -> Entrant:
+    """An entrant of ``--quick``, with enough trajectories where its loop is compared with another's."""
+    engine = {f"{tables.OWN} {method}" for method in METHODS}
+    compared = entrant.family in engine or entrant.family.startswith(tables.FUSED)
+    return entrant._replace(least=max(entrant.least, QUICK_LEAST)) if compared else entrant
+
+
+def _threads(entrant: Entrant) -> list[int]:
+    every = thread_count(None)
+    return [1, every] if entrant.threaded and every > 1 else [1]
+
+
+def _preamble(quick: bool, failures: list[str]) -> list[str]:
+    """What was measured, how, and on what."""
+    lines = ["# Speed against error", ""]
+    if quick:
+        lines += ["**A quick run: few trajectories, few settings. Not for quoting.**", ""]
+    versions = []
+    for library in LIBRARIES:
+        try:
+            versions.append(f"{library} {metadata.version(library)}")
+        except metadata.PackageNotFoundError:
+            continue
+    load = f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
+    lines += [
+        f"{processor_name()}, {thread_count(None)} cores, load {load} at the end. {', '.join(versions)}.",
+        "",
+        "Everyone solves the same problems: Table 1 with its force constant. Errors are the largest and the "
+        "median over trajectories of the largest component of a final state's error, against a reference of "
+        "24 digits (`data/make_bench_reference.py`). All are prepared and warmed up first and then timed in "
+        "turns; rates on one thread are medians per second of processor time, on a quiet machine wall time.",
+        "",
+    ]
+    missing = [name for name in peers.LIBRARIES if name not in peers.installed()]
+    if missing:
+        lines += [f"Not installed: {', '.join(missing)}.", ""]
+    if failures:
+        lines += ["Failed:", "", *(f"- {failure}" for failure in failures), ""]
+    return lines
+
+
+def speed_dataset(rows: list[Row], problems: list[Problem]) -> Dataset:
+    """Every row with the error of each of its trajectories, NaN where it was not given one."""
+    errors = np.full((len(rows), max(len(problem.starts) for problem in problems)), np.nan)
+    for line, row in zip(errors, rows, strict=True):
+        line[: row.errors.size] = row.errors
+    worst = "of the worst component of a final state in rad and rad/s"
+    about = _ROWS | {f"{name}_error": ("1", f"{told} error, {worst}") for name, told in _ERRORS.items()}
+    each = {"error": Variable(("row", "trajectory"), errors, "1", f"error, {worst}")}
+    return Dataset(columns("row", rows, about) | each)
+
+
+#: What is read from each row of the sections.
+_ROWS = {
+    "problem": ("1", "problem"),
+    "family": ("1", "integrator"),
+    "setting": ("1", "step or tolerance"),
+    "threads": ("1", "threads"),
+    "trajectories": ("1", "trajectories in a timed call"),
+    "wall": ("s", "wall time of a call, median"),
+    "processor": ("s", "processor time of a call, median"),
+    "first_call": ("s", "preparing and the first call"),
+}
+_ERRORS = {"max": "largest", "median": "median"}
+_PLACES = {"place": ("1", "where they are evaluated"), "rhs": ("1/s", "right-hand sides")}
+_KINDS = {"kind": ("1", "terms of the scene"), "rate": ("1/s", "trajectories")}
+_STARTS = {
+    "entrant": ("1", "integrator"),
+    "first": ("s", "to the first result"),
+    "second": ("s", "the same in a second process"),
+    "steady": ("s", "a later call"),
+}

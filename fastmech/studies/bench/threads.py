@@ -1,0 +1,102 @@
+"""Threads: the same ensembles on one thread and on all, in turns, beside what the machine itself gives.
+
+A yardstick goes along in every turn: a loop of multiply-adds in registers, which shares nothing, once on one
+thread and once on each. What it falls short of the number of threads the machine has kept from everybody.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+
+import numpy as np
+
+from fastmech.ensembles.threads import thread_count
+from fastmech.reports import Stage, table
+from fastmech.studies.bench.machine import LANES, multiply_adds
+from fastmech.studies.bench.measure import Problem, fast_starts, rest_starts
+from fastmech.studies.bench.package import AGAIN, prepared
+from fastmech.studies.reporting import TURNS, in_turns
+
+#: Trajectories of a call: tenths of a second to seconds of work.
+TRAJECTORIES = 32_768
+
+#: Turns of the yardstick's loop: about a third of a second.
+YARDSTICK = 500_000
+
+#: From rest: method, step [s], fitted. From fast starts: method, step [s], fitted again.
+REST = (
+    ("rk4", 0.02, False),
+    ("dop853", 0.05, False),
+    ("ab6", 0.0175, False),
+    ("abm10", 0.018, True),
+    ("abm8", 0.028, True),
+    ("abm12", 0.0115, True),
+)
+FAST = (("abm8", 0.028), ("abm10", 0.018))
+
+
+#: A run on so many threads.
+Run = Callable[[int], object]
+
+
+def threads_study(quick: bool, stage: Stage) -> list[str]:
+    """``threads.md``; ``quick``: a turn of few trajectories."""
+    many, turns, n = thread_count(None), 1 if quick else TURNS, 1024 if quick else TRAJECTORIES
+    found = cases(n, YARDSTICK // 20 if quick else YARDSTICK)
+    works = {(name, k): partial(run, k) for name, run in found.items() for k in sorted({1, many})}
+    seconds = in_turns(works, turns, stage("threads", len(works) * (turns + 1)), time.perf_counter)
+    ratios = {
+        name: [one / all_ for one, all_ in zip(seconds[name, 1], seconds[name, many], strict=True)]
+        for name in found
+    }
+    return [
+        "# Threads",
+        "",
+        f"{n:,} trajectories to t = 10 s on {many} threads over one, by wall time: {turns} "
+        f"turn{'s' * (turns > 1)}, each on one thread and at once on all. The multiply-adds share nothing: "
+        "what they fall short of the number of threads, the machine gave to others.",
+        "",
+        *table(
+            "run | speed-up, median | least | greatest",
+            (
+                f"{name} | {statistics.median(r):.2f} | {min(r):.2f} | {max(r):.2f}"
+                for name, r in ratios.items()
+            ),
+        ),
+    ]
+
+
+def cases(n: int, turns: int) -> dict[str, Run]:
+    """The yardstick and the engine's runs of ``n`` trajectories."""
+    rest, fast = rest_starts(), fast_starts()
+    again = [share * fast.t_end for share in AGAIN]
+    found = {"multiply-adds, one loop a thread": _arithmetic(turns)}
+    for method, dt, fit in REST:
+        name = f"{method}, dt = {dt:g} s{', `fit=True`' * fit}, from rest"
+        found[name] = _ensemble(rest, n, {"method": method, "dt": dt, "fit": fit})
+    for method, dt in FAST:
+        name = f"{method}, dt = {dt:g} s, fitted again, fast starts"
+        found[name] = _ensemble(fast, n, {"method": method, "dt": dt, "fit": again})
+    return found
+
+
+def _ensemble(problem: Problem, n: int, keywords: dict[str, object]) -> Run:
+    starts = np.resize(problem.starts, (n, problem.starts.shape[1]))
+    prepare = prepared(keywords)
+    return lambda threads: prepare(problem, threads)(starts)
+
+
+def _arithmetic(turns: int) -> Run:
+    """So many turns of the loop in all, shared among the threads."""
+    loop = multiply_adds()
+
+    def run(threads: int) -> object:
+        lanes = [np.ones(LANES) for _ in range(threads)]
+        with ThreadPoolExecutor(threads) as pool:
+            return list(pool.map(lambda x: loop(x, turns // threads, 0.5), lanes))
+
+    return run

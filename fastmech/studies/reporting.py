@@ -1,0 +1,46 @@
+"""What the studies share: columns of a result file, timing in turns."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
+
+import numpy as np
+
+from fastmech.ensembles.run import Progress
+from fastmech.results import Variable
+
+Name = TypeVar("Name")
+
+#: Measured turns of :func:`in_turns` after one that warms up.
+TURNS = 7
+
+
+def columns(dim: str, rows: Sequence[Any], about: Mapping[str, tuple[str, str]]) -> dict[str, Variable]:
+    """Attributes of rows by name as variables along ``dim``; ``about``: unit and description of each."""
+
+    def column(name: str, unit: str, told: str) -> Variable:
+        values = [value() if callable(value := getattr(row, name)) else value for row in rows]
+        data = np.array(values, dtype=object if values and isinstance(values[0], str) else None)
+        return Variable((dim,), data, unit, told)
+
+    return {name: column(name, *told) for name, told in about.items()}
+
+
+def in_turns(
+    works: Mapping[Name, Callable[[], object]],
+    turns: int = TURNS,
+    advance: Progress = lambda done: None,
+    clock: Callable[[], float] = time.process_time,
+) -> dict[Name, list[float]]:
+    """Seconds of each turn's call, after a turn that is not counted; ``advance`` is told 1 for each call."""
+    seconds: dict[Name, list[float]] = {name: [] for name in works}
+    for turn in range(turns + 1):
+        for name, work in works.items():
+            began = clock()
+            work()
+            if turn:
+                seconds[name].append(clock() - began)
+            advance(1)
+    return seconds
