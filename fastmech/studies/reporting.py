@@ -1,15 +1,20 @@
-"""What the studies share: columns of a result file, timing in turns."""
+"""What the studies share: timing in turns, columns of result files, texts and data with their origin."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
 from fastmech.ensembles.run import Progress
-from fastmech.results import Variable
+from fastmech.ensembles.threads import thread_count
+from fastmech.results import Dataset, Variable, scene_parameters
+from fastmech.scene import Scene
+from fastmech.store.provenance import provenance
+from fastmech.store.write import write_results
 
 Name = TypeVar("Name")
 
@@ -44,3 +49,22 @@ def in_turns(
                 seconds[name].append(clock() - began)
             advance(1)
     return seconds
+
+
+def write_text(path: Path, lines: Sequence[str]) -> Path:
+    """Markdown in a folder that is made where it is missing."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("\n".join(lines).rstrip("\n") + "\n", encoding="utf-8")
+    return path
+
+
+def write_data(path: Path, scene: Scene, sections: Mapping[str, Dataset], began: float, **attrs: Any) -> Path:
+    """A study's result file; ``began``: its first moment by ``time.perf_counter`` [s]."""
+    write_results(
+        path,
+        scene_parameters=scene_parameters(scene),
+        sections=sections,
+        attrs=provenance(thread_count(None)) | attrs | {"wall_time_s": time.perf_counter() - began},
+        replace=True,
+    )
+    return path

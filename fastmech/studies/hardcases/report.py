@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from enum import IntEnum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,43 +24,20 @@ from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import FAILURES, Status
 from fastmech.ensembles.system import System
-from fastmech.ensembles.threads import thread_count
 from fastmech.equilibria.find import Equilibrium, find_equilibria
 from fastmech.errors import InputError, StepWarning
-from fastmech.integrators.methods import METHODS, Adams, ImplicitRungeKutta, RungeKutta
+from fastmech.integrators.methods import METHODS
 from fastmech.plots.style import save
 from fastmech.reports import Stage, no_stage, table
-from fastmech.results import Dataset, Variable, flags, scene_parameters
+from fastmech.results import Dataset, Variable, flags
 from fastmech.scene import Scene
 from fastmech.step_limits.amplification import imaginary_limit, real_limit
 from fastmech.step_limits.measure import measured_stable_step
 from fastmech.step_limits.predict import largest_stable_step, limiting_eigenvalues
-from fastmech.store.provenance import provenance
-from fastmech.store.write import write_results
-from fastmech.studies.hardcases.cases import (
-    algebraic,
-    chaos,
-    conservative,
-    folds,
-    precision,
-    references,
-    saddle,
-    starts,
-)
-from fastmech.studies.hardcases.cases.conservative import (
-    DT,
-    ENERGETIC_START,
-    PAPER_START,
-    QUICK_STEPS,
-    STEPS,
-    energy_history,
-)
-from fastmech.studies.hardcases.pictures import draw_energy_drift, draw_stability_regions
-from fastmech.studies.hardcases.walk import REFUSED, HardCase, Row
-from fastmech.studies.reporting import columns, in_turns
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from fastmech.studies.hardcases.cases import CASES, PAPER, QUICK_STEPS, STEPS, energy_history
+from fastmech.studies.hardcases.pictures import DRIFTS, Limits, draw_energy_drift, stability_pages
+from fastmech.studies.hardcases.walk import REFUSED, HardCase, Row, content
+from fastmech.studies.reporting import columns, in_turns, write_data, write_text
 
 #: Methods that are measured, explicit, multistep and implicit ones, with the step [s].
 CONTAINED = {"rk4": 0.01, "dop853": 0.02, "ab6": 0.005, "abm8": 0.01, "gauss6": 0.05, "sdirk4": 0.02}
@@ -70,8 +47,6 @@ SPANS, QUICK_SPANS = (5.0, 20.0, 100.0), (2.0,)
 
 #: When trajectories fail: the mechanism's at once, the system's about these shares of the run's length.
 WHEN = {"in the first step": 0.0, "after 10 %": 0.1, "after 85 %": 0.85}
-
-SCENE = Scene(c2=1100 / 3, alpha=0.0)
 
 #: Trajectories, one in how many fails, and runs of each kind, in turn, after one that does not count.
 NUMBER, ONE_IN, REPETITIONS = 4096, 16, 3
@@ -95,7 +70,7 @@ def ensembles(when: float, span: float) -> tuple[Scene | System, Floats, Floats]
         starts = random.uniform([-2, -2, -3, -3], [2, 2, 3, 3], (NUMBER, 4))
         mixed = starts.copy()
         mixed[failing, 2] = 1e200
-        return SCENE, starts, mixed
+        return PAPER, starts, mixed
     starts = random.uniform(-2.0, 2.0, (NUMBER, 5))
     starts[:, 4] = -1.0
     mixed = starts.copy()
@@ -119,7 +94,7 @@ def _beside(method: str, dt: float, when: float, span: float, repetitions: int) 
     return float(share), int((runs[1].status != Status.OK).sum()), same
 
 
-def containment(quick: bool, progress: Callable[[int], None]) -> Dataset:
+def containment(quick: bool, progress: Progress) -> Dataset:
     """Share of the throughput of healthy trajectories that is left, by method, time of failure and span."""
     spans = QUICK_SPANS if quick else SPANS
     found = []
@@ -148,10 +123,10 @@ def contained(shares: Dataset) -> bool:
     return bool(shares["same"].data.all() and (shares["failed"].data == shares.attrs["failing"]).all())
 
 
-def containment_markdown(shares: Dataset) -> list[str]:
-    """The table as text."""
+def _containment_lines(shares: Dataset) -> list[str]:
     methods, when, spans = (shares[name].data for name in ("method", "when", "span"))
     failing, number = shares.attrs["failing"], shares.attrs["trajectories"]
+    rows = zip(methods, shares["share"].data, strict=True)
     return [
         "## Failing neighbours",
         "",
@@ -162,10 +137,7 @@ def containment_markdown(shares: Dataset) -> list[str]:
         "",
         *table(
             ["method", *(f"{kind}, {span:g} s" for kind in when for span in spans)],
-            (
-                [method, *(f"{share:.2f}" for share in row.ravel())]
-                for method, row in zip(methods, shares["share"].data, strict=True)
-            ),
+            ([method, *(f"{share:.2f}" for share in row.ravel())] for method, row in rows),
         ),
     ]
 
@@ -175,14 +147,6 @@ RowStatus = IntEnum(  # type: ignore[misc]
     "RowStatus",
     {status.name: status.value for status in sorted((Status.OK, *FAILURES))} | {REFUSED.upper(): 100},
 )
-
-
-#: Every case by its name.
-CASES: dict[str, HardCase] = {
-    case.name: case
-    for module in (references, conservative, algebraic, folds, saddle, chaos, precision, starts)
-    for case in module.CASES
-}
 
 
 class Result(NamedTuple):
@@ -251,37 +215,24 @@ _INTRODUCTION = (
 )
 
 
-def gallery_markdown(results: Sequence[Result], tables: Sequence[str]) -> str:
-    """The report's text; ``tables`` are those that follow the cases."""
+def gallery_lines(results: Sequence[Result]) -> list[str]:
+    """Every case with its table."""
     head = "method | step [s] | steps | error | claimed to | drift | status | verdict | why | remark"
     lines = ["# Hard cases", "", f"{verdict(results).capitalize()}.", "", _INTRODUCTION, ""]
-    for result in results:
-        case = result.case
-        lines += [f"## {case.name}: {'passed' if result.passed else 'FAILED'}", ""]
+    for case, rows in results:
+        lines += [f"## {case.name}: {'passed' if all(row.passed for row in rows) else 'FAILED'}", ""]
         lines += [f"Hard: {case.hard}.  ", f"Oracle: {case.oracle}.  ", f"Must: {case.must}.", ""]
-        lines += table(head, map(_line, result.rows), (0, 6, 7, 8, 9))
-    return "\n".join([*lines, *tables])
+        lines += table(head, map(_cells, rows), (0, 6, 7, 8, 9))
+    return lines
 
 
-def _line(row: Row) -> str:
+def _cells(row: Row) -> list[object]:
     step, error, allowed, drift = (
         "" if np.isnan(value) else f"{value:{form}}"
         for value, form in ((row.dt, ".3g"), (row.error, ".1e"), (row.allowed, ".1e"), (row.drift, ".1e"))
     )
-    claim = allowed if row.claimed else "not claimed"
-    numbers = f"{row.method} | {step} | {row.steps:,} | {error} | {claim} | {drift}"
-    return f"{numbers} | {row.status} | {row.verdict} | {row.why} | {row.remark}"
-
-
-#: Methods and formulations whose energy is drawn.
-DRIFTS = (("rk4", "lagrange"), ("dop853", "lagrange"), ("gauss6", "lagrange"), ("gauss6", "hamilton"))
-
-#: Pages of stability regions: name, methods on it, title.
-REGIONS = (
-    ("explicit", RungeKutta, "Stability regions |R(z)| ≤ 1 of the explicit Runge-Kutta methods"),
-    ("adams", Adams, "Stability regions of the Adams methods, by the roots of the history's map"),
-    ("implicit", ImplicitRungeKutta, "Stability regions |R(z)| ≤ 1 of the implicit Runge-Kutta methods"),
-)
+    numbers = [row.method, step, f"{row.steps:,}", error, allowed or "not claimed", drift]
+    return [*numbers, row.status, row.verdict, row.why, row.remark]
 
 
 class Report(NamedTuple):
@@ -298,70 +249,46 @@ def write_hardcases(out: Path, *, quick: bool = False, stage: Stage = no_stage) 
     Raises:
         InputError: the folder cannot be written.
     """
-    started = time.perf_counter()
+    began = time.perf_counter()
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{out}: cannot be made: {error.strerror}") from None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StepWarning)  # steps that are too long are what some cases are about
-        return _write(out, quick, stage, started)
+        return _write(out, quick, stage, began)
 
 
-def _write(out: Path, quick: bool, stage: Stage, started: float) -> Report:
+def _write(out: Path, quick: bool, stage: Stage, began: float) -> Report:
     results = run_gallery(quick, stage("hard cases", len(CASES)))
-    scene = Scene(c2=1100 / 3, alpha=0.0)
-    minimum = next(e for e in find_equilibria(scene) if e.morse_index == 0)
-    limits = _limits(scene, minimum, stage("step limits", len(METHODS)))
+    minimum = next(e for e in find_equilibria(PAPER) if e.morse_index == 0)
+    limits = _limits(minimum, stage("step limits", len(METHODS)))
     shares = containment(quick, stage("failing neighbours", len(CONTAINED)))
     told, passed = verdict(results), all(result.passed for result in results)
     if not contained(shares):
         told, passed = f"{told}; failing trajectories are not contained", False
-    text, store = out / "hardcases.md", out / "hardcases.h5"
-    tables = [*_limits_markdown(limits), *containment_markdown(shares)]
-    text.write_text(gallery_markdown(results, tables), encoding="utf-8")
-    attrs = {"title": "Hard cases", "verdict": told, "wall_time_s": time.perf_counter() - started}
-    write_results(
-        store,
-        scene_parameters=scene_parameters(scene),
-        sections={"gallery": gallery_dataset(results), "step_limits": limits, "containment": shares},
-        attrs=provenance(thread_count(None)) | attrs,
-        replace=True,
-    )
-    pictures, eigenvalues = {}, limiting_eigenvalues(scene, minimum)
-    for name, family, title in REGIONS:  # regions, the scene's eigenvalues at the limits, limits on the axes
-        members = {key: method for key, method in METHODS.items() if isinstance(method, family)}
-        if not members:
-            continue
-        title += "\nλ: eigenvalues at the minimum of Table 1 under the constant force"
-        pictures[f"stability_{name}"] = draw_stability_regions(members, eigenvalues, limits, title)
+    lines = [*gallery_lines(results), *_limits_lines(limits), *_containment_lines(shares)]
+    sections = {
+        "gallery": gallery_dataset(results),
+        "step_limits": Dataset(columns("method", limits, _LIMITS)),
+        "containment": shares,
+    }
+    text, store = write_text(out / "hardcases.md", lines), out / "hardcases.h5"
+    write_data(store, PAPER, sections, began, title="Hard cases", verdict=told)
     steps = QUICK_STEPS if quick else STEPS
-    pictures["energy_paper_start"] = _energy_picture("the paper's start", PAPER_START, steps)
-    pictures["energy_energetic_start"] = _energy_picture("an energetic start", ENERGETIC_START, steps)
+    pictures = stability_pages(limits, limiting_eigenvalues(PAPER, minimum))
+    for name, label in (("paper", "the paper's start"), ("energetic", "an energetic start")):
+        start = content("cases.toml")[f"undamped_{name}_start"]["start"]
+        histories = {drawn: energy_history(start, *drawn, steps)[:2] for drawn in DRIFTS}
+        pictures[f"energy_{name}_start"] = draw_energy_drift(histories, label, start, steps)
     for name, figure in pictures.items():
         save(figure, out / f"{name}.png")
     return Report([text, store, *(out / f"{name}.png" for name in pictures)], told, passed)
 
 
-def _energy_picture(label: str, start: Sequence[float], steps: int) -> Figure:
-    """Energy errors from one start by a few methods."""
-    histories = {
-        f"{method}, {'(q, p)' if formulation == 'hamilton' else '(q, q′)'}": energy_history(
-            start, method, formulation, steps
-        )[:2]
-        for method, formulation in DRIFTS
-    }
-    phi, theta, u, v = start
-    return draw_energy_drift(
-        histories,
-        f"Energy error of an undamped motion from {label}",
-        f"φ = {phi:.4g} rad, θ = {theta:.4g} rad, φ′ = {u:g} rad/s, θ′ = {v:g} rad/s; "
-        f"{steps:,} steps of h = {DT:g} s",
-    )
-
-
 #: Columns of the step limits.
 _LIMITS = {
+    "method": ("1", "method"),
     "real_limit": ("1", "stable for -x up to here; inf: no limit"),
     "imaginary_limit": ("1", "stable for iy up to here; inf: no limit"),
     "predicted_step": ("s", "largest stable step at the minimum, from coefficients and eigenvalues"),
@@ -369,27 +296,22 @@ _LIMITS = {
 }
 
 
-def _limits(scene: Scene, minimum: Equilibrium, advance: Progress) -> Dataset:
+def _limits(minimum: Equilibrium, advance: Progress) -> list[Limits]:
     """Axis limits of every method, and at the scene's minimum the step predicted and measured."""
     rows = []
     for name, method in METHODS.items():
-        steps = largest_stable_step(scene, minimum, name), measured_stable_step(scene, minimum, name)
-        rows.append((real_limit(method), imaginary_limit(method), *steps))
+        steps = largest_stable_step(PAPER, minimum, name), measured_stable_step(PAPER, minimum, name)
+        rows.append(Limits(name, real_limit(method), imaginary_limit(method), *steps))
         advance(1)
-    names = Variable(("method",), np.array(list(METHODS), object), "1", "method")
-    found = zip(_LIMITS.items(), np.array(rows).T, strict=True)
-    return Dataset({"method": names} | {key: Variable(("method",), x, *told) for (key, told), x in found})
+    return rows
 
 
-def _limits_markdown(limits: Dataset) -> list[str]:
+def _limits_lines(limits: Sequence[Limits]) -> list[str]:
     head = "method | real axis | imaginary axis | predicted step [s] | measured step [s] | difference"
     rows = []
-    for name, real, imaginary, predicted, measured in zip(
-        *(v.data for v in limits.variables.values()), strict=True
-    ):
+    for name, real, imaginary, predicted, measured in limits:
         difference = f"{measured / predicted - 1:+.1e}" if np.isfinite(predicted) else ""
-        rows.append(
-            f"{name} | {real:.4f} | {imaginary:.4f} | {predicted:.5f} | {measured:.5f} | {difference}"
-        )
+        steps = f"{predicted:.5f} | {measured:.5f}"
+        rows.append(f"{name} | {real:.4f} | {imaginary:.4f} | {steps} | {difference}")
     about = "At the minimum of Table 1 under the constant force."
     return ["## Step limits", "", about, "", *table(head, rows)]

@@ -34,9 +34,6 @@ from fastmech.scene import Scene
 from fastmech.step_limits.predict import stable_step
 from fastmech.step_limits.warning import step_limit, step_warning
 
-#: Why a method claims nothing of an undamped motion.
-DRIVEN = "undamped motions grow with every step"
-
 #: In place of a status: the request was refused before the run.
 REFUSED = "refused"
 
@@ -55,9 +52,13 @@ class Row(NamedTuple):
     allowed: float  #: error to which the method claims the case; NaN where it does not
     drift: float  #: largest change of energy over the energy above the lowest; NaN where energy is not kept
     status: str  #: worst status of the trajectories, or REFUSED
-    claimed: bool  #: whether the method claims the case
     remark: str = ""
     why: str = ""  #: why it claims the case so far and no further, or not
+
+    @property
+    def claimed(self) -> bool:
+        """Whether the method claims the case."""
+        return not np.isnan(self.allowed)
 
     @property
     def passed(self) -> bool:
@@ -98,22 +99,20 @@ def energy(scene: Scene, y: Floats) -> Floats:
 def row_of(
     run: Trajectories,
     error: float,
-    allowed: float,
+    allowed: float = np.nan,
     drift: float = np.nan,
     *,
-    claimed: bool = True,
     remark: str = "",
     why: str = "",
 ) -> Row:
-    """A row of what ``integrate`` gave."""
-    return Row(run.method, run.dt, run.steps, error, allowed, drift, worst(run.status), claimed, remark, why)
+    """A row of what ``integrate`` gave; without ``allowed`` it claims nothing."""
+    return Row(run.method, run.dt, run.steps, error, allowed, drift, worst(run.status), remark, why)
 
 
 def labels_row(method: str, found: Labels, wrong: int, told: str = "") -> Row:
     """A row of what ``fm.label_starts`` gave: the error is how many are wrong, and none may be."""
     remark = "labels: " + ", ".join(f"{n} {name}" for name, n in found.counts.items() if n) + told
-    nan, why = float("nan"), "fm.label_starts"
-    return Row(method, nan, found.steps, float(wrong), 0.0, nan, "ok", True, remark, why)
+    return Row(method, np.nan, found.steps, float(wrong), 0.0, np.nan, "ok", remark, "fm.label_starts")
 
 
 #: Relative error that rounding explains, of motions that are not chaotic.
@@ -135,17 +134,16 @@ class Goal(NamedTuple):
 
 
 @cache
-def _content() -> dict[str, Any]:
-    return tomllib.loads(resources.files(__package__).joinpath("references.toml").read_text(encoding="utf-8"))
+def content(name: str) -> dict[str, Any]:
+    """A TOML file of this folder."""
+    return tomllib.loads(resources.files(__package__).joinpath(name).read_text(encoding="utf-8"))
 
 
 def motion(name: str, rounded: float = ROUNDED) -> Goal:
     """The reference of this name; its scene is the paper's with a few changes."""
-    entry = _content()[name]
-    end = np.array([float(x) for x in entry["state"]])
-    return Goal(
-        Scene(c2=1100 / 3).replace(**entry["scene"]), np.array(entry["start"]), entry["t"], end, rounded
-    )
+    entry = content("references.toml")[name]
+    scene, end = Scene(c2=1100 / 3).replace(**entry["scene"]), np.array([float(x) for x in entry["state"]])
+    return Goal(scene, np.array(entry["start"]), entry["t"], end, rounded)
 
 
 class Boundary(NamedTuple):
@@ -159,7 +157,7 @@ class Boundary(NamedTuple):
 
 def boundary() -> Boundary:
     """The crossing found by bisection in extended precision."""
-    entry = _content()["boundary"]
+    entry = content("references.toml")["boundary"]
     below, above = (np.array(end) for end in entry["ends"])
     return Boundary(Scene(c2=1100 / 3).replace(**entry["scene"]), float(entry["phi"]), below, above)
 
@@ -180,19 +178,14 @@ SHORTER = 4.0
 WORTHLESS, MOST_STEPS = 0.1, 200_000
 
 
-def walked(quick: bool) -> tuple[str, ...]:
-    """Names of the methods that a case tries."""
-    return FAMILIES if quick else tuple(METHODS)
+def walked(quick: bool, euler: bool = True) -> tuple[str, ...]:
+    """Names of the methods that a case tries; ``euler``: whether the quick version has time for its steps."""
+    return FAMILIES[not euler :] if quick else tuple(METHODS)
 
 
 def labellers(quick: bool) -> tuple[str, ...]:
     """Names of the methods by which a case looks for labels."""
     return LABELLERS if quick else tuple(METHODS)
-
-
-def without_euler(quick: bool) -> tuple[str, ...]:
-    """The methods of a case in which Euler's needs steps of 1e-4 s: it only goes through the full version."""
-    return tuple(method for method in walked(quick) if not (quick and method == "euler"))
 
 
 def admitted_step(scene: Scene, method: str, longest: float, starts: ArrayLike | None = None) -> float:
@@ -229,8 +222,8 @@ def status_row(goal: Goal, method: str, dt: float, why: str, dtype: str = "float
     try:
         run = integrate(goal.scene, goal.start, goal.t_end, dt, method, dtype=dtype)
     except InputError as error:
-        return Row(method, dt, 0, np.nan, np.nan, np.nan, REFUSED, False, str(error), why)
-    return row_of(run, goal.error(run.y[-1, 0]), np.nan, claimed=False, why=why)
+        return Row(method, dt, 0, np.nan, np.nan, np.nan, REFUSED, str(error), why)
+    return row_of(run, goal.error(run.y[-1, 0]), why=why)
 
 
 def fixed_row(goal: Goal, method: str, dt: float, allowed: float, why: str, dtype: str = "float64") -> Row:
