@@ -17,6 +17,7 @@ from fastmech.store.provenance import provenance
 from fastmech.store.write import write_results
 
 Name = TypeVar("Name")
+Result = TypeVar("Result")
 
 #: Measured turns of :func:`in_turns` after one that warms up.
 TURNS = 7
@@ -34,21 +35,25 @@ def columns(dim: str, rows: Sequence[Any], about: Mapping[str, tuple[str, str]])
 
 
 def in_turns(
-    works: Mapping[Name, Callable[[], object]],
+    works: Mapping[Name, Callable[[], Result]],
     turns: int = TURNS,
     advance: Progress = lambda done: None,
     clock: Callable[[], float] = time.process_time,
-) -> dict[Name, list[float]]:
-    """Seconds of each turn's call, after a turn that is not counted; ``advance`` is told 1 for each call."""
+) -> tuple[dict[Name, list[float]], dict[Name, Result]]:
+    """Seconds of each turn's call, after a turn that is not counted, and what the last calls have returned.
+
+    ``advance`` is told 1 for each call.
+    """
     seconds: dict[Name, list[float]] = {name: [] for name in works}
+    results: dict[Name, Result] = {}
     for turn in range(turns + 1):
         for name, work in works.items():
             began = clock()
-            work()
+            results[name] = work()
             if turn:
                 seconds[name].append(clock() - began)
             advance(1)
-    return seconds
+    return seconds, results
 
 
 def write_text(path: Path, lines: Sequence[str]) -> Path:

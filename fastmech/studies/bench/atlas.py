@@ -76,10 +76,10 @@ def side_by_side(
         A row for each, and by the map's threads the least, median and largest ratio of rates over the turns.
     """
     threads = sorted({1, thread_count(None)})
-    rates: dict[int, list[float]] = {n: [] for n in threads}
     turns: list[Search] = []
     for n in threads:
         map_equilibria(SCENE, grid(20), threads=n)
+    rates: dict[int, list[float]] = {n: [] for n in threads}
     for turn in range(REPEATS):
         for n in threads:
             began = time.perf_counter()
@@ -88,9 +88,9 @@ def side_by_side(
         turns.append(multistart(scenes[turn::REPEATS], advance))
     theirs = [turn.seconds.size / turn.seconds.sum() for turn in turns]
     unproved = int(np.count_nonzero(atlas.outcome != Outcome.COMPLETE))
-    found, name, none = int(atlas.count.sum(dtype=int)), "fastmech map_equilibria", (0,) * len(TOLD)
+    told = int(atlas.count.sum(dtype=int)), (0,) * len(TOLD), 0, unproved
     rows = [
-        AtlasRow(name, n, side * side, statistics.median(own), found, none, 0, unproved)
+        AtlasRow("fastmech map_equilibria", n, side * side, statistics.median(own), *told)
         for n, own in rates.items()
     ]
     together = row_of("in the map's region", Search(*(np.concatenate(x) for x in zip(*turns, strict=True))))
@@ -102,10 +102,9 @@ def side_by_side(
 def traced(stage: Stage) -> str:
     """How long the fold curves of the region take, seeds and cusps included."""
     axes = grid(201).items()
-    (seconds,) = in_turns(
-        {"": lambda: trace_folds(SCENE, *axes)}, REPEATS, stage("fold curves", REPEATS + 1), time.perf_counter
-    ).values()
-    found = trace_folds(SCENE, *axes)
+    advance = stage("fold curves", REPEATS + 1)
+    taken, sets = in_turns({"": lambda: trace_folds(SCENE, *axes)}, REPEATS, advance, time.perf_counter)
+    seconds, found = taken[""], sets[""]
     return (
         f"`trace_folds` takes {statistics.median(seconds):.2f} s for the region's {len(found.curves)} curves "
         f"and {len(found.cusps)} cusps, {sum(curve.x.size for curve in found.curves)} points; largest "

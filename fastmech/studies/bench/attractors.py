@@ -23,10 +23,9 @@ from fastmech.basins.map import map_basins
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
 from fastmech.kernels.sincos import cos, sin
-from fastmech.studies.bench.measure import Stage
+from fastmech.reports import Stage, table
 from fastmech.studies.bench.own_systems import inverse_cube, spoken
 from fastmech.studies.bench.peers import installed
-from fastmech.studies.bench.tables import table
 
 #: Starts that are timed and that others follow; those of SciPy; runs of which the median counts.
 STARTS, FOLLOWED, BY_SCIPY, RUNS = 10_000, 2_000, 200, 5

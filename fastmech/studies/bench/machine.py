@@ -83,7 +83,7 @@ def throughputs(problem: Problem, stage: Stage) -> tuple[float, list[Throughput]
 
         works[f"inside {method}"] = (run, len(many) * find_method(method).evaluations(steps))
     calls = {name: work for name, (work, _) in works.items()}
-    seconds = in_turns(calls, advance=stage("right-hand sides", len(works) * (TURNS + 1)))
+    seconds, _ = in_turns(calls, advance=stage("right-hand sides", len(works) * (TURNS + 1)))
     rates = {name: count / statistics.median(seconds[name]) for name, (_, count) in works.items()}
     peak = rates.pop("peak")
     alone = rates["kernel alone"]
@@ -127,7 +127,7 @@ def costs(problem: Problem, stage: Stage) -> list[Cost]:
         return lambda: integrate(scene, starts, problem.t_end, DT, METHOD, threads=1, parameters=parameters)
 
     works = {name: work(changes, {}) for name, changes in SCENES.items()} | {OWN_PARAMETERS: work({}, own)}
-    seconds = in_turns(works, advance=stage("terms", len(works) * (TURNS + 1)))
+    seconds, _ = in_turns(works, advance=stage("terms", len(works) * (TURNS + 1)))
     rates = {name: len(starts) / statistics.median(times) for name, times in seconds.items()}
     base = rates["damper, constant force"]
     return [Cost(name, rate, rate / base) for name, rate in rates.items()]

@@ -154,30 +154,42 @@ class Row:
         return float(np.median(self.errors))
 
 
-@dataclass
 class _Runner:
-    """A prepared entrant and its times so far."""
+    """A prepared entrant, warmed up and compared with the truth, and its times so far."""
 
-    entrant: Entrant
-    threads: int
-    solve: Solve
-    starts: Floats
-    first_call: float
-    errors: Floats
-    repeats: int
-    wall: list[float] = field(default_factory=list)
-    processor: list[float] = field(default_factory=list)
+    def __init__(self, problem: Problem, entrant: Entrant, threads: int, budget: float) -> None:
+        self.entrant, self.threads, self.problem = entrant, threads, problem.name
+        n = min(len(problem.starts), entrant.most)
+        self.starts = np.tile(problem.starts[:n], (max(1, -(-entrant.least // n)), 1))
+        began = time.perf_counter()
+        self.solve = entrant.prepare(problem, threads)
+        final = self.solve(self.starts)
+        self.first_call = time.perf_counter() - began
+        self.errors = np.abs(final[:n] - problem.truth[:n]).max(axis=1)
+        self.errors[~np.isfinite(self.errors)] = np.inf
+        self.wall, self.processor = list[float](), list[float]()
+        self.time()
+        taken = max(self.processor[0], 1e-6)
+        short = min(SHORT_CALL, budget / MOST_REPEATS)
+        more = min(entrant.most // len(self.starts), int(np.ceil(short / taken)))
+        if more > 1:
+            self.starts = np.tile(self.starts, (more, 1))
+            self.wall, self.processor = [], []
+            taken *= more
+        self.repeats = int(np.clip(budget / taken, 1, MOST_REPEATS)) - len(self.wall)
 
     def time(self) -> None:
+        """One more call."""
         wall, processor = time.perf_counter(), time.process_time()
         self.solve(self.starts)
         self.processor.append(time.process_time() - processor)
         self.wall.append(time.perf_counter() - wall)
 
-    def row(self, problem: str) -> Row:
-        named = self.entrant.family, self.entrant.setting, self.threads, len(self.starts)
+    def row(self) -> Row:
+        """Medians of the calls."""
         wall, processor = statistics.median(self.wall), statistics.median(self.processor)
-        return Row(problem, *named, wall, processor, self.first_call, self.errors)
+        named = self.problem, self.entrant.family, self.entrant.setting, self.threads, len(self.starts)
+        return Row(*named, wall, processor, self.first_call, self.errors)
 
 
 def measure(
@@ -195,7 +207,7 @@ def measure(
     runners = []
     for entrant, threads in everyone:
         try:
-            runners.append(_prepare(problem, entrant, threads, budget))
+            runners.append(_Runner(problem, entrant, threads, budget))
         except Exception as error:
             if failed is None:
                 raise
@@ -207,32 +219,7 @@ def measure(
                 runner.time()
             if turn == 0:
                 advance(1)
-    return [runner.row(problem.name) for runner in runners]
-
-
-def _prepare(problem: Problem, entrant: Entrant, threads: int, budget: float) -> _Runner:
-    """Compile, warm up, compare with the truth, and decide how often and on how many trajectories to time."""
-    n = min(len(problem.starts), entrant.most)
-    copies = max(1, -(-entrant.least // n))
-    starts = np.tile(problem.starts[:n], (copies, 1))
-    began = time.perf_counter()
-    solve = entrant.prepare(problem, threads)
-    final = solve(starts)
-    first_call = time.perf_counter() - began
-    errors = np.abs(final[:n] - problem.truth[:n]).max(axis=1)
-    errors[~np.isfinite(errors)] = np.inf
-    runner = _Runner(entrant, threads, solve, starts, first_call, errors, 0)
-    runner.time()
-    taken = max(runner.processor[0], 1e-6)
-    short = min(SHORT_CALL, budget / MOST_REPEATS)
-    more = min(entrant.most // len(starts), int(np.ceil(short / taken)))
-    if more > 1:
-        runner.starts = np.tile(starts, (more, 1))
-        runner.wall.clear()
-        runner.processor.clear()
-        taken *= more
-    runner.repeats = int(np.clip(budget / taken, 1, MOST_REPEATS)) - len(runner.wall)
-    return runner
+    return [runner.row() for runner in runners]
 
 
 #: Largest errors [rad, rad/s] at which integrators are compared.

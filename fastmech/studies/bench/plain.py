@@ -5,9 +5,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-from typing import Any
-
 import numpy as np
 from numba import njit
 
@@ -40,24 +37,8 @@ def scalar_rhs(t: float, y: Floats, p: Floats) -> Floats:
 
 
 @njit(nogil=True, **FLAGS)  # type: ignore[untyped-decorator]
-def one_at_a_time(starts: Floats, p: Floats, h: float, steps: int) -> Floats:
-    """RK4 as most users write it: one trajectory after the other, states as small arrays."""
-    final = np.empty_like(starts)
-    for i in range(len(starts)):
-        y = starts[i].copy()
-        for step in range(steps):
-            k1 = scalar_rhs(step * h, y, p)
-            k2 = scalar_rhs(step * h, y + 0.5 * h * k1, p)
-            k3 = scalar_rhs(step * h, y + 0.5 * h * k2, p)
-            k4 = scalar_rhs(step * h, y + h * k3, p)
-            y = y + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-        final[i] = y
-    return final
-
-
-@njit(nogil=True, **FLAGS)  # type: ignore[untyped-decorator]
 def in_scalars(starts: Floats, p: Floats, h: float, steps: int) -> Floats:
-    """The same without small arrays: the states and stages are local numbers."""
+    """RK4, one trajectory after the other; the states and stages are local numbers."""
     final = np.empty_like(starts)
     for i in range(len(starts)):
         a, b, u, w = starts[i]
@@ -78,14 +59,11 @@ def in_scalars(starts: Floats, p: Floats, h: float, steps: int) -> Floats:
     return final
 
 
-def prepared(kernel: Any, problem: Problem, threads: int, h: float) -> Solve:
-    """A kernel above at a fixed step."""
+def prepared(problem: Problem, threads: int, h: float) -> Solve:
+    """The loop at a fixed step."""
     p, steps = np.array(problem.coefficients), round(problem.t_end / h)
-    return lambda starts: kernel(starts, p, problem.t_end / steps, steps)
+    return lambda starts: in_scalars(starts, p, problem.t_end / steps, steps)
 
 
 #: RK4 at the package's steps.
-SERIES = tuple(
-    Series(f"Numba RK4, one at a time, {how}", "dt = {:g} s", STEPS, partial(prepared, kernel), most=1024)
-    for how, kernel in (("small arrays", one_at_a_time), ("local numbers", in_scalars))
-)
+SERIES = (Series("Numba RK4, one at a time", "dt = {:g} s", STEPS, prepared, most=1024),)

@@ -8,7 +8,7 @@ import statistics
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
@@ -65,7 +65,7 @@ with open("/proc/self/status") as status:  # what getrusage tells may be the par
 STARTED = (
     ("fastmech", "fastmech rk4", "dt = 0.05 s"),
     ("fastmech", "fastmech tsit5", "dt = 0.12 s"),
-    ("fastmech", "Numba RK4, one at a time, local numbers", "dt = 0.05 s"),
+    ("fastmech", "Numba RK4, one at a time", "dt = 0.05 s"),
     ("heyoka", "heyoka batch", "tol = 0.01"),
     ("diffrax", "diffrax Tsit5, constant step", "dt = 0.1 s"),
     ("torch", "torch.compile rk4", "dt = 0.05 s"),
@@ -74,8 +74,7 @@ STARTED = (
 #: Vector widths: processor and features that each is compiled for, the entrants, and turns of the processes.
 BUILDS = {"AVX2": ("haswell", "+avx2,+fma"), "AVX-512": ("skylake-avx512", "-prefer-256-bit")}
 WIDE = (
-    ("Numba RK4, one at a time, small arrays", "dt = 0.02 s"),
-    ("Numba RK4, one at a time, local numbers", "dt = 0.02 s"),
+    ("Numba RK4, one at a time", "dt = 0.02 s"),
     ("fastmech rk4", "dt = 0.02 s"),
     ("fastmech ab6", "dt = 0.0175 s"),
     ("fastmech dop853", "dt = 0.05 s"),
@@ -111,7 +110,7 @@ def told(script: str, argument: str, environment: Mapping[str, str] = {}) -> str
 
 
 def entrants_in_process(
-    library: str, names: list[tuple[str, str]], most: int, environment: Mapping[str, str]
+    library: str, names: Sequence[Sequence[str]], most: int, environment: Mapping[str, str]
 ) -> tuple[int, list[Later]]:
     """Width of the vectors [bit], and what each entrant (family, setting) took."""
     bits, found = json.loads(told(ENTRANTS, json.dumps([library, names, most]), environment))
@@ -125,9 +124,8 @@ def started(stage: Stage) -> Iterator[Start]:
         if find_spec(library) is not None:
             with tempfile.TemporaryDirectory() as folder:
                 caches = dict.fromkeys(CACHES, folder)
-                both = [entrants_in_process(library, [(name[0], name[1])], 1024, caches) for _ in range(2)]
-            (_, (one,)), (_, (other,)) = both
-            yield Start(", ".join(name), one.first, other.first, other.steady)
+                first, second = (entrants_in_process(library, [name], 1024, caches)[1][0] for _ in range(2))
+            yield Start(", ".join(name), first.first, second.first, second.steady)
         advance(1)
 
 
@@ -155,7 +153,7 @@ def vectors_study(quick: bool, stage: Stage) -> list[str]:
         for name, (processor, features) in BUILDS.items():
             build = {"NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": features}
             with suppress(subprocess.CalledProcessError):  # the processor lacks the instructions
-                found[name].append(entrants_in_process("fastmech", list(WIDE), 1 << 20, build))
+                found[name].append(entrants_in_process("fastmech", WIDE, 1 << 20, build))
             advance(1)
     builds = " and ".join(f"{n} ({b[0]}, `{b[1]}`)" for n, b in BUILDS.items())
     lines = [
@@ -167,25 +165,16 @@ def vectors_study(quick: bool, stage: Stage) -> list[str]:
         *(f"{name}: this processor cannot run it." for name, runs in found.items() if not runs),
     ]
     for name, runs in found.items():
-        if not runs:
-            continue
-        bits, errors = runs[0][0], [each.error for each in runs[0][1]]
-        columns = zip(*(each for _, each in runs), strict=True)
-        rates = [1024 / statistics.median(each.steady for each in column) for column in columns]
-        lines += [
-            f"## {name}: vectors of {bits} bit",
-            "",
-            *table(
-                "integrator | rate | over plain Numba, small arrays | local numbers | largest error",
-                (
-                    [
-                        f"{family}, {setting}",
-                        f"{rate:,.0f}",
-                        *(f"{rate / slow:.2f}" if family == "fastmech rk4" else "" for slow in rates[:2]),
-                        f"{error:.1e}",
-                    ]
-                    for (family, setting), rate, error in zip(WIDE, rates, errors, strict=True)
-                ),
-            ),
-        ]
+        if runs:
+            bits, errors = runs[0][0], [each.error for each in runs[0][1]]
+            each = zip(*(own for _, own in runs), strict=True)
+            rates = [1024 / statistics.median(later.steady for later in entrant) for entrant in each]
+            rows = (
+                f"{family}, {setting} | {rate:,.0f} | "
+                + (f"{rate / rates[0]:.2f}" if family == "fastmech rk4" else "")
+                + f" | {error:.1e}"
+                for (family, setting), rate, error in zip(WIDE, rates, errors, strict=True)
+            )
+            lines += [f"## {name}: vectors of {bits} bit", ""]
+            lines += table("integrator | rate | over plain Numba | largest error", rows)
     return lines

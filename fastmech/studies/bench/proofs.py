@@ -15,9 +15,8 @@ from fastmech.equilibria.certificate import Outcome
 from fastmech.models.equilibria import RestingPlaces, prove_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.statics import Statics
+from fastmech.reports import Stage, table
 from fastmech.studies.bench.devices import KINDS
-from fastmech.studies.bench.measure import Stage
-from fastmech.studies.bench.tables import table
 
 #: Mechanisms of the study, and starts of Newton's method for each; of a quick one.
 NUMBER, STARTS = 2000, 10_000
@@ -49,25 +48,23 @@ class Tally(NamedTuple):
 
 def proofs_study(quick: bool, stage: Stage, scenes: int | None = None) -> list[str]:
     """``proofs.md``: what a multistart finds that a proved list lacks, and where indices do not add up."""
-    number = scenes or (FEW if quick else NUMBER)
+    number, starts = scenes or (FEW if quick else NUMBER), FEW_STARTS if quick else STARTS
     tallies = {name: Tally() for name in KINDS}
     advance = stage("random mechanisms", number)
     for seed in range(number):
         name = list(KINDS)[seed % len(KINDS)]
-        mechanism = KINDS[name](np.random.default_rng([7, seed]))
-        each = examined(mechanism, FEW_STARTS if quick else STARTS, seed)
+        each = examined(KINDS[name](np.random.default_rng([7, seed])), starts, seed)
         summed: list[Any] = [a + b for a, b in zip(tallies[name], each, strict=True)]
         tallies[name] = Tally(*summed)
         advance(1)
-    rows = [
+    head = (
+        "kind | mechanisms | equilibria proved | lists complete | left open | zeros by Newton | "
+        "of these missing | index sums | of these wrong | ms a proof"
+    )
+    rows = (
         [name, *(f"{n:,}" for n in tally[:-1]), f"{1e3 * tally.seconds / max(tally.number, 1):.3g}"]
         for name, tally in tallies.items()
-    ]
-    head = [
-        "kind", "mechanisms", "equilibria proved", "lists complete", "left open", "zeros by Newton",
-        "of these missing", "index sums", "of these wrong", "ms a proof",
-    ]  # fmt: skip
-    starts = FEW_STARTS if quick else STARTS
+    )
     return [
         "# Proved lists beside a multistart",
         "",

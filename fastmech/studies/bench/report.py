@@ -13,10 +13,10 @@ import numpy as np
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.threads import thread_count
 from fastmech.reports import Stage, no_stage
-from fastmech.results import Dataset, Variable, scene_parameters
+from fastmech.results import Dataset, Variable
 from fastmech.scene import Scene
-from fastmech.store.provenance import processor_name, provenance
-from fastmech.store.write import check_writable, write_results
+from fastmech.store.provenance import processor_name
+from fastmech.store.write import check_writable
 from fastmech.studies.bench import peers, tables
 from fastmech.studies.bench.atlas import atlas_study
 from fastmech.studies.bench.attractors import attractors_study
@@ -32,17 +32,11 @@ from fastmech.studies.bench.systems import systems_study
 from fastmech.studies.bench.tables import draw_bench
 from fastmech.studies.bench.threads import threads_study
 from fastmech.studies.bench.tolerances import tolerances_study
-from fastmech.studies.reporting import columns
+from fastmech.studies.reporting import columns, write_data, write_text
 
-#: Starts of ``--quick``, of those that have a reference.
-QUICK_STARTS = 8
-
-#: What ``--quick`` gives each entrant [s].
-QUICK_BUDGET = 0.05
-
-#: Trajectories a call of the engine and its yardstick with ``--quick``: they take milliseconds, and on fewer
-#: not the loops but what stands around a call would be compared.
-QUICK_LEAST = 8192
+#: Of ``--quick``: starts that have a reference, what each entrant is given [s], and trajectories a call of
+#: the engine and its yardstick: on fewer than those not the loops would be compared but what is around them.
+QUICK_STARTS, QUICK_BUDGET, QUICK_LEAST = 8, 0.05, 8192
 
 LIBRARIES = ("numba", "scipy", "heyoka", "torch", "jax", "diffrax", "numbalsoda", "CyRK", "pynamicalsys")
 
@@ -60,34 +54,18 @@ STUDIES: dict[str, Callable[..., list[str]]] = {
 }
 
 
-def run_study(
-    name: str,
-    out: Path,
-    *,
-    quick: bool = False,
-    stage: Stage = no_stage,
-    **chosen: int,
-) -> Path:
+def run_study(name: str, out: Path, *, quick: bool = False, stage: Stage = no_stage, **chosen: int) -> Path:
     """Measure and write a study's ``NAME.md`` into the folder ``out``; ``chosen`` are its own settings."""
-    lines = STUDIES[name](quick, stage, **chosen)
-    out.mkdir(parents=True, exist_ok=True)
-    path = out / f"{name}.md"
-    path.write_text("\n".join(lines).rstrip("\n") + "\n", encoding="utf-8")
-    return path
+    return write_text(out / f"{name}.md", STUDIES[name](quick, stage, **chosen))
 
 
-def run_bench(
-    out: Path,
-    *,
-    quick: bool = False,
-    stage: Stage = no_stage,
-) -> list[Path]:
+def run_bench(out: Path, *, quick: bool = False, stage: Stage = no_stage) -> list[Path]:
     """Measure and write ``bench.md``, ``bench.png`` and ``bench.h5`` into the folder ``out``.
 
     ``quick`` takes few trajectories, every third setting and no libraries beyond SciPy: for trying the
     command, not for quoting.
     """
-    data = out / "bench.h5"
+    data, picture = out / "bench.h5", out / "bench.png"
     check_writable(data, replace=True)
     began = time.perf_counter()
     problems = [make(QUICK_STARTS) if quick else make() for make in PROBLEMS.values()]
@@ -95,7 +73,8 @@ def run_bench(
     failures: list[str] = []
     for problem in problems:
         found = [enlarged(entrant) if quick else entrant for entrant in entrants(problem, quick)]
-        everyone = [(entrant, n) for entrant in found for n in _threads(entrant)]
+        every = thread_count(None)
+        everyone = [(e, n) for e in found for n in ([1, every] if e.threaded and every > 1 else [1])]
         advance = stage(f"{problem.name}: prepare and time", 2 * len(everyone))
 
         def failed(entrant: Entrant, error: Exception, advance: Progress = advance) -> None:
@@ -107,12 +86,11 @@ def run_bench(
     prices = costs(problems[0], stage)
     starts = [] if quick else list(started(stage))
     memory = [] if quick else footprints(stage)
-    table, picture = out / "bench.md", out / "bench.png"
     lines = _preamble(quick, failures)
     for problem in problems:
         lines += tables.problem_section(problem, rows)
     lines += tables.machine_sections(peak, rhs, prices, starts, memory)
-    table.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    table = write_text(out / "bench.md", lines)
     draw_bench(rows, picture)
     fused = Variable((), np.array(peak), "1/s", "fused multiply-adds of doubles of one core, measured")
     sections = {
@@ -122,14 +100,7 @@ def run_bench(
     }
     if starts:
         sections["starts"] = Dataset(columns("entrant", starts, _STARTS))
-    write_results(
-        data,
-        scene_parameters=scene_parameters(Scene(alpha=0.0)),
-        sections=sections,
-        attrs={"title": "Speed against error", "wall_time_s": time.perf_counter() - began}
-        | provenance(thread_count(None)),
-        replace=True,
-    )
+    write_data(data, Scene(alpha=0.0), sections, began, title="Speed against error")
     return [table, picture, data, *(run_study(name, out, quick=quick, stage=stage) for name in STUDIES)]
 
 
@@ -140,16 +111,8 @@ def enlarged(entrant: Entrant) -> Entrant:
     return entrant._replace(least=max(entrant.least, QUICK_LEAST)) if compared else entrant
 
 
-def _threads(entrant: Entrant) -> list[int]:
-    every = thread_count(None)
-    return [1, every] if entrant.threaded and every > 1 else [1]
-
-
 def _preamble(quick: bool, failures: list[str]) -> list[str]:
     """What was measured, how, and on what."""
-    lines = ["# Speed against error", ""]
-    if quick:
-        lines += ["**A quick run: few trajectories, few settings. Not for quoting.**", ""]
     versions = []
     for library in LIBRARIES:
         try:
@@ -157,7 +120,11 @@ def _preamble(quick: bool, failures: list[str]) -> list[str]:
         except metadata.PackageNotFoundError:
             continue
     load = f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
-    lines += [
+    missing = [name for name in peers.LIBRARIES if name not in peers.installed()]
+    return [
+        "# Speed against error",
+        "",
+        *(["**A quick run: few trajectories, few settings. Not for quoting.**", ""] if quick else []),
         f"{processor_name()}, {thread_count(None)} cores, load {load} at the end. {', '.join(versions)}.",
         "",
         "Everyone solves the same problems: Table 1 with its force constant. Errors are the largest and the "
@@ -165,13 +132,9 @@ def _preamble(quick: bool, failures: list[str]) -> list[str]:
         "24 digits (`data/make_bench_reference.py`). All are prepared and warmed up first and then timed in "
         "turns; rates on one thread are medians per second of processor time, on a quiet machine wall time.",
         "",
+        *([f"Not installed: {', '.join(missing)}.", ""] if missing else []),
+        *(["Failed:", "", *(f"- {failure}" for failure in failures), ""] if failures else []),
     ]
-    missing = [name for name in peers.LIBRARIES if name not in peers.installed()]
-    if missing:
-        lines += [f"Not installed: {', '.join(missing)}.", ""]
-    if failures:
-        lines += ["Failed:", "", *(f"- {failure}" for failure in failures), ""]
-    return lines
 
 
 def speed_dataset(rows: list[Row], problems: list[Problem]) -> Dataset:

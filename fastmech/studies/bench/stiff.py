@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import statistics
 import time
+from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -31,6 +31,15 @@ REPEATS = 3
 EQUAL = 1.5
 
 
+def _own(scene: Scene, starts: Floats, k: int, method: str) -> Floats:
+    return np.asarray(integrate(scene, starts, T_END, 1 / k, method, threads=1).y[-1])
+
+
+def _peer(scene: Scene, starts: Floats, tol: float, method: str) -> Floats:
+    options = {"method": method, "args": (np.array(reduce(scene)),), "rtol": tol, "atol": tol * 1e-2}
+    return np.array([solve_ivp(scalar_rhs, (0.0, T_END), y0, **options).y[:, -1] for y0 in starts])
+
+
 def stiff_study(quick: bool, stage: Stage) -> list[str]:
     """``stiff.md``: one thread, medians of warm calls.
 
@@ -40,25 +49,22 @@ def stiff_study(quick: bool, stage: Stage) -> list[str]:
     n, few = (128, 4) if quick else (2048, 16)
     starts = rest_starts(n).starts
     lines = ["# Heavy damping", "", f"Rest starts, t = {T_END:g} s, one thread.", ""]
-    ours = {f"fastmech {m}, dt = 1/{k} s": (m, k) for m, ks in STEPS.items() for k in ks}
-    theirs = {f"SciPy {m}, rtol = {tol:g}": (m, tol) for m, tols in TOLERANCES.items() for tol in tols}
     for beta in BETAS:
         scene = Scene(alpha=0.0, beta=beta)
-        truth = integrate(scene, starts[:few], T_END, 1 / 6400, "gauss6", threads=1).y[-1]
-        final: dict[str, Floats] = {}
-
-        def own(name: str, method: str, k: int, scene: Scene = scene, final: Any = final) -> None:
-            final[name] = integrate(scene, starts, T_END, 1 / k, method, threads=1).y[-1]
-
-        def peer(name: str, method: str, tol: float, scene: Scene = scene, final: Any = final) -> None:
-            options = {"method": method, "args": (np.array(reduce(scene)),), "rtol": tol, "atol": tol * 1e-2}
-            ends = [solve_ivp(scalar_rhs, (0.0, T_END), y0, **options).y[:, -1] for y0 in starts[:few]]
-            final[name] = np.array(ends)
-
-        works = {name: partial(own, name, *how) for name, how in ours.items()}
-        works |= {name: partial(peer, name, *how) for name, how in theirs.items()}
+        truth = _own(scene, starts[:few], 6400, "gauss6")
+        ours: dict[str, Callable[[], Floats]] = {
+            f"fastmech {m}, dt = 1/{k} s": partial(_own, scene, starts, k, m)
+            for m, ks in STEPS.items()
+            for k in ks
+        }
+        theirs = {
+            f"SciPy {m}, rtol = {tol:g}": partial(_peer, scene, starts[:few], tol, m)
+            for m, tols in TOLERANCES.items()
+            for tol in tols
+        }
+        works = ours | theirs
         advance = stage(f"stiff, beta = {beta:g}", len(works) * (REPEATS + 1))
-        seconds = in_turns(works, REPEATS, advance, time.perf_counter)
+        seconds, final = in_turns(works, REPEATS, advance, time.perf_counter)
         rates = {name: len(final[name]) / statistics.median(each) for name, each in seconds.items()}
         errors = {name: float(np.abs(end[:few] - truth).max()) for name, end in final.items()}
         rows = (f"{name} | {rates[name]:,.0f} | {errors[name]:.0e}" for name in works)

@@ -8,19 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fastmech.plots.style import LINES, new_figure, save, style
-from fastmech.reports import table as table
+from fastmech.reports import table
 from fastmech.studies.bench.machine import Cost, Throughput
 from fastmech.studies.bench.measure import PROBLEMS, TARGETS, Problem, Row, fastest_at, frontier, rate_at
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from fastmech.studies.bench.measure import Row
-
 #: Errors [rad, rad/s] that the picture shows: larger ones answer nothing.
 LARGEST, SMALLEST = 3e-2, 3e-15
-
-GREY = "0.35"
 
 #: Names of methods on the curve keep this ratio of errors between them.
 APART = 20.0
@@ -43,36 +39,36 @@ def draw_bench(rows: list[Row], path: Path) -> None:
     with style():
         figure = new_figure(11.0, 6.2)
         panels = figure.subplots(1, len(PROBLEMS), sharey=True, squeeze=False)[0]
+        named: dict[str, Any] = {}
         for axes, (name, make) in zip(panels, PROBLEMS.items(), strict=True):
             problem = make(1)
-            mine = [row for row in rows if (row.problem, row.threads) == (name, 1)]
-            _draw(axes, mine)
+            shown = [row for row in rows if SMALLEST < row.max_error() < LARGEST]
+            _draw(axes, [row for row in shown if (row.problem, row.threads) == (name, 1)])
             axes.set(xscale="log", yscale="log", xlim=(LARGEST, SMALLEST))
             axes.set_title(f"{problem.description}, to {problem.t_end:g} s")
             axes.set_xlabel("largest error of a final state [rad, rad/s], smaller to the right")
-        panels[0].set_ylabel("trajectories per second of one core")
-        named: dict[str, Any] = {}
-        for axes in panels:
             for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
                 named.setdefault(label, handle)
+        panels[0].set_ylabel("trajectories per second of one core")
         place: Any = "outside lower center"
         figure.legend(list(named.values()), list(named), loc=place, ncols=5, frameon=False)
         save(figure, path)
 
 
 def _draw(axes: Axes, rows: list[Row]) -> None:
-    for family in dict.fromkeys(row.family for row in rows if row.family.startswith("fastmech")):
-        own = sorted(_shown(row for row in rows if row.family == family), key=lambda row: row.max_error())
-        errors, rates = [row.max_error() for row in own], [row.rate for row in own]
-        axes.plot(errors, rates, color="0.75", linewidth=0.8, label="fastmech, each method")
-    for (prefix, label, marker), color in zip(CURVES, [*LINES, GREY], strict=True):
-        best = frontier(_shown(row for row in rows if row.family.startswith(prefix)))
+    def plot(line: list[Row], **look: Any) -> None:
+        axes.plot([row.max_error() for row in line], [row.rate for row in line], **look)
+
+    for family in dict.fromkeys(row.family for row in own(rows)):
+        mine = sorted((row for row in rows if row.family == family), key=lambda row: row.max_error())
+        plot(mine, color="0.75", linewidth=0.8, label="fastmech, each method")
+    for (prefix, label, marker), color in zip(CURVES, [*LINES, "0.35"], strict=True):
+        best = frontier(row for row in rows if row.family.startswith(prefix))
         if best:
-            errors, rates = [row.max_error() for row in best], [row.rate for row in best]
-            width = 2.4 if prefix == "fastmech" else 1.4
-            axes.plot(errors, rates, marker=marker, color=color, linewidth=width, label=label)
-            if prefix == "fastmech":
-                _name_methods(axes, best, color)
+            width = 2.4 if prefix == OWN else 1.4
+            plot(best, marker=marker, color=color, linewidth=width, label=label)
+        if prefix == OWN:
+            _name_methods(axes, best, color)
 
 
 def _name_methods(axes: Axes, best: list[Row], color: str) -> None:
@@ -82,18 +78,11 @@ def _name_methods(axes: Axes, best: list[Row], color: str) -> None:
         row = list(rows)[-1]
         if name != named and row.max_error() > last * APART:
             last, named = row.max_error(), name
-            at = (last, row.rate)
-            axes.annotate(name, at, (2, 7), textcoords="offset points", color=color, size=9)
+            axes.annotate(name, (last, row.rate), (2, 7), textcoords="offset points", color=color, size=9)
 
 
-def _shown(rows: Iterable[Row]) -> list[Row]:
-    return [row for row in rows if SMALLEST < row.max_error() < LARGEST]
-
-
-OWN = "fastmech"
-
-#: Rows of the package's engine and of its yardstick at the same method and step.
-FUSED = "hand-fused"
+#: Families of the package, and of its engine's yardstick at the same method and step.
+OWN, FUSED = "fastmech", "hand-fused"
 
 #: Seconds that a call takes at least for the loop's own speed to show, not what stands around it.
 WORTH_COMPARING = 0.01
@@ -120,24 +109,16 @@ def own(rows: Iterable[Row]) -> list[Row]:
     return [row for row in rows if row.family.startswith(OWN)]
 
 
-def peers(rows: Iterable[Row]) -> dict[str, list[Row]]:
-    """Rows of everyone else but the yardstick, by family."""
-    found: dict[str, list[Row]] = {}
-    for row in rows:
-        if not row.family.startswith((OWN, FUSED)):
-            found.setdefault(row.family, []).append(row)
-    return found
-
-
 def equal_error(rows: list[Row], threads: int) -> list[str]:
     """The package's rate at each error, and how many times the rate of each peer that is."""
-    mine = own(rows)
-    first = ["fastmech, best method"]
-    for error in TARGETS:
-        best = fastest_at(mine, error)
-        first.append("-" if best is None else f"{best[1]:,.0f} ({best[0].removeprefix(OWN).strip()})")
-    lines = [first]
-    for family, theirs in peers(rows).items():
+    mine, peers = own(rows), dict[str, list[Row]]()
+    for row in rows:
+        if not row.family.startswith((OWN, FUSED)):
+            peers.setdefault(row.family, []).append(row)
+    known = [fastest_at(mine, error) for error in TARGETS]
+    told = ["-" if x is None else f"{x[1]:,.0f} ({x[0].removeprefix(OWN).strip()})" for x in known]
+    lines = [["fastmech, best method", *told]]
+    for family, theirs in peers.items():
         count = min(len(row.errors) for row in theirs)
         line = [family + (f" (first {count})" if count < len(mine[0].errors) else "")]
         for error in TARGETS:
@@ -188,29 +169,8 @@ def speed_up(rows: list[Row]) -> list[str]:
             ratio = (single.wall / single.trajectories) / (row.wall / row.trajectories)
             used = row.processor / row.wall
             lines.append(f"{row.family}, {row.setting} | {row.threads} | {ratio:.2f} | {used:.2f}")
-    if not lines:
-        return []
-    return [
-        "All threads over one, by wall time, and the cores that it got.",
-        "",
-        *table("integrator | threads | speed-up | cores used", lines),
-    ]
-
-
-def everything(rows: list[Row]) -> list[str]:
-    """Every row."""
-    head = (
-        "integrator | setting | threads | n | 1/s a core | 1/s wall | largest error | median error | "
-        "compared | first call [s]"
-    )
-    lines = []
-    for row in rows:
-        rates = (f"{row.trajectories / seconds:,.0f}" for seconds in (row.processor, row.wall))
-        lines.append(
-            f"{row.family} | {row.setting} | {row.threads} | {row.trajectories} | {' | '.join(rates)} | "
-            f"{row.max_error():.1e} | {row.median_error:.1e} | {len(row.errors)} | {row.first_call:.2f}"
-        )
-    return table(head, lines)
+    about = "All threads over one, by wall time, and the cores that it got."
+    return [about, "", *table("integrator | threads | speed-up | cores used", lines)] if lines else []
 
 
 def problem_section(problem: Problem, rows: list[Row]) -> list[str]:
@@ -219,7 +179,17 @@ def problem_section(problem: Problem, rows: list[Row]) -> list[str]:
     lines = [f"## {problem.name}: {problem.description}, to t = {problem.t_end:g} s", ""]
     for threads in sorted({row.threads for row in mine}):
         lines += equal_error([row for row in mine if row.threads == threads], threads)
-    return [*lines, *same_step(mine), *speed_up(mine), "Every setting:", "", *everything(mine)]
+    head = (
+        "integrator | setting | threads | n | 1/s a core | 1/s wall | largest error | median error | "
+        "compared | first call [s]"
+    )
+    everything = (
+        f"{r.family} | {r.setting} | {r.threads} | {r.trajectories} | {r.trajectories / r.processor:,.0f} | "
+        f"{r.trajectories / r.wall:,.0f} | {r.max_error():.1e} | {r.median_error:.1e} | {len(r.errors)} | "
+        f"{r.first_call:.2f}"
+        for r in mine
+    )
+    return [*lines, *same_step(mine), *speed_up(mine), "Every setting:", "", *table(head, everything)]
 
 
 def machine_sections(

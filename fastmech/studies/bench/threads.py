@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -21,11 +22,8 @@ from fastmech.studies.bench.measure import Problem, fast_starts, rest_starts
 from fastmech.studies.bench.package import AGAIN, prepared
 from fastmech.studies.reporting import TURNS, in_turns
 
-#: Trajectories of a call: tenths of a second to seconds of work.
-TRAJECTORIES = 32_768
-
-#: Turns of the yardstick's loop: about a third of a second.
-YARDSTICK = 500_000
+#: Trajectories of a call, tenths of a second to seconds of work; turns of the yardstick, a third of one.
+TRAJECTORIES, YARDSTICK = 32_768, 500_000
 
 #: From rest: method, step [s], fitted. From fast starts: method, step [s], fitted again.
 REST = (
@@ -38,7 +36,6 @@ REST = (
 )
 FAST = (("abm8", 0.028), ("abm10", 0.018))
 
-
 #: A run on so many threads.
 Run = Callable[[int], object]
 
@@ -48,11 +45,11 @@ def threads_study(quick: bool, stage: Stage) -> list[str]:
     many, turns, n = thread_count(None), 1 if quick else TURNS, 1024 if quick else TRAJECTORIES
     found = cases(n, YARDSTICK // 20 if quick else YARDSTICK)
     works = {(name, k): partial(run, k) for name, run in found.items() for k in sorted({1, many})}
-    seconds = in_turns(works, turns, stage("threads", len(works) * (turns + 1)), time.perf_counter)
-    ratios = {
-        name: [one / all_ for one, all_ in zip(seconds[name, 1], seconds[name, many], strict=True)]
-        for name in found
-    }
+    seconds, _ = in_turns(works, turns, stage("threads", len(works) * (turns + 1)), time.perf_counter)
+    rows = []
+    for name in found:
+        ratios = [one / all_ for one, all_ in zip(seconds[name, 1], seconds[name, many], strict=True)]
+        rows.append(f"{name} | {statistics.median(ratios):.2f} | {min(ratios):.2f} | {max(ratios):.2f}")
     return [
         "# Threads",
         "",
@@ -60,13 +57,7 @@ def threads_study(quick: bool, stage: Stage) -> list[str]:
         f"turn{'s' * (turns > 1)}, each on one thread and at once on all. The multiply-adds share nothing: "
         "what they fall short of the number of threads, the machine gave to others.",
         "",
-        *table(
-            "run | speed-up, median | least | greatest",
-            (
-                f"{name} | {statistics.median(r):.2f} | {min(r):.2f} | {max(r):.2f}"
-                for name, r in ratios.items()
-            ),
-        ),
+        *table("run | speed-up, median | least | greatest", rows),
     ]
 
 
@@ -74,7 +65,7 @@ def cases(n: int, turns: int) -> dict[str, Run]:
     """The yardstick and the engine's runs of ``n`` trajectories."""
     rest, fast = rest_starts(), fast_starts()
     again = [share * fast.t_end for share in AGAIN]
-    found = {"multiply-adds, one loop a thread": _arithmetic(turns)}
+    found: dict[str, Run] = {"multiply-adds, one loop a thread": partial(_arithmetic, turns)}
     for method, dt, fit in REST:
         name = f"{method}, dt = {dt:g} s{', `fit=True`' * fit}, from rest"
         found[name] = _ensemble(rest, n, {"method": method, "dt": dt, "fit": fit})
@@ -84,19 +75,13 @@ def cases(n: int, turns: int) -> dict[str, Run]:
     return found
 
 
-def _ensemble(problem: Problem, n: int, keywords: dict[str, object]) -> Run:
-    starts = np.resize(problem.starts, (n, problem.starts.shape[1]))
-    prepare = prepared(keywords)
+def _ensemble(problem: Problem, n: int, keywords: dict[str, Any]) -> Run:
+    starts, prepare = np.resize(problem.starts, (n, problem.starts.shape[1])), prepared(keywords)
     return lambda threads: prepare(problem, threads)(starts)
 
 
-def _arithmetic(turns: int) -> Run:
+def _arithmetic(turns: int, threads: int) -> object:
     """So many turns of the loop in all, shared among the threads."""
-    loop = multiply_adds()
-
-    def run(threads: int) -> object:
-        lanes = [np.ones(LANES) for _ in range(threads)]
-        with ThreadPoolExecutor(threads) as pool:
-            return list(pool.map(lambda x: loop(x, turns // threads, 0.5), lanes))
-
-    return run
+    loop, lanes = multiply_adds(), [np.ones(LANES) for _ in range(threads)]
+    with ThreadPoolExecutor(threads) as pool:
+        return list(pool.map(lambda x: loop(x, turns // threads, 0.5), lanes))

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fastmech.arrays import Floats
-from fastmech.ensembles.integrate import Trajectories, integrate
+from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import FAILURES, Status
 from fastmech.ensembles.system import System
@@ -81,14 +81,10 @@ def ensembles(when: float, span: float) -> tuple[Scene | System, Floats, Floats]
 def _beside(method: str, dt: float, when: float, span: float, repetitions: int) -> tuple[float, int, bool]:
     """The share, how many have failed, and whether the rest is the same to the bit."""
     what, *both = ensembles(when, span)
-    runs: dict[int, Trajectories] = {}
-
-    def run(kind: int) -> None:
-        runs[kind] = integrate(what, both[kind], span, dt, method, threads=1)
-
-    alone, beside = in_turns({kind: partial(run, kind) for kind in (0, 1)}, repetitions).values()
+    works = {k: partial(integrate, what, y, span, dt, method, threads=1) for k, y in enumerate(both)}
+    seconds, runs = in_turns(works, repetitions)
     least = np.finfo(np.float64).tiny
-    share = np.median([one / max(other, least) for one, other in zip(alone, beside, strict=True)])
+    share = np.median([one / max(other, least) for one, other in zip(*seconds.values(), strict=True)])
     healthy = np.flatnonzero(np.arange(NUMBER) % ONE_IN)
     same = np.array_equal(runs[0].y[:, healthy], runs[1].y[:, healthy], equal_nan=True)
     return float(share), int((runs[1].status != Status.OK).sum()), same

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 from decimal import Decimal
 from enum import StrEnum
 from fnmatch import fnmatchcase
@@ -148,30 +147,6 @@ def number(printed: str) -> float:
     return float(evaluate(printed.replace(" pi", "*pi")))
 
 
-@dataclass(frozen=True)
-class Judge:
-    """Compares prints with computed values; knows which misprints are proved."""
-
-    misprints: Collection[str]  #: keys of the misprints that the evidence confirms
-
-    def row(
-        self,
-        section: str,
-        place: str,
-        symbol: str,
-        unit: str,
-        printed: str,
-        computed: float | str,
-        *explanations: str,
-    ) -> Row:
-        """A row with its verdict; ``explanations``: keys of misprints that would explain a difference."""
-        verdict, see = compare(printed, computed), ""
-        if verdict == Verdict.DIFFERS:
-            see = next((key for key in explanations if key in self.misprints), "")
-            verdict = Verdict.MISPRINT if see else verdict
-        return Row(section, place, symbol, unit, printed, computed, verdict, see)
-
-
 def compare(printed: str, computed: float | str) -> Verdict:
     """Verdict of a print by itself."""
     if isinstance(computed, str):
@@ -180,3 +155,32 @@ def compare(printed: str, computed: float | str) -> Verdict:
         return Verdict.LEGIBLE if agrees_legibly(printed, computed) else Verdict.DIFFERS
     same = number(printed) == computed if "pi" in printed else agrees(printed, computed)
     return Verdict.AGREES if same else Verdict.DIFFERS
+
+
+def judged(
+    misprints: Collection[str],
+    section: str,
+    place: str,
+    symbol: str,
+    unit: str,
+    printed: str,
+    computed: float | str,
+    *explanations: str,
+) -> Row:
+    """A row with its verdict.
+
+    Args:
+        misprints: keys of the misprints that the evidence confirms.
+        section: of the paper.
+        place: case or part of it.
+        symbol: of the quantity.
+        unit: its unit.
+        printed: as printed.
+        computed: the computed value.
+        explanations: keys of misprints that would explain a difference.
+    """
+    verdict, see = compare(printed, computed), ""
+    if verdict == Verdict.DIFFERS:
+        see = next((key for key in explanations if key in misprints), "")
+        verdict = Verdict.MISPRINT if see else verdict
+    return Row(section, place, symbol, unit, printed, computed, verdict, see)

@@ -72,19 +72,19 @@ class Computed:
     formulations_differ: Floats  #: largest differences between the formulations [rad, rad/s], (4,)
 
 
-def compute(printed: Printed, *, threads: int | None = None) -> Computed:
+def compute(printed: Printed) -> Computed:
     """Compute tables and figures; the print is used for the numbering of the cases only."""
     t = np.linspace(0.0, MOTION_SPAN, round(MOTION_SPAN / OUTPUT) + 1)
     motion = energy_balance(PAPER_SCENE, START, t, dt=STEP, method=METHOD)
-    canonical = integrate(
-        PAPER_SCENE, START, dt=STEP, method=METHOD, t_eval=t, formulation="hamilton", threads=threads
-    ).y[:, 0]
+    canonical = integrate(PAPER_SCENE, START, dt=STEP, method=METHOD, t_eval=t, formulation="hamilton").y[
+        :, 0
+    ]
     equilibria = find_equilibria(STATIC_SCENE)
     return Computed(
         count=len(equilibria),
         certificate=equilibria.certificate,
         cases=tuple(
-            _case(number, nearest(equilibria, printed["table_2"][name]), threads)
+            _case(number, nearest(equilibria, printed["table_2"][name]))
             for number, name in enumerate(CASES, start=1)
         ),
         motion=motion,
@@ -99,11 +99,9 @@ def nearest(equilibria: Equilibria, angles: Printed) -> Equilibrium:
     return min(equilibria, key=lambda e: np.hypot(np.sin((e.phi - phi) / 2), np.sin((e.theta - theta) / 2)))
 
 
-def _case(number: int, equilibrium: Equilibrium, threads: int | None) -> Case:
+def _case(number: int, equilibrium: Equilibrium) -> Case:
     t = np.linspace(0.0, DISTURBED_SPAN, round(DISTURBED_SPAN / OUTPUT) + 1)
-    disturbed = disturbed_motion(
-        STATIC_SCENE, equilibrium, DISTURBANCE, t, dt=STEP, method=METHOD, threads=threads
-    )
+    disturbed = disturbed_motion(STATIC_SCENE, equilibrium, DISTURBANCE, t, dt=STEP, method=METHOD)
     size = size_at(STATIC_SCENE, equilibrium.phi, equilibrium.theta)
     return Case(
         number=number,

@@ -1,19 +1,23 @@
-"""The report's tables and figures as labelled data, and all its pictures with their captions."""
+"""The report's tables and figures as labelled data, and all its pictures with their captions.
+
+Names, units, titles and captions stand in ``figures.toml``.
+"""
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from importlib import resources
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
 from fastmech.mechanism.geometry import constraints, positions
 from fastmech.mechanism.lagrange import potential_energy, potential_gradient
 from fastmech.plots.equilibria import draw_mechanism, drawing_of, legend_handles
-from fastmech.plots.style import LINES, PALETTE, legend_below, new_figure, style
+from fastmech.plots.style import LINES, PALETTE, entry, legend_below, new_figure, style
 from fastmech.results import Dataset, Variable
 from fastmech.studies.paper.compare import HEADINGS, Row, Verdict
 from fastmech.studies.paper.compute import (
@@ -30,71 +34,40 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-TABLES = ("Table 1", "Table 2", "Table 3", "Table 4")
-#: Cases that each figure of disturbed motion shows.
-DISTURBED = {"figure_7": (1, 3), "figure_8": (1, 3), "figure_9": (2,), "figure_10": (4,), "figure_11": (4,)}
-GRID = 181
+ABOUT: dict[str, Any] = tomllib.loads(
+    resources.files(__package__).joinpath("figures.toml").read_text(encoding="utf-8")
+)
 
-_DISTURBANCES = {
-    "xi_1": ("rad", "disturbance of phi"),
-    "xi_2": ("rad", "disturbance of theta"),
-    "eta_1": ("rad/s", "disturbance of phi'"),
-    "eta_2": ("rad/s", "disturbance of theta'"),
-}
+#: Points a side of the potential's grid.
+GRID = 181
 
 
 def all_datasets(computed: Computed, rows: Sequence[Row]) -> dict[str, Dataset]:
     """One dataset for every table and figure, and the rows of all printed numbers."""
-    tables = {
-        name.lower().replace(" ", "_"): rows_dataset([row for row in rows if row.section == name])
-        for name in TABLES
-    }
     motion = computed.motion
     points = positions(PAPER_SCENE, motion.y)
-    constrained = enumerate(constraints(PAPER_SCENE, points), start=1)
     p_phi, p_theta = computed.momenta.T
-    over_time: dict[str, dict[str, tuple[str, Floats]]] = {
-        "figure_2": {"phi": ("rad", motion.y[:, 0]), "theta": ("rad", motion.y[:, 1])},
-        "figure_3": {name: ("m", value) for name, value in points._asdict().items()},
-        "figure_4": {f"f_{i}": ("m" if i == 3 else "m2", residual) for i, residual in constrained},
-        "figure_5": {"p_phi": ("kg m2/s", p_phi), "p_theta": ("kg m2/s", p_theta)},
-        "energy_balance": {
-            "kinetic_energy": ("J", motion.kinetic),
-            "potential_energy": ("J", motion.potential),
-            "work_damper": ("J", motion.work_damper),
-            "work_force": ("J", motion.work_force),
-            "energy_residual": ("J", motion.residual),
-        },
+    values = points._asdict() | {"phi": motion.y[:, 0], "theta": motion.y[:, 1], "p_phi": p_phi}
+    values |= {f"f_{i}": f for i, f in enumerate(constraints(PAPER_SCENE, points), start=1)}
+    values |= {"p_theta": p_theta, "kinetic_energy": motion.kinetic, "potential_energy": motion.potential}
+    values |= {"work_damper": motion.work_damper, "work_force": motion.work_force}
+    values |= {"energy_residual": motion.residual}
+    time = {"time": Variable(("time",), motion.t, "s", "time")}
+    moving = {
+        section: Dataset(time | {n: Variable(("time",), values[n], *ABOUT["variables"][n]) for n in names})
+        for section, names in ABOUT["over_time"].items()
     }
-    moving = {name: _over_time(computed, values) for name, values in over_time.items()}
-    balance = moving.pop("energy_balance")
+    last = {"energy_balance": moving.pop("energy_balance"), "printed_numbers": rows_dataset(rows)}
+    tables = {_file(n): rows_dataset([row for row in rows if row.section == n]) for n in ABOUT["tables"]}
     disturbed = {
-        name: _disturbed([computed.cases[number - 1] for number in numbers])
-        for name, numbers in DISTURBED.items()
+        name: _disturbed([computed.cases[number - 1] for number in about["cases"]])
+        for name, about in ABOUT["disturbed"].items()
     }
-    resting = {"figure_6": _equilibria(computed.cases)}
-    last = {"energy_balance": balance, "printed_numbers": rows_dataset(rows)}
-    return tables | moving | resting | disturbed | last
+    return tables | moving | {"figure_6": _equilibria(computed.cases)} | disturbed | last
 
 
-_LONG_NAMES = {
-    "phi": "angle phi",
-    "theta": "angle theta",
-    "p_phi": "generalized momentum of phi, canonical equations",
-    "p_theta": "generalized momentum of theta, canonical equations",
-    "kinetic_energy": "kinetic energy T",
-    "potential_energy": "potential energy Pi",
-    "work_damper": "work of the damper since t = 0",
-    "work_force": "work of the force since t = 0",
-    "energy_residual": "change of T + Pi less both works",
-    **{f"f_{i}": f"residual of constraint ({i + 1})" for i in range(1, 5)},
-    **{f"{axis}{i}": f"coordinate {axis} of M{i}" for axis in "xy" for i in (1, 2, 3)},
-}
-
-
-def _over_time(computed: Computed, values: dict[str, tuple[str, Floats]]) -> Dataset:
-    moving = {name: Variable(("time",), v, unit, _LONG_NAMES[name]) for name, (unit, v) in values.items()}
-    return Dataset({"time": Variable(("time",), computed.motion.t, "s", "time")} | moving)
+def _file(table: str) -> str:
+    return table.lower().replace(" ", "_")
 
 
 def _numbers(cases: Sequence[Case]) -> Variable:
@@ -121,7 +94,7 @@ def _equilibria(cases: Sequence[Case]) -> Dataset:
             "phi_st": Variable(along, rest[:, 0], "rad", "angle phi at rest"),
             "theta_st": Variable(along, rest[:, 1], "rad", "angle theta at rest"),
             **columns("case", found, {"energy": ("J", "U at rest"), "kind": ("1", "kind of equilibrium")}),
-            **{name: Variable(along, x, "m", f"{_LONG_NAMES[name]} at rest") for name, x in points},
+            **{n: Variable(along, x, "m", f"{ABOUT['variables'][n][1]} at rest") for n, x in points},
         }
     )
 
@@ -130,7 +103,7 @@ def _disturbed(cases: Sequence[Case]) -> Dataset:
     along = ("case", "time")
     variables = {"case": _numbers(cases), "time": Variable(("time",), cases[0].disturbed.t, "s", "time")}
     for which in ("nonlinear", "linearized"):
-        for i, (name, (unit, long_name)) in enumerate(_DISTURBANCES.items()):
+        for i, (name, (unit, long_name)) in enumerate(ABOUT["disturbances"].items()):
             data = np.stack([getattr(case.disturbed, which)[:, 0, i] for case in cases])
             variables[f"{name}_{which}"] = Variable(along, data, unit, f"{long_name}, {which} equations")
         norm, about = np.stack([getattr(case, f"norm_{which}") for case in cases]), "size of the disturbance"
@@ -141,26 +114,11 @@ def _disturbed(cases: Sequence[Case]) -> Dataset:
     return Dataset(variables)
 
 
-#: Columns of the printed numbers.
-_ROWS = {
-    "section": ("1", "where it is printed"),
-    "place": ("1", "case or part"),
-    "symbol": ("1", "symbol"),
-    "unit": ("1", "unit of the values"),
-    "printed": ("1", "as printed, * for lost characters"),
-    "word": ("1", "the computed word, for words"),
-    "verdict": ("1", "what the comparison came to"),
-    "see": ("1", "key of the misprint that explains it"),
-    "value": ("1", "value in its unit, NaN for words"),
-    "difference": ("1", "computed less printed in that unit"),
-}
-_ROW_NAMES = {"word": "computed_text", "value": "computed"}
-
-
 def rows_dataset(rows: Sequence[Row]) -> Dataset:
     """Rows of printed against computed values."""
-    found = {_ROW_NAMES.get(name, name): column for name, column in columns("row", rows, _ROWS).items()}
-    return Dataset(found, {"disagreeing": sum(row.verdict == Verdict.DIFFERS for row in rows)})
+    found, names = columns("row", rows, ABOUT["rows"]), {"word": "computed_text", "value": "computed"}
+    about = {names.get(name, name): column for name, column in found.items()}
+    return Dataset(about, {"disagreeing": sum(row.verdict == Verdict.DIFFERS for row in rows)})
 
 
 ROW_HEIGHT = 0.27  #: inch
@@ -216,7 +174,6 @@ CURVES = (
 def draw_potential(data: Dataset) -> Figure:
     """Figure 6 (a): contours of U = Pi - F x2, both curves of (20) and their intersections."""
     from matplotlib import patheffects
-    from matplotlib.lines import Line2D
     from matplotlib.ticker import MaxNLocator
 
     with style():
@@ -231,7 +188,7 @@ def draw_potential(data: Dataset) -> Figure:
             line = axes.contour(phi, theta, data[name].data.T, levels=[0.0], colors=[colour])
             line.set(linestyles=dashes, linewidths=2.2, path_effects=halo)
             label = rf"$\partial U/\partial{angle} = 0$, {place} of (20)"
-            handles.append(Line2D([], [], color=colour, ls=dashes, lw=2.2, label=label))
+            handles.append(entry(label, color=colour, ls=dashes, lw=2.2))
         handles += _mark_equilibria(axes, data)
         _angle_axes(axes)
         axes.set_title("Fig. 6 (a)  Static equilibria: where both curves cross (F = 100 N)")
@@ -240,20 +197,16 @@ def draw_potential(data: Dataset) -> Figure:
 
 
 def _mark_equilibria(axes: Axes, data: Dataset) -> list[Any]:
-    from matplotlib.lines import Line2D
-
     box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
     look: dict[str, Any] = {"mfc": "white", "mec": "black", "ms": 11, "ls": "none"}
-    places = zip(
-        data["case"].data, data["phi_st"].data, data["theta_st"].data, data["kind"].data, strict=True
-    )
-    for number, phi, theta, kind in places:
+    names = ("case", "phi_st", "theta_st", "kind")
+    for number, phi, theta, kind in zip(*(data[name].data for name in names), strict=True):
         axes.plot(phi, theta, KINDS[kind][0], zorder=5, **look)
         offset = (0, 14) if theta < 0.7 * np.pi else (0, -22)
         text: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "zorder": 6, "bbox": box}
         axes.annotate(f"Case {number}", (phi, theta), offset, **text)
     present = [kind for kind in KINDS if kind in set(data["kind"].data)]
-    return [Line2D([], [], marker=KINDS[kind][0], label=KINDS[kind][1], **look) for kind in present]
+    return [entry(KINDS[kind][1], marker=KINDS[kind][0], **look) for kind in present]
 
 
 def _angle_axes(axes: Axes) -> None:
@@ -299,63 +252,37 @@ def degrees(angle: float) -> str:
 
 TIME = "time t [s]"
 
-_POINTS = {1: "point $M_1$", 2: "point $M_2$", 3: "slider $M_3$"}
 
-#: Title of a figure, and its panels: label of the ordinate, names of what is drawn.
-PANELS: dict[str, tuple[str, dict[str, dict[str, str]]]] = {
-    "figure_2": (
-        "Fig. 2  Generalized coordinates, force decaying as F₀ exp(−αt)",
-        {"angle [rad]": {"phi": r"$\varphi$", "theta": r"$\theta$"}},
-    ),
-    "figure_3": (
-        "Fig. 3  Coordinates of the points; the slider stays on its guide, y₃ = 0",
-        {f"{axis} [m]": {f"{axis}{i}": name for i, name in _POINTS.items()} for axis in "xy"},
-    ),
-    "figure_5": (
-        "Fig. 5  Generalized momenta, from Hamilton's equations",
-        {"generalized momentum [kg m²/s]": {"p_phi": r"$p_\varphi$", "p_theta": r"$p_\theta$"}},
-    ),
-}
-
-#: The constraints of Figure 4.
-CONSTRAINTS = {
-    "f_1": "(2)  $x_1^2 + y_1^2 - l^2$",
-    "f_2": "(3)  $(x_2-x_1)^2 + (y_2-y_1)^2 - l^2$",
-    "f_3": "(4)  $y_3$",
-    "f_4": "(5)  $(x_3-x_1)^2 + (y_3-y_1)^2 - 4l^2$",
-}
-
-
-def draw_over_time(name: str, data: Dataset) -> Figure:
-    """Figures 2, 3 and 5."""
-    title, panels = PANELS[name]
+def draw_over_time(about: Mapping[str, Any], data: Dataset) -> Figure:
+    """Figures 2, 3 and 5: ``about`` has title and panels."""
+    panels = about["panels"]
     with style():
         figure = new_figure(7.2, 2.8 + 1.4 * len(panels))
         rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         for axes, (label, lines) in zip(rows, panels.items(), strict=True):
-            for dashes, (line, about) in zip(("-", "-", "--"), lines.items(), strict=False):
-                axes.plot(data["time"].data, data[line].data, dashes, label=about)
+            for dashes, (line, told) in zip(("-", "-", "--"), lines.items(), strict=False):
+                axes.plot(data["time"].data, data[line].data, dashes, label=told)
             axes.axhline(0.0, color="0.4", lw=0.8, zorder=1.5)
             axes.set_ylabel(label)
             axes.margins(x=0)
-        rows[0].set_title(title)
+        rows[0].set_title(about["title"])
         rows[-1].set_xlabel(TIME)
         legend_below(figure, rows[0], len(lines))
     return figure
 
 
-def draw_constraints(data: Dataset) -> Figure:
+def draw_constraints(about: Mapping[str, Any], data: Dataset) -> Figure:
     """Figure 4: residuals of the constraints (2)-(5)."""
     with style():
         figure = new_figure(7.2, 6.4)
         rows = figure.subplots(4, 1, sharex=True, sharey=True)
-        for axes, (name, label), colour in zip(rows, CONSTRAINTS.items(), LINES, strict=False):
+        for axes, (name, label), colour in zip(rows, about["constraints"].items(), LINES, strict=False):
             axes.plot(data["time"].data, data[name].data / 1e-15, color=colour, lw=0.7)
             unit = data[name].units.replace("m2", "m²")
             axes.set_title(f"{label}", loc="left", fontsize=10)
             axes.set_ylabel(f"10⁻¹⁵ {unit}")
             axes.margins(x=0)
-        figure.suptitle("Fig. 4  Residuals of the constraints: rounding of double precision")
+        figure.suptitle(about["title"])
         rows[-1].set_xlabel(TIME)
     return figure
 
@@ -383,30 +310,23 @@ def draw_disturbed(cases: Sequence[Case], title: str, *, linearized: bool) -> Fi
 
 def _draw_angles(axes: Axes, case: Case, linearized: bool) -> None:
     t, nonlinear, linear = case.disturbed.t, case.disturbed.nonlinear[:, 0], case.disturbed.linearized[:, 0]
-    shown = _span(t, nonlinear, linear) if linearized else t[-1]
-    inside = t <= shown
+    inside = t <= (_span(t, nonlinear, linear) if linearized else t[-1])
     broad = 3.4 if linearized else 1.8
     for i, (name, colour) in enumerate(zip(ANGLES, (PALETTE["sky"], PALETTE["orange"]), strict=True)):
         axes.plot(t[inside], nonlinear[inside, i], color=colour, lw=broad, label=f"{name}, nonlinear")
-    if linearized:
-        for i, (name, colour) in enumerate(
-            zip(ANGLES, (PALETTE["blue"], PALETTE["vermillion"]), strict=True)
-        ):
-            axes.plot(t[inside], linear[inside, i], "--", color=colour, lw=1.5, label=f"{name}, linearized")
-        if case.verdict == "unstable":
-            axes.set_ylim(_limits(nonlinear[inside, :2]))
+    both = zip(ANGLES, (PALETTE["blue"], PALETTE["vermillion"]), strict=True)
+    for i, (name, colour) in enumerate(both if linearized else ()):
+        axes.plot(t[inside], linear[inside, i], "--", color=colour, lw=1.5, label=f"{name}, linearized")
+    if linearized and case.verdict == "unstable":
+        shown = np.append(nonlinear[inside, :2], 0.0)
+        room = 0.15 * np.ptp(shown)
+        axes.set_ylim(shown.min() - room, shown.max() + room)
     axes.axhline(0.0, color="0.4", lw=0.8)
-    axes.set(xlabel="time t [s]", ylabel="disturbance [rad]", title=case.title)
+    axes.set(xlabel=TIME, ylabel="disturbance [rad]", title=case.title)
     axes.margins(x=0)
 
 
-def _limits(values: NDArray[np.float64]) -> tuple[float, float]:
-    low, high = min(0.0, float(values.min())), max(0.0, float(values.max()))
-    room = 0.15 * (high - low)
-    return low - room, high + room
-
-
-def _span(t: NDArray[np.float64], nonlinear: NDArray[np.float64], linear: NDArray[np.float64]) -> float:
+def _span(t: Floats, nonlinear: Floats, linear: Floats) -> float:
     """Time to show: twice as long as the linearized angles stay in the nonlinear one's range [s]."""
     gone = np.max(np.abs(linear[:, :2]), axis=1) > GROWTH * np.max(np.abs(nonlinear[:, :2]))
     return float(min(t[-1], 2.0 * t[np.argmax(gone)])) if gone.any() else float(t[-1])
@@ -429,11 +349,7 @@ def _draw_roots(axes: Axes, case: Case) -> None:
             axes.annotate(text, (root.real, root.imag), (0, 11), textcoords="offset points", **look)
     axes.set(xlim=(-reach, reach), ylim=(-height, height), xlabel="Re λ [1/s]", ylabel="Im λ [1/s]")
     unstable = int(np.sum(roots.real > 0))
-    axes.set_title(
-        "no root on the right"
-        if not unstable
-        else f"{unstable} root{'s' if unstable > 1 else ''} on the right"
-    )
+    axes.set_title(f"{unstable or 'no'} root{'s' * (unstable > 1)} on the right")
 
 
 def draw_norms(cases: Sequence[Case]) -> Figure:
@@ -447,7 +363,7 @@ def draw_norms(cases: Sequence[Case]) -> Figure:
         left.set(title="nonlinear equations", ylabel="size of the disturbance [rad]", ylim=(3e-4, 30.0))
         right.set_title("linearized equations")
         for axes in (left, right):
-            axes.set_xlabel("time t [s]")
+            axes.set_xlabel(TIME)
             axes.margins(x=0)
         figure.suptitle("Norm of the disturbance over time")
         legend_below(figure, left, 4)
@@ -463,45 +379,29 @@ class Picture(NamedTuple):
     draw: Callable[[], Figure]
 
 
-#: Titles of the tables, and of the figures of disturbed motion.
-TITLES = {
-    "Table 1": "Numerical values",
-    "Table 2": "Static equilibria [rad]",
-    "Table 3": "Hessian of U = Π − F x₂ at the equilibria",
-    "Table 4": "Characteristic polynomials, with the sign of the print",
-    "figure_7": "Cases 1 and 3: disturbed motion and roots of the polynomial",
-    "figure_8": "Cases 1 and 3: nonlinear and linearized equations",
-    "figure_9": "Case 2: nonlinear and linearized equations, roots of the polynomial",
-    "figure_10": "Case 4: disturbed motion and roots of the polynomial",
-    "figure_11": "Case 4: nonlinear and linearized equations",
-}
-_ONLY_NONLINEAR = ("figure_7", "figure_10")
 _KICK = "After the disturbance ξ1 = 0.1 rad, η1 = 0.1 rad/s."
 
 
 def table_pictures(rows: Sequence[Row]) -> list[Picture]:
     """Tables 1 to 4."""
-    pictures = []
-    for name in TABLES:
-        own = [row for row in rows if row.section == name]
-        draw = partial(draw_table, f"{name}  {TITLES[name]}", own)
-        pictures.append(Picture(name.lower().replace(" ", "_"), name, TITLES[name], draw))
-    return pictures
+    return [
+        Picture(
+            _file(name),
+            name,
+            title,
+            partial(draw_table, f"{name}  {title}", [row for row in rows if row.section == name]),
+        )
+        for name, title in ABOUT["tables"].items()
+    ]
 
 
 def figure_pictures(computed: Computed, data: Mapping[str, Dataset]) -> list[Picture]:
     """Figures 2 to 11 and the norm of the disturbances."""
     start = f"From Table 1's start with the decaying force, {MOTION_SPAN:g} s."
-    over_time = {
-        "figure_2": "Generalized coordinates.",
-        "figure_3": "Coordinates of the points.",
-        "figure_4": "Left sides of the constraints (2) to (5), of (2) as corrected.",
-        "figure_5": "Generalized momenta, from the canonical equations.",
-    }
     pictures = []
-    for name, caption in over_time.items():
-        draw = partial(draw_over_time, name) if name in PANELS else draw_constraints
-        pictures.append(Picture(name, f"Figure {name[-1]}", f"{caption} {start}", partial(draw, data[name])))
+    for name, about in ABOUT["motion"].items():
+        draw = partial(draw_over_time if "panels" in about else draw_constraints, about, data[name])
+        pictures.append(Picture(name, f"Figure {name[-1]}", f"{about['caption']} {start}", draw))
     crossings = (
         "Potential under the constant force, both curves of (20), and the equilibria at their crossings."
     )
@@ -510,13 +410,12 @@ def figure_pictures(computed: Computed, data: Mapping[str, Dataset]) -> list[Pic
         Picture("figure_6a", "Figure 6 (a)", crossings, partial(draw_potential, data["figure_6"])),
         Picture("figure_6b", "Figure 6 (b)", scale, partial(draw_positions, computed.cases)),
     ]
-    for name, numbers in DISTURBED.items():
-        number, cases = name.removeprefix("figure_"), [computed.cases[case - 1] for case in numbers]
-        linearized, caption = name not in _ONLY_NONLINEAR, f"{TITLES[name]}. {_KICK}"
+    for name, about in ABOUT["disturbed"].items():
+        number, linearized = name.removeprefix("figure_"), about["linearized"]
+        cases, caption = [computed.cases[case - 1] for case in about["cases"]], f"{about['title']}. {_KICK}"
         if linearized and any(case.verdict == "unstable" for case in cases):
             caption += " The linearized motion leaves the picture; the time shown is twice as long."
-        title = f"Fig. {number}  {TITLES[name]}"
-        draw = partial(draw_disturbed, cases, title, linearized=linearized)
+        draw = partial(draw_disturbed, cases, f"Fig. {number}  {about['title']}", linearized=linearized)
         pictures.append(Picture(name, f"Figure {number}", caption, draw))
     norm = (
         "Size of the disturbance in the kinetic-energy norm (radians of θ): it falls to zero in the stable "

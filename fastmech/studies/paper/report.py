@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError
 from fastmech.plots.style import png
 from fastmech.reports import Stage, no_stage, table, to_html
-from fastmech.results import scene_parameters
-from fastmech.store.provenance import provenance
-from fastmech.store.write import check_writable, write_results
+from fastmech.store.write import check_writable
 from fastmech.studies.paper.compare import HEADINGS, Row, Verdict, load_printed
-from fastmech.studies.paper.compute import METHOD, PAPER_SCENE, STEP, Computed, compute
+from fastmech.studies.paper.compute import METHOD, PAPER_SCENE, STEP, Case, Computed, compute
 from fastmech.studies.paper.figures import Picture, all_datasets, figure_pictures, table_pictures
 from fastmech.studies.paper.misprints import Misprint, candidates
 from fastmech.studies.paper.rows import Check, Guess, all_checks, all_rows, parameters_used
+from fastmech.studies.reporting import write_data
 
 TITLE = "The source paper, computed again"
 
@@ -43,14 +42,13 @@ def report_text(
     confirmed = [item for item in misprints if item.confirmed]
     right = [item for item in misprints if not item.confirmed]
     places = {item.key: item.place for item in misprints}
-    lines = [
-        f"# {TITLE}",
-        "",
-        *_summary(computed, rows, confirmed, checks),
-        "",
-        "## Printed against computed",
-        "",
-        *_rows(rows, places),
+    lines = [f"# {TITLE}", "", *_summary(computed, rows, confirmed, checks), ""]
+    lines += ["## Printed against computed", ""]
+    for section in dict.fromkeys(row.section for row in rows):
+        lines += [f"### {section}, printed numbers", ""]
+        lines += [_NOTES[section], ""] if section in _NOTES else []
+        lines += table(HEADINGS, (_row(row, places) for row in rows if row.section == section), (0, 1, 2, 6))
+    lines += [
         "## Misprints",
         "",
         "A place counts as misprinted only if each measure of the print exceeds the tolerance and the same "
@@ -61,9 +59,17 @@ def report_text(
     if right:
         lines += ["## Suspected, but printed rightly", ""]
         lines += [*(f"- {item.place}: {item.error}" for item in right), ""]
-    lines += ["## Parameters used", "", *_guesses(guesses)]
-    lines += ["## Checks of the computation", "", *_checks(checks)]
-    lines += ["## Equilibria", "", *_equilibria(computed)]
+    lines += ["## Parameters used", ""]
+    lines += ["Angles of Table 2 that come out to the printed digit with each choice of c2 and g:", ""]
+    choices = (f"{guess.c2} | {guess.g} | {guess.agreeing} of {guess.total}" for guess in guesses)
+    lines += table("c2 [N/m] | g [m/s²] | Agreeing angles", choices, ())
+    promises = (
+        f"{c.name} | {c.value:.2g} | {c.limit:.1g} | {c.unit} | {'passed' if c.passed else '**failed**'}"
+        for c in checks
+    )
+    lines += ["## Checks of the computation", ""]
+    lines += table("Check | Value | Limit | Unit | Result", promises, (0, 3, 4))
+    lines += ["## Equilibria", "", *_equilibria(computed.cases)]
     lines += ["## Figures", "", "Spans are not printed in the paper; those here show decay or escape.", ""]
     for name, heading, caption, _ in figures:
         lines += [f"### {heading}", "", f"![{heading}]({name}.png)", "", caption, ""]
@@ -72,53 +78,32 @@ def report_text(
 
 def _summary(
     computed: Computed, rows: Sequence[Row], confirmed: Sequence[Misprint], checks: Sequence[Check]
-) -> Iterator[str]:
-    numbers = [row for row in rows if row.is_number]
-    words = [row for row in rows if not row.is_number]
-
-    def count(verdict: Verdict) -> int:
-        return sum(row.verdict == verdict for row in numbers)
-
-    same = sum(row.verdict.good for row in words)
-    yield (
-        f"Of **{len(numbers)} printed numbers**, {count(Verdict.AGREES)} agree to the printed digit, "
-        f"{count(Verdict.LEGIBLE)} in every legible digit, {count(Verdict.ROUNDING)} is a rounding of the "
-        f"value that was used, **{count(Verdict.MISPRINT)} are misprints** and "
-        f"**{count(Verdict.DIFFERS)} differ unexplained**. "
-        f"{same} of {len(words)} printed verdicts say the same as the computation."
-    )
-    yield ""
-    yield f"{len(confirmed)} misprints are proved, formulas included:"
-    yield ""
-    yield from (f"- [{item.place}](#{_anchor(item.key)}): {item.error}" for item in confirmed)
-    yield ""
-    kept = sum(check.passed for check in checks)
-    yield (
-        f"{kept} of {len(checks)} checks of the computation itself are passed; on the equilibria: "
-        f"{computed.certificate.sentence}. Motions: {METHOD}, step {STEP:g} s."
-    )
+) -> list[str]:
+    numbers = Counter(row.verdict for row in rows if row.is_number)
+    words = [row.verdict.good for row in rows if not row.is_number]
+    return [
+        f"Of **{numbers.total()} printed numbers**, {numbers[Verdict.AGREES]} agree to the printed digit, "
+        f"{numbers[Verdict.LEGIBLE]} in every legible digit, {numbers[Verdict.ROUNDING]} is a rounding of "
+        f"the value that was used, **{numbers[Verdict.MISPRINT]} are misprints** and "
+        f"**{numbers[Verdict.DIFFERS]} differ unexplained**. "
+        f"{sum(words)} of {len(words)} printed verdicts say the same as the computation.",
+        "",
+        f"{len(confirmed)} misprints are proved, formulas included:",
+        "",
+        *(f"- [{item.place}](#{_anchor(item.key)}): {item.error}" for item in confirmed),
+        "",
+        f"{sum(check.passed for check in checks)} of {len(checks)} checks of the computation itself are "
+        f"passed; on the equilibria: {computed.certificate.sentence}. Motions: {METHOD}, step {STEP:g} s.",
+    ]
 
 
 def _anchor(key: str) -> str:
     return key.replace("_", "-")
 
 
-def _rows(rows: Sequence[Row], places: dict[str, str]) -> Iterator[str]:
-    for section in dict.fromkeys(row.section for row in rows):
-        yield f"### {section}, printed numbers"
-        yield ""
-        if section in _NOTES:
-            yield _NOTES[section]
-            yield ""
-        own = [_row(row, places) for row in rows if row.section == section]
-        yield from table(HEADINGS, own, (0, 1, 2, 6))
-
-
 def _row(row: Row, places: dict[str, str]) -> list[str]:
-    texts = list(row.cells)
-    for i in (0, 1, 3):
-        # Markdown would read the stars as emphasis.
-        texts[i] = f"`{texts[i]}`" if "*" in texts[i] else texts[i]
+    # Markdown would read the stars as emphasis.
+    texts = [f"`{text}`" if "*" in text and i in (0, 1, 3) else text for i, text in enumerate(row.cells)]
     if row.verdict == Verdict.MISPRINT:
         texts[-1] = f"**misprint**: see [{places[row.see]}](#{_anchor(row.see)})"
     if row.verdict == Verdict.DIFFERS:
@@ -126,56 +111,37 @@ def _row(row: Row, places: dict[str, str]) -> list[str]:
     return texts
 
 
-def _misprint(item: Misprint) -> Iterator[str]:
-    # Plain Markdown has no anchors of its own.
-    yield f'<a id="{_anchor(item.key)}"></a>'
-    yield ""
-    yield f"### {item.place}: {item.error}"
-    yield ""
-    yield f"- printed: `{item.printed}`"
-    yield f"- corrected: `{item.corrected}`"
-    yield ""
-    yield from table(
-        "Measure | Unit | As printed | Corrected | Tolerance",
-        (
-            f"{e.measure} | {e.unit} | {e.printed:.3g} | {e.corrected:.2g} | {e.tolerance:.1g}"
-            for e in item.evidence
-        ),
-        (0, 1),
+def _misprint(item: Misprint) -> list[str]:
+    evidence = (
+        f"{e.measure} | {e.unit} | {e.printed:.3g} | {e.corrected:.2g} | {e.tolerance:.1g}"
+        for e in item.evidence
     )
+    return [
+        f'<a id="{_anchor(item.key)}"></a>',  # plain Markdown has no anchors of its own
+        "",
+        f"### {item.place}: {item.error}",
+        "",
+        f"- printed: `{item.printed}`",
+        f"- corrected: `{item.corrected}`",
+        "",
+        *table("Measure | Unit | As printed | Corrected | Tolerance", evidence, (0, 1)),
+    ]
 
 
-def _guesses(guesses: Sequence[Guess]) -> Iterator[str]:
-    yield "Angles of Table 2 that come out to the printed digit with each choice of c2 and g:"
-    yield ""
-    rows = (f"{guess.c2} | {guess.g} | {guess.agreeing} of {guess.total}" for guess in guesses)
-    yield from table("c2 [N/m] | g [m/s²] | Agreeing angles", rows, ())
-
-
-def _checks(checks: Sequence[Check]) -> list[str]:
-    rows = (
-        f"{c.name} | {c.value:.2g} | {c.limit:.1g} | {c.unit} | {'passed' if c.passed else '**failed**'}"
-        for c in checks
-    )
-    return table("Check | Value | Limit | Unit | Result", rows, (0, 3, 4))
-
-
-def _equilibria(computed: Computed) -> Iterator[str]:
-    rows = []
-    for case in computed.cases:
+def _equilibria(cases: Sequence[Case]) -> list[str]:
+    rows, verdicts = [], []
+    for case in cases:
         e, c = case.equilibrium, case.classification
-        roots = ", ".join(_complex(root) for root in c.eigenvalues if root.imag >= 0.0)
+        roots = ", ".join(
+            f"{root.real:.4f}" + (f" ± {root.imag:.4f}i" if root.imag else "")
+            for root in c.eigenvalues
+            if root.imag >= 0.0
+        )
         rows.append(
             f"Case {case.number} | {e.phi:.10f} | {e.theta:.10f} | {e.energy:.4f} | {e.kind} | {roots}"
         )
-    yield from table("Case | φ [rad] | θ [rad] | U [J] | Kind | Roots [1/s]", rows, (0, 4, 5))
-    for case in computed.cases:
-        yield f"- Case {case.number}, {case.classification.verdict}: {case.classification.explanation}."
-    yield ""
-
-
-def _complex(root: complex) -> str:
-    return f"{root.real:.4f}" + (f" ± {root.imag:.4f}i" if root.imag else "")
+        verdicts.append(f"- Case {case.number}, {c.verdict}: {c.explanation}.")
+    return [*table("Case | φ [rad] | θ [rad] | U [J] | Kind | Roots [1/s]", rows, (0, 4, 5)), *verdicts, ""]
 
 
 DATA = "paper.h5"
@@ -202,7 +168,7 @@ class PaperReport:
         return explained and all(check.passed for check in self.checks)
 
 
-def write_paper(out: Path, *, threads: int | None = None, stage: Stage = no_stage) -> PaperReport:
+def write_paper(out: Path, *, stage: Stage = no_stage) -> PaperReport:
     """Compute the paper's tables and figures and set them against what it prints.
 
     Writes into the folder ``out`` (made if missing, files of an earlier report replaced): ``report.html``
@@ -211,7 +177,6 @@ def write_paper(out: Path, *, threads: int | None = None, stage: Stage = no_stag
 
     Args:
         out: folder of the report.
-        threads: threads to use, all processors by default.
         stage: makes a bar; it is told of every picture.
 
     Raises:
@@ -220,7 +185,7 @@ def write_paper(out: Path, *, threads: int | None = None, stage: Stage = no_stag
     began = time.perf_counter()
     check_writable(out / DATA, replace=True)
     printed = load_printed()
-    computed = compute(printed, threads=threads)
+    computed = compute(printed)
     suspects = candidates(printed, computed)
     misprints = tuple(item for item in suspects if item.confirmed)
     rows = all_rows(printed, computed, {item.key for item in misprints})
@@ -240,13 +205,6 @@ def write_paper(out: Path, *, threads: int | None = None, stage: Stage = no_stag
             (out / name).write_bytes(content)
     except OSError as error:
         raise InputError(f"{out}: cannot be written: {error.strerror}") from None
-    attrs = {"title": TITLE, "method": METHOD, "dt": STEP, "wall_time_s": time.perf_counter() - began}
-    write_results(
-        out / DATA,
-        scene_parameters=scene_parameters(PAPER_SCENE),
-        sections=datasets,
-        attrs=provenance(thread_count(threads)) | attrs,
-        replace=True,
-    )
+    write_data(out / DATA, PAPER_SCENE, datasets, began, title=TITLE, method=METHOD, dt=STEP)
     paths = tuple(out / name for name in (*files, DATA))
     return PaperReport(paths, tuple(rows), misprints, tuple(checks))

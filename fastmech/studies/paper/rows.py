@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from typing import NamedTuple
+from itertools import chain
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from fastmech.arrays import Floats
 from fastmech.equilibria.find import find_equilibria
 from fastmech.mechanism.geometry import Points, constraints, positions
 from fastmech.scene import Scene
-from fastmech.studies.paper.compare import CASES, Judge, Printed, Row, Verdict, agrees
+from fastmech.studies.paper.compare import CASES, Printed, Row, Verdict, agrees, judged
 from fastmech.studies.paper.compute import (
     DISTURBANCE,
     METHOD,
@@ -72,7 +73,8 @@ class Guess(NamedTuple):
 
 def parameters_used(printed: Printed) -> list[Guess]:
     """Which c2 and g the paper computed with: how many angles of Table 2 each choice gives."""
-    stiffnesses = {"1100/3": STATIC_SCENE.c2, printed["table_1"]["c2"]: float(printed["table_1"]["c2"])}
+    printed_c2 = printed["table_1"]["c2"]
+    stiffnesses = {"1100/3": STATIC_SCENE.c2, printed_c2: float(printed_c2)}
     gravities = {"9.80665": STATIC_SCENE.g, "9.81": 9.81}
     return [
         Guess(c2, g, _agreeing(printed, STATIC_SCENE.replace(c2=stiffness, g=gravity)), 2 * len(CASES))
@@ -91,37 +93,43 @@ def _agreeing(printed: Printed, scene: Scene) -> int:
     return count
 
 
+#: What is judged: section, place, symbol, unit, print, computed value, keys of misprints.
+Number = tuple[Any, ...]
+
+
 def all_rows(printed: Printed, computed: Computed, misprints: Collection[str]) -> list[Row]:
     """Rows in the paper's order; ``misprints`` are the keys of those that the evidence confirms."""
-    judge = Judge(misprints)
+    numbers = chain(
+        _table_1(printed),
+        _text(printed, computed),
+        _equations(printed),
+        _tables(printed, computed.cases),
+    )
+    # The paper's order has Table 2 between its equations.
+    order = ("Table 1", "Text", "Equation (16)", "Table 2", "Equation (20)", "Table 3", "Table 4")
+    rows = [judged(misprints, *number) for number in sorted(numbers, key=lambda n: order.index(n[0]))]
+    # The one parameter of which the paper used more digits than it prints.
     return [
-        *_table_1(judge, printed),
-        *_text(judge, printed, computed),
-        *_equation_16(judge, printed),
-        *_table_2(judge, printed, computed.cases),
-        *_equation_20(judge, printed),
-        *_table_3(judge, printed, computed.cases),
-        *_table_4(judge, printed, computed.cases),
+        row._replace(verdict=Verdict.ROUNDING)
+        if (row.section, row.symbol) == ("Table 1", "c2") and row.difference
+        else row
+        for row in rows
     ]
 
 
-def _table_1(judge: Judge, printed: Printed) -> Iterator[Row]:
+def _table_1(printed: Printed) -> Iterator[Number]:
     units = {name: unit for name, (_, unit, _) in PAPER_SCENE.described().items()}
+    units |= {"phi_0": "rad", "theta_0": "rad", "phi_dot_0": "rad/s", "theta_dot_0": "rad/s"}
     start = dict(zip(("phi_0", "theta_0", "phi_dot_0", "theta_dot_0"), START, strict=True))
     values = {**PAPER_SCENE.parameters, **start}
-    units |= {"phi_0": "rad", "theta_0": "rad", "phi_dot_0": "rad/s", "theta_dot_0": "rad/s"}
     for symbol, value in printed["table_1"].items():
         if symbol in values:
-            row = judge.row("Table 1", "", symbol, units[symbol], value, values[symbol])
-            # The one parameter of which the paper used more digits than it prints.
-            yield row._replace(verdict=Verdict.ROUNDING) if symbol == "c2" and row.difference else row
+            yield "Table 1", "", symbol, units[symbol], value, values[symbol]
 
 
-def _text(judge: Judge, printed: Printed, computed: Computed) -> Iterator[Row]:
-    text = printed["text"]
-    rank = _constraint_rank(np.array(START))
-    stable = [CASES[case.number - 1] for case in computed.cases if case.verdict == "stable"]
-    numbers: list[tuple[str, str, str, float]] = [
+def _text(printed: Printed, computed: Computed) -> Iterator[Number]:
+    text, rank = printed["text"], _constraint_rank(np.array(START))
+    numbers = [
         ("degrees_of_freedom", "degrees of freedom", "1", 6 - rank),
         ("geometric_constraints", "geometric constraints", "1", rank),
         ("static_force", "constant force", "N", STATIC_SCENE.F0),
@@ -132,30 +140,26 @@ def _text(judge: Judge, printed: Printed, computed: Computed) -> Iterator[Row]:
         ("eta_2", "η2", "rad/s", DISTURBANCE[3]),
     ]
     for key, symbol, unit, value in numbers:
-        yield judge.row("Text", "", symbol, unit, text[key], float(value))
-    yield judge.row("Text", "", "stable cases", "", _words(text["stable_cases"]), _words(stable))
-
-
-def _words(names: list[str]) -> str:
-    return ", ".join(name.replace("_", " ").capitalize() for name in names)
+        yield "Text", "", symbol, unit, text[key], float(value)
+    stable = [CASES[case.number - 1] for case in computed.cases if case.verdict == "stable"]
+    words = (", ".join(names).replace("_", " ").title() for names in (text["stable_cases"], stable))
+    yield "Text", "", "stable cases", "", *words
 
 
 def _constraint_rank(state: Floats) -> int:
     """Number of independent constraints (2)-(5) on the six coordinates."""
     points = np.array(positions(PAPER_SCENE, state))
     # The constraints are of second degree: central differences are exact.
-    steps = np.eye(6)
     columns = [
         constraints(PAPER_SCENE, Points(*(points + s))) - constraints(PAPER_SCENE, Points(*(points - s)))
-        for s in steps
+        for s in np.eye(6)
     ]
     return int(np.linalg.matrix_rank(np.array(columns) / 2.0))
 
 
-def _equation_16(judge: Judge, printed: Printed) -> Iterator[Row]:
+def _equations(printed: Printed) -> Iterator[Number]:
     equation = printed["equation_16"]
-    exact = hamiltonian_16(PAPER_SCENE, equation)
-    shape = equation["denominator"]
+    exact, shape = hamiltonian_16(PAPER_SCENE, equation), equation["denominator"]
     parts: list[tuple[str, str, Terms, Floats]] = [
         ("potential", "J", equation["potential"], exact.potential.coefficients),
         ("times p_phi**2", "1/(kg m²)", equation["p_phi_2"], exact.p_phi_2.coefficients),
@@ -168,43 +172,28 @@ def _equation_16(judge: Judge, printed: Printed) -> Iterator[Row]:
         for term, value in zip(terms, values, strict=True):
             symbol = "constant" if term["factor"] == "1" else term["factor"]
             keys = ("equation_16_coefficient",) if symbol == "sin(phi)" else ()
-            yield judge.row("Equation (16)", place, symbol, unit, term["value"], float(value), *keys)
+            yield "Equation (16)", place, symbol, unit, term["value"], float(value), *keys
+    for angle, found in equilibrium_20(STATIC_SCENE, printed["equation_20"]).items():
+        for term, value in zip(printed["equation_20"][angle], found.coefficients, strict=True):
+            yield "Equation (20)", f"condition of {angle}", term["factor"], "N m", term["value"], float(value)
 
 
-def _equation_20(judge: Judge, printed: Printed) -> Iterator[Row]:
-    for angle, exact in equilibrium_20(STATIC_SCENE, printed["equation_20"]).items():
-        for term, value in zip(printed["equation_20"][angle], exact.coefficients, strict=True):
-            place = f"condition of {angle}"
-            yield judge.row("Equation (20)", place, term["factor"], "N m", term["value"], float(value))
-
-
-def _table_2(judge: Judge, printed: Printed, cases: tuple[Case, ...]) -> Iterator[Row]:
+def _tables(printed: Printed, cases: tuple[Case, ...]) -> Iterator[Number]:
+    """Tables 2 to 4, case by case."""
     for name, case in zip(CASES, cases, strict=True):
-        entry = printed["table_2"][name]
-        for symbol, value in (("φ", case.equilibrium.phi), ("θ", case.equilibrium.theta)):
-            key = {"φ": "phi", "θ": "theta"}[symbol]
-            yield judge.row("Table 2", f"Case {case.number}", symbol, "rad", entry[key], value)
-
-
-def _table_3(judge: Judge, printed: Printed, cases: tuple[Case, ...]) -> Iterator[Row]:
-    for name, case in zip(CASES, cases, strict=True):
-        entry, place = printed["table_3"][name], f"Case {case.number}"
-        for i in range(2):
-            for j in range(2):
-                symbol, value = f"c{i + 1}{j + 1}", float(case.equilibrium.hessian[i, j])
-                # A whole matrix may be wrong, or one element.
-                keys = (f"table_3_{name}", f"table_3_{name}_{symbol}")
-                yield judge.row("Table 3", place, symbol, "J", entry["hessian"][i][j], value, *keys)
-        yield judge.row("Table 3", place, "stability", "", entry["verdict"], case.verdict)
-
-
-def _table_4(judge: Judge, printed: Printed, cases: tuple[Case, ...]) -> Iterator[Row]:
-    powers = ("constant", "λ", "λ²", "λ³", "λ⁴")
-    for name, case in zip(CASES, cases, strict=True):
-        entry, place = printed["table_4"][name], f"Case {case.number}"
-        values = printed_polynomial(entry["coefficients"], case)
-        for power, (symbol, pattern) in enumerate(zip(powers, entry["coefficients"], strict=True)):
-            unit = "1" if power == 4 else f"1/s{'⁴³²¹'[power].replace('¹', '')}"
-            yield judge.row("Table 4", place, symbol, unit, pattern, float(values[power]), f"table_4_{name}")
+        place, e = f"Case {case.number}", case.equilibrium
+        second, third, fourth = (printed[f"table_{number}"][name] for number in (2, 3, 4))
+        yield "Table 2", place, "φ", "rad", second["phi"], e.phi
+        yield "Table 2", place, "θ", "rad", second["theta"], e.theta
+        for i, j in np.ndindex(2, 2):
+            symbol = f"c{i + 1}{j + 1}"
+            # A whole matrix may be wrong, or one element.
+            keys = (f"table_3_{name}", f"table_3_{name}_{symbol}")
+            yield "Table 3", place, symbol, "J", third["hessian"][i][j], float(e.hessian[i, j]), *keys
+        yield "Table 3", place, "stability", "", third["verdict"], case.verdict
+        values = printed_polynomial(fourth["coefficients"], case)
+        units = zip(("constant", "λ", "λ²", "λ³", "λ⁴"), ("1/s⁴", "1/s³", "1/s²", "1/s", "1"), strict=True)
+        for (symbol, unit), pattern, value in zip(units, fourth["coefficients"], values, strict=True):
+            yield "Table 4", place, symbol, unit, pattern, float(value), f"table_4_{name}"
         by_hurwitz = "stable" if "stable" in case.classification.hurwitz.verdict.split() else "unstable"
-        yield judge.row("Table 4", place, "stability", "", entry["verdict"], by_hurwitz)
+        yield "Table 4", place, "stability", "", fourth["verdict"], by_hurwitz

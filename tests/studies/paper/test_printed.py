@@ -3,13 +3,13 @@ from __future__ import annotations
 import pytest
 
 from fastmech.studies.paper.compare import (
-    Judge,
     Verdict,
     agrees,
     agrees_legibly,
     compare,
     evaluate,
     half_unit,
+    judged,
     number,
 )
 
@@ -47,7 +47,7 @@ def test_fractions_of_pi() -> None:
 
 
 def test_a_difference_needs_a_proved_misprint() -> None:
-    row = Judge({"known"}).row("Table", "", "x", "J", "1.0", 2.0, "known")
+    row = judged({"known"}, "Table", "", "x", "J", "1.0", 2.0, "known")
     assert (row.verdict, row.see) == (Verdict.MISPRINT, "known")
-    row = Judge(set()).row("Table", "", "x", "J", "1.0", 2.0, "known")
+    row = judged(set(), "Table", "", "x", "J", "1.0", 2.0, "known")
     assert (row.verdict, row.see) == (Verdict.DIFFERS, "")

@@ -134,7 +134,7 @@ def test_the_data_hold_every_table_and_figure(report: PaperReport) -> None:
 
 
 def test_a_report_can_be_written_again(report: PaperReport) -> None:
-    again = write_paper(report.paths[0].parent, threads=1)
+    again = write_paper(report.paths[0].parent)
     assert again.rows == report.rows
 
 
