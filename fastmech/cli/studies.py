@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import click
 
 from fastmech.cli.reporting import account, out_option, reporting_options
+
+
+def _count(name: str, least: int, metavar: str = "N", **more: Any) -> Callable[[Any], Any]:
+    """An option that is a whole number."""
+    return click.option(name, metavar=metavar, type=click.IntRange(min=least), **more)
 
 
 @click.command(name="paper")
@@ -60,28 +67,15 @@ STUDIES = (
 @click.command(name="bench")
 @out_option("Folder for the report.", "results/bench")
 @click.option("--quick", is_flag=True, help="Fewer trajectories and methods.")
-@click.option(
-    "--only",
-    type=click.Choice(
-        ["atlas", "attractors", "basins", "proofs", "stiff", "systems", "threads", "tolerances", "vectors"]
-    ),
-    help="One study alone.",
-)
+@click.option("--only", type=click.Choice(STUDIES), help="One study alone.")
 @click.option(
     "--problem",
     metavar="FILE",
     help="Every method on a problem of your own instead: FILE.py:NAME, a function that returns problem, "
     "starts, t_end (and keywords of fm.work_precision); or the scene of a scan request, REQUEST.toml.",
 )
-@click.option(
-    "--scenes",
-    metavar="N",
-    type=click.IntRange(min=1),
-    help="Random scenes of `tolerances`, mechanisms of `proofs`.",
-)
-@click.option(
-    "--starts", metavar="N", type=click.IntRange(min=1), help="Trajectories of each scene of `tolerances`."
-)
+@_count("--scenes", 1, help="Random scenes of `tolerances`, mechanisms of `proofs`.")
+@_count("--starts", 1, help="Trajectories of each scene of `tolerances`.")
 @reporting_options
 def bench(
     out: Path,
@@ -116,18 +110,18 @@ def bench(
 
 
 @click.command(name="faults")
-@click.option("--kills", metavar="N", type=click.IntRange(min=0), default=200, show_default=True)
-@click.option("--disks", metavar="N", type=click.IntRange(min=0), default=20, show_default=True)
-@click.option("--workers", metavar="N", type=click.IntRange(min=0), default=5, show_default=True)
-@click.option("--mutations", metavar="N", type=click.IntRange(min=0), default=100_000, show_default=True)
-@click.option(
+@_count("--kills", 0, default=200, show_default=True)
+@_count("--disks", 0, default=20, show_default=True)
+@_count("--workers", 0, default=5, show_default=True)
+@_count("--mutations", 0, default=100_000, show_default=True)
+@_count(
     "--overhead",
-    metavar="SECONDS",
-    type=click.IntRange(min=0),
+    0,
+    "SECONDS",
     default=0,
     help="Also measure what durability and Dask cost, in scans of so many seconds.",
 )
-@click.option("--seed", metavar="N", type=click.IntRange(min=0), default=0, show_default=True)
+@_count("--seed", 0, default=0, show_default=True)
 @reporting_options
 def faults(
     kills: int,
@@ -145,34 +139,26 @@ def faults(
     mount), kills Dask workers, and reads files with flipped, lost and added bytes. Ends with code 1 if a
     result is not the undisturbed one, or a damaged file is not refused in one line.
     """
-    from fastmech.studies.faults.processes import FaultFound, Found
-
     with account("faults", quiet, as_json) as told:
         with told.bars.preparing():
-            from fastmech.studies.faults.campaigns import (
-                can_mount,
-                disk_campaign,
-                kill_campaign,
-                worker_campaign,
-            )
+            from fastmech.studies.faults import campaigns
             from fastmech.studies.faults.fuzz import fuzz_requests, fuzz_results
-            from fastmech.studies.faults.processes import reference
 
-        def show(found: Found) -> None:
+        def show(found: campaigns.Found) -> None:
             for sentence in found.sentences:
                 told.say(sentence)
             told.facts.update(found.facts)
 
         try:
             if kills or disks or workers:
-                expected = reference()
-            if disks and not can_mount():
+                expected = campaigns.reference()
+            if disks and not campaigns.can_mount():
                 told.say("no right to mount small disks: full disks are left out")
                 disks = 0
             interruptions = (
-                ("kills", kills, kill_campaign),
-                ("full disks", disks, disk_campaign),
-                ("workers", workers, worker_campaign),
+                ("kills", kills, campaigns.kill_campaign),
+                ("full disks", disks, campaigns.disk_campaign),
+                ("workers", workers, campaigns.worker_campaign),
             )
             for name, count, campaign in interruptions:
                 if count:
@@ -184,7 +170,7 @@ def faults(
                 from fastmech.studies.faults.overhead import REPEATS, overheads
 
                 for ratio in overheads(overhead, told.bars.stage("scans both ways", 4 * REPEATS)):
-                    show(Found((str(ratio),), {ratio.what: [ratio.value, ratio.error]}))
-        except FaultFound as fault:
+                    show(campaigns.Found((str(ratio),), {ratio.what: [ratio.value, ratio.error]}))
+        except campaigns.FaultFound as fault:
             told.say(f"fastmech: fault found: {fault}", err=True)
             raise click.exceptions.Exit(1) from None

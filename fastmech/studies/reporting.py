@@ -1,9 +1,12 @@
-"""What the studies share: timing in turns, columns of result files, texts and data with their origin."""
+"""What the studies share: timing in turns, tables that are read, texts and data that are written."""
 
 from __future__ import annotations
 
 import time
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -21,6 +24,12 @@ Result = TypeVar("Result")
 
 #: Measured turns of :func:`in_turns` after one that warms up.
 TURNS = 7
+
+
+@cache
+def content(package: str, name: str) -> dict[str, Any]:
+    """A TOML file that lies beside the modules of a package; not to be changed."""
+    return tomllib.loads(resources.files(package).joinpath(name).read_text(encoding="utf-8"))
 
 
 def columns(dim: str, rows: Sequence[Any], about: Mapping[str, tuple[str, str]]) -> dict[str, Variable]:

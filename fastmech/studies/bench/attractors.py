@@ -24,8 +24,8 @@ from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
 from fastmech.kernels.sincos import cos, sin
 from fastmech.reports import Stage, table
+from fastmech.studies.bench.entrants import installed
 from fastmech.studies.bench.own_systems import inverse_cube, spoken
-from fastmech.studies.bench.peers import installed
 
 #: Starts that are timed and that others follow; those of SciPy; runs of which the median counts.
 STARTS, FOLLOWED, BY_SCIPY, RUNS = 10_000, 2_000, 200, 5

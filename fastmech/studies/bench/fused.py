@@ -7,7 +7,7 @@ package's own trigonometry and accelerations, so what is left to compare is the 
 
 from __future__ import annotations
 
-from functools import cache, partial
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -19,10 +19,7 @@ from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import FLAGS
 from fastmech.kernels.sincos import sincos
 from fastmech.mechanism.equations import lagrange_accelerations
-from fastmech.studies.bench.measure import Problem, Series, Solve
-from fastmech.studies.bench.package import STEPS
-
-METHODS = ("rk4", "dop853")
+from fastmech.studies.bench.measure import Problem, Solve
 
 #: Lanes of a block: all of it is in the first cache at any width, so the engine's widest serves both methods.
 LANES = 256
@@ -82,10 +79,3 @@ def prepared(method: str, problem: Problem, threads: int, h: float) -> Solve:
         return final
 
     return solve
-
-
-#: RK4 and order 8 at the package's steps.
-SERIES = tuple(
-    Series(f"hand-fused {method}", "dt = {:g} s", STEPS[method], partial(prepared, method))
-    for method in METHODS
-)

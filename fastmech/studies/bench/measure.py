@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
 from typing import NamedTuple
@@ -25,7 +25,6 @@ from fastmech.ensembles.run import Progress
 from fastmech.ensembles.system import System
 from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.models.mechanism import Mechanism
-from fastmech.reports import Stage as Stage
 from fastmech.scene import Scene
 
 #: Starts of a problem that have a reference; larger ensembles repeat them.
@@ -94,27 +93,6 @@ class Entrant(NamedTuple):
     most: int = 32768  #: trajectories a call at most; slow integrators are given the first few
     least: int = 1  #: trajectories a call at least: a batch that needs them to be at its best
     threaded: bool = False  #: whether it also enters on all cores
-
-
-class Series(NamedTuple):
-    """One integrator at its settings."""
-
-    family: str
-    setting: str  #: ``dt = {:g} s`` or ``rtol = {:g}``: steps are scaled by a problem's pace
-    values: tuple[float, ...]
-    prepare: Callable[[Problem, int, float], Solve]  #: for a problem, a number of threads and a value
-    most: int = 32768
-    least: int = 1
-
-    def entrants(self, problem: Problem) -> Iterator[Entrant]:
-        """One for each value."""
-        for value in self.values:
-            x = value * problem.pace if self.setting.startswith("dt") else value
-
-            def prepare(problem: Problem, threads: int, x: float = x) -> Solve:
-                return self.prepare(problem, threads, x)
-
-            yield Entrant(self.family, self.setting.format(x), prepare, self.most, self.least)
 
 
 #: Processor seconds of timed calls that one entrant is given, and its calls at most.

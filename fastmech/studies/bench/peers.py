@@ -1,6 +1,6 @@
 """The libraries that take part, each by a function that prepares one of its solvers at one setting.
 
-To add a library, write such a function, which imports it, and name it in :data:`LIBRARIES`. SciPy and
+To add a library, write such a function, which imports it, and name it in ``entrants.toml``. SciPy and
 pynamicalsys go one trajectory at a time, CyRK and numbalsoda in one Numba loop over the trajectories,
 heyoka in batches of one vector, diffrax (``vmap``) and PyTorch (``torch.compile``) on all trajectories at
 once.
@@ -9,11 +9,9 @@ once.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from copy import deepcopy
 from functools import cache, partial
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -26,9 +24,8 @@ from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import FLAGS
 from fastmech.mechanism.coefficients import Coefficients
 from fastmech.models.mechanism import Mechanism
-from fastmech.studies.bench import fused, package, plain
 from fastmech.studies.bench.devices import explicit
-from fastmech.studies.bench.measure import Entrant, Problem, Series, Solve
+from fastmech.studies.bench.measure import Problem, Solve
 from fastmech.studies.bench.own_systems import spoken
 from fastmech.studies.bench.plain import accelerations, scalar_rhs
 
@@ -278,76 +275,3 @@ def heyoka(problem: Problem, threads: int, tolerance: float) -> Solve:
         return final
 
     return solve if threads > 1 else partial(share, first)
-
-
-def _several(
-    function: Callable[..., Solve],
-    name: str,
-    setting: str,
-    values: dict[str, tuple[float, ...]],
-    **sizes: int,
-) -> tuple[Series, ...]:
-    """A series for each method of a library: ``values`` are its steps or tolerances."""
-    return tuple(
-        Series(f"{name} {method}", setting, own, partial(function, method), **sizes)
-        for method, own in values.items()
-    )
-
-
-DT, RTOL = "dt = {:g} s", "rtol = {:g}"
-_TOLERANCES = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-13)
-
-_SCIPY = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-13)
-
-SCIPY = (
-    *_several(scipy, "SciPy", RTOL, {"LSODA": _SCIPY[:5], "DOP853": _SCIPY}, most=64),
-    *_several(scipy, "SciPy", RTOL, {"Radau": _SCIPY[:2]}, most=16),
-)
-
-_HEYOKA = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10, 1e-12, 1e-14, 2.2e-16)
-
-_TORCH = {
-    "rk4": (0.05, 0.02),
-    "tsit5": (0.12, 0.08, 0.05, 0.03),
-    "dop853": (0.12, 0.08, 0.05, 0.03, 0.018),
-}
-
-#: Module that a library is imported by, and its series: the extra ``bench``, and more.
-LIBRARIES: dict[str, tuple[Series, ...]] = {
-    "heyoka": (Series("heyoka batch", "tol = {:g}", _HEYOKA, heyoka),),
-    "torch": _several(torch, "torch.compile", DT, _TORCH, least=8192),
-    "diffrax": (
-        Series("diffrax Tsit5, constant step", DT, (0.1, 0.05, 0.02), partial(diffrax, "Tsit5", False), 1024),
-        Series("diffrax Dopri8, adaptive", RTOL, (1e-6, 1e-9, 1e-12), partial(diffrax, "Dopri8", True), 1024),
-    ),
-    "numbalsoda": _several(
-        numbalsoda, "numbalsoda", RTOL, {"dop853": _TOLERANCES, "lsoda": (1e-5, 1e-7, 1e-9, 1e-11)}, most=1024
-    ),
-    "CyRK": _several(cyrk, "CyRK", RTOL, {"DOP853": _TOLERANCES, "TSIT5": (1e-3, 1e-5, 1e-7)}, most=1024),
-    "pynamicalsys": (Series("pynamicalsys rk4", DT, (0.05, 0.02, 0.01), pynamicalsys, 256),),
-}
-
-
-def installed() -> list[str]:
-    """Libraries that are there."""
-    return [name for name in LIBRARIES if find_spec(name) is not None]
-
-
-def entrants_of(library: str, problem: Problem) -> Iterator[Entrant]:
-    """Those of a library, every second one of heyoka also on all cores; of fastmech: what is always there."""
-    if library == "fastmech":
-        yield from package.entrants(problem)
-    always = (*fused.SERIES, *plain.SERIES, *SCIPY)
-    several = always if library == "fastmech" else LIBRARIES[library]
-    for number, entrant in enumerate(e for series in several for e in series.entrants(problem)):
-        yield entrant._replace(threaded=library == "heyoka" and number % 2 == 0)
-
-
-def entrants(problem: Problem, quick: bool) -> Iterator[Entrant]:
-    """Every entrant, the package's first; quick: every third of its own and one of what is always there."""
-    if quick:
-        yield from list(package.entrants(problem))[::3]
-        yield from (next(each[0].entrants(problem)) for each in (fused.SERIES, plain.SERIES, SCIPY))
-        return
-    for library in ("fastmech", *installed()):
-        yield from entrants_of(library, problem)

@@ -10,10 +10,7 @@ from numba import njit
 
 from fastmech.arrays import Floats
 from fastmech.jit import FLAGS
-from fastmech.studies.bench.measure import Problem, Series, Solve
-
-#: Steps [s], those of the package's RK4 among them.
-STEPS = (0.05, 0.02, 0.01, 0.005)
+from fastmech.studies.bench.measure import Problem, Solve
 
 
 @njit(nogil=True, **FLAGS)  # type: ignore[untyped-decorator]
@@ -63,7 +60,3 @@ def prepared(problem: Problem, threads: int, h: float) -> Solve:
     """The loop at a fixed step."""
     p, steps = np.array(problem.coefficients), round(problem.t_end / h)
     return lambda starts: in_scalars(starts, p, problem.t_end / steps, steps)
-
-
-#: RK4 at the package's steps.
-SERIES = (Series("Numba RK4, one at a time", "dt = {:g} s", STEPS, prepared, most=1024),)

@@ -26,7 +26,7 @@ began = time.perf_counter()
 library, names, most = json.loads(sys.argv[1])
 __import__(library)
 import numpy as np
-from fastmech.studies.bench.peers import entrants_of
+from fastmech.studies.bench.entrants import entrants_of
 from fastmech.studies.bench.measure import rest_starts
 problem = rest_starts()
 everyone = {(e.family, e.setting): e for e in entrants_of(library, problem)}

@@ -17,14 +17,13 @@ from fastmech.results import Dataset, Variable
 from fastmech.scene import Scene
 from fastmech.store.provenance import processor_name
 from fastmech.store.write import check_writable
-from fastmech.studies.bench import peers, tables
+from fastmech.studies.bench import tables
 from fastmech.studies.bench.atlas import atlas_study
 from fastmech.studies.bench.attractors import attractors_study
 from fastmech.studies.bench.basins import basins_study
-from fastmech.studies.bench.fused import METHODS
+from fastmech.studies.bench.entrants import LIBRARIES, entrants, installed
 from fastmech.studies.bench.machine import costs, throughputs
 from fastmech.studies.bench.measure import BUDGET, PROBLEMS, Entrant, Problem, Row, measure
-from fastmech.studies.bench.peers import entrants
 from fastmech.studies.bench.processes import footprints, started, vectors_study
 from fastmech.studies.bench.proofs import proofs_study
 from fastmech.studies.bench.stiff import stiff_study
@@ -38,7 +37,7 @@ from fastmech.studies.reporting import columns, write_data, write_text
 #: the engine and its yardstick: on fewer than those not the loops would be compared but what is around them.
 QUICK_STARTS, QUICK_BUDGET, QUICK_LEAST = 8, 0.05, 8192
 
-LIBRARIES = ("numba", "scipy", "heyoka", "torch", "jax", "diffrax", "numbalsoda", "CyRK", "pynamicalsys")
+VERSIONS = ("numba", "scipy", "heyoka", "torch", "jax", "diffrax", "numbalsoda", "CyRK", "pynamicalsys")
 
 #: Studies with a file of their own, by name: from `quick` and a stage to the lines of Markdown.
 STUDIES: dict[str, Callable[..., list[str]]] = {
@@ -106,21 +105,20 @@ def run_bench(out: Path, *, quick: bool = False, stage: Stage = no_stage) -> lis
 
 def enlarged(entrant: Entrant) -> Entrant:
     """An entrant of ``--quick``, with enough trajectories where its loop is compared with another's."""
-    engine = {f"{tables.OWN} {method}" for method in METHODS}
-    compared = entrant.family in engine or entrant.family.startswith(tables.FUSED)
+    compared = entrant.family.removeprefix("fastmech ").removeprefix("hand-fused ") in ("rk4", "dop853")
     return entrant._replace(least=max(entrant.least, QUICK_LEAST)) if compared else entrant
 
 
 def _preamble(quick: bool, failures: list[str]) -> list[str]:
     """What was measured, how, and on what."""
     versions = []
-    for library in LIBRARIES:
+    for library in VERSIONS:
         try:
             versions.append(f"{library} {metadata.version(library)}")
         except metadata.PackageNotFoundError:
             continue
     load = f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
-    missing = [name for name in peers.LIBRARIES if name not in peers.installed()]
+    missing = [name for name in LIBRARIES if name not in installed()]
     return [
         "# Speed against error",
         "",

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,11 +23,11 @@ from fastmech.integrators.methods import find_method
 from fastmech.reports import Stage, table
 from fastmech.scene import Scene
 from fastmech.studies.bench.devices import KINDS, explicit
+from fastmech.studies.bench.entrants import installed, prepared
 from fastmech.studies.bench.measure import Entrant, Prepare, Problem, Row, Solve, measure, rate_at
 from fastmech.studies.bench.own_systems import STARTS, SYSTEMS, OwnSystem, spoken
-from fastmech.studies.bench.package import prepared
-from fastmech.studies.bench.peers import heyoka, installed
-from fastmech.studies.bench.tolerances import ROUNDINGS, extended, scene_rates
+from fastmech.studies.bench.peers import heyoka
+from fastmech.studies.bench.tolerances import ROUNDINGS, Rates, extended, scene_rates
 
 #: Errors at which rates are compared.
 TARGETS = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
@@ -64,20 +65,23 @@ class Measured(NamedTuple):
     call: float  #: seconds of heyoka's time on a trajectory in which a batch's call takes no step
 
 
+def _problem(name: str, scene: Any, rates: Rates, starts: Floats, t_end: float) -> Problem:
+    truth = extended(rates, starts, t_end, ROUNDINGS[1]).astype(np.float64)
+    return Problem(name, name, scene, starts, truth, t_end, 1.0)
+
+
 def problem_of(name: str, own: OwnSystem, n: int) -> Problem:
     """A system with its first n starts and their truth."""
-    rhs, starts = spoken(own.rhs, sin=np.sin, cos=np.cos, inverse_cube=lambda s: s**-1.5), own.starts(n)
-    truth = extended(lambda t, y: np.stack(rhs(t, *y)), starts, own.t_end, ROUNDINGS[1])
-    return Problem(name, name, own.system(), starts, truth.astype(np.float64), own.t_end, 1.0)
+    rhs = spoken(own.rhs, sin=np.sin, cos=np.cos, inverse_cube=lambda s: s**-1.5)
+    return _problem(name, own.system(), lambda t, y: np.stack(rhs(t, *y)), own.starts(n), own.t_end)
 
 
 def mechanism(name: str, n: int) -> Problem:
     """The mechanism with its first n starts and their truth."""
-    scene, t_end, low = Scene(alpha=0.0), 10.0, np.array([0.5, -1.0, -SCENES[name], -SCENES[name]])
-    high = np.array([2.5, 1.0, SCENES[name], SCENES[name]])
-    starts = np.ascontiguousarray(np.random.default_rng(1).uniform(low, high, (STARTS, 4))[:n])
-    truth = extended(scene_rates(scene), starts, t_end, ROUNDINGS[1])
-    return Problem(name, name, scene, starts, truth.astype(np.float64), t_end, 1.0)
+    scene, rate = Scene(alpha=0.0), SCENES[name]
+    low, high = [0.5, -1.0, -rate, -rate], [2.5, 1.0, rate, rate]
+    starts = np.random.default_rng(1).uniform(low, high, (STARTS, 4))[:n]
+    return _problem(name, scene, scene_rates(scene), np.ascontiguousarray(starts), 10.0)
 
 
 def device(name: str, n: int) -> Problem:
@@ -87,8 +91,7 @@ def device(name: str, n: int) -> Problem:
     state, rates = explicit(made)
     function = sympy.lambdify(state, rates, "numpy", cse=True)
     starts = np.random.default_rng(1).uniform(-spread, spread, (STARTS, len(state)))[:n]
-    truth = extended(lambda t, y: np.stack(np.broadcast_arrays(*function(*y))), starts, t_end, ROUNDINGS[1])
-    return Problem(name, name, made, starts, truth.astype(np.float64), t_end, 1.0)
+    return _problem(name, made, lambda t, y: np.stack(np.broadcast_arrays(*function(*y))), starts, t_end)
 
 
 def candidates(problem: Problem, targets: Sequence[float]) -> Iterator[dict[str, Any]]:
@@ -146,22 +149,17 @@ def measured(
         ]
         everyone += [Entrant("tol", "", to_tolerance(t, q, found.estimates), size) for q, t in asked]
         everyone += [by_heyoka(t, n) for t in peers if size == n]
-        rows = measure(cut(problem, size), [(entrant, 1) for entrant in everyone])
-        told, theirs = len(settings), len(settings) + len(asked)
-        found.fixed[size] = rows[:told]
-        found.tol.update({(size, *key): row for key, row in zip(asked, rows[told:theirs], strict=True)})
-        found.heyoka.extend(rows[theirs:])
+        few = replace(problem, starts=problem.starts[:size], truth=problem.truth[:size])
+        rows = iter(measure(few, [(entrant, 1) for entrant in everyone]))
+        found.fixed[size] = list(islice(rows, len(settings)))
+        found.tol.update({(size, *key): next(rows) for key in asked})
+        found.heyoka.extend(rows)
         advance(1)
     if not peers:
         return found
     still = replace(problem, truth=problem.starts, t_end=0.0)
     (idle,) = measure(still, [(by_heyoka(1e-5, n), 1)])
     return found._replace(call=1.0 / idle.rate)
-
-
-def cut(problem: Problem, n: int) -> Problem:
-    """The problem of the first n starts."""
-    return replace(problem, starts=problem.starts[:n], truth=problem.truth[:n])
 
 
 def rate(rows: list[Row], error: float, level: float) -> float:
@@ -172,20 +170,21 @@ def rate(rows: list[Row], error: float, level: float) -> float:
 
 def ratios(found: Measured, target: float) -> dict[str, float]:
     """What is compared at one error, by column."""
-    small, n = min(found.fixed), max(found.fixed)
+    n = max(found.fixed)
     mine, theirs = (rate(rows, target, 1.0) for rows in (found.fixed[n], found.heyoka))
     columns = {
         "fixed over heyoka": mine / theirs,
         "the same, its calls free": mine * (1.0 / theirs - found.call),
     }
     for level, name in LEVELS.items():
-        mine = found.tol[n, level, target].rate
-        columns[f"`tol`, {name}, over heyoka"] = mine / rate(found.heyoka, target, level)
+        own = found.tol[n, level, target].rate
+        columns[f"`tol`, {name}, over heyoka"] = own / rate(found.heyoka, target, level)
     for level, name in LEVELS.items():
-        for size in dict.fromkeys((small, n)):
-            best = rate(found.fixed[size], target, level)
-            mine = found.tol[size, level, target].rate
-            columns[f"time of `tol` over fixed, {name}, {size:,}"] = best / mine
+        for size in sorted(found.fixed):
+            own = found.tol[size, level, target].rate
+            columns[f"time of `tol` over fixed, {name}, {size:,}"] = (
+                rate(found.fixed[size], target, level) / own
+            )
     return columns
 
 
@@ -243,38 +242,33 @@ def systems_study(quick: bool, stage: Stage) -> list[str]:
     systems = dict(list(SYSTEMS.items())[1:2]) if quick else SYSTEMS
     scenes = () if quick else (*SCENES, *DEVICES)
     n, targets = (QUICK, TARGETS[:2]) if quick else (STARTS, TARGETS)
-    advance = stage("systems", 4 * (len(systems) + len(scenes)))
-
-    def measure_all(problems: Iterator[Problem]) -> list[Measured]:
-        found = []
-        for problem in problems:
-            advance(1)
-            found.append(measured(problem, targets, advance))
-        return found
-
-    own = measure_all(problem_of(name, system, n) for name, system in systems.items())
-    return report(
-        own, targets, measure_all((mechanism if name in SCENES else device)(name, n) for name in scenes)
-    )
+    advance, found = stage("systems", 4 * (len(systems) + len(scenes))), []
+    for name in (*systems, *scenes):
+        problem = (
+            problem_of(name, systems[name], n)
+            if name in systems
+            else (mechanism if name in SCENES else device)(name, n)
+        )
+        advance(1)
+        found.append(measured(problem, targets, advance))
+    return report(found[: len(systems)], targets, found[len(systems) :])
 
 
 def report(found: list[Measured], targets: Sequence[float], scenes: Sequence[Measured] = ()) -> list[str]:
     """The study of own systems, and of ``scenes`` of the mechanism, as Markdown."""
-    n = max(found[0].fixed)
     lines = [
         "# Own systems beside heyoka",
         "",
-        f"{n:,} starts, one thread, all timed in turns, rates by processor time, compiling apart. Errors are "
-        "those of final states against extended precision; rates at equal error are interpolated in "
-        "logarithms. heyoka runs in batches with fast-math and has the rate of the tolerance that gives the "
-        "error, in hindsight. Each batch is a call from Python; `its calls free` deducts what a call takes "
-        "that makes no step. `tol` has its rate at that tolerance, whatever error it keeps.",
+        f"{max(found[0].fixed):,} starts, one thread, all timed in turns, rates by processor time, compiling "
+        "apart. Errors are those of final states against extended precision; rates at equal error are "
+        "interpolated in logarithms. heyoka runs in batches with fast-math and has the rate of the tolerance "
+        "that gives the error, in hindsight. Each batch is a call from Python; `its calls free` deducts what "
+        "a call takes that makes no step. `tol` has its rate at that tolerance, whatever error it keeps.",
         "",
         *([] if found[0].heyoka else ["Not installed: heyoka.", ""]),
-        *summary(found, targets),
     ]
-    own = [line for one in found for line in section(one, targets)]
-    if not scenes:
-        return lines + own
-    lines += [*own, "# Mechanisms beside heyoka", "", *summary(scenes, targets)]
-    return lines + [line for one in scenes for line in section(one, targets)]
+    for head, each in ((None, found), ("# Mechanisms beside heyoka", scenes)):
+        if each:
+            lines += [*([head, ""] if head else []), *summary(each, targets)]
+            lines += [line for one in each for line in section(one, targets)]
+    return lines

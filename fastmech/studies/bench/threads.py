@@ -17,9 +17,9 @@ import numpy as np
 
 from fastmech.ensembles.threads import thread_count
 from fastmech.reports import Stage, table
+from fastmech.studies.bench.entrants import PACKAGE, prepared
 from fastmech.studies.bench.machine import LANES, multiply_adds
 from fastmech.studies.bench.measure import Problem, fast_starts, rest_starts
-from fastmech.studies.bench.package import AGAIN, prepared
 from fastmech.studies.reporting import TURNS, in_turns
 
 #: Trajectories of a call, tenths of a second to seconds of work; turns of the yardstick, a third of one.
@@ -64,7 +64,7 @@ def threads_study(quick: bool, stage: Stage) -> list[str]:
 def cases(n: int, turns: int) -> dict[str, Run]:
     """The yardstick and the engine's runs of ``n`` trajectories."""
     rest, fast = rest_starts(), fast_starts()
-    again = [share * fast.t_end for share in AGAIN]
+    again = [share * fast.t_end for share in PACKAGE["again"]]
     found: dict[str, Run] = {"multiply-adds, one loop a thread": partial(_arithmetic, turns)}
     for method, dt, fit in REST:
         name = f"{method}, dt = {dt:g} s{', `fit=True`' * fit}, from rest"

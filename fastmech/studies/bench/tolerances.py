@@ -131,14 +131,9 @@ class Estimate(NamedTuple):
     doubt: float  #: of the truth
 
     @property
-    def ratio(self) -> float:
-        """Estimated over true."""
-        return self.estimate / self.true
-
-    @property
     def right(self) -> bool:
-        """Whether it is within the factor, both ways."""
-        return 1.0 / FACTOR <= self.ratio <= FACTOR
+        """Whether it is within the factor of the truth, both ways."""
+        return 1.0 / FACTOR <= self.estimate / self.true <= FACTOR
 
     @property
     def known(self) -> bool:
@@ -146,24 +141,18 @@ class Estimate(NamedTuple):
         return self.doubt <= KNOWN * self.true
 
     @property
-    def missed(self) -> bool:
-        """Whether the true error is above the tolerance."""
-        return self.true > self.tol
-
-    @property
-    def said(self) -> bool:
-        """Whether the run says that it has missed the tolerance."""
-        return self.estimate > self.tol
+    def miss(self) -> str:
+        """Whether the true error is above the tolerance, and the run says so; empty: it is not."""
+        said = "misses `tol` and says so" if self.estimate > self.tol else "misses `tol` unsaid"
+        return said if self.true > self.tol else ""
 
     @property
     def verdict(self) -> str:
         """What is to be said about it; empty where all is well."""
         if not self.known:
             return "truth not known"
-        words = [] if self.right else ["estimate too small" if self.ratio < 1.0 else "estimate too large"]
-        if self.missed:
-            words.append("misses `tol` and says so" if self.said else "misses `tol` unsaid")
-        return ", ".join(words)
+        words = "" if self.right else f"estimate too {'small' if self.estimate < self.true else 'large'}"
+        return ", ".join(filter(None, (words, self.miss)))
 
 
 def random_case(rng: np.random.Generator, n: int) -> tuple[Scene, Floats, float, float]:
@@ -194,23 +183,31 @@ def estimates(scenes: int, n: int, advance: Callable[[int], None], seed: int = 7
         right, doubts = extended_truth(scene_rates(scene), starts, t_end)
         for quantile in QUANTILES:
             run = integrate(scene, starts, t_end, tol=tol, quantile=quantile, threads=1)
-            estimate = float(run.error_estimate or 0.0)
-            true, doubt = _true(right, doubts, quantile, run.y[-1])
-            found.append(Estimate(number, quantile, tol, run.method, estimate, true, doubt))
+            errors, rank = np.abs(run.y[-1] - right).max(axis=1), math.ceil(quantile * n) - 1
+            least, true, most = (float(np.sort(errors + d)[rank]) for d in (-doubts, 0.0, doubts))
+            told, doubt = float(run.error_estimate or 0.0), max(most - true, true - least)
+            found.append(Estimate(number, quantile, tol, run.method, told, true, doubt))
         advance(1)
     return found
 
 
-def _true(right: Floats, doubts: Floats, quantile: float, end: Floats) -> tuple[float, float]:
-    """A quantile's true error and its uncertainty, of a run that ends so (n, 4)."""
-    rank, errors = math.ceil(quantile * len(end)) - 1, np.abs(end - right).max(axis=1)
-    least, true, most = (float(np.sort(e)[rank]) for e in (errors - doubts, errors, errors + doubts))
-    return true, max(most - true, true - least)
-
-
 def report(found: list[Estimate], n: int) -> list[str]:
     """The study as Markdown."""
-    unknown = sum(not e.known for e in found)
+    unknown, rows = sum(not e.known for e in found), []
+    for quantile in QUANTILES:
+        mine = [e for e in found if e.quantile == quantile]
+        known = [e for e in mine if e.known]
+        ratios = np.array([e.estimate / e.true for e in known] or [math.nan])
+        counts = (
+            sum(e.right for e in known),
+            sum(not e.miss for e in known),
+            sum("says so" in e.miss for e in known),
+            sum("unsaid" in e.miss for e in known),
+        )
+        whose = "largest error" if quantile == 1.0 else f"{quantile:.0%} quantile"
+        shares = (f"{count / max(len(known), 1):.0%}" for count in counts)
+        spread = (f"{ratio:.2g}" for ratio in (ratios.min(), np.median(ratios), ratios.max()))
+        rows.append([whose, f"{len(known)} of {len(mine)}", *shares, *spread])
     lines = [
         "# `tol` on random scenes",
         "",
@@ -220,38 +217,22 @@ def report(found: list[Estimate], n: int) -> list[str]:
         f"known where its uncertainty is at most {KNOWN:.0%} of it; {unknown or 'none'} of {len(found)} "
         f"{'is' if unknown == 1 else 'are'} not known, and not judged.",
         "",
+        *table(
+            f"whose error | truth known | estimate within a factor {FACTOR:g} | true error within `tol` | "
+            "above it, and said so | above it, unsaid | least estimate/truth | median | greatest",
+            rows,
+        ),
     ]
-    rows = []
-    for quantile in QUANTILES:
-        mine = [e for e in found if e.quantile == quantile]
-        known = [e for e in mine if e.known]
-        ratios = np.array([e.ratio for e in known] or [math.nan])
-        shares = (
-            [e.right for e in known],
-            [not e.missed for e in known],
-            [e.missed and e.said for e in known],
-            [e.missed and not e.said for e in known],
-        )
-        whose = "largest error" if quantile == 1.0 else f"{quantile:.0%} quantile"
-        told = " | ".join(f"{sum(which) / max(len(known), 1):.0%}" for which in shares)
-        spread = f"{ratios.min():.2g} | {np.median(ratios):.2g} | {ratios.max():.2g}"
-        rows.append(f"{whose} | {len(known)} of {len(mine)} | {told} | {spread}")
-    lines += table(
-        f"whose error | truth known | estimate within a factor {FACTOR:g} | true error within `tol` | "
-        "above it, and said so | above it, unsaid | least estimate/truth | median | greatest",
-        rows,
+    odd = (
+        f"{e.scene} | {e.quantile:g} | {e.method} | {e.tol:.1e} | {e.estimate:.1e} | {e.true:.1e} | "
+        f"{e.doubt:.0e} | {e.verdict}"
+        for e in found
+        if e.verdict
     )
-    odd = [e for e in found if e.verdict]
-    if odd:
+    listed = table("scene | quantile | method | `tol` | estimate | truth | its uncertainty | verdict", odd)
+    if any(e.verdict for e in found):
         lines += ["Estimates beyond the factor, errors beyond the tolerance, truths that are not known:", ""]
-        lines += table(
-            "scene | quantile | method | `tol` | estimate | truth | its uncertainty | verdict",
-            (
-                f"{e.scene} | {e.quantile:g} | {e.method} | {e.tol:.1e} | {e.estimate:.1e} | {e.true:.1e} | "
-                f"{e.doubt:.0e} | {e.verdict}"
-                for e in odd
-            ),
-        )
+        lines += listed
     return lines
 
 

@@ -16,7 +16,7 @@ from fastmech.runner import run_request
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import read_request
 from fastmech.store.read import open_results
-from fastmech.studies.faults.processes import FaultFound, Found
+from fastmech.studies.faults.campaigns import FaultFound, Found
 from fastmech.studies.faults.victim import REQUEST, content_of, values_of
 
 #: Seconds after which reading a file counts as hanging.
@@ -96,17 +96,18 @@ def damaged(data: bytes, rng: random.Random) -> bytes:
         if not copy:
             break
         place, length = rng.randrange(len(copy)), rng.choice((1, 1, 4, 64))
-        match rng.randrange(6):
+        here, kind = slice(place, place + length), rng.randrange(6)
+        match kind:
             case 0:
                 copy[place] ^= 1 << rng.randrange(8)
             case 1:
-                copy[place : place + length] = rng.randbytes(len(copy[place : place + length]))
+                copy[here] = rng.randbytes(len(copy[here]))
             case 2:
-                del copy[place : place + length]
+                del copy[here]
             case 3:
-                copy[place:place] = copy[place : place + length]
+                copy[place:place] = copy[here]
             case 4:
-                copy[place : place + length] = b"\xff" * len(copy[place : place + length])
+                copy[here] = b"\xff" * len(copy[here])
             case 5:
                 del copy[place:]
     return bytes(copy)

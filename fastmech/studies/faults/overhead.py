@@ -7,18 +7,18 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from itertools import repeat
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
-from fastmech.results import Dataset
 from fastmech.runner import run_request
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import RunContext, read_request
 from fastmech.store.provenance import provenance
 from fastmech.store.write import write_results
 from fastmech.tiles.cluster import cluster
-from fastmech.tiles.section import TiledSection, asked_for, assembled, identity_of, sections_of
+from fastmech.tiles.section import asked_for, assembled, identity_of, sections_of
 
 #: Threads, and workers of the cluster.
 WORKERS = 2
@@ -82,9 +82,9 @@ def _in_memory(path: Path, out: Path) -> None:
     request = read_request(path, scan_kinds())
     sections = {}
     for section in sections_of(request, identity_of(asked_for(request))):
-        compute = partial(_tile, section)
         with ThreadPoolExecutor(WORKERS) as pool:
-            tiles = list(pool.map(compute, range(section.tiling.count)))
+            contexts = repeat(RunContext(1))
+            tiles = list(pool.map(section.tiling.compute, range(section.tiling.count), contexts))
         sections[section.name] = assembled(section, tiles.__getitem__, 0.0)
     write_results(
         out,
@@ -96,15 +96,11 @@ def _in_memory(path: Path, out: Path) -> None:
     )
 
 
-def _tile(section: TiledSection, index: int) -> Dataset:
-    return section.tiling.compute(index, RunContext(1))
-
-
 def _ratio(what: str, one: Run, other: Run, tell: Callable[[int], None]) -> Ratio:
     ratios, seconds = [], []
-    for repeat in range(REPEATS):
+    for turn in range(REPEATS):
         taken = {}
-        for way in (one, other) if repeat % 2 else (other, one):
+        for way in (one, other) if turn % 2 else (other, one):
             taken[way] = _seconds(way)
             tell(1)
         ratios.append(taken[one] / taken[other])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager
 from pathlib import Path
@@ -130,12 +130,6 @@ def values_of(variable: Variable) -> bytes:
     data = variable.data
     raw = repr(data.tolist()).encode() if data.dtype == object else data.tobytes()
     return repr((variable.dims, data.dtype.str, data.shape, variable.units)).encode() + raw
-
-
-def computed_again(log: Iterable[str]) -> int:
-    """How many tiles were computed more than once, by the lines of a log."""
-    begun = [line for line in log if line.startswith("tile ")]
-    return len(begun) - len(set(begun))
 
 
 def _attributes(where: str, attrs: dict[str, Any]) -> dict[str, bytes]:

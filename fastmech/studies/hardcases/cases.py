@@ -39,7 +39,6 @@ from fastmech.studies.hardcases.walk import (
     admitted_step,
     boundary,
     claimed_row,
-    content,
     counted,
     energy,
     explicit_calls,
@@ -53,6 +52,7 @@ from fastmech.studies.hardcases.walk import (
     walked,
     worst,
 )
+from fastmech.studies.reporting import content
 from fastmech.transients.lyapunov import largest_lyapunov
 
 #: Why a method claims nothing of an undamped motion; why it claims what it does.
@@ -756,4 +756,4 @@ def _case(name: str, hard: str, oracle: str, must: str, walk: str = "", **given:
 
 
 #: Every case by its name.
-CASES = {name: _case(name, **about) for name, about in content("cases.toml").items()}
+CASES = {name: _case(name, **about) for name, about in content(__package__, "cases.toml").items()}

@@ -36,8 +36,8 @@ from fastmech.step_limits.measure import measured_stable_step
 from fastmech.step_limits.predict import largest_stable_step, limiting_eigenvalues
 from fastmech.studies.hardcases.cases import CASES, PAPER, QUICK_STEPS, STEPS, energy_history
 from fastmech.studies.hardcases.pictures import DRIFTS, Limits, draw_energy_drift, stability_pages
-from fastmech.studies.hardcases.walk import REFUSED, HardCase, Row, content
-from fastmech.studies.reporting import columns, in_turns, write_data, write_text
+from fastmech.studies.hardcases.walk import REFUSED, HardCase, Row
+from fastmech.studies.reporting import columns, content, in_turns, write_data, write_text
 
 #: Methods that are measured, explicit, multistep and implicit ones, with the step [s].
 CONTAINED = {"rk4": 0.01, "dop853": 0.02, "ab6": 0.005, "abm8": 0.01, "gauss6": 0.05, "sdirk4": 0.02}
@@ -274,7 +274,7 @@ def _write(out: Path, quick: bool, stage: Stage, began: float) -> Report:
     steps = QUICK_STEPS if quick else STEPS
     pictures = stability_pages(limits, limiting_eigenvalues(PAPER, minimum))
     for name, label in (("paper", "the paper's start"), ("energetic", "an energetic start")):
-        start = content("cases.toml")[f"undamped_{name}_start"]["start"]
+        start = content(__package__, "cases.toml")[f"undamped_{name}_start"]["start"]
         histories = {drawn: energy_history(start, *drawn, steps)[:2] for drawn in DRIFTS}
         pictures[f"energy_{name}_start"] = draw_energy_drift(histories, label, start, steps)
     for name, figure in pictures.items():

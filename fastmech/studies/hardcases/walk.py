@@ -9,11 +9,8 @@ far too long.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Sequence
-from functools import cache
-from importlib import resources
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,6 +30,7 @@ from fastmech.mechanism.lagrange import kinetic_energy, potential_energy
 from fastmech.scene import Scene
 from fastmech.step_limits.predict import stable_step
 from fastmech.step_limits.warning import step_limit, step_warning
+from fastmech.studies.reporting import content
 
 #: In place of a status: the request was refused before the run.
 REFUSED = "refused"
@@ -133,15 +131,9 @@ class Goal(NamedTuple):
         return float(np.abs(state - self.expected).max() / max(1.0, np.abs(self.expected).max()))
 
 
-@cache
-def content(name: str) -> dict[str, Any]:
-    """A TOML file of this folder."""
-    return tomllib.loads(resources.files(__package__).joinpath(name).read_text(encoding="utf-8"))
-
-
 def motion(name: str, rounded: float = ROUNDED) -> Goal:
     """The reference of this name; its scene is the paper's with a few changes."""
-    entry = content("references.toml")[name]
+    entry = content(__package__, "references.toml")[name]
     scene, end = Scene(c2=1100 / 3).replace(**entry["scene"]), np.array([float(x) for x in entry["state"]])
     return Goal(scene, np.array(entry["start"]), entry["t"], end, rounded)
 
@@ -157,7 +149,7 @@ class Boundary(NamedTuple):
 
 def boundary() -> Boundary:
     """The crossing found by bisection in extended precision."""
-    entry = content("references.toml")["boundary"]
+    entry = content(__package__, "references.toml")["boundary"]
     below, above = (np.array(end) for end in entry["ends"])
     return Boundary(Scene(c2=1100 / 3).replace(**entry["scene"]), float(entry["phi"]), below, above)
 

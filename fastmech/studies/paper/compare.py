@@ -5,12 +5,10 @@ Every number has exactly its printed digits.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Collection, Mapping
 from decimal import Decimal
 from enum import StrEnum
 from fnmatch import fnmatchcase
-from importlib import resources
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,11 +21,6 @@ CASES = ("case_1", "case_2", "case_3", "case_4")
 MOST_DECIMALS = 6
 
 _FUNCTIONS = {"pi": np.pi, "sin": np.sin, "cos": np.cos, "sqrt": np.sqrt}
-
-
-def load_printed() -> dict[str, Any]:
-    """Content of ``printed.toml``."""
-    return tomllib.loads(resources.files(__package__).joinpath("printed.toml").read_text(encoding="utf-8"))
 
 
 def evaluate(expression: str, **names: Any) -> Any:

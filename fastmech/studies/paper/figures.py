@@ -5,10 +5,8 @@ Names, units, titles and captions stand in ``figures.toml``.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from importlib import resources
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -28,15 +26,13 @@ from fastmech.studies.paper.compute import (
     Case,
     Computed,
 )
-from fastmech.studies.reporting import columns
+from fastmech.studies.reporting import columns, content
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-ABOUT: dict[str, Any] = tomllib.loads(
-    resources.files(__package__).joinpath("figures.toml").read_text(encoding="utf-8")
-)
+ABOUT = content(__package__, "figures.toml")
 
 #: Points a side of the potential's grid.
 GRID = 181

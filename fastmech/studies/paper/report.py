@@ -12,12 +12,12 @@ from fastmech.errors import InputError
 from fastmech.plots.style import png
 from fastmech.reports import Stage, no_stage, table, to_html
 from fastmech.store.write import check_writable
-from fastmech.studies.paper.compare import HEADINGS, Row, Verdict, load_printed
+from fastmech.studies.paper.compare import HEADINGS, Row, Verdict
 from fastmech.studies.paper.compute import METHOD, PAPER_SCENE, STEP, Case, Computed, compute
 from fastmech.studies.paper.figures import Picture, all_datasets, figure_pictures, table_pictures
 from fastmech.studies.paper.misprints import Misprint, candidates
 from fastmech.studies.paper.rows import Check, Guess, all_checks, all_rows, parameters_used
-from fastmech.studies.reporting import write_data
+from fastmech.studies.reporting import content, write_data
 
 TITLE = "The source paper, computed again"
 
@@ -184,7 +184,7 @@ def write_paper(out: Path, *, stage: Stage = no_stage) -> PaperReport:
     """
     began = time.perf_counter()
     check_writable(out / DATA, replace=True)
-    printed = load_printed()
+    printed = content(__package__, "printed.toml")
     computed = compute(printed)
     suspects = candidates(printed, computed)
     misprints = tuple(item for item in suspects if item.confirmed)
@@ -201,8 +201,8 @@ def write_paper(out: Path, *, stage: Stage = no_stage) -> PaperReport:
     files = {"report.html": to_html(markdown, TITLE, pictures).encode(), "report.md": markdown.encode()}
     files |= pictures
     try:
-        for name, content in files.items():
-            (out / name).write_bytes(content)
+        for name, written in files.items():
+            (out / name).write_bytes(written)
     except OSError as error:
         raise InputError(f"{out}: cannot be written: {error.strerror}") from None
     write_data(out / DATA, PAPER_SCENE, datasets, began, title=TITLE, method=METHOD, dt=STEP)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from fastmech.integrators.methods import METHODS
-from fastmech.studies.bench import fused, package, peers
+from fastmech.studies.bench import fused, peers
+from fastmech.studies.bench.entrants import PACKAGE, SERIES, entrants, entrants_of, installed
 from fastmech.studies.bench.measure import STARTS, fast_starts, rest_starts
-from fastmech.studies.bench.peers import entrants, entrants_of, installed
 
 FEW = 12
 
@@ -34,8 +34,10 @@ def test_entrants_are_distinct_and_the_methods_exist():
     everyone = list(entrants(rest_starts(1), quick=False))
     names = [(entrant.family, entrant.setting) for entrant in everyone]
     assert len(set(names)) == len(names)
-    assert set(package.STEPS) <= set(METHODS)
-    assert set(fused.METHODS) <= set(package.STEPS)
+    kinds = ("steps", "fitted", "single", "single_fitted")
+    assert {method for kind in kinds for method in PACKAGE[kind]} <= set(METHODS)
+    loops = [series for series in SERIES["fastmech"] if series["prepare"] == "fused"]
+    assert all(series["dt"] == PACKAGE["steps"][series["given"][0]] for series in loops)
 
 
 def solved(entrant, problem):
@@ -49,8 +51,7 @@ def solved(entrant, problem):
         ("fastmech rk4", "dt = 0.01 s", 1e-5),
         ("fastmech dop853", "dt = 0.05 s", 1e-7),
         ("hand-fused rk4", "dt = 0.01 s", 1e-5),
-        ("Numba RK4, one at a time, small arrays", "dt = 0.01 s", 1e-5),
-        ("Numba RK4, one at a time, local numbers", "dt = 0.01 s", 1e-5),
+        ("Numba RK4, one at a time", "dt = 0.01 s", 1e-5),
         ("SciPy LSODA", "rtol = 1e-08", 1e-6),
     ],
 )
@@ -63,7 +64,7 @@ def test_errors_are_what_order_and_tolerance_promise(family, setting, most):
 
 def test_the_hand_fused_loop_solves_the_hard_problem_in_blocks_that_are_not_full():
     problem = fast_starts(300)
-    entrant = next(fused.SERIES[0].entrants(problem))
+    entrant = next(e for e in entrants_of("fastmech", problem) if e.family == "hand-fused rk4")
     finer = fused.prepared("rk4", problem, 1, 0.0005)(problem.starts)
     assert np.median(np.abs(finer - problem.truth).max(axis=1)) < 1e-9
     assert entrant.prepare(problem, 1)(problem.starts).shape == (300, 4)

@@ -7,15 +7,15 @@ from typing import Any
 
 import pytest
 
-from fastmech.studies.paper.compare import load_printed
 from fastmech.studies.paper.compute import Computed, compute
 from fastmech.studies.paper.report import PaperReport, write_paper
+from fastmech.studies.reporting import content
 
 
 @pytest.fixture(scope="session")
 def print_() -> dict[str, Any]:
     """The print; not to be changed."""
-    return load_printed()
+    return content("fastmech.studies.paper", "printed.toml")
 
 
 @pytest.fixture
