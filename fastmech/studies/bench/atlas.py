@@ -16,7 +16,7 @@ from scipy import optimize
 
 from fastmech.arrays import Floats
 from fastmech.atlas.folds import trace_folds
-from fastmech.atlas.map import EquilibriumMap, map_equilibria
+from fastmech.atlas.map import map_equilibria
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.threads import thread_count
 from fastmech.equilibria.certificate import Outcome
@@ -31,9 +31,6 @@ REPEATS, STARTS = 3, 64
 
 #: Numbers of starts after which what is still missing is counted.
 TOLD = (8, 16, 32, 64)
-
-#: Distance in F0 [N] of the scenes beside folds.
-NEAR_FOLD = 0.01
 
 
 class AtlasRow(NamedTuple):
@@ -61,9 +58,6 @@ def atlas_study(quick: bool, stage: Stage) -> list[str]:
     """``atlas.md``; ``quick`` is for trying the command."""
     side, sample = (200, 99) if quick else (1000, 1998)
     rows, ratios = side_by_side(side, region_scenes(sample), stage("maps and multistart", sample))
-    advance = stage("multistart elsewhere", 2 * sample)
-    rows.append(row_of("random scenes", multistart(random_scenes(sample), advance)))
-    rows.append(row_of(f"within {NEAR_FOLD:g} N of a fold", multistart(fold_scenes(sample), advance)))
     return [*markdown(rows, ratios), traced(stage)]
 
 
@@ -93,7 +87,7 @@ def side_by_side(
         AtlasRow("fastmech map_equilibria", n, side * side, statistics.median(own), *told)
         for n, own in rates.items()
     ]
-    together = row_of("in the map's region", Search(*(np.concatenate(x) for x in zip(*turns, strict=True))))
+    together = row_of(Search(*(np.concatenate(x) for x in zip(*turns, strict=True))))
     rows.append(together._replace(rate=statistics.median(theirs)))
     ratios = {n: sorted(a / b for a, b in zip(own, theirs, strict=True)) for n, own in rates.items()}
     return rows, {n: (each[0], statistics.median(each), each[-1]) for n, each in ratios.items()}
@@ -141,33 +135,6 @@ def region_scenes(n: int) -> list[Scene]:
     return [SCENE.replace(F0=rng.uniform(*F0_RANGE), c1=rng.uniform(*C1_RANGE)) for _ in range(n)]
 
 
-def random_scenes(n: int) -> list[Scene]:
-    """Four decades of stiffness, forces of both signs, l 0.2-4 m, masses 0.1-100 kg."""
-    rng = np.random.default_rng(2)
-    return [
-        Scene(
-            **{name: 10 ** rng.uniform(-1.0, 2.0) for name in ("m1", "m2", "m3")},
-            **{name: 10 ** rng.uniform(0.0, 4.0) for name in ("c1", "c2")},
-            l=rng.uniform(0.2, 4.0),
-            F0=rng.choice([-1.0, 1.0]) * 10 ** rng.uniform(-1.0, 4.0),
-            alpha=0.0,
-        )
-        for _ in range(n)
-    ]
-
-
-def fold_scenes(n: int) -> list[Scene]:
-    """Points of the map's region just beside its fold curves, on either side."""
-    rng = np.random.default_rng(4)
-    curves = trace_folds(SCENE, *grid(201).items()).curves
-    x, y = (np.concatenate([getattr(curve, name) for curve in curves]) for name in ("x", "y"))
-    chosen = rng.integers(x.size, size=n)
-    sides = rng.choice([-NEAR_FOLD, NEAR_FOLD], n)
-    return [
-        SCENE.replace(F0=float(x[k] + side), c1=float(y[k])) for k, side in zip(chosen, sides, strict=True)
-    ]
-
-
 def multistart(scenes: list[Scene], advance: Progress) -> Search:
     """SciPy from random starts, duplicates removed; what it misses is counted by the certified count."""
     rng = np.random.default_rng(3)
@@ -184,8 +151,10 @@ def multistart(scenes: list[Scene], advance: Progress) -> Search:
                 found.append((n, solution.x))
         seconds.append(time.perf_counter() - began)
         exact = map_equilibria(scene, {"F0": [scene.F0]}, threads=1)
+        places = np.stack([exact.phi[0], exact.theta[0]], axis=-1)[: exact.count[0]]
+        first = [min((n for n, x in found if _same(place, x, 1e-5)), default=np.inf) for place in places]
         count.append(len(found))
-        lacking.append([missing(exact, [x for n, x in found if n <= most]) for most in TOLD])
+        lacking.append([sum(n > most for n in first) for most in TOLD])
         advance(1)
     return Search(np.array(seconds), np.array(count), np.array(lacking))
 
@@ -194,15 +163,9 @@ def _same(one: Floats, other: Floats, within: float) -> bool:
     return bool(np.abs(np.exp(1j * one) - np.exp(1j * other)).max() < within)
 
 
-def missing(exact: EquilibriumMap, found: list[Floats]) -> int:
-    """How many certified equilibria of a point are not among those found."""
-    places = np.stack([exact.phi[0], exact.theta[0]], axis=-1)[: exact.count[0]]
-    return sum(not any(_same(place, other, 1e-5) for other in found) for place in places)
-
-
-def row_of(where: str, search: Search) -> AtlasRow:
+def row_of(search: Search) -> AtlasRow:
     """Multistart's row."""
-    name, n = f"scipy.optimize.root, {STARTS} starts, {where}", search.seconds.size
+    name, n = f"scipy.optimize.root, {STARTS} starts", search.seconds.size
     missed = tuple(search.lacking.sum(axis=0).tolist())
     incomplete = int(np.count_nonzero(search.lacking[:, -1]))
     return AtlasRow(name, 1, n, n / search.seconds.sum(), int(search.found.sum()), missed, incomplete, n)
@@ -210,6 +173,12 @@ def row_of(where: str, search: Search) -> AtlasRow:
 
 def markdown(rows: list[AtlasRow], ratios: dict[int, tuple[float, float, float]]) -> list[str]:
     """The table and the ratios."""
+    cells = (
+        f"{r.name} | {r.threads} | {r.points:,} | {r.rate:,.4g} | {r.found:,} | "
+        f"{', '.join(map(str, r.missed)) if any(r.missed) else 0} | {r.incomplete} | {r.unproved}"
+        for r in rows
+    )
+    head = "search | threads | points | points/s | equilibria | missed | points incomplete | no proof"
     lines = [
         "# The equilibrium atlas",
         "",
@@ -218,14 +187,7 @@ def markdown(rows: list[AtlasRow], ratios: dict[int, tuple[float, float, float]]
         f"Missed: equilibria of the certified map that multistart has not found after "
         f"{', '.join(map(str, TOLD))} starts; its rate and the other columns are for {STARTS}.",
         "",
-        *table(
-            "search | threads | points | points/s | equilibria | missed | points incomplete | no proof",
-            (
-                f"{r.name} | {r.threads} | {r.points:,} | {r.rate:,.4g} | {r.found:,} | "
-                f"{', '.join(map(str, r.missed)) if any(r.missed) else 0} | {r.incomplete} | {r.unproved}"
-                for r in rows
-            ),
-        ),
+        *table(head, cells),
     ]
     for row, (low, middle, high) in zip(rows, ratios.values(), strict=False):
         by = f"{row.threads} thread{'s' * (row.threads > 1)}"

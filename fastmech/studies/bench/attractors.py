@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,6 +27,7 @@ from fastmech.kernels.sincos import cos, sin
 from fastmech.reports import Stage, table
 from fastmech.studies.bench.entrants import installed
 from fastmech.studies.bench.own_systems import inverse_cube, spoken
+from fastmech.studies.reporting import in_turns
 
 #: Starts that are timed and that others follow; those of SciPy; runs of which the median counts.
 STARTS, FOLLOWED, BY_SCIPY, RUNS = 10_000, 2_000, 200, 5
@@ -121,18 +123,14 @@ def attractors_study(quick: bool, stage: Stage) -> list[str]:
     ]
     if "heyoka" in installed():
         peers.insert(0, ("heyoka", by_heyoka, QUICK_FOLLOWED if quick else FOLLOWED))
-    advance = stage("systems", len(CASES) + 1)
-    rows = []
+    advance, rows = stage("systems", len(CASES) + 1), []
     for name, (system, ranges) in CASES.items():
-        seconds = []
-        for _ in range(1 + (1 if quick else RUNS)):
-            began = time.process_time()
-            found = find_attractors(system, ranges, STARTS, threads=1)
-            seconds.append(time.process_time() - began)
+        find = partial(find_attractors, system, ranges, STARTS, threads=1)
+        seconds, results = in_turns({name: find}, 1 if quick else RUNS)
+        found, counted = results[name], results[name].counts
         kinds = ", ".join(f"{one.kind} {one.found / STARTS:.4f}" for one in found)
-        counted = found.counts
         row = [name, kinds, f"{counted['escaped'] / STARTS:.4f}", f"{counted['unsure'] / STARTS:.4f}"]
-        row.append(f"{np.median(seconds[1:]):.2f}")
+        row.append(f"{np.median(seconds[name]):.2f}")
         row += [beside(system, found, ranges, path(system), number) for _, path, number in peers]
         rows.append(row)
         advance(1)
@@ -143,21 +141,14 @@ def attractors_study(quick: bool, stage: Stage) -> list[str]:
     map_basins(system, axes)
     whole = time.perf_counter() - began
     advance(1)
-    head = [
-        "system",
-        "attractors and shares",
-        "escaped",
-        "unsure",
-        "seconds",
-        *(name for name, _, _ in peers),
-    ]
+    names = [name for name, _, _ in peers]
     return [
         "# Attractors",
         "",
         f"Shares of {STARTS:,} starts; processor seconds of one core for finding and labelling, median, the "
         "first call left out. Beside others: wrong labels of those compared.",
         "",
-        *table(head, rows),
+        *table(["system", "attractors and shares", "escaped", "unsure", "seconds", *names], rows),
         "",
         f"A map of Duffing's basins with {side:,} x {side:,} points, all processors: {whole:.1f} s.",
     ]

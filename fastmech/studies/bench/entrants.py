@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
+from functools import partial
 from importlib.util import find_spec
 from typing import Any
 
@@ -53,13 +54,16 @@ def settings(problem: Problem) -> Iterator[tuple[str, str, dict[str, Any]]]:
 
 
 def prepared(keywords: dict[str, Any]) -> Prepare:
-    """A call of ``fm.integrate`` with these keywords; what it says is not to be trusted has no end."""
+    """A call of ``fm.integrate`` with these keywords, on one thread unless they say otherwise.
 
-    def prepare(problem: Problem, threads: int) -> Solve:
+    What it says is not to be trusted has no end.
+    """
+
+    def prepare(problem: Problem) -> Solve:
         def solve(starts: Any) -> Any:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", StepWarning)  # the status tells whom it concerns
-                run = integrate(problem.scene, starts, problem.t_end, threads=threads, **keywords)
+                run = integrate(problem.scene, starts, problem.t_end, **({"threads": 1} | keywords))
             final = run.y[-1]
             if run.status.any():
                 final[run.status != Status.OK] = np.inf
@@ -78,29 +82,24 @@ def _of_series(series: dict[str, Any], problem: Problem) -> Iterator[Entrant]:
     sizes = {key: series[key] for key in ("most", "least") if key in series}
     for value in values:
         x = value * problem.pace if kind == "dt" else value
-
-        def prepare(problem: Problem, threads: int, x: float = x) -> Solve:
-            solve: Solve = function(*series.get("given", ()), problem, threads, x)
-            return solve
-
+        prepare = partial(function, *series.get("given", ()), x)
         yield Entrant(series["family"], SETTINGS[kind].format(x), prepare, **sizes)
 
 
 def entrants_of(library: str, problem: Problem) -> Iterator[Entrant]:
-    """Those of a library, every second one of heyoka also on all cores; of fastmech: what is always there."""
+    """Those of a library; of fastmech: its own and what is always there."""
     if library == "fastmech":
         for family, setting, keywords in settings(problem):
-            yield Entrant(family, setting, prepared(keywords), threaded=True)
-    found = (entrant for series in SERIES[library] for entrant in _of_series(series, problem))
-    for number, entrant in enumerate(found):
-        yield entrant._replace(threaded=library == "heyoka" and number % 2 == 0)
+            yield Entrant(family, setting, prepared(keywords))
+    for series in SERIES[library]:
+        yield from _of_series(series, problem)
 
 
 def entrants(problem: Problem, quick: bool) -> Iterator[Entrant]:
     """Every entrant, the package's first; quick: every third of its own and one of what is always there."""
     if quick:
-        own = list(entrants_of("fastmech", problem))
-        yield from [entrant for entrant in own if entrant.threaded][::3]
+        own = (e for e in entrants_of("fastmech", problem) if e.family.startswith("fastmech"))
+        yield from list(own)[::3]
         first = {series["prepare"]: series for series in reversed(SERIES["fastmech"])}
         yield from (next(_of_series(first[name], problem)) for name in ("fused", "plain", "scipy"))
         return

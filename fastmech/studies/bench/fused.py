@@ -68,7 +68,7 @@ def compiled(method: str) -> Any:
     return njit(nogil=True, **FLAGS)(names["integrate"])
 
 
-def prepared(method: str, problem: Problem, threads: int, h: float) -> Solve:
+def prepared(method: str, h: float, problem: Problem) -> Solve:
     """A method at a fixed step, in blocks of lanes."""
     kernel, p = compiled(method), problem.coefficients
     steps = int(np.ceil(problem.t_end / h - 1e-9))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -67,26 +67,21 @@ def throughputs(problem: Problem, stage: Stage) -> tuple[float, list[Throughput]
     """The measured peak [multiply-adds/s], and right-hand sides alone and inside of methods."""
     x, turns = np.ones(LANES), 2000
     Y = np.ascontiguousarray(np.resize(problem.starts, (LANES, 4)).T)
-    coefficients = problem.coefficients
-    p = np.repeat(np.array(coefficients)[:, None], LANES, axis=1)
-    rhs, dY = right_hand_side(coefficients), np.empty_like(Y)
+    p = np.repeat(np.array(problem.coefficients)[:, None], LANES, axis=1)
+    rhs, dY = right_hand_side(problem.coefficients), np.empty_like(Y)
     many = np.tile(problem.starts, (max(1, 4096 // len(problem.starts)), 1))
-    works: dict[str, tuple[Callable[[], Any], int]] = {
-        "peak": (lambda: multiply_adds()(x, turns, 0.5), turns * x.size * CHAINS * LENGTH),
-        "kernel alone": (lambda: evaluations()(rhs, 0.0, Y, dY, p, turns), turns * LANES),
+    works: dict[str, Callable[[], Any]] = {
+        "peak": lambda: multiply_adds()(x, turns, 0.5),
+        "kernel alone": lambda: evaluations()(rhs, 0.0, Y, dY, p, turns),
     }
+    counts = {"peak": turns * x.size * CHAINS * LENGTH, "kernel alone": turns * LANES}
     for method, dt in (("rk4", 0.02), ("dop853", 0.05), ("abm12", 0.0125)):
-        steps = int(np.ceil(problem.t_end / dt * (1.0 - 1e-12)))
-
-        def run(method: str = method, dt: float = dt) -> Any:
-            return integrate(problem.scene, many, problem.t_end, dt, method, threads=1)
-
-        works[f"inside {method}"] = (run, len(many) * find_method(method).evaluations(steps))
-    calls = {name: work for name, (work, _) in works.items()}
-    seconds, _ = in_turns(calls, advance=stage("right-hand sides", len(works) * (TURNS + 1)))
-    rates = {name: count / statistics.median(seconds[name]) for name, (_, count) in works.items()}
-    peak = rates.pop("peak")
-    alone = rates["kernel alone"]
+        steps, name = int(np.ceil(problem.t_end / dt * (1.0 - 1e-12))), f"inside {method}"
+        works[name] = partial(integrate, problem.scene, many, problem.t_end, dt, method, threads=1)
+        counts[name] = len(many) * find_method(method).evaluations(steps)
+    seconds, _ = in_turns(works, advance=stage("right-hand sides", len(works) * (TURNS + 1)))
+    rates = {name: count / statistics.median(seconds[name]) for name, count in counts.items()}
+    peak, alone = rates.pop("peak"), rates["kernel alone"]
     return peak, [Throughput(name, rate, rate / alone, peak / rate) for name, rate in rates.items()]
 
 
@@ -115,18 +110,15 @@ class Cost(NamedTuple):
 def costs(problem: Problem, stage: Stage) -> list[Cost]:
     """Every kind of scene with the same method, step and starts, in turns."""
     starts = np.tile(problem.starts, (max(1, 4096 // len(problem.starts)), 1))
-    rng = np.random.default_rng(3)
+    rng, table_1 = np.random.default_rng(3), Scene(alpha=0.0)
     own = {
         name: value * rng.uniform(0.99, 1.01, len(starts))
-        for name, value in Scene(alpha=0.0).parameters.items()
+        for name, value in table_1.parameters.items()
         if value
     }
-
-    def work(changes: dict[str, float], parameters: dict[str, Any]) -> Callable[[], object]:
-        scene = Scene(alpha=0.0).replace(**changes)
-        return lambda: integrate(scene, starts, problem.t_end, DT, METHOD, threads=1, parameters=parameters)
-
-    works = {name: work(changes, {}) for name, changes in SCENES.items()} | {OWN_PARAMETERS: work({}, own)}
+    run = partial(integrate, y0=starts, t_end=problem.t_end, dt=DT, method=METHOD, threads=1)
+    works = {name: partial(run, table_1.replace(**changes)) for name, changes in SCENES.items()}
+    works[OWN_PARAMETERS] = partial(run, table_1, parameters=own)
     seconds, _ = in_turns(works, advance=stage("terms", len(works) * (TURNS + 1)))
     rates = {name: len(starts) / statistics.median(times) for name, times in seconds.items()}
     base = rates["damper, constant force"]

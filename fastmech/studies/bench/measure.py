@@ -80,8 +80,8 @@ def reference(name: str) -> Floats:
 #: Starts (n, 4) to final states (n, 4): what is timed.
 Solve = Callable[[Floats], Floats]
 
-#: Makes a ``Solve`` for a problem and a number of threads: compiling and tables, not timed as speed.
-Prepare = Callable[[Problem, int], Solve]
+#: Makes a ``Solve`` for a problem: compiling and tables, not timed as speed.
+Prepare = Callable[[Problem], Solve]
 
 
 class Entrant(NamedTuple):
@@ -92,7 +92,6 @@ class Entrant(NamedTuple):
     prepare: Prepare
     most: int = 32768  #: trajectories a call at most; slow integrators are given the first few
     least: int = 1  #: trajectories a call at least: a batch that needs them to be at its best
-    threaded: bool = False  #: whether it also enters on all cores
 
 
 #: Processor seconds of timed calls that one entrant is given, and its calls at most.
@@ -110,7 +109,6 @@ class Row:
     problem: str
     family: str
     setting: str
-    threads: int
     trajectories: int  #: in each timed call
     wall: float  #: s, median of timed calls
     processor: float  #: s of processor time, median of timed calls
@@ -119,8 +117,8 @@ class Row:
 
     @property
     def rate(self) -> float:
-        """Trajectories per second: of processor time on one thread, of wall time on more."""
-        return self.trajectories / (self.processor if self.threads == 1 else self.wall)
+        """Trajectories per second of processor time."""
+        return self.trajectories / self.processor
 
     def max_error(self, count: int | None = None) -> float:
         """Largest error of the first ``count`` trajectories, of all known by default."""
@@ -135,12 +133,12 @@ class Row:
 class _Runner:
     """A prepared entrant, warmed up and compared with the truth, and its times so far."""
 
-    def __init__(self, problem: Problem, entrant: Entrant, threads: int, budget: float) -> None:
-        self.entrant, self.threads, self.problem = entrant, threads, problem.name
+    def __init__(self, problem: Problem, entrant: Entrant, budget: float) -> None:
+        self.entrant, self.problem = entrant, problem.name
         n = min(len(problem.starts), entrant.most)
         self.starts = np.tile(problem.starts[:n], (max(1, -(-entrant.least // n)), 1))
         began = time.perf_counter()
-        self.solve = entrant.prepare(problem, threads)
+        self.solve = entrant.prepare(problem)
         final = self.solve(self.starts)
         self.first_call = time.perf_counter() - began
         self.errors = np.abs(final[:n] - problem.truth[:n]).max(axis=1)
@@ -166,26 +164,26 @@ class _Runner:
     def row(self) -> Row:
         """Medians of the calls."""
         wall, processor = statistics.median(self.wall), statistics.median(self.processor)
-        named = self.problem, self.entrant.family, self.entrant.setting, self.threads, len(self.starts)
+        named = self.problem, self.entrant.family, self.entrant.setting, len(self.starts)
         return Row(*named, wall, processor, self.first_call, self.errors)
 
 
 def measure(
     problem: Problem,
-    everyone: Sequence[tuple[Entrant, int]],
+    everyone: Sequence[Entrant],
     advance: Progress = lambda done: None,
     failed: Callable[[Entrant, Exception], None] | None = None,
     budget: float = BUDGET,
 ) -> list[Row]:
-    """Time entrants, each with its number of threads; ``advance`` is told 1 twice for each.
+    """Time entrants on one thread; ``advance`` is told 1 twice for each.
 
     ``budget`` is what each is given [s of processor time]; a call that takes longer is made once. An
     exception of an entrant is raised, or handed to ``failed`` where it is given.
     """
     runners = []
-    for entrant, threads in everyone:
+    for entrant in everyone:
         try:
-            runners.append(_Runner(problem, entrant, threads, budget))
+            runners.append(_Runner(problem, entrant, budget))
         except Exception as error:
             if failed is None:
                 raise

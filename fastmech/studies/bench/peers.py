@@ -9,8 +9,6 @@ once.
 from __future__ import annotations
 
 import os
-from concurrent.futures import ThreadPoolExecutor
-from copy import deepcopy
 from functools import cache, partial
 from typing import Any
 
@@ -33,7 +31,7 @@ _COUNT = len(Coefficients._fields)
 _POINTER = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
 
 
-def scipy(method: str, problem: Problem, threads: int, tolerance: float) -> Solve:
+def scipy(method: str, tolerance: float, problem: Problem) -> Solve:
     """One ``solve_ivp`` after the other, with the compiled right-hand side."""
     from scipy.integrate import solve_ivp
 
@@ -44,7 +42,7 @@ def scipy(method: str, problem: Problem, threads: int, tolerance: float) -> Solv
     )
 
 
-def pynamicalsys(problem: Problem, threads: int, h: float) -> Solve:
+def pynamicalsys(h: float, problem: Problem) -> Solve:
     """RK4, a trajectory a call."""
     from pynamicalsys import ContinuousDynamicalSystem
 
@@ -84,7 +82,7 @@ def _cyrk() -> Any:
     return loop, rhs
 
 
-def cyrk(method: str, problem: Problem, threads: int, tolerance: float) -> Solve:
+def cyrk(method: str, tolerance: float, problem: Problem) -> Solve:
     """One of its C++ solvers."""
     (loop, rhs), p = _cyrk(), np.array(problem.coefficients)
     return lambda starts: loop(rhs.address, starts, problem.t_end, p, method, tolerance)
@@ -113,7 +111,7 @@ def _numbalsoda(method: str) -> Any:
     return loop, rhs
 
 
-def numbalsoda(method: str, problem: Problem, threads: int, tolerance: float) -> Solve:
+def numbalsoda(method: str, tolerance: float, problem: Problem) -> Solve:
     """LSODA or DOP853."""
     loop, rhs = _numbalsoda(method)
     p, times = np.array(problem.coefficients), np.array([0.0, problem.t_end])
@@ -135,7 +133,7 @@ def _rates(m: Any, p: Coefficients, y: Any) -> tuple[Any, Any, Any, Any]:
     return u, w, phi_ddot, r2 - s12 * phi_ddot
 
 
-def diffrax(solver: str, adapts: bool, problem: Problem, threads: int, value: float) -> Solve:
+def diffrax(solver: str, adapts: bool, value: float, problem: Problem) -> Solve:
     """``diffeqsolve`` for JAX; every setting compiles for some seconds.
 
     XLA's pool is held to one thread so that rates are those of one core; its flags must stand before JAX is
@@ -197,11 +195,11 @@ def _torch(method: str, p: Coefficients) -> Any:
     return torch.compile(step, dynamic=False, fullgraph=True)
 
 
-def torch(method: str, problem: Problem, threads: int, h: float) -> Solve:
+def torch(method: str, h: float, problem: Problem) -> Solve:
     """A Runge-Kutta step written by hand over 8,192 lanes."""
     import torch
 
-    torch.set_num_threads(threads)
+    torch.set_num_threads(1)
     step, steps = _torch(method, problem.coefficients), round(problem.t_end / h)
     length = torch.tensor(problem.t_end / steps, dtype=torch.float64)
 
@@ -240,12 +238,12 @@ def _heyoka_equations(problem: Problem) -> list[Any]:
     return [(phi, u), (theta, w), (u, phi_ddot), (w, r2 - s12 * phi_ddot)]
 
 
-def heyoka(problem: Problem, threads: int, tolerance: float) -> Solve:
-    """Adaptive Taylor series, 512-bit where the processor has it; threads share the batches."""
+def heyoka(tolerance: float, problem: Problem) -> Solve:
+    """Adaptive Taylor series, 512-bit where the processor has it."""
     import heyoka as hy
 
     width = hy.recommended_simd_size()
-    first = hy.taylor_adaptive_batch(
+    flow = hy.taylor_adaptive_batch(
         _heyoka_equations(problem),
         np.zeros((problem.starts.shape[1], width)),
         tol=tolerance,
@@ -254,10 +252,9 @@ def heyoka(problem: Problem, threads: int, tolerance: float) -> Solve:
         fast_math=True,
         force_avx512=True,
     )
-    flows = [first, *(deepcopy(first) for _ in range(threads - 1))]
     stop = np.full(width, problem.t_end)
 
-    def share(flow: Any, starts: Floats) -> Floats:
+    def solve(starts: Floats) -> Floats:
         final = np.empty_like(starts)
         for i in range(0, len(starts), width):
             flow.set_time(0.0)
@@ -266,12 +263,4 @@ def heyoka(problem: Problem, threads: int, tolerance: float) -> Solve:
             final[i : i + width] = flow.state.T
         return final
 
-    def solve(starts: Floats) -> Floats:
-        parts = [np.ascontiguousarray(starts[k::threads]) for k in range(threads)]
-        final = np.empty_like(starts)
-        with ThreadPoolExecutor(threads) as pool:
-            for k, part in enumerate(pool.map(share, flows, parts)):
-                final[k::threads] = part
-        return final
-
-    return solve if threads > 1 else partial(share, first)
+    return solve

@@ -56,7 +56,7 @@ def in_scalars(starts: Floats, p: Floats, h: float, steps: int) -> Floats:
     return final
 
 
-def prepared(problem: Problem, threads: int, h: float) -> Solve:
+def prepared(h: float, problem: Problem) -> Solve:
     """The loop at a fixed step."""
     p, steps = np.array(problem.coefficients), round(problem.t_end / h)
     return lambda starts: in_scalars(starts, p, problem.t_end / steps, steps)

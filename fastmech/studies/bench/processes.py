@@ -34,7 +34,7 @@ found = []
 for name in names:
     entrant = everyone[tuple(name)]
     starts = np.tile(problem.starts, (max(1, min(most, entrant.most) // 1024, entrant.least // 1024), 1))
-    solve = entrant.prepare(problem, 1)
+    solve = entrant.prepare(problem)
     error = float(np.abs(solve(starts)[:1024] - problem.truth).max())
     first, seconds = time.perf_counter() - began, []
     for _ in range(5):

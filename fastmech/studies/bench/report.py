@@ -72,15 +72,13 @@ def run_bench(out: Path, *, quick: bool = False, stage: Stage = no_stage) -> lis
     failures: list[str] = []
     for problem in problems:
         found = [enlarged(entrant) if quick else entrant for entrant in entrants(problem, quick)]
-        every = thread_count(None)
-        everyone = [(e, n) for e in found for n in ([1, every] if e.threaded and every > 1 else [1])]
-        advance = stage(f"{problem.name}: prepare and time", 2 * len(everyone))
+        advance = stage(f"{problem.name}: prepare and time", 2 * len(found))
 
         def failed(entrant: Entrant, error: Exception, advance: Progress = advance) -> None:
             failures.append(f"{entrant.family}, {entrant.setting}: {type(error).__name__}: {error}")
             advance(1)
 
-        rows += measure(problem, everyone, advance, failed, QUICK_BUDGET if quick else BUDGET)
+        rows += measure(problem, found, advance, failed, QUICK_BUDGET if quick else BUDGET)
     peak, rhs = throughputs(problems[0], stage)
     prices = costs(problems[0], stage)
     starts = [] if quick else list(started(stage))
@@ -128,7 +126,7 @@ def _preamble(quick: bool, failures: list[str]) -> list[str]:
         "Everyone solves the same problems: Table 1 with its force constant. Errors are the largest and the "
         "median over trajectories of the largest component of a final state's error, against a reference of "
         "24 digits (`data/make_bench_reference.py`). All are prepared and warmed up first and then timed in "
-        "turns; rates on one thread are medians per second of processor time, on a quiet machine wall time.",
+        "turns; rates are medians per second of processor time, on a quiet machine wall time.",
         "",
         *([f"Not installed: {', '.join(missing)}.", ""] if missing else []),
         *(["Failed:", "", *(f"- {failure}" for failure in failures), ""] if failures else []),
@@ -151,7 +149,6 @@ _ROWS = {
     "problem": ("1", "problem"),
     "family": ("1", "integrator"),
     "setting": ("1", "step or tolerance"),
-    "threads": ("1", "threads"),
     "trajectories": ("1", "trajectories in a timed call"),
     "wall": ("s", "wall time of a call, median"),
     "processor": ("s", "processor time of a call, median"),

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import islice
 from typing import Any, NamedTuple
 
@@ -104,7 +105,7 @@ def candidates(problem: Problem, targets: Sequence[float]) -> Iterator[dict[str,
         for method in list(dict.fromkeys(p.method for p in kept))[:METHODS]:
             for dtype in ("float64", "float32") if target >= 1e-4 else ("float64",):
                 keywords = {"method": method, "dt": best[method], "dtype": dtype}
-                final = prepared(keywords)(problem, 1)(starts)
+                final = prepared(keywords)(problem)(starts)
                 errors = np.abs(final - problem.truth).max(axis=1)
                 for level in LEVELS:
                     ratio = 0.9 * target / max(order_statistic(errors, level), 1e-300)
@@ -115,9 +116,9 @@ def candidates(problem: Problem, targets: Sequence[float]) -> Iterator[dict[str,
 def to_tolerance(tol: float, quantile: float, estimates: dict[tuple[int, float, float], float]) -> Prepare:
     """A run to a tolerance, which leaves its estimate by number of starts, quantile and tolerance."""
 
-    def prepare(problem: Problem, threads: int) -> Solve:
+    def prepare(problem: Problem) -> Solve:
         def solve(starts: Floats) -> Floats:
-            run = integrate(problem.scene, starts, problem.t_end, tol=tol, quantile=quantile, threads=threads)
+            run = integrate(problem.scene, starts, problem.t_end, tol=tol, quantile=quantile, threads=1)
             estimates[len(starts), quantile, tol] = float(run.error_estimate or 0.0)
             return np.asarray(run.y[-1])
 
@@ -128,9 +129,7 @@ def to_tolerance(tol: float, quantile: float, estimates: dict[tuple[int, float, 
 
 def by_heyoka(tolerance: float, most: int) -> Entrant:
     """heyoka at a tolerance."""
-    return Entrant(
-        "heyoka", f"{tolerance:g}", lambda problem, threads: heyoka(problem, threads, tolerance), most
-    )
+    return Entrant("heyoka", f"{tolerance:g}", partial(heyoka, tolerance), most)
 
 
 def measured(
@@ -150,7 +149,7 @@ def measured(
         everyone += [Entrant("tol", "", to_tolerance(t, q, found.estimates), size) for q, t in asked]
         everyone += [by_heyoka(t, n) for t in peers if size == n]
         few = replace(problem, starts=problem.starts[:size], truth=problem.truth[:size])
-        rows = iter(measure(few, [(entrant, 1) for entrant in everyone]))
+        rows = iter(measure(few, everyone))
         found.fixed[size] = list(islice(rows, len(settings)))
         found.tol.update({(size, *key): next(rows) for key in asked})
         found.heyoka.extend(rows)
@@ -158,7 +157,7 @@ def measured(
     if not peers:
         return found
     still = replace(problem, truth=problem.starts, t_end=0.0)
-    (idle,) = measure(still, [(by_heyoka(1e-5, n), 1)])
+    (idle,) = measure(still, [by_heyoka(1e-5, n)])
     return found._replace(call=1.0 / idle.rate)
 
 

@@ -43,7 +43,7 @@ def draw_bench(rows: list[Row], path: Path) -> None:
         for axes, (name, make) in zip(panels, PROBLEMS.items(), strict=True):
             problem = make(1)
             shown = [row for row in rows if SMALLEST < row.max_error() < LARGEST]
-            _draw(axes, [row for row in shown if (row.problem, row.threads) == (name, 1)])
+            _draw(axes, [row for row in shown if row.problem == name])
             axes.set(xscale="log", yscale="log", xlim=(LARGEST, SMALLEST))
             axes.set_title(f"{problem.description}, to {problem.t_end:g} s")
             axes.set_xlabel("largest error of a final state [rad, rad/s], smaller to the right")
@@ -109,7 +109,7 @@ def own(rows: Iterable[Row]) -> list[Row]:
     return [row for row in rows if row.family.startswith(OWN)]
 
 
-def equal_error(rows: list[Row], threads: int) -> list[str]:
+def equal_error(rows: list[Row]) -> list[str]:
     """The package's rate at each error, and how many times the rate of each peer that is."""
     mine, peers = own(rows), dict[str, list[Row]]()
     for row in rows:
@@ -125,11 +125,10 @@ def equal_error(rows: list[Row], threads: int) -> list[str]:
             rate, best = rate_at(theirs, error, count), fastest_at(mine, error, count)
             line.append("-" if rate is None or best is None else f"{best[1] / rate:.2f} x ({rate:,.0f})")
         lines.append(line)
-    unit = "core second" if threads == 1 else "second"
     return [
-        f"Trajectories per {unit} at equal largest error, {threads} thread{'s' * (threads > 1)}; for the "
-        "others fastmech's rate over theirs, and theirs in brackets. A peer that was given fewer "
-        "trajectories is compared on those. `-`: no setting is as accurate.",
+        "Trajectories per core second at equal largest error, one thread; for the others fastmech's rate "
+        "over theirs, and theirs in brackets. A peer that was given fewer trajectories is compared on those. "
+        "`-`: no setting is as accurate.",
         "",
         *table(["largest error", *(f"{error:.0e}" for error in TARGETS)], lines),
     ]
@@ -137,7 +136,7 @@ def equal_error(rows: list[Row], threads: int) -> list[str]:
 
 def same_step(rows: list[Row]) -> list[str]:
     """The engine against the hand-fused loop and against plain Numba, same method and step."""
-    found = {(row.family, row.setting): row for row in rows if row.threads == 1}
+    found = {(row.family, row.setting): row for row in rows}
     lines, left_out = [], 0
     for (family, setting), row in found.items():
         method = "rk4" if family.startswith("Numba RK4") else family.removeprefix(FUSED).strip()
@@ -159,37 +158,22 @@ def same_step(rows: list[Row]) -> list[str]:
     ]
 
 
-def speed_up(rows: list[Row]) -> list[str]:
-    """All threads over one, by wall time, of the package."""
-    one = {(row.family, row.setting): row for row in rows if row.threads == 1}
-    lines = []
-    for row in rows:
-        if row.threads > 1:
-            single = one[row.family, row.setting]
-            ratio = (single.wall / single.trajectories) / (row.wall / row.trajectories)
-            used = row.processor / row.wall
-            lines.append(f"{row.family}, {row.setting} | {row.threads} | {ratio:.2f} | {used:.2f}")
-    about = "All threads over one, by wall time, and the cores that it got."
-    return [about, "", *table("integrator | threads | speed-up | cores used", lines)] if lines else []
-
-
 def problem_section(problem: Problem, rows: list[Row]) -> list[str]:
     """All that was measured on one problem."""
     mine = [row for row in rows if row.problem == problem.name]
     lines = [f"## {problem.name}: {problem.description}, to t = {problem.t_end:g} s", ""]
-    for threads in sorted({row.threads for row in mine}):
-        lines += equal_error([row for row in mine if row.threads == threads], threads)
+    lines += equal_error(mine)
     head = (
-        "integrator | setting | threads | n | 1/s a core | 1/s wall | largest error | median error | "
+        "integrator | setting | n | 1/s a core | 1/s wall | largest error | median error | "
         "compared | first call [s]"
     )
     everything = (
-        f"{r.family} | {r.setting} | {r.threads} | {r.trajectories} | {r.trajectories / r.processor:,.0f} | "
+        f"{r.family} | {r.setting} | {r.trajectories} | {r.trajectories / r.processor:,.0f} | "
         f"{r.trajectories / r.wall:,.0f} | {r.max_error():.1e} | {r.median_error:.1e} | {len(r.errors)} | "
         f"{r.first_call:.2f}"
         for r in mine
     )
-    return [*lines, *same_step(mine), *speed_up(mine), "Every setting:", "", *table(head, everything)]
+    return [*lines, *same_step(mine), "Every setting:", "", *table(head, everything)]
 
 
 def machine_sections(

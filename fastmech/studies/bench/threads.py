@@ -76,8 +76,8 @@ def cases(n: int, turns: int) -> dict[str, Run]:
 
 
 def _ensemble(problem: Problem, n: int, keywords: dict[str, Any]) -> Run:
-    starts, prepare = np.resize(problem.starts, (n, problem.starts.shape[1])), prepared(keywords)
-    return lambda threads: prepare(problem, threads)(starts)
+    starts = np.resize(problem.starts, (n, problem.starts.shape[1]))
+    return lambda threads: prepared(keywords | {"threads": threads})(problem)(starts)
 
 
 def _arithmetic(turns: int, threads: int) -> object:

@@ -151,15 +151,6 @@ def equilibrium_20(scene: Scene, equation: Printed) -> dict[str, Fit]:
 ANGLES, FIRST = 256, 1.0
 
 
-class Measure(NamedTuple):
-    """How wrong an expression is, along the paper's motion."""
-
-    about: str
-    unit: str
-    tolerance: float  #: what rounding explains
-    of: Callable[[str, EnergyBalance], float]
-
-
 def _largest(values: Floats) -> float:
     return float(np.max(np.abs(values)))
 
@@ -253,28 +244,15 @@ def _gradient_of_hamiltonian(q: Floats, p: Floats) -> Floats:
     return gradient
 
 
-#: What is measured about the formula of a key of ``printed.toml``.
-MEASURES = {
-    "text_rod": [
-        Measure(
-            "largest residual along the motion, which is zero for a rod of length l", "m", 1e-12, _residual
-        ),
-    ],
-    "equation_2": [Measure("largest residual of the constraint along the motion", "m²", 1e-12, _residual)],
-    "equation_9": [
-        Measure("largest difference from the kinetic energy (8) along the motion", "J", 1e-9, _kinetic),
-    ],
-    "equation_10": [
-        Measure("largest violation of the energy balance along the motion", "J", 1e-6, _imbalance),
-        Measure("change of the energy if lengths are given in cm instead of m", "J", 1e-9, _change_of_units),
-    ],
-    "equation_12": [
-        Measure("largest difference from (1/2) d a11/d phi over a turn", "kg m²", 1e-9, _christoffel),
-    ],
-    "equation_14": [
-        Measure("largest difference from the rate of the momenta along the motion", "N m", 1e-6, _canonical),
-        Measure(f"largest deviation of the angles in the first {FIRST:g} s", "rad", 1e-6, _deviation),
-    ],
+#: How wrong an expression is, along the paper's motion: what the measures of ``printed.toml`` name.
+MEASURES: dict[str, Callable[[str, EnergyBalance], float]] = {
+    "residual": _residual,
+    "kinetic": _kinetic,
+    "imbalance": _imbalance,
+    "change_of_units": _change_of_units,
+    "christoffel": _christoffel,
+    "canonical": _canonical,
+    "deviation": _deviation,
 }
 
 
@@ -311,156 +289,115 @@ class Misprint(NamedTuple):
 
 def candidates(printed: Printed, computed: Computed) -> list[Misprint]:
     """Every place of the paper that was found suspect, in the paper's order, with evidence computed now."""
-    formulas = []
+    formulas, motion = [], computed.motion
     for key, formula in printed["formula"].items():
         wrong, right = formula["printed"], formula["corrected"]
         evidence = [
-            Evidence(about, unit, of(wrong, computed.motion), of(right, computed.motion), tolerance)
-            for about, unit, tolerance, of in MEASURES[key]
+            Evidence(about, unit, MEASURES[of](wrong, motion), MEASURES[of](right, motion), tolerance)
+            for about, unit, tolerance, of in formula["measures"]
         ]
         formulas.append(Misprint(key, formula["place"], formula["error"], wrong, right, tuple(evidence)))
+    equation, cases = printed["equation_16"], computed.cases
+    index = next(i for i, term in enumerate(equation["potential"]) if term["factor"] == "sin(phi)")
+    other = next(term["value"] for term in printed["equation_20"]["phi"] if term["factor"] == "cos(phi)")
+    exact = float(hamiltonian_16(PAPER_SCENE, equation).potential.coefficients[index])
+    case_4, hessian = printed["table_3"]["case_4"]["hessian"], cases[3].equilibrium.hessian
     return [
         *formulas,
         _bracket_16(printed, computed),
-        _coefficient_16(printed),
-        _copied_hessian(printed, computed.cases),
-        *_elements_case_4(printed, computed.cases[3]),
+        _wrong_digits(
+            printed, "equation_16_coefficient", equation["potential"][index]["value"], exact, other
+        ),
+        _copied_hessian(printed, cases),
+        _wrong_digits(printed, "table_3_case_4_c12", case_4[0][1], float(hessian[0, 1]), case_4[1][0]),
+        _wrong_digits(printed, "table_3_case_4_c22", case_4[1][1], float(hessian[1, 1])),
         _sign_of_polynomials(printed),
-        _copied_polynomial(printed, computed.cases),
+        _copied_polynomial(printed, cases),
     ]
+
+
+def _misprint(
+    printed: Printed, key: str, both: tuple[str, str], *evidence: Evidence, other: str = ""
+) -> Misprint:
+    about = printed["misprint"][key]
+    return Misprint(key, about["place"], about["error"].format(other=other), *both, evidence)
 
 
 def _bracket_16(printed: Printed, computed: Computed) -> Misprint:
     equation = printed["equation_16"]
     exact = hamiltonian_16(PAPER_SCENE, equation)
-    q, p = computed.motion.y[:, :2], computed.momenta
-    kinetic = computed.motion.kinetic
-
-    def kinetic_error(corrected: bool) -> float:
-        difference = printed_kinetic(equation, q, p, corrected=corrected) - kinetic
-        return float(np.max(np.abs(difference)) / np.max(kinetic))
-
-    fitted = Evidence(
-        "remainder of the denominator that no coefficients in this shape remove, over its largest value",
-        "1",
-        exact.residual_as_printed,
-        exact.residual_corrected,
-        1e-12,
+    q, p, kinetic = computed.motion.y[:, :2], computed.momenta, computed.motion.kinetic
+    wrong, right = (
+        _largest(printed_kinetic(equation, q, p, corrected=corrected) - kinetic) / float(np.max(kinetic))
+        for corrected in (False, True)
     )
-    # The coefficients have two or three digits: 0.03 stands for 0.0267.
-    along = Evidence(
-        "largest error of the kinetic energy along the motion, over its largest value",
-        "1",
-        kinetic_error(False),
-        kinetic_error(True),
-        0.02,
+    fitted = "remainder of the denominator that no coefficients in this shape remove, over its largest value"
+    along = "largest error of the kinetic energy along the motion, over its largest value"
+    return _misprint(
+        printed,
+        "equation_16_bracket",
+        (_denominator(equation, False), _denominator(equation, True)),
+        Evidence(fitted, "1", exact.residual_as_printed, exact.residual_corrected, 1e-12),
+        # The coefficients have two or three digits: 0.03 stands for 0.0267.
+        Evidence(along, "1", wrong, right, 0.02),
     )
-    error = "the bracket that `sin(phi)**2` multiplies is closed too early"
-    both = _denominator(equation, False), _denominator(equation, True)
-    return Misprint("equation_16_bracket", "Equation (16), denominator", error, *both, (fitted, along))
 
 
 def _denominator(equation: Printed, corrected: bool) -> str:
     shape = equation["denominator"]
-    inside, after = list(shape["inside"]), list(shape["after"])
+    parts = shape["outside"], shape["inside"], shape["after"]
     if corrected:
-        inside, after = inside + after, []
-    text = f"{_sum(shape['outside'])} + sin(phi)**2*({_sum(inside)})" + " + " * bool(after) + _sum(after)
+        parts = shape["outside"], shape["inside"] + shape["after"], []
+    outside, inside, after = (
+        " + ".join(f"{term['value']}*{term['factor']}".removesuffix("*1") for term in terms)
+        for terms in parts
+    )
+    text = f"{outside} + sin(phi)**2*({inside})" + " + " * bool(after) + after
     return text.replace("+ -", "- ").replace("+ 1*", "+ ")
 
 
-def _sum(terms: Terms) -> str:
-    return " + ".join(f"{term['value']}*{term['factor']}".removesuffix("*1") for term in terms)
-
-
-def _coefficient_16(printed: Printed) -> Misprint:
-    equation = printed["equation_16"]
-    index = next(i for i, term in enumerate(equation["potential"]) if term["factor"] == "sin(phi)")
-    other = next(term["value"] for term in printed["equation_20"]["phi"] if term["factor"] == "cos(phi)")
-    return _wrong_digits(
-        "equation_16_coefficient",
-        "Equation (16), sin(phi)",
-        f"no rounding of the same number that (20) prints as {other}",
-        equation["potential"][index]["value"],
-        float(hamiltonian_16(PAPER_SCENE, equation).potential.coefficients[index]),
-    )
-
-
-def _wrong_digits(key: str, place: str, error: str, value: str, exact: float) -> Misprint:
+def _wrong_digits(printed: Printed, key: str, value: str, exact: float, other: str = "") -> Misprint:
     """A number [J] that misses the computed one by more than half a unit in its last place."""
     places = len(value.partition(".")[2])
-    right = f"{exact:.{places}f}"
-    evidence = Evidence(
-        f"difference from the computed {exact:.{places + 3}f}",
-        "J",
-        abs(float(value) - exact),
-        abs(float(right) - exact),
-        half_unit(value) * (1.0 + 1e-9),
-    )
-    return Misprint(key, place, error, value, right, (evidence,))
+    right, about = f"{exact:.{places}f}", f"difference from the computed {exact:.{places + 3}f}"
+    errors = abs(float(value) - exact), abs(float(right) - exact)
+    evidence = Evidence(about, "J", *errors, half_unit(value) * (1.0 + 1e-9))
+    return _misprint(printed, key, (value, right), evidence, other=other)
 
 
 def _copied_hessian(printed: Printed, cases: tuple[Case, ...]) -> Misprint:
     entries = printed["table_3"]["case_1"]["hessian"]
-    matrix, true = np.array(entries, dtype=np.float64), cases[0].equilibrium.hessian
+    hessians = [case.equilibrium.hessian for case in cases]
     evidence = Evidence(
         "largest difference of the printed matrix from the Hessian at Case 1 (as printed) and at Case 3",
         "J",
-        float(np.abs(matrix - true).max()),
-        float(np.abs(matrix - cases[2].equilibrium.hessian).max()),
+        _largest(np.array(entries, dtype=np.float64) - hessians[0]),
+        _largest(np.array(entries, dtype=np.float64) - hessians[2]),
         half_unit(entries[0][0]) * (1.0 + 1e-9),
     )
-    both = _matrix(entries), _matrix([[f"{value:.3f}" for value in row] for row in true])
-    return Misprint("table_3_case_1", "Table 3, Case 1", "the matrix is a copy of Case 3", *both, (evidence,))
-
-
-def _matrix(rows: list[list[str]]) -> str:
-    return "[" + ", ".join("[" + ", ".join(row) + "]" for row in rows) + "]"
-
-
-def _elements_case_4(printed: Printed, case: Case) -> list[Misprint]:
-    entries = printed["table_3"]["case_4"]["hessian"]
-    hessian = case.equilibrium.hessian
-    upper = f"the matrix is symmetric, and the equal element is printed as {entries[1][0]}"
-    places = (("c12", upper, 0, 1), ("c22", "the last digits are wrong", 1, 1))
-    return [
-        _wrong_digits(
-            f"table_3_case_4_{c}", f"Table 3, Case 4, {c}", error, entries[i][j], float(hessian[i, j])
-        )
-        for c, error, i, j in places
-    ]
+    true = [[f"{value:.3f}" for value in row] for row in hessians[0]]
+    wrong, right = (str([list(row) for row in rows]).replace("'", "") for rows in (entries, true))
+    return _misprint(printed, "table_3_case_1", (wrong, right), evidence)
 
 
 def _sign_of_polynomials(printed: Printed) -> Misprint:
     leading = [float(printed["table_4"][name]["coefficients"][4]) for name in CASES]
-    evidence = Evidence(
-        "difference of the leading coefficient from 1, that of det(lambda - J)",
-        "1",
-        max(abs(value - 1.0) for value in leading),
-        max(abs(-value - 1.0) for value in leading),
-        0.0,
-    )
-    error = "the polynomials are printed with the opposite sign (their roots are the same)"
-    return Misprint("table_4_sign", "Table 4", error, "... - lambda**4", "... + lambda**4", (evidence,))
+    wrong, right = (max(abs(sign * value - 1.0) for value in leading) for sign in (1.0, -1.0))
+    about = "difference of the leading coefficient from 1, that of det(lambda - J)"
+    both = "... - lambda**4", "... + lambda**4"
+    return _misprint(printed, "table_4_sign", both, Evidence(about, "1", wrong, right, 0.0))
 
 
 def _copied_polynomial(printed: Printed, cases: tuple[Case, ...]) -> Misprint:
     patterns = printed["table_4"]["case_1"]["coefficients"]
-
-    def contradictions(case: Case) -> float:
-        values = printed_polynomial(patterns, case)
-        return float(sum(not agrees_legibly(p, v) for p, v in zip(patterns, values, strict=True)))
-
-    evidence = Evidence(
-        "coefficients whose legible digits contradict the polynomial of Case 1 (as printed) and of Case 3",
-        "1",
-        contradictions(cases[0]),
-        contradictions(cases[2]),
-        0.0,
+    values = [printed_polynomial(patterns, cases[k]) for k in (0, 2)]
+    wrong, right = (
+        float(sum(not agrees_legibly(p, v) for p, v in zip(patterns, of_case, strict=True)))
+        for of_case in values
     )
-    error = "a copy of Case 3, from which follows the remark that both cases have the same graphs"
-    right = ", ".join(f"{value:.6g}" for value in printed_polynomial(patterns, cases[0]))
-    return Misprint("table_4_case_1", "Table 4, Case 1", error, ", ".join(patterns), right, (evidence,))
+    about = "coefficients whose legible digits contradict the polynomial of Case 1 (as printed) and of Case 3"
+    both = ", ".join(patterns), ", ".join(f"{value:.6g}" for value in values[0])
+    return _misprint(printed, "table_4_case_1", both, Evidence(about, "1", wrong, right, 0.0))
 
 
 def printed_polynomial(patterns: list[str], case: Case) -> Floats:

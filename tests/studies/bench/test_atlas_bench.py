@@ -12,7 +12,7 @@ def test_what_one_start_cannot_find_is_counted(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr("fastmech.studies.bench.atlas.STARTS", 2)
     monkeypatch.setattr("fastmech.studies.bench.atlas.TOLD", (1, 2))
     finished: list[int] = []
-    row = row_of("here", multistart([SCENE] * 3, finished.append))
+    row = row_of(multistart([SCENE] * 3, finished.append))
     assert sum(finished) == row.points == row.incomplete == 3
     after_one, after_two = row.missed
     assert 15 <= after_one <= 18

@@ -41,7 +41,7 @@ def test_entrants_are_distinct_and_the_methods_exist():
 
 
 def solved(entrant, problem):
-    final = entrant.prepare(problem, 1)(problem.starts)
+    final = entrant.prepare(problem)(problem.starts)
     return np.abs(final - problem.truth).max(axis=1)
 
 
@@ -65,18 +65,17 @@ def test_errors_are_what_order_and_tolerance_promise(family, setting, most):
 def test_the_hand_fused_loop_solves_the_hard_problem_in_blocks_that_are_not_full():
     problem = fast_starts(300)
     entrant = next(e for e in entrants_of("fastmech", problem) if e.family == "hand-fused rk4")
-    finer = fused.prepared("rk4", problem, 1, 0.0005)(problem.starts)
+    finer = fused.prepared("rk4", 0.0005, problem)(problem.starts)
     assert np.median(np.abs(finer - problem.truth).max(axis=1)) < 1e-9
-    assert entrant.prepare(problem, 1)(problem.starts).shape == (300, 4)
+    assert entrant.prepare(problem)(problem.starts).shape == (300, 4)
 
 
-@pytest.mark.parametrize("threads", [1, 2])
-def test_heyoka(threads):
+def test_heyoka():
     pytest.importorskip("heyoka")
     problem = dataclasses.replace(
         rest_starts(32), starts=rest_starts(32).starts[16:], truth=rest_starts(32).truth[16:]
     )
-    final = peers.heyoka(problem, threads, 1e-12)(problem.starts)
+    final = peers.heyoka(1e-12, problem)(problem.starts)
     assert np.abs(final - problem.truth).max() < 1e-11
 
 
@@ -86,5 +85,5 @@ def test_other_libraries(library):
     problem = rest_starts(FEW)
     *_, entrant = entrants_of(library, problem)
     starts = np.tile(problem.starts, (max(1, -(-entrant.least // FEW)), 1))
-    final = entrant.prepare(problem, 1)(starts)
+    final = entrant.prepare(problem)(starts)
     assert np.abs(final[:FEW] - problem.truth).max() < 1e-5

@@ -12,7 +12,7 @@ pytestmark = pytest.mark.nojit
 
 
 def row(family: str, rate: float, *errors: float, setting: str = "dt = 1 s") -> Row:
-    return Row("rest", family, setting, 1, 1000, 1000 / rate, 1000 / rate, 0.1, np.array(errors))
+    return Row("rest", family, setting, 1000, 1000 / rate, 1000 / rate, 0.1, np.array(errors))
 
 
 def test_a_setting_that_is_slower_and_less_accurate_is_left_out():
@@ -43,7 +43,7 @@ def test_a_peer_with_fewer_trajectories_is_compared_on_those():
     rows = [row("fastmech rk4", 1000.0, 1e-5, 1e-3), row("fastmech rk4", 10.0, 1e-9, 1e-6)]
     rows.append(row("SciPy", 5.0, 1e-5))
     assert rate_at(rows[:2], 1e-5) < 100.0
-    text = "\n".join(equal_error(rows, 1))
+    text = "\n".join(equal_error(rows))
     assert "| SciPy (first 1) |" in text
     assert "200.00 x (5)" in text
 

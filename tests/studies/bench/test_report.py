@@ -14,11 +14,11 @@ from fastmech.studies.bench.machine import multiply_adds
 from fastmech.studies.bench.measure import Entrant, Row, measure, rest_starts
 
 
-def exact(problem, threads):
+def exact(problem):
     return lambda starts: np.resize(problem.truth, starts.shape)
 
 
-def one_off(problem, threads):
+def one_off(problem):
     def solve(starts):
         final = np.resize(problem.truth, starts.shape).copy()
         final[0, 2] += 0.25
@@ -27,17 +27,17 @@ def one_off(problem, threads):
     return solve
 
 
-def impossible(problem, threads):
+def impossible(problem):
     raise RuntimeError("no such solver")
 
 
-def overflowing(problem, threads):
+def overflowing(problem):
     return lambda starts: np.full_like(starts, np.nan)
 
 
 @pytest.mark.nojit
 def test_errors_are_the_largest_component_of_each_trajectory():
-    (row,) = measure(rest_starts(8), [(Entrant("a", "b", one_off, most=64), 1)])
+    (row,) = measure(rest_starts(8), [Entrant("a", "b", one_off, most=64)])
     assert row.max_error() == pytest.approx(0.25)
     assert row.median_error == 0.0
     assert row.max_error(8) == row.max_error()
@@ -47,20 +47,20 @@ def test_errors_are_the_largest_component_of_each_trajectory():
 
 @pytest.mark.nojit
 def test_a_batch_that_needs_many_lanes_is_given_copies():
-    (row,) = measure(rest_starts(8), [(Entrant("a", "b", exact, most=104, least=100), 1)])
+    (row,) = measure(rest_starts(8), [Entrant("a", "b", exact, most=104, least=100)])
     assert row.trajectories == 104
     assert row.errors.shape == (8,)
 
 
 @pytest.mark.nojit
 def test_what_is_not_finite_has_no_finite_error():
-    (row,) = measure(rest_starts(4), [(Entrant("a", "b", overflowing), 1)])
+    (row,) = measure(rest_starts(4), [Entrant("a", "b", overflowing)])
     assert row.max_error() == np.inf
 
 
 @pytest.mark.nojit
 def test_failures_are_told_or_raised():
-    entrants = [(Entrant("a", "b", impossible), 1), (Entrant("c", "d", exact), 1)]
+    entrants = [Entrant("a", "b", impossible), Entrant("c", "d", exact)]
     told = []
     rows = measure(
         rest_starts(4), entrants, failed=lambda entrant, error: told.append((entrant.family, error))
@@ -107,7 +107,7 @@ def test_a_tiny_run(tmp_path, monkeypatch):
 def test_a_loop_is_not_compared_with_the_engine_by_calls_that_are_too_short(seconds, shown):
     """What stands around a call would be compared; the report says how many it leaves out."""
     rows = [
-        Row("rest", family, "dt = 0.08 s", 1, 48, seconds, seconds, 1.0, np.zeros(8))
+        Row("rest", family, "dt = 0.08 s", 48, seconds, seconds, 1.0, np.zeros(8))
         for family in ("fastmech rk4", "hand-fused rk4")
     ]
     text = "\n".join(tables.same_step(rows))

@@ -77,7 +77,7 @@ def test_the_mechanism_s_truth_is_scipy_s():
 
 
 def row(family: str, rate: float, *errors: float) -> Row:
-    return Row("x", family, "", 1, 1000, 1000 / rate, 1000 / rate, 0.1, np.array(errors))
+    return Row("x", family, "", 1000, 1000 / rate, 1000 / rate, 0.1, np.array(errors))
 
 
 def made(n: int = 16) -> Measured:
