@@ -74,4 +74,4 @@ def test_a_folder_that_cannot_be_made(invoke):
     Path("file").write_text("", encoding="utf-8")
     result = invoke("hardcases", "--out", "file/hard")
     assert result.exit_code == 2
-    assert result.stderr.startswith("fastmech: file/hard: cannot be made")
+    assert result.stderr.startswith("fastmech: file/hard/hardcases.h5: cannot be written")

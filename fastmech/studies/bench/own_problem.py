@@ -17,6 +17,7 @@ from fastmech.plots.style import new_figure, save, style
 from fastmech.reports import Stage, no_stage, table
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import read_request
+from fastmech.studies.reporting import write_text
 
 #: Starts at rest anywhere, of a request's scene, and the end in its vibrations' time scale.
 STARTS, UNTIL = 512, 50.0
@@ -99,9 +100,8 @@ def run_problem(where: str, out: Path, stage: Stage = no_stage) -> tuple[list[st
     except TypeError as error:
         raise InputError(f"{_named(where)}: {error}") from None
     lines = tabled(found)
-    out.mkdir(parents=True, exist_ok=True)
-    written, picture = out / "problem.md", out / "problem.png"
-    written.write_text("\n".join([f"# {shown_name(where)}", "", *lines]) + "\n", encoding="utf-8")
+    written = write_text(out / "problem.md", [f"# {shown_name(where)}", "", *lines])
+    picture = out / "problem.png"
     with style():
         figure = new_figure(9.0, 5.4)
         found.plot(figure.subplots())

@@ -203,11 +203,7 @@ def decay_power(t: Floats, level: Floats) -> float:
 
 
 def _kept_step(method: str, scene: Scene, frequency: float, length: float, most: int) -> float:
-    """Longest step [s] with which a method itself damps or drives an undamped mode by no more than KEPT.
-
-    Over the whole run, as the exponent of its energy: 2 ln|R(i omega h)| / h times the length. 0: more than
-    ``most`` steps.
-    """
+    """Longest step [s] with which the energy's own exponent, 2 ln|R(i omega h)| / h, stays small; 0: none."""
     dt = SLOW_DT
     while length <= most * dt:
         own = abs(np.log(amplification(find_method(method), 1j * frequency * dt))) / dt

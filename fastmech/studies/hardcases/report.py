@@ -25,7 +25,7 @@ from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import FAILURES, Status
 from fastmech.ensembles.system import System
 from fastmech.equilibria.find import Equilibrium, find_equilibria
-from fastmech.errors import InputError, StepWarning
+from fastmech.errors import StepWarning
 from fastmech.integrators.methods import METHODS
 from fastmech.plots.style import save
 from fastmech.reports import Stage, no_stage, table
@@ -34,6 +34,7 @@ from fastmech.scene import Scene
 from fastmech.step_limits.amplification import imaginary_limit, real_limit
 from fastmech.step_limits.measure import measured_stable_step
 from fastmech.step_limits.predict import largest_stable_step, limiting_eigenvalues
+from fastmech.store.write import check_writable
 from fastmech.studies.hardcases.cases import CASES, PAPER, QUICK_STEPS, STEPS, energy_history
 from fastmech.studies.hardcases.pictures import DRIFTS, Limits, draw_energy_drift, stability_pages
 from fastmech.studies.hardcases.walk import REFUSED, HardCase, Row
@@ -231,6 +232,9 @@ def _cells(row: Row) -> list[object]:
     return [*numbers, row.status, row.verdict, row.why, row.remark]
 
 
+DATA = "hardcases.h5"
+
+
 class Report(NamedTuple):
     """What was written, and how the gallery ended."""
 
@@ -246,10 +250,7 @@ def write_hardcases(out: Path, *, quick: bool = False, stage: Stage = no_stage) 
         InputError: the folder cannot be written.
     """
     began = time.perf_counter()
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{out}: cannot be made: {error.strerror}") from None
+    check_writable(out / DATA, replace=True)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StepWarning)  # steps that are too long are what some cases are about
         return _write(out, quick, stage, began)
@@ -269,8 +270,8 @@ def _write(out: Path, quick: bool, stage: Stage, began: float) -> Report:
         "step_limits": Dataset(columns("method", limits, _LIMITS)),
         "containment": shares,
     }
-    text, store = write_text(out / "hardcases.md", lines), out / "hardcases.h5"
-    write_data(store, PAPER, sections, began, title="Hard cases", verdict=told)
+    text = write_text(out / "hardcases.md", lines)
+    store = write_data(out / DATA, PAPER, sections, began, title="Hard cases", verdict=told)
     steps = QUICK_STEPS if quick else STEPS
     pictures = stability_pages(limits, limiting_eigenvalues(PAPER, minimum))
     for name, label in (("paper", "the paper's start"), ("energetic", "an energetic start")):
