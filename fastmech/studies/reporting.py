@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -14,6 +14,7 @@ import numpy as np
 
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.threads import thread_count
+from fastmech.reports import Line, table
 from fastmech.results import Dataset, Variable, scene_parameters
 from fastmech.scene import Scene
 from fastmech.store.provenance import provenance
@@ -32,15 +33,22 @@ def content(package: str, name: str) -> dict[str, Any]:
     return tomllib.loads(resources.files(package).joinpath(name).read_text(encoding="utf-8"))
 
 
-def columns(dim: str, rows: Sequence[Any], about: Mapping[str, tuple[str, str]]) -> dict[str, Variable]:
-    """Attributes of rows by name as variables along ``dim``; ``about``: unit and description of each."""
+def section(
+    title: str, about: str, head: Line, rows: Iterable[Line], left: Collection[int] = (0,)
+) -> list[str]:
+    """A heading, a paragraph (either may be empty) and a table, as Markdown; see :func:`table`."""
+    return [line for text in (title, about) if text for line in (text, "")] + table(head, rows, left)
+
+
+def columns(dim: str, rows: Sequence[Any], section: str) -> dict[str, Variable]:
+    """Attributes of rows by name as variables along ``dim``, as ``columns.toml`` has them for a section."""
 
     def column(name: str, unit: str, told: str) -> Variable:
         values = [value() if callable(value := getattr(row, name)) else value for row in rows]
         data = np.array(values, dtype=object if values and isinstance(values[0], str) else None)
         return Variable((dim,), data, unit, told)
 
-    return {name: column(name, *told) for name, told in about.items()}
+    return {name: column(name, *told) for name, told in content(__package__, "columns.toml")[section].items()}
 
 
 def in_turns(

@@ -20,9 +20,9 @@ from fastmech.atlas.map import map_equilibria
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.threads import thread_count
 from fastmech.equilibria.certificate import Outcome
-from fastmech.reports import Stage, table
+from fastmech.reports import Stage
 from fastmech.scene import Scene
-from fastmech.studies.reporting import in_turns
+from fastmech.studies.reporting import in_turns, section
 
 SCENE = Scene(c1=294.9, c2=92.85, F0=85.3, alpha=0.0)
 F0_RANGE, C1_RANGE = (-400.0, 400.0), (0.0, 400.0)
@@ -178,17 +178,14 @@ def markdown(rows: list[AtlasRow], ratios: dict[int, tuple[float, float, float]]
         f"{', '.join(map(str, r.missed)) if any(r.missed) else 0} | {r.incomplete} | {r.unproved}"
         for r in rows
     )
-    head = "search | threads | points | points/s | equilibria | missed | points incomplete | no proof"
-    lines = [
-        "# The equilibrium atlas",
-        "",
+    about = (
         f"Bistable scene, F0 from {F0_RANGE[0]:g} to {F0_RANGE[1]:g} N, c1 from {C1_RANGE[0]:g} to "
         f"{C1_RANGE[1]:g} N/m; medians of warm calls in turns. The map includes proof, stability and sheets. "
         f"Missed: equilibria of the certified map that multistart has not found after "
-        f"{', '.join(map(str, TOLD))} starts; its rate and the other columns are for {STARTS}.",
-        "",
-        *table(head, cells),
-    ]
+        f"{', '.join(map(str, TOLD))} starts; its rate and the other columns are for {STARTS}."
+    )
+    head = "search | threads | points | points/s | equilibria | missed | points incomplete | no proof"
+    lines = section("# The equilibrium atlas", about, head, cells)
     for row, (low, middle, high) in zip(rows, ratios.values(), strict=False):
         by = f"{row.threads} thread{'s' * (row.threads > 1)}"
         lines += [

@@ -24,10 +24,10 @@ from fastmech.basins.map import map_basins
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
 from fastmech.kernels.sincos import cos, sin
-from fastmech.reports import Stage, table
+from fastmech.reports import Stage
 from fastmech.studies.bench.entrants import installed
 from fastmech.studies.bench.own_systems import inverse_cube, spoken
-from fastmech.studies.reporting import in_turns
+from fastmech.studies.reporting import in_turns, section
 
 #: Starts that are timed and that others follow; those of SciPy; runs of which the median counts.
 STARTS, FOLLOWED, BY_SCIPY, RUNS = 10_000, 2_000, 200, 5
@@ -141,17 +141,14 @@ def attractors_study(quick: bool, stage: Stage) -> list[str]:
     map_basins(system, axes)
     whole = time.perf_counter() - began
     advance(1)
-    names = [name for name, _, _ in peers]
-    return [
-        "# Attractors",
-        "",
+    about = (
         f"Shares of {STARTS:,} starts; processor seconds of one core for finding and labelling, median, the "
-        "first call left out. Beside others: wrong labels of those compared.",
-        "",
-        *table(["system", "attractors and shares", "escaped", "unsure", "seconds", *names], rows),
-        "",
-        f"A map of Duffing's basins with {side:,} x {side:,} points, all processors: {whole:.1f} s.",
-    ]
+        "first call left out. Beside others: wrong labels of those compared."
+    )
+    names = [name for name, _, _ in peers]
+    head = ["system", "attractors and shares", "escaped", "unsure", "seconds", *names]
+    told = f"A map of Duffing's basins with {side:,} x {side:,} points, all processors: {whole:.1f} s."
+    return [*section("# Attractors", about, head, rows), "", told]
 
 
 def beside(

@@ -24,10 +24,10 @@ from fastmech.jit import FLAGS
 from fastmech.mechanism.coefficients import reduce
 from fastmech.mechanism.lagrange import unit
 from fastmech.mechanism.reduced import metric_11, potential, slider_ratio
-from fastmech.reports import Stage, table
+from fastmech.reports import Stage
 from fastmech.scene import Scene
 from fastmech.studies.bench.plain import scalar_rhs
-from fastmech.studies.reporting import in_turns
+from fastmech.studies.reporting import in_turns, section
 
 SCENE = Scene(alpha=0.0)
 REST, T_END, REPEATS = 1e-3, 300.0, 3
@@ -59,18 +59,13 @@ def basins_study(quick: bool, stage: Stage) -> list[str]:
     rows.append(lsoda(starts[:few]))
     advance(1)
     first, (rest, peer) = rows[0], rows[-2:]
+    cells = (
+        f"{r.name} | {r.threads} | {r.starts:,} | {r.rate:,.4g} | {r.steps:,.4g} | {r.wrong}" for r in rows
+    )
+    about = "Table 1, constant force, random starts at rest; medians of warm calls."
+    head = "labelled by | threads | starts | starts/s | steps a start | labels that differ"
     return [
-        "# Basin labels",
-        "",
-        "Table 1, constant force, random starts at rest; medians of warm calls.",
-        "",
-        *table(
-            "labelled by | threads | starts | starts/s | steps a start | labels that differ",
-            (
-                f"{r.name} | {r.threads} | {r.starts:,} | {r.rate:,.4g} | {r.steps:,.4g} | {r.wrong}"
-                for r in rows
-            ),
-        ),
+        *section("# Basin labels", about, head, cells),
         f"The certificate takes 1/{rest.steps / first.steps:.0f} of the steps to rest, both of its "
         f"computations counted, and labels {first.rate / peer.rate:,.0f} times as many starts a second "
         f"on one core as SciPy.",

@@ -14,8 +14,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
-from fastmech.reports import Stage, table
+from fastmech.reports import Stage
 from fastmech.studies.bench.tables import Footprint, Start
+from fastmech.studies.reporting import section
 
 #: Prepares entrants of rest starts, at most so many trajectories a call: of each the seconds from the first
 #: import to its first result, of a later call of 1,024 trajectories on one core (median of five), and the
@@ -175,6 +176,6 @@ def vectors_study(quick: bool, stage: Stage) -> list[str]:
                 + f" | {error:.1e}"
                 for (family, setting), rate, error in zip(WIDE, rates, errors, strict=True)
             )
-            lines += [f"## {name}: vectors of {bits} bit", ""]
-            lines += table("integrator | rate | over plain Numba | largest error", rows)
+            head = "integrator | rate | over plain Numba | largest error"
+            lines += section(f"## {name}: vectors of {bits} bit", "", head, rows)
     return lines

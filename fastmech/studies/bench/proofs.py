@@ -15,8 +15,9 @@ from fastmech.equilibria.certificate import Outcome
 from fastmech.models.equilibria import RestingPlaces, prove_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.statics import Statics
-from fastmech.reports import Stage, table
+from fastmech.reports import Stage
 from fastmech.studies.bench.devices import KINDS
+from fastmech.studies.reporting import section
 
 #: Mechanisms of the study, and starts of Newton's method for each; of a quick one.
 NUMBER, STARTS = 2000, 10_000
@@ -65,14 +66,11 @@ def proofs_study(quick: bool, stage: Stage, scenes: int | None = None) -> list[s
         [name, *(f"{n:,}" for n in tally[:-1]), f"{1e3 * tally.seconds / max(tally.number, 1):.3g}"]
         for name, tally in tallies.items()
     )
-    return [
-        "# Proved lists beside a multistart",
-        "",
+    about = (
         f"{number:,} random mechanisms of one to three coordinates; Newton's method from {starts:,} starts "
-        "each. Missing is a zero, confirmed in fifty digits, that is neither listed nor left open.",
-        "",
-        *table(head, rows),
-    ]
+        "each. Missing is a zero, confirmed in fifty digits, that is neither listed nor left open."
+    )
+    return section("# Proved lists beside a multistart", about, head, rows)
 
 
 def examined(mechanism: Mechanism, starts: int, seed: int) -> Tally:

@@ -92,11 +92,11 @@ def run_bench(out: Path, *, quick: bool = False, stage: Stage = no_stage) -> lis
     fused = Variable((), np.array(peak), "1/s", "fused multiply-adds of doubles of one core, measured")
     sections = {
         "speed": speed_dataset(rows, problems),
-        "rhs": Dataset({"peak": fused} | columns("place", rhs, _PLACES)),
-        "terms": Dataset(columns("kind", prices, _KINDS)),
+        "rhs": Dataset({"peak": fused} | columns("place", rhs, "rhs")),
+        "terms": Dataset(columns("kind", prices, "terms")),
     }
     if starts:
-        sections["starts"] = Dataset(columns("entrant", starts, _STARTS))
+        sections["starts"] = Dataset(columns("entrant", starts, "starts"))
     write_data(data, Scene(alpha=0.0), sections, began, title="Speed against error")
     return [table, picture, data, *(run_study(name, out, quick=quick, stage=stage) for name in STUDIES)]
 
@@ -139,27 +139,5 @@ def speed_dataset(rows: list[Row], problems: list[Problem]) -> Dataset:
     for line, row in zip(errors, rows, strict=True):
         line[: row.errors.size] = row.errors
     worst = "of the worst component of a final state in rad and rad/s"
-    about = _ROWS | {f"{name}_error": ("1", f"{told} error, {worst}") for name, told in _ERRORS.items()}
     each = {"error": Variable(("row", "trajectory"), errors, "1", f"error, {worst}")}
-    return Dataset(columns("row", rows, about) | each)
-
-
-#: What is read from each row of the sections.
-_ROWS = {
-    "problem": ("1", "problem"),
-    "family": ("1", "integrator"),
-    "setting": ("1", "step or tolerance"),
-    "trajectories": ("1", "trajectories in a timed call"),
-    "wall": ("s", "wall time of a call, median"),
-    "processor": ("s", "processor time of a call, median"),
-    "first_call": ("s", "preparing and the first call"),
-}
-_ERRORS = {"max": "largest", "median": "median"}
-_PLACES = {"place": ("1", "where they are evaluated"), "rhs": ("1/s", "right-hand sides")}
-_KINDS = {"kind": ("1", "terms of the scene"), "rate": ("1/s", "trajectories")}
-_STARTS = {
-    "entrant": ("1", "integrator"),
-    "first": ("s", "to the first result"),
-    "second": ("s", "the same in a second process"),
-    "steady": ("s", "a later call"),
-}
+    return Dataset(columns("row", rows, "speed") | each)

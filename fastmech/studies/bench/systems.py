@@ -21,7 +21,7 @@ from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.work_precision import order_statistic
 from fastmech.frontier import work_precision
 from fastmech.integrators.methods import find_method
-from fastmech.reports import Stage, table
+from fastmech.reports import Stage
 from fastmech.scene import Scene
 from fastmech.studies.bench.devices import KINDS, explicit
 from fastmech.studies.bench.entrants import installed, prepared
@@ -29,6 +29,7 @@ from fastmech.studies.bench.measure import Entrant, Prepare, Problem, Row, Solve
 from fastmech.studies.bench.own_systems import STARTS, SYSTEMS, OwnSystem, spoken
 from fastmech.studies.bench.peers import heyoka
 from fastmech.studies.bench.tolerances import ROUNDINGS, Rates, extended, scene_rates
+from fastmech.studies.reporting import section
 
 #: Errors at which rates are compared.
 TARGETS = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
@@ -212,17 +213,16 @@ def summary(found: Sequence[Measured], targets: Sequence[float]) -> list[str]:
         lines.append(line)
     every = np.array([r for one in found for r in estimate_ratios(one)])
     good = (every >= 1.0 / FACTOR) & (every <= FACTOR)
+    about = "Geometric mean over systems, in brackets the worst."
     return [
-        "Geometric mean over systems, in brackets the worst.",
-        "",
-        *table(["", *(f"{target:.0e}" for target in targets)], lines),
+        *section("", about, ["", *(f"{target:.0e}" for target in targets)], lines),
         f"`tol`'s estimate is within a factor {FACTOR:g} of the truth in {good.sum()} of {good.size} runs "
         f"({every.min():.2g} to {every.max():.2g} times it).",
         "",
     ]
 
 
-def section(found: Measured, targets: Sequence[float]) -> list[str]:
+def system_section(found: Measured, targets: Sequence[float]) -> list[str]:
     """One system: best settings, rates, ratios."""
     n, lines = max(found.fixed), []
     for target in targets:
@@ -233,7 +233,7 @@ def section(found: Measured, targets: Sequence[float]) -> list[str]:
         told = ratios(found, target).values()
         lines.append([f"{target:.0e}", setting, *(f"{r:,.0f}" for r in rates), *(f"{r:.2f}" for r in told)])
     head = ("error", "fastest fixed steps that keep it", "its rate [1/s]", "heyoka's [1/s]")
-    return [f"## {found.name}", "", *table([*head, *ratios(found, targets[0])], lines)]
+    return section(f"## {found.name}", "", [*head, *ratios(found, targets[0])], lines)
 
 
 def systems_study(quick: bool, stage: Stage) -> list[str]:
@@ -269,5 +269,5 @@ def report(found: list[Measured], targets: Sequence[float], scenes: Sequence[Mea
     for head, each in ((None, found), ("# Mechanisms beside heyoka", scenes)):
         if each:
             lines += [*([head, ""] if head else []), *summary(each, targets)]
-            lines += [line for one in each for line in section(one, targets)]
+            lines += [line for one in each for line in system_section(one, targets)]
     return lines

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fastmech.plots.style import LINES, new_figure, save, style
-from fastmech.reports import table
 from fastmech.studies.bench.machine import Cost, Throughput
 from fastmech.studies.bench.measure import PROBLEMS, TARGETS, Problem, Row, fastest_at, frontier, rate_at
+from fastmech.studies.reporting import section
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -125,13 +125,12 @@ def equal_error(rows: list[Row]) -> list[str]:
             rate, best = rate_at(theirs, error, count), fastest_at(mine, error, count)
             line.append("-" if rate is None or best is None else f"{best[1] / rate:.2f} x ({rate:,.0f})")
         lines.append(line)
-    return [
+    about = (
         "Trajectories per core second at equal largest error, one thread; for the others fastmech's rate "
         "over theirs, and theirs in brackets. A peer that was given fewer trajectories is compared on those. "
-        "`-`: no setting is as accurate.",
-        "",
-        *table(["largest error", *(f"{error:.0e}" for error in TARGETS)], lines),
-    ]
+        "`-`: no setting is as accurate."
+    )
+    return section("", about, ["largest error", *(f"{error:.0e}" for error in TARGETS)], lines)
 
 
 def same_step(rows: list[Row]) -> list[str]:
@@ -149,13 +148,12 @@ def same_step(rows: list[Row]) -> list[str]:
         rates = f"{row.rate:,.0f} | {engine.rate:,.0f} | {engine.rate / row.rate:.2f}"
         lines.append(f"{family}, {setting} | {rates}")
     told = f"Left out: {left_out} whose calls are shorter than {WORTH_COMPARING:g} s."
-    return [
+    about = (
         "The same method and step, one thread, trajectories per core second. The hand-fused loop is the "
-        "engine's yardstick: this mechanism and this method alone, in the same blocks.",
-        "",
-        *table("against | its rate | fastmech | ratio", lines),
-        *([told, ""] if left_out else []),
-    ]
+        "engine's yardstick: this mechanism and this method alone, in the same blocks."
+    )
+    compared = section("", about, "against | its rate | fastmech | ratio", lines)
+    return [*compared, told, ""] if left_out else compared
 
 
 def problem_section(problem: Problem, rows: list[Row]) -> list[str]:
@@ -173,7 +171,7 @@ def problem_section(problem: Problem, rows: list[Row]) -> list[str]:
         f"{r.first_call:.2f}"
         for r in mine
     )
-    return [*lines, *same_step(mine), "Every setting:", "", *table(head, everything)]
+    return [*lines, *same_step(mine), *section("", "Every setting:", head, everything)]
 
 
 def machine_sections(
@@ -184,40 +182,31 @@ def machine_sections(
     memory: list[Footprint],
 ) -> list[str]:
     """Peak, terms, cold starts and memory."""
-    lines = [
+    lines = section(
         "## Right-hand sides and the core's peak",
-        "",
         f"Measured peak: {peak / 1e9:.1f} billion fused multiply-adds of doubles per core second.",
-        "",
-        *table(
-            "where | million right-hand sides/s | of the kernel alone | multiply-adds in that time",
-            (f"{t.place} | {t.rhs / 1e6:.1f} | {t.share:.2f} | {t.slots:.0f}" for t in throughputs),
-        ),
+        "where | million right-hand sides/s | of the kernel alone | multiply-adds in that time",
+        (f"{t.place} | {t.rhs / 1e6:.1f} | {t.share:.2f} | {t.slots:.0f}" for t in throughputs),
+    )
+    lines += section(
         "## Terms of a scene (RK4, dt = 0.01 s)",
         "",
-        *table(
-            "scene | trajectories per core second | relative",
-            (f"{c.kind} | {c.rate:,.0f} | {c.relative:.3f}" for c in costs),
-        ),
-    ]
+        "scene | trajectories per core second | relative",
+        (f"{c.kind} | {c.rate:,.0f} | {c.relative:.3f}" for c in costs),
+    )
     if starts:
-        lines += [
+        lines += section(
             "## Cold start and steady state",
-            "",
             "Seconds from the first import to the first result of 1,024 rest starts, in a first process and "
             "in a second one that finds what the first has left on the disk, and of a later call.",
-            "",
-            *table(
-                "integrator | first process | second process | later call",
-                (f"{s.entrant} | {s.first:.2f} | {s.second:.2f} | {s.steady:.4f}" for s in starts),
-            ),
-        ]
+            "integrator | first process | second process | later call",
+            (f"{s.entrant} | {s.first:.2f} | {s.second:.2f} | {s.steady:.4f}" for s in starts),
+        )
     if memory:
-        lines += [
+        lines += section(
             "## Memory",
-            "",
             "The most that a process takes which asks for final states, its starts included.",
-            "",
-            *table("trajectories | GiB", (f"{p.trajectories:,} | {p.memory / 2**30:.2f}" for p in memory)),
-        ]
+            "trajectories | GiB",
+            (f"{p.trajectories:,} | {p.memory / 2**30:.2f}" for p in memory),
+        )
     return lines

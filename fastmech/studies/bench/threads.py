@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 
 from fastmech.ensembles.threads import thread_count
-from fastmech.reports import Stage, table
+from fastmech.reports import Stage
 from fastmech.studies.bench.entrants import PACKAGE, prepared
 from fastmech.studies.bench.machine import LANES, multiply_adds
 from fastmech.studies.bench.measure import Problem, fast_starts, rest_starts
-from fastmech.studies.reporting import TURNS, in_turns
+from fastmech.studies.reporting import TURNS, in_turns, section
 
 #: Trajectories of a call, tenths of a second to seconds of work; turns of the yardstick, a third of one.
 TRAJECTORIES, YARDSTICK = 32_768, 500_000
@@ -50,15 +50,12 @@ def threads_study(quick: bool, stage: Stage) -> list[str]:
     for name in found:
         ratios = [one / all_ for one, all_ in zip(seconds[name, 1], seconds[name, many], strict=True)]
         rows.append(f"{name} | {statistics.median(ratios):.2f} | {min(ratios):.2f} | {max(ratios):.2f}")
-    return [
-        "# Threads",
-        "",
+    about = (
         f"{n:,} trajectories to t = 10 s on {many} threads over one, by wall time: {turns} "
         f"turn{'s' * (turns > 1)}, each on one thread and at once on all. The multiply-adds share nothing: "
-        "what they fall short of the number of threads, the machine gave to others.",
-        "",
-        *table("run | speed-up, median | least | greatest", rows),
-    ]
+        "what they fall short of the number of threads, the machine gave to others."
+    )
+    return section("# Threads", about, "run | speed-up, median | least | greatest", rows)
 
 
 def cases(n: int, turns: int) -> dict[str, Run]:

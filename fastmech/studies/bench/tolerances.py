@@ -24,9 +24,10 @@ from numpy.typing import NDArray
 from fastmech.arrays import Floats
 from fastmech.ensembles.integrate import integrate
 from fastmech.mechanism.coefficients import reduce
-from fastmech.reports import Stage, table
+from fastmech.reports import Stage
 from fastmech.scene import Scene
 from fastmech.studies.bench.plain import accelerations
+from fastmech.studies.reporting import section
 
 Extended = NDArray[np.longdouble]
 
@@ -208,32 +209,27 @@ def report(found: list[Estimate], n: int) -> list[str]:
         shares = (f"{count / max(len(known), 1):.0%}" for count in counts)
         spread = (f"{ratio:.2g}" for ratio in (ratios.min(), np.median(ratios), ratios.max()))
         rows.append([whose, f"{len(known)} of {len(mine)}", *shares, *spread])
-    lines = [
-        "# `tol` on random scenes",
-        "",
+    about = (
         f"{len(found) // len(QUANTILES)} random scenes of {n} trajectories each, tolerances from 1e-8 to "
         "1e-3; estimate of the error against the truth (extrapolation of order 18 in extended precision, "
         "each trajectory with its own steps, equations typed separately). Truth is "
         f"known where its uncertainty is at most {KNOWN:.0%} of it; {unknown or 'none'} of {len(found)} "
-        f"{'is' if unknown == 1 else 'are'} not known, and not judged.",
-        "",
-        *table(
-            f"whose error | truth known | estimate within a factor {FACTOR:g} | true error within `tol` | "
-            "above it, and said so | above it, unsaid | least estimate/truth | median | greatest",
-            rows,
-        ),
-    ]
-    odd = (
+        f"{'is' if unknown == 1 else 'are'} not known, and not judged."
+    )
+    head = (
+        f"whose error | truth known | estimate within a factor {FACTOR:g} | true error within `tol` | "
+        "above it, and said so | above it, unsaid | least estimate/truth | median | greatest"
+    )
+    lines = section("# `tol` on random scenes", about, head, rows)
+    odd = [
         f"{e.scene} | {e.quantile:g} | {e.method} | {e.tol:.1e} | {e.estimate:.1e} | {e.true:.1e} | "
         f"{e.doubt:.0e} | {e.verdict}"
         for e in found
         if e.verdict
-    )
-    listed = table("scene | quantile | method | `tol` | estimate | truth | its uncertainty | verdict", odd)
-    if any(e.verdict for e in found):
-        lines += ["Estimates beyond the factor, errors beyond the tolerance, truths that are not known:", ""]
-        lines += listed
-    return lines
+    ]
+    told = "Estimates beyond the factor, errors beyond the tolerance, truths that are not known:"
+    listed = "scene | quantile | method | `tol` | estimate | truth | its uncertainty | verdict"
+    return lines + (section("", told, listed, odd) if odd else [])
 
 
 def tolerances_study(quick: bool, stage: Stage, scenes: int = SCENES, starts: int = STARTS) -> list[str]:

@@ -38,7 +38,7 @@ from fastmech.store.write import check_writable
 from fastmech.studies.hardcases.cases import CASES, PAPER, QUICK_STEPS, STEPS, energy_history
 from fastmech.studies.hardcases.pictures import DRIFTS, Limits, draw_energy_drift, stability_pages
 from fastmech.studies.hardcases.walk import REFUSED, HardCase, Row
-from fastmech.studies.reporting import columns, content, in_turns, write_data, write_text
+from fastmech.studies.reporting import columns, content, in_turns, section, write_data, write_text
 
 #: Methods that are measured, explicit, multistep and implicit ones, with the step [s].
 CONTAINED = {"rk4": 0.01, "dop853": 0.02, "ab6": 0.005, "abm8": 0.01, "gauss6": 0.05, "sdirk4": 0.02}
@@ -124,19 +124,15 @@ def _containment_lines(shares: Dataset) -> list[str]:
     methods, when, spans = (shares[name].data for name in ("method", "when", "span"))
     failing, number = shares.attrs["failing"], shares.attrs["trajectories"]
     rows = zip(methods, shares["share"].data, strict=True)
-    return [
-        "## Failing neighbours",
-        "",
+    about = (
         f"{failing} of {number} trajectories fail: throughput of the rest over that in the same run "
         "without failures. At least 0.9 is wanted; above 1 those that failed have made room. Processor time "
         "of one thread, median of runs in turn. Failing trajectories have a status and the rest is "
-        f"the same to the bit: {'yes' if contained(shares) else 'NO'}.",
-        "",
-        *table(
-            ["method", *(f"{kind}, {span:g} s" for kind in when for span in spans)],
-            ([method, *(f"{share:.2f}" for share in row.ravel())] for method, row in rows),
-        ),
-    ]
+        f"the same to the bit: {'yes' if contained(shares) else 'NO'}."
+    )
+    head = ["method", *(f"{kind}, {span:g} s" for kind in when for span in spans)]
+    cells = ([method, *(f"{share:.2f}" for share in row.ravel())] for method, row in rows)
+    return section("## Failing neighbours", about, head, cells)
 
 
 #: Statuses of rows in the file: the trajectories', and one for a request that is refused before the run.
@@ -167,21 +163,6 @@ def run_gallery(quick: bool, progress: Callable[[int], None] = lambda done: None
     return results
 
 
-#: Columns of the file, by the attributes of a row.
-_COLUMNS = {
-    "method": ("1", "method"),
-    "dt": ("s", "step"),
-    "steps": ("1", "steps"),
-    "error": ("1", "error as the case defines it; NaN: it has none"),
-    "allowed": ("1", "error to which the method claims the case; NaN: it does not"),
-    "drift": ("1", "largest relative change of energy; NaN: it is not conserved"),
-    "claimed": ("1", "method claims it"),
-    "passed": ("1", "did what it must"),
-    "why": ("1", "why so far"),
-    "remark": ("1", "remark"),
-}
-
-
 def gallery_dataset(results: Sequence[Result]) -> Dataset:
     """One row a case and method."""
     rows = [row for result in results for row in result.rows]
@@ -191,7 +172,7 @@ def gallery_dataset(results: Sequence[Result]) -> Dataset:
         "case": Variable(("row",), names, "1", "case"),
         "status": Variable(("row",), codes, "1", "worst status", flags(RowStatus)),
     }
-    return Dataset(about | columns("row", rows, _COLUMNS), {"failures": sum(not row.passed for row in rows)})
+    return Dataset(about | columns("row", rows, "gallery"), {"failures": sum(not row.passed for row in rows)})
 
 
 def verdict(results: Sequence[Result]) -> str:
@@ -267,7 +248,7 @@ def _write(out: Path, quick: bool, stage: Stage, began: float) -> Report:
     lines = [*gallery_lines(results), *_limits_lines(limits), *_containment_lines(shares)]
     sections = {
         "gallery": gallery_dataset(results),
-        "step_limits": Dataset(columns("method", limits, _LIMITS)),
+        "step_limits": Dataset(columns("method", limits, "step_limits")),
         "containment": shares,
     }
     text = write_text(out / "hardcases.md", lines)
@@ -281,16 +262,6 @@ def _write(out: Path, quick: bool, stage: Stage, began: float) -> Report:
     for name, figure in pictures.items():
         save(figure, out / f"{name}.png")
     return Report([text, store, *(out / f"{name}.png" for name in pictures)], told, passed)
-
-
-#: Columns of the step limits.
-_LIMITS = {
-    "method": ("1", "method"),
-    "real_limit": ("1", "stable for -x up to here; inf: no limit"),
-    "imaginary_limit": ("1", "stable for iy up to here; inf: no limit"),
-    "predicted_step": ("s", "largest stable step at the minimum, from coefficients and eigenvalues"),
-    "measured_step": ("s", "the same from the differenced one-step map"),
-}
 
 
 def _limits(minimum: Equilibrium, advance: Progress) -> list[Limits]:
@@ -311,4 +282,4 @@ def _limits_lines(limits: Sequence[Limits]) -> list[str]:
         steps = f"{predicted:.5f} | {measured:.5f}"
         rows.append(f"{name} | {real:.4f} | {imaginary:.4f} | {steps} | {difference}")
     about = "At the minimum of Table 1 under the constant force."
-    return ["## Step limits", "", about, "", *table(head, rows)]
+    return section("## Step limits", about, head, rows)

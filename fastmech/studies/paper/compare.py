@@ -13,6 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fastmech.studies.reporting import content
+
 Printed = Mapping[str, Any]
 
 CASES = ("case_1", "case_2", "case_3", "case_4")
@@ -54,15 +56,6 @@ def agrees_legibly(pattern: str, computed: float) -> bool:
 HEADINGS = ("Case, part", "Symbol", "Unit", "Printed", "Computed", "Difference", "Verdict")
 
 _NEGLIGIBLE = 1e-9
-_SYMBOLS = {
-    "beta": "β",
-    "alpha": "α",
-    "phi_0": "φ₀",
-    "theta_0": "θ₀",
-    "phi_dot_0": "φ₀′",
-    "theta_dot_0": "θ₀′",
-    "F0": "F₀",
-}
 
 
 class Verdict(StrEnum):
@@ -129,7 +122,7 @@ class Row(NamedTuple):
         computed = self.word or f"{self.computed:.7g}"
         if difference != "–" and "pi" not in self.printed:
             computed = f"{self.computed:.{len(self.printed.partition('.')[2]) + 3 * differs}f}"
-        symbol = _SYMBOLS.get(self.symbol, self.symbol)
+        symbol = content(__package__, "printed.toml")["symbols"].get(self.symbol, self.symbol)
         return self.place, symbol, self.unit, self.printed, computed, difference, str(self.verdict)
 
 

@@ -89,7 +89,7 @@ def _equilibria(cases: Sequence[Case]) -> Dataset:
             "case": _numbers(cases),
             "phi_st": Variable(along, rest[:, 0], "rad", "angle phi at rest"),
             "theta_st": Variable(along, rest[:, 1], "rad", "angle theta at rest"),
-            **columns("case", found, {"energy": ("J", "U at rest"), "kind": ("1", "kind of equilibrium")}),
+            **columns("case", found, "resting"),
             **{n: Variable(along, x, "m", f"{ABOUT['variables'][n][1]} at rest") for n, x in points},
         }
     )
@@ -112,7 +112,7 @@ def _disturbed(cases: Sequence[Case]) -> Dataset:
 
 def rows_dataset(rows: Sequence[Row]) -> Dataset:
     """Rows of printed against computed values."""
-    found, names = columns("row", rows, ABOUT["rows"]), {"word": "computed_text", "value": "computed"}
+    found, names = columns("row", rows, "printed_numbers"), {"word": "computed_text", "value": "computed"}
     about = {names.get(name, name): column for name, column in found.items()}
     return Dataset(about, {"disagreeing": sum(row.verdict == Verdict.DIFFERS for row in rows)})
 

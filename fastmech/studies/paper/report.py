@@ -21,14 +21,6 @@ from fastmech.studies.reporting import content, write_data
 
 TITLE = "The source paper, computed again"
 
-_NOTES = {
-    "Table 1": "Given values, as this report's scene has them. The paper prints no g; see *Parameters used*.",
-    "Equation (16)": "The exact coefficients of the Hamiltonian in the paper's shape, with the inner bracket "
-    "of the denominator closed after the last term.",
-    "Table 4": "Computed coefficients are given the sign of the print. A `*` stands for characters that are "
-    "lost in the text at hand; a row agrees if some rounding of the computed number fits what is left.",
-}
-
 
 def report_text(
     computed: Computed,
@@ -42,11 +34,12 @@ def report_text(
     confirmed = [item for item in misprints if item.confirmed]
     right = [item for item in misprints if not item.confirmed]
     places = {item.key: item.place for item in misprints}
+    notes = content(__package__, "printed.toml")["notes"]
     lines = [f"# {TITLE}", "", *_summary(computed, rows, confirmed, checks), ""]
     lines += ["## Printed against computed", ""]
     for section in dict.fromkeys(row.section for row in rows):
         lines += [f"### {section}, printed numbers", ""]
-        lines += [_NOTES[section], ""] if section in _NOTES else []
+        lines += [notes[section], ""] if section in notes else []
         lines += table(HEADINGS, (_row(row, places) for row in rows if row.section == section), (0, 1, 2, 6))
     lines += [
         "## Misprints",
