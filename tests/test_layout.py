@@ -54,8 +54,8 @@ LAYERS = (
     "runner",
     "reports",
     "device_report",
-    "studies",
     "explore",
+    "studies",
     "cli",
     "__main__",
 )

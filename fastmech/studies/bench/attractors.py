@@ -11,7 +11,7 @@ import math
 import time
 from collections.abc import Callable
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -27,6 +27,7 @@ from fastmech.kernels.sincos import cos, sin
 from fastmech.reports import Stage
 from fastmech.studies.bench.entrants import installed
 from fastmech.studies.bench.own_systems import inverse_cube, spoken
+from fastmech.studies.bench.peers import heyoka_equations
 from fastmech.studies.reporting import in_turns, section
 
 #: Starts that are timed and that others follow; those of SciPy; runs of which the median counts.
@@ -237,11 +238,7 @@ def by_heyoka(system: System) -> Path:
     """Taylor series to 1e-13."""
     import heyoka as hy
 
-    rhs: Any = spoken(system.rhs, sin=hy.sin, cos=hy.cos, inverse_cube=lambda s: s**-1.5)
-    state = hy.make_vars(*system.state)
-    flow = hy.taylor_adaptive(
-        list(zip(state, rhs(hy.time, *state), strict=True)), [0.0] * len(state), tol=1e-13
-    )
+    flow = hy.taylor_adaptive(heyoka_equations(system), [0.0] * len(system.state), tol=1e-13)
 
     def path(start: Floats, times: Floats) -> Floats:
         states = np.full((times.size, start.size), np.nan)

@@ -20,8 +20,9 @@ from fastmech.arrays import Floats
 from fastmech.ensembles.system import System
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import FLAGS
-from fastmech.mechanism.coefficients import Coefficients
+from fastmech.mechanism.coefficients import Coefficients, reduce
 from fastmech.models.mechanism import Mechanism
+from fastmech.scene import Scene
 from fastmech.studies.bench.devices import explicit
 from fastmech.studies.bench.measure import Problem, Solve
 from fastmech.studies.bench.own_systems import spoken
@@ -213,19 +214,19 @@ def torch(method: str, h: float, problem: Problem) -> Solve:
     return solve
 
 
-def _heyoka_equations(problem: Problem) -> list[Any]:
-    """Those of a system, or Lagrange's over m2 l^2: the shortest decomposition of those tried."""
+def heyoka_equations(scene: Scene | System | Mechanism) -> list[Any]:
+    """Of a scene Lagrange's over m2 l^2, the shortest decomposition of those tried; of others their own."""
     import heyoka as hy
 
-    if isinstance(problem.scene, System):
-        rhs = spoken(problem.scene.rhs, sin=hy.sin, cos=hy.cos, inverse_cube=lambda s: s**-1.5)
-        state = hy.make_vars(*problem.scene.state)
+    if isinstance(scene, System):
+        rhs = spoken(scene.rhs, sin=hy.sin, cos=hy.cos, inverse_cube=lambda s: s**-1.5)
+        state = hy.make_vars(*scene.state)
         return list(zip(state, rhs(hy.time, *state), strict=True))
-    if isinstance(problem.scene, Mechanism):
-        state, rates = explicit(problem.scene)
+    if isinstance(scene, Mechanism):
+        state, rates = explicit(scene)
         known = {symbol: hy.make_vars(symbol.name) for symbol in state}
         return [(known[s], hy.from_sympy(sympy.sympify(r), known)) for s, r in zip(state, rates, strict=True)]
-    p = problem.coefficients
+    p = reduce(scene)
     phi, theta, u, w = hy.make_vars("phi", "theta", "u", "w")
     s, c, s12, c12 = hy.sin(phi), hy.cos(phi), hy.sin(phi + theta), hy.cos(phi + theta)
     root = hy.sqrt(4.0 - s * s)
@@ -244,7 +245,7 @@ def heyoka(tolerance: float, problem: Problem) -> Solve:
 
     width = hy.recommended_simd_size()
     flow = hy.taylor_adaptive_batch(
-        _heyoka_equations(problem),
+        heyoka_equations(problem.scene),
         np.zeros((problem.starts.shape[1], width)),
         tol=tolerance,
         high_accuracy=False,
