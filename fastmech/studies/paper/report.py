@@ -17,7 +17,7 @@ from fastmech.studies.paper.compute import METHOD, PAPER_SCENE, STEP, Case, Comp
 from fastmech.studies.paper.figures import Picture, all_datasets, figure_pictures, table_pictures
 from fastmech.studies.paper.misprints import Misprint, candidates
 from fastmech.studies.paper.rows import Check, Guess, all_checks, all_rows, parameters_used
-from fastmech.studies.reporting import content, write_data
+from fastmech.studies.reporting import content, section, write_data
 
 TITLE = "The source paper, computed again"
 
@@ -37,10 +37,9 @@ def report_text(
     notes = content(__package__, "printed.toml")["notes"]
     lines = [f"# {TITLE}", "", *_summary(computed, rows, confirmed, checks), ""]
     lines += ["## Printed against computed", ""]
-    for section in dict.fromkeys(row.section for row in rows):
-        lines += [f"### {section}, printed numbers", ""]
-        lines += [notes[section], ""] if section in notes else []
-        lines += table(HEADINGS, (_row(row, places) for row in rows if row.section == section), (0, 1, 2, 6))
+    for name in dict.fromkeys(row.section for row in rows):
+        own = (_row(row, places) for row in rows if row.section == name)
+        lines += section(f"### {name}, printed numbers", notes.get(name, ""), HEADINGS, own, (0, 1, 2, 6))
     lines += [
         "## Misprints",
         "",
@@ -52,17 +51,16 @@ def report_text(
     if right:
         lines += ["## Suspected, but printed rightly", ""]
         lines += [*(f"- {item.place}: {item.error}" for item in right), ""]
-    lines += ["## Parameters used", ""]
-    lines += ["Angles of Table 2 that come out to the printed digit with each choice of c2 and g:", ""]
     choices = (f"{guess.c2} | {guess.g} | {guess.agreeing} of {guess.total}" for guess in guesses)
-    lines += table("c2 [N/m] | g [m/s²] | Agreeing angles", choices, ())
+    about = "Angles of Table 2 that come out to the printed digit with each choice of c2 and g:"
+    lines += section("## Parameters used", about, "c2 [N/m] | g [m/s²] | Agreeing angles", choices, ())
     promises = (
         f"{c.name} | {c.value:.2g} | {c.limit:.1g} | {c.unit} | {'passed' if c.passed else '**failed**'}"
         for c in checks
     )
-    lines += ["## Checks of the computation", ""]
-    lines += table("Check | Value | Limit | Unit | Result", promises, (0, 3, 4))
-    lines += ["## Equilibria", "", *_equilibria(computed.cases)]
+    head = "Check | Value | Limit | Unit | Result"
+    lines += section("## Checks of the computation", "", head, promises, (0, 3, 4))
+    lines += _equilibria(computed.cases)
     lines += ["## Figures", "", "Spans are not printed in the paper; those here show decay or escape.", ""]
     for name, heading, caption, _ in figures:
         lines += [f"### {heading}", "", f"![{heading}]({name}.png)", "", caption, ""]
@@ -134,7 +132,8 @@ def _equilibria(cases: Sequence[Case]) -> list[str]:
             f"Case {case.number} | {e.phi:.10f} | {e.theta:.10f} | {e.energy:.4f} | {e.kind} | {roots}"
         )
         verdicts.append(f"- Case {case.number}, {c.verdict}: {c.explanation}.")
-    return [*table("Case | φ [rad] | θ [rad] | U [J] | Kind | Roots [1/s]", rows, (0, 4, 5)), *verdicts, ""]
+    head = "Case | φ [rad] | θ [rad] | U [J] | Kind | Roots [1/s]"
+    return [*section("## Equilibria", "", head, rows, (0, 4, 5)), *verdicts, ""]
 
 
 DATA = "paper.h5"
