@@ -1,4 +1,4 @@
-"""Write fastmech/bench/references/{rest,fast}.csv: final states of the benchmark's problems to 24 digits.
+"""Write fastmech/studies/bench/references/{rest,fast}.csv: the benchmark's final states to 24 digits.
 
     pip install heyoka mpmath && python data/make_bench_reference.py
 
@@ -33,7 +33,7 @@ COUNT = 1024
 KEPT_DIGITS = 24
 HARDEST = 5
 LARGEST_RATE = {"rest": 0.0, "fast": 10.0}
-FOLDER = Path(__file__).parents[1] / "fastmech" / "bench" / "references"
+FOLDER = Path(__file__).parents[1] / "fastmech" / "studies" / "bench" / "references"
 
 
 def starts(problem: str) -> np.ndarray:

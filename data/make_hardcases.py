@@ -1,4 +1,4 @@
-"""Write fastmech/hardcases/references.toml: final states of hard motions, 19 digits.
+"""Write fastmech/studies/hardcases/references.toml: final states of hard motions, 19 digits.
 
     python data/make_hardcases.py
 
@@ -46,7 +46,7 @@ BOUNDARY_BETWEEN, BOUNDARY_TIME = (-1.0, -0.975), 60.0
 
 PRECISION = np.longdouble
 
-TARGET = Path(__file__).parents[1] / "fastmech" / "hardcases" / "references.toml"
+TARGET = Path(__file__).parents[1] / "fastmech" / "studies" / "hardcases" / "references.toml"
 
 
 def equations(p: dict[str, float]) -> list[tuple[hy.expression, hy.expression]]:

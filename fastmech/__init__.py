@@ -82,7 +82,6 @@ if TYPE_CHECKING:
     from fastmech.basins.shock_limit import ShockLimit, impulse_start, shock_limit
     from fastmech.basins.snapping import SnappingMap, critical_forces, map_snapping
     from fastmech.basins.well_numbers import well_numbers, well_of_number
-    from fastmech.bench.frontier import WorkPrecision, work_precision
     from fastmech.capture.select import trapped
     from fastmech.device_report import report
     from fastmech.disturbance.motion import DisturbedMotion, LinearRange, disturbed_motion, linear_range
@@ -90,6 +89,7 @@ if TYPE_CHECKING:
     from fastmech.ensembles.status import Status
     from fastmech.ensembles.system import System
     from fastmech.errors import InputError, StepWarning
+    from fastmech.frontier import WorkPrecision, work_precision
     from fastmech.kernels.sincos import cos, sin
     from fastmech.models.coordinates import angles, lengths
     from fastmech.models.elements import Body, Damper, Force, Spring, Torque, TorsionDamper, TorsionSpring
@@ -147,7 +147,7 @@ _NAMES = {
     "basins.shock_limit": "ShockLimit impulse_start shock_limit",
     "basins.snapping": "SnappingMap critical_forces map_snapping",
     "basins.well_numbers": "well_numbers well_of_number",
-    "bench.frontier": "WorkPrecision work_precision",
+    "frontier": "WorkPrecision work_precision",
     "slider.capture.barriers": "barrier_tree",
     "capture.select": "trapped",
     "device_report": "report",

@@ -1,32 +1,23 @@
-"""What reports share: Markdown tables, pages in HTML and PDF, columns of a result file, timing in turns."""
+"""What reports share: Markdown tables, pages in HTML and PDF."""
 
 from __future__ import annotations
 
 import base64
 import re
 import textwrap
-import time
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from itertools import takewhile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from fastmech.ensembles.run import Progress
 from fastmech.plots.style import style
-from fastmech.results import Variable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Name = TypeVar("Name")
-
 #: Makes a bar from what is done and how many pieces that are; it is told of each.
 Stage = Callable[[str, int], Progress]
-
-#: Measured turns of :func:`in_turns` after one that warms up.
-TURNS = 7
 
 
 def no_stage(name: str, total: int) -> Progress:
@@ -43,35 +34,6 @@ def table(head: Line, rows: Iterable[Line], left: Collection[int] = (0,)) -> lis
     lines = [line if isinstance(line, str) else " | ".join(map(str, line)) for line in (head, *rows)]
     marks = ("---" if i in left else "---:" for i in range(lines[0].count(" | ") + 1))
     return [f"| {lines[0]} |", f"|{'|'.join(marks)}|", *(f"| {line} |" for line in lines[1:]), ""]
-
-
-def columns(dim: str, rows: Sequence[Any], about: Mapping[str, tuple[str, str]]) -> dict[str, Variable]:
-    """Attributes of rows by name as variables along ``dim``; ``about``: unit and description of each."""
-
-    def column(name: str, unit: str, told: str) -> Variable:
-        values = [value() if callable(value := getattr(row, name)) else value for row in rows]
-        data = np.array(values, dtype=object if values and isinstance(values[0], str) else None)
-        return Variable((dim,), data, unit, told)
-
-    return {name: column(name, *told) for name, told in about.items()}
-
-
-def in_turns(
-    works: Mapping[Name, Callable[[], object]],
-    turns: int = TURNS,
-    advance: Progress = lambda done: None,
-    clock: Callable[[], float] = time.process_time,
-) -> dict[Name, list[float]]:
-    """Seconds of each turn's call, after a turn that is not counted; ``advance`` is told 1 for each call."""
-    seconds: dict[Name, list[float]] = {name: [] for name in works}
-    for turn in range(turns + 1):
-        for name, work in works.items():
-            began = clock()
-            work()
-            if turn:
-                seconds[name].append(clock() - began)
-            advance(1)
-    return seconds
 
 
 _PAGE = """<!DOCTYPE html>

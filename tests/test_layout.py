@@ -52,16 +52,14 @@ LAYERS = (
     "store",
     "system_info",
     "plots",
+    "frontier",
     "scan_types",
     "tiles",
     "runner",
     "reports",
     "device_report",
-    "paper",
-    "hardcases",
-    "bench",
-    "faults",
     "explore",
+    "studies",
     "cli",
     "__main__",
 )
@@ -128,7 +126,7 @@ def test_imports_point_one_way(path: Path) -> None:
     mine = LAYERS.index(layer(path))
     for other in imported(tree(path)):
         if other in ("", "__version__"):  # the package's own names: only where a user's command starts
-            assert layer(path) in ("cli", "paper", "store", "bench"), path
+            assert layer(path) in ("cli", "studies", "store"), path
         elif (path.name, other) not in UPWARD:
             assert LAYERS.index(other) <= mine, f"{path} imports {other}"
 

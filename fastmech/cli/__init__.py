@@ -27,12 +27,12 @@ COMMANDS = {
     "plot": "results",
     "explore": "explore",
     "equilibria": "equilibria",
-    "paper": "reports",
-    "report": "reports",
-    "hardcases": "reports",
-    "bench": "reports",
+    "paper": "studies",
+    "report": "report",
+    "hardcases": "studies",
+    "bench": "studies",
     "warmup": "warmup",
-    "faults": "reports",
+    "faults": "studies",
 }
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from fastmech import open_results
-from fastmech.hardcases import report
-from fastmech.hardcases.report import CONTAINED, NUMBER, ONE_IN
-from fastmech.hardcases.walk import HardCase, Row
 from fastmech.integrators.methods import METHODS
+from fastmech.studies.hardcases import report
+from fastmech.studies.hardcases.report import CONTAINED, NUMBER, ONE_IN
+from fastmech.studies.hardcases.walk import HardCase, Row
 
 
 @pytest.fixture
@@ -19,7 +19,7 @@ def one_case(monkeypatch: pytest.MonkeyPatch):
     """A gallery of one quick case whose error is given, and the step limits of few methods."""
 
     def gallery_of(error: float) -> None:
-        row = Row("rk4", 0.1, 3, error, 1e-8, np.nan, "ok", True)
+        row = Row("rk4", 0.1, 3, error, 1e-8, np.nan, "ok")
         cases = {"easy": HardCase("easy", "nothing", "a closed form", "pass", lambda quick: [row])}
         monkeypatch.setattr(report, "CASES", cases)
         monkeypatch.setattr(report, "METHODS", {name: METHODS[name] for name in ("rk4", "dop853", "gauss6")})
@@ -74,4 +74,4 @@ def test_a_folder_that_cannot_be_made(invoke):
     Path("file").write_text("", encoding="utf-8")
     result = invoke("hardcases", "--out", "file/hard")
     assert result.exit_code == 2
-    assert result.stderr.startswith("fastmech: file/hard: cannot be made")
+    assert result.stderr.startswith("fastmech: file/hard/hardcases.h5: cannot be written")

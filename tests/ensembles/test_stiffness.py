@@ -9,11 +9,11 @@ from scipy.integrate import solve_ivp
 
 import fastmech as fm
 from fastmech.ensembles.fitting import damping_rate, stability_radius
-from fastmech.hardcases.walk import motion
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import reduce
 from fastmech.slider.lagrange import angular_accelerations
 from fastmech.step_limits.warning import configuration_eigenvalues
+from fastmech.studies.hardcases.walk import motion
 
 
 def stiff_motions(scene: Scene, starts: Floats, t_end: float) -> Floats:

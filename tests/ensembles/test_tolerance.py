@@ -15,7 +15,6 @@ from ensembles.references import Floats, errors, motions, motions_of, rest_start
 from ensembles.starts import random_starts
 
 import fastmech as fm
-from fastmech.bench.own_systems import SYSTEMS
 from fastmech.ensembles.problem import system_problem
 from fastmech.ensembles.run import Sample, run_ensemble
 from fastmech.ensembles.tolerance import FEW
@@ -23,6 +22,7 @@ from fastmech.ensembles.work_precision import ROUNDING
 from fastmech.errors import InputError
 from fastmech.integrators.methods import METHODS
 from fastmech.scene import Scene
+from fastmech.studies.bench.own_systems import SYSTEMS
 
 N = 24
 TIMES = np.linspace(0.0, 4.0, 9)

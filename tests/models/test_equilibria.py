@@ -26,13 +26,13 @@ from devices import (
 )
 
 import fastmech as fm
-from fastmech.bench.proofs import newton, unlisted
 from fastmech.errors import InputError
 from fastmech.models.equilibria import prove_equilibria, search_rows
 from fastmech.models.mechanism import Linear
 from fastmech.models.stability import assess
 from fastmech.models.statics import Coordinate, Statics
 from fastmech.outcome import Outcome
+from fastmech.studies.bench.proofs import newton, unlisted
 
 
 def missing(statics: Statics, values: Any, starts: int, seed: int = 0) -> list[Any]:

@@ -9,13 +9,13 @@ import pytest
 from tiles.conftest import content
 from tiles.test_run import stopped_after
 
-from fastmech.faults.small_tiles import small_tiles
 from fastmech.interrupts import Stopped
 from fastmech.runner import draw_results, run_request
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import RunContext, read_request
 from fastmech.store.read import open_results
 from fastmech.store.write import Stream, in_memory
+from fastmech.studies.faults.small_tiles import small_tiles
 from fastmech.tiles.look import ScanLook, compute_alone
 from fastmech.tiles.section import _tiling
 from fastmech.tiles.tile_file import dataset_image, dataset_of_image

@@ -1,0 +1,206 @@
+"""Speed against error of methods and steps on a problem of your own: which one to take for which error."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fastmech.ensembles import checks
+from fastmech.ensembles.integrate import problem_of
+from fastmech.ensembles.problem import Case
+from fastmech.ensembles.run import Progress
+from fastmech.ensembles.solve import solve_at
+from fastmech.ensembles.system import System
+from fastmech.ensembles.tolerance import SAMPLE, evenly, usable_starts
+from fastmech.ensembles.work_precision import (
+    IMPLICIT,
+    REFERENCE,
+    Trial,
+    first_guess,
+    order_statistic,
+    times_to_fit,
+)
+from fastmech.errors import InputError, called_here, shown
+from fastmech.integrators.methods import METHODS, ImplicitRungeKutta, Method, find_method
+from fastmech.models.mechanism import Mechanism
+from fastmech.objects import Drawn, Field
+from fastmech.plots.style import LINES
+from fastmech.samplers import Starts
+from fastmech.scene import Scene
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+#: Runs of which the median time counts, after one that is not counted: so many, and so long [s].
+TIMED, LONG = 3, 0.1
+
+#: Markers that tell methods of one colour apart.
+MARKERS = "osD^vPX*"
+
+#: Methods that are tried by default.
+EXPLICIT = tuple(m.name for m in METHODS.values() if m.order >= 4 and not isinstance(m, ImplicitRungeKutta))
+
+#: Errors that are asked for by default, in the state's units.
+ERRORS = (1e-3, 1e-5, 1e-7, 1e-9)
+
+
+@dataclass(frozen=True)
+class WorkPoint:
+    """A method with its steps."""
+
+    method: str
+    dt: float  #: step [s]
+    largest: float  #: error of the worst trajectory of the sample, in the state's units
+    error_99: float  #: the 99 % quantile
+    rate: float  #: trajectories a second
+
+
+@dataclass(frozen=True, repr=False)
+class WorkPrecision(Drawn):
+    """Methods and steps on one problem; printed, it names the frontier."""
+
+    points: tuple[WorkPoint, ...]
+    errors: tuple[float, ...]  #: that were asked for, falling
+    fit: tuple[float, ...]  #: times [s] at which steps were fitted to the energy; (): they were not
+
+    @property
+    def frontier(self) -> tuple[WorkPoint, ...]:
+        """For each of the errors that any method keeps, the fastest that does."""
+        kept = ([p for p in self.points if p.largest <= error] for error in self.errors)
+        return tuple(dict.fromkeys(max(points, key=lambda p: p.rate) for points in kept if points))
+
+    def call(self, error: float) -> str:
+        """The call to copy, with the fastest method whose largest error is at most ``error``.
+
+        Raises:
+            InputError: no point keeps it.
+        """
+        kept = [p for p in self.points if p.largest <= checks.number("error", error, "", above=0.0)]
+        if not kept:
+            least = min((p.largest for p in self.points), default=np.inf)
+            raise InputError(f"error = {shown(error)}: no method keeps it; the least is {least:.2g}")
+        best = max(kept, key=lambda p: p.rate)
+        fit = f", fit={list(self.fit)}" if self.fit else ""
+        return f'fm.integrate(problem, starts, t_end, dt={best.dt:.4g}, method="{best.method}"{fit})'
+
+    KIND = "work_precision"
+    PICTURE = "frontier:draw_frontier"
+    FIELDS = {
+        "method": Field("point", "1", "method", "points.method"),
+        "dt": Field("point", "s", "step", "points.dt"),
+        "largest": Field(
+            "point", "1", "error of the worst trajectory, in the states' units", "points.largest"
+        ),
+        "error_99": Field("point", "1", "99 % quantile of the errors", "points.error_99"),
+        "rate": Field("point", "s-1", "trajectories a second", "points.rate"),
+    }
+
+    def told(self) -> str:
+        """The frontier."""
+        each = [
+            f"  error {p.largest:.0e}: {p.method}, dt = {p.dt:.3g} s, {p.rate:,.0f} trajectories/s"
+            for p in self.frontier
+        ]
+        return "\n".join([f"{len(self.points)} methods and steps; the fastest for each error:", *each])
+
+
+def draw_frontier(found: WorkPrecision, axes: Axes) -> None:
+    """Trajectories a second over the largest error, a line for each method, the frontier marked."""
+    names = list(dict.fromkeys(point.method for point in found.points))
+    for k, name in enumerate(names):
+        mine = sorted((p.largest, p.rate) for p in found.points if p.method == name)
+        marker = MARKERS[k // len(LINES) % len(MARKERS)]
+        x, y = zip(*mine, strict=True)
+        axes.plot(x, y, marker=marker, color=LINES[k % len(LINES)], label=name, linewidth=1.2)
+    best = found.frontier
+    axes.plot(
+        [p.largest for p in best], [p.rate for p in best], "o", markersize=13, fillstyle="none",
+        color="black", label="fastest at its error",
+    )  # fmt: skip
+    axes.set(xscale="log", yscale="log")
+    axes.set(xlabel="largest error [state's units]", ylabel="trajectories [1/s]")
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+    axes.grid(which="both", alpha=0.25)
+
+
+@called_here(t_span="t_end", tol="errors")
+def work_precision(
+    scene: Scene | Mechanism | System,
+    y0: Starts,
+    t_end: float,
+    *,
+    errors: Sequence[float] = ERRORS,
+    methods: Sequence[str] | None = None,
+    parameters: Mapping[str, ArrayLike] | None = None,
+    threads: int | None = 1,
+    progress: Progress | None = None,
+) -> WorkPrecision:
+    """Measure speed against error on your problem.
+
+    Every method runs with steps that bring its largest error, on a sample of at most 128 trajectories, to
+    each of ``errors``; all trajectories are timed with them. The reference is a run with shorter and shorter
+    steps until it is right to a sixteenth of the least error.
+
+    Args:
+        scene: the mechanism, or a system of your own.
+        y0: starts, a sampler or of shape (n, dim) or (dim,).
+        t_end: end of the run [s].
+        errors: largest errors to look at, in the state's units.
+        methods: names from :data:`fastmech.integrators.methods.METHODS`; all explicit ones of order 4 and
+            more by default.
+        parameters: values of parameters that differ between trajectories, each of shape (n,).
+        threads: threads to use, one by default, so that rates are those of a core.
+        progress: is told 1 after each method.
+
+    Returns:
+        a point for each method and each error that it keeps.
+
+    Raises:
+        InputError: an argument is wrong.
+    """
+    starts, problem, _ = problem_of(scene, y0, {} if parameters is None else parameters, None)
+    outputs = np.array([checks.number("t_end", t_end, "s", above=0.0)])
+    wanted = sorted((checks.number("errors", e, "", above=0.0) for e in errors), reverse=True)
+    checks.progress_function(progress, "methods")
+    tried = [find_method(name) for name in (EXPLICIT if methods is None else methods)]
+    usable = np.flatnonzero(usable_starts(problem, starts, float(outputs[-1]), threads))
+    if not usable.size or not wanted:
+        raise InputError(
+            "y0: holds no start that steps can follow" if wanted else "errors: must not be empty"
+        )
+    case = Case(problem, starts, outputs, threads)
+    sample = case.part(evenly(case, usable, SAMPLE))
+    trial = Trial(sample, wanted[-1], 1.0, times_to_fit(sample))
+    guess = first_guess(sample, wanted[-1])
+    base = find_method(IMPLICIT if isinstance(tried[0], ImplicitRungeKutta) else REFERENCE)
+    trial.refer(base, guess)
+    points: list[WorkPoint] = []
+    for method in tried:
+        dt = guess * method.evaluations(1000) / base.evaluations(1000)
+        for error in wanted:
+            trial.tol = error
+            found = trial.tune(method, dt, near=0.5)
+            if found.good and not (points and (points[-1].method, points[-1].dt) == (method.name, found.dt)):
+                dt = found.dt
+                points.append(_timed(case, trial, method, dt))
+        if progress is not None:
+            progress(1)
+    return WorkPrecision(tuple(points), tuple(wanted), trial.fit).of(scene)
+
+
+def _timed(case: Case, trial: Trial, method: Method, dt: float) -> WorkPoint:
+    """A point: the sample's errors, and the time of all."""
+    settings = trial.settings(method, dt)
+    taken: list[float] = []
+    while len(taken) < 1 + TIMED or sum(taken[1:]) < LONG:
+        began = time.perf_counter()
+        solve_at(case, settings)
+        taken.append(time.perf_counter() - began)
+    found = trial.errors(method, dt)
+    rate = len(case.starts) / float(np.median(taken[1:]))
+    return WorkPoint(method.name, dt, float(found.max()), order_statistic(found, 0.99), rate)

@@ -1,5 +1,0 @@
-"""The cases, a few to a file.
-
-To add one, append a :class:`fastmech.hardcases.walk.HardCase` to the ``CASES`` of a module here; a new module
-is named in :mod:`fastmech.hardcases.report`.
-"""

@@ -1,0 +1,125 @@
+"""Right-hand sides per second against the core's peak, and what a scene's missing terms save."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Callable
+from functools import cache, partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from fastmech.ensembles.integrate import integrate
+from fastmech.integrators.methods import find_method
+from fastmech.jit import FLAGS
+from fastmech.reports import Stage
+from fastmech.scene import Scene
+from fastmech.slider.kernels.select import right_hand_side
+from fastmech.studies.bench.measure import Problem
+from fastmech.studies.reporting import TURNS, in_turns
+
+#: Independent chains of multiply-adds in a lane, and their length: enough to hide each one's latency.
+CHAINS, LENGTH = 8, 32
+
+#: Lanes of the block that the right-hand side alone is given.
+LANES = 256
+
+
+class Throughput(NamedTuple):
+    """Evaluations of right-hand sides per second of one core."""
+
+    place: str
+    rhs: float  #: right-hand sides of one trajectory, per second
+    share: float  #: of the kernel alone
+    slots: float  #: multiply-adds that the core could have done in the time of one
+
+
+@cache
+def multiply_adds() -> Any:
+    """A loop over lanes that does CHAINS x LENGTH multiply-adds in each, as machine code."""
+    names = [f"a{j}" for j in range(CHAINS)]
+    lines = [
+        "def loop(x, turns, factor):",
+        "    for _ in range(turns):",
+        "        for i in range(x.shape[0]):",
+    ]
+    lines += [f"            {name} = x[i] + {j}.0" for j, name in enumerate(names)]
+    lines += [f"            {name} = {name} * factor + 1.0" for _ in range(LENGTH) for name in names]
+    lines += [f"            x[i] = {' + '.join(names)}"]
+    scope: dict[str, Any] = {}
+    exec(compile("\n".join(lines), "<multiply-adds>", "exec"), scope)
+    return njit(["void(float64[::1], int64, float64)"], nogil=True, **FLAGS)(scope["loop"])
+
+
+@cache
+def evaluations() -> Any:
+    """A loop that calls a block right-hand side over and over."""
+
+    def loop(rhs, t, Y, dY, p, turns):  # type: ignore[no-untyped-def]
+        for _ in range(turns):
+            rhs(t, Y, dY, p)
+
+    return njit(nogil=True, **FLAGS)(loop)
+
+
+def throughputs(problem: Problem, stage: Stage) -> tuple[float, list[Throughput]]:
+    """The measured peak [multiply-adds/s], and right-hand sides alone and inside of methods."""
+    x, turns = np.ones(LANES), 2000
+    Y = np.ascontiguousarray(np.resize(problem.starts, (LANES, 4)).T)
+    p = np.repeat(np.array(problem.coefficients)[:, None], LANES, axis=1)
+    rhs, dY = right_hand_side(problem.coefficients), np.empty_like(Y)
+    many = np.tile(problem.starts, (max(1, 4096 // len(problem.starts)), 1))
+    works: dict[str, Callable[[], Any]] = {
+        "peak": lambda: multiply_adds()(x, turns, 0.5),
+        "kernel alone": lambda: evaluations()(rhs, 0.0, Y, dY, p, turns),
+    }
+    counts = {"peak": turns * x.size * CHAINS * LENGTH, "kernel alone": turns * LANES}
+    for method, dt in (("rk4", 0.02), ("dop853", 0.05), ("abm12", 0.0125)):
+        steps, name = int(np.ceil(problem.t_end / dt * (1.0 - 1e-12))), f"inside {method}"
+        works[name] = partial(integrate, problem.scene, many, problem.t_end, dt, method, threads=1)
+        counts[name] = len(many) * find_method(method).evaluations(steps)
+    seconds, _ = in_turns(works, advance=stage("right-hand sides", len(works) * (TURNS + 1)))
+    rates = {name: count / statistics.median(seconds[name]) for name, count in counts.items()}
+    peak, alone = rates.pop("peak"), rates["kernel alone"]
+    return peak, [Throughput(name, rate, rate / alone, peak / rate) for name, rate in rates.items()]
+
+
+METHOD, DT = "rk4", 0.01
+
+#: Scenes by the terms that they have, as changes of Table 1.
+SCENES: dict[str, dict[str, float]] = {
+    "damper, decaying force": {"alpha": 0.7},
+    "damper, constant force": {"alpha": 0.0},
+    "damper, no force": {"F0": 0.0},
+    "no damper, decaying force": {"beta": 0.0, "alpha": 0.7},
+    "no damper, constant force": {"beta": 0.0, "alpha": 0.0},
+    "no damper, no force": {"beta": 0.0, "F0": 0.0},
+}
+OWN_PARAMETERS = "damper, constant force, every trajectory its own ten parameters"
+
+
+class Cost(NamedTuple):
+    """Trajectories per second of a kind of scene."""
+
+    kind: str
+    rate: float  #: per second of one core
+    relative: float  #: to the damper with constant force
+
+
+def costs(problem: Problem, stage: Stage) -> list[Cost]:
+    """Every kind of scene with the same method, step and starts, in turns."""
+    starts = np.tile(problem.starts, (max(1, 4096 // len(problem.starts)), 1))
+    rng, table_1 = np.random.default_rng(3), Scene(alpha=0.0)
+    own = {
+        name: value * rng.uniform(0.99, 1.01, len(starts))
+        for name, value in table_1.parameters.items()
+        if value
+    }
+    run = partial(integrate, y0=starts, t_end=problem.t_end, dt=DT, method=METHOD, threads=1)
+    works = {name: partial(run, table_1.replace(**changes)) for name, changes in SCENES.items()}
+    works[OWN_PARAMETERS] = partial(run, table_1, parameters=own)
+    seconds, _ = in_turns(works, advance=stage("terms", len(works) * (TURNS + 1)))
+    rates = {name: len(starts) / statistics.median(times) for name, times in seconds.items()}
+    base = rates["damper, constant force"]
+    return [Cost(name, rate, rate / base) for name, rate in rates.items()]

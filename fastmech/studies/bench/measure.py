@@ -1,0 +1,236 @@
+"""Timing: everyone is prepared first, then timed in turns, so that a busy machine disturbs all alike.
+
+Rates are trajectories per second of processor time, all threads of the process together: on a quiet machine
+that is wall time on one thread, on a busy one the time spent waiting for a core does not count, and an
+integrator that secretly takes two threads pays for both. Wall times stand beside them.
+
+The benchmark's problems, and what takes part: one integrator at one setting. Problems are ensembles whose
+final states are known to more digits than a double holds: the references come from
+``data/make_bench_reference.py``, which computes them without this package.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from importlib.resources import files
+from typing import NamedTuple
+
+import numpy as np
+
+from fastmech.arrays import Floats
+from fastmech.ensembles.run import Progress
+from fastmech.ensembles.system import System
+from fastmech.models.mechanism import Mechanism
+from fastmech.scene import Scene
+from fastmech.slider.coefficients import Coefficients, reduce
+
+#: Starts of a problem that have a reference; larger ensembles repeat them.
+STARTS = 1024
+
+
+@dataclass(frozen=True)
+class Problem:
+    """An ensemble whose final states are wanted."""
+
+    name: str
+    description: str
+    scene: Scene | System | Mechanism
+    starts: Floats  #: shape (n, dim)
+    truth: Floats  #: final states, shape (n, dim)
+    t_end: float  #: s
+    pace: float  #: steps of fixed-step methods relative to those of the rest starts
+
+    @property
+    def coefficients(self) -> Coefficients:
+        """The scene's reduced coefficients; a system has none."""
+        assert isinstance(self.scene, Scene)
+        return reduce(self.scene)
+
+
+def _problem(name: str, description: str, rate: float, pace: float, n: int) -> Problem:
+    rng = np.random.default_rng(1)
+    angles = [rng.uniform(0.5, 2.5, STARTS), rng.uniform(-1.0, 1.0, STARTS)]
+    starts = np.stack([*angles, *(rng.uniform(-rate, rate, STARTS) for _ in range(2))], axis=1)
+    return Problem(name, description, Scene(alpha=0.0), starts[:n], reference(name)[:n], 10.0, pace)
+
+
+def rest_starts(n: int = STARTS) -> Problem:
+    """Table 1, constant force, at rest with phi in [0.5, 2.5] and theta in [-1, 1], for 10 s."""
+    return _problem("rest", "rest starts", 0.0, 1.0, n)
+
+
+def fast_starts(n: int = STARTS) -> Problem:
+    """The same angles with rates up to 10 rad/s: up to fifteen turns, and passages close to saddles."""
+    return _problem("fast", "starts with |phi'|, |theta'| up to 10 rad/s", 10.0, 0.15, n)
+
+
+PROBLEMS: dict[str, Callable[..., Problem]] = {"rest": rest_starts, "fast": fast_starts}
+
+
+def reference(name: str) -> Floats:
+    """Final states of all starts of a problem, shape (STARTS, 4), each the nearest double."""
+    text = files("fastmech.studies.bench").joinpath("references", f"{name}.csv").read_text(encoding="utf-8")
+    rows = [line for line in text.splitlines() if not line.startswith(("#", "phi"))]
+    return np.array([[float(x) for x in row.split(",")] for row in rows])
+
+
+#: Starts (n, 4) to final states (n, 4): what is timed.
+Solve = Callable[[Floats], Floats]
+
+#: Makes a ``Solve`` for a problem: compiling and tables, not timed as speed.
+Prepare = Callable[[Problem], Solve]
+
+
+class Entrant(NamedTuple):
+    """One integrator at one setting."""
+
+    family: str  #: integrator; its settings make one curve
+    setting: str  #: step or tolerance
+    prepare: Prepare
+    most: int = 32768  #: trajectories a call at most; slow integrators are given the first few
+    least: int = 1  #: trajectories a call at least: a batch that needs them to be at its best
+
+
+#: Processor seconds of timed calls that one entrant is given, and its calls at most.
+BUDGET = 0.8
+MOST_REPEATS = 7
+
+#: Calls shorter than this [s] are given copies of the starts, up to the entrant's most.
+SHORT_CALL = 0.1
+
+
+@dataclass(frozen=True)
+class Row:
+    """What one entrant did on one problem."""
+
+    problem: str
+    family: str
+    setting: str
+    trajectories: int  #: in each timed call
+    wall: float  #: s, median of timed calls
+    processor: float  #: s of processor time, median of timed calls
+    first_call: float  #: s, preparing and the first call: compiling or loading included
+    errors: Floats = field(repr=False)  #: largest error of any component, by trajectory
+
+    @property
+    def rate(self) -> float:
+        """Trajectories per second of processor time."""
+        return self.trajectories / self.processor
+
+    def max_error(self, count: int | None = None) -> float:
+        """Largest error of the first ``count`` trajectories, of all known by default."""
+        return float(self.errors[:count].max())
+
+    @property
+    def median_error(self) -> float:
+        """Median over trajectories."""
+        return float(np.median(self.errors))
+
+
+class _Runner:
+    """A prepared entrant, warmed up and compared with the truth, and its times so far."""
+
+    def __init__(self, problem: Problem, entrant: Entrant, budget: float) -> None:
+        self.entrant, self.problem = entrant, problem.name
+        n = min(len(problem.starts), entrant.most)
+        self.starts = np.tile(problem.starts[:n], (max(1, -(-entrant.least // n)), 1))
+        began = time.perf_counter()
+        self.solve = entrant.prepare(problem)
+        final = self.solve(self.starts)
+        self.first_call = time.perf_counter() - began
+        self.errors = np.abs(final[:n] - problem.truth[:n]).max(axis=1)
+        self.errors[~np.isfinite(self.errors)] = np.inf
+        self.wall, self.processor = list[float](), list[float]()
+        self.time()
+        taken = max(self.processor[0], 1e-6)
+        short = min(SHORT_CALL, budget / MOST_REPEATS)
+        more = min(entrant.most // len(self.starts), int(np.ceil(short / taken)))
+        if more > 1:
+            self.starts = np.tile(self.starts, (more, 1))
+            self.wall, self.processor = [], []
+            taken *= more
+        self.repeats = int(np.clip(budget / taken, 1, MOST_REPEATS)) - len(self.wall)
+
+    def time(self) -> None:
+        """One more call."""
+        wall, processor = time.perf_counter(), time.process_time()
+        self.solve(self.starts)
+        self.processor.append(time.process_time() - processor)
+        self.wall.append(time.perf_counter() - wall)
+
+    def row(self) -> Row:
+        """Medians of the calls."""
+        wall, processor = statistics.median(self.wall), statistics.median(self.processor)
+        named = self.problem, self.entrant.family, self.entrant.setting, len(self.starts)
+        return Row(*named, wall, processor, self.first_call, self.errors)
+
+
+def measure(
+    problem: Problem,
+    everyone: Sequence[Entrant],
+    advance: Progress = lambda done: None,
+    failed: Callable[[Entrant, Exception], None] | None = None,
+    budget: float = BUDGET,
+) -> list[Row]:
+    """Time entrants on one thread; ``advance`` is told 1 twice for each.
+
+    ``budget`` is what each is given [s of processor time]; a call that takes longer is made once. An
+    exception of an entrant is raised, or handed to ``failed`` where it is given.
+    """
+    runners = []
+    for entrant in everyone:
+        try:
+            runners.append(_Runner(problem, entrant, budget))
+        except Exception as error:
+            if failed is None:
+                raise
+            failed(entrant, error)
+        advance(1)
+    for turn in range(MOST_REPEATS):
+        for runner in runners:
+            if turn < runner.repeats:
+                runner.time()
+            if turn == 0:
+                advance(1)
+    return [runner.row() for runner in runners]
+
+
+#: Largest errors [rad, rad/s] at which integrators are compared.
+TARGETS = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)
+
+
+def frontier(rows: Iterable[Row], count: int | None = None) -> list[Row]:
+    """Settings that no other beats in both speed and error, the most accurate first."""
+    best: list[Row] = []
+    # Errors that differ by rounding alone are equal.
+    for row in sorted(rows, key=lambda row: (float(f"{row.max_error(count):.2e}"), -row.rate)):
+        if np.isfinite(row.max_error(count)) and (not best or row.rate > best[-1].rate):
+            best.append(row)
+    return best
+
+
+def rate_at(rows: Iterable[Row], error: float, count: int | None = None) -> float | None:
+    """Trajectories per second at a largest error, between neighbours on the frontier in logarithms.
+
+    An integrator whose every setting is more accurate than that gives its fastest one; ``None`` where none
+    is as accurate.
+    """
+    best = frontier(rows, count)
+    errors = [row.max_error(count) for row in best]
+    if not best or error < errors[0]:
+        return None
+    logs = np.log(np.maximum(errors, 1e-300))
+    return float(np.exp(np.interp(np.log(error), logs, np.log([row.rate for row in best]))))
+
+
+def fastest_at(rows: Iterable[Row], error: float, count: int | None = None) -> tuple[str, float] | None:
+    """The family that is fastest at an error, and its rate."""
+    families: dict[str, list[Row]] = {}
+    for row in rows:
+        families.setdefault(row.family, []).append(row)
+    found = {name: rate_at(own, error, count) for name, own in families.items()}
+    known = {name: rate for name, rate in found.items() if rate is not None}
+    return max(known.items(), key=lambda item: item[1]) if known else None

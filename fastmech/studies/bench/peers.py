@@ -1,0 +1,267 @@
+"""The libraries that take part, each by a function that prepares one of its solvers at one setting.
+
+To add a library, write such a function, which imports it, and name it in ``entrants.toml``. SciPy and
+pynamicalsys go one trajectory at a time, CyRK and numbalsoda in one Numba loop over the trajectories,
+heyoka in batches of one vector, diffrax (``vmap``) and PyTorch (``torch.compile``) on all trajectories at
+once.
+"""
+
+from __future__ import annotations
+
+import os
+from functools import cache, partial
+from typing import Any
+
+import numpy as np
+import sympy
+from numba import carray, cfunc, njit, types  # type: ignore[attr-defined]
+
+from fastmech.arrays import Floats
+from fastmech.ensembles.system import System
+from fastmech.integrators.tableaus import TABLEAUS
+from fastmech.jit import FLAGS
+from fastmech.models.mechanism import Mechanism
+from fastmech.scene import Scene
+from fastmech.slider.coefficients import Coefficients, reduce
+from fastmech.studies.bench.devices import explicit
+from fastmech.studies.bench.measure import Problem, Solve
+from fastmech.studies.bench.own_systems import spoken
+from fastmech.studies.bench.plain import accelerations, scalar_rhs
+
+_COUNT = len(Coefficients._fields)
+_POINTER = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
+
+
+def scipy(method: str, tolerance: float, problem: Problem) -> Solve:
+    """One ``solve_ivp`` after the other, with the compiled right-hand side."""
+    from scipy.integrate import solve_ivp
+
+    p, span = np.array(problem.coefficients), (0.0, problem.t_end)
+    options = {"method": method, "args": (p,), "rtol": tolerance, "atol": 0.1 * tolerance}
+    return lambda starts: np.array(
+        [solve_ivp(scalar_rhs, span, y0, t_eval=span[1:], **options).y[:, -1] for y0 in starts]
+    )
+
+
+def pynamicalsys(h: float, problem: Problem) -> Solve:
+    """RK4, a trajectory a call."""
+    from pynamicalsys import ContinuousDynamicalSystem
+
+    p = np.array(problem.coefficients)
+    step = problem.t_end / round(problem.t_end / h)
+    system = ContinuousDynamicalSystem(
+        equations_of_motion=scalar_rhs, system_dimension=4, parameters=p, number_of_parameters=p.size
+    )
+    system.integrator("rk4", time_step=step)
+    end = problem.t_end - step  # it adds a step to the time that it is given
+    return lambda starts: np.array([system.evolve_system(y0, end) for y0 in starts])
+
+
+@cache
+def _cyrk() -> Any:
+    """The loop and the right-hand side."""
+    from CyRK import nbsolve2_ivp
+
+    @cfunc(types.void(_POINTER, types.float64, _POINTER, _POINTER), **FLAGS)
+    def rhs(dy, t, y, data):  # type: ignore[no-untyped-def]
+        dy[0], dy[1] = y[2], y[3]
+        dy[2], dy[3] = accelerations(y[0], y[1], y[2], y[3], carray(data, (_COUNT,)))
+
+    @njit(nogil=True, **FLAGS)
+    def loop(address, starts, t_end, p, method, tolerance):  # type: ignore[no-untyped-def]
+        final = np.empty_like(starts)
+        span, times = (0.0, t_end), np.array([t_end])
+        for i in range(len(starts)):
+            found = nbsolve2_ivp(
+                address, span, starts[i], method=method, t_eval=times, args=p,
+                rtol=tolerance, atol=0.1 * tolerance, max_num_steps=1000000, force_retain_solver=False,
+            )  # fmt: skip
+            final[i] = found.y[:, -1]
+            found.free()
+        return final
+
+    return loop, rhs
+
+
+def cyrk(method: str, tolerance: float, problem: Problem) -> Solve:
+    """One of its C++ solvers."""
+    (loop, rhs), p = _cyrk(), np.array(problem.coefficients)
+    return lambda starts: loop(rhs.address, starts, problem.t_end, p, method, tolerance)
+
+
+@cache
+def _numbalsoda(method: str) -> Any:
+    """A solver's loop and the right-hand side."""
+    import numbalsoda
+
+    solver = getattr(numbalsoda, method)
+
+    @cfunc(types.void(types.float64, _POINTER, _POINTER, _POINTER), **FLAGS)
+    def rhs(t, y, dy, data):  # type: ignore[no-untyped-def]
+        dy[0], dy[1] = y[2], y[3]
+        dy[2], dy[3] = accelerations(y[0], y[1], y[2], y[3], carray(data, (_COUNT,)))
+
+    @njit(nogil=True, **FLAGS)
+    def loop(address, starts, times, p, tolerance):  # type: ignore[no-untyped-def]
+        final = np.empty_like(starts)
+        for i in range(len(starts)):
+            found, _ = solver(address, starts[i], times, p, tolerance, 0.1 * tolerance, 1000000)
+            final[i] = found[-1]
+        return final
+
+    return loop, rhs
+
+
+def numbalsoda(method: str, tolerance: float, problem: Problem) -> Solve:
+    """LSODA or DOP853."""
+    loop, rhs = _numbalsoda(method)
+    p, times = np.array(problem.coefficients), np.array([0.0, problem.t_end])
+    return lambda starts: loop(rhs.address, starts, times, p, tolerance)
+
+
+def _rates(m: Any, p: Coefficients, y: Any) -> tuple[Any, Any, Any, Any]:
+    """Derivatives of lanes by the functions of a module of arrays."""
+    phi, theta, u, w = y
+    s1, c1, s12, c12 = m.sin(phi), m.cos(phi), m.sin(phi + theta), m.cos(phi + theta)
+    inverse = 1.0 / m.sqrt(4.0 - s1 * s1)
+    q = c1 * inverse
+    k = s1 + s1 * q
+    dk = c1 + q * c1 - s1 * s1 * (1.0 - q * q) * inverse
+    r1 = c12 * (p.spring - w * w) - p.lift * c1 - p.force * s1
+    r1 = r1 - k * u * (p.damping * k + p.slider * dk * u)
+    r2 = c12 * (p.spring - u * u) - p.gravity * m.sin(theta) - p.force * m.cos(theta)
+    phi_ddot = (r1 - s12 * r2) / (p.mass + c12 * c12 + p.slider * k * k)
+    return u, w, phi_ddot, r2 - s12 * phi_ddot
+
+
+def diffrax(solver: str, adapts: bool, value: float, problem: Problem) -> Solve:
+    """``diffeqsolve`` for JAX; every setting compiles for some seconds.
+
+    XLA's pool is held to one thread so that rates are those of one core; its flags must stand before JAX is
+    imported, so a process that has imported it already keeps its own. A step written by hand under
+    ``fori_loop`` was no faster.
+    """
+    one = "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"
+    if one not in os.environ.get("XLA_FLAGS", ""):
+        os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {one}".strip()
+    import jax
+
+    jax.config.update("jax_enable_x64", True)
+    import diffrax
+
+    p, end = problem.coefficients, problem.t_end
+    term = diffrax.ODETerm(lambda t, y, args: jax.numpy.stack(_rates(jax.numpy, p, y)))
+    steps = round(end / value)
+    chosen: Any = (diffrax.ConstantStepSize(), end / steps, steps + 1)
+    if adapts:
+        chosen = (diffrax.PIDController(rtol=value, atol=0.1 * value), None, 1_000_000)
+    controller, first, most = chosen
+
+    def one_start(y: Any) -> Any:
+        return diffrax.diffeqsolve(
+            term, getattr(diffrax, solver)(), 0.0, end, first, y, stepsize_controller=controller,
+            saveat=diffrax.SaveAt(t1=True), max_steps=most, adjoint=diffrax.ForwardMode(),
+        ).ys[-1]  # fmt: skip
+
+    all_of_them = jax.jit(jax.vmap(one_start))
+    return lambda starts: np.asarray(all_of_them(starts))
+
+
+def runge_kutta(method: str, h: Any, rates: Any) -> Any:
+    """One step of a method on a tuple of arrays, every stage typed out when it is traced."""
+    tableau = TABLEAUS[method]
+
+    def step(y: tuple[Any, ...]) -> tuple[Any, ...]:
+        stages: list[Any] = []
+        for row in [*tableau.a, tableau.b]:
+            z = y
+            if stages:
+                weights = [(h * float(a), k) for a, k in zip(row, stages, strict=True) if a]
+                z = tuple(x + sum(a * k[i] for a, k in weights) for i, x in enumerate(y))
+            if len(stages) < tableau.stages:
+                stages.append(rates(z))
+        return z
+
+    return step
+
+
+@cache
+def _torch(method: str, p: Coefficients) -> Any:
+    """A step ``(phi, theta, u, w, h)`` as machine code, compiled once for all steps."""
+    import torch
+
+    def step(phi: Any, theta: Any, u: Any, w: Any, h: Any) -> tuple[Any, ...]:
+        return tuple(runge_kutta(method, h, partial(_rates, torch, p))((phi, theta, u, w)))
+
+    return torch.compile(step, dynamic=False, fullgraph=True)
+
+
+def torch(method: str, h: float, problem: Problem) -> Solve:
+    """A Runge-Kutta step written by hand over 8,192 lanes."""
+    import torch
+
+    torch.set_num_threads(1)
+    step, steps = _torch(method, problem.coefficients), round(problem.t_end / h)
+    length = torch.tensor(problem.t_end / steps, dtype=torch.float64)
+
+    def solve(starts: Floats) -> Floats:
+        with torch.no_grad():
+            y = tuple(torch.from_numpy(np.ascontiguousarray(column)) for column in starts.T)
+            for _ in range(steps):
+                y = step(*y, length)
+            return np.asarray(torch.stack(y, dim=1).numpy())
+
+    return solve
+
+
+def heyoka_equations(scene: Scene | System | Mechanism) -> list[Any]:
+    """Of a scene Lagrange's over m2 l^2, the shortest decomposition of those tried; of others their own."""
+    import heyoka as hy
+
+    if isinstance(scene, System):
+        rhs = spoken(scene.rhs, sin=hy.sin, cos=hy.cos, inverse_cube=lambda s: s**-1.5)
+        state = hy.make_vars(*scene.state)
+        return list(zip(state, rhs(hy.time, *state), strict=True))
+    if isinstance(scene, Mechanism):
+        state, rates = explicit(scene)
+        known = {symbol: hy.make_vars(symbol.name) for symbol in state}
+        return [(known[s], hy.from_sympy(sympy.sympify(r), known)) for s, r in zip(state, rates, strict=True)]
+    p = reduce(scene)
+    phi, theta, u, w = hy.make_vars("phi", "theta", "u", "w")
+    s, c, s12, c12 = hy.sin(phi), hy.cos(phi), hy.sin(phi + theta), hy.cos(phi + theta)
+    root = hy.sqrt(4.0 - s * s)
+    q = c / root
+    k, dk = s + s * q, c + (c * c - s * s + (s * q) ** 2.0) / root
+    r1 = c12 * (p.spring - w * w) - p.lift * c - p.force * s
+    r1 = r1 - k * u * (p.damping * k + p.slider * dk * u)
+    r2 = c12 * (p.spring - u * u) - p.gravity * hy.sin(theta) - p.force * hy.cos(theta)
+    phi_ddot = (r1 - s12 * r2) / (p.mass + c12 * c12 + p.slider * (k * k))
+    return [(phi, u), (theta, w), (u, phi_ddot), (w, r2 - s12 * phi_ddot)]
+
+
+def heyoka(tolerance: float, problem: Problem) -> Solve:
+    """Adaptive Taylor series, 512-bit where the processor has it."""
+    import heyoka as hy
+
+    width = hy.recommended_simd_size()
+    flow = hy.taylor_adaptive_batch(
+        heyoka_equations(problem.scene),
+        np.zeros((problem.starts.shape[1], width)),
+        tol=tolerance,
+        high_accuracy=False,
+        compact_mode=False,
+        fast_math=True,
+        force_avx512=True,
+    )
+    stop = np.full(width, problem.t_end)
+
+    def solve(starts: Floats) -> Floats:
+        final = np.empty_like(starts)
+        for i in range(0, len(starts), width):
+            flow.set_time(0.0)
+            flow.state[:] = starts[i : i + width].T
+            flow.propagate_until(stop)
+            final[i : i + width] = flow.state.T
+        return final
+
+    return solve

@@ -1,0 +1,165 @@
+"""Requests and result files with bytes flipped, lost, added or copied, read as a user's would be."""
+
+from __future__ import annotations
+
+import random
+import resource
+import signal
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import FrameType
+
+from fastmech.errors import InputError
+from fastmech.runner import run_request
+from fastmech.scan_types import scan_kinds
+from fastmech.scan_types.request import read_request
+from fastmech.store.read import open_results
+from fastmech.studies.faults.campaigns import FaultFound, Found
+from fastmech.studies.faults.victim import REQUEST, content_of, values_of
+
+#: Seconds after which reading a file counts as hanging.
+PATIENCE = 20
+
+#: Bytes by which reading damaged files may let the process grow.
+GROWTH = 512 << 20
+
+#: A request whose result has variables of every kind: scalars, texts, flags, small and chunked arrays.
+SMALL = """
+[scene]
+alpha = 0.0
+[scan.rest]
+kind = "equilibria"
+[scan.line]
+kind = "equilibrium_map"
+axes.c2 = { start = 1.0, stop = 900.0, num = 200 }
+variables = ["count", "outcome", "phi"]
+"""
+
+
+def fuzz_requests(count: int, seed: int, tell: Callable[[int], None] = lambda n: None) -> Found:
+    """Read damaged scan files.
+
+    Args:
+        count: how many.
+        seed: of the damage.
+        tell: is told of the files read.
+
+    Raises:
+        FaultFound: one was refused otherwise than by an `InputError` of one line, hung or took much memory.
+    """
+    texts = [REQUEST.encode(), *(path.read_bytes() for path in sorted(Path("scans").glob("*.toml")))]
+
+    def read(path: Path) -> None:
+        request = read_request(path, scan_kinds())
+        for name in request.scans:
+            if Path(name).name != name or name in (".", ".."):
+                raise FaultFound(f"the section {name!r} would leave the folder of the result")
+
+    return _fuzz("requests", texts, read, random.Random(seed), count, tell)
+
+
+def fuzz_results(count: int, seed: int, tell: Callable[[int], None] = lambda n: None) -> Found:
+    """Read damaged result files, every variable of them: it is refused, or has the undamaged values.
+
+    Args and errors as of `fuzz_requests`.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        request, result = Path(folder) / "scan.toml", Path(folder) / "scan.h5"
+        request.write_text(SMALL, encoding="utf-8")
+        run_request(request, result)
+        image, whole = result.read_bytes(), content_of(result)
+
+    def read(path: Path) -> None:
+        refusal = None
+        with open_results(path) as results:
+            for name in results.groups:
+                for variable in results[name]:
+                    try:
+                        found = values_of(results[name][variable])
+                    except InputError as error:
+                        refusal = error
+                        continue
+                    if found != whole.get(f"{name}/{variable}"):
+                        raise FaultFound(f"{name}/{variable} was read with other values")
+        if refusal is not None:
+            raise refusal
+
+    return _fuzz("result files", [image], read, random.Random(seed), count, tell)
+
+
+def damaged(data: bytes, rng: random.Random) -> bytes:
+    """A copy with one to four places flipped, overwritten, cut out, doubled or filled."""
+    copy = bytearray(data)
+    for _ in range(rng.choice((1, 1, 1, 2, 4))):
+        if not copy:
+            break
+        place, length = rng.randrange(len(copy)), rng.choice((1, 1, 4, 64))
+        here, kind = slice(place, place + length), rng.randrange(6)
+        match kind:
+            case 0:
+                copy[place] ^= 1 << rng.randrange(8)
+            case 1:
+                copy[here] = rng.randbytes(len(copy[here]))
+            case 2:
+                del copy[here]
+            case 3:
+                copy[place:place] = copy[here]
+            case 4:
+                copy[here] = b"\xff" * len(copy[here])
+            case 5:
+                del copy[place:]
+    return bytes(copy)
+
+
+def _fuzz(
+    what: str,
+    originals: list[bytes],
+    read: Callable[[Path], None],
+    rng: random.Random,
+    count: int,
+    tell: Callable[[int], None],
+) -> Found:
+    refused, slowest, grown, before = 0, 0.0, 0, _memory()
+    previous = signal.signal(signal.SIGALRM, _too_long)
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "file"
+            for number in range(count):
+                path.write_bytes(damaged(rng.choice(originals), rng))
+                started = time.perf_counter()
+                signal.alarm(PATIENCE)
+                try:
+                    read(path)
+                except InputError as error:
+                    refused += 1
+                    if "\n" in str(error):
+                        raise FaultFound(f"number {number}: not one line: {error}") from None
+                except FaultFound:
+                    raise
+                except BaseException as error:
+                    raise FaultFound(f"number {number}: {type(error).__name__}: {error}") from error
+                finally:
+                    signal.alarm(0)
+                slowest = max(slowest, time.perf_counter() - started)
+                tell(1)
+                grown = _memory() - before
+                if grown > GROWTH:
+                    raise FaultFound(f"number {number}: the process grew by {grown / 1e6:.0f} MB")
+    finally:
+        signal.signal(signal.SIGALRM, previous)
+    sentences = (
+        f"{count} damaged {what} read: {refused} refused, none crashed",
+        f"  slowest {slowest:.2f} s, memory grew by {grown / 1e6:.0f} MB",
+    )
+    return Found(sentences, {what: {"tried": count, "refused": refused}})
+
+
+def _too_long(number: int, frame: FrameType | None) -> None:
+    raise FaultFound(f"hung for {PATIENCE} s")
+
+
+def _memory() -> int:
+    """Largest memory of this process so far [bytes]."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024

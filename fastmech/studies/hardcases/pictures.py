@@ -1,0 +1,156 @@
+"""Pictures of the hard cases: stability regions with a scene's eigenvalues, and the drift of energies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.arrays import Floats
+from fastmech.integrators.methods import METHODS, Adams, ImplicitRungeKutta, Method, RungeKutta
+from fastmech.plots.style import PALETTE, entry, legend_below, new_figure, style
+from fastmech.step_limits.amplification import amplification
+from fastmech.studies.hardcases.cases import DT
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: Points a side of the fields of |R|, and panels in a row.
+SIDE, ACROSS = 181, 4
+
+#: Step [s] for the eigenvalues of a method that has no limit, and half width of its panel.
+WITHOUT_LIMIT, WIDE = 2.0, 14.0
+
+#: Pages of stability regions: name, methods on it, title.
+REGIONS = (
+    ("explicit", RungeKutta, "Stability regions |R(z)| ≤ 1 of the explicit Runge-Kutta methods"),
+    ("adams", Adams, "Stability regions of the Adams methods, by the roots of the history's map"),
+    ("implicit", ImplicitRungeKutta, "Stability regions |R(z)| ≤ 1 of the implicit Runge-Kutta methods"),
+)
+
+
+class Limits(NamedTuple):
+    """How far a method is stable; inf: it has no limit."""
+
+    method: str
+    real_limit: float
+    imaginary_limit: float
+    predicted_step: float  #: s
+    measured_step: float  #: s
+
+
+def stability_pages(limits: Sequence[Limits], eigenvalues: NDArray[np.complex128]) -> dict[str, Figure]:
+    """Where steps do not amplify, by name: a page a family, about sixteen methods; eigenvalues in 1/s."""
+    pages = {}
+    for name, family, title in REGIONS:
+        mine = [row for row in limits if isinstance(METHODS[row.method], family)]
+        if mine:
+            title += "\nλ: eigenvalues at the minimum of Table 1 under the constant force"
+            pages[f"stability_{name}"] = _page(mine, eigenvalues, title)
+    return pages
+
+
+def _page(limits: Sequence[Limits], eigenvalues: NDArray[np.complex128], title: str) -> Figure:
+    from matplotlib.patches import Patch
+
+    rows = -(-len(limits) // ACROSS)
+    look: dict[str, Any] = {"facecolor": PALETTE["sky"], "edgecolor": PALETTE["blue"], "alpha": 0.5}
+    handles: list[Artist] = [Patch(label="no step amplifies", **look)]
+    label = f"h λ of the scene at h = {WITHOUT_LIMIT:g} s: no step is too long for stability"
+    marks = [("o", PALETTE["vermillion"], PALETTE["vermillion"], label)]
+    if np.isfinite(limits[0].predicted_step):
+        marks = [
+            ("o", PALETTE["vermillion"], PALETTE["vermillion"], "h λ of the scene, h predicted"),
+            ("x", PALETTE["black"], PALETTE["black"], "h λ of the scene, h measured"),
+            ("D", PALETTE["black"], "white", "limit on the real axis"),
+            ("s", PALETTE["black"], "white", "limit on the imaginary axis"),
+        ]
+    with style():
+        figure = new_figure(12.0, 3.6 * rows + 0.9)
+        panels = figure.subplots(rows, ACROSS, squeeze=False)
+        for axes in panels.flat[len(limits) :]:
+            axes.remove()
+        for axes, row in zip(panels.flat, limits, strict=False):
+            _panel(axes, METHODS[row.method], row, eigenvalues)
+        handles += [entry(told, ls="", marker=m, mec=edge, mfc=face, ms=6) for m, edge, face, told in marks]
+        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+        figure.suptitle(title)
+    return figure
+
+
+def _panel(axes: Axes, method: Method, limits: Limits, eigenvalues: NDArray[np.complex128]) -> None:
+    name, real, imaginary, predicted, measured = limits
+    bounded = np.isfinite(predicted)
+    scaled = (predicted if bounded else WITHOUT_LIMIT) * eigenvalues
+    reach = 1.2 * max(real, imaginary, float(np.abs(scaled).max())) if bounded else WIDE
+    left, right = -reach, 0.5 * reach if bounded else reach
+    x, y = np.linspace(left, right, SIDE), np.linspace(-reach, reach, SIDE)
+    field = amplification(method, x[None, :] + 1j * y[:, None])
+    axes.contourf(x, y, field, levels=[0.0, 1.0], colors=[PALETTE["sky"]], alpha=0.35)
+    axes.contour(x, y, field, levels=[1.0], colors=[PALETTE["blue"]], linewidths=1.1)
+    axes.axhline(0.0, color="0.5", lw=0.6)
+    axes.axvline(0.0, color="0.5", lw=0.6)
+    axes.plot(scaled.real, scaled.imag, "o", color=PALETTE["vermillion"], ms=6)
+    if bounded:
+        again = measured * eigenvalues
+        axes.plot(again.real, again.imag, "x", color=PALETTE["black"], ms=7)
+        axes.plot([-real], [0.0], "D", mfc="white", mec=PALETTE["black"], ms=5, clip_on=False)
+        axes.plot([0.0, 0.0], [-imaginary, imaginary], "s", mfc="white", mec=PALETTE["black"], ms=5)
+        steps = f"h predicted {predicted:.5f} s\nh measured {measured:.5f} s\n"
+        ends = f"real −{real:.3g}, imaginary ±{imaginary:.3g}"
+    else:
+        one, other, on_real, on_imaginary = (
+            f"{value:.4g}" if np.isfinite(value) else "no limit"
+            for value in (predicted, measured, real, imaginary)
+        )
+        steps, ends = f"h predicted {one}\nh measured {other}\n", f"real {on_real}, imaginary {on_imaginary}"
+    axes.set_aspect("equal")
+    axes.set_xlim(left, right)
+    axes.set_ylim(-reach, reach)
+    axes.locator_params(axis="x", nbins=4)
+    axes.locator_params(axis="y", nbins=5)
+    axes.set_title(f"{name}, order {method.order}", loc="left", fontsize=10, pad=44, weight="bold")
+    axes.text(0.0, 1.02, steps + ends, transform=axes.transAxes, fontsize=8.5, va="bottom", linespacing=1.25)
+    axes.set_xlabel("Re z", labelpad=1)
+    axes.set_ylabel("Im z", labelpad=1)
+
+
+#: Methods and formulations whose energy is drawn.
+DRIFTS = (("rk4", "lagrange"), ("dop853", "lagrange"), ("gauss6", "lagrange"), ("gauss6", "hamilton"))
+
+#: Error that is drawn for zero, below the rounding of an energy.
+FLOOR = 1e-17
+
+
+def draw_energy_drift(
+    histories: Mapping[tuple[str, str], tuple[Floats, Floats]], label: str, start: Sequence[float], steps: int
+) -> Figure:
+    """Energy errors from one start, on two logarithmic axes.
+
+    Args:
+        histories: method and formulation -> (times [s], relative energy error).
+        label: names the start.
+        start: its state [rad, rad/s].
+        steps: of each run.
+    """
+    phi, theta, u, v = start
+    with style():
+        figure = new_figure(7.6, 4.6)
+        axes = figure.subplots()
+        for (method, formulation), (times, error) in histories.items():
+            told = f"{method}, {'(q, p)' if formulation == 'hamilton' else '(q, q′)'}"
+            axes.loglog(times, np.maximum(np.abs(error), FLOOR), lw=1.1, label=told)
+        axes.set_xlabel("time t [s]")
+        axes.set_ylabel("|E − E(0)| / (E(0) − min U)")
+        subtitle = (
+            f"φ = {phi:.4g} rad, θ = {theta:.4g} rad, φ′ = {u:g} rad/s, θ′ = {v:g} rad/s; "
+            f"{steps:,} steps of h = {DT:g} s"
+        )
+        axes.set_title(subtitle, loc="left", fontsize=9)
+        figure.suptitle(f"Energy error of an undamped motion from {label}", x=0.01, ha="left")
+        legend_below(figure, axes, 2)
+    return figure

@@ -1,0 +1,285 @@
+"""``fastmech hardcases``: the gallery's table, result file and pictures, and what failing lanes cost others.
+
+What failing trajectories cost their neighbours in a block: throughput of the rest beside them. The rest are
+the trajectories that do not fail; their throughput is how many of them end in how much time. The share is
+that beside failing ones over that of the same ensemble in which nobody fails: the time without failures over
+the time with them. It passes 1 where lanes that have failed have left.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+import warnings
+from collections.abc import Callable, Sequence
+from enum import IntEnum
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from fastmech.arrays import Floats
+from fastmech.ensembles.integrate import integrate
+from fastmech.ensembles.run import Progress
+from fastmech.ensembles.status import FAILURES, Status
+from fastmech.ensembles.system import System
+from fastmech.errors import StepWarning
+from fastmech.integrators.methods import METHODS
+from fastmech.plots.style import save
+from fastmech.reports import Stage, no_stage, table
+from fastmech.results import Dataset, Variable, flags
+from fastmech.scene import Scene
+from fastmech.slider.equilibria import Equilibrium, find_equilibria
+from fastmech.step_limits.amplification import imaginary_limit, real_limit
+from fastmech.step_limits.measure import measured_stable_step
+from fastmech.step_limits.predict import largest_stable_step, limiting_eigenvalues
+from fastmech.store.write import check_writable
+from fastmech.studies.hardcases.cases import CASES, PAPER, QUICK_STEPS, STEPS, energy_history
+from fastmech.studies.hardcases.pictures import DRIFTS, Limits, draw_energy_drift, stability_pages
+from fastmech.studies.hardcases.walk import REFUSED, HardCase, Row
+from fastmech.studies.reporting import columns, content, in_turns, section, write_data, write_text
+
+#: Methods that are measured, explicit, multistep and implicit ones, with the step [s].
+CONTAINED = {"rk4": 0.01, "dop853": 0.02, "ab6": 0.005, "abm8": 0.01, "gauss6": 0.05, "sdirk4": 0.02}
+
+#: Lengths of the runs [s], and those of the quick version.
+SPANS, QUICK_SPANS = (5.0, 20.0, 100.0), (2.0,)
+
+#: When trajectories fail: the mechanism's at once, the system's about these shares of the run's length.
+WHEN = {"in the first step": 0.0, "after 10 %": 0.1, "after 85 %": 0.85}
+
+#: Trajectories, one in how many fails, and runs of each kind, in turn, after one that does not count.
+NUMBER, ONE_IN, REPETITIONS = 4096, 16, 3
+
+
+def pendulums(
+    t: float, phi: float, omega: float, psi: float, rate: float, y: float
+) -> tuple[float, float, float, float, float]:
+    """Two coupled pendulums, and y' = y^2, which is infinite at t = 1/y(0)."""
+    first = -math.sin(phi) - 0.1 * omega
+    return omega, first, rate, 0.2 * math.sin(phi) - math.sin(psi) - 0.1 * rate, y * y
+
+
+def ensembles(when: float, span: float) -> tuple[Scene | System, Floats, Floats]:
+    """What is integrated, starts without failures, and the same where every sixteenth fails.
+
+    They fail in the first step, or spread over a tenth around the share ``when`` of ``span`` [s].
+    """
+    random, failing = np.random.default_rng(1), np.arange(0, NUMBER, ONE_IN)
+    if when == 0.0:
+        starts = random.uniform([-2, -2, -3, -3], [2, 2, 3, 3], (NUMBER, 4))
+        mixed = starts.copy()
+        mixed[failing, 2] = 1e200
+        return PAPER, starts, mixed
+    starts = random.uniform(-2.0, 2.0, (NUMBER, 5))
+    starts[:, 4] = -1.0
+    mixed = starts.copy()
+    mixed[failing, 4] = 1.0 / (when * span * np.linspace(0.95, 1.05, failing.size))
+    return System(pendulums, ["phi", "omega", "psi", "rate", "y"], {}), starts, mixed
+
+
+def _beside(method: str, dt: float, when: float, span: float, repetitions: int) -> tuple[float, int, bool]:
+    """The share, how many have failed, and whether the rest is the same to the bit."""
+    what, *both = ensembles(when, span)
+    works = {k: partial(integrate, what, y, span, dt, method, threads=1) for k, y in enumerate(both)}
+    seconds, runs = in_turns(works, repetitions)
+    least = np.finfo(np.float64).tiny
+    share = np.median([one / max(other, least) for one, other in zip(*seconds.values(), strict=True)])
+    healthy = np.flatnonzero(np.arange(NUMBER) % ONE_IN)
+    same = np.array_equal(runs[0].y[:, healthy], runs[1].y[:, healthy], equal_nan=True)
+    return float(share), int((runs[1].status != Status.OK).sum()), same
+
+
+def containment(quick: bool, progress: Progress) -> Dataset:
+    """Share of the throughput of healthy trajectories that is left, by method, time of failure and span."""
+    spans = QUICK_SPANS if quick else SPANS
+    found = []
+    for method, dt in CONTAINED.items():
+        for when in WHEN.values():
+            found += [_beside(method, dt, when, span, 1 if quick else REPETITIONS) for span in spans]
+        progress(1)
+    shape = (len(CONTAINED), len(WHEN), len(spans))
+    shares, flagged, same = (np.array(part).reshape(shape) for part in zip(*found, strict=True))
+    each = ("method", "when", "span")
+    return Dataset(
+        {
+            "method": Variable(each[:1], np.array(list(CONTAINED), object), "1", "method"),
+            "when": Variable(each[1:2], np.array(list(WHEN), object), "1", "when trajectories fail"),
+            "span": Variable(each[2:], np.array(spans), "s", "length of the run"),
+            "share": Variable(each, shares, "1", "throughput of the rest beside failing ones"),
+            "failed": Variable(each, flagged, "1", "trajectories with a status that is not OK"),
+            "same": Variable(each, same, "1", "whether the rest is the same to the bit"),
+        },
+        {"trajectories": NUMBER, "failing": -(-NUMBER // ONE_IN)},
+    )
+
+
+def contained(shares: Dataset) -> bool:
+    """Whether those that fail, and nobody else, have a status, and the rest is the same to the bit."""
+    return bool(shares["same"].data.all() and (shares["failed"].data == shares.attrs["failing"]).all())
+
+
+def _containment_lines(shares: Dataset) -> list[str]:
+    methods, when, spans = (shares[name].data for name in ("method", "when", "span"))
+    failing, number = shares.attrs["failing"], shares.attrs["trajectories"]
+    rows = zip(methods, shares["share"].data, strict=True)
+    about = (
+        f"{failing} of {number} trajectories fail: throughput of the rest over that in the same run "
+        "without failures. At least 0.9 is wanted; above 1 those that failed have made room. Processor time "
+        "of one thread, median of runs in turn. Failing trajectories have a status and the rest is "
+        f"the same to the bit: {'yes' if contained(shares) else 'NO'}."
+    )
+    head = ["method", *(f"{kind}, {span:g} s" for kind in when for span in spans)]
+    cells = ([method, *(f"{share:.2f}" for share in row.ravel())] for method, row in rows)
+    return section("## Failing neighbours", about, head, cells)
+
+
+#: Statuses of rows in the file: the trajectories', and one for a request that is refused before the run.
+RowStatus = IntEnum(  # type: ignore[misc]
+    "RowStatus",
+    {status.name: status.value for status in sorted((Status.OK, *FAILURES))} | {REFUSED.upper(): 100},
+)
+
+
+class Result(NamedTuple):
+    """A case and its rows."""
+
+    case: HardCase
+    rows: Sequence[Row]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every row did what it must."""
+        return all(row.passed for row in self.rows)
+
+
+def run_gallery(quick: bool, progress: Callable[[int], None] = lambda done: None) -> list[Result]:
+    """Every case in turn; ``progress`` is told of each."""
+    results = []
+    for case in CASES.values():
+        results.append(Result(case, case.run(quick)))
+        progress(1)
+    return results
+
+
+def gallery_dataset(results: Sequence[Result]) -> Dataset:
+    """One row a case and method."""
+    rows = [row for result in results for row in result.rows]
+    names = np.array([result.case.name for result in results for _ in result.rows], object)
+    codes = np.array([RowStatus[row.status.upper()] for row in rows], dtype=np.int8)
+    about = {
+        "case": Variable(("row",), names, "1", "case"),
+        "status": Variable(("row",), codes, "1", "worst status", flags(RowStatus)),
+    }
+    return Dataset(about | columns("row", rows, "gallery"), {"failures": sum(not row.passed for row in rows)})
+
+
+def verdict(results: Sequence[Result]) -> str:
+    """One line: how many cases passed, and which did not."""
+    failed = [result.case.name for result in results if not result.passed]
+    rows = [row for result in results for row in result.rows]
+    if not failed:
+        claims = sum(row.claimed for row in rows)
+        told = f"{claims} claims hold, {len(rows) - claims} end with a status" if len(rows) > 1 else "1 row"
+        return f"all {len(results)} cases passed ({told})"
+    return f"{len(failed)} of {len(results)} cases failed: {', '.join(failed)}"
+
+
+_INTRODUCTION = (
+    "A method claims a case to an error, at a step that the package lets pass without a warning; the oracle "
+    "says whether the claim holds. Where the claim is its own, it comes from the method alone: twice what "
+    "halving the step tells. A method that claims nothing must end with a status, not with a number."
+)
+
+
+def gallery_lines(results: Sequence[Result]) -> list[str]:
+    """Every case with its table."""
+    head = "method | step [s] | steps | error | claimed to | drift | status | verdict | why | remark"
+    lines = ["# Hard cases", "", f"{verdict(results).capitalize()}.", "", _INTRODUCTION, ""]
+    for case, rows in results:
+        lines += [f"## {case.name}: {'passed' if all(row.passed for row in rows) else 'FAILED'}", ""]
+        lines += [f"Hard: {case.hard}.  ", f"Oracle: {case.oracle}.  ", f"Must: {case.must}.", ""]
+        lines += table(head, map(_cells, rows), (0, 6, 7, 8, 9))
+    return lines
+
+
+def _cells(row: Row) -> list[object]:
+    step, error, allowed, drift = (
+        "" if np.isnan(value) else f"{value:{form}}"
+        for value, form in ((row.dt, ".3g"), (row.error, ".1e"), (row.allowed, ".1e"), (row.drift, ".1e"))
+    )
+    numbers = [row.method, step, f"{row.steps:,}", error, allowed or "not claimed", drift]
+    return [*numbers, row.status, row.verdict, row.why, row.remark]
+
+
+DATA = "hardcases.h5"
+
+
+class Report(NamedTuple):
+    """What was written, and how the gallery ended."""
+
+    paths: list[Path]
+    verdict: str
+    passed: bool
+
+
+def write_hardcases(out: Path, *, quick: bool = False, stage: Stage = no_stage) -> Report:
+    """Run the gallery and write ``hardcases.md``, ``hardcases.h5`` and pictures into the folder ``out``.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    began = time.perf_counter()
+    check_writable(out / DATA, replace=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", StepWarning)  # steps that are too long are what some cases are about
+        return _write(out, quick, stage, began)
+
+
+def _write(out: Path, quick: bool, stage: Stage, began: float) -> Report:
+    results = run_gallery(quick, stage("hard cases", len(CASES)))
+    minimum = next(e for e in find_equilibria(PAPER) if e.morse_index == 0)
+    limits = _limits(minimum, stage("step limits", len(METHODS)))
+    shares = containment(quick, stage("failing neighbours", len(CONTAINED)))
+    told, passed = verdict(results), all(result.passed for result in results)
+    if not contained(shares):
+        told, passed = f"{told}; failing trajectories are not contained", False
+    lines = [*gallery_lines(results), *_limits_lines(limits), *_containment_lines(shares)]
+    sections = {
+        "gallery": gallery_dataset(results),
+        "step_limits": Dataset(columns("method", limits, "step_limits")),
+        "containment": shares,
+    }
+    text = write_text(out / "hardcases.md", lines)
+    store = write_data(out / DATA, PAPER, sections, began, title="Hard cases", verdict=told)
+    steps = QUICK_STEPS if quick else STEPS
+    pictures = stability_pages(limits, limiting_eigenvalues(PAPER, minimum))
+    for name, label in (("paper", "the paper's start"), ("energetic", "an energetic start")):
+        start = content(__package__, "cases.toml")[f"undamped_{name}_start"]["start"]
+        histories = {drawn: energy_history(start, *drawn, steps)[:2] for drawn in DRIFTS}
+        pictures[f"energy_{name}_start"] = draw_energy_drift(histories, label, start, steps)
+    for name, figure in pictures.items():
+        save(figure, out / f"{name}.png")
+    return Report([text, store, *(out / f"{name}.png" for name in pictures)], told, passed)
+
+
+def _limits(minimum: Equilibrium, advance: Progress) -> list[Limits]:
+    """Axis limits of every method, and at the scene's minimum the step predicted and measured."""
+    rows = []
+    for name, method in METHODS.items():
+        steps = largest_stable_step(PAPER, minimum, name), measured_stable_step(PAPER, minimum, name)
+        rows.append(Limits(name, real_limit(method), imaginary_limit(method), *steps))
+        advance(1)
+    return rows
+
+
+def _limits_lines(limits: Sequence[Limits]) -> list[str]:
+    head = "method | real axis | imaginary axis | predicted step [s] | measured step [s] | difference"
+    rows = []
+    for name, real, imaginary, predicted, measured in limits:
+        difference = f"{measured / predicted - 1:+.1e}" if np.isfinite(predicted) else ""
+        steps = f"{predicted:.5f} | {measured:.5f}"
+        rows.append(f"{name} | {real:.4f} | {imaginary:.4f} | {steps} | {difference}")
+    about = "At the minimum of Table 1 under the constant force."
+    return section("## Step limits", about, head, rows)

@@ -1,0 +1,286 @@
+"""Every method through the same motion: which step it takes, to what error it claims the end, and whether so.
+
+A method claims an end to twice what halving its own step tells (Richardson; Hairer, Norsett, Wanner, *Solving
+ODEs I*, section II.4): no knowledge of the true motion goes into a claim, the oracle then judges it. The step
+is the motion's, or a shorter one where the package would warn of that; it is halved until the claim is worth
+something. A method that would need too many steps claims nothing and must end with a status at a step that is
+far too long.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fastmech.arrays import Floats
+from fastmech.basins.labels import Labels
+from fastmech.ensembles.integrate import Trajectories, integrate
+from fastmech.ensembles.status import Status
+from fastmech.errors import InputError
+from fastmech.integrators.explicit import Batch, observe_nothing
+from fastmech.integrators.methods import METHODS, Adams, ImplicitRungeKutta, find_method
+from fastmech.integrators.tableaus.implicit import IMPLICIT_TABLEAUS
+from fastmech.scene import Scene
+from fastmech.slider.coefficients import reduce
+from fastmech.slider.kernels.jacobians import lagrange_inverse, lagrange_jacobian
+from fastmech.slider.kernels.work import CALLS, JACOBIANS, counting_jacobian, counting_lagrange
+from fastmech.slider.lagrange import kinetic_energy, potential_energy
+from fastmech.step_limits.predict import stable_step
+from fastmech.step_limits.warning import step_limit, step_warning
+from fastmech.studies.reporting import content
+
+#: In place of a status: the request was refused before the run.
+REFUSED = "refused"
+
+
+class Row(NamedTuple):
+    """What one method did in a case.
+
+    A method claims a case to an error, at a step; one that claims nothing must end with a status (or be
+    refused), not with a number.
+    """
+
+    method: str
+    dt: float  #: step [s]
+    steps: int
+    error: float  #: against the oracle, see the case; NaN where there is none
+    allowed: float  #: error to which the method claims the case; NaN where it does not
+    drift: float  #: largest change of energy over the energy above the lowest; NaN where energy is not kept
+    status: str  #: worst status of the trajectories, or REFUSED
+    remark: str = ""
+    why: str = ""  #: why it claims the case so far and no further, or not
+
+    @property
+    def claimed(self) -> bool:
+        """Whether the method claims the case."""
+        return not np.isnan(self.allowed)
+
+    @property
+    def passed(self) -> bool:
+        """A claimed case within its error and without failures; a case not claimed with a status."""
+        fine = self.status == Status.OK.name.lower()
+        return fine and self.error <= self.allowed if self.claimed else not fine
+
+    @property
+    def verdict(self) -> str:
+        """What a reader must know: whether the number may be taken, and to how many digits."""
+        if self.claimed:
+            return "passed" if self.passed else f"FAILED: claimed to {self.allowed:.0e}"
+        return "a status, as it must" if self.passed else f"FAILED: not claimed, error {self.error:.1e}"
+
+
+class HardCase(NamedTuple):
+    """A case of the gallery; ``run(quick)`` gives its rows, ``quick`` in about a second."""
+
+    name: str
+    hard: str  #: what makes it hard
+    oracle: str  #: where the expected value comes from, and what the error is
+    must: str  #: what must happen
+    run: Callable[[bool], Sequence[Row]]
+
+
+def worst(status: ArrayLike) -> str:
+    """Name of the gravest status among trajectories: any failure before OK."""
+    values = np.unique(np.asarray(status))
+    return Status(int(values.max())).name.lower()
+
+
+def energy(scene: Scene, y: Floats) -> Floats:
+    """T + U [J] of states (..., 4) under a constant force, or none."""
+    force = scene.F0 if scene.alpha == 0.0 else 0.0
+    return kinetic_energy(scene, y) + potential_energy(scene, y[..., :2], force)
+
+
+def row_of(
+    run: Trajectories,
+    error: float,
+    allowed: float = np.nan,
+    drift: float = np.nan,
+    *,
+    remark: str = "",
+    why: str = "",
+) -> Row:
+    """A row of what ``integrate`` gave; without ``allowed`` it claims nothing."""
+    return Row(run.method, run.dt, run.steps, error, allowed, drift, worst(run.status), remark, why)
+
+
+def labels_row(method: str, found: Labels, wrong: int, told: str = "") -> Row:
+    """A row of what ``fm.label_starts`` gave: the error is how many are wrong, and none may be."""
+    remark = "labels: " + ", ".join(f"{n} {name}" for name, n in found.counts.items() if n) + told
+    return Row(method, np.nan, found.steps, float(wrong), 0.0, np.nan, "ok", remark, "fm.label_starts")
+
+
+#: Relative error that rounding explains, of motions that are not chaotic.
+ROUNDED = 1e-10
+
+
+class Goal(NamedTuple):
+    """A motion whose end is known, of a reference to better than double precision."""
+
+    scene: Scene
+    start: Floats  #: (4,): rad, rad/s
+    t_end: float  #: s
+    expected: Floats  #: (4,), state at that time
+    rounded: float = ROUNDED  #: error that rounding explains, of the largest entry
+
+    def error(self, state: Floats) -> float:
+        """Largest difference from the known end, relative to its largest entry, 1 at least."""
+        return float(np.abs(state - self.expected).max() / max(1.0, np.abs(self.expected).max()))
+
+
+def motion(name: str, rounded: float = ROUNDED) -> Goal:
+    """The reference of this name; its scene is the paper's with a few changes."""
+    entry = content(__package__, "references.toml")[name]
+    scene, end = Scene(c2=1100 / 3).replace(**entry["scene"]), np.array([float(x) for x in entry["state"]])
+    return Goal(scene, np.array(entry["start"]), entry["t"], end, rounded)
+
+
+class Boundary(NamedTuple):
+    """Where a line of starts at rest, theta = 0, crosses a basin boundary, and where motions end."""
+
+    scene: Scene
+    phi: float  #: rad, rounded; to 1e-16
+    below: Floats  #: phi, theta [rad] at the end of motions that start at smaller phi, (2,)
+    above: Floats  #: the same for greater phi
+
+
+def boundary() -> Boundary:
+    """The crossing found by bisection in extended precision."""
+    entry = content(__package__, "references.toml")["boundary"]
+    below, above = (np.array(end) for end in entry["ends"])
+    return Boundary(Scene(c2=1100 / 3).replace(**entry["scene"]), float(entry["phi"]), below, above)
+
+
+#: One method of each family: what quick versions walk.
+FAMILIES = ("euler", "rk4", "dop853", "abm8", "gauss6", "radau5", "sdirk4")
+
+#: Those whose labels quick versions look at.
+LABELLERS = ("rk4", "dop853", "radau5")
+
+#: Share of the step limit that is taken where the limit is shorter than the motion's step.
+WITHIN = 0.9
+
+#: An Adams method's history is this much shorter than the step of a method without memory.
+SHORTER = 4.0
+
+#: Relative error beyond which a number is worth nothing, and steps that are too many to get one.
+WORTHLESS, MOST_STEPS = 0.1, 200_000
+
+
+def walked(quick: bool, euler: bool = True) -> tuple[str, ...]:
+    """Names of the methods that a case tries; ``euler``: whether the quick version has time for its steps."""
+    return FAMILIES[not euler :] if quick else tuple(METHODS)
+
+
+def labellers(quick: bool) -> tuple[str, ...]:
+    """Names of the methods by which a case looks for labels."""
+    return LABELLERS if quick else tuple(METHODS)
+
+
+def admitted_step(scene: Scene, method: str, longest: float, starts: ArrayLike | None = None) -> float:
+    """The longest step [s], ``longest`` at most, that the package lets pass without a warning; 0: none."""
+    dt = longest / (SHORTER if isinstance(find_method(method), Adams) else 1.0)
+    if step_warning(scene, dt, method, starts) is None:
+        return dt
+    return min(dt, WITHIN * step_limit(scene, method))
+
+
+def claimed_row(goal: Goal, method: str, longest: float, refused: float) -> Row:
+    """The end by one method, to the error that it claims itself, or the status that it must end with.
+
+    Args:
+        goal: the motion.
+        method: its name.
+        longest: longest step [s].
+        refused: step [s] that is far too long for a method that claims nothing.
+    """
+    scene, start, t_end, _, rounded = goal
+    dt = admitted_step(scene, method, longest, start)
+    while 0.0 < t_end <= MOST_STEPS * dt:
+        run, claim = _own_claim(goal, method, dt)
+        if worst(run.status) == "ok" and claim <= WORTHLESS:
+            why = "twice what halving the step tells" if claim > 2.0 * rounded else "rounding"
+            return row_of(run, goal.error(run.y[-1, 0]), claim, why=why)
+        dt /= 2.0
+    why = f"no claim with {MOST_STEPS:,} steps"
+    return status_row(goal, method, refused, why)
+
+
+def status_row(goal: Goal, method: str, dt: float, why: str, dtype: str = "float64") -> Row:
+    """A row of a method that claims nothing with this step."""
+    try:
+        run = integrate(goal.scene, goal.start, goal.t_end, dt, method, dtype=dtype)
+    except InputError as error:
+        return Row(method, dt, 0, np.nan, np.nan, np.nan, REFUSED, str(error), why)
+    return row_of(run, goal.error(run.y[-1, 0]), why=why)
+
+
+def fixed_row(goal: Goal, method: str, dt: float, allowed: float, why: str, dtype: str = "float64") -> Row:
+    """A row of a method that claims the end to an error that is known beforehand."""
+    run = integrate(goal.scene, goal.start, goal.t_end, dt, method, dtype=dtype)
+    remark = "" if dtype == "float64" else dtype
+    return row_of(run, goal.error(run.y[-1, 0]), allowed, why=why, remark=remark)
+
+
+def halving_tells(method: str, state: Floats, half: Floats) -> float:
+    """The error of a result by the same with half the steps: Richardson's estimate, of the largest entry."""
+    return float(np.abs(state - half).max()) / (1.0 - 0.5 ** find_method(method).order)
+
+
+def _own_claim(goal: Goal, method: str, dt: float) -> tuple[Trajectories, float]:
+    """A run and the error that it claims: twice Richardson's estimate, rounding added."""
+    run, half = (integrate(goal.scene, goal.start, goal.t_end, h, method) for h in (dt, 0.5 * dt))
+    size = max(1.0, float(np.abs(half.y[-1, 0]).max()))
+    claim = 2.0 * halving_tells(method, run.y[-1, 0], half.y[-1, 0]) / size + goal.rounded
+    return run, claim if np.isfinite(claim) else np.inf
+
+
+class Work(NamedTuple):
+    """What a run took."""
+
+    state: Floats  #: (4,) at the end
+    calls: int  #: right-hand sides
+    jacobians: int
+    path: Floats  #: states (steps + 1, 4)
+
+
+def counted(goal: Goal, method: str, steps: int) -> Work:
+    """A run of an implicit method in equal steps with every call counted."""
+    params = np.concatenate([np.array(reduce(goal.scene), dtype=np.float64), np.zeros(2)])
+    batch = Batch(
+        times=np.linspace(0.0, goal.t_end, steps + 1),
+        steps=np.ones(steps, dtype=np.int64),
+        params=params[None, :, None].copy(),
+        observer_params=np.zeros(0),
+        Y=goal.start[None, :, None].copy(),
+        record=np.zeros((1, 0, 1)),
+        out=np.empty((1, steps, 4, 1)),
+    )
+    formula = ImplicitRungeKutta(IMPLICIT_TABLEAUS[method], counting_jacobian, lagrange_inverse)
+    formula.run(counting_lagrange, observe_nothing, batch)
+    calls, jacobians = (int(batch.params[0, row, 0]) for row in (CALLS, JACOBIANS))
+    path = np.concatenate([goal.start[None], batch.out[0, :, :, 0]])
+    return Work(path[-1], calls, jacobians, path)
+
+
+def path_eigenvalues(goal: Goal, path: Floats) -> Floats:
+    """Eigenvalues (states, 4) [1/s] of the motion linearized along a path (states, 4)."""
+    Y = np.ascontiguousarray(path.T)
+    J = np.empty((16, len(path)))
+    own = np.repeat(np.array(reduce(goal.scene), dtype=np.float64)[:, None], len(path), axis=1)
+    lagrange_jacobian(0.0, Y, J, own)
+    return np.asarray(np.linalg.eigvals(J.T.reshape(-1, 4, 4)))
+
+
+def explicit_calls(goal: Goal, path: Floats, method: str = "rk4") -> float:
+    """Right-hand sides of an explicit method whose step is the stability limit all along a path.
+
+    Fewer than with any fixed step, which the narrowest place on the path sets.
+    """
+    formula = METHODS[method]
+    limits = np.array([stable_step(formula, values) for values in path_eigenvalues(goal, path)])
+    steps = goal.t_end * float(np.mean(1.0 / limits))
+    return steps * formula.evaluations(1000) / 1000.0

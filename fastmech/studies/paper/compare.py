@@ -1,0 +1,172 @@
+"""The paper's print, read from ``printed.toml``, and its comparison with what is computed.
+
+Every number has exactly its printed digits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from decimal import Decimal
+from enum import StrEnum
+from fnmatch import fnmatchcase
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fastmech.studies.reporting import content
+
+Printed = Mapping[str, Any]
+
+CASES = ("case_1", "case_2", "case_3", "case_4")
+
+#: Finest rounding tried when characters of a printed number are lost.
+MOST_DECIMALS = 6
+
+_FUNCTIONS = {"pi": np.pi, "sin": np.sin, "cos": np.cos, "sqrt": np.sqrt}
+
+
+def evaluate(expression: str, **names: Any) -> Any:
+    """Value of an expression of ``printed.toml`` (Python's syntax) for the quantities it names.
+
+    Beside those it knows ``sin``, ``cos``, ``sqrt`` and ``pi``. Only the package's own file is evaluated.
+    """
+    return eval(expression, {"__builtins__": {}}, {**_FUNCTIONS, **names})
+
+
+def half_unit(printed: str) -> float:
+    """Half a unit in the last printed place: the largest rounding error of a right print."""
+    exponent = Decimal(printed).as_tuple().exponent
+    assert isinstance(exponent, int)
+    return 0.5 * 10.0**exponent
+
+
+def agrees(printed: str, computed: float) -> bool:
+    """Whether a print is a rounding of the computed value; a tie may have been rounded either way."""
+    return abs(float(printed) - computed) <= half_unit(printed) * (1.0 + 1e-9)
+
+
+def agrees_legibly(pattern: str, computed: float) -> bool:
+    """Whether some rounding of the computed value fits a print of which characters are lost.
+
+    ``*`` stands for any lost characters, as in the file.
+    """
+    return any(fnmatchcase(f"{computed:.{places}f}", pattern) for places in range(MOST_DECIMALS + 1))
+
+
+HEADINGS = ("Case, part", "Symbol", "Unit", "Printed", "Computed", "Difference", "Verdict")
+
+_NEGLIGIBLE = 1e-9
+
+
+class Verdict(StrEnum):
+    """What a comparison of a printed number came to."""
+
+    AGREES = "agrees to the printed digit"
+    SAME = "says the same"
+    LEGIBLE = "agrees to the legible digits"
+    ROUNDING = "rounding of the print"
+    MISPRINT = "misprint"
+    DIFFERS = "differs"
+
+    @property
+    def good(self) -> bool:
+        """Whether print and computation say the same."""
+        return self not in (Verdict.MISPRINT, Verdict.DIFFERS)
+
+
+class Row(NamedTuple):
+    """One printed number or word of the paper."""
+
+    section: str  #: "Table 2", "Equation (16)", ...
+    place: str  #: case, or part of the equation
+    symbol: str
+    unit: str
+    printed: str  #: exactly as printed, lost characters as ``*``
+    computed: float | str
+    verdict: Verdict
+    see: str = ""  #: key of the misprint that explains it
+
+    @property
+    def difference(self) -> float:
+        """Computed less printed; NaN for words and for prints that lost characters."""
+        return (
+            np.nan if "*" in self.printed else self.value - (number(self.printed) if self.is_number else 0.0)
+        )
+
+    @property
+    def is_number(self) -> bool:
+        """Whether it is a number, not a word."""
+        return not isinstance(self.computed, str)
+
+    @property
+    def value(self) -> float:
+        """The computed number; NaN for words."""
+        return np.nan if isinstance(self.computed, str) else self.computed
+
+    @property
+    def word(self) -> str:
+        """The computed word; empty for numbers."""
+        return self.computed if isinstance(self.computed, str) else ""
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """Its texts in the order of ``HEADINGS``: a dash where there is no number to subtract.
+
+        The computed value has three digits more than the print, or as many as are needed.
+        """
+        differs, difference = abs(self.difference) > _NEGLIGIBLE, f"{self.difference:+.3g}"
+        if np.isnan(self.difference):
+            difference = "–"
+        elif not differs:
+            difference = "0"
+        computed = self.word or f"{self.computed:.7g}"
+        if difference != "–" and "pi" not in self.printed:
+            computed = f"{self.computed:.{len(self.printed.partition('.')[2]) + 3 * differs}f}"
+        symbol = content(__package__, "printed.toml")["symbols"].get(self.symbol, self.symbol)
+        return self.place, symbol, self.unit, self.printed, computed, difference, str(self.verdict)
+
+
+def number(printed: str) -> float:
+    """Value of a print: a decimal number, or a fraction of pi such as ``4 pi / 13``."""
+    if "pi" not in printed:
+        return float(printed)
+    return float(evaluate(printed.replace(" pi", "*pi")))
+
+
+def compare(printed: str, computed: float | str) -> Verdict:
+    """Verdict of a print by itself."""
+    if isinstance(computed, str):
+        return Verdict.SAME if printed == computed else Verdict.DIFFERS
+    if "*" in printed:
+        return Verdict.LEGIBLE if agrees_legibly(printed, computed) else Verdict.DIFFERS
+    same = number(printed) == computed if "pi" in printed else agrees(printed, computed)
+    return Verdict.AGREES if same else Verdict.DIFFERS
+
+
+def judged(
+    misprints: Collection[str],
+    section: str,
+    place: str,
+    symbol: str,
+    unit: str,
+    printed: str,
+    computed: float | str,
+    *explanations: str,
+) -> Row:
+    """A row with its verdict.
+
+    Args:
+        misprints: keys of the misprints that the evidence confirms.
+        section: of the paper.
+        place: case or part of it.
+        symbol: of the quantity.
+        unit: its unit.
+        printed: as printed.
+        computed: the computed value.
+        explanations: keys of misprints that would explain a difference.
+    """
+    verdict, see = compare(printed, computed), ""
+    if verdict == Verdict.DIFFERS:
+        see = next((key for key in explanations if key in misprints), "")
+        verdict = Verdict.MISPRINT if see else verdict
+    return Row(section, place, symbol, unit, printed, computed, verdict, see)

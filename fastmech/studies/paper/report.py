@@ -1,0 +1,202 @@
+"""``fastmech paper``: the report as Markdown and HTML, data and pictures, written into one folder."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from fastmech.errors import InputError
+from fastmech.plots.style import png
+from fastmech.reports import Stage, no_stage, table, to_html
+from fastmech.store.write import check_writable
+from fastmech.studies.paper.compare import HEADINGS, Row, Verdict
+from fastmech.studies.paper.compute import METHOD, PAPER_SCENE, STEP, Case, Computed, compute
+from fastmech.studies.paper.figures import Picture, all_datasets, figure_pictures, table_pictures
+from fastmech.studies.paper.misprints import Misprint, candidates
+from fastmech.studies.paper.rows import Check, Guess, all_checks, all_rows, parameters_used
+from fastmech.studies.reporting import content, section, write_data
+
+TITLE = "The source paper, computed again"
+
+
+def report_text(
+    computed: Computed,
+    rows: Sequence[Row],
+    misprints: Sequence[Misprint],
+    checks: Sequence[Check],
+    guesses: Sequence[Guess],
+    figures: Sequence[Picture],
+) -> str:
+    """The whole report."""
+    confirmed = [item for item in misprints if item.confirmed]
+    right = [item for item in misprints if not item.confirmed]
+    places = {item.key: item.place for item in misprints}
+    notes = content(__package__, "printed.toml")["notes"]
+    lines = [f"# {TITLE}", "", *_summary(computed, rows, confirmed, checks), ""]
+    lines += ["## Printed against computed", ""]
+    for name in dict.fromkeys(row.section for row in rows):
+        own = (_row(row, places) for row in rows if row.section == name)
+        lines += section(f"### {name}, printed numbers", notes.get(name, ""), HEADINGS, own, (0, 1, 2, 6))
+    lines += [
+        "## Misprints",
+        "",
+        "A place counts as misprinted only if each measure of the print exceeds the tolerance and the same "
+        "measure of the correction does not. Formulas are in Python's syntax and are what was evaluated.",
+        "",
+        *(line for item in confirmed for line in _misprint(item)),
+    ]
+    if right:
+        lines += ["## Suspected, but printed rightly", ""]
+        lines += [*(f"- {item.place}: {item.error}" for item in right), ""]
+    choices = (f"{guess.c2} | {guess.g} | {guess.agreeing} of {guess.total}" for guess in guesses)
+    about = "Angles of Table 2 that come out to the printed digit with each choice of c2 and g:"
+    lines += section("## Parameters used", about, "c2 [N/m] | g [m/s²] | Agreeing angles", choices, ())
+    promises = (
+        f"{c.name} | {c.value:.2g} | {c.limit:.1g} | {c.unit} | {'passed' if c.passed else '**failed**'}"
+        for c in checks
+    )
+    head = "Check | Value | Limit | Unit | Result"
+    lines += section("## Checks of the computation", "", head, promises, (0, 3, 4))
+    lines += _equilibria(computed.cases)
+    lines += ["## Figures", "", "Spans are not printed in the paper; those here show decay or escape.", ""]
+    for name, heading, caption, _ in figures:
+        lines += [f"### {heading}", "", f"![{heading}]({name}.png)", "", caption, ""]
+    return "\n".join(lines)
+
+
+def _summary(
+    computed: Computed, rows: Sequence[Row], confirmed: Sequence[Misprint], checks: Sequence[Check]
+) -> list[str]:
+    numbers = Counter(row.verdict for row in rows if row.is_number)
+    words = [row.verdict.good for row in rows if not row.is_number]
+    return [
+        f"Of **{numbers.total()} printed numbers**, {numbers[Verdict.AGREES]} agree to the printed digit, "
+        f"{numbers[Verdict.LEGIBLE]} in every legible digit, {numbers[Verdict.ROUNDING]} is a rounding of "
+        f"the value that was used, **{numbers[Verdict.MISPRINT]} are misprints** and "
+        f"**{numbers[Verdict.DIFFERS]} differ unexplained**. "
+        f"{sum(words)} of {len(words)} printed verdicts say the same as the computation.",
+        "",
+        f"{len(confirmed)} misprints are proved, formulas included:",
+        "",
+        *(f"- [{item.place}](#{_anchor(item.key)}): {item.error}" for item in confirmed),
+        "",
+        f"{sum(check.passed for check in checks)} of {len(checks)} checks of the computation itself are "
+        f"passed; on the equilibria: {computed.certificate.sentence}. Motions: {METHOD}, step {STEP:g} s.",
+    ]
+
+
+def _anchor(key: str) -> str:
+    return key.replace("_", "-")
+
+
+def _row(row: Row, places: dict[str, str]) -> list[str]:
+    # Markdown would read the stars as emphasis.
+    texts = [f"`{text}`" if "*" in text and i in (0, 1, 3) else text for i, text in enumerate(row.cells)]
+    if row.verdict == Verdict.MISPRINT:
+        texts[-1] = f"**misprint**: see [{places[row.see]}](#{_anchor(row.see)})"
+    if row.verdict == Verdict.DIFFERS:
+        texts[-1] = "**differs**"
+    return texts
+
+
+def _misprint(item: Misprint) -> list[str]:
+    evidence = (
+        f"{e.measure} | {e.unit} | {e.printed:.3g} | {e.corrected:.2g} | {e.tolerance:.1g}"
+        for e in item.evidence
+    )
+    return [
+        f'<a id="{_anchor(item.key)}"></a>',  # plain Markdown has no anchors of its own
+        "",
+        f"### {item.place}: {item.error}",
+        "",
+        f"- printed: `{item.printed}`",
+        f"- corrected: `{item.corrected}`",
+        "",
+        *table("Measure | Unit | As printed | Corrected | Tolerance", evidence, (0, 1)),
+    ]
+
+
+def _equilibria(cases: Sequence[Case]) -> list[str]:
+    rows, verdicts = [], []
+    for case in cases:
+        e, c = case.equilibrium, case.classification
+        roots = ", ".join(
+            f"{root.real:.4f}" + (f" ± {root.imag:.4f}i" if root.imag else "")
+            for root in c.eigenvalues
+            if root.imag >= 0.0
+        )
+        rows.append(
+            f"Case {case.number} | {e.phi:.10f} | {e.theta:.10f} | {e.energy:.4f} | {e.kind} | {roots}"
+        )
+        verdicts.append(f"- Case {case.number}, {c.verdict}: {c.explanation}.")
+    head = "Case | φ [rad] | θ [rad] | U [J] | Kind | Roots [1/s]"
+    return [*section("## Equilibria", "", head, rows, (0, 4, 5)), *verdicts, ""]
+
+
+DATA = "paper.h5"
+
+
+@dataclass(frozen=True)
+class PaperReport:
+    """What was written, and what it says."""
+
+    paths: tuple[Path, ...]  #: all files, the HTML report first
+    rows: tuple[Row, ...]  #: every printed number and verdict
+    misprints: tuple[Misprint, ...]  #: those that the evidence confirms
+    checks: tuple[Check, ...]
+
+    @property
+    def n_rows(self) -> int:
+        """Number of printed numbers and verdicts that were compared."""
+        return len(self.rows)
+
+    @property
+    def as_expected(self) -> bool:
+        """Whether every difference is a proved misprint and every check is passed."""
+        explained = all(row.verdict.good or row.see for row in self.rows)
+        return explained and all(check.passed for check in self.checks)
+
+
+def write_paper(out: Path, *, stage: Stage = no_stage) -> PaperReport:
+    """Compute the paper's tables and figures and set them against what it prints.
+
+    Writes into the folder ``out`` (made if missing, files of an earlier report replaced): ``report.html``
+    (which needs no other file), ``report.md``, a PNG for every table and figure, and their data in
+    ``paper.h5``.
+
+    Args:
+        out: folder of the report.
+        stage: makes a bar; it is told of every picture.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    began = time.perf_counter()
+    check_writable(out / DATA, replace=True)
+    printed = content(__package__, "printed.toml")
+    computed = compute(printed)
+    suspects = candidates(printed, computed)
+    misprints = tuple(item for item in suspects if item.confirmed)
+    rows = all_rows(printed, computed, {item.key for item in misprints})
+    checks = all_checks(computed)
+    datasets = all_datasets(computed, rows)
+    tables, figures = table_pictures(rows), figure_pictures(computed, datasets)
+    advance = stage("tables and figures", len(tables) + len(figures))
+    pictures: dict[str, bytes] = {}
+    for picture in (*tables, *figures):
+        pictures[f"{picture.name}.png"] = png(picture.draw())
+        advance(1)
+    markdown = report_text(computed, rows, suspects, checks, parameters_used(printed), figures)
+    files = {"report.html": to_html(markdown, TITLE, pictures).encode(), "report.md": markdown.encode()}
+    files |= pictures
+    try:
+        for name, written in files.items():
+            (out / name).write_bytes(written)
+    except OSError as error:
+        raise InputError(f"{out}: cannot be written: {error.strerror}") from None
+    write_data(out / DATA, PAPER_SCENE, datasets, began, title=TITLE, method=METHOD, dt=STEP)
+    paths = tuple(out / name for name in (*files, DATA))
+    return PaperReport(paths, tuple(rows), misprints, tuple(checks))
