@@ -260,7 +260,7 @@ def gallery() -> None:
             how = ["--mechanism", f"{own}:{name}"] if own.exists() else []
             fastmech = [sys.executable, "-m", "fastmech"]
             subprocess.run([*fastmech, "run", str(coarse), "--out", str(result), *how], check=True)
-            subprocess.run([*fastmech, "plot", str(result), "--out", str(drawn), *how], check=True)
+            subprocess.run([*fastmech, "plot", str(result), "--out", str(drawn)], check=True)
             first = max(
                 drawn.glob("*.png"),
                 key=lambda path: ("labels" in path.name, "map" in path.name, path.stat().st_size),

@@ -80,7 +80,7 @@ def report(
         title: of the page, by default "Report on" and the device's name.
         tolerances: half widths of the uniform distributions of parameters, by name, in the parameters' units.
         threads: threads to use, all processors by default.
-        stage: makes a bar, which is told of each part.
+        stage: makes a progress bar for the parts.
 
     Returns:
         the paths of the page and of the PDF.

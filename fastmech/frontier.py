@@ -155,7 +155,7 @@ def work_precision(
             more by default.
         parameters: values of parameters that differ between trajectories, each of shape (n,).
         threads: threads to use, one by default, so that rates are those of a core.
-        progress: is told 1 after each method.
+        progress: called with 1 after each method.
 
     Returns:
         a point for each method and each error that it keeps.

@@ -277,3 +277,12 @@ def test_few_general_modules_know_the_paper_s_mechanism(folder: str) -> None:
     paths = sorted((PACKAGE / folder).rglob("*.py"))
     naming = [path.name for path in paths if re.search(r"\b(phi|theta|F0|c1)\b", path.read_text("utf-8"))]
     assert len(naming) <= KNOWING[folder], naming
+
+
+def test_no_two_classes_share_a_name() -> None:
+    homes: dict[str, list[str]] = {}
+    for path in MODULES:
+        for node in ast.walk(tree(path)):
+            if isinstance(node, ast.ClassDef):
+                homes.setdefault(node.name, []).append(str(path.relative_to(PACKAGE)))
+    assert {name: where for name, where in homes.items() if len(where) > 1} == {}

@@ -95,7 +95,7 @@ def critical_values(
         parameter: its name.
         values: of it, two or more, rising; what changes twice between two of them is missed.
         threads: threads to use; the result does not depend on it.
-        progress: is told how many of the values are done since its last call.
+        progress: called with the number of values that are done since the last call.
 
     Raises:
         InputError: an argument is wrong, or as :func:`fastmech.find_equilibria`.

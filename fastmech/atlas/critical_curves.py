@@ -114,7 +114,7 @@ def critical_curves(
         mechanism: gives the other parameters; loads are at their means.
         x, y: name and rising values of a parameter; what passes between all points of the grid is missed.
         threads: threads to use; the result does not depend on it.
-        progress: is told how many points of the grid are done since its last call.
+        progress: called with the number of points of the grid that are done since the last call.
 
     Raises:
         InputError: an argument is wrong, or as :func:`fastmech.find_equilibria`.
@@ -134,7 +134,7 @@ def critical_curves(
         {name: float(values[0]) for name, values in found.axes.items()},
         {name: float(values[-1]) for name, values in found.axes.items()},
     )
-    search = _Search(balance)
+    search = _CurveSearch(balance)
     for a, b in narrowed(mechanism, found.axes, pairs, HALVINGS, threads=threads):
         search.begin(*named(mechanism, found.axes, a, b), 0.5 * (a.at + b.at))
     lost = [at for at in search.lost if not search.explains(at)]
@@ -166,7 +166,7 @@ def _changes(found: Any) -> Pairs:
     return pairs
 
 
-class _Search:
+class _CurveSearch:
     """The curves that are known so far."""
 
     def __init__(self, balance: Balance) -> None:

@@ -93,7 +93,7 @@ def map_resting_places(
         mechanism: gives every parameter that is no axis.
         axes: parameters' names with their values, in the order of the result's dimensions.
         threads: threads to use, all processors by default.
-        progress: is told how many points are done since its last call.
+        progress: called with the number of points that are done since the last call.
 
     Raises:
         InputError: an unknown name, values that the mechanism refuses, a load that they turn into another at

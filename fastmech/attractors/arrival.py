@@ -19,7 +19,7 @@ from scipy.linalg import eig, solve_discrete_lyapunov
 
 from fastmech.attractors.flow import FINER, Floats, Flow
 from fastmech.attractors.orbits import ATTRACTS, Orbit
-from fastmech.attractors.proof import Proof, prove_rest
+from fastmech.attractors.proof import RestProof, prove_rest
 from fastmech.ensembles.system import System
 from fastmech.kernels.levels import levels
 
@@ -43,7 +43,7 @@ class Balls(NamedTuple):
     # how far along a cycle e goes, in distances to the next place
     slopes: Floats  #: (m, dim): rates of change from place to place along a cycle, else zero
     radius: float  #: the least distance to a ball's border, over the scale
-    proof: Proof | None = None  #: of a place of rest
+    proof: RestProof | None = None  #: of a place of rest
 
 
 def levels_of(flow: Flow, of: Balls, states: Floats) -> tuple[Integers, Floats]:
@@ -102,7 +102,7 @@ def balls(flow: Flow, orbit: Orbit) -> Balls:
     return own._replace(radius=1.0 / widest)
 
 
-def _proved(flow: Flow, place: Floats, proof: Proof) -> Balls:
+def _proved(flow: Flow, place: Floats, proof: RestProof) -> Balls:
     """The ball of a proof."""
     root = np.linalg.cholesky(proof.form).T
     forms = np.zeros((1, len(root) + 1, len(root)))
@@ -139,7 +139,7 @@ class Cloud(NamedTuple):
     continuum: bool = False  #: whether fixed points of the map lie side by side, each motion in its own
 
 
-class Cells(NamedTuple):
+class ArrivalCells(NamedTuple):
     """Cells of several clouds by their numbers, rising; those of two clouds are nobody's."""
 
     size: Floats  #: (dim,)
@@ -147,16 +147,16 @@ class Cells(NamedTuple):
     owner: Integers  #: whose (cells,)
 
 
-def cells_of(flow: Flow, clouds: list[Cloud], wider: float) -> Cells:
+def cells_of(flow: Flow, clouds: list[Cloud], wider: float) -> ArrivalCells:
     """Cells of clouds, ``wider`` by a factor than the widest of theirs."""
     size = wider * np.max([cloud.size for cloud in clouds], axis=0)
     each = [np.unique(keys_of(flow, size, cloud.points)) for cloud in clouds]
     keys, first, count = np.unique(np.concatenate(each), return_index=True, return_counts=True)
     owner = np.repeat(np.arange(len(clouds)), [k.size for k in each])[first]
-    return Cells(size, keys, np.where(count == 1, owner, -1))
+    return ArrivalCells(size, keys, np.where(count == 1, owner, -1))
 
 
-def owners(flow: Flow, cells: Cells, states: Floats) -> Integers:
+def owners(flow: Flow, cells: ArrivalCells, states: Floats) -> Integers:
     """In whose cell each state (..., dim) is, -1: nobody's."""
     keys = keys_of(flow, cells.size, states)
     place = np.minimum(np.searchsorted(cells.keys, keys), cells.keys.size - 1)

@@ -155,7 +155,7 @@ def frequency_response(
         raise InputError(f"between = {shown(between)}: must rise")
     periods = checks.whole_number("periods", periods, least=1, most=1024)
     y = checks.starts("starts", starts, system.state, n=STARTS, seed=seed)
-    family = Family(system, parameter, (low, high), y, periods, threads)
+    family = OrbitFamily(system, parameter, (low, high), y, periods, threads)
     branches: list[Branch] = []
     for value, flow in family.flows.items():
         guesses = np.concatenate([y, flow.after(y, RUN_IN)])
@@ -179,7 +179,7 @@ def _units(system: System | Mechanism) -> dict[str, str]:
     return units | {f"{name}_dot": f"{unit}/s" for name, unit in units.items()} | dict(system.units)
 
 
-class Family:
+class OrbitFamily:
     """The map over some periods and its derivatives, for any value of a parameter."""
 
     def __init__(
@@ -284,7 +284,7 @@ class _Point(NamedTuple):
     J: Floats
 
 
-def _correct(family: Family, guess: Floats, tangent: Floats) -> _Point | None:
+def _correct(family: OrbitFamily, guess: Floats, tangent: Floats) -> _Point | None:
     """The branch's point in the plane through a guess across a direction."""
     u, size, low = guess.copy(), np.inf, family.between[0]
     range_ = family.between[1] - low
@@ -313,7 +313,7 @@ def _correct(family: Family, guess: Floats, tangent: Floats) -> _Point | None:
     return None
 
 
-def _branch(family: Family, place: Floats, value: float) -> Branch:
+def _branch(family: OrbitFamily, place: Floats, value: float) -> Branch:
     """The whole branch through a periodic motion."""
     u = np.append(place / family.scale, (value - family.between[0]) / (family.between[1] - family.between[0]))
     start = _correct(family, u, np.eye(len(u))[-1])
@@ -342,7 +342,7 @@ def _branch(family: Family, place: Floats, value: float) -> Branch:
     )
 
 
-def _follow(family: Family, start: _Point) -> tuple[list[_Point], str]:
+def _follow(family: OrbitFamily, start: _Point) -> tuple[list[_Point], str]:
     """Points along a branch, and how it ends: at the end of the range, "closed" where it began, or "cut"."""
     points: list[_Point] = []
     last, length = start, FIRST
@@ -379,7 +379,7 @@ def _tests(p: _Point) -> Floats:
     return np.array([p.tangent[-1], doubling, np.prod(pairs).real if pairs else 1.0])
 
 
-def _between(family: Family, one: _Point, two: _Point) -> list[Special]:
+def _between(family: OrbitFamily, one: _Point, two: _Point) -> list[Special]:
     """Special points between neighbours of a branch."""
     found = []
     direction = two.u - one.u
@@ -407,7 +407,7 @@ def _between(family: Family, one: _Point, two: _Point) -> list[Special]:
     return found
 
 
-def _amplitudes(family: Family, places: Floats, values: Floats) -> Floats:
+def _amplitudes(family: OrbitFamily, places: Floats, values: Floats) -> Floats:
     """Half of the range of each state over a period (m, dim), between outputs by parabolas.
 
     Of an angle that makes full turns it is the range over one period, in which it does not come back.
@@ -427,7 +427,7 @@ def _amplitudes(family: Family, places: Floats, values: Floats) -> Floats:
     return np.asarray(0.5 * (ends[0] + ends[1]))
 
 
-def _at(family: Family, branch: Branch, value: float) -> list[Floats]:
+def _at(family: OrbitFamily, branch: Branch, value: float) -> list[Floats]:
     """Where a branch passes a value of the parameter (dim,)."""
     found = []
     crossing = np.flatnonzero((branch.values[1:] - value) * (branch.values[:-1] - value) <= 0.0)

@@ -13,7 +13,7 @@ from scipy.stats import binomtest
 from fastmech.attractors.arrival import Balls, Cloud
 from fastmech.attractors.flow import FINER, Floats, Flow, SectionFlow, flow_of
 from fastmech.attractors.orbits import Orbit
-from fastmech.attractors.proof import Proof
+from fastmech.attractors.proof import RestProof
 from fastmech.attractors.search import Search
 from fastmech.attractors.settle import Ends, settle
 from fastmech.ensembles import checks
@@ -56,7 +56,7 @@ class Attractor(Printed):
     exponent_error: float  #: its error
     residual: float | None  #: of the map over its period, as a share of the scale
     radius: float | None  #: of the ball about it that it attracts, over the scale: measured, or proved
-    proof: Proof | None  #: of a place of rest, where the right-hand side can be called with symbols
+    proof: RestProof | None  #: of a place of rest, where the right-hand side can be called with symbols
     found: int  #: how many starts end there
 
     def told(self) -> str:
@@ -114,6 +114,11 @@ class Attractors(Drawn, Sequence[Attractor]):
         return self.label_starts(starts).label
 
     @property
+    def well(self) -> Integers:
+        """The labels, as measures of basins take them."""
+        return self.label
+
+    @property
     def counts(self) -> dict[str, int]:
         """How many starts have each status."""
         return counts(self.status, LABELS)
@@ -127,9 +132,11 @@ class Attractors(Drawn, Sequence[Attractor]):
         """The shares of the attractors, the most frequent first."""
         n = self.status.size
         told = ", ".join(f"{count:,} {name}" for name, count in self.counts.items() if count)
-        lines = [f"{len(self)} attractors of {n:,} starts: {told}"]
+        lines = [f"{len(self)} attractor{'s' * (len(self) != 1)} of {n:,} starts: {told}"]
+        open_ = sum(self.counts[name] for name in ("unsure", "undecided"))
         for one in self.attractors[: LINES if len(self) <= LINES else LINES - 1]:
             low, high = binomtest(one.found, n).proportion_ci(method="wilson")
+            high = binomtest(one.found + open_, n).proportion_ci(method="wilson").high if open_ else high
             lines.append(f"  {one.found / n:.4f} ({low:.4f} to {high:.4f}): {one.name}")
         if len(self) > LINES:
             rest = sum(one.found for one in self.attractors[LINES - 1 :])
@@ -161,7 +168,7 @@ def find_attractors(
         seed: of the sampler, by default its own.
         method: of integration, with a fixed step that a sample chooses; "radau5" where motion is stiff.
         threads: threads to use, all processors by default. The result does not depend on it.
-        progress: is told how many starts are done since its last call.
+        progress: called with the number of starts that are done since the last call.
 
     Returns:
         attractors and labels. A start is captured when two runs with different steps stay together until both

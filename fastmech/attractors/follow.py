@@ -54,7 +54,7 @@ class Tipping(NamedTuple):
     high: float
 
 
-class Place(NamedTuple):
+class AttractorPlace(NamedTuple):
     """What an attractor is followed by."""
 
     points: Floats  #: (m, dim)
@@ -71,7 +71,7 @@ class BasinsAlong(Drawn):
         Floats  #: share of the starts that ends at each attractor (m, attractors), NaN: it is not there
     )
     unlabelled: Floats  #: share that escapes, is unsure, undecided or not finite (m,)
-    attractors: tuple[Mapping[int, Attractor | Place], ...]  #: at each value, by number
+    attractors: tuple[Mapping[int, Attractor | AttractorPlace], ...]  #: at each value, by number
     tipping: tuple[Tipping, ...]
 
     KIND = "follow_basins"
@@ -144,7 +144,7 @@ def follow_basins(
         t_end: how long a motion has to arrive [s].
         seed: of the sampler, by default its own.
         threads: threads to use, all processors by default.
-        progress: is told 1 after each value.
+        progress: called with 1 after each value.
 
     Raises:
         InputError: an argument is wrong.
@@ -255,7 +255,7 @@ def joined(
                 tracer = _Tracer(moved_to, second, y, threads, JOINING)
                 last = lines[k - 1].attractors[i][number]
                 _, gone, points = tracer.follow(last, float(across[k - 1]), float(across[k]))
-                moved = {number: Place(points, last.period)} if gone is None else {}
+                moved = {number: AttractorPlace(points, last.period)} if gone is None else {}
                 for found in matched(flow, lines[k].attractors[i], moved):
                     votes[(k - 1, number), (k, found)] += 1
     group = {
@@ -297,7 +297,9 @@ def _renumbered(line: BasinsAlong, numbers: Mapping[int, int], count: int) -> Ba
 
 
 def matched(
-    flow: Flow, found: Mapping[int, Attractor | Place], before: Mapping[int, Attractor | Place]
+    flow: Flow,
+    found: Mapping[int, Attractor | AttractorPlace],
+    before: Mapping[int, Attractor | AttractorPlace],
 ) -> dict[int, int]:
     """Numbers of earlier attractors by those of attractors found now that lie next to them."""
     if not before or not found:
@@ -318,7 +320,7 @@ class _Tracer(NamedTuple):
     halvings: int = HALVINGS
 
     def follow(
-        self, attractor: Attractor | Place, there: float, end: float
+        self, attractor: Attractor | AttractorPlace, there: float, end: float
     ) -> tuple[float, float | None, Floats]:
         """From where it is there towards an end: the last value where it is, the first where not, its points.
 

@@ -27,14 +27,14 @@ MOST_STATES, HALVINGS, REFINEMENTS = 12, 40, 4
 BOXES = (1e-12, 1e-10, 1e-8, 1e-6)
 
 
-class Proof(NamedTuple):
+class RestProof(NamedTuple):
     """One place of rest, and what it attracts."""
 
     box: Floats  #: holds one place of rest (dim, 2)
     form: Floats  #: every motion from e' P e < 1 about it comes to it (dim, dim)
 
 
-def prove_rest(system: System, place: Floats, scale: Floats) -> Proof | None:
+def prove_rest(system: System, place: Floats, scale: Floats) -> RestProof | None:
     """Prove a place of rest near ``place`` (dim,), states being of size ``scale`` (dim,); None: no proof."""
     try:
         equations = _Equations(system, scale)
@@ -48,7 +48,7 @@ def prove_rest(system: System, place: Floats, scale: Floats) -> Proof | None:
         return None
     if box is None or form is None:
         return None
-    return Proof(box * scale[:, None], form / np.outer(scale, scale))
+    return RestProof(box * scale[:, None], form / np.outer(scale, scale))
 
 
 class _Equations:

@@ -16,8 +16,8 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 
 from fastmech.attractors.arrival import (
+    ArrivalCells,
     Balls,
-    Cells,
     Cloud,
     balls,
     cells_of,
@@ -106,7 +106,7 @@ class Search:
             found[left[in_balls(self.flow, own, states[left]) >= 0]] = k
         return found
 
-    def cells(self, wider: float) -> Cells | None:
+    def cells(self, wider: float) -> ArrivalCells | None:
         """Cells of the clouds."""
         return cells_of(self.flow, self.clouds, wider) if self.clouds else None
 

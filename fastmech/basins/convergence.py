@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
 from fastmech.basins.runs import Paths
-from fastmech.capture.certificate import OUT, Certificate
+from fastmech.capture.certificate import OUT, CaptureCertificate
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.status import Status
@@ -34,7 +34,7 @@ LOOK, MOST_LOOKS = 0.25, 1 << 20
 class Computations(ABC):
     """Computations of the same starts with different steps; members are starts' numbers."""
 
-    certificate: Certificate  #: of the system
+    certificate: CaptureCertificate  #: of the system
     ladder: tuple[int, ...] = SUBSTEPS  #: numbers of substeps, one computation after the other
 
     @abstractmethod
@@ -86,7 +86,7 @@ class Computations(ABC):
 
 
 def tell_the_same(
-    certificate: Certificate, coarse: Paths, fine: Paths, longest: float, push: Floats | None = None
+    certificate: CaptureCertificate, coarse: Paths, fine: Paths, longest: float, push: Floats | None = None
 ) -> NDArray[np.bool_]:
     """Which paths are not captured either time, or captured both times beyond their difference.
 
@@ -107,7 +107,7 @@ def tell_the_same(
     return np.asarray(same & (proved | ~held))
 
 
-def near_saddle(certificate: Certificate, states: Floats) -> NDArray[np.bool_]:
+def near_saddle(certificate: CaptureCertificate, states: Floats) -> NDArray[np.bool_]:
     """Which states (n, dim) rest at an unstable equilibrium.
 
     Beside a fold, a motion that creeps between two equilibria is near both: near is a tenth of the way to
@@ -124,7 +124,7 @@ def near_saddle(certificate: Certificate, states: Floats) -> NDArray[np.bool_]:
 
 
 def lingering(
-    certificate: Certificate, starts: Floats, t_end: float, dt: float, method: str, threads: int | None
+    certificate: CaptureCertificate, starts: Floats, t_end: float, dt: float, method: str, threads: int | None
 ) -> NDArray[np.bool_]:
     """Which motions from ``starts`` (n, 4) come to an unstable equilibrium by ``t_end`` [s]."""
     times = np.linspace(0.0, t_end, math.ceil(t_end / LOOK) + 1)

@@ -189,7 +189,7 @@ def disturb(
         return_radius: radius of the ball of return [rad].
         part: which of the n disturbances to follow, with a step of 1; all by default.
         threads: threads to use; the result does not depend on it.
-        progress: is told how many trajectories have finished since its last call.
+        progress: called with the number of trajectories that have finished since the last call.
 
     Raises:
         InputError: an argument is wrong, the scene's force decays, it has no damper, or its wells are not

@@ -44,7 +44,7 @@ from fastmech.slider.atlas.map import sheets_of_wells
 TOLERANCE = 1e-3
 
 
-class Ends(Protocol):
+class ErosionEnds(Protocol):
     """Where n starts end."""
 
     @property
@@ -57,7 +57,7 @@ class Ends(Protocol):
 
 
 #: Where starts (n, states) of a scene or a mechanism end.
-LabelsOf = Callable[[Any, Floats], Ends]
+LabelsOf = Callable[[Any, Floats], ErosionEnds]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -244,7 +244,7 @@ def erosion(
         directions: random directions of the search for a shock. It also begins with those to the saddles,
             and with the smallest kick.
         seed: of the starts and the search.
-        progress: is told how many values are done since its last call.
+        progress: called with the number of values that are done since the last call.
 
     Raises:
         InputError: an argument is wrong, a load changes, there is no damper, or wells are not certain.

@@ -27,7 +27,7 @@ from fastmech.basins.labels import Labels, of_attractors, pieces_of
 from fastmech.basins.measures.norm import FEW_TURNS, beyond_turns
 from fastmech.basins.runs import Paths, follow, rounds_until
 from fastmech.basins.system import label_system_starts
-from fastmech.capture.certificate import Certificate
+from fastmech.capture.certificate import CaptureCertificate
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
@@ -93,7 +93,7 @@ def label_starts(
         settle_radius: if given, also the time from which on a captured motion stays within so many rad of
             its well in the kinetic-energy norm (by its energy, to second order about the well).
         threads: threads to use, all processors by default. The result does not depend on it.
-        progress: is told how many starts are done since its last call.
+        progress: called with the number of starts that are done since the last call.
 
     Raises:
         InputError: an argument is wrong, the scene has no damper, or its wells are not certain.
@@ -217,8 +217,8 @@ def _unwound(starts: Floats, periods: Floats) -> tuple[Floats, Integers]:
 class Prelude:
     """The motion until a force that dies out at once is gone, and what the damper stops at once rests."""
 
-    first: Certificate
-    rest: Certificate  #: of what follows
+    first: CaptureCertificate
+    rest: CaptureCertificate  #: of what follows
     span: float  #: s
     step: float  #: coarsest [s]
     method: Method
@@ -226,7 +226,7 @@ class Prelude:
 
     @classmethod
     def of(
-        cls, certificate: Certificate, method: Method, threads: int | None, t_end: float
+        cls, certificate: CaptureCertificate, method: Method, threads: int | None, t_end: float
     ) -> Prelude | None:
         """None where nothing is over so quickly, or not before ``t_end`` [s]."""
         early = certificate.early(method)
@@ -254,7 +254,7 @@ class Prelude:
 class Ladder(Computations):
     """Computations of starts (n, states), with a prelude or without."""
 
-    certificate: Certificate
+    certificate: CaptureCertificate
     starts: Floats
     t_end: float
     coarse: float  #: s

@@ -119,8 +119,8 @@ def map_basins(
         method: name of the integration method; ``dop853`` by default, of a scene see there.
         settle_radius: see there; a scene's only.
         threads: threads to use, all processors by default. The result does not depend on it.
-        progress: is told how many starts are done since its last call; of a refined map its share of the work
-            as far as that can be foreseen, as so many starts.
+        progress: called with the number of starts that are done since the last call; of a refined
+            map its share of the work, as far as that can be foreseen, as so many starts.
 
     Raises:
         InputError: an argument is wrong, the scene has no damper, or its wells are not certain.

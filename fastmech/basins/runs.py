@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.capture.certificate import Certificate
+from fastmech.capture.certificate import CaptureCertificate
 from fastmech.ensembles.ends import STOP_TIME
 from fastmech.ensembles.lanes import MOST_STEPS, finite_rows
 from fastmech.ensembles.run import run_ensemble
@@ -81,7 +81,7 @@ def rounds_until(t_end: float, longest: float) -> int:
 
 
 def follow(
-    certificate: Certificate,
+    certificate: CaptureCertificate,
     observer: Floats,
     starts: Floats,
     t_end: float,

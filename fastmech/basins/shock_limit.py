@@ -20,7 +20,7 @@ from fastmech.arrays import Floats, Integers
 from fastmech.basins.convergence import SUBSTEPS
 from fastmech.basins.label import How, label_states
 from fastmech.basins.well_numbers import number_wells, well_of_number
-from fastmech.capture.certificate import Certificate
+from fastmech.capture.certificate import CaptureCertificate
 from fastmech.capture.select import certificate_of
 from fastmech.disturbance.motion import equilibria_to_disturb, require_constant_force
 from fastmech.ensembles import checks
@@ -374,7 +374,7 @@ def _require_point(on: str) -> None:
         raise InputError(f"on = {shown(on)}: must be one of {', '.join(POINTS)}")
 
 
-def _long_enough(certificate: Certificate, place: Floats) -> float:
+def _long_enough(certificate: CaptureCertificate, place: Floats) -> float:
     """For how long a blow is followed [s]."""
     equilibria = certificate.tree.equilibria
     states = [state_matrix(certificate.system, e) for e in equilibria if e.morse_index < 2]

@@ -296,7 +296,7 @@ def map_snapping(
             force acts, steps are shorter by themselves.
         method: name of the method, by default as for labels.
         threads: threads to use; the result does not depend on it.
-        progress: is told how many motions are done since its last call.
+        progress: called with the number of motions that are done since the last call.
 
     Raises:
         InputError: an argument is wrong, alpha is 0, the scene has no damper, its force-free wells are not

@@ -57,12 +57,12 @@ class Noted(NamedTuple):
 class Early(NamedTuple):
     """What is over long before motions come to rest, and asks for shorter steps until then."""
 
-    rest: Certificate  #: of what follows
+    rest: CaptureCertificate  #: of what follows
     span: float  #: s
     step: float  #: coarsest [s]
 
 
-class Certificate(ABC):
+class CaptureCertificate(ABC):
     """What is known of a system whose energy falls, for whoever follows its motions to rest.
 
     Energies are in units of its own; states are coordinates, then rates.

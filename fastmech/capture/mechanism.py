@@ -28,7 +28,7 @@ from fastmech.capture.certificate import (
     MOST_OCTAVES,
     PHASE,
     TURNING,
-    Certificate,
+    CaptureCertificate,
     Early,
     Noted,
 )
@@ -287,7 +287,7 @@ def observe(t, Y, params, record):
 
 
 @dataclass(frozen=True, eq=False)
-class MechanismCertificate(Certificate):
+class MechanismCertificate(CaptureCertificate):
     """Wells of a mechanism, ready for observers; energies in J."""
 
     system: Mechanism

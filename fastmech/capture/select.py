@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from fastmech.capture.certificate import Captured, Certificate
+from fastmech.capture.certificate import CaptureCertificate, Captured
 from fastmech.capture.mechanism import mechanism_certificate
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
@@ -17,11 +17,11 @@ from fastmech.slider.capture.certificate import scene_certificate
 NO_DAMPER = "scene.beta = 0: must be greater than 0 N s/m"
 
 #: Certificates of mechanisms that are kept, the oldest first, by what tells mechanisms apart.
-_kept: dict[tuple[Any, ...], Certificate] = {}
+_kept: dict[tuple[Any, ...], CaptureCertificate] = {}
 MOST_KEPT = 16
 
 
-def certificate_of(system: Scene | Mechanism) -> Certificate:
+def certificate_of(system: Scene | Mechanism) -> CaptureCertificate:
     """The capture certificate of a scene or a mechanism, kept for the next starts.
 
     Raises:

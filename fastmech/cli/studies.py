@@ -144,7 +144,7 @@ def faults(
             from fastmech.studies.faults import campaigns
             from fastmech.studies.faults.fuzz import fuzz_requests, fuzz_results
 
-        def show(found: campaigns.Found) -> None:
+        def show(found: campaigns.CampaignFound) -> None:
             for sentence in found.sentences:
                 told.say(sentence)
             told.facts.update(found.facts)
@@ -170,7 +170,7 @@ def faults(
                 from fastmech.studies.faults.overhead import REPEATS, overheads
 
                 for ratio in overheads(overhead, told.bars.stage("scans both ways", 4 * REPEATS)):
-                    show(campaigns.Found((str(ratio),), {ratio.what: [ratio.value, ratio.error]}))
+                    show(campaigns.CampaignFound((str(ratio),), {ratio.what: [ratio.value, ratio.error]}))
         except campaigns.FaultFound as fault:
             told.say(f"fastmech: fault found: {fault}", err=True)
             raise click.exceptions.Exit(1) from None

@@ -22,7 +22,7 @@ from fastmech.arrays import Floats, Integers
 from fastmech.callee import callee
 from fastmech.ensembles.lanes import Lanes, Span
 from fastmech.integrators.explicit import PHASE, WEIGHTS, Batch, Moment, Stepped, step_by_stages, weights_of
-from fastmech.integrators.implicit import CALLS, SCHEME, Calls, drive_implicit, inverse_by_elimination
+from fastmech.integrators.implicit import CALLS, SCHEME, ImplicitCalls, drive_implicit, inverse_by_elimination
 from fastmech.integrators.methods import Adams, ImplicitRungeKutta, Method
 from fastmech.jit import MATRIX, OBSERVER, OBSERVER_SIGNATURE, RHS, VECTOR, inlined, kernel, named_tuple
 from fastmech.kernels.blocks import observer_in_single
@@ -85,7 +85,7 @@ def observe_before(t: float, Y: Floats, params: Floats, record: Floats) -> None:
                 record[2 + d, i] = Y[d, i]
 
 
-class Search(NamedTuple):
+class StopSearch(NamedTuple):
     """Trajectories (n) that have stopped, and where their last steps began."""
 
     begin: Floats  #: times [s] (n,)
@@ -96,7 +96,7 @@ class Search(NamedTuple):
     record: Floats  #: (n, rows); its stops move to where they happened
 
 
-SEARCH = named_tuple([VECTOR, MATRIX, MATRIX, VECTOR, VECTOR, MATRIX], Search)
+SEARCH = named_tuple([VECTOR, MATRIX, MATRIX, VECTOR, VECTOR, MATRIX], StopSearch)
 
 
 @inlined
@@ -106,7 +106,7 @@ def fresh_row(empty: Floats, params: Floats, row: int) -> float:
 
 
 @inlined
-def _narrowed(of: Search, i: int, seen: Floats, times: tuple[float, float, float]) -> tuple[float, float]:
+def _narrowed(of: StopSearch, i: int, seen: Floats, times: tuple[float, float, float]) -> tuple[float, float]:
     """Where trajectory ``i`` stops, after a step to the middle one of three times."""
     low, middle, high = times
     if seen[STOP_CODE, 0] == 0.0:
@@ -117,7 +117,7 @@ def _narrowed(of: Search, i: int, seen: Floats, times: tuple[float, float, float
 
 
 @kernel(types.void(RHS, OBSERVER, WEIGHTS, SEARCH))
-def halve_steps(rhs: Any, observe: Any, weights: Any, of: Search) -> None:
+def halve_steps(rhs: Any, observe: Any, weights: Any, of: StopSearch) -> None:
     """Find the stops of a search by an explicit one-step method of these weights."""
     (n, dim), count = of.states.shape, of.params.shape[1]
     Y, own, seen = np.empty((dim, 1)), np.empty((count, 1)), np.empty((of.empty.size, 1))
@@ -142,7 +142,7 @@ def halve_steps(rhs: Any, observe: Any, weights: Any, of: Search) -> None:
 
 
 @kernel(types.void(CALLS, SCHEME, SEARCH))
-def halve_implicit_steps(call: Any, scheme: Any, of: Search) -> None:
+def halve_implicit_steps(call: Any, scheme: Any, of: StopSearch) -> None:
     """The same by an implicit method.
 
     A shortened step of which Newton's iteration finds no solution counts as one that does not reach the stop.
@@ -218,12 +218,14 @@ class Resumption:
             seen = self._watched(observe_before, self._span, some, self._states(some), found[:, STOP_TIME])
             begin, states = np.ascontiguousarray(seen[:, TIME]), np.ascontiguousarray(seen[:, STATE:])
             own = np.repeat(params[None], some.size, axis=0) if params.ndim == 1 else params[some]
-            search = Search(begin, states, own, observation.params, empty=observation.record, record=found)
+            search = StopSearch(
+                begin, states, own, observation.params, empty=observation.record, record=found
+            )
             method: Any = self._method
             if isinstance(method, ImplicitRungeKutta):
                 functions = self._rhs, self._rhs, inverse_by_elimination, observation.observe
                 scheme = method.tableau.scheme._replace(differences=True)
-                halve_implicit_steps(Calls(*map(callee, functions)), scheme, search)
+                halve_implicit_steps(ImplicitCalls(*map(callee, functions)), scheme, search)
             else:
                 tableau = method.starter if isinstance(method, Adams) else method.tableau
                 called = callee(self._rhs), callee(observation.observe)

@@ -149,7 +149,7 @@ def integrate(
             (13)), "hamilton" those and generalized momenta (paper (14)); both take and give angles and rates.
         dtype: precision of the lanes, "float64" or "float32": about twice as fast, for errors down to 1e-4.
         threads: threads to use, all processors by default. The result does not depend on it.
-        progress: is told how many trajectories have finished since its last call.
+        progress: called with the number of trajectories that have finished since the last call.
 
     Returns:
         states at the output times and the status of every trajectory: a start that is not finite, a motion

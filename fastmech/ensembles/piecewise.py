@@ -84,7 +84,7 @@ _tuple: Any = types.NamedTuple
 COURSE = _tuple([MATRIX, MATRIX, VECTOR, VECTOR, VECTOR, VECTOR, CUBE, MATRIX, MATRIX, INTEGERS], Course)
 
 
-class Work(NamedTuple):
+class PieceWork(NamedTuple):
     """Memory of one trajectory."""
 
     y: Floats  #: state (dim,)
@@ -231,7 +231,7 @@ def _switch(rhs: Any, switches: Any, t: float, w: Any, within: tuple[float, floa
 def _follow(rhs: Any, switches: Any, observe: Any, course: Any, i: int) -> None:
     """Trajectory ``i`` of a course; what it has not reached is NaN."""
     dim, longest = course.starts.shape[1], course.limits[0]
-    w = Work(
+    w = PieceWork(
         y=np.empty(dim),
         trial=np.empty(dim),
         near=np.empty(dim),

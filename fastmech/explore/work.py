@@ -26,7 +26,7 @@ MODULES = {
     "equilibria": ("models.equilibria", "models.stability", "models.drawing", "mechanisms"),
     "motion": ("ensembles.integrate",),
     "basins": ("basins.label",),
-    "atlas": ("atlas.map", "atlas.folds", "atlas.critical_curves"),
+    "atlas": ("slider.atlas.map", "slider.atlas.folds", "atlas.critical_curves"),
 }
 _LOADING = threading.Lock()
 

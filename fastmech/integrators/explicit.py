@@ -36,7 +36,7 @@ from fastmech.kernels.steps import (
     EVERY,
     Advance,
     Formula,
-    Lanes,
+    LaneArrays,
     Steps,
     advance_signature,
     advance_type,
@@ -307,7 +307,7 @@ def drive(calls: Calls, weights: Weights, run: Batch) -> None:
     seen = np.empty((dim, group * width if observed else 0), run.Y.dtype)
     stages = np.empty((weights.nodes.shape[0] + 2, dim, width), run.Y.dtype)
     lost = np.zeros(group * width, dtype=np.bool_)
-    flat = Lanes(
+    flat = LaneArrays(
         run.Y.reshape(run.Y.size),
         run.params.reshape(run.params.size),
         run.memory.reshape(run.memory.size),
@@ -368,7 +368,7 @@ def drive_in(precision: str) -> Any:
 
 
 @kernel(advance_signature(types.float64))
-def no_steps(flat: Lanes, steps: Steps) -> int:
+def no_steps(flat: LaneArrays, steps: Steps) -> int:
     """Where there are no whole steps."""
     return 0
 

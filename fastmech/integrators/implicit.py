@@ -54,7 +54,7 @@ PATIENCE, SLOW_REMAINDER = 8, 1e-14
 INCREMENT = 2.0**-26
 
 
-class Calls(NamedTuple):
+class ImplicitCalls(NamedTuple):
     """What the driver calls."""
 
     rhs: BlockRHS
@@ -84,7 +84,7 @@ class Block(NamedTuple):
     alive: Floats  #: 0: it has been given up
 
 
-class Moment(NamedTuple):
+class ImplicitMoment(NamedTuple):
     """When a block takes a step, and which of its stages it solves for."""
 
     t: float  #: begin [s]
@@ -93,7 +93,7 @@ class Moment(NamedTuple):
     known: bool  #: the increments of a last step as long are there, from which these are guessed
 
 
-CALLS = named_tuple([RHS, JACOBIAN, INVERSE, OBSERVER], Calls)
+CALLS = named_tuple([RHS, JACOBIAN, INVERSE, OBSERVER], ImplicitCalls)
 SCHEME = named_tuple(
     [MATRIX, VECTOR, VECTOR, MATRIX, MATRIX, VECTOR, MATRIX, types.float64, types.boolean], Scheme
 )
@@ -184,7 +184,7 @@ def inverse_by_elimination(J: Floats, mu: complex, G: Floats, X: Floats, V: Floa
 
 
 @called
-def linearize(call: Calls, scheme: Scheme, block: Block, point: Floats, at: Moment) -> None:
+def linearize(call: ImplicitCalls, scheme: Scheme, block: Block, point: Floats, at: ImplicitMoment) -> None:
     """The Jacobian J at a point (dim, lanes), and what solves the systems of the eigenvalues over h."""
     if scheme.differences:
         difference_jacobian(call.rhs, at.t, point, block.J, block.params)
@@ -260,7 +260,9 @@ def accept(block: Block, step: Floats, scale: Floats, iteration: int, remainder:
 
 
 @called
-def iterate(call: Calls, scheme: Scheme, block: Block, at: Moment, begun: tuple[int, int]) -> tuple[int, int]:
+def iterate(
+    call: ImplicitCalls, scheme: Scheme, block: Block, at: ImplicitMoment, begun: tuple[int, int]
+) -> tuple[int, int]:
     """Iterate on a group of stages until few lanes are left; how many are, and iterations.
 
     ``begun`` are the iterations that have been, and how many lanes are few.
@@ -321,7 +323,7 @@ def chosen(rows: Floats, which: Integers) -> Floats:
 
 
 @called
-def solve_stages(call: Calls, scheme: Scheme, block: Block, at: Moment) -> int:
+def solve_stages(call: ImplicitCalls, scheme: Scheme, block: Block, at: ImplicitMoment) -> int:
     """Solve for a group of stages, first of a whole block and then of its last lanes; how many fail."""
     (stages, dim, lanes), group = block.E.shape, scheme.back.shape[0]
     left, iteration = iterate(call, scheme, block, at, (0, int(FEW * lanes) if lanes > NARROWEST else 0))
@@ -364,7 +366,7 @@ def solve_stages(call: Calls, scheme: Scheme, block: Block, at: Moment) -> int:
 
 
 @called
-def step_implicitly(call: Calls, scheme: Scheme, block: Block, at: Moment) -> bool:
+def step_implicitly(call: ImplicitCalls, scheme: Scheme, block: Block, at: ImplicitMoment) -> bool:
     """A step of a block in place; whether lanes fail, which keep their states and are not alive then."""
     (stages, dim, lanes), group, failing = block.E.shape, scheme.back.shape[0], False
     n = dim * lanes
@@ -388,7 +390,7 @@ def step_implicitly(call: Calls, scheme: Scheme, block: Block, at: Moment) -> bo
             for x in range(dim):
                 for i in range(lanes):
                     point[x, i] += block.Z[k, x, i] / stages
-    linearize(call, scheme, block, point, Moment(at.t + middle, at.h, 0, False))
+    linearize(call, scheme, block, point, ImplicitMoment(at.t + middle, at.h, 0, False))
     for first in range(0, stages, group):
         for k in range(first, first + group):
             for x in range(n):
@@ -402,7 +404,7 @@ def step_implicitly(call: Calls, scheme: Scheme, block: Block, at: Moment) -> bo
                 z[first, x] = e[first, x]
         for i in range(lanes):
             block.active[i], block.last[i] = block.alive[i], np.inf
-        if solve_stages(call, scheme, block, Moment(at.t, at.h, first, False)):
+        if solve_stages(call, scheme, block, ImplicitMoment(at.t, at.h, first, False)):
             failing = True
             for i in range(lanes):
                 if block.active[i] > 0.0:
@@ -448,7 +450,7 @@ def block_of(scheme: Scheme, run: Batch, b: int) -> Block:
 
 
 @kernel(types.void(CALLS, SCHEME, batch_type(types.float64), MATRIX))
-def drive_implicit(call: Calls, scheme: Scheme, run: Batch, failed: Floats) -> None:
+def drive_implicit(call: ImplicitCalls, scheme: Scheme, run: Batch, failed: Floats) -> None:
     """Take blocks of lanes through all times, one after the other.
 
     ``failed`` (blocks, lanes) is NaN or, for a lane that has been given up, the time of its last state, which
@@ -471,7 +473,7 @@ def drive_implicit(call: Calls, scheme: Scheme, run: Batch, failed: Floats) -> N
                 t = run.times[j] + step * h
                 equal = abs(h - previous) <= ROUNDED_TIME * max(abs(t), abs(t + h))
                 known, previous = equal and scheme.extrapolation.shape[0] > 0, h
-                if step_implicitly(call, scheme, block, Moment(t, h, 0, known)):
+                if step_implicitly(call, scheme, block, ImplicitMoment(t, h, 0, known)):
                     for i in range(width):
                         if block.alive[i] == 0.0 and np.isnan(failed[b, i]):
                             failed[b, i] = t

@@ -40,7 +40,7 @@ from fastmech.arrays import Floats
 from fastmech.callee import callee
 from fastmech.errors import InputError, shown
 from fastmech.integrators.explicit import Batch, Weights, formula_of, take_steps, weights_of
-from fastmech.integrators.implicit import Calls, drive_implicit, inverse_by_elimination
+from fastmech.integrators.implicit import ImplicitCalls, drive_implicit, inverse_by_elimination
 from fastmech.integrators.tableau import ImplicitTableau, Tableau
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.integrators.tableaus.implicit import IMPLICIT_TABLEAUS
@@ -225,7 +225,7 @@ class ImplicitRungeKutta(Method):
         """
         jacobian, inverse = self.jacobian or rhs, self.inverse or inverse_by_elimination
         failed = np.full(batch.Y.shape[::2], np.nan)
-        calls = Calls(*map(callee, (rhs, jacobian, inverse, observe)))
+        calls = ImplicitCalls(*map(callee, (rhs, jacobian, inverse, observe)))
         scheme = self.tableau.scheme._replace(differences=self.jacobian is None)
         drive_implicit(calls, scheme, batch.ready(self.carried), failed)
         return failed

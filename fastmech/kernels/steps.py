@@ -34,7 +34,7 @@ from fastmech.jit import lanes, named_tuple
 from fastmech.kernels.blocks import VECTOR_LANES, Rates, identifier, loops
 
 
-class Lanes(NamedTuple):
+class LaneArrays(NamedTuple):
     """Blocks of lanes, flat, as steps are given them."""
 
     Y: Floats  #: states (blocks, dim, lanes)
@@ -58,7 +58,7 @@ class Steps(NamedTuple):
 
 #: ``advance(lanes, steps)`` gives the number of steps taken, negative if some lanes are lost in the last one:
 #: that is to be done again for them.
-Advance = Callable[[Lanes, Steps], int]
+Advance = Callable[[LaneArrays, Steps], int]
 
 #: Steps between two looks at the last term: a history is about as long, so that little passes unseen.
 EVERY = 8
@@ -73,9 +73,9 @@ MOST_ROWS = 100
 
 
 def lanes_type(precision: Any) -> Any:
-    """Type of :class:`Lanes`."""
+    """Type of :class:`LaneArrays`."""
     flags = types.Array(types.boolean, 1, "C")
-    return named_tuple([*[lanes(precision, 1)] * 3, flags], Lanes)
+    return named_tuple([*[lanes(precision, 1)] * 3, flags], LaneArrays)
 
 
 STEPS = named_tuple([*[types.float64] * 2, *[types.int64] * 6], Steps)

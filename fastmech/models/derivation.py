@@ -16,9 +16,9 @@ import sympy
 
 from fastmech.errors import InputError
 from fastmech.loads import Function, Sampled
-from fastmech.models.elements import Parts
+from fastmech.models.elements import ElementParts
 from fastmech.models.statics import Coordinate, Statics
-from fastmech.models.writer import Body, Coefficients, Texts, expanded, simplest
+from fastmech.models.writer import StepBody, Texts, WrittenCoefficients, expanded, simplest
 
 
 class Derived(NamedTuple):
@@ -42,7 +42,7 @@ class Equations(NamedTuple):
     means: dict[Any, Any]  #: their values at rest
 
 
-def equations(parts: Parts, q: Sequence[Any], v: Sequence[Any], means: Sequence[Any]) -> Equations:
+def equations(parts: ElementParts, q: Sequence[Any], v: Sequence[Any], means: Sequence[Any]) -> Equations:
     """From energies and forces.
 
     Raises:
@@ -74,7 +74,7 @@ def equations(parts: Parts, q: Sequence[Any], v: Sequence[Any], means: Sequence[
     return Equations(metric, forces, inertia, gain, loads, dict(zip(loads, means, strict=True)))
 
 
-def total_potential(parts: Parts, found: Equations) -> Any:
+def total_potential(parts: ElementParts, found: Equations) -> Any:
     """U of springs, weights and loads at their means; None where forces are not known to have one."""
     means = [found.means[symbol] for symbol in found.loads]
     follows = any(acting.place is None and mean != 0 for acting, mean in zip(parts.loads, means, strict=True))
@@ -86,7 +86,7 @@ def total_potential(parts: Parts, found: Equations) -> Any:
     return total
 
 
-def bounding_energy(parts: Parts, found: Equations, q: Sequence[Any], v: Sequence[Any]) -> Any:
+def bounding_energy(parts: ElementParts, found: Equations, q: Sequence[Any], v: Sequence[Any]) -> Any:
     """T + U with that potential, or None."""
     total, n = total_potential(parts, found), len(q)
     if total is None:
@@ -100,7 +100,7 @@ def _by_terms(expression: Any, q: Sequence[Any]) -> Any:
 
 
 def statics(
-    parts: Parts, found: Equations, coordinates: tuple[Coordinate, ...], parameters: tuple[Any, ...]
+    parts: ElementParts, found: Equations, coordinates: tuple[Coordinate, ...], parameters: tuple[Any, ...]
 ) -> Statics:
     """Forces at rest, loads at their means."""
     q = [coordinate.symbol for coordinate in coordinates]
@@ -192,12 +192,12 @@ def _divided(expression: Any, by: Any) -> Any:
 
 
 def derive(
-    parts: Parts, found: Equations, q: Sequence[Any], v: Sequence[Any], parameters: Sequence[Any]
+    parts: ElementParts, found: Equations, q: Sequence[Any], v: Sequence[Any], parameters: Sequence[Any]
 ) -> Derived:
     """Write all functions of a mechanism."""
     n, t = len(q), sympy.Symbol("t", real=True)
     p = [sympy.Symbol(f"p_{symbol}", real=True) for symbol in q]
-    coefficients = Coefficients([*q, *v, *p, t])
+    coefficients = WrittenCoefficients([*q, *v, *p, t])
 
     def lifted(outputs: dict[str, Any]) -> dict[str, Any]:
         return {name: coefficients.lift(expanded(sympy.sympify(e), q)) for name, e in outputs.items()}
@@ -254,10 +254,10 @@ def derive(
     if (total := total_potential(parts, found)) is not None:
         outputs, result = lifted(entries | {"_U": _by_terms(total, q)}), " + ".join([*kinetic, "_U"])
         texts.packed("bounding", list(map(str, [*q, *v])), outputs, f"({result},)")
-    body, solved = Body(lagrange), [f"_d{i}" for i in range(n)]
+    body, solved = StepBody(lagrange), [f"_d{i}" for i in range(n)]
     lines = [*body.text()[0], *solver.lines()]
     texts.motion("lagrange", list(map(str, [*q, *v])), body, lines, _tuple([*map(str, v), *solved]))
-    body = Body(canonical)
+    body = StepBody(canonical)
     first, last = body.text([str(rate) for rate in v])
     rates = [f"{rate} = _d{i}" for i, rate in enumerate(v)]
     lines, result = [*first, *solver.lines(), *rates, *last], _tuple([*solved, *(f"_f{i}" for i in range(n))])

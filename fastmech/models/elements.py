@@ -82,7 +82,7 @@ class Acting(NamedTuple):
     place: Any  #: where it acts, along its direction [m], or the angle [rad]; None: it follows a body
 
 
-class Parts(NamedTuple):
+class ElementParts(NamedTuple):
     """All that a mechanism's motion follows from, as SymPy expressions."""
 
     metric: Any  #: matrix of masses and bodies, T = a_ij q_i' q_j' / 2
@@ -92,7 +92,7 @@ class Parts(NamedTuple):
     forces: tuple[Any, ...]  #: generalized forces beside those, one a coordinate
     loads: tuple[Acting, ...]
 
-    def put(self, values: Mapping[Any, Any]) -> Parts:
+    def put(self, values: Mapping[Any, Any]) -> ElementParts:
         """The same with values of some symbols."""
         loads = []
         for load, moved, place in self.loads:
@@ -100,7 +100,7 @@ class Parts(NamedTuple):
             put = None if place is None else place.xreplace(values)
             loads.append(Acting(replace(load, **given), tuple(x.xreplace(values) for x in moved), put))
         a, T, U, D = (sympy.sympify(part).xreplace(values) for part in self[:4])
-        return Parts(a, T, U, D, tuple(x.xreplace(values) for x in self.forces), tuple(loads))
+        return ElementParts(a, T, U, D, tuple(x.xreplace(values) for x in self.forces), tuple(loads))
 
     @property
     def finite(self) -> bool:
@@ -166,7 +166,7 @@ class Builder:
             )
         return self._points
 
-    def parts(self, given: Mapping[str, Any]) -> Parts:
+    def parts(self, given: Mapping[str, Any]) -> ElementParts:
         """Energies and forces of everything together."""
         potential = self.expression("potential", given["potential"])
         kinetic = self.expression("kinetic", given["kinetic"], rates=True)
@@ -197,7 +197,7 @@ class Builder:
             self._load(f"forces[{number}]", force)
             for number, force in enumerate(_all("forces", given["forces"], Force, Torque))
         )
-        return Parts(
+        return ElementParts(
             metric, kinetic, potential, dissipation, self._generalized(given["generalized_forces"]), loads
         )
 

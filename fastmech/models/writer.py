@@ -82,7 +82,7 @@ class Printer(PythonCodePrinter):  # type: ignore[misc]
 PRINTER = Printer({"fully_qualified_modules": False})
 
 
-class Coefficients:
+class WrittenCoefficients:
     """Parts of expressions that depend on parameters alone, each with a name."""
 
     def __init__(self, dynamic: Iterable[Any]) -> None:
@@ -175,7 +175,7 @@ def simplest(expression: Any, q: Sequence[Any]) -> Any:
                 lambda x, s=s: (1 - s**2) ** (x.exp // 2) * x.base ** (x.exp % 2),
             )
         )
-    lifted = Coefficients([*q, *into.values()])
+    lifted = WrittenCoefficients([*q, *into.values()])
     best = min((flat, plain), key=lambda e: sympy.count_ops(lifted.lift(e)))
     return best.xreplace({new: old for old, new in into.items()})
 
@@ -196,7 +196,7 @@ def expanded(expression: Any, q: Sequence[Any]) -> Any:
     )
 
 
-class Body:
+class StepBody:
     """A function's body: ``outputs`` assigned by name, of expressions in symbols that are its arguments."""
 
     def __init__(self, outputs: dict[str, Any]) -> None:
@@ -286,7 +286,7 @@ class Texts:
 
     def plain(self, name: str, arguments: Sequence[str], outputs: dict[str, Any], *after: str) -> None:
         """A function that gives the outputs, or what the last line of ``after`` tells."""
-        body = Body(outputs)
+        body = StepBody(outputs)
         *more, result = after or (f"({', '.join(outputs)},)",)
         lines = [*body.trigonometry("any"), *body.text()[0], *more, f"return {result}"]
         self._function(name, arguments, self._used(lines), lines)
@@ -294,12 +294,12 @@ class Texts:
     def packed(self, name: str, arguments: Sequence[str], outputs: dict[str, Any], result: str) -> None:
         """A plain function, and one for packed loops, which tells first whether the sines do not reach."""
         self.plain(name, arguments, outputs, result)
-        body = Body(outputs)
+        body = StepBody(outputs)
         variant, beyond = ("within", "_beyond") if body.angles else ("any", "False")
         lines = [*body.trigonometry(variant), *body.text()[0], f"return {beyond}, {result}[0]"]
         self._function(f"{name}_within", arguments, self._used(lines), lines)
 
-    def motion(self, name: str, states: Sequence[str], body: Body, lines: list[str], result: str) -> None:
+    def motion(self, name: str, states: Sequence[str], body: StepBody, lines: list[str], result: str) -> None:
         """What :class:`fastmech.kernels.blocks.Rates` wants."""
         own = self._used([*lines, *body.trigonometry("any")])
         lines = [*lines, f"return {result}"]

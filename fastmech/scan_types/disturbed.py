@@ -250,7 +250,7 @@ class DisturbedTiling(scans.Tiling):
 
     what = "disturbed trajectories"
 
-    def __init__(self, request: Disturbed, scene: Scene | Mechanism) -> None:
+    def __init__(self, request: DisturbedScan, scene: Scene | Mechanism) -> None:
         self.request, self.scene = request, scene
         self.equilibria = equilibria_to_disturb(scene)
         refuse_meeting_balls(scene, self.equilibria, request.return_radius, range(len(self.equilibria)))
@@ -419,7 +419,7 @@ class DisturbedMap(scans.Tiling):
 
     what = "disturbed trajectories"
 
-    def __init__(self, request: Disturbed, scene: Scene) -> None:
+    def __init__(self, request: DisturbedScan, scene: Scene) -> None:
         self.request, self.scene, self.axes = request, scene, scans.values_of(request.axes)
         self.atlas = map_equilibria(scene, self.axes)
         self.entries = np.argwhere(self.atlas.sheet >= 0)
@@ -521,7 +521,7 @@ def _known_variables(names: list[str]) -> list[str]:
 _NOT_OF_A_MAP = ("variables", "linear_horizon", "linear_tolerance", "linear_directions")
 
 
-class Disturbed(scans.Scan):
+class DisturbedScan(scans.Scan):
     """Ensembles about every equilibrium, uniform in a ball of the kinetic-energy norm."""
 
     kind: ClassVar[str] = "disturbed"

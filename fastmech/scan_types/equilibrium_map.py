@@ -52,7 +52,7 @@ MOST_POINTS = 50_000_000
 SHEET_NUMBERS, POINT_NUMBERS = 3, 250
 
 
-class EquilibriumMap(scans.Scan):
+class EquilibriumMapScan(scans.Scan):
     """Every equilibrium at every point of a grid of parameters, with the proof that none is missing."""
 
     kind: ClassVar[str] = "equilibrium_map"
@@ -127,7 +127,7 @@ class MapTiling(scans.Planes):
 
     what = "points of the map"
 
-    def __init__(self, request: EquilibriumMap, scene: Scene) -> None:
+    def __init__(self, request: EquilibriumMapScan, scene: Scene) -> None:
         super().__init__(scans.values_of(request.axes), TILE_POINTS)
         self.request, self.scene, self.plane = request, scene, math.prod(self.others)
         self.count += 1
@@ -210,7 +210,7 @@ class RestingTiling(scans.Planes):
 
     what = "points of the map"
 
-    def __init__(self, request: EquilibriumMap, scene: Mechanism) -> None:
+    def __init__(self, request: EquilibriumMapScan, scene: Mechanism) -> None:
         super().__init__(scans.values_of(request.axes), RESTING_POINTS)
         self.request, self.scene = request, scene
 

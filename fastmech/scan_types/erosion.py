@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import AfterValidator, Field
 
 from fastmech.basins.disturbed import MOST_RADIUS
-from fastmech.basins.erosion import FLAGS, MEASURES, Ends, ErosionProfile, survey_of, wells_along
+from fastmech.basins.erosion import FLAGS, MEASURES, ErosionEnds, ErosionProfile, survey_of, wells_along
 from fastmech.basins.label import How, label_states
 from fastmech.capture.select import require_damper
 from fastmech.disturbance.motion import require_constant_force
@@ -145,7 +145,7 @@ class ErosionTiling(scans.Tiling):
         """Measure one well at one value."""
         at, well = divmod(index, self.sheets.size)
 
-        def ends(scene: Scene, starts: np.ndarray) -> Ends:
+        def ends(scene: Scene, starts: np.ndarray) -> ErosionEnds:
             context.check()
             return label_states(scene, starts, self.request.t_end, How(threads=context.threads))
 

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from fastmech.arrays import Floats
-from fastmech.attractors.follow import BasinsAlong, BasinsOver, Place, Tipping, follow_basins, joined
+from fastmech.attractors.follow import AttractorPlace, BasinsAlong, BasinsOver, Tipping, follow_basins, joined
 from fastmech.ensembles.system import System
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots.response import draw_shares
@@ -130,11 +130,11 @@ def _tile(found: BasinsAlong) -> Dataset:
 
 def _read(tile: Dataset, name: str, values: Floats) -> BasinsAlong:
     """The same from a tile."""
-    there: tuple[dict[int, Place], ...] = tuple({} for _ in values)
+    there: tuple[dict[int, AttractorPlace], ...] = tuple({} for _ in values)
     rows = tile["places"].data
     ends = np.cumsum(rows[:, 3].astype(np.int64))
     for (i, j, period, count), end in zip(rows.tolist(), ends.tolist(), strict=True):
-        there[int(i)][int(j)] = Place(tile["points"].data[end - int(count) : end], period or None)
+        there[int(i)][int(j)] = AttractorPlace(tile["points"].data[end - int(count) : end], period or None)
     tipping = tuple(
         Tipping(int(j), "born" if born else "dies", low, high) for j, born, low, high in tile["tipping"].data
     )

@@ -221,7 +221,7 @@ class Merging(IntEnum):
     MAXIMUM = 1
 
 
-class Kind(IntEnum):
+class CurveKind(IntEnum):
     """What happens on a fold."""
 
     FOLD = 0
@@ -262,7 +262,7 @@ def fold_points(found: FoldPoints) -> Dataset:
     about = "{} at the fold", "{} where two equilibria merge"
     rows = _points("fold", found, {"value": name}, folds, about)
     rows["fold_merges"] = _codes("merges", folds, "merges with a saddle", Merging)
-    rows["fold_kind"] = _codes("kind", folds, "kind of the fold", Kind)
+    rows["fold_kind"] = _codes("kind", folds, "kind of the fold", CurveKind)
     return Dataset(columns(("fold",), rows) | _proof(found.reason), {"axes": (name,)})
 
 
@@ -273,7 +273,7 @@ def fold_curves(found: FoldSet) -> Dataset:
     rows = _points("fold", found, axes, curves, about)
     rows["fold_curve"] = _numbering(curves, "number of the fold curve")
     rows["fold_merges"] = _codes("merges", curves, "merges with a saddle", Merging)
-    rows["fold_kind"] = _codes("kind", curves, "kind of the curve", Kind)
+    rows["fold_kind"] = _codes("kind", curves, "kind of the curve", CurveKind)
     cusps = _points("cusp", found, axes, found.cusps, ("{} at the cusp", "{} where three equilibria merge"))
     tally = "edges between whose ends the count changes, those that no fold curve crosses, curves cut short"
     return Dataset(

@@ -47,7 +47,7 @@ _ENDS = ("label", "turns", "time", "status")
 TILE_POINTS = 1 << 12
 
 
-class Rates(scans.Axis):
+class DecayRates(scans.Axis):
     """Values evenly spaced in their logarithm, unless it is said otherwise."""
 
     spacing: Literal["linear", "log"] = "log"
@@ -60,7 +60,7 @@ class Snapping(scans.Scan):
     draw = staticmethod(draw_snapping)
 
     F0: scans.Axis = Field(description="forces, of one sign [N]")
-    alpha: Rates = Field(description="decay rates, evenly spaced in their logarithm [1/s]")
+    alpha: DecayRates = Field(description="decay rates, evenly spaced in their logarithm [1/s]")
     tolerance: Annotated[float, Field(gt=0)] = Field(0.1, description="of the critical forces [N]")
     t_end: Annotated[float, Field(gt=0)] | None = Field(
         None, description="end of the runs [s]; by default 200 s after a millionth of the force is left"

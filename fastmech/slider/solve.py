@@ -45,7 +45,7 @@ EVEN = 32.0 * EPS
 INDICES = types.Array(types.int8, 2, "C")
 
 
-class Solution(NamedTuple):
+class Roots(NamedTuple):
     """What :func:`solve` writes for n scenes; slots without an equilibrium hold NaN."""
 
     phi: Floats  #: (n, 6) [rad] in (-pi, pi]
@@ -59,7 +59,7 @@ class Solution(NamedTuple):
     margin: Floats  #: (n,) distance to the fold [rad], positive with six equilibria; NaN if undefined
 
 
-SOLUTION: Any = named_tuple([*[MATRIX] * 4, INDICES, *[STATUSES] * 3, VECTOR], Solution)
+SOLUTION: Any = named_tuple([*[MATRIX] * 4, INDICES, *[STATUSES] * 3, VECTOR], Roots)
 
 
 @inlined
@@ -130,7 +130,7 @@ def sort_by_energy(count: int, energy: Floats, phi: Floats, theta: Floats, radiu
 
 
 @kernel(types.void(MATRIX, boolean, SOLUTION))
-def solve(coefficients: Floats, inherit: bool, out: Solution) -> None:
+def solve(coefficients: Floats, inherit: bool, out: Roots) -> None:
     """Equilibria of every row of ``coefficients``, deepest first, with the outcome of the proof.
 
     Args:
@@ -180,14 +180,14 @@ def solve(coefficients: Floats, inherit: bool, out: Solution) -> None:
         count[row] = found
 
 
-def solve_rows(coefficients: Floats, compiled: bool = True) -> Solution:
+def solve_rows(coefficients: Floats, compiled: bool = True) -> Roots:
     """Equilibria of n scenes from their (n, 8) reduced coefficients, contiguous, the force frozen.
 
     Without ``compiled`` plain Python does the same, up to rounding: in milliseconds a scene, with nothing to
     compile.
     """
     n = len(coefficients)
-    result = Solution(
+    result = Roots(
         phi=np.empty((n, MOST)),
         theta=np.empty((n, MOST)),
         energy=np.empty((n, MOST)),

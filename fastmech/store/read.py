@@ -31,7 +31,7 @@ BEYOND = 0.5 * (1.0 + 1e-9)
 
 
 @dataclass(frozen=True)
-class Chosen:
+class ChosenPart:
     """What a selection takes along one dimension."""
 
     places: NDArray[np.int64]  #: one place, or all those of a range
@@ -81,7 +81,7 @@ def _parsed(value: str, text: str) -> float:
     return number
 
 
-def choose(section: Section, wanted: Mapping[str, Any]) -> dict[str, Chosen]:
+def choose(section: Section, wanted: Mapping[str, Any]) -> dict[str, ChosenPart]:
     """What a selection takes along each dimension; of the section only coordinates are read.
 
     Raises:
@@ -90,7 +90,7 @@ def choose(section: Section, wanted: Mapping[str, Any]) -> dict[str, Chosen]:
     return {dim: _choose(section, dim, value) for dim, value in wanted.items()}
 
 
-def take(section: Section, chosen: Mapping[str, Chosen], names: Collection[str] | None = None) -> Dataset:
+def take(section: Section, chosen: Mapping[str, ChosenPart], names: Collection[str] | None = None) -> Dataset:
     """The variables of these names, all by default, at what was chosen."""
     variables = list(section) if names is None else list(names)
     dims = chosen.keys() | {dim for name in variables for dim in section.dims(name)}
@@ -99,7 +99,7 @@ def take(section: Section, chosen: Mapping[str, Chosen], names: Collection[str] 
     return Dataset({name: _narrowed(v, chosen) for name, v in part.variables.items()}, part.attrs)
 
 
-def _narrowed(variable: Variable, chosen: Mapping[str, Chosen]) -> Variable:
+def _narrowed(variable: Variable, chosen: Mapping[str, ChosenPart]) -> Variable:
     """A variable at what was chosen, without the dimensions along which that is one value."""
     data = variable.data
     for axis, dim in reversed(list(enumerate(variable.dims))):
@@ -108,7 +108,7 @@ def _narrowed(variable: Variable, chosen: Mapping[str, Chosen]) -> Variable:
     return Variable(left, data, variable.units, variable.long_name, variable.attrs)
 
 
-def _choose(section: Section, name: str, wanted: object) -> Chosen:
+def _choose(section: Section, name: str, wanted: object) -> ChosenPart:
     if name not in section.sizes:
         known = ", ".join(section.sizes) or "none"
         raise InputError(f"{name}: is no dimension of {section.where}; it has {known}")
@@ -131,10 +131,10 @@ def _choose(section: Section, name: str, wanted: object) -> Chosen:
     place = int(np.nanargmin(np.abs(axis - value)))
     shown, asked = f"{axis[place]:.10g}", f"{value:.10g}"
     told = f"{name} = {shown}{unit}" + ("" if shown == asked else f" (nearest to {asked})")
-    return Chosen(np.array([place]), False, told)
+    return ChosenPart(np.array([place]), False, told)
 
 
-def _within(section: Section, name: str, axis: NDArray[np.float64], unit: str, wanted: slice) -> Chosen:
+def _within(section: Section, name: str, axis: NDArray[np.float64], unit: str, wanted: slice) -> ChosenPart:
     """The places whose values lie in a range."""
     if wanted.step is not None:
         raise InputError(f"{name} = {wanted!r}: a range must be slice(low, high) without a step")
@@ -148,7 +148,7 @@ def _within(section: Section, name: str, axis: NDArray[np.float64], unit: str, w
         _refuse(section, name, asked, axis[np.isfinite(axis)], unit, " and hold at least one value")
     values = axis[places]
     told = f"{name} = {values.min():.10g} to {values.max():.10g}{unit} ({len(places)} of {len(axis)} values)"
-    return Chosen(places, True, told)
+    return ChosenPart(places, True, told)
 
 
 def _number(name: str, value: object) -> float:

@@ -14,7 +14,7 @@ from fastmech.errors import InputError
 from fastmech.scan_types.request import RunContext
 from fastmech.tiles.section import code_in_use
 from fastmech.tiles.tile_file import Tile
-from fastmech.tiles.work import LOST, PERIOD, Task, Workers
+from fastmech.tiles.work import LOST, PERIOD, TileTask, Workers
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -72,7 +72,7 @@ class ClusterWorkers:
                 raise InputError(f"the Dask scheduler has had no worker for {WITHOUT:g} s")
         return DEPTH * max(1, self._threads)
 
-    def submit(self, task: Task) -> Future[Tile]:
+    def submit(self, task: TileTask) -> Future[Tile]:
         """Send the tile to a worker; it runs in one thread there.
 
         Raises:
@@ -91,7 +91,7 @@ class ClusterHiring:
         self._client = client
 
     @contextmanager
-    def __call__(self, tasks: Sequence[Task], context: RunContext) -> Iterator[Workers]:
+    def __call__(self, tasks: Sequence[TileTask], context: RunContext) -> Iterator[Workers]:
         """All workers."""
         executor = self._client.get_executor(pure=False)
         try:
@@ -101,7 +101,7 @@ class ClusterHiring:
                 executor.shutdown(wait=False)
 
 
-def _compute(task: Task, code: dict[str, str]) -> Tile:
+def _compute(task: TileTask, code: dict[str, str]) -> Tile:
     """Compute a tile, on the worker."""
     mine = code_in_use()
     if mine != code:

@@ -31,7 +31,7 @@ from fastmech.tiles.section import (
     sections_of,
 )
 from fastmech.tiles.tile_file import DamagedTileError, Tile
-from fastmech.tiles.work import Crash, Hiring, Task, compute_tiles, still_computing
+from fastmech.tiles.work import Crash, Hiring, TileTask, compute_tiles, still_computing
 
 
 @dataclass
@@ -114,7 +114,7 @@ class ScanRun:
         self.parts = Parts(Path(os.path.realpath(target)))
         for path in (target, self.parts.folder):
             _check_place(path)
-        self.seconds: dict[Task, float] = {}
+        self.seconds: dict[TileTask, float] = {}
         self.crashes: list[Crash] = []
         self.replace = False
         self.started = time.perf_counter()
@@ -122,9 +122,9 @@ class ScanRun:
         self.report = RunReport(target)
 
     @cached_property
-    def tasks(self) -> list[Task]:
+    def tasks(self) -> list[TileTask]:
         """All tiles; what they are may take kernels to find out."""
-        return [Task(s, index) for s in self.sections for index in range(s.tiling.count)]
+        return [TileTask(s, index) for s in self.sections for index in range(s.tiling.count)]
 
     def run(self, fresh: bool) -> RunReport:
         """Compute what is missing and assemble the result file.
@@ -244,7 +244,7 @@ class ScanRun:
             advance(1)
         self.tell(f"{len(self.seconds)} of {len(self.tasks)} tiles are kept from before")
 
-    def _damaged(self, task: Task, error: DamagedTileError) -> None:
+    def _damaged(self, task: TileTask, error: DamagedTileError) -> None:
         self.tell(f"{error}; it is computed again")
         self.report.damaged.append(self.parts.path(task.section, task.index))
         self.seconds.pop(task, None)
@@ -258,7 +258,7 @@ class ScanRun:
             if total and (section.tiling.count > 1 or self.hire.together):
                 stages[section.name] = self.context.stage(f"{section.name}: {section.tiling.what}", total)
 
-        def keep(task: Task, tile: Tile) -> None:
+        def keep(task: TileTask, tile: Tile) -> None:
             self.parts.store(task.section, tile)
             self.seconds[task] = tile.head.seconds
             self.report.computed += 1
@@ -271,7 +271,7 @@ class ScanRun:
         if self.crashes:
             raise CrashedTilesError(self._crash_report())
 
-    def _groups(self, missing: list[Task]) -> list[list[Task]]:
+    def _groups(self, missing: list[TileTask]) -> list[list[TileTask]]:
         """Tiles that are handed out together: section after section unless they are handed out together."""
         if self.hire.together:
             return [missing] if missing else []
@@ -280,11 +280,11 @@ class ScanRun:
 
     def _assemble(self) -> bool:
         """Write the result file; False where a tile turned out to be damaged."""
-        reading: list[Task] = []
+        reading: list[TileTask] = []
 
         def tiles(section: TiledSection) -> Tiles:
             def tile(index: int) -> Dataset:
-                reading[:] = [Task(section, index)]
+                reading[:] = [TileTask(section, index)]
                 dataset = self.parts.load(section, index)
                 advance(1)
                 return dataset

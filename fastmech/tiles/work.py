@@ -36,7 +36,7 @@ LOST = "the connection to the Dask scheduler is lost"
 
 
 @dataclass(frozen=True)
-class Task:
+class TileTask:
     """A tile to compute."""
 
     section: TiledSection
@@ -47,7 +47,7 @@ class Task:
 class Crash:
     """A tile that could not be computed."""
 
-    task: Task
+    task: TileTask
     reason: str
 
 
@@ -68,7 +68,7 @@ class Workers(Protocol):
             InputError: there is nobody any more.
         """
 
-    def submit(self, task: Task) -> Future[Tile]:
+    def submit(self, task: TileTask) -> Future[Tile]:
         """Have a tile computed."""
 
 
@@ -82,7 +82,7 @@ class Hiring(Protocol):
 
     together: bool
 
-    def __call__(self, tasks: Sequence[Task], context: RunContext) -> AbstractContextManager[Workers]:
+    def __call__(self, tasks: Sequence[TileTask], context: RunContext) -> AbstractContextManager[Workers]:
         """Workers for some tiles; when the block is left by an exception, tiles in hand end soon."""
 
 
@@ -103,7 +103,7 @@ class ThreadWorkers:
         self._pool, self._share, self._stopping = pool, 1.0 / side, stopping
         self._context = replace(context, threads=max(1, thread_count(context.threads) // side))
 
-    def submit(self, task: Task) -> Future[Tile]:
+    def submit(self, task: TileTask) -> Future[Tile]:
         """Queue the tile."""
 
         def check() -> None:
@@ -129,7 +129,7 @@ class ThreadHiring:
     together = False
 
     @contextmanager
-    def __call__(self, tasks: Sequence[Task], context: RunContext) -> Iterator[ThreadWorkers]:
+    def __call__(self, tasks: Sequence[TileTask], context: RunContext) -> Iterator[ThreadWorkers]:
         """As many as the context allows."""
         side = max(1, min(thread_count(context.threads), len(tasks)))
         stopping = threading.Event()
@@ -142,9 +142,9 @@ class ThreadHiring:
 
 
 def compute_tiles(
-    tasks: Sequence[Task],
+    tasks: Sequence[TileTask],
     workers: Workers,
-    keep: Callable[[Task, Tile], None],
+    keep: Callable[[TileTask, Tile], None],
     crashed: Callable[[Crash], None],
 ) -> None:
     """Compute tiles and keep each as soon as it is finished, in this thread.
@@ -160,9 +160,9 @@ def compute_tiles(
         OSError: ``keep`` failed.
         KeyboardInterrupt: the user stops it; what ends within `GRACE` seconds is kept.
     """
-    waiting, suspects = list(reversed(tasks)), list[Task]()
-    tries: dict[Task, int] = {}
-    running: dict[Future[Tile], Task] = {}
+    waiting, suspects = list(reversed(tasks)), list[TileTask]()
+    tries: dict[TileTask, int] = {}
+    running: dict[Future[Tile], TileTask] = {}
     try:
         while waiting or suspects or running:
             slots = workers.slots
@@ -216,7 +216,7 @@ def still_computing(patience: float) -> int:
     return sum(thread.is_alive() for thread in threads)
 
 
-def _keep_what_ends(running: dict[Future[Tile], Task], keep: Callable[[Task, Tile], None]) -> None:
+def _keep_what_ends(running: dict[Future[Tile], TileTask], keep: Callable[[TileTask, Tile], None]) -> None:
     for future in running:
         future.cancel()
     done, _ = wait(running, timeout=GRACE)

@@ -40,7 +40,7 @@ from fastmech.slider.linearize import Rest, jacobian, linearized
 from fastmech.step_limits.warning import too_long, warn_of_step
 
 
-class Flow(NamedTuple):
+class TangentFlow(NamedTuple):
     """Derivatives of the states and of their disturbances."""
 
     rhs: BlockRHS
@@ -65,14 +65,14 @@ class Disturbed(NamedTuple):
     growth: Floats  #: (lanes,) is added the logarithm of what a disturbance has grown by
 
 
-FLOW = named_tuple([RHS, JACOBIAN, types.boolean], Flow)
+FLOW = named_tuple([RHS, JACOBIAN, types.boolean], TangentFlow)
 STAGES = named_tuple([MATRIX, VECTOR, VECTOR], Stages)
 DISTURBED = named_tuple([MATRIX, MATRIX, MATRIX, VECTOR], Disturbed)
 
 
 @kernel(types.void(FLOW, STAGES, DISTURBED, types.float64, types.float64, types.int64))
 def advance_tangents(
-    flow: Flow, method: Stages, lanes: Disturbed, begin: float, h: float, steps: int
+    flow: TangentFlow, method: Stages, lanes: Disturbed, begin: float, h: float, steps: int
 ) -> None:
     """Take states and disturbances so many steps of ``h`` on from time ``begin`` [s].
 
@@ -212,7 +212,7 @@ def largest_lyapunov(
     exponents = np.empty((PIECES, len(starts)))
     analytic = problem.jacobian is not None
     called = callee(problem.rhs), callee(problem.jacobian if analytic else problem.rhs)
-    flow, lanes = Flow(*called, analytic), Disturbed(Y, D, params, growth)
+    flow, lanes = TangentFlow(*called, analytic), Disturbed(Y, D, params, growth)
     method = Stages(TABLEAU.matrix, np.array(TABLEAU.b), np.array(TABLEAU.c))
     for piece in range(PIECES):
         advance_tangents(flow, method, lanes, float(times[piece]), h, steps)

@@ -8,7 +8,7 @@ import pytest
 from fastmech.atlas import cover
 from fastmech.atlas.continuation import finish_on_edge, inside, trace
 from fastmech.scene import Scene
-from fastmech.slider.atlas.cover import System, apart, solutions
+from fastmech.slider.atlas.cover import DefiningSystem, apart, solutions
 from fastmech.slider.atlas.systems import Plane, fold
 
 PLANE = Plane(Scene(c1=294.9, alpha=0.0), ("F0", "l"), (-400.0, 0.3), (400.0, 2.0))
@@ -44,7 +44,7 @@ def test_slopes_are_derivatives() -> None:
         assert slope[:, k] == pytest.approx(central, abs=1e-8)
 
 
-def circles(radii: list[tuple[float, float, float]]) -> System:
+def circles(radii: list[tuple[float, float, float]]) -> DefiningSystem:
     """phi = 1, theta = -2 and circles (u, v, radius) of parameters."""
 
     def equations(z):
@@ -54,7 +54,7 @@ def circles(radii: list[tuple[float, float, float]]) -> System:
             product = (x * x + y * y - radius**2) * product
         return np.sin(0.5 * z[0] - 0.5), np.sin(0.5 * z[1] + 1.0), product
 
-    return System(equations, 4)
+    return DefiningSystem(equations, 4)
 
 
 def test_islands_of_any_size_are_found_and_nothing_else() -> None:
@@ -75,7 +75,7 @@ def test_islands_of_any_size_are_found_and_nothing_else() -> None:
 
 def test_where_curves_cross_there_is_no_proof(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two lines that cross are singular where they do."""
-    cross = System(lambda z: (np.sin(0.5 * z[0]), np.sin(0.5 * z[1]), (z[2] - 0.4) * (z[3] - 0.3)), 4)
+    cross = DefiningSystem(lambda z: (np.sin(0.5 * z[0]), np.sin(0.5 * z[1]), (z[2] - 0.4) * (z[3] - 0.3)), 4)
     found = solutions(cross, lambda z: trace(cross, z, inside, finish_on_edge(cross), apart))
     assert len(found.open)
     assert np.abs(found.open - [0.0, 0.0, 0.4, 0.3]).max() < 1e-3

@@ -10,7 +10,7 @@ import pytest
 from fastmech.atlas.snap import find_snap
 from fastmech.errors import InputError
 from fastmech.outcome import Outcome
-from fastmech.scan_types.equilibrium_map import EquilibriumMap as EquilibriumMapScan
+from fastmech.scan_types.equilibrium_map import EquilibriumMapScan as EquilibriumMapScan
 from fastmech.scene import Scene
 from fastmech.slider.atlas.damping import trace_undamped
 from fastmech.slider.atlas.folds import find_folds, trace_folds

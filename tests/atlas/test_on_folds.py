@@ -12,7 +12,7 @@ from fastmech.scene import Scene
 from fastmech.slider.atlas.axes import coefficient_columns
 from fastmech.slider.atlas.folds import trace_folds
 from fastmech.slider.atlas.map import Coincidence, map_equilibria
-from fastmech.slider.solve import Solution, solve_rows
+from fastmech.slider.solve import Roots, solve_rows
 
 Floats = np.typing.NDArray[np.float64]
 
@@ -23,7 +23,7 @@ MORE = {
 }
 
 
-def solve_at(scene: Scene, values: dict[str, Floats]) -> Solution:
+def solve_at(scene: Scene, values: dict[str, Floats]) -> Roots:
     n = len(next(iter(values.values())))
     columns = coefficient_columns(scene, values)
     rows = np.stack([np.broadcast_to(np.asarray(c, dtype=np.float64), n) for c in columns], axis=1)

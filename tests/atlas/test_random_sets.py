@@ -11,27 +11,27 @@ from scenes import exact_unit_roots, loads, polynomial, random_scenes, roots
 from fastmech.outcome import Outcome
 from fastmech.scene import Scene
 from fastmech.slider.atlas.axes import coefficient_columns
-from fastmech.slider.solve import Solution, solve_rows
+from fastmech.slider.solve import Roots, solve_rows
 
 N = 10_000
 SCENES = random_scenes(N, seed=2026)
 
 
 @pytest.fixture(scope="module")
-def solution() -> Solution:
+def solution() -> Roots:
     columns = coefficient_columns(Scene(alpha=0.0), SCENES)
     rows = np.stack([np.broadcast_to(np.asarray(c, dtype=np.float64), N) for c in columns], axis=1)
     return solve_rows(np.ascontiguousarray(rows))
 
 
-def test_at_most_one_in_a_thousand_is_not_proved(solution: Solution) -> None:
+def test_at_most_one_in_a_thousand_is_not_proved(solution: Roots) -> None:
     proved = np.count_nonzero(solution.outcome == Outcome.COMPLETE)
     print(f"proved complete: {proved} of {N}")
     assert proved >= 0.999 * N
     assert not (solution.outcome == Outcome.UNPROVED).any()
 
 
-def test_counts_are_those_of_the_polynomial(solution: Solution) -> None:
+def test_counts_are_those_of_the_polynomial(solution: Roots) -> None:
     """Unit roots of the degree-6 polynomial: in doubles where plain, at 60 digits where not."""
     off = np.abs(np.log(np.abs(roots(polynomial(*loads(SCENES))))))
     on = off < 1e-8
@@ -57,7 +57,7 @@ def newton_in_long_double(phi: Any, theta: Any, a: Any, b: Any, C: Any, f: Any) 
     return phi, theta
 
 
-def test_positions_to_1e_12(solution: Solution) -> None:
+def test_positions_to_1e_12(solution: Roots) -> None:
     assert np.finfo(np.longdouble).eps < 2e-19, "needs 80-bit long doubles"
     phi, theta = newton_in_long_double(solution.phi, solution.theta, *loads(SCENES))
     moved = np.hypot((phi - solution.phi).astype(float), (theta - solution.theta).astype(float))

@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import fastmech as fm
-from fastmech.attractors.proof import Proof, prove_rest
+from fastmech.attractors.proof import RestProof, prove_rest
 
 
 def lorenz(t, x, y, z, sigma, rho, beta):  # type: ignore[no-untyped-def]
@@ -46,7 +46,7 @@ def plain(system: fm.System, y: np.ndarray) -> tuple[float, ...]:
     return system.rhs(0.0, *y.tolist(), *values)
 
 
-def proved(system: fm.System, place: np.ndarray, scale: np.ndarray) -> Proof:
+def proved(system: fm.System, place: np.ndarray, scale: np.ndarray) -> RestProof:
     found = prove_rest(system, place, scale)
     assert found is not None
     return found

@@ -11,7 +11,7 @@ from fastmech import open_results
 from fastmech.integrators.methods import METHODS
 from fastmech.studies.hardcases import report
 from fastmech.studies.hardcases.report import CONTAINED, NUMBER, ONE_IN
-from fastmech.studies.hardcases.walk import HardCase, Row
+from fastmech.studies.hardcases.walk import CaseRow, HardCase
 
 
 @pytest.fixture
@@ -19,7 +19,7 @@ def one_case(monkeypatch: pytest.MonkeyPatch):
     """A gallery of one quick case whose error is given, and the step limits of few methods."""
 
     def gallery_of(error: float) -> None:
-        row = Row("rk4", 0.1, 3, error, 1e-8, np.nan, "ok")
+        row = CaseRow("rk4", 0.1, 3, error, 1e-8, np.nan, "ok")
         cases = {"easy": HardCase("easy", "nothing", "a closed form", "pass", lambda quick: [row])}
         monkeypatch.setattr(report, "CASES", cases)
         monkeypatch.setattr(report, "METHODS", {name: METHODS[name] for name in ("rk4", "dop853", "gauss6")})

@@ -16,7 +16,7 @@ from fastmech.scene import Scene
 from fastmech.slider.coefficients import reduce
 from fastmech.slider.equilibria import find_equilibria
 from fastmech.slider.proof import certify, existence_radius
-from fastmech.slider.solve import Solution, solve_rows
+from fastmech.slider.solve import Roots, solve_rows
 from fastmech.slider.theorem import EPS, expected_count, normal_form, pulls
 
 PAPER = Scene(c2=1100 / 3, alpha=0.0)
@@ -48,11 +48,11 @@ def coefficients() -> NDArray[np.float64]:
 
 
 @pytest.fixture(scope="module")
-def solution(coefficients: NDArray[np.float64]) -> Solution:
+def solution(coefficients: NDArray[np.float64]) -> Roots:
     return solve_rows(coefficients)
 
 
-def test_random_scenes_are_proved(solution: Solution) -> None:
+def test_random_scenes_are_proved(solution: Roots) -> None:
     proved = np.count_nonzero(solution.outcome == Outcome.COMPLETE) / SCENES
     print(f"proved complete: {100 * proved:.2f} % of {SCENES} random scenes")
     assert proved >= 0.999
@@ -83,7 +83,7 @@ def grid_newton(a: float, C: float, b: float, f: float, starts: int = 40) -> lis
     return roots
 
 
-def test_grid_search_finds_nothing_else(coefficients: NDArray[np.float64], solution: Solution) -> None:
+def test_grid_search_finds_nothing_else(coefficients: NDArray[np.float64], solution: Roots) -> None:
     for row in range(60):
         _, _, lift, spring, gravity, force, _, _ = coefficients[row]
         for phi, theta in grid_newton(lift, spring, gravity, force):
@@ -116,7 +116,7 @@ def unit_roots(a: float, C: float, b: float, f: float) -> list[Any]:
 
 
 def test_counts_agree_with_the_polynomial_at_fifty_digits(
-    coefficients: NDArray[np.float64], solution: Solution
+    coefficients: NDArray[np.float64], solution: Roots
 ) -> None:
     for row in range(40):
         _, _, lift, spring, gravity, force, _, _ = coefficients[row]
@@ -214,7 +214,7 @@ def test_expected_count_in_plain_python() -> None:
 
 
 def test_the_radius_does_not_tell_where_the_search_began(
-    coefficients: NDArray[np.float64], solution: Solution
+    coefficients: NDArray[np.float64], solution: Roots
 ) -> None:
     """Places within rounding of one another have one radius: verdicts at rounding's edge rest on it."""
     rng = np.random.default_rng(3)

@@ -17,7 +17,7 @@ from fastmech.ensembles.run import Ensemble, run_ensemble
 from fastmech.integrators.methods import METHODS, Adams, RungeKutta, bashforth
 from fastmech.kernels.blocks import VECTOR_LANES, Rates
 from fastmech.kernels.sincos import REDUCTION_LIMIT
-from fastmech.kernels.steps import EVERY, MOST_STATES, Lanes, Steps, term_weights, whole_steps
+from fastmech.kernels.steps import EVERY, MOST_STATES, LaneArrays, Steps, term_weights, whole_steps
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import reduce
 
@@ -52,7 +52,7 @@ def stepped(
         memory[-1] = 0.0
     params = np.repeat(np.array(reduce(scene))[:, None], Y.shape[1], axis=1)
     state = Y.copy().ravel()
-    flat = Lanes(state, params.ravel(), memory.ravel(), np.zeros(Y.shape[1], dtype=bool))
+    flat = LaneArrays(state, params.ravel(), memory.ravel(), np.zeros(Y.shape[1], dtype=bool))
     with np.errstate(all="ignore"):  # plain Python warns where compiled code is silent
         done = whole_steps(rhs.rates, method.formulas[1], "float64")(
             flat, Steps(BEGIN, H, 0, steps, 0, 1, 0, 0)

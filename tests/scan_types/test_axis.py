@@ -12,9 +12,9 @@ from pydantic import ValidationError
 import fastmech as fm
 from fastmech.ensembles import checks
 from fastmech.scan_types import scan_kinds
-from fastmech.scan_types.equilibrium_map import EquilibriumMap
+from fastmech.scan_types.equilibrium_map import EquilibriumMapScan
 from fastmech.scan_types.request import Axis, RunContext, read_request
-from fastmech.scan_types.snapping import Rates
+from fastmech.scan_types.snapping import DecayRates
 from fastmech.slider.capture.steps import coarse_steps, fastest_followed, shortest_step
 from fastmech.slider.coefficients import reduce
 
@@ -40,9 +40,9 @@ def test_values(table: dict[str, Any], values: list[float]) -> None:
 
 
 def test_decay_rates_are_logarithmic_unless_said_otherwise() -> None:
-    np.testing.assert_allclose(Rates(start=1.0, stop=100.0, num=3).array, [1.0, 10.0, 100.0], rtol=1e-15)
-    assert Rates(start=1.0, stop=3.0, num=3, spacing="linear").array.tolist() == [1.0, 2.0, 3.0]
-    assert Rates(values=[1.0, 4.0]).array.tolist() == [1.0, 4.0]
+    np.testing.assert_allclose(DecayRates(start=1.0, stop=100.0, num=3).array, [1.0, 10.0, 100.0], rtol=1e-15)
+    assert DecayRates(start=1.0, stop=3.0, num=3, spacing="linear").array.tolist() == [1.0, 2.0, 3.0]
+    assert DecayRates(values=[1.0, 4.0]).array.tolist() == [1.0, 4.0]
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def test_a_map_is_over_the_values_asked_for() -> None:
     """Beside the fold at c2 = 98.59 N/m, unevenly; each point is what the scene there has."""
     values = [99.5, 98.0, 40.0]
     scene = fm.Scene(F0=85.3, c1=294.9, c2=92.85, alpha=0.0)
-    found = EquilibriumMap(axes={"c2": {"values": values}}).run(scene, RunContext(threads=1))
+    found = EquilibriumMapScan(axes={"c2": {"values": values}}).run(scene, RunContext(threads=1))
     assert found["c2"].data.tolist() == values
     assert found["count"].data.tolist() == [len(fm.find_equilibria(scene.replace(c2=c2))) for c2 in values]
     assert len(set(found["count"].data.tolist())) == 2

@@ -32,7 +32,7 @@ from scan_types.values import (
 
 import fastmech as fm
 from fastmech.results import Dataset
-from fastmech.scan_types.disturbed import Disturbed
+from fastmech.scan_types.disturbed import DisturbedScan
 from fastmech.scan_types.request import RunContext
 from fastmech.scene import Scene
 
@@ -52,11 +52,11 @@ QUANTILES = [0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0]
 
 #: Strong damping of a light slider: within 6 s most, not all, come to rest, many some turns away. The other
 #: run is so short that little is decided, of two minima.
-SETTLING = Disturbed(
+SETTLING = DisturbedScan(
     trajectories=300, radius=1.6, return_radius=0.1, seed=5, t_end=6.0, dt=0.02, method="rk4",
     linear_horizon=0.7, linear_tolerance=0.04, linear_directions=2,
 )  # fmt: skip
-BRIEF = Disturbed(
+BRIEF = DisturbedScan(
     trajectories=200, radius=0.3, return_radius=0.2, seed=11, t_end=0.3, dt=0.07, method="rk4",
     linear_horizon=1.0, linear_tolerance=0.05, linear_directions=1,
 )  # fmt: skip
@@ -66,7 +66,7 @@ BRIEF = Disturbed(
 class Run:
     """A stored section and the same ensembles by own steps."""
 
-    scan: Disturbed
+    scan: DisturbedScan
     scene: Scene
     angles: Floats
     section: Dataset
@@ -112,7 +112,7 @@ def settling_scene() -> tuple[Scene, Floats]:
     return scene.replace(beta=30.0, m3=0.5), angles
 
 
-MAKE: dict[str, Callable[[], tuple[Disturbed, Scene, Floats]]] = {
+MAKE: dict[str, Callable[[], tuple[DisturbedScan, Scene, Floats]]] = {
     "settling": lambda: (SETTLING, *settling_scene()),
     "brief": lambda: (BRIEF, *deepest_first("bistable")),
 }
@@ -319,7 +319,7 @@ def test_attributes(run: Run) -> None:
 
 
 def test_failures_are_counted(tmp_path: Path) -> None:
-    scan = Disturbed(trajectories=100, radius=1.0, t_end=2.0, dt=0.25, method="rk4", linear_directions=1)
+    scan = DisturbedScan(trajectories=100, radius=1.0, t_end=2.0, dt=0.25, method="rk4", linear_directions=1)
     section = stored(scan, settling_scene()[0].replace(beta=60.0), tmp_path)
     outcomes = np.ravel(np.array(decoded(section["outcome"]))).tolist()
     failed = outcomes.count("not_finite") + outcomes.count("step_too_large")
@@ -337,8 +337,8 @@ def test_less_may_be_kept(tmp_path: Path) -> None:
     """Labels only: nothing else of the trajectories, what is counted is the same."""
     fields = {"trajectories": 600, "t_end": 4.0, "return_radius": 0.1, "linear_directions": 1}
     scene = settling_scene()[0]
-    whole = stored(Disturbed(**fields), scene, tmp_path)
-    less = stored(Disturbed(**fields, variables=["outcome"]), scene, tmp_path)
+    whole = stored(DisturbedScan(**fields), scene, tmp_path)
+    less = stored(DisturbedScan(**fields, variables=["outcome"]), scene, tmp_path)
     gone = set(whole) - set(less)
     apart = {f"{of}_{name}" for of in ("start", "final") for name in STATE}
     apart |= {f"{of}_{angle}" for of in ("turns", "excursion") for angle in ("phi", "theta")}
@@ -346,14 +346,14 @@ def test_less_may_be_kept(tmp_path: Path) -> None:
     for name in less:
         np.testing.assert_array_equal(less[name].data, whole[name].data)
     assert np.isfinite(less["time_to_return_quantile"].data).any()
-    assert set(Disturbed.draw(less, {})) == {"linear_range", "outcomes"}
+    assert set(DisturbedScan.draw(less, {})) == {"linear_range", "outcomes"}
     with pytest.raises(ValueError, match="unknown variable 'finl'; did you mean 'final'"):
-        Disturbed(variables=["finl"])
+        DisturbedScan(variables=["finl"])
 
 
 def test_blocks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
     """Tiles of 256 trajectories and 5 directions: the same bits as one tile of each equilibrium."""
-    scan = Disturbed(trajectories=700, t_end=0.5, linear_directions=12)
+    scan = DisturbedScan(trajectories=700, t_end=0.5, linear_directions=12)
     scene = deepest_first("table_1")[0]
     whole = scan.run(scene, RunContext(threads=2))
     monkeypatch.setattr("fastmech.scan_types.disturbed.EVALUATIONS", 1)
@@ -368,16 +368,18 @@ def test_a_seed_of_128_bits_is_kept_whole(tmp_path: Path) -> None:
     """HDF5 has no such integers: the file holds its digits."""
     scene, seed = Scene(alpha=0.0), 2**128 - 1
     brief = {"trajectories": 3, "t_end": 0.1, "method": "rk4", "linear_directions": 1}
-    section = stored(Disturbed(seed=seed, **brief), scene, tmp_path)
+    section = stored(DisturbedScan(seed=seed, **brief), scene, tmp_path)
     assert section.attrs["seed"] == str(seed)
-    other = stored(Disturbed(seed=2**64 - 1, **brief), scene, tmp_path)
+    other = stored(DisturbedScan(seed=2**64 - 1, **brief), scene, tmp_path)
     assert other.attrs["seed"] == 2**64 - 1
     assert (section["start_phi"].data != other["start_phi"].data).all()
 
 
 def test_heavy_damping_fails_nothing(tmp_path: Path) -> None:
     heavy = Scene(F0=-150.0, c1=260.0, c2=60.0, alpha=0.0, beta=1e5)
-    section = stored(Disturbed(trajectories=64, radius=1.2, t_end=20.0, linear_directions=2), heavy, tmp_path)
+    section = stored(
+        DisturbedScan(trajectories=64, radius=1.2, t_end=20.0, linear_directions=2), heavy, tmp_path
+    )
     assert section.attrs["failed"] == 0
     assert section.attrs["method"] == "radau5"
     assert section.attrs["error_estimate_median"] < 1e-4
@@ -387,6 +389,6 @@ def test_what_cannot_be_disturbed_is_refused_before_anything_is_computed() -> No
     """All along a line in closed form; a ball of return by the equilibria alone."""
     line = Scene(alpha=0.0, F0=0.0, c1=0.0, c2=22.0 * 9.80665 / 1.25)
     with pytest.raises(fm.InputError, match="equilibria are not isolated: c1 = 0, F = 0"):
-        Disturbed().check(line)
+        DisturbedScan().check(line)
     with pytest.raises(fm.InputError, match="return_radius = 3 rad: must not exceed"):
-        Disturbed(return_radius=3.0).tiling(Scene(alpha=0.0))
+        DisturbedScan(return_radius=3.0).tiling(Scene(alpha=0.0))

@@ -13,7 +13,7 @@ from scan_types.values import check_labels, stored
 import fastmech as fm
 from fastmech.results import Dataset
 from fastmech.scan_types import scan_kinds
-from fastmech.scan_types.disturbed import Disturbed
+from fastmech.scan_types.disturbed import DisturbedScan
 from fastmech.scan_types.request import RunContext, read_request
 
 BISTABLE = fm.Scene(F0=85.3, c1=294.9, c2=92.85, alpha=0.0)
@@ -26,7 +26,7 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
 
 @pytest.fixture(scope="module")
 def section(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
-    return stored(Disturbed(axes=AXES, **SMALL), BISTABLE, tmp_path_factory.mktemp("disturbed_map"))
+    return stored(DisturbedScan(axes=AXES, **SMALL), BISTABLE, tmp_path_factory.mktemp("disturbed_map"))
 
 
 def test_labels(section: Dataset) -> None:
@@ -36,7 +36,7 @@ def test_labels(section: Dataset) -> None:
     check_labels(section, units | {"F0": "N", "c2": "N/m", "time_to_return_quantile": "s"})
     assert section["share_returned"].dims == ("F0", "c2", "sheet")
     assert section["time_to_return_quantile"].dims == ("F0", "c2", "sheet", "quantile")
-    asked = Disturbed(axes=AXES, **SMALL)
+    asked = DisturbedScan(axes=AXES, **SMALL)
     assert {name: section.attrs[name] for name in asked.settings} == asked.settings
     assert (section.attrs["failed"], section.attrs["refused"]) == (0, 0)
 
@@ -90,7 +90,7 @@ def test_numbers_are_those_of_disturb(section: Dataset) -> None:
 
 
 def test_tiles_need_no_other_one_and_no_threads(section: Dataset) -> None:
-    tiling = Disturbed(axes=AXES, **SMALL).tiling(BISTABLE)
+    tiling = DisturbedScan(axes=AXES, **SMALL).tiling(BISTABLE)
     last = tiling.count - 1
     alone = tiling.compute(last, RunContext(threads=1))
     look = tiling.assemble(lambda index: alone if index == last else tiling.missing(index))
@@ -116,7 +116,7 @@ def test_a_tile_is_left_between_blocks() -> None:
         raise Left
 
     with pytest.raises(Left):
-        Disturbed(axes=AXES, **SMALL).tiling(BISTABLE).compute(0, RunContext(threads=1, check=leave))
+        DisturbedScan(axes=AXES, **SMALL).tiling(BISTABLE).compute(0, RunContext(threads=1, check=leave))
 
 
 def test_failures_and_refusals_are_no_results() -> None:
@@ -124,18 +124,18 @@ def test_failures_and_refusals_are_no_results() -> None:
     scene = fm.Scene(c1=2000.0, c2=8000.0, beta=20.0, alpha=0.0)
     axes = {"F0": {"start": 0.0, "stop": 100.0, "num": 2}}
     fields: dict[str, Any] = {"trajectories": 64, "radius": 1.0, "t_end": 20.0}
-    lost = Disturbed(axes=axes, dt=0.05, **fields).run(scene, RunContext(threads=1))
+    lost = DisturbedScan(axes=axes, dt=0.05, **fields).run(scene, RunContext(threads=1))
     failed = lost["share_failed"].data
     assert lost.attrs["failed"] == np.nansum(failed) * 64 > 20
     assert (lost["share_returned_at_most"].data >= failed - 1e-15)[np.isfinite(failed)].all()
     assert np.nanmax(lost["largest_excursion_theta"].data) < 1e4
-    kept = Disturbed(axes=axes, **fields).run(scene, RunContext(threads=1))
+    kept = DisturbedScan(axes=axes, **fields).run(scene, RunContext(threads=1))
     assert kept.attrs["failed"] == 0
-    refused = Disturbed(axes=axes, return_radius=3.0, **fields).run(scene, RunContext(threads=1))
+    refused = DisturbedScan(axes=axes, return_radius=3.0, **fields).run(scene, RunContext(threads=1))
     assert refused.attrs["refused"] == np.isfinite(refused["phi"].data).sum()
     assert str(refused.attrs["refused_first"]).startswith("return_radius = 3 rad: must not exceed")
     for dataset in (lost, refused):
-        figures = Disturbed.draw(dataset, scene.parameters)
+        figures = DisturbedScan.draw(dataset, scene.parameters)
         for figure in figures.values():
             assert_legible(figure)
         texts = [text.get_text() for text in figures["excursions"].legends[0].get_texts()]
@@ -144,8 +144,8 @@ def test_failures_and_refusals_are_no_results() -> None:
 
 @pytest.mark.parametrize("axes", [AXES, {"c2": AXES["c2"]}, AXES | {"c1": AXES["c2"] | {"num": 1}}])
 def test_pictures(axes: dict[str, Any]) -> None:
-    found = Disturbed(axes=axes, **SMALL | {"trajectories": 12}).run(BISTABLE, RunContext(threads=1))
-    figures = Disturbed.draw(found, BISTABLE.parameters)
+    found = DisturbedScan(axes=axes, **SMALL | {"trajectories": 12}).run(BISTABLE, RunContext(threads=1))
+    figures = DisturbedScan.draw(found, BISTABLE.parameters)
     assert set(figures) == {"share_returned", "time_to_return", "excursions"}
     for figure in figures.values():
         assert_legible(figure)
@@ -154,7 +154,7 @@ def test_pictures(axes: dict[str, Any]) -> None:
 @pytest.mark.nojit
 def test_the_request_in_the_repository_is_valid() -> None:
     request = read_request(Path(__file__).parents[2] / "scans" / "disturbed_map.toml", scan_kinds())
-    assert all(isinstance(scan, Disturbed) and scan.axes for scan in request.scans.values())
+    assert all(isinstance(scan, DisturbedScan) and scan.axes for scan in request.scans.values())
 
 
 @pytest.mark.nojit

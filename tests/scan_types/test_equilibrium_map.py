@@ -11,7 +11,7 @@ import fastmech as fm
 from fastmech.errors import InputError
 from fastmech.results import Dataset
 from fastmech.scan_types import scan_kinds
-from fastmech.scan_types.equilibrium_map import EquilibriumMap
+from fastmech.scan_types.equilibrium_map import EquilibriumMapScan
 from fastmech.scan_types.request import RunContext, read_request
 from fastmech.scan_types.snap import SnapScan
 from fastmech.scene import Scene
@@ -27,7 +27,7 @@ AXES = {
 
 
 def mapped() -> Dataset:
-    result = EquilibriumMap(axes=AXES).run(SCENE, RunContext())
+    result = EquilibriumMapScan(axes=AXES).run(SCENE, RunContext())
     assert isinstance(result, Dataset)
     return result
 
@@ -57,7 +57,9 @@ def test_curves_come_with_the_map() -> None:
     assert set(dataset["fold_kind"].data) == {0}
     assert dataset["cusp_F0"].data.size >= 4
     assert set(np.unique(dataset["unreached_vanishes"].data)) >= {0, 2}
-    line = EquilibriumMap(axes={"F0": {"start": -800.0, "stop": 800.0, "num": 99}}).run(SCENE, RunContext())
+    line = EquilibriumMapScan(axes={"F0": {"start": -800.0, "stop": 800.0, "num": 99}}).run(
+        SCENE, RunContext()
+    )
     assert line.groups["curves"]["fold_F0"].data == pytest.approx(
         [-671.1627073982018, 671.1627073982018], abs=1e-9
     )
@@ -100,7 +102,7 @@ def test_xarray_opens_a_map_with_names_and_units(tmp_path: Path) -> None:
 def test_tiles_agree_with_the_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = mapped()
     monkeypatch.setattr("fastmech.scan_types.equilibrium_map.TILE_POINTS", 100)
-    tiling = EquilibriumMap(axes=AXES).tiling(SCENE)
+    tiling = EquilibriumMapScan(axes=AXES).tiling(SCENE)
     assert tiling.count == 9
     assert sum(map(tiling.items, range(tiling.count))) == 31 * 23
     tiles = [tiling.compute(index, RunContext(threads=1)) for index in range(tiling.count)]
@@ -134,7 +136,7 @@ def test_pictures_read_a_part_of_a_large_map(tmp_path: Path, monkeypatch: pytest
     monkeypatch.setattr("fastmech.plots.map_view.MOST_DRAWN", 10)
     monkeypatch.setattr("fastmech.store.decode.PIECE_BYTES", 4000)
     with open_results(path) as results:
-        drawn = EquilibriumMap.read(results["map"], SCENE.parameters)
+        drawn = EquilibriumMapScan.read(results["map"], SCENE.parameters)
     assert drawn.sizes["F0"] <= 10
     assert drawn.sizes["c2"] <= 10
     for name in drawn:
@@ -145,31 +147,31 @@ def test_pictures_read_a_part_of_a_large_map(tmp_path: Path, monkeypatch: pytest
     assert {"phi", "sheet", "count"} <= set(drawn)
     assert {"fold_F0", "unreached_c2"} <= set(drawn.groups["curves"])
     assert not {"hessian_phi_phi", "eigenvalue_re_1", "radius"} & set(drawn)
-    figures = EquilibriumMap.draw(drawn, SCENE.parameters)
+    figures = EquilibriumMapScan.draw(drawn, SCENE.parameters)
     assert figures["count"].get_suptitle().endswith("; 1 in 4 values of F0; 1 in 3 values of c2")
 
 
 def test_of_a_third_axis_only_the_drawn_plane_is_read(tmp_path: Path) -> None:
     axes = AXES | {"c1": {"start": 280.0, "stop": 310.0, "num": 4}}
-    whole = EquilibriumMap(axes=axes).run(SCENE, RunContext())
+    whole = EquilibriumMapScan(axes=axes).run(SCENE, RunContext())
     assert isinstance(whole, Dataset)
     path = tmp_path / "map.h5"
     attrs = {**provenance(1), "title": "map"}
     write_results(path, scene_parameters={}, sections={"map": whole}, attrs=attrs)
     with open_results(path) as results:
-        drawn = EquilibriumMap.read(results["map"], SCENE.parameters)
+        drawn = EquilibriumMapScan.read(results["map"], SCENE.parameters)
     # 290 N/m is the nearest of 280, 290, 300, 310 to the scene's 294.9.
     assert list(drawn["c1"].data) == [290.0]
     np.testing.assert_array_equal(drawn["phi"].data, whole["phi"].data[:, :, 1:2])
-    assert "c1 = 290 N/m" in EquilibriumMap.draw(drawn, SCENE.parameters)["count"].get_suptitle()
+    assert "c1 = 290 N/m" in EquilibriumMapScan.draw(drawn, SCENE.parameters)["count"].get_suptitle()
 
 
 def test_chosen_variables_only() -> None:
-    result = EquilibriumMap(axes=AXES, variables=["count", "phi"]).run(SCENE, RunContext())
+    result = EquilibriumMapScan(axes=AXES, variables=["count", "phi"]).run(SCENE, RunContext())
     assert {"count", "phi", "sheet"} <= set(result)
     assert "depth" not in result
     with pytest.raises(fm.InputError, match="unknown variable 'phii'; did you mean 'phi'"):
-        EquilibriumMap(axes=AXES, variables=["phii"]).check(SCENE)
+        EquilibriumMapScan(axes=AXES, variables=["phii"]).check(SCENE)
 
 
 def test_requests_of_the_atlas_are_valid() -> None:
@@ -197,6 +199,6 @@ def test_snap_scan_of_a_spring_and_a_place() -> None:
 
 def test_a_map_too_large_for_any_machine_is_refused_at_once() -> None:
     axis = {"start": 0.0, "stop": 1.0, "num": 100_000}
-    scan = EquilibriumMap(axes={"F0": axis, "c1": axis})
+    scan = EquilibriumMapScan(axes={"F0": axis, "c1": axis})
     with pytest.raises(InputError, match=r"^axes: ask for 1e\+10 points, at most 5e\+07 are allowed$"):
         scan.check(Scene(alpha=0.0))

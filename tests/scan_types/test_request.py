@@ -8,7 +8,7 @@ import pytest
 
 from fastmech.errors import InputError
 from fastmech.scan_types import scan_kinds
-from fastmech.scan_types.equilibrium_map import EquilibriumMap
+from fastmech.scan_types.equilibrium_map import EquilibriumMapScan
 from fastmech.scan_types.request import Request, Scan, read_request
 from fastmech.scene import Scene
 
@@ -54,7 +54,7 @@ def test_everything_is_read(tmp_path: Path):
     first = request.scans["first"].model_dump()
     assert (first["phi"], first["t_end"], first["outputs"]) == (1.0, 2.5, 11)
     second = request.scans["second"]
-    assert isinstance(second, EquilibriumMap)
+    assert isinstance(second, EquilibriumMapScan)
     assert second.axes["F0"].array.tolist() == [-10.0, 0.0, 10.0]
 
 

@@ -163,7 +163,7 @@ class Term:
 
 
 @dataclass
-class System:
+class DefiningSystem:
     """m equations F(z) = 0 in n unknowns, recorded once.
 
     ``equations`` takes the unknowns, a sequence of n numbers, and returns the m left sides. It may add,
@@ -287,7 +287,7 @@ def inverses(slope: Floats) -> tuple[Floats, Floats]:
 class Neighbourhoods:
     """Boxes round solutions that hold nothing but the arcs through these."""
 
-    system: System
+    system: DefiningSystem
     points: Floats  #: of a curve in order, or one alone; polished points between them are added
     tangents: Floats = field(init=False)
     radius: Floats = field(init=False)  #: (points, n)
@@ -356,7 +356,7 @@ class Neighbourhoods:
         return held
 
 
-def polished(system: System, points: Floats) -> Floats:
+def polished(system: DefiningSystem, points: Floats) -> Floats:
     """Solutions near points (points, n) by Newton's method, the nearest ones of curves."""
     for _ in range(4):
         found = system.over(points, np.zeros_like(points))
@@ -374,7 +374,7 @@ def wrapped(points: Floats) -> Floats:
 
 
 @dataclass
-class Found:
+class Covered:
     """What a search has found."""
 
     curves: list[Curve]
@@ -382,7 +382,7 @@ class Found:
     cut_short: bool  #: at ``MOST_BOXES`` or ``MOST_VAIN``
 
 
-def solutions(system: System, follow: Callable[[Floats], Curve | None]) -> Found:
+def solutions(system: DefiningSystem, follow: Callable[[Floats], Curve | None]) -> Covered:
     """All solutions of a system with the unknowns phi, theta [rad] and one or two parts from 0 to 1.
 
     Args:
@@ -418,7 +418,7 @@ def solutions(system: System, follow: Callable[[Floats], Curve | None]) -> Found
         tiny.append(centre[left & small])
         left &= ~small
         centre, half = split(centre[left], half[left], slope[left])
-    return Found(curves, np.concatenate([*tiny, centre]), len(centre) > 0)
+    return Covered(curves, np.concatenate([*tiny, centre]), len(centre) > 0)
 
 
 def held_by(known: list[Neighbourhoods], centre: Floats, half: Floats) -> NDArray[np.bool_]:
@@ -438,7 +438,9 @@ def start(n: int) -> tuple[Floats, Floats]:
     return centre, np.tile(0.5 * length / np.array(pieces), (len(centre), 1))
 
 
-def pruned(system: System, centre: Floats, half: Floats) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
+def pruned(
+    system: DefiningSystem, centre: Floats, half: Floats
+) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
     """What is left of boxes: centres, halves, slopes, and whether at most one arc can pass through."""
     value, slope, bend = system.over(centre, half)
     kept = ~np.isnan(value[:, 0])

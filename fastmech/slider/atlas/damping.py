@@ -17,13 +17,13 @@ from fastmech.arrays import Floats
 from fastmech.atlas.continuation import LONGEST, distance, finish_on_edge, inside, newton, regular, trace
 from fastmech.objects import Drawn
 from fastmech.scene import Scene
-from fastmech.slider.atlas.cover import System, apart
+from fastmech.slider.atlas.cover import DefiningSystem, apart
 from fastmech.slider.atlas.folds import MOST_POINTS, checked_plane, plane_of
 from fastmech.slider.atlas.map import EquilibriumMap, map_equilibria
 from fastmech.slider.atlas.systems import Plane, dead_centre, point_at, straight, unloaded
 from fastmech.slider.linearize import SIN_PHI, SIN_PSI, UNLOADED
 
-SYSTEMS: dict[str, Callable[[Plane], System]] = {
+SYSTEMS: dict[str, Callable[[Plane], DefiningSystem]] = {
     SIN_PHI: dead_centre,
     SIN_PSI: straight,
     UNLOADED: unloaded,
@@ -149,7 +149,7 @@ def stable(plane: Plane, z: Floats) -> bool:
     return bool(p.determinant[0] > 0.0 and p.hessian[0][0] > 0.0)
 
 
-def finish(plane: Plane, equations: System) -> Callable[[Floats, Floats], Floats]:
+def finish(plane: Plane, equations: DefiningSystem) -> Callable[[Floats, Floats], Floats]:
     """How a curve ends: on the rectangle's side, or just before the minimum is lost at a fold."""
     on_edge = finish_on_edge(equations)
 
@@ -224,7 +224,7 @@ def sheet_of(plane: Plane, name: str, places: Floats, share: float) -> UndampedS
     return UndampedSheet(name, x, y, float(phi), float(theta), float(share))
 
 
-def curve_of(plane: Plane, name: str, equations: System, points: Floats) -> UndampedCurve:
+def curve_of(plane: Plane, name: str, equations: DefiningSystem, points: Floats) -> UndampedCurve:
     """A traced curve in the parameters' units."""
     residual = max(float(np.max(np.abs(equations(z)[0]))) for z in points)
     values = plane.values(points[:, 2:].T)

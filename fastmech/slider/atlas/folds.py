@@ -16,8 +16,8 @@ from fastmech.ensembles.checks import check_pair
 from fastmech.objects import Drawn, Printed
 from fastmech.scene import Scene
 from fastmech.slider.atlas.axes import check_axis, coefficient_columns, grid_coefficients, margins
-from fastmech.slider.atlas.cover import TURNS, Found, System, apart, solutions, wrapped
-from fastmech.slider.atlas.systems import Plane, Point, cusp, families, point_at, rest, suited
+from fastmech.slider.atlas.cover import TURNS, Covered, DefiningSystem, apart, solutions, wrapped
+from fastmech.slider.atlas.systems import ParameterPoint, Plane, cusp, families, point_at, rest, suited
 
 #: Points after which no further curve is begun.
 MOST_POINTS = 40_000
@@ -168,7 +168,7 @@ def plane_of(scene: Scene, axes: dict[str, Floats]) -> Plane:
     )
 
 
-def follower(system: System, before: list[Curve]) -> Callable[..., Curve | None]:
+def follower(system: DefiningSystem, before: list[Curve]) -> Callable[..., Curve | None]:
     """Follows a system's curves within the rectangle, until all have ``MOST_POINTS``."""
     total = sum(len(line.points) for line in before)
 
@@ -184,7 +184,7 @@ def follower(system: System, before: list[Curve]) -> Callable[..., Curve | None]
     return follow
 
 
-def sifted(plane: Plane, found: Found) -> tuple[list[Curve], list[str]]:
+def sifted(plane: Plane, found: Covered) -> tuple[list[Curve], list[str]]:
     """The curves of folds among solutions of a family's equations, and why these may not be all, in words.
 
     The equations of a symmetry have other solutions too, and where equilibria are not isolated every place
@@ -257,7 +257,7 @@ def fold_curve(plane: Plane, points: Floats, closed: bool, kind: str) -> FoldCur
     return FoldCurve(x, y, phi, theta, closed, merging(p), kind, p.residual)
 
 
-def merging(p: Point) -> str:
+def merging(p: ParameterPoint) -> str:
     """What merges with a saddle at folds."""
     return "minimum" if float(np.median(p.hessian[0] + p.hessian[2])) > 0.0 else "maximum"
 
@@ -386,7 +386,7 @@ def find_folds(scene: Scene, name: str, values: ArrayLike) -> FoldPoints:
     return FoldPoints(sorted(points, key=lambda point: point.value), "; ".join(reasons), name).of(scene)
 
 
-def _alone(system: System) -> Callable[[Floats], Curve | None]:
+def _alone(system: DefiningSystem) -> Callable[[Floats], Curve | None]:
     def follow(z: Floats) -> Curve | None:
         there = newton(system, z, reach=1e-3)
         return None if there is None else Curve(there[None], np.zeros((1, z.size)), False)

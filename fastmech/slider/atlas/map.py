@@ -31,7 +31,7 @@ from fastmech.slider.atlas.axes import check_axes, grid_coefficients
 from fastmech.slider.atlas.sheets import SheetBuilder
 from fastmech.slider.descent import convex_radius, descend, slope, step_off
 from fastmech.slider.impulse import POINTS, impulse_for, mobility
-from fastmech.slider.solve import MERGE, SINGULAR, SOLUTION, Solution, solve
+from fastmech.slider.solve import MERGE, SINGULAR, SOLUTION, Roots, solve
 from fastmech.slider.stability import assess_one
 from fastmech.slider.theorem import MOST, wrap
 
@@ -56,7 +56,7 @@ COMPLETE = int(Outcome.COMPLETE)
 
 
 @kernel(types.void(MATRIX, SOLUTION, STATUSES))
-def coincidences(coefficients: Floats, found: Solution, special: Codes) -> None:
+def coincidences(coefficients: Floats, found: Roots, special: Codes) -> None:
     """Write the ``Coincidence`` of every row into ``special``.
 
     At a fold with null direction v of the Hessian the third derivative of U along v is 3 P v1 v2 (v1 + v2),
@@ -104,7 +104,7 @@ ASSESSED: Any = named_tuple([CUBE, ROOTS, MATRIX, MATRIX, VERDICTS], Assessed)
 
 
 @kernel(types.void(MATRIX, SOLUTION, ASSESSED))
-def assess(coefficients: Floats, found: Solution, out: Assessed) -> None:
+def assess(coefficients: Floats, found: Roots, out: Assessed) -> None:
     """Stability of the equilibria of every row of (n, 8) reduced coefficients, the force frozen."""
     hessian, eigenvalues, verdict = out.hessian, out.eigenvalues, out.verdict
     frequency, decay = out.frequency, out.decay
@@ -132,7 +132,7 @@ ROUNDING = 1e-12
 
 
 @kernel(types.void(MATRIX, SOLUTION, MATRIX))
-def barriers(coefficients: Floats, found: Solution, barrier: Floats) -> None:
+def barriers(coefficients: Floats, found: Roots, barrier: Floats) -> None:
     """Write the energy of the lowest way out of every minimum into ``barrier`` (n, 6), NaN elsewhere.
 
     Equilibria come deepest first, and energies and barriers are in the same unit. Saddles are taken in rising
@@ -400,7 +400,7 @@ def solve_block(
     ``mass`` is m2 [kg].
     """
     expected = np.empty(len(coefficients), dtype=np.int8)
-    found = Solution(
+    found = Roots(
         out.phi, out.theta, out.energy, out.radius, out.morse_index, out.count, expected, out.outcome,
         out.fold_margin,
     )  # fmt: skip

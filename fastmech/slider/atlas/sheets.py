@@ -47,7 +47,7 @@ from fastmech.scene import Scene
 from fastmech.slider.atlas.axes import coefficient_columns, margins
 from fastmech.slider.descent import slope
 from fastmech.slider.proof import apart
-from fastmech.slider.solve import INDICES, Solution, solve_rows
+from fastmech.slider.solve import INDICES, Roots, solve_rows
 from fastmech.slider.theorem import EPS, MOST
 
 #: A partner is plain if the next candidate is this many times as far, and if both Hessians stay regular
@@ -193,7 +193,7 @@ def join(parent: Labels, rank: Codes, mine: Labels, other: Labels, partner: Code
     return True
 
 
-class Points(NamedTuple):
+class SheetPoints(NamedTuple):
     """Points of a grid, consecutive in memory order, as ``solve`` fills them."""
 
     coefficients: Floats  #: (n, 8)
@@ -204,7 +204,7 @@ class Points(NamedTuple):
 
 
 @inlined
-def match(points: Points, regular: Floats, q: int, p: int, between: Floats, partner: Codes) -> int:
+def match(points: SheetPoints, regular: Floats, q: int, p: int, between: Floats, partner: Codes) -> int:
     """Write the slot in row ``p`` that each equilibrium in row ``q`` continues to into ``partner``, -1: none.
 
     ``regular`` (n, 6) are the distances by ``trust``; ``between`` (8,) is for working in.
@@ -241,7 +241,7 @@ def match(points: Points, regular: Floats, q: int, p: int, between: Floats, part
     return pairs
 
 
-class Place(NamedTuple):
+class SheetPlace(NamedTuple):
     """Where points lie in their grid."""
 
     ghosts: int  #: first points, which have their labels already
@@ -266,15 +266,15 @@ class Edges(NamedTuple):
     filled: NDArray[np.int64]  #: (1,) how many
 
 
-POINTS = named_tuple([MATRIX, MATRIX, MATRIX, INDICES, STATUSES], Points)
-PLACE = named_tuple([types.int64, types.int64, INTEGERS, INTEGERS], Place)
+POINTS = named_tuple([MATRIX, MATRIX, MATRIX, INDICES, STATUSES], SheetPoints)
+PLACE = named_tuple([types.int64, types.int64, INTEGERS, INTEGERS], SheetPlace)
 TREES = named_tuple([LABEL_LIST, INDICES, INDICES], Trees)
 EDGES = named_tuple([PLACES, INDICES, INTEGERS], Edges)
 
 
 @kernel(types.int64(POINTS, PLACE, types.int64, TREES, LABELS, EDGES))
 def label_points(
-    points: Points, place: Place, regions: int, trees: Trees, label: Labels, edges: Edges
+    points: SheetPoints, place: SheetPlace, regions: int, trees: Trees, label: Labels, edges: Edges
 ) -> int:
     """Label points (n, 6) of which some may have their labels already; all but the first two are written.
 
@@ -403,7 +403,7 @@ class Borders:
     label: list[Any] = field(default_factory=lambda: _none(2, MOST, dtype=np.int32))  #: (edges, 2, 6)
     angles: list[Any] = field(default_factory=lambda: _none(2, 2, MOST, dtype=np.float64))  #: phi and theta
 
-    def add(self, offset: int, ends: Integers, edges: Edges, points: Points, label: Labels) -> None:
+    def add(self, offset: int, ends: Integers, edges: Edges, points: SheetPoints, label: Labels) -> None:
         """Keep edges between rows ``ends`` (edges, 2) of points and labels; row 0 is point ``offset``."""
         self.point.append(ends + offset)
         self.axis.append(edges.borders[: len(ends), 1])
@@ -523,7 +523,7 @@ def deepest(ground: Ground, places: Floats, axis: int, sign: float) -> Floats:
     return places
 
 
-def continued(ground: Ground, start: Floats, end: Floats, count: int) -> tuple[Solution, Labels] | None:
+def continued(ground: Ground, start: Floats, end: Floats, count: int) -> tuple[Roots, Labels] | None:
     """The equilibria all along a way, and their labels: equal ones continue one another; None: no way."""
     places = way(ground, start, end, count)
     if places is None:
@@ -537,8 +537,8 @@ def continued(ground: Ground, start: Floats, end: Floats, count: int) -> tuple[S
     forest = Forest()
     forest.make_room(n)
     edges = Edges(np.empty((n, 2), np.int64), np.empty((n, MOST), np.int8), np.empty(1, np.int64))
-    points = Points(rows, found.phi, found.theta, found.index, found.count)
-    line = Place(0, 0, np.ones(1, dtype=np.int64), np.array([n]))
+    points = SheetPoints(rows, found.phi, found.theta, found.index, found.count)
+    line = SheetPlace(0, 0, np.ones(1, dtype=np.int64), np.array([n]))
     regions = label_points(points, line, 0, forest.trees, label, edges)
     return (found, label) if regions == 1 else None
 
@@ -671,8 +671,8 @@ class SheetBuilder:
         partners = np.empty((n * len(lengths), MOST), dtype=np.int8)
         filled = np.zeros(1, dtype=np.int64)
         own: Any = arrays
-        points, edges = Points(*own), Edges(borders, partners, filled)
-        place = Place(ghosts, self._done - ghosts, strides, lengths)
+        points, edges = SheetPoints(*own), Edges(borders, partners, filled)
+        place = SheetPlace(ghosts, self._done - ghosts, strides, lengths)
         forest.regions = label_points(points, place, forest.regions, forest.trees, label, edges)
         rows, axis = borders[: filled[0]].T
         ends = np.stack([rows - strides[axis], rows], axis=1)

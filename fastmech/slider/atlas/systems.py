@@ -17,7 +17,7 @@ import numpy as np
 from fastmech.arrays import Floats
 from fastmech.scene import Scene
 from fastmech.slider.atlas.axes import coefficient_columns
-from fastmech.slider.atlas.cover import System
+from fastmech.slider.atlas.cover import DefiningSystem
 from fastmech.slider.reduced import potential_gradient, potential_hessian
 
 #: A part of a load that is this small beside the largest load of a plane is rounding.
@@ -83,7 +83,7 @@ class Plane:
 
 
 @dataclass(frozen=True)
-class Point:
+class ParameterPoint:
     """Gradient, Hessian and what else systems are made of at z, over the plane's largest load."""
 
     phi: Any
@@ -138,7 +138,7 @@ class Point:
         return np.sort(amplitudes, axis=0)[1] > VANISHING
 
 
-def point_at(plane: Plane, z: Any) -> Point:
+def point_at(plane: Plane, z: Any) -> ParameterPoint:
     """Everything at z, a sequence of numbers, vectors or terms that are recorded."""
     a, C, b, f = plane.loads(z[2:])
     phi, theta, psi = (z[0], z[1] - z[0], z[1]) if plane.sheared else (z[0], z[1], z[0] + z[1])
@@ -147,7 +147,7 @@ def point_at(plane: Plane, z: Any) -> Point:
     # Without the spring the gradient is what balances its pull.
     p1, p2 = potential_gradient(s1, c1, s2, c2, 0.0, a, 0.0, b, f)
     x1, _, x2 = potential_hessian(s1, c1, s2, c2, 0.0, a, 0.0, b, f)
-    return Point(phi, theta, (p1, p2, C * c12), (x1, x2, C * s12), (a, C, b, f))
+    return ParameterPoint(phi, theta, (p1, p2, C * c12), (x1, x2, C * s12), (a, C, b, f))
 
 
 def suited(plane: Plane) -> Plane:
@@ -156,42 +156,42 @@ def suited(plane: Plane) -> Plane:
     return replace(plane, sheared=bool(np.max(C) > np.max(np.hypot(b, f))))
 
 
-def system(plane: Plane, equations: Callable[[Point], tuple[Any, ...]]) -> System:
-    """The equations of a ``Point``, recorded."""
-    return System(lambda z: equations(point_at(plane, z)), 2 + len(plane.names))
+def system(plane: Plane, equations: Callable[[ParameterPoint], tuple[Any, ...]]) -> DefiningSystem:
+    """The equations of a ``ParameterPoint``, recorded."""
+    return DefiningSystem(lambda z: equations(point_at(plane, z)), 2 + len(plane.names))
 
 
-def fold(plane: Plane) -> System:
+def fold(plane: Plane) -> DefiningSystem:
     """gradient = 0, det Hessian = 0."""
 
-    def equations(p: Point) -> tuple[Any, ...]:
+    def equations(p: ParameterPoint) -> tuple[Any, ...]:
         first, second = p.gradient
         return first, p.pulls[0] - p.pulls[1] if plane.sheared else second, p.determinant
 
     return system(plane, equations)
 
 
-def rest(plane: Plane) -> System:
+def rest(plane: Plane) -> DefiningSystem:
     """gradient = 0: the equilibria themselves, over one parameter."""
     return system(plane, lambda p: p.gradient)
 
 
-def dead_centre(plane: Plane) -> System:
+def dead_centre(plane: Plane) -> DefiningSystem:
     """An equilibrium with sin phi = 0: small motions do not move the damper."""
     return system(plane, lambda p: (*p.gradient, np.sin(p.phi)))
 
 
-def straight(plane: Plane) -> System:
+def straight(plane: Plane) -> DefiningSystem:
     """An equilibrium with sin(phi + theta) = 0: M2 swings without pulling at M1."""
     return system(plane, lambda p: (*p.gradient, np.sin(p.phi + p.theta)))
 
 
-def unloaded(plane: Plane) -> System:
+def unloaded(plane: Plane) -> DefiningSystem:
     """An equilibrium with U_theta,theta = C: the rod M1M2 is unloaded and M2 swings by itself."""
     return system(plane, lambda p: (*p.gradient, p.hessian[2] - p.loads[1]))
 
 
-def cusp(plane: Plane, other: int | None) -> System:
+def cusp(plane: Plane, other: int | None) -> DefiningSystem:
     """Three equilibria merge: the null vector has no part along y ``other``, or (None) the pulls are zero."""
     if other is None:
         return system(plane, lambda p: (*p.pulls, p.determinant))
@@ -204,7 +204,7 @@ class Family:
     """Equations of all folds of a plane that are of one kind."""
 
     kind: str  #: ``fold`` or ``pitchfork``
-    system: System
+    system: DefiningSystem
 
 
 def families(plane: Plane) -> tuple[Family, ...]:
@@ -242,10 +242,10 @@ def families(plane: Plane) -> tuple[Family, ...]:
 def exchanged(plane: Plane, one: int, two: int, other: int) -> tuple[Family, Family]:
     """Folds where the amplitudes ``one`` and ``two`` agree all over the plane."""
 
-    def split(p: Point) -> tuple[Any, ...]:
+    def split(p: ParameterPoint) -> tuple[Any, ...]:
         return p.bent[one], p.bent[two], p.pulls[two] - p.pulls[other]
 
-    def together(p: Point) -> tuple[Any, ...]:
+    def together(p: ParameterPoint) -> tuple[Any, ...]:
         sine = p.bent[one] * p.pulls[two] - p.bent[two] * p.pulls[one]  # of yj - yi
         return sine, p.pulls[one] - p.pulls[other], p.bent[one] + 2.0 * p.bent[other]
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.capture.certificate import MEASURING, PHASE, Certificate, Early, Noted
+from fastmech.capture.certificate import MEASURING, PHASE, CaptureCertificate, Early, Noted
 from fastmech.disturbance.motion import damped_times
 from fastmech.ensembles.ends import STOP_CODE
 from fastmech.ensembles.fitting import breaks_energy_bounds
@@ -52,7 +52,7 @@ from fastmech.step_limits.warning import grows, step_limit, warn_of_step
 
 
 @dataclass(frozen=True)
-class SceneCertificate(Certificate):
+class SceneCertificate(CaptureCertificate):
     """The barrier tree of a scene, ready for observers; energies are over m2 l^2."""
 
     system: Scene

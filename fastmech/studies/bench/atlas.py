@@ -46,7 +46,7 @@ class AtlasRow(NamedTuple):
     unproved: int  #: points without a proof that all are found
 
 
-class Search(NamedTuple):
+class GridSearch(NamedTuple):
     """Multistart at n points."""
 
     seconds: Floats  #: (n,)
@@ -70,7 +70,7 @@ def side_by_side(
         A row for each, and by the map's threads the least, median and largest ratio of rates over the turns.
     """
     threads = sorted({1, thread_count(None)})
-    turns: list[Search] = []
+    turns: list[GridSearch] = []
     for n in threads:
         map_equilibria(SCENE, grid(20), threads=n)
     rates: dict[int, list[float]] = {n: [] for n in threads}
@@ -87,7 +87,7 @@ def side_by_side(
         AtlasRow("fastmech map_equilibria", n, side * side, statistics.median(own), *told)
         for n, own in rates.items()
     ]
-    together = row_of(Search(*(np.concatenate(x) for x in zip(*turns, strict=True))))
+    together = row_of(GridSearch(*(np.concatenate(x) for x in zip(*turns, strict=True))))
     rows.append(together._replace(rate=statistics.median(theirs)))
     ratios = {n: sorted(a / b for a, b in zip(own, theirs, strict=True)) for n, own in rates.items()}
     return rows, {n: (each[0], statistics.median(each), each[-1]) for n, each in ratios.items()}
@@ -135,7 +135,7 @@ def region_scenes(n: int) -> list[Scene]:
     return [SCENE.replace(F0=rng.uniform(*F0_RANGE), c1=rng.uniform(*C1_RANGE)) for _ in range(n)]
 
 
-def multistart(scenes: list[Scene], advance: Progress) -> Search:
+def multistart(scenes: list[Scene], advance: Progress) -> GridSearch:
     """SciPy from random starts, duplicates removed; what it misses is counted by the certified count."""
     rng = np.random.default_rng(3)
     seconds, count, lacking = [], [], []
@@ -156,14 +156,14 @@ def multistart(scenes: list[Scene], advance: Progress) -> Search:
         count.append(len(found))
         lacking.append([sum(n > most for n in first) for most in TOLD])
         advance(1)
-    return Search(np.array(seconds), np.array(count), np.array(lacking))
+    return GridSearch(np.array(seconds), np.array(count), np.array(lacking))
 
 
 def _same(one: Floats, other: Floats, within: float) -> bool:
     return bool(np.abs(np.exp(1j * one) - np.exp(1j * other)).max() < within)
 
 
-def row_of(search: Search) -> AtlasRow:
+def row_of(search: GridSearch) -> AtlasRow:
     """Multistart's row."""
     name, n = f"scipy.optimize.root, {STARTS} starts", search.seconds.size
     missed = tuple(search.lacking.sum(axis=0).tolist())

@@ -90,7 +90,7 @@ def lorenz84(t, x, y, z):  # type: ignore[no-untyped-def]
     )
 
 
-class Case(NamedTuple):
+class StudyCase(NamedTuple):
     """A system and where its starts lie."""
 
     system: System
@@ -99,17 +99,19 @@ class Case(NamedTuple):
 
 _REST = math.asin(0.5)
 CASES = {
-    "driven pendulum": Case(
+    "driven pendulum": StudyCase(
         System(pendulum, ["x", "x_dot"], {}, angles=["x"]),
         {"x": (_REST - math.pi, _REST + math.pi), "x_dot": (-10.0, 10.0)},
     ),
-    "Duffing": Case(
+    "Duffing": StudyCase(
         System(duffing, ["x", "x_dot"], {}, period=2.0 * math.pi), {"x": (-1.0, 1.0), "x_dot": (-0.5, 1.0)}
     ),
-    "Lorenz, r = 0": Case(System(lorenz, ["x", "y", "z"], {}), {"x": (-10.0, 10.0), "y": (-20.0, 20.0)}),
-    "three magnets": Case(System(magnets, ["x", "y", "u", "v"], {}), {"x": (-2.0, 2.0), "y": (-2.0, 2.0)}),
-    "Thomas": Case(System(thomas, ["x", "y", "z"], {}), dict.fromkeys("xyz", (-4.0, 4.0))),
-    "Lorenz 84": Case(
+    "Lorenz, r = 0": StudyCase(System(lorenz, ["x", "y", "z"], {}), {"x": (-10.0, 10.0), "y": (-20.0, 20.0)}),
+    "three magnets": StudyCase(
+        System(magnets, ["x", "y", "u", "v"], {}), {"x": (-2.0, 2.0), "y": (-2.0, 2.0)}
+    ),
+    "Thomas": StudyCase(System(thomas, ["x", "y", "z"], {}), dict.fromkeys("xyz", (-4.0, 4.0))),
+    "Lorenz 84": StudyCase(
         System(lorenz84, ["x", "y", "z"], {}), {"x": (-1.0, 3.0), "y": (-2.0, 3.0), "z": (-2.0, 2.5)}
     ),
 }

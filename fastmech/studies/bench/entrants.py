@@ -14,7 +14,7 @@ from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import Status
 from fastmech.errors import StepWarning
 from fastmech.studies.bench import fused, peers, plain
-from fastmech.studies.bench.measure import Entrant, Prepare, Problem, Solve
+from fastmech.studies.bench.measure import BenchProblem, Entrant, Prepare, Solve
 from fastmech.studies.reporting import content
 
 #: Steps and tolerances of fastmech's own methods.
@@ -33,7 +33,7 @@ def installed() -> list[str]:
     return [name for name in LIBRARIES if find_spec(name) is not None]
 
 
-def settings(problem: Problem) -> Iterator[tuple[str, str, dict[str, Any]]]:
+def settings(problem: BenchProblem) -> Iterator[tuple[str, str, dict[str, Any]]]:
     """Family, setting and the keywords that ``fm.integrate`` is given."""
     fit, single = {"fit": True}, {"dtype": "float32"}
     again = {"fit": [share * problem.t_end for share in PACKAGE["again"]]}
@@ -59,7 +59,7 @@ def prepared(keywords: dict[str, Any]) -> Prepare:
     What it says is not to be trusted has no end.
     """
 
-    def prepare(problem: Problem) -> Solve:
+    def prepare(problem: BenchProblem) -> Solve:
         def solve(starts: Any) -> Any:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", StepWarning)  # the status tells whom it concerns
@@ -74,7 +74,7 @@ def prepared(keywords: dict[str, Any]) -> Prepare:
     return prepare
 
 
-def _of_series(series: dict[str, Any], problem: Problem) -> Iterator[Entrant]:
+def _of_series(series: dict[str, Any], problem: BenchProblem) -> Iterator[Entrant]:
     """One for each value."""
     name = series["prepare"]
     function: Any = {"fused": fused.prepared, "plain": plain.prepared}.get(name) or getattr(peers, name)
@@ -86,7 +86,7 @@ def _of_series(series: dict[str, Any], problem: Problem) -> Iterator[Entrant]:
         yield Entrant(series["family"], SETTINGS[kind].format(x), prepare, **sizes)
 
 
-def entrants_of(library: str, problem: Problem) -> Iterator[Entrant]:
+def entrants_of(library: str, problem: BenchProblem) -> Iterator[Entrant]:
     """Those of a library; of fastmech: its own and what is always there."""
     if library == "fastmech":
         for family, setting, keywords in settings(problem):
@@ -95,7 +95,7 @@ def entrants_of(library: str, problem: Problem) -> Iterator[Entrant]:
         yield from _of_series(series, problem)
 
 
-def entrants(problem: Problem, quick: bool) -> Iterator[Entrant]:
+def entrants(problem: BenchProblem, quick: bool) -> Iterator[Entrant]:
     """Every entrant, the package's first; quick: every third of its own and one of what is always there."""
     if quick:
         own = (e for e in entrants_of("fastmech", problem) if e.family.startswith("fastmech"))

@@ -19,7 +19,7 @@ from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import FLAGS
 from fastmech.kernels.sincos import sincos
 from fastmech.slider.equations import lagrange_accelerations
-from fastmech.studies.bench.measure import Problem, Solve
+from fastmech.studies.bench.measure import BenchProblem, Solve
 
 #: Lanes of a block: all of it is in the first cache at any width, so the engine's widest serves both methods.
 LANES = 256
@@ -68,7 +68,7 @@ def compiled(method: str) -> Any:
     return njit(nogil=True, **FLAGS)(names["integrate"])
 
 
-def prepared(method: str, h: float, problem: Problem) -> Solve:
+def prepared(method: str, h: float, problem: BenchProblem) -> Solve:
     """A method at a fixed step, in blocks of lanes."""
     kernel, p = compiled(method), problem.coefficients
     steps = int(np.ceil(problem.t_end / h - 1e-9))

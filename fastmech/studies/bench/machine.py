@@ -16,7 +16,7 @@ from fastmech.jit import FLAGS
 from fastmech.reports import Stage
 from fastmech.scene import Scene
 from fastmech.slider.kernels.select import right_hand_side
-from fastmech.studies.bench.measure import Problem
+from fastmech.studies.bench.measure import BenchProblem
 from fastmech.studies.reporting import TURNS, in_turns
 
 #: Independent chains of multiply-adds in a lane, and their length: enough to hide each one's latency.
@@ -63,7 +63,7 @@ def evaluations() -> Any:
     return njit(nogil=True, **FLAGS)(loop)
 
 
-def throughputs(problem: Problem, stage: Stage) -> tuple[float, list[Throughput]]:
+def throughputs(problem: BenchProblem, stage: Stage) -> tuple[float, list[Throughput]]:
     """The measured peak [multiply-adds/s], and right-hand sides alone and inside of methods."""
     x, turns = np.ones(LANES), 2000
     Y = np.ascontiguousarray(np.resize(problem.starts, (LANES, 4)).T)
@@ -107,7 +107,7 @@ class Cost(NamedTuple):
     relative: float  #: to the damper with constant force
 
 
-def costs(problem: Problem, stage: Stage) -> list[Cost]:
+def costs(problem: BenchProblem, stage: Stage) -> list[Cost]:
     """Every kind of scene with the same method, step and starts, in turns."""
     starts = np.tile(problem.starts, (max(1, 4096 // len(problem.starts)), 1))
     rng, table_1 = np.random.default_rng(3), Scene(alpha=0.0)

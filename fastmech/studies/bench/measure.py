@@ -32,7 +32,7 @@ STARTS = 1024
 
 
 @dataclass(frozen=True)
-class Problem:
+class BenchProblem:
     """An ensemble whose final states are wanted."""
 
     name: str
@@ -50,24 +50,24 @@ class Problem:
         return reduce(self.scene)
 
 
-def _problem(name: str, description: str, rate: float, pace: float, n: int) -> Problem:
+def _problem(name: str, description: str, rate: float, pace: float, n: int) -> BenchProblem:
     rng = np.random.default_rng(1)
     angles = [rng.uniform(0.5, 2.5, STARTS), rng.uniform(-1.0, 1.0, STARTS)]
     starts = np.stack([*angles, *(rng.uniform(-rate, rate, STARTS) for _ in range(2))], axis=1)
-    return Problem(name, description, Scene(alpha=0.0), starts[:n], reference(name)[:n], 10.0, pace)
+    return BenchProblem(name, description, Scene(alpha=0.0), starts[:n], reference(name)[:n], 10.0, pace)
 
 
-def rest_starts(n: int = STARTS) -> Problem:
+def rest_starts(n: int = STARTS) -> BenchProblem:
     """Table 1, constant force, at rest with phi in [0.5, 2.5] and theta in [-1, 1], for 10 s."""
     return _problem("rest", "rest starts", 0.0, 1.0, n)
 
 
-def fast_starts(n: int = STARTS) -> Problem:
+def fast_starts(n: int = STARTS) -> BenchProblem:
     """The same angles with rates up to 10 rad/s: up to fifteen turns, and passages close to saddles."""
     return _problem("fast", "starts with |phi'|, |theta'| up to 10 rad/s", 10.0, 0.15, n)
 
 
-PROBLEMS: dict[str, Callable[..., Problem]] = {"rest": rest_starts, "fast": fast_starts}
+PROBLEMS: dict[str, Callable[..., BenchProblem]] = {"rest": rest_starts, "fast": fast_starts}
 
 
 def reference(name: str) -> Floats:
@@ -81,7 +81,7 @@ def reference(name: str) -> Floats:
 Solve = Callable[[Floats], Floats]
 
 #: Makes a ``Solve`` for a problem: compiling and tables, not timed as speed.
-Prepare = Callable[[Problem], Solve]
+Prepare = Callable[[BenchProblem], Solve]
 
 
 class Entrant(NamedTuple):
@@ -133,7 +133,7 @@ class Row:
 class _Runner:
     """A prepared entrant, warmed up and compared with the truth, and its times so far."""
 
-    def __init__(self, problem: Problem, entrant: Entrant, budget: float) -> None:
+    def __init__(self, problem: BenchProblem, entrant: Entrant, budget: float) -> None:
         self.entrant, self.problem = entrant, problem.name
         n = min(len(problem.starts), entrant.most)
         self.starts = np.tile(problem.starts[:n], (max(1, -(-entrant.least // n)), 1))
@@ -169,7 +169,7 @@ class _Runner:
 
 
 def measure(
-    problem: Problem,
+    problem: BenchProblem,
     everyone: Sequence[Entrant],
     advance: Progress = lambda done: None,
     failed: Callable[[Entrant, Exception], None] | None = None,

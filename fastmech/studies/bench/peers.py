@@ -24,7 +24,7 @@ from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import Coefficients, reduce
 from fastmech.studies.bench.devices import explicit
-from fastmech.studies.bench.measure import Problem, Solve
+from fastmech.studies.bench.measure import BenchProblem, Solve
 from fastmech.studies.bench.own_systems import spoken
 from fastmech.studies.bench.plain import accelerations, scalar_rhs
 
@@ -32,7 +32,7 @@ _COUNT = len(Coefficients._fields)
 _POINTER = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
 
 
-def scipy(method: str, tolerance: float, problem: Problem) -> Solve:
+def scipy(method: str, tolerance: float, problem: BenchProblem) -> Solve:
     """One ``solve_ivp`` after the other, with the compiled right-hand side."""
     from scipy.integrate import solve_ivp
 
@@ -43,7 +43,7 @@ def scipy(method: str, tolerance: float, problem: Problem) -> Solve:
     )
 
 
-def pynamicalsys(h: float, problem: Problem) -> Solve:
+def pynamicalsys(h: float, problem: BenchProblem) -> Solve:
     """RK4, a trajectory a call."""
     from pynamicalsys import ContinuousDynamicalSystem
 
@@ -83,7 +83,7 @@ def _cyrk() -> Any:
     return loop, rhs
 
 
-def cyrk(method: str, tolerance: float, problem: Problem) -> Solve:
+def cyrk(method: str, tolerance: float, problem: BenchProblem) -> Solve:
     """One of its C++ solvers."""
     (loop, rhs), p = _cyrk(), np.array(problem.coefficients)
     return lambda starts: loop(rhs.address, starts, problem.t_end, p, method, tolerance)
@@ -112,7 +112,7 @@ def _numbalsoda(method: str) -> Any:
     return loop, rhs
 
 
-def numbalsoda(method: str, tolerance: float, problem: Problem) -> Solve:
+def numbalsoda(method: str, tolerance: float, problem: BenchProblem) -> Solve:
     """LSODA or DOP853."""
     loop, rhs = _numbalsoda(method)
     p, times = np.array(problem.coefficients), np.array([0.0, problem.t_end])
@@ -134,7 +134,7 @@ def _rates(m: Any, p: Coefficients, y: Any) -> tuple[Any, Any, Any, Any]:
     return u, w, phi_ddot, r2 - s12 * phi_ddot
 
 
-def diffrax(solver: str, adapts: bool, value: float, problem: Problem) -> Solve:
+def diffrax(solver: str, adapts: bool, value: float, problem: BenchProblem) -> Solve:
     """``diffeqsolve`` for JAX; every setting compiles for some seconds.
 
     XLA's pool is held to one thread so that rates are those of one core; its flags must stand before JAX is
@@ -196,7 +196,7 @@ def _torch(method: str, p: Coefficients) -> Any:
     return torch.compile(step, dynamic=False, fullgraph=True)
 
 
-def torch(method: str, h: float, problem: Problem) -> Solve:
+def torch(method: str, h: float, problem: BenchProblem) -> Solve:
     """A Runge-Kutta step written by hand over 8,192 lanes."""
     import torch
 
@@ -239,7 +239,7 @@ def heyoka_equations(scene: Scene | System | Mechanism) -> list[Any]:
     return [(phi, u), (theta, w), (u, phi_ddot), (w, r2 - s12 * phi_ddot)]
 
 
-def heyoka(tolerance: float, problem: Problem) -> Solve:
+def heyoka(tolerance: float, problem: BenchProblem) -> Solve:
     """Adaptive Taylor series, 512-bit where the processor has it."""
     import heyoka as hy
 

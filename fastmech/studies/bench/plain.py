@@ -10,7 +10,7 @@ from numba import njit
 
 from fastmech.arrays import Floats
 from fastmech.jit import FLAGS
-from fastmech.studies.bench.measure import Problem, Solve
+from fastmech.studies.bench.measure import BenchProblem, Solve
 
 
 @njit(nogil=True, **FLAGS)  # type: ignore[untyped-decorator]
@@ -56,7 +56,7 @@ def in_scalars(starts: Floats, p: Floats, h: float, steps: int) -> Floats:
     return final
 
 
-def prepared(h: float, problem: Problem) -> Solve:
+def prepared(h: float, problem: BenchProblem) -> Solve:
     """The loop at a fixed step."""
     p, steps = np.array(problem.coefficients), round(problem.t_end / h)
     return lambda starts: in_scalars(starts, p, problem.t_end / steps, steps)

@@ -33,7 +33,7 @@ SMALL = 1e-12
 SAME, LISTED = 1e-6, 1e-5
 
 
-class Tally(NamedTuple):
+class ProofTally(NamedTuple):
     """What was found of the mechanisms of one kind."""
 
     number: int = 0
@@ -50,13 +50,13 @@ class Tally(NamedTuple):
 def proofs_study(quick: bool, stage: Stage, scenes: int | None = None) -> list[str]:
     """``proofs.md``: what a multistart finds that a proved list lacks, and where indices do not add up."""
     number, starts = scenes or (FEW if quick else NUMBER), FEW_STARTS if quick else STARTS
-    tallies = {name: Tally() for name in KINDS}
+    tallies = {name: ProofTally() for name in KINDS}
     advance = stage("random mechanisms", number)
     for seed in range(number):
         name = list(KINDS)[seed % len(KINDS)]
         each = examined(KINDS[name](np.random.default_rng([7, seed])), starts, seed)
         summed: list[Any] = [a + b for a, b in zip(tallies[name], each, strict=True)]
-        tallies[name] = Tally(*summed)
+        tallies[name] = ProofTally(*summed)
         advance(1)
     head = (
         "kind | mechanisms | equilibria proved | lists complete | left open | zeros by Newton | "
@@ -73,7 +73,7 @@ def proofs_study(quick: bool, stage: Stage, scenes: int | None = None) -> list[s
     return section("# Proved lists beside a multistart", about, head, rows)
 
 
-def examined(mechanism: Mechanism, starts: int, seed: int) -> Tally:
+def examined(mechanism: Mechanism, starts: int, seed: int) -> ProofTally:
     """Prove, search, compare."""
     statics, values = mechanism.statics(), list(mechanism.parameters.values())
     prove_equilibria(statics, values, 2)  # compiles
@@ -84,7 +84,7 @@ def examined(mechanism: Mechanism, starts: int, seed: int) -> Tally:
     lacking = unlisted(statics, values, found, zeros)
     proof = found.certificate
     known = proof.complete and proof.expected_sum is not None and proof.index_sum is not None
-    return Tally(
+    return ProofTally(
         1, len(found), int(proof.complete), int(proof.outcome != Outcome.COMPLETE), len(zeros), len(lacking),
         int(known), int(known and proof.index_sum != proof.expected_sum), seconds,
     )  # fmt: skip

@@ -23,7 +23,7 @@ from fastmech.studies.bench.attractors import attractors_study
 from fastmech.studies.bench.basins import basins_study
 from fastmech.studies.bench.entrants import LIBRARIES, entrants, installed
 from fastmech.studies.bench.machine import costs, throughputs
-from fastmech.studies.bench.measure import BUDGET, PROBLEMS, Entrant, Problem, Row, measure
+from fastmech.studies.bench.measure import BUDGET, PROBLEMS, BenchProblem, Entrant, Row, measure
 from fastmech.studies.bench.processes import footprints, started, vectors_study
 from fastmech.studies.bench.proofs import proofs_study
 from fastmech.studies.bench.stiff import stiff_study
@@ -133,7 +133,7 @@ def _preamble(quick: bool, failures: list[str]) -> list[str]:
     ]
 
 
-def speed_dataset(rows: list[Row], problems: list[Problem]) -> Dataset:
+def speed_dataset(rows: list[Row], problems: list[BenchProblem]) -> Dataset:
     """Every row with the error of each of its trajectories, NaN where it was not given one."""
     errors = np.full((len(rows), max(len(problem.starts) for problem in problems)), np.nan)
     for line, row in zip(errors, rows, strict=True):

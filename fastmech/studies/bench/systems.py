@@ -25,7 +25,7 @@ from fastmech.reports import Stage
 from fastmech.scene import Scene
 from fastmech.studies.bench.devices import KINDS, explicit
 from fastmech.studies.bench.entrants import installed, prepared
-from fastmech.studies.bench.measure import Entrant, Prepare, Problem, Row, Solve, measure, rate_at
+from fastmech.studies.bench.measure import BenchProblem, Entrant, Prepare, Row, Solve, measure, rate_at
 from fastmech.studies.bench.own_systems import STARTS, SYSTEMS, OwnSystem, spoken
 from fastmech.studies.bench.peers import heyoka
 from fastmech.studies.bench.tolerances import ROUNDINGS, Rates, extended, scene_rates
@@ -67,18 +67,18 @@ class Measured(NamedTuple):
     call: float  #: seconds of heyoka's time on a trajectory in which a batch's call takes no step
 
 
-def _problem(name: str, scene: Any, rates: Rates, starts: Floats, t_end: float) -> Problem:
+def _problem(name: str, scene: Any, rates: Rates, starts: Floats, t_end: float) -> BenchProblem:
     truth = extended(rates, starts, t_end, ROUNDINGS[1]).astype(np.float64)
-    return Problem(name, name, scene, starts, truth, t_end, 1.0)
+    return BenchProblem(name, name, scene, starts, truth, t_end, 1.0)
 
 
-def problem_of(name: str, own: OwnSystem, n: int) -> Problem:
+def problem_of(name: str, own: OwnSystem, n: int) -> BenchProblem:
     """A system with its first n starts and their truth."""
     rhs = spoken(own.rhs, sin=np.sin, cos=np.cos, inverse_cube=lambda s: s**-1.5)
     return _problem(name, own.system(), lambda t, y: np.stack(rhs(t, *y)), own.starts(n), own.t_end)
 
 
-def mechanism(name: str, n: int) -> Problem:
+def mechanism(name: str, n: int) -> BenchProblem:
     """The mechanism with its first n starts and their truth."""
     scene, rate = Scene(alpha=0.0), SCENES[name]
     low, high = [0.5, -1.0, -rate, -rate], [2.5, 1.0, rate, rate]
@@ -86,7 +86,7 @@ def mechanism(name: str, n: int) -> Problem:
     return _problem(name, scene, scene_rates(scene), np.ascontiguousarray(starts), 10.0)
 
 
-def device(name: str, n: int) -> Problem:
+def device(name: str, n: int) -> BenchProblem:
     """A random mechanism with its first n starts and their truth."""
     seed, spread, t_end = DEVICES[name]
     made = KINDS[name.split()[-1]](np.random.default_rng(seed))
@@ -96,7 +96,7 @@ def device(name: str, n: int) -> Problem:
     return _problem(name, made, lambda t, y: np.stack(np.broadcast_arrays(*function(*y))), starts, t_end)
 
 
-def candidates(problem: Problem, targets: Sequence[float]) -> Iterator[dict[str, Any]]:
+def candidates(problem: BenchProblem, targets: Sequence[float]) -> Iterator[dict[str, Any]]:
     """Methods with steps by which everyone, or 99 %, has the errors asked for."""
     starts, t_end = problem.starts, problem.t_end
     found = work_precision(problem.scene, starts[:PICKED], t_end, errors=targets)
@@ -117,7 +117,7 @@ def candidates(problem: Problem, targets: Sequence[float]) -> Iterator[dict[str,
 def to_tolerance(tol: float, quantile: float, estimates: dict[tuple[int, float, float], float]) -> Prepare:
     """A run to a tolerance, which leaves its estimate by number of starts, quantile and tolerance."""
 
-    def prepare(problem: Problem) -> Solve:
+    def prepare(problem: BenchProblem) -> Solve:
         def solve(starts: Floats) -> Floats:
             run = integrate(problem.scene, starts, problem.t_end, tol=tol, quantile=quantile, threads=1)
             estimates[len(starts), quantile, tol] = float(run.error_estimate or 0.0)
@@ -134,7 +134,7 @@ def by_heyoka(tolerance: float, most: int) -> Entrant:
 
 
 def measured(
-    problem: Problem, targets: Sequence[float], advance: Callable[[int], None] = lambda done: None
+    problem: BenchProblem, targets: Sequence[float], advance: Callable[[int], None] = lambda done: None
 ) -> Measured:
     """Everyone on one system, timed in turns."""
     n, found = len(problem.starts), Measured(problem.name, {}, {}, {}, [], 0.0)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fastmech.plots.style import LINES, new_figure, save, style
 from fastmech.studies.bench.machine import Cost, Throughput
-from fastmech.studies.bench.measure import PROBLEMS, TARGETS, Problem, Row, fastest_at, frontier, rate_at
+from fastmech.studies.bench.measure import PROBLEMS, TARGETS, BenchProblem, Row, fastest_at, frontier, rate_at
 from fastmech.studies.reporting import section
 
 if TYPE_CHECKING:
@@ -156,7 +156,7 @@ def same_step(rows: list[Row]) -> list[str]:
     return [*compared, told, ""] if left_out else compared
 
 
-def problem_section(problem: Problem, rows: list[Row]) -> list[str]:
+def problem_section(problem: BenchProblem, rows: list[Row]) -> list[str]:
     """All that was measured on one problem."""
     mine = [row for row in rows if row.problem == problem.name]
     lines = [f"## {problem.name}: {problem.description}, to t = {problem.t_end:g} s", ""]

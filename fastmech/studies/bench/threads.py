@@ -19,7 +19,7 @@ from fastmech.ensembles.threads import thread_count
 from fastmech.reports import Stage
 from fastmech.studies.bench.entrants import PACKAGE, prepared
 from fastmech.studies.bench.machine import LANES, multiply_adds
-from fastmech.studies.bench.measure import Problem, fast_starts, rest_starts
+from fastmech.studies.bench.measure import BenchProblem, fast_starts, rest_starts
 from fastmech.studies.reporting import TURNS, in_turns, section
 
 #: Trajectories of a call, tenths of a second to seconds of work; turns of the yardstick, a third of one.
@@ -72,7 +72,7 @@ def cases(n: int, turns: int) -> dict[str, Run]:
     return found
 
 
-def _ensemble(problem: Problem, n: int, keywords: dict[str, Any]) -> Run:
+def _ensemble(problem: BenchProblem, n: int, keywords: dict[str, Any]) -> Run:
     starts = np.resize(problem.starts, (n, problem.starts.shape[1]))
     return lambda threads: prepared(keywords | {"threads": threads})(problem)(starts)
 

@@ -36,14 +36,14 @@ class FaultFound(AssertionError):  # noqa: N818 - what a campaign is there to fi
     """A run did not keep what it promises."""
 
 
-class Found(NamedTuple):
+class CampaignFound(NamedTuple):
     """What a campaign has found: sentences for the user, figures for other programs."""
 
     sentences: tuple[str, ...]
     facts: dict[str, Any]
 
 
-class Place(NamedTuple):
+class KillPlace(NamedTuple):
     """A folder with a request, its result and a log."""
 
     folder: Path
@@ -74,12 +74,12 @@ class Place(NamedTuple):
 
 
 @contextmanager
-def place() -> Iterator[Place]:
+def place() -> Iterator[KillPlace]:
     """A place with the request alone, removed in the end."""
     with tempfile.TemporaryDirectory(prefix="fastmech-faults-") as folder:
         inner = Path(folder) / "place"
         inner.mkdir()
-        here = Place(inner, Path(folder) / "log", inner / "scan.toml", inner / "scan.h5")
+        here = KillPlace(inner, Path(folder) / "log", inner / "scan.toml", inner / "scan.h5")
         here.request.write_text(REQUEST, encoding="utf-8")
         yield here
 
@@ -114,7 +114,7 @@ def reference() -> Reference:
     return result
 
 
-def check_resumed(here: Place, expected: Reference, what: str, interruptions: int = 1) -> int:
+def check_resumed(here: KillPlace, expected: Reference, what: str, interruptions: int = 1) -> int:
     """How many tiles were computed again, no more than were in hand.
 
     The result must be the undisturbed one, with nothing left beside it.
@@ -134,7 +134,7 @@ def check_resumed(here: Place, expected: Reference, what: str, interruptions: in
     return again
 
 
-def kill_campaign(kills: int, expected: Reference, seed: int, tell: Callable[[int], None]) -> Found:
+def kill_campaign(kills: int, expected: Reference, seed: int, tell: Callable[[int], None]) -> CampaignFound:
     """Kill runs at random moments, every third while it assembles, and resume them to the end.
 
     Raises:
@@ -161,10 +161,10 @@ def kill_campaign(kills: int, expected: Reference, seed: int, tell: Callable[[in
         f"{stages.total()} runs killed, {finished} scans resumed to the same result",
         f"  {again} tiles computed again; killed while {while_doing}",
     )
-    return Found(sentences, {"killed": {"runs": stages.total(), "tiles_again": again, **stages}})
+    return CampaignFound(sentences, {"killed": {"runs": stages.total(), "tiles_again": again, **stages}})
 
 
-def _killed_in(here: Place, expected: Reference, rng: random.Random) -> str:
+def _killed_in(here: KillPlace, expected: Reference, rng: random.Random) -> str:
     """Start a run and kill it; what it was doing, empty where it was faster."""
     seen = len(here.lines())
     process = here.start()
@@ -198,7 +198,7 @@ def can_mount() -> bool:
             return False
 
 
-def disk_campaign(runs: int, expected: Reference, seed: int, tell: Callable[[int], None]) -> Found:
+def disk_campaign(runs: int, expected: Reference, seed: int, tell: Callable[[int], None]) -> CampaignFound:
     """Run on disks that are too small, then give them room and run again.
 
     Raises:
@@ -224,7 +224,7 @@ def disk_campaign(runs: int, expected: Reference, seed: int, tell: Callable[[int
             again += check_resumed(here, expected, "after a full disk")
     told = f"{full} full disks told, the scans resumed to the same result"
     sentences = (told, f"  {again} tiles computed again; {fitting} disks were large enough")
-    return Found(sentences, {"full_disks": {"runs": full, "tiles_again": again}})
+    return CampaignFound(sentences, {"full_disks": {"runs": full, "tiles_again": again}})
 
 
 @contextmanager
@@ -240,7 +240,7 @@ def _small_disk(folder: Path, size: int) -> Iterator[Callable[[int], None]]:
         subprocess.run(["umount", str(folder)], check=True, capture_output=True)
 
 
-def worker_campaign(kills: int, expected: Reference, seed: int, tell: Callable[[int], None]) -> Found:
+def worker_campaign(kills: int, expected: Reference, seed: int, tell: Callable[[int], None]) -> CampaignFound:
     """Run the scan on two local workers and kill one of them at a random moment, time and again.
 
     Raises:
@@ -279,4 +279,4 @@ def worker_campaign(kills: int, expected: Reference, seed: int, tell: Callable[[
                 raise FaultFound("after a worker was killed the result differs")
             finished += 1
     sentence = f"{len(killed)} Dask workers killed, {finished} scans with the same result"
-    return Found((sentence,), {"workers_killed": len(killed)})
+    return CampaignFound((sentence,), {"workers_killed": len(killed)})

@@ -16,7 +16,7 @@ from fastmech.runner import run_request
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import read_request
 from fastmech.store.read import open_results
-from fastmech.studies.faults.campaigns import FaultFound, Found
+from fastmech.studies.faults.campaigns import CampaignFound, FaultFound
 from fastmech.studies.faults.victim import REQUEST, content_of, values_of
 
 #: Seconds after which reading a file counts as hanging.
@@ -38,7 +38,7 @@ variables = ["count", "outcome", "phi"]
 """
 
 
-def fuzz_requests(count: int, seed: int, tell: Callable[[int], None] = lambda n: None) -> Found:
+def fuzz_requests(count: int, seed: int, tell: Callable[[int], None] = lambda n: None) -> CampaignFound:
     """Read damaged scan files.
 
     Args:
@@ -60,7 +60,7 @@ def fuzz_requests(count: int, seed: int, tell: Callable[[int], None] = lambda n:
     return _fuzz("requests", texts, read, random.Random(seed), count, tell)
 
 
-def fuzz_results(count: int, seed: int, tell: Callable[[int], None] = lambda n: None) -> Found:
+def fuzz_results(count: int, seed: int, tell: Callable[[int], None] = lambda n: None) -> CampaignFound:
     """Read damaged result files, every variable of them: it is refused, or has the undamaged values.
 
     Args and errors as of `fuzz_requests`.
@@ -120,7 +120,7 @@ def _fuzz(
     rng: random.Random,
     count: int,
     tell: Callable[[int], None],
-) -> Found:
+) -> CampaignFound:
     refused, slowest, grown, before = 0, 0.0, 0, _memory()
     previous = signal.signal(signal.SIGALRM, _too_long)
     try:
@@ -153,7 +153,7 @@ def _fuzz(
         f"{count} damaged {what} read: {refused} refused, none crashed",
         f"  slowest {slowest:.2f} s, memory grew by {grown / 1e6:.0f} MB",
     )
-    return Found(sentences, {what: {"tried": count, "refused": refused}})
+    return CampaignFound(sentences, {what: {"tried": count, "refused": refused}})
 
 
 def _too_long(number: int, frame: FrameType | None) -> None:

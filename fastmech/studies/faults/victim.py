@@ -19,7 +19,7 @@ from fastmech.store.read import open_results
 from fastmech.studies.faults.small_tiles import small_tiles
 from fastmech.tiles.section import code_in_use
 from fastmech.tiles.tile_file import Tile
-from fastmech.tiles.work import Task, ThreadHiring, ThreadWorkers
+from fastmech.tiles.work import ThreadHiring, ThreadWorkers, TileTask
 
 REQUEST = """
 title = "a scan to be interrupted"
@@ -101,11 +101,11 @@ class _NotedHiring(ThreadHiring):
         self._note = note
 
     @contextmanager
-    def __call__(self, tasks: Sequence[Task], context: RunContext) -> Iterator[ThreadWorkers]:
+    def __call__(self, tasks: Sequence[TileTask], context: RunContext) -> Iterator[ThreadWorkers]:
         with super().__call__(tasks, context) as workers:
             submit = workers.submit
 
-            def noted(task: Task) -> Future[Tile]:
+            def noted(task: TileTask) -> Future[Tile]:
                 self._note(f"tile {task.section.name}:{task.index}")
                 return submit(task)
 

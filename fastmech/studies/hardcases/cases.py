@@ -33,9 +33,9 @@ from fastmech.studies.hardcases.walk import (
     ROUNDED,
     WITHIN,
     Boundary,
+    CaseRow,
     Goal,
     HardCase,
-    Row,
     admitted_step,
     boundary,
     claimed_row,
@@ -77,7 +77,7 @@ def motions(
     rounded: float = ROUNDED,
     stiff: bool = False,
     counted: Sequence[tuple[str, float, float, float]] = (),
-) -> Sequence[Row]:
+) -> Sequence[CaseRow]:
     """A reference motion by every method.
 
     Args:
@@ -110,7 +110,7 @@ def motions(
     return rows
 
 
-def _counted_row(goal: Goal, method: str, dt: float, allowed: float, fewer: float) -> Row:
+def _counted_row(goal: Goal, method: str, dt: float, allowed: float, fewer: float) -> CaseRow:
     """A declared claim with every right-hand side counted; too many of them fail the row."""
     row = fixed_row(goal, method, dt, allowed, "L-stable")
     work = counted(goal, method, round(goal.t_end / dt))
@@ -123,7 +123,7 @@ def _counted_row(goal: Goal, method: str, dt: float, allowed: float, fewer: floa
     return row._replace(error=error, remark=remark)
 
 
-def whip(quick: bool) -> Sequence[Row]:
+def whip(quick: bool) -> Sequence[CaseRow]:
     """A motion through which no fixed step of a useful length gets."""
     goal = motion("whip")
     return [status_row(goal, method, 1e-3, "1e3 rad/s and more for a moment") for method in walked(quick)]
@@ -146,7 +146,7 @@ def energy_history(
 
 def undamped(
     quick: bool, name: str, start: Sequence[float], claims: Sequence[tuple[str, str, float, float]]
-) -> Sequence[Row]:
+) -> Sequence[CaseRow]:
     """No damper, no force, a million steps: what happens to the energy.
 
     The methods that the case is about claim a trend and a drift beforehand (``claims``: method, formulation,
@@ -164,7 +164,7 @@ def undamped(
     return rows + [_shorter(start, method, short) for method in walked(quick)]
 
 
-def _shorter(start: Sequence[float], method: str, steps: int) -> Row:
+def _shorter(start: Sequence[float], method: str, steps: int) -> CaseRow:
     """A shorter run of any method: its largest energy error, claimed to what halving its step tells."""
     dt = admitted_step(UNDAMPED, method, DT, np.array([start]))
     if dt == 0.0:
@@ -217,7 +217,7 @@ def _kept_step(method: str, scene: Scene, frequency: float, length: float, most:
 
 def missed(
     quick: bool, name: str, scene: dict[str, float], near: tuple[float, float], power: float
-) -> Sequence[Row]:
+) -> Sequence[CaseRow]:
     """Motions that decay like a power of time because the damping misses a mode."""
     here = Scene(alpha=0.0).replace(**scene)
     rest = min(find_equilibria(here), key=lambda e: abs(e.phi - near[0]) + abs(e.theta - near[1]))
@@ -257,7 +257,7 @@ def _circled(method: str, dt: float, length: float) -> tuple[Trajectories, float
     return run, power, float(run.y[-1, 0, 1]) / (2.0 * np.pi)
 
 
-def endless_circling(quick: bool) -> Sequence[Row]:
+def endless_circling(quick: bool) -> Sequence[CaseRow]:
     """M2 circles M1 for ever: no label, and the energy above the orbit falls like 1/t."""
     length, most = QUICK if quick else FULL
     turning = float(np.sqrt(CIRCLING.c1 / CIRCLING.m2))
@@ -326,7 +326,7 @@ def _passage(side: float) -> _Passage:
     return _Passage(side, here, find_equilibria(here), ends.mean(axis=0), way, 0.5 * gap, rate)
 
 
-def beside_fold(quick: bool, name: str, side: float) -> Sequence[Row]:
+def beside_fold(quick: bool, name: str, side: float) -> Sequence[CaseRow]:
     """One part in a million from a fold, before (-1) or behind it (1): a passage that looks like rest.
 
     Near a fold the motion follows one direction, x' = b (x^2 - d^2) with the minimum and the saddle at -d and
@@ -342,7 +342,7 @@ def beside_fold(quick: bool, name: str, side: float) -> Sequence[Row]:
     return [*rows, *(_fold_labels(passage, method) for method in labellers(quick))]
 
 
-def _creeping(passage: _Passage, method: str) -> Row:
+def _creeping(passage: _Passage, method: str) -> CaseRow:
     """How far the motion has crept, by its phase r t / 2, against the normal form's."""
     dt = admitted_step(passage.scene, method, SLOW_DT)
     run = integrate(passage.scene, [*passage.middle, 0.0, 0.0], CREEPING, dt or SLOW_DT, method)
@@ -356,7 +356,7 @@ def _creeping(passage: _Passage, method: str) -> Row:
     return row_of(run, error, FOLD_ALLOWED, remark=remark, why="resolves the slow rate")
 
 
-def _whole(passage: _Passage, method: str) -> Row:
+def _whole(passage: _Passage, method: str) -> CaseRow:
     """The minimum that is reached in the end, and when the ghost is left."""
     times = np.arange(10.0, WHOLE + 5.0, 10.0)
     run = integrate(passage.scene, [*passage.middle, 0.0, 0.0], dt=SLOW_DT, method=method, t_eval=times)
@@ -373,7 +373,7 @@ def _whole(passage: _Passage, method: str) -> Row:
     return row_of(run, error, FOLD_ALLOWED, remark=remark, why="resolves the slow rate")
 
 
-def _fold_labels(passage: _Passage, method: str) -> Row:
+def _fold_labels(passage: _Passage, method: str) -> CaseRow:
     """No start may be given to a well that it does not end in, and none be settled on the way."""
     wells = [k for k, e in enumerate(passage.equilibria) if e.morse_index == 0]
     shallow = [k for k in wells if passage.near(passage.equilibria[k])]
@@ -446,7 +446,7 @@ def _root(saddle: _Saddle, method: str, dt: float) -> float:
     return 0.5 * (low + high)
 
 
-def saddle_manifold(quick: bool) -> Sequence[Row]:
+def saddle_manifold(quick: bool) -> Sequence[CaseRow]:
     """A start on a saddle's stable manifold to 1e-12: the smallest difference decides where it ends."""
     saddle, rows = _saddle(), []
     for method in walked(quick, euler=False):
@@ -462,7 +462,7 @@ def saddle_manifold(quick: bool) -> Sequence[Row]:
     return [*rows, *(_saddle_labels(saddle, root, method) for method in labellers(quick))]
 
 
-def _saddle_labels(saddle: _Saddle, root: float, method: str) -> Row:
+def _saddle_labels(saddle: _Saddle, root: float, method: str) -> CaseRow:
     """Labels of starts on either side of the manifold at offset ``root``: the side's well, or none."""
     distance = 10.0 ** -np.arange(2.0, 13.0)
     far = label_starts(SADDLE, saddle.starts(root + np.array([-1.0, 1.0]) * distance[0]), 100.0)
@@ -482,7 +482,7 @@ def _saddle_labels(saddle: _Saddle, root: float, method: str) -> Row:
 CHAOTIC_START, SEED, LOST = np.array([0.3, 2.5, 3.0, -4.0]), 1e-12, 1e-2
 
 
-def chaos_predictability(quick: bool) -> Sequence[Row]:
+def chaos_predictability(quick: bool) -> Sequence[CaseRow]:
     """How long chaotic motion can be predicted."""
     found = largest_lyapunov(UNDAMPED, CHAOTIC_START, 500.0 if quick else 5000.0, 0.01)
     exponent = float(found.largest[0])
@@ -519,7 +519,7 @@ def _there_and_back(method: str, dt: float) -> tuple[Trajectories, Floats, float
     return again, again.y[-1, 0] * back, drift
 
 
-def chaos_reversed(quick: bool) -> Sequence[Row]:
+def chaos_reversed(quick: bool) -> Sequence[CaseRow]:
     """Whether chaotic motion comes back in reverse."""
     rows = []
     for method, dt in (("dop853", 0.005), ("abm12", 0.002), ("gauss6", 0.002)):
@@ -528,7 +528,7 @@ def chaos_reversed(quick: bool) -> Sequence[Row]:
     return rows + [_returned(method) for method in walked(quick)]
 
 
-def _returned(method: str) -> Row:
+def _returned(method: str) -> CaseRow:
     """Where one method comes back to, claimed to what halving its step tells and rounding that grew."""
     dt = admitted_step(UNDAMPED, method, 0.01, np.array([CHAOTIC_START]))
     while 0.0 < REVERSE <= CHAOS_STEPS * dt:
@@ -575,7 +575,7 @@ def _tangent_growth(start: Floats) -> float:
     return float(np.log(np.linalg.norm(solution.y[4:, -1]))) / SHORT
 
 
-def chaos_published(quick: bool) -> Sequence[Row]:
+def chaos_published(quick: bool) -> Sequence[CaseRow]:
     """The largest exponent of Henon-Heiles against printed ones and SciPy's tangent flow."""
     system, count = System(henon_heiles, ["x", "y", "u", "v"], {}), MEAN_OF // 4 if quick else MEAN_OF
     y = np.append(-0.25, -0.25 + 1e-9 * np.random.default_rng(1).normal(size=count - 1))
@@ -591,14 +591,14 @@ def chaos_published(quick: bool) -> Sequence[Row]:
     )
     why, ok = "three standard errors of the difference of two means", Status.OK.name.lower()
     steps = round(PRINTED_LENGTH / 0.1)
-    first = Row("dop853", 0.1, steps, abs(mean - theirs), allowed, np.nan, ok, remark, why)
+    first = CaseRow("dop853", 0.1, steps, abs(mean - theirs), allowed, np.nan, ok, remark, why)
     short, expected = largest_lyapunov(system, starts[0], SHORT, 0.05).largest[0], _tangent_growth(starts[0])
     remark = f"{short:.8f} 1/s over {SHORT:g} s, SciPy {expected:.8f} 1/s"
     error, steps = abs(float(short) - expected), round(SHORT / 0.05)
-    return [first, Row("dop853", 0.05, steps, error, 1e-6, np.nan, ok, remark, "rounding")]
+    return [first, CaseRow("dop853", 0.05, steps, error, 1e-6, np.nan, ok, remark, "rounding")]
 
 
-def chaos_reference(quick: bool) -> Sequence[Row]:
+def chaos_reference(quick: bool) -> Sequence[CaseRow]:
     """20 s of an undamped motion; rounding of 1e-16 grows with the exponent."""
     goal = motion("chaos", 1e-9)
     declared = (("dop853", 0.01, 1e-6), ("gauss6", 0.005, 1e-6), ("abm12", 0.004, 1e-6))
@@ -623,7 +623,7 @@ class _Line(NamedTuple):
     distance: Floats  #: from it [rad]
 
 
-def float32_at_a_boundary(quick: bool) -> Sequence[Row]:
+def float32_at_a_boundary(quick: bool) -> Sequence[CaseRow]:
     """Lanes of float32 beside lanes of float64: rounding decides where a motion ends."""
     distances = 10.0 ** -np.arange(3.0, 15.0)
     edge, shift = boundary(), np.concatenate([-distances, distances])
@@ -634,14 +634,14 @@ def float32_at_a_boundary(quick: bool) -> Sequence[Row]:
     return [*rows, *(_certified(line, method) for method in labellers(quick))]
 
 
-def _ends(line: _Line, method: str, dtype: str) -> Row:
+def _ends(line: _Line, method: str, dtype: str) -> CaseRow:
     """Where motions end in one precision; the boundary that a method sees moves by its own error, too."""
     edge, starts, above, distance = line
     dt = admitted_step(edge.scene, method, DT)
     try:
         run = integrate(edge.scene, starts, 60.0, dt, method, dtype=dtype)
     except InputError as refusal:
-        return Row(method, dt, 0, np.nan, np.nan, np.nan, REFUSED, str(refusal), "float32 is not offered")
+        return CaseRow(method, dt, 0, np.nan, np.nan, np.nan, REFUSED, str(refusal), "float32 is not offered")
     to_above, to_below = (np.abs(run.y[-1, :, :2] - end).max(axis=1) for end in (edge.above, edge.below))
     error = float(distance[(to_above < to_below) != above].max(initial=0.0))
     near, half = (integrate(edge.scene, starts, NEAR, h, method).y[-1] for h in (dt, 0.5 * dt))
@@ -651,7 +651,7 @@ def _ends(line: _Line, method: str, dtype: str) -> Row:
     return row_of(run, error, RIGHT_FROM[dtype] + estimate, remark=remark, why=why)
 
 
-def _certified(line: _Line, method: str) -> Row:
+def _certified(line: _Line, method: str) -> CaseRow:
     """Labels with a proof: none may be wrong, and near the boundary there must be none but a status."""
     edge, starts, above, distance = line
     found = label_starts(edge.scene, starts, 60.0, method=method)
@@ -672,7 +672,7 @@ def _certified(line: _Line, method: str) -> Row:
 BAD = {3: np.nan, 17: np.inf, 18: -np.inf, 40: 1e200, 41: 5e-324, 42: -1e-310}
 
 
-def bad_neighbours(quick: bool) -> Sequence[Row]:
+def bad_neighbours(quick: bool) -> Sequence[CaseRow]:
     """One block with and without unusual starts."""
     n = 64 if quick else 256
     starts = np.random.default_rng(1).uniform([-2, -2, -3, -3], [2, 2, 3, 3], (n, 4))
@@ -700,7 +700,7 @@ def bad_neighbours(quick: bool) -> Sequence[Row]:
 FAR_TOO_LONG = 2.0
 
 
-def sudden_decay(quick: bool) -> Sequence[Row]:
+def sudden_decay(quick: bool) -> Sequence[CaseRow]:
     """A force gone within a step."""
     m = motion("sudden_decay")
     gone = 50.0 / m.scene.alpha
@@ -718,7 +718,7 @@ def sudden_decay(quick: bool) -> Sequence[Row]:
     return rows
 
 
-def steps_ten_times_too_long(quick: bool) -> Sequence[Row]:
+def steps_ten_times_too_long(quick: bool) -> Sequence[CaseRow]:
     """Steps ten times too long: a warning before, and a status for every single trajectory."""
     minimum = next(e for e in find_equilibria(PAPER) if e.morse_index == 0)
     starts = np.random.default_rng(2).uniform([0.5, -1, 0, 0], [2.5, 1, 0, 0], (32 if quick else 256, 4))
@@ -736,7 +736,7 @@ def steps_ten_times_too_long(quick: bool) -> Sequence[Row]:
     return rows
 
 
-WALKS: dict[str, Callable[..., Sequence[Row]]] = {
+WALKS: dict[str, Callable[..., Sequence[CaseRow]]] = {
     walk.__name__: walk
     for walk in (
         motions, whip, undamped, missed, endless_circling, beside_fold, saddle_manifold, chaos_predictability,

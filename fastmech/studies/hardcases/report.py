@@ -37,7 +37,7 @@ from fastmech.step_limits.predict import largest_stable_step, limiting_eigenvalu
 from fastmech.store.write import check_writable
 from fastmech.studies.hardcases.cases import CASES, PAPER, QUICK_STEPS, STEPS, energy_history
 from fastmech.studies.hardcases.pictures import DRIFTS, Limits, draw_energy_drift, stability_pages
-from fastmech.studies.hardcases.walk import REFUSED, HardCase, Row
+from fastmech.studies.hardcases.walk import REFUSED, CaseRow, HardCase
 from fastmech.studies.reporting import columns, content, in_turns, section, write_data, write_text
 
 #: Methods that are measured, explicit, multistep and implicit ones, with the step [s].
@@ -142,11 +142,11 @@ RowStatus = IntEnum(  # type: ignore[misc]
 )
 
 
-class Result(NamedTuple):
+class CaseResult(NamedTuple):
     """A case and its rows."""
 
     case: HardCase
-    rows: Sequence[Row]
+    rows: Sequence[CaseRow]
 
     @property
     def passed(self) -> bool:
@@ -154,16 +154,16 @@ class Result(NamedTuple):
         return all(row.passed for row in self.rows)
 
 
-def run_gallery(quick: bool, progress: Callable[[int], None] = lambda done: None) -> list[Result]:
+def run_gallery(quick: bool, progress: Callable[[int], None] = lambda done: None) -> list[CaseResult]:
     """Every case in turn; ``progress`` is told of each."""
     results = []
     for case in CASES.values():
-        results.append(Result(case, case.run(quick)))
+        results.append(CaseResult(case, case.run(quick)))
         progress(1)
     return results
 
 
-def gallery_dataset(results: Sequence[Result]) -> Dataset:
+def gallery_dataset(results: Sequence[CaseResult]) -> Dataset:
     """One row a case and method."""
     rows = [row for result in results for row in result.rows]
     names = np.array([result.case.name for result in results for _ in result.rows], object)
@@ -175,7 +175,7 @@ def gallery_dataset(results: Sequence[Result]) -> Dataset:
     return Dataset(about | columns("row", rows, "gallery"), {"failures": sum(not row.passed for row in rows)})
 
 
-def verdict(results: Sequence[Result]) -> str:
+def verdict(results: Sequence[CaseResult]) -> str:
     """One line: how many cases passed, and which did not."""
     failed = [result.case.name for result in results if not result.passed]
     rows = [row for result in results for row in result.rows]
@@ -193,7 +193,7 @@ _INTRODUCTION = (
 )
 
 
-def gallery_lines(results: Sequence[Result]) -> list[str]:
+def gallery_lines(results: Sequence[CaseResult]) -> list[str]:
     """Every case with its table."""
     head = "method | step [s] | steps | error | claimed to | drift | status | verdict | why | remark"
     lines = ["# Hard cases", "", f"{verdict(results).capitalize()}.", "", _INTRODUCTION, ""]
@@ -204,7 +204,7 @@ def gallery_lines(results: Sequence[Result]) -> list[str]:
     return lines
 
 
-def _cells(row: Row) -> list[object]:
+def _cells(row: CaseRow) -> list[object]:
     step, error, allowed, drift = (
         "" if np.isnan(value) else f"{value:{form}}"
         for value, form in ((row.dt, ".3g"), (row.error, ".1e"), (row.allowed, ".1e"), (row.drift, ".1e"))

@@ -36,7 +36,7 @@ from fastmech.studies.reporting import content
 REFUSED = "refused"
 
 
-class Row(NamedTuple):
+class CaseRow(NamedTuple):
     """What one method did in a case.
 
     A method claims a case to an error, at a step; one that claims nothing must end with a status (or be
@@ -79,7 +79,7 @@ class HardCase(NamedTuple):
     hard: str  #: what makes it hard
     oracle: str  #: where the expected value comes from, and what the error is
     must: str  #: what must happen
-    run: Callable[[bool], Sequence[Row]]
+    run: Callable[[bool], Sequence[CaseRow]]
 
 
 def worst(status: ArrayLike) -> str:
@@ -102,15 +102,15 @@ def row_of(
     *,
     remark: str = "",
     why: str = "",
-) -> Row:
+) -> CaseRow:
     """A row of what ``integrate`` gave; without ``allowed`` it claims nothing."""
-    return Row(run.method, run.dt, run.steps, error, allowed, drift, worst(run.status), remark, why)
+    return CaseRow(run.method, run.dt, run.steps, error, allowed, drift, worst(run.status), remark, why)
 
 
-def labels_row(method: str, found: Labels, wrong: int, told: str = "") -> Row:
+def labels_row(method: str, found: Labels, wrong: int, told: str = "") -> CaseRow:
     """A row of what ``fm.label_starts`` gave: the error is how many are wrong, and none may be."""
     remark = "labels: " + ", ".join(f"{n} {name}" for name, n in found.counts.items() if n) + told
-    return Row(method, np.nan, found.steps, float(wrong), 0.0, np.nan, "ok", remark, "fm.label_starts")
+    return CaseRow(method, np.nan, found.steps, float(wrong), 0.0, np.nan, "ok", remark, "fm.label_starts")
 
 
 #: Relative error that rounding explains, of motions that are not chaotic.
@@ -188,7 +188,7 @@ def admitted_step(scene: Scene, method: str, longest: float, starts: ArrayLike |
     return min(dt, WITHIN * step_limit(scene, method))
 
 
-def claimed_row(goal: Goal, method: str, longest: float, refused: float) -> Row:
+def claimed_row(goal: Goal, method: str, longest: float, refused: float) -> CaseRow:
     """The end by one method, to the error that it claims itself, or the status that it must end with.
 
     Args:
@@ -209,16 +209,18 @@ def claimed_row(goal: Goal, method: str, longest: float, refused: float) -> Row:
     return status_row(goal, method, refused, why)
 
 
-def status_row(goal: Goal, method: str, dt: float, why: str, dtype: str = "float64") -> Row:
+def status_row(goal: Goal, method: str, dt: float, why: str, dtype: str = "float64") -> CaseRow:
     """A row of a method that claims nothing with this step."""
     try:
         run = integrate(goal.scene, goal.start, goal.t_end, dt, method, dtype=dtype)
     except InputError as error:
-        return Row(method, dt, 0, np.nan, np.nan, np.nan, REFUSED, str(error), why)
+        return CaseRow(method, dt, 0, np.nan, np.nan, np.nan, REFUSED, str(error), why)
     return row_of(run, goal.error(run.y[-1, 0]), why=why)
 
 
-def fixed_row(goal: Goal, method: str, dt: float, allowed: float, why: str, dtype: str = "float64") -> Row:
+def fixed_row(
+    goal: Goal, method: str, dt: float, allowed: float, why: str, dtype: str = "float64"
+) -> CaseRow:
     """A row of a method that claims the end to an error that is known beforehand."""
     run = integrate(goal.scene, goal.start, goal.t_end, dt, method, dtype=dtype)
     remark = "" if dtype == "float64" else dtype

@@ -58,7 +58,7 @@ HEADINGS = ("Case, part", "Symbol", "Unit", "Printed", "Computed", "Difference",
 _NEGLIGIBLE = 1e-9
 
 
-class Verdict(StrEnum):
+class Agreement(StrEnum):
     """What a comparison of a printed number came to."""
 
     AGREES = "agrees to the printed digit"
@@ -71,10 +71,10 @@ class Verdict(StrEnum):
     @property
     def good(self) -> bool:
         """Whether print and computation say the same."""
-        return self not in (Verdict.MISPRINT, Verdict.DIFFERS)
+        return self not in (Agreement.MISPRINT, Agreement.DIFFERS)
 
 
-class Row(NamedTuple):
+class PaperRow(NamedTuple):
     """One printed number or word of the paper."""
 
     section: str  #: "Table 2", "Equation (16)", ...
@@ -83,7 +83,7 @@ class Row(NamedTuple):
     unit: str
     printed: str  #: exactly as printed, lost characters as ``*``
     computed: float | str
-    verdict: Verdict
+    verdict: Agreement
     see: str = ""  #: key of the misprint that explains it
 
     @property
@@ -133,14 +133,14 @@ def number(printed: str) -> float:
     return float(evaluate(printed.replace(" pi", "*pi")))
 
 
-def compare(printed: str, computed: float | str) -> Verdict:
+def compare(printed: str, computed: float | str) -> Agreement:
     """Verdict of a print by itself."""
     if isinstance(computed, str):
-        return Verdict.SAME if printed == computed else Verdict.DIFFERS
+        return Agreement.SAME if printed == computed else Agreement.DIFFERS
     if "*" in printed:
-        return Verdict.LEGIBLE if agrees_legibly(printed, computed) else Verdict.DIFFERS
+        return Agreement.LEGIBLE if agrees_legibly(printed, computed) else Agreement.DIFFERS
     same = number(printed) == computed if "pi" in printed else agrees(printed, computed)
-    return Verdict.AGREES if same else Verdict.DIFFERS
+    return Agreement.AGREES if same else Agreement.DIFFERS
 
 
 def judged(
@@ -152,7 +152,7 @@ def judged(
     printed: str,
     computed: float | str,
     *explanations: str,
-) -> Row:
+) -> PaperRow:
     """A row with its verdict.
 
     Args:
@@ -166,7 +166,7 @@ def judged(
         explanations: keys of misprints that would explain a difference.
     """
     verdict, see = compare(printed, computed), ""
-    if verdict == Verdict.DIFFERS:
+    if verdict == Agreement.DIFFERS:
         see = next((key for key in explanations if key in misprints), "")
-        verdict = Verdict.MISPRINT if see else verdict
-    return Row(section, place, symbol, unit, printed, computed, verdict, see)
+        verdict = Agreement.MISPRINT if see else verdict
+    return PaperRow(section, place, symbol, unit, printed, computed, verdict, see)

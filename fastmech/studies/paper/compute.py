@@ -39,7 +39,7 @@ STEP, METHOD = 0.01, "dop853"
 
 
 @dataclass(frozen=True)
-class Case:
+class PaperCase:
     """One of the paper's equilibria, under the number that Table 2 gives it."""
 
     number: int
@@ -66,7 +66,7 @@ class Computed:
 
     count: int  #: number of equilibria under the constant force
     certificate: Certificate  #: of their completeness
-    cases: tuple[Case, ...]
+    cases: tuple[PaperCase, ...]
     motion: EnergyBalance  #: Lagrange's equations from Table 1's start
     momenta: Floats  #: p_phi, p_theta [kg m2/s] from the canonical equations, shape (times, 2)
     formulations_differ: Floats  #: largest differences between the formulations [rad, rad/s], (4,)
@@ -99,11 +99,11 @@ def nearest(equilibria: Equilibria, angles: Printed) -> Equilibrium:
     return min(equilibria, key=lambda e: np.hypot(np.sin((e.phi - phi) / 2), np.sin((e.theta - theta) / 2)))
 
 
-def _case(number: int, equilibrium: Equilibrium) -> Case:
+def _case(number: int, equilibrium: Equilibrium) -> PaperCase:
     t = np.linspace(0.0, DISTURBED_SPAN, round(DISTURBED_SPAN / OUTPUT) + 1)
     disturbed = disturbed_motion(STATIC_SCENE, equilibrium, DISTURBANCE, t, dt=STEP, method=METHOD)
     size = size_at(STATIC_SCENE, equilibrium.phi, equilibrium.theta)
-    return Case(
+    return PaperCase(
         number=number,
         equilibrium=equilibrium,
         classification=classify(STATIC_SCENE, equilibrium),

@@ -17,14 +17,14 @@ from fastmech.plots.style import LINES, PALETTE, entry, legend_below, new_figure
 from fastmech.results import Dataset, Variable
 from fastmech.slider.geometry import constraints, positions
 from fastmech.slider.lagrange import potential_energy, potential_gradient
-from fastmech.studies.paper.compare import HEADINGS, Row, Verdict
+from fastmech.studies.paper.compare import HEADINGS, Agreement, PaperRow
 from fastmech.studies.paper.compute import (
     DISTURBED_SPAN,
     MOTION_SPAN,
     PAPER_SCENE,
     STATIC_SCENE,
-    Case,
     Computed,
+    PaperCase,
 )
 from fastmech.studies.reporting import columns, content
 
@@ -38,7 +38,7 @@ ABOUT = content(__package__, "figures.toml")
 GRID = 181
 
 
-def all_datasets(computed: Computed, rows: Sequence[Row]) -> dict[str, Dataset]:
+def all_datasets(computed: Computed, rows: Sequence[PaperRow]) -> dict[str, Dataset]:
     """One dataset for every table and figure, and the rows of all printed numbers."""
     motion = computed.motion
     points = positions(PAPER_SCENE, motion.y)
@@ -66,11 +66,11 @@ def _file(table: str) -> str:
     return table.lower().replace(" ", "_")
 
 
-def _numbers(cases: Sequence[Case]) -> Variable:
+def _numbers(cases: Sequence[PaperCase]) -> Variable:
     return Variable(("case",), np.array([case.number for case in cases]), "1", "case of Table 2")
 
 
-def _equilibria(cases: Sequence[Case]) -> Dataset:
+def _equilibria(cases: Sequence[PaperCase]) -> Dataset:
     angles = np.linspace(-np.pi, np.pi, GRID)
     grid = np.stack(np.meshgrid(angles, angles, indexing="ij"), axis=-1)
     force = STATIC_SCENE.F0
@@ -95,7 +95,7 @@ def _equilibria(cases: Sequence[Case]) -> Dataset:
     )
 
 
-def _disturbed(cases: Sequence[Case]) -> Dataset:
+def _disturbed(cases: Sequence[PaperCase]) -> Dataset:
     along = ("case", "time")
     variables = {"case": _numbers(cases), "time": Variable(("time",), cases[0].disturbed.t, "s", "time")}
     for which in ("nonlinear", "linearized"):
@@ -110,21 +110,21 @@ def _disturbed(cases: Sequence[Case]) -> Dataset:
     return Dataset(variables)
 
 
-def rows_dataset(rows: Sequence[Row]) -> Dataset:
+def rows_dataset(rows: Sequence[PaperRow]) -> Dataset:
     """Rows of printed against computed values."""
     found, names = columns("row", rows, "printed_numbers"), {"word": "computed_text", "value": "computed"}
     about = {names.get(name, name): column for name, column in found.items()}
-    return Dataset(about, {"disagreeing": sum(row.verdict == Verdict.DIFFERS for row in rows)})
+    return Dataset(about, {"disagreeing": sum(row.verdict == Agreement.DIFFERS for row in rows)})
 
 
 ROW_HEIGHT = 0.27  #: inch
 
 #: Widths of the columns: place, symbol, unit, printed, computed, difference, verdict.
 WIDTHS = (0.10, 0.12, 0.10, 0.13, 0.16, 0.12, 0.27)
-HEADING, SHADES = "#e6e6e6", {Verdict.MISPRINT: "#fbe3cf", Verdict.DIFFERS: "#f4b6a6"}
+HEADING, SHADES = "#e6e6e6", {Agreement.MISPRINT: "#fbe3cf", Agreement.DIFFERS: "#f4b6a6"}
 
 
-def draw_table(title: str, rows: Sequence[Row]) -> Figure:
+def draw_table(title: str, rows: Sequence[PaperRow]) -> Figure:
     """One table of the paper, a line for each number; misprints are shaded."""
     from matplotlib.transforms import Bbox
 
@@ -214,7 +214,7 @@ def _angle_axes(axes: Axes) -> None:
     axes.grid(False)
 
 
-def draw_positions(cases: Sequence[Case]) -> Figure:
+def draw_positions(cases: Sequence[PaperCase]) -> Figure:
     """Figure 6 (b): the mechanism at each equilibrium, to scale."""
     with style():
         figure = new_figure(9.6, 9.2)
@@ -291,7 +291,7 @@ GROWTH = 1.5
 """A linearized disturbance leaves the picture at so many times the nonlinear one's largest angle."""
 
 
-def draw_disturbed(cases: Sequence[Case], title: str, *, linearized: bool) -> Figure:
+def draw_disturbed(cases: Sequence[PaperCase], title: str, *, linearized: bool) -> Figure:
     """Disturbances of the angles over time, one row a case, with the roots of the polynomial."""
     with style():
         figure = new_figure(9.6, 1.4 + 3.1 * len(cases))
@@ -304,7 +304,7 @@ def draw_disturbed(cases: Sequence[Case], title: str, *, linearized: bool) -> Fi
     return figure
 
 
-def _draw_angles(axes: Axes, case: Case, linearized: bool) -> None:
+def _draw_angles(axes: Axes, case: PaperCase, linearized: bool) -> None:
     t, nonlinear, linear = case.disturbed.t, case.disturbed.nonlinear[:, 0], case.disturbed.linearized[:, 0]
     inside = t <= (_span(t, nonlinear, linear) if linearized else t[-1])
     broad = 3.4 if linearized else 1.8
@@ -328,7 +328,7 @@ def _span(t: Floats, nonlinear: Floats, linear: Floats) -> float:
     return float(min(t[-1], 2.0 * t[np.argmax(gone)])) if gone.any() else float(t[-1])
 
 
-def _draw_roots(axes: Axes, case: Case) -> None:
+def _draw_roots(axes: Axes, case: PaperCase) -> None:
     roots = case.classification.eigenvalues
     reach = 1.7 * float(np.max(np.abs(roots.real)))
     height = 1.5 * max(1.0, float(np.max(np.abs(roots.imag))))
@@ -348,7 +348,7 @@ def _draw_roots(axes: Axes, case: Case) -> None:
     axes.set_title(f"{unstable or 'no'} root{'s' * (unstable > 1)} on the right")
 
 
-def draw_norms(cases: Sequence[Case]) -> Figure:
+def draw_norms(cases: Sequence[PaperCase]) -> Figure:
     """The size of the disturbance over time for all cases, nonlinear and linearized."""
     with style():
         figure = new_figure(9.6, 4.6)
@@ -378,7 +378,7 @@ class Picture(NamedTuple):
 _KICK = "After the disturbance ξ1 = 0.1 rad, η1 = 0.1 rad/s."
 
 
-def table_pictures(rows: Sequence[Row]) -> list[Picture]:
+def table_pictures(rows: Sequence[PaperRow]) -> list[Picture]:
     """Tables 1 to 4."""
     return [
         Picture(

@@ -32,7 +32,7 @@ from fastmech.slider.lagrange import (
     rates,
 )
 from fastmech.studies.paper.compare import CASES, Printed, agrees_legibly, evaluate, half_unit
-from fastmech.studies.paper.compute import PAPER_SCENE, START, Case, Computed
+from fastmech.studies.paper.compute import PAPER_SCENE, START, Computed, PaperCase
 
 Terms = list[dict[str, str]]
 
@@ -256,7 +256,7 @@ MEASURES: dict[str, Callable[[str, EnergyBalance], float]] = {
 }
 
 
-class Evidence(NamedTuple):
+class MisprintEvidence(NamedTuple):
     """One measure of how wrong a print is, and the correction."""
 
     measure: str
@@ -279,7 +279,7 @@ class Misprint(NamedTuple):
     error: str  #: in words, Markdown
     printed: str
     corrected: str
-    evidence: tuple[Evidence, ...]
+    evidence: tuple[MisprintEvidence, ...]
 
     @property
     def confirmed(self) -> bool:
@@ -293,7 +293,7 @@ def candidates(printed: Printed, computed: Computed) -> list[Misprint]:
     for key, formula in printed["formula"].items():
         wrong, right = formula["printed"], formula["corrected"]
         evidence = [
-            Evidence(about, unit, MEASURES[of](wrong, motion), MEASURES[of](right, motion), tolerance)
+            MisprintEvidence(about, unit, MEASURES[of](wrong, motion), MEASURES[of](right, motion), tolerance)
             for about, unit, tolerance, of in formula["measures"]
         ]
         formulas.append(Misprint(key, formula["place"], formula["error"], wrong, right, tuple(evidence)))
@@ -317,7 +317,7 @@ def candidates(printed: Printed, computed: Computed) -> list[Misprint]:
 
 
 def _misprint(
-    printed: Printed, key: str, both: tuple[str, str], *evidence: Evidence, other: str = ""
+    printed: Printed, key: str, both: tuple[str, str], *evidence: MisprintEvidence, other: str = ""
 ) -> Misprint:
     about = printed["misprint"][key]
     return Misprint(key, about["place"], about["error"].format(other=other), *both, evidence)
@@ -337,9 +337,9 @@ def _bracket_16(printed: Printed, computed: Computed) -> Misprint:
         printed,
         "equation_16_bracket",
         (_denominator(equation, False), _denominator(equation, True)),
-        Evidence(fitted, "1", exact.residual_as_printed, exact.residual_corrected, 1e-12),
+        MisprintEvidence(fitted, "1", exact.residual_as_printed, exact.residual_corrected, 1e-12),
         # The coefficients have two or three digits: 0.03 stands for 0.0267.
-        Evidence(along, "1", wrong, right, 0.02),
+        MisprintEvidence(along, "1", wrong, right, 0.02),
     )
 
 
@@ -361,14 +361,14 @@ def _wrong_digits(printed: Printed, key: str, value: str, exact: float, other: s
     places = len(value.partition(".")[2])
     right, about = f"{exact:.{places}f}", f"difference from the computed {exact:.{places + 3}f}"
     errors = abs(float(value) - exact), abs(float(right) - exact)
-    evidence = Evidence(about, "J", *errors, half_unit(value) * (1.0 + 1e-9))
+    evidence = MisprintEvidence(about, "J", *errors, half_unit(value) * (1.0 + 1e-9))
     return _misprint(printed, key, (value, right), evidence, other=other)
 
 
-def _copied_hessian(printed: Printed, cases: tuple[Case, ...]) -> Misprint:
+def _copied_hessian(printed: Printed, cases: tuple[PaperCase, ...]) -> Misprint:
     entries = printed["table_3"]["case_1"]["hessian"]
     hessians = [case.equilibrium.hessian for case in cases]
-    evidence = Evidence(
+    evidence = MisprintEvidence(
         "largest difference of the printed matrix from the Hessian at Case 1 (as printed) and at Case 3",
         "J",
         _largest(np.array(entries, dtype=np.float64) - hessians[0]),
@@ -385,10 +385,10 @@ def _sign_of_polynomials(printed: Printed) -> Misprint:
     wrong, right = (max(abs(sign * value - 1.0) for value in leading) for sign in (1.0, -1.0))
     about = "difference of the leading coefficient from 1, that of det(lambda - J)"
     both = "... - lambda**4", "... + lambda**4"
-    return _misprint(printed, "table_4_sign", both, Evidence(about, "1", wrong, right, 0.0))
+    return _misprint(printed, "table_4_sign", both, MisprintEvidence(about, "1", wrong, right, 0.0))
 
 
-def _copied_polynomial(printed: Printed, cases: tuple[Case, ...]) -> Misprint:
+def _copied_polynomial(printed: Printed, cases: tuple[PaperCase, ...]) -> Misprint:
     patterns = printed["table_4"]["case_1"]["coefficients"]
     values = [printed_polynomial(patterns, cases[k]) for k in (0, 2)]
     wrong, right = (
@@ -397,9 +397,9 @@ def _copied_polynomial(printed: Printed, cases: tuple[Case, ...]) -> Misprint:
     )
     about = "coefficients whose legible digits contradict the polynomial of Case 1 (as printed) and of Case 3"
     both = ", ".join(patterns), ", ".join(f"{value:.6g}" for value in values[0])
-    return _misprint(printed, "table_4_case_1", both, Evidence(about, "1", wrong, right, 0.0))
+    return _misprint(printed, "table_4_case_1", both, MisprintEvidence(about, "1", wrong, right, 0.0))
 
 
-def printed_polynomial(patterns: list[str], case: Case) -> Floats:
+def printed_polynomial(patterns: list[str], case: PaperCase) -> Floats:
     """Coefficients of lambda^0 to lambda^4 with the sign that the print's leading coefficient has."""
     return case.classification.polynomial[::-1] * float(patterns[4])

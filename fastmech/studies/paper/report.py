@@ -12,8 +12,8 @@ from fastmech.errors import InputError
 from fastmech.plots.style import png
 from fastmech.reports import Stage, no_stage, table, to_html
 from fastmech.store.write import check_writable
-from fastmech.studies.paper.compare import HEADINGS, Row, Verdict
-from fastmech.studies.paper.compute import METHOD, PAPER_SCENE, STEP, Case, Computed, compute
+from fastmech.studies.paper.compare import HEADINGS, Agreement, PaperRow
+from fastmech.studies.paper.compute import METHOD, PAPER_SCENE, STEP, Computed, PaperCase, compute
 from fastmech.studies.paper.figures import Picture, all_datasets, figure_pictures, table_pictures
 from fastmech.studies.paper.misprints import Misprint, candidates
 from fastmech.studies.paper.rows import Check, Guess, all_checks, all_rows, parameters_used
@@ -24,7 +24,7 @@ TITLE = "The source paper, computed again"
 
 def report_text(
     computed: Computed,
-    rows: Sequence[Row],
+    rows: Sequence[PaperRow],
     misprints: Sequence[Misprint],
     checks: Sequence[Check],
     guesses: Sequence[Guess],
@@ -68,15 +68,15 @@ def report_text(
 
 
 def _summary(
-    computed: Computed, rows: Sequence[Row], confirmed: Sequence[Misprint], checks: Sequence[Check]
+    computed: Computed, rows: Sequence[PaperRow], confirmed: Sequence[Misprint], checks: Sequence[Check]
 ) -> list[str]:
     numbers = Counter(row.verdict for row in rows if row.is_number)
     words = [row.verdict.good for row in rows if not row.is_number]
     return [
-        f"Of **{numbers.total()} printed numbers**, {numbers[Verdict.AGREES]} agree to the printed digit, "
-        f"{numbers[Verdict.LEGIBLE]} in every legible digit, {numbers[Verdict.ROUNDING]} is a rounding of "
-        f"the value that was used, **{numbers[Verdict.MISPRINT]} are misprints** and "
-        f"**{numbers[Verdict.DIFFERS]} differ unexplained**. "
+        f"Of **{numbers.total()} printed numbers**, {numbers[Agreement.AGREES]} agree to the printed digit, "
+        f"{numbers[Agreement.LEGIBLE]} in every legible digit, {numbers[Agreement.ROUNDING]} is a rounding "
+        f"of the value that was used, **{numbers[Agreement.MISPRINT]} are misprints** and "
+        f"**{numbers[Agreement.DIFFERS]} differ unexplained**. "
         f"{sum(words)} of {len(words)} printed verdicts say the same as the computation.",
         "",
         f"{len(confirmed)} misprints are proved, formulas included:",
@@ -92,12 +92,12 @@ def _anchor(key: str) -> str:
     return key.replace("_", "-")
 
 
-def _row(row: Row, places: dict[str, str]) -> list[str]:
+def _row(row: PaperRow, places: dict[str, str]) -> list[str]:
     # Markdown would read the stars as emphasis.
     texts = [f"`{text}`" if "*" in text and i in (0, 1, 3) else text for i, text in enumerate(row.cells)]
-    if row.verdict == Verdict.MISPRINT:
+    if row.verdict == Agreement.MISPRINT:
         texts[-1] = f"**misprint**: see [{places[row.see]}](#{_anchor(row.see)})"
-    if row.verdict == Verdict.DIFFERS:
+    if row.verdict == Agreement.DIFFERS:
         texts[-1] = "**differs**"
     return texts
 
@@ -119,7 +119,7 @@ def _misprint(item: Misprint) -> list[str]:
     ]
 
 
-def _equilibria(cases: Sequence[Case]) -> list[str]:
+def _equilibria(cases: Sequence[PaperCase]) -> list[str]:
     rows, verdicts = [], []
     for case in cases:
         e, c = case.equilibrium, case.classification
@@ -144,7 +144,7 @@ class PaperReport:
     """What was written, and what it says."""
 
     paths: tuple[Path, ...]  #: all files, the HTML report first
-    rows: tuple[Row, ...]  #: every printed number and verdict
+    rows: tuple[PaperRow, ...]  #: every printed number and verdict
     misprints: tuple[Misprint, ...]  #: those that the evidence confirms
     checks: tuple[Check, ...]
 

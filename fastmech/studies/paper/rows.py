@@ -12,7 +12,7 @@ from fastmech.arrays import Floats
 from fastmech.scene import Scene
 from fastmech.slider.equilibria import find_equilibria
 from fastmech.slider.geometry import Points, constraints, positions
-from fastmech.studies.paper.compare import CASES, Printed, Row, Verdict, agrees, judged
+from fastmech.studies.paper.compare import CASES, Agreement, PaperRow, Printed, agrees, judged
 from fastmech.studies.paper.compute import (
     DISTURBANCE,
     METHOD,
@@ -21,8 +21,8 @@ from fastmech.studies.paper.compute import (
     START,
     STATIC_SCENE,
     STEP,
-    Case,
     Computed,
+    PaperCase,
     nearest,
 )
 from fastmech.studies.paper.misprints import Terms, equilibrium_20, hamiltonian_16, printed_polynomial
@@ -97,7 +97,7 @@ def _agreeing(printed: Printed, scene: Scene) -> int:
 Number = tuple[Any, ...]
 
 
-def all_rows(printed: Printed, computed: Computed, misprints: Collection[str]) -> list[Row]:
+def all_rows(printed: Printed, computed: Computed, misprints: Collection[str]) -> list[PaperRow]:
     """Rows in the paper's order; ``misprints`` are the keys of those that the evidence confirms."""
     numbers = chain(
         _table_1(printed),
@@ -110,7 +110,7 @@ def all_rows(printed: Printed, computed: Computed, misprints: Collection[str]) -
     rows = [judged(misprints, *number) for number in sorted(numbers, key=lambda n: order.index(n[0]))]
     # The one parameter of which the paper used more digits than it prints.
     return [
-        row._replace(verdict=Verdict.ROUNDING)
+        row._replace(verdict=Agreement.ROUNDING)
         if (row.section, row.symbol) == ("Table 1", "c2") and row.difference
         else row
         for row in rows
@@ -178,7 +178,7 @@ def _equations(printed: Printed) -> Iterator[Number]:
             yield "Equation (20)", f"condition of {angle}", term["factor"], "N m", term["value"], float(value)
 
 
-def _tables(printed: Printed, cases: tuple[Case, ...]) -> Iterator[Number]:
+def _tables(printed: Printed, cases: tuple[PaperCase, ...]) -> Iterator[Number]:
     """Tables 2 to 4, case by case."""
     for name, case in zip(CASES, cases, strict=True):
         place, e = f"Case {case.number}", case.equilibrium

@@ -11,8 +11,8 @@ import fastmech as fm
 from fastmech.integrators.methods import METHODS
 from fastmech.step_limits.predict import stable_step
 from fastmech.studies.hardcases.cases import CASES
-from fastmech.studies.hardcases.report import Result, gallery_dataset, gallery_lines, verdict
-from fastmech.studies.hardcases.walk import Row, counted, explicit_calls, motion, path_eigenvalues
+from fastmech.studies.hardcases.report import CaseResult, gallery_dataset, gallery_lines, verdict
+from fastmech.studies.hardcases.walk import CaseRow, counted, explicit_calls, motion, path_eigenvalues
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -31,10 +31,10 @@ def test_the_gallery_is_large_and_described() -> None:
         assert case.must
 
 
-def row(**changes: object) -> Row:
+def row(**changes: object) -> CaseRow:
     values = {"method": "rk4", "dt": 0.1, "steps": 3, "error": 1e-9, "allowed": 1e-8, "drift": np.nan,
               "status": "ok"} | changes  # fmt: skip
-    return Row(**values)  # type: ignore[arg-type]
+    return CaseRow(**values)  # type: ignore[arg-type]
 
 
 def test_what_passes() -> None:
@@ -48,7 +48,7 @@ def test_what_passes() -> None:
 
 def test_a_failure_is_said_in_one_line_and_in_the_file(tmp_path: Path) -> None:
     case = CASES["chaos_reversed"]
-    good, bad = Result(case, [row()]), Result(case, [row(), row(error=1.0, method="euler")])
+    good, bad = CaseResult(case, [row()]), CaseResult(case, [row(), row(error=1.0, method="euler")])
     assert verdict([good]) == "all 1 cases passed (1 row)"
     assert verdict([good, bad]) == "1 of 2 cases failed: chaos_reversed"
     dataset = gallery_dataset([good, bad])

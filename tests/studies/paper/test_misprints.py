@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from oracles import TABLE_1, oracle
 
-from fastmech.studies.paper.compare import Verdict, evaluate
+from fastmech.studies.paper.compare import Agreement, evaluate
 from fastmech.studies.paper.compute import PAPER_SCENE, Computed
 from fastmech.studies.paper.misprints import Misprint, candidates, hamiltonian_16
 from fastmech.studies.paper.rows import all_rows
@@ -76,7 +76,7 @@ def test_a_right_print_is_no_misprint(changed: dict[str, Any], computed: Compute
     gone = {"table_4_sign", "table_4_case_1"} if key == "table_4_sign" else {key}
     assert confirmed == set(KEYS) - gone
     rows = all_rows(changed, computed, confirmed)
-    assert [row for row in rows if row.verdict == Verdict.DIFFERS or row.see in gone] == []
+    assert [row for row in rows if row.verdict == Agreement.DIFFERS or row.see in gone] == []
 
 
 def test_with_all_mended_everything_agrees(changed: dict[str, Any], computed: Computed) -> None:

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from fastmech.studies.paper.compare import (
-    Verdict,
+    Agreement,
     agrees,
     agrees_legibly,
     compare,
@@ -43,11 +43,11 @@ def test_expressions_see_nothing_but_the_quantities_given() -> None:
 
 def test_fractions_of_pi() -> None:
     assert number("4 pi / 13") == pytest.approx(0.9666438934122440)
-    assert compare("pi / 7", 0.4487989505128276) == Verdict.AGREES
+    assert compare("pi / 7", 0.4487989505128276) == Agreement.AGREES
 
 
 def test_a_difference_needs_a_proved_misprint() -> None:
     row = judged({"known"}, "Table", "", "x", "J", "1.0", 2.0, "known")
-    assert (row.verdict, row.see) == (Verdict.MISPRINT, "known")
+    assert (row.verdict, row.see) == (Agreement.MISPRINT, "known")
     row = judged(set(), "Table", "", "x", "J", "1.0", 2.0, "known")
-    assert (row.verdict, row.see) == (Verdict.DIFFERS, "")
+    assert (row.verdict, row.see) == (Agreement.DIFFERS, "")
