@@ -27,6 +27,7 @@ def test_every_value_of_every_kind_can_be_read() -> None:
     assert {scan.kind for scan in asked.scans.values()} == for_the_scene
     with fm.open_results(SHIPPED) as results:
         assert results.sections == tuple(asked.scans)
+        assert all(f"{name} ({scan.kind})" in repr(results) for name, scan in asked.scans.items())
         for name, scan in asked.scans.items():
             section = results[name]
             assert section.attrs["kind"] == scan.kind

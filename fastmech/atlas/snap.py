@@ -43,17 +43,11 @@ class Snap(Printed):
             for value, how in zip((self.below, self.above), self.how, strict=True)
             if value is not None
         ]
-        nowhere = "no load whatever" if self.parameter == "F0" else f"no {self.parameter} whatever"
-        if not self.exhaustive:
-            nowhere = (
-                "no load in that range" if self.parameter == "F0" else f"no {self.parameter} in that range"
-            )
+        what = "load" if self.parameter == "F0" else self.parameter
+        nowhere = f"does not end at any {what}" + ("" if self.exhaustive else " in that range")
         low, high = self.searched
         beyond = "; no position merges with another beyond" if self.exhaustive else ""
-        return (
-            f"{' and '.join(ends) or f'disappears at {nowhere}'} "
-            f"(searched from {low:.6g} to {high:.6g} {self.unit}{beyond})"
-        )
+        return f"{' and '.join(ends) or nowhere} (searched from {low:.6g} to {high:.6g} {self.unit}{beyond})"
 
     def told(self) -> str:
         """The answer in words."""

@@ -49,7 +49,7 @@ _ADVICE = {
     Status.ELSEWHERE: "proved to end at another stable equilibrium, or at its own some turns further",
     Status.OUT_OF_RANGE: "leaves the range of a coordinate, beyond which the mechanism is not described",
     Status.ESCAPED: "goes far beyond all attractors that were found, or stops where its system says so",
-    Status.UNSURE: "two runs with different steps part: near a boundary, or in chaos that lasts long before it ends",
+    Status.UNSURE: "runs with different steps part: near a boundary, or in chaos that lasts long",
 }
 
 #: Statuses of motions that have failed; of labels; and of where disturbances end.

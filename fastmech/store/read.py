@@ -276,6 +276,10 @@ class Results(AbstractContextManager["Results"]):
             self.close()
             raise
 
+    def __repr__(self) -> str:
+        sections = ", ".join(f"{name} ({one.attrs.get('kind')})" for name, one in self._sections.items())
+        return f"results of {shown(self.attrs.get('title', ''))} in {self.path}\n  sections: {sections}"
+
     @property
     def sections(self) -> tuple[str, ...]:
         """Names of the sections, in the order of the request."""

@@ -30,7 +30,7 @@ def test_table_1_never_snaps() -> None:
     assert (snap.below, snap.above) == (None, None)
     assert snap.exhaustive
     assert snap.position == pytest.approx((1.4506, -0.2326), abs=1e-3)
-    assert "no load whatever" in snap.sentence
+    assert "does not end at any load (" in snap.sentence
 
 
 def test_each_well_of_a_bistable_mechanism_snaps_at_one_end() -> None:
@@ -161,7 +161,7 @@ def test_wrong_requests_are_refused() -> None:
 def test_searched_range_is_kept_to() -> None:
     snap = find_snap(BISTABLE, searched=(-600.0, 600.0))
     assert (snap.below, snap.above, snap.exhaustive) == (None, None, False)
-    assert "no load in that range" in snap.sentence
+    assert "does not end at any load in that range" in snap.sentence
 
 
 def test_any_mechanism_snaps() -> None:
