@@ -166,10 +166,12 @@ def label_states(
         certificate.warn_of_step(dt, method)
     if settle_radius is not None:
         settle_radius = checks.number("settle_radius", settle_radius, "rad", above=0.0)
-    finite = finite_rows(begin)
+    outside = first.outside(begin)
+    finite = finite_rows(begin) & ~outside
     coarse = first.coarse_steps(begin) if dt is None else np.full(len(begin), dt)
     found = Paths.empty(len(begin), len(first.names))
     status = np.where(finite, Status.UNDECIDED, Status.START_NOT_FINITE).astype(np.int8)
+    status[outside] = Status.OUT_OF_RANGE
     settle = None if settle_radius is None else np.full(len(begin), np.nan)
     shortest = np.inf if dt is not None else certificate.shortest_step
     for some in pieces_of(len(begin)):

@@ -78,6 +78,10 @@ class CaptureCertificate(ABC):
     joule: float  #: J of the unit that energies have here
     amplitudes: float  #: how much U varies, in that unit: the scale of its rounding
 
+    def outside(self, states: Floats) -> NDArray[np.bool_]:
+        """Which states (n, states) lie beyond the range of a coordinate (n,)."""
+        return np.zeros(len(states), dtype=np.bool_)
+
     @property
     @abstractmethod
     def levels(self) -> Floats:

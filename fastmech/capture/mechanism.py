@@ -297,6 +297,12 @@ class MechanismCertificate(CaptureCertificate):
     fades: float  #: [s]: after it, the last of these
     origin: float = 0.0
 
+    def outside(self, states: Floats) -> NDArray[np.bool_]:
+        """Which states (n, states) lie beyond the range of a coordinate (n,)."""
+        low, high, period = self.tree.cells.domain.T
+        q = states[:, : len(low)]
+        return np.asarray((((q < low) | (q > high)) & (period == 0.0)).any(axis=1))
+
     @property
     def names(self) -> tuple[str, ...]:  # type: ignore[override]
         """Of the coordinates."""

@@ -189,6 +189,20 @@ def test_a_motion_that_leaves_its_range_says_so() -> None:
     assert found.counts["out_of_range"] == 2
 
 
+def test_starts_beyond_a_range_have_no_label() -> None:
+    """A range of an angle that does not turn, and one of a length: both are where they were declared."""
+    truss = fm.mechanisms.von_mises_truss().replace(b=3.0, P=2.0)
+    starts = np.zeros((5, 4))
+    starts[:, 0] = 0.89, 0.91, -0.91, 0.0, 0.0
+    starts[:, 1] = -0.5, -0.5, -0.5, 1.99, 2.01
+    found = fm.label_starts(truss, starts)
+    beyond = found.status == fm.Status.OUT_OF_RANGE
+    assert beyond[[1, 2, 4]].all()
+    assert (found.well[beyond] == -1).all()
+    assert not beyond[0]
+
+
+
 def test_disturbances_maps_and_shocks_of_a_mechanism() -> None:
     mechanism = double_well()
     equilibria = fm.find_equilibria(mechanism)
