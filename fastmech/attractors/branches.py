@@ -35,7 +35,7 @@ from fastmech.generated import new_module, run_module
 from fastmech.jit import FLAGS
 from fastmech.kernels.rebuilding import fingerprint, rebuilt
 from fastmech.models.mechanism import Mechanism
-from fastmech.objects import Drawn
+from fastmech.objects import Drawn, Printed
 from fastmech.samplers import Starts
 from fastmech.scene import nearest
 
@@ -63,8 +63,8 @@ class Special(NamedTuple):
     amplitude: Floats  #: of each state (dim,)
 
 
-@dataclass(frozen=True)
-class Branch:
+@dataclass(frozen=True, repr=False)
+class Branch(Printed):
     """Periodic motions along a branch."""
 
     values: Floats  #: of the parameter (m,)
@@ -74,6 +74,14 @@ class Branch:
     special: tuple[Special, ...]
     closed: bool  #: whether it comes back to where it began: an isola
     cut: bool  #: whether it goes on inside the range beyond an end: it is too long, or turns too sharply
+
+    def told(self) -> str:
+        """Where it leads, how much of it is stable, and how it ends."""
+        low, high = self.values.min(), self.values.max()
+        how = ", closed" * self.closed + ", cut off" * self.cut
+        special = ", ".join(f"{one.kind} at {one.value:.6g}" for one in self.special)
+        head = f"{len(self.values)} periodic motions from {low:.6g} to {high:.6g}{how}"
+        return f"{head}, {self.stable.mean():.0%} stable" + (f"\n  {special}" if special else "")
 
     @property
     def stable(self) -> Flags:

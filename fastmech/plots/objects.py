@@ -25,6 +25,13 @@ def _parameters(system: Any) -> dict[str, float]:
     return {name: value for name, (value, *_) in system.described().items()}
 
 
+def _setting(system: Any) -> str:
+    """The name of a mechanism or a system, with some of its parameters, for titles."""
+    values = list(_parameters(system).items())
+    each = ", ".join(f"{name} = {value:g}" for name, value in values[: style.MOST_TOLD])
+    return f"{system.name}: {each}{', ...' * (len(values) > style.MOST_TOLD)}"
+
+
 def draw_trajectories(found: Any, axes: style.Axes) -> None:
     """Coordinates over time, of at most 50 trajectories; of a system of one's own all states."""
     units = state_units(found.system)
@@ -151,6 +158,7 @@ def draw_attractors(found: Any, axes: style.Axes) -> None:
             **look,
         )
     axes.set(**{f"{x}label": found.names[c] for x, c in zip("xy", columns, strict=True)})
+    axes.set_title(_setting(found.system))
     style.legend_under(axes, columns=1)
 
 
@@ -167,10 +175,21 @@ def draw_basin_map(found: Any, axes: style.Axes) -> None:
     well = found.well.reshape(*(found.axes[n].size for n in names), -1)
     well = well[..., well.shape[-1] // 2].reshape(found.axes[names[0]].size, -1)
     there = np.unique(well)
-    colors = ["#ffffff" if k < 0 else COLORS[i % len(COLORS)] for i, k in enumerate(there)]
+    colors = ["#d9d9d9" if k < 0 else COLORS[i % len(COLORS)] for i, k in enumerate(there)]
     y = found.axes[names[1]] if len(names) > 1 else np.zeros(1)
     style.paint(axes, found.axes[names[0]], y, np.searchsorted(there, well), colors)
     axes.set(xlabel=names[0], ylabel=names[1] if len(names) > 1 else "")
     told = ["no label" if k < 0 else f"code {k}" if found.tree is None else found.tree[k].name for k in there]
     shares = [f"{text}: {np.mean(well == k):.1%}" for k, text in zip(there, told, strict=True)]
-    style.legend_under(axes, [style.swatch(t, c, "black") for c, t in zip(colors, shares, strict=True)], 1)
+    handles = [style.swatch(t, c, "black") for c, t in zip(colors, shares, strict=True)]
+    if found.tree is not None and len(names) > 1:
+        columns = [found.tree.names.index(name) for name in names]
+        looks: Any = {"ls": "none", "marker": "o", "mfc": "white", "mec": "black", "ms": 5}
+        low, high = np.array([[found.axes[name][k] for name in names] for k in (0, -1)])
+        points = np.concatenate([one.points[:64, columns] for one in found.tree.attractors])
+        points = points[((points >= low) & (points <= high)).all(axis=1)]
+        if len(points):
+            axes.plot(*points.T, **looks)
+            handles.append(style.entry("points of attractors", **looks))
+    axes.set_title(_setting(found.system))
+    style.legend_under(axes, handles, 1)

@@ -202,7 +202,6 @@ def test_starts_beyond_a_range_have_no_label() -> None:
     assert not beyond[0]
 
 
-
 def test_disturbances_maps_and_shocks_of_a_mechanism() -> None:
     mechanism = double_well()
     equilibria = fm.find_equilibria(mechanism)
