@@ -88,7 +88,7 @@ print(json.dumps({"answer": dY[:, 0].tolist(), "kept": kept}))
 
 USERS_MODULE = """
 import numba
-from fastmech.kernels import select
+from fastmech.slider.kernels import select
 
 @numba.njit(cache=True)
 def twice(x):
@@ -133,7 +133,7 @@ def copied(folder: Path) -> tuple[Path, dict[str, str]]:
 
 def reduced(copy: Path) -> tuple[Path, str]:
     """A file that kernels reach through imports, and its text with the potential's gradient doubled."""
-    source = copy / "fastmech" / "mechanism" / "reduced.py"
+    source = copy / "fastmech" / "slider" / "reduced.py"
     text = source.read_text()
     old = "    return u1, u2\n"  # of potential_gradient
     assert text.count(old) == 1

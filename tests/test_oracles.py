@@ -33,7 +33,7 @@ def read(name: str) -> dict[str, Any]:
 
 
 def printed_numbers() -> dict[str, Any]:
-    path = DATA.parent / "fastmech" / "paper" / "printed.toml"
+    path = DATA.parent / "fastmech" / "studies" / "paper" / "printed.toml"
     return tomllib.loads(path.read_text(encoding="utf-8"))
 
 

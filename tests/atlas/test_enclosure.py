@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fastmech.atlas import cover
 from fastmech.atlas.continuation import finish_on_edge, inside, trace
 from fastmech.scene import Scene
+from fastmech.slider.atlas import cover
 from fastmech.slider.atlas.cover import DefiningSystem, apart, solutions
 from fastmech.slider.atlas.systems import Plane, fold
 
