@@ -220,7 +220,7 @@ def require_scene(scene: Any, hint: str = "") -> None:
         InputError: it is something else.
     """
     if not isinstance(scene, Scene):
-        raise InputError(f"scene = {shown(scene)}: must be a Scene{hint or ' or a Mechanism'}")
+        raise InputError(f"scene = {shown(scene)}: must be a Scene{hint}")
 
 
 #: How HDF5 files begin.

@@ -94,7 +94,7 @@ def find_snap(
     """
     if isinstance(system, Mechanism):
         return _of_mechanism(system, equilibrium, searched, parameter)
-    require_scene(system)
+    require_scene(system, " or a Mechanism")
     parameter = moving("F0" if parameter is None else parameter)
     found = find_equilibria(system)
     scene = held(system, found)

@@ -262,7 +262,7 @@ def require_constant_force(scene: Scene | Mechanism) -> None:
             if load.to_come(0.0) != (0.0, 0.0):
                 raise InputError(f"{scene.name}: {load!r} changes; nothing rests while it does")
         return
-    require_scene(scene)
+    require_scene(scene, " or a Mechanism")
     if scene.F0 != 0 and scene.alpha != 0:
         raise InputError(
             f"scene.alpha = {scene.alpha:g}: must be 0 1/s for motion about an equilibrium (or F0 = 0 N); "

@@ -366,7 +366,7 @@ def find_equilibria(scene: Scene, at: float = math.inf) -> Equilibria:
     Raises:
         InputError: ``at`` is not a number >= 0.
     """
-    require_scene(scene)
+    require_scene(scene, " or a Mechanism")
     frozen = frozen_force(scene, at)
     coefficients = reduce(scene)._replace(force=frozen / (scene.m2 * scene.l))
     solution = solve_rows(np.array([coefficients]), compiled=False)

@@ -60,7 +60,7 @@ def test_no_scene_is_refused_in_a_line() -> None:
         lambda: find_folds(None, "c1", [1.0, 2.0]),  # type: ignore[arg-type]
         lambda: find_snap(None),  # type: ignore[arg-type]
     ):
-        with pytest.raises(InputError, match=r"^scene = None: must be a Scene$"):
+        with pytest.raises(InputError, match=r"^scene = None: must be a Scene"):
             wrong()
 
 
