@@ -124,7 +124,7 @@ class DisturbedEnsemble(Drawn):
             f"(95 % interval {shares.lower:.2%} to {shares.upper:.2%})",
         ]
         back, median = np.isfinite(self.time_to_return).sum(), return_quantile(self, 0.5)
-        half = f"half of those that return after {median:.3g} s" if median < np.inf else "the others later"
+        half = f"after {median:.3g} s (median)" if median < np.inf else "most of them later"
         lines.append(
             f"  back (see time_to_return) by {self.t_end:g} s: {back:,} of {self.outcome.size:,}, {half}"
         )
