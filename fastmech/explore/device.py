@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from fastmech.errors import InputError
 from fastmech.scene import STATE, Scene, nearest
@@ -77,22 +77,6 @@ class Device:
         for form in forms:
             form.places([[0.0, 0.0]])  # makes its functions
         return forms
-
-    def loads(self, parameters: Mapping[str, float], q: ArrayLike, times: Floats) -> tuple[Floats, Floats]:
-        """Forces: ends a unit apart (m, k, 2, 2) [m] at positions (m, n), values (m, k) [N] at times (m,)."""
-        import sympy
-
-        from fastmech.models.drawing import Element
-
-        t, made = sympy.Symbol("t"), self.mechanism(parameters)
-        ends, values = [np.zeros((len(times), 0, 2, 2))], [np.zeros((len(times), 0))]
-        for (kind, load, *_), (*_, places) in zip(made._drawn, made.places(q)[1], strict=False):
-            if kind is Element.LOAD:
-                one = load.at(made.parameters)
-                value = getattr(one, "function", None) or sympy.lambdify(t, one.expression(t), "math")
-                ends.append(places[:, None])
-                values.append(np.array([float(value(float(s))) for s in times])[:, None])
-        return np.concatenate(ends, axis=1), np.concatenate(values, axis=1)
 
     @cached_property
     def _energy(self) -> Any:

@@ -22,7 +22,7 @@ TILE, ATLAS = 5_000, 20
 
 #: What views import; one thread at a time, in this order unless a page asks for another.
 MODULES = {
-    "equilibria": ("models.equilibria", "models.stability", "models.drawing", "mechanisms"),
+    "equilibria": ("models.equilibria", "models.stability", "plots.animation", "mechanisms"),
     "motion": ("ensembles.integrate",),
     "basins": ("basins.label", "attractors.flow"),
     "atlas": ("atlas.map", "atlas.folds", "atlas.critical_curves"),
@@ -56,9 +56,10 @@ def _header(message: Any, **more: Any) -> dict[str, Any]:
 
 def _drawn(device: Device, message: Any, q: Any, times: Floats) -> tuple[dict[str, Any], dict[str, Floats]]:
     from fastmech.models.drawing import drawing
+    from fastmech.plots.animation import load_arrows
 
     drawn = drawing(device.mechanism(message.parameters, still=True), q)
-    loads, forces = device.loads(message.parameters, q, times)
+    loads, forces = load_arrows(device.mechanism(message.parameters), q, times)
     masses = [float(m) if np.isfinite(m) else None for m in drawn.mass]
     told = {"elements": drawn.kind.tolist(), "names": drawn.name, "masses": masses, "angles": drawn.angles}
     return told, {"ends": drawn.ends, "loads": loads, "forces": forces}

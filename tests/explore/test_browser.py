@@ -18,7 +18,8 @@ import sys
 import time
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -289,7 +290,8 @@ def lines_of(opened: Opened, view: str, folder: Path, monkeypatch: pytest.Monkey
     python, request = opened.page.locator(f"#{view} pre").all_text_contents()
     monkeypatch.chdir(folder)
     names: dict[str, Any] = {}
-    exec(python, names)
+    with redirect_stdout(StringIO()):
+        exec(python, names)
     plt.close("all")
     assert len(request_of_text(request, "request.toml", scan_kinds()).scans) == 1
     return names | {"request": request}

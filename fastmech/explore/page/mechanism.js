@@ -4,6 +4,7 @@ import { Plane, canvas, css, draggable, element, fixed, panel } from "./ink.js";
 const [FIXED, POINT, GUIDE, ROD, SPRING, DAMPER, LOAD, MASS] = [0, 1, 2, 3, 4, 5, 6, 7];
 
 // Names as in the package's pictures.
+const SYMBOLS = { phi: "φ", theta: "θ" };
 const named = (name) => name.replace(/^([A-Za-z])(\d+)$/, (_, letter, digits) => letter + digits.replace(/\d/g, (d) => "₀₁₂₃₄₅₆₇₈₉"[d]));
 
 export class MechanismView {
@@ -153,11 +154,11 @@ export class MechanismView {
         ink.line([[x0, y0], on(origin, 1.25 * r)], { color, width: 1, dash: [4, 3] });
         ink.line(arc, { color, width: 2 });
         if (Math.abs(q) > 0.25) this.head(arc[28], arc[32], color);
-        ink.text(...on(origin + 0.5 * sign * q, 1.3 * r), coordinates[k], { color: css("ink"), size: 13 });
+        ink.text(...on(origin + 0.5 * sign * q, 1.3 * r), SYMBOLS[coordinates[k]] ?? coordinates[k], { color: css("ink"), size: 13 });
       }
       coordinates.forEach((n, k) => {
         const degrees = states[n].unit === "rad" ? ` (${fixed(y[k] * 180 / Math.PI, 1)}°)` : "";
-        ink.text(this.plane.box.left + 6, this.plane.box.top + 10 + 16 * k, `${n} = ${fixed(y[k], 3)} ${states[n].unit}${degrees}`, { color: css("ink"), align: "left" });
+        ink.text(this.plane.box.left + 6, this.plane.box.top + 10 + 16 * k, `${SYMBOLS[n] ?? n} = ${fixed(y[k], 3)} ${states[n].unit}${degrees}`, { color: css("ink"), align: "left" });
       });
     }
     if (of.forces.shape[1]) {
