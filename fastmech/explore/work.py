@@ -147,11 +147,14 @@ def _basins(device: Device, message: Any) -> Iterator[bytes]:
 
 
 def _atlas(device: Device, message: Any) -> Iterator[bytes]:
+    from fastmech.atlas.axes import check_axis
     from fastmech.atlas.critical_curves import critical_curves
     from fastmech.atlas.folds import trace_folds
     from fastmech.atlas.map import map_equilibria
 
     system = device.at(message.parameters)
+    for name, ends in message.axes.items() if device.is_scene else ():
+        check_axis(system, name, ends)  # what its curves refuse, before numbers are shown
     for halving in range(message.halvings + 1):
         divisions = ATLAS * 2**halving
         axes = {name: np.linspace(a, b, divisions + 1) for name, (a, b) in message.axes.items()}

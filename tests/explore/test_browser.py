@@ -370,6 +370,12 @@ def test_an_atlas_over_a_mass_begins_above_zero_and_names_what_its_curves_are(
     select.select_option("m1")
     opened.until("explorer.atlas.current && explorer.atlas.shown.m1[0] > 0", 60)
     assert opened.page.inner_text("#atlas .refusal") == ""
+    # Axes are those that are chosen even where nothing can be answered.
+    opened.page.evaluate("explorer.change({ atlas: ['alpha', 'c2'] }, 'atlas')")
+    opened.until("document.querySelector('#atlas .refusal').textContent.includes('alpha')", 60)
+    assert opened.page.evaluate("explorer.atlas.plane.labels") == ["alpha [1/s]", "c2 [N/m]"]
+    assert not opened.page.evaluate("explorer.atlas.current")
+    opened.page.evaluate("explorer.change({ atlas: ['m1', 'c2'] }, 'atlas')")
     # What is typed beyond the range widens slider and atlas.
     number = opened.page.get_by_label(re.compile("^m1: .*value$"))
     number.fill("70")

@@ -210,6 +210,12 @@ def test_an_atlas_is_the_library_s_with_its_curves(what: str | None) -> None:
     np.testing.assert_array_equal(arrays["curve0"][0], curves.curves[0].x.astype(np.float32))
 
 
+def test_an_atlas_over_what_moves_no_equilibrium_shows_nothing() -> None:
+    told = {"kind": "atlas", "id": 1, "axes": {"alpha": [0.0, 2.0], "c2": [1.0, 2.0]}, "halvings": 0}
+    with pytest.raises(InputError, match=r"axes\.alpha"):
+        next(replies(opened(None), read_message(json.dumps(told))))
+
+
 def test_newest_wins_and_two_pages_do_not_disturb_each_other(server: tuple[str, int]) -> None:
     big = {"kind": "basins", "axes": AXES, "halvings": 4}
     with talk(server) as one, talk(server) as two:

@@ -91,8 +91,8 @@ class Field {
   }
   // What the picture is a slice at, and which equilibria lie in it.
   slice() {
-    const names = this.app.state[this.key], { coordinates, states } = this.app.about, held = Object.keys(states).filter((n) => !names.includes(n));
-    return held.some((n) => coordinates.includes(n)) ? ` Held: ${held.map((n) => `${n} = 0 ${states[n].unit}`).join(", ")}; equilibria elsewhere are pale.` : "";
+    const names = this.app.state[this.key], { coordinates, states } = this.app.about, held = coordinates.filter((n) => !names.includes(n));
+    return held.length ? ` Held: ${held.map((n) => `${n} = 0 ${states[n].unit}`).join(", ")}; equilibria elsewhere are pale.` : "";
   }
   within(row) {
     const { coordinates, states } = this.app.about, names = this.app.state[this.key];
@@ -116,6 +116,8 @@ class Field {
       p.ink.text(p.x(x), p.y(y), `${k + 1}`, { color: stable ? "#ffffff" : "#000000", size: 11 });
     });
   }
+  // Said until the first answer is there.
+  waits(words) { if (!this.shown) this.note.textContent = words; }
   // The path within one turn, broken where it leaves at one side and comes back at the other.
   wrapped() {
     const motion = this.app.motion, names = this.app.state[this.key], key = names.join();

@@ -261,7 +261,7 @@ export function panel(id, title, { planes = () => [], lines = true } = {}) {
     made.python = code.textContent = python;
     made.request = request.textContent = text;
     made.ways.forEach((one) => { one.disabled = !python; });
-    section.classList.toggle("stale", line !== "");
+    section.classList.toggle("stale", line !== "" && made.filled === true);
     refusal.textContent = line;
   };
   made.tell = (about, view, asked) => { made.filled = true; made.put(pythonOf(about, view, asked), requestOf(about, view, asked)); };

@@ -110,7 +110,7 @@ class App {
   refused({ line, of }) {
     const { landscape, table, mechanism, basins, atlas, histories } = this, still = this.motion ? [] : [mechanism];
     const views = { equilibria: [landscape, table, ...still], basins: [basins], atlas: [atlas], motion: [...histories.panels.map((one) => ({ panel: one })), mechanism] }[of] ?? [];
-    views.forEach((one) => one.panel.refuse(line));
+    views.forEach((one) => { one.waits?.(""); one.panel.refuse(line); });
     if (of === "equilibria" || !views.length) { this.failed = of; error.textContent = line; }
     if (of === "equilibria") this.free();
     if (of === "motion") this.stood();
@@ -172,11 +172,13 @@ class App {
   askBasins() {
     this.mapped = true;
     this.basins.set();
+    this.basins.waits("Starts are being followed.");
     this.talk.ask("basins", { parameters: this.state.parameters, axes: this.basins.axes() });
   }
   askAtlas() {
     if (!this.atlas) return;
     this.atlas.set();
+    this.atlas.waits("Equilibria are being counted.");
     this.talk.ask("atlas", { parameters: this.held() ? { ...this.state.parameters, alpha: 0 } : this.state.parameters, axes: this.atlas.axes() });
   }
   // Over the force of a scene the atlas is of one that stays: of one that fades nothing is left at rest.
