@@ -262,6 +262,8 @@ def test_pictures_requests_and_python_are_taken_along(opened: Opened, tmp_path: 
     page = opened.page
     opened.press("#landscape", 0.6, 0.4)
     opened.until("explorer.mechanism.playing", 30)
+    page.wait_for_timeout(1000)
+    opened.settle()  # lines follow a map that is refined
     for view in ("mechanism", "landscape", "basins", "atlas", "motion", "energies", "portrait"):
         for form in ("PNG", "SVG"):
             with page.expect_download() as got:
