@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import threading
+import webbrowser
+from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -15,9 +18,7 @@ if TYPE_CHECKING:
 
 @click.command(name="explore")
 @click.argument("what", metavar="[SCENE.toml | MECHANISM | RESULT.h5]", required=False)
-@click.option(
-    "--port", metavar="N", type=click.IntRange(0, 65535), default=0, help="Port [default: a free one]."
-)
+@click.option("--port", metavar="N", type=click.IntRange(0, 65535), default=0, help="Port [default: free].")
 @click.option("--no-browser", is_flag=True, help="Only print the page's address.")
 def explore(what: str | None, port: int, no_browser: bool) -> None:
     """Explore a mechanism live, on a page in the browser.
@@ -25,23 +26,13 @@ def explore(what: str | None, port: int, no_browser: bool) -> None:
     MECHANISM is the name of a shipped one, or FILE.py:NAME; by default it is the paper's with Table 1. The
     page is served to this machine only. Ctrl-C ends it.
     """
-    try:
-        import starlette  # noqa: F401
-        import uvicorn  # noqa: F401
-        import websockets  # noqa: F401
-    except ImportError:
-        raise InputError(
-            "explore: needs starlette, uvicorn and websockets; install them with:"
-            " pip install 'fastmech[explore]'"
-        ) from None
+    if missing := [one for one in ("starlette", "uvicorn", "websockets") if find_spec(one) is None]:
+        raise InputError(f"explore: needs {', '.join(missing)}; install: pip install 'fastmech[explore]'")
     from fastmech.explore.serve import serve
 
     def ready(address: str) -> None:
         click.echo(f"fastmech: {address} (Ctrl-C ends)")
         if not no_browser:
-            import threading
-            import webbrowser
-
             threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
 
     serve(opened(what), port, ready)
@@ -56,9 +47,8 @@ def opened(what: str | None) -> Device:
     from fastmech.explore.device import Device
     from fastmech.scene import Scene, parse_toml, read_toml
 
-    if what is None:
-        return Device(Scene())
-    results = None
+    what, results = what or "", None
+    table: dict[str, Any] = {"mechanism": what} if what else {}
     if what.endswith((".h5", ".hdf5")):
         from fastmech.store.read import open_results
 
@@ -74,8 +64,6 @@ def opened(what: str | None) -> Device:
         if not isinstance(made, Mechanism):
             raise InputError(f"{what}: is a System, which has no drawing; give a Mechanism")
         return Device(made, what)
-    else:
-        table = {"mechanism": what}
     if "mechanism" not in table:
         return Device(Scene(**table.get("scene", {})), None, results)
     from fastmech.scan_types.request import device_of

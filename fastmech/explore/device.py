@@ -1,25 +1,21 @@
-"""What is explored: a scene of the paper's mechanism or any mechanism, its parameters, ranges and drawing.
-
-A page is there as soon as a scene is: SymPy and Numba are loaded when something is computed.
-"""
+"""What is explored: a scene or any mechanism, its parameters and ranges; there before SymPy and Numba are."""
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from fastmech.errors import InputError
 from fastmech.scene import STATE, Scene, nearest
 
 if TYPE_CHECKING:
-    from fastmech.models.drawing import Drawing
     from fastmech.models.mechanism import Mechanism
 
 Floats = NDArray[np.float64]
@@ -32,15 +28,12 @@ class Device:
     """A mechanism with parameters that the page changes.
 
     Args:
-        system: as it is first shown.
-        source: what stands for it in lines of Python and in requests: the name of a shipped mechanism, or
-            ``FILE.py:NAME``; of a scene None.
+        system: the scene or mechanism as it is first shown.
+        source: name of a shipped mechanism, or ``FILE.py:NAME``; of a scene None.
         results: the result file that is shown with it.
     """
 
-    def __init__(
-        self, system: Scene | Mechanism, source: str | None = None, results: Path | None = None
-    ) -> None:
+    def __init__(self, system: Any, source: str | None = None, results: Path | None = None) -> None:
         self.system, self.source, self.results = system, source, results
         self.is_scene = isinstance(system, Scene)
         self.name = "slider_pendulum" if isinstance(system, Scene) else system.name
@@ -68,9 +61,10 @@ class Device:
         values = {name: float(value) for name, (value, *_) in made.described().items()}
         if still and values["alpha"]:
             values |= {"F0": 0.0, "alpha": 0.0}
-        form = copy.copy(self._forms[values["alpha"] != 0.0])
-        form.parameters = values
-        return form
+        form = self._forms[values["alpha"] != 0.0]
+        made = object.__new__(type(form))
+        vars(made).update(vars(form), parameters=values)  # with its functions, which a copy makes again
+        return made
 
     @cached_property
     def _forms(self) -> Any:
@@ -81,17 +75,8 @@ class Device:
 
         forms = tuple(slider_pendulum().replace(F0=1.0, alpha=alpha) for alpha in (0.0, 1.0))
         for form in forms:
-            form.places([[0.0, 0.0]])  # its functions, which copies share
+            form.places([[0.0, 0.0]])  # makes its functions
         return forms
-
-    def drawn(self, parameters: Mapping[str, float], q: ArrayLike) -> Drawing:
-        """What is drawn at positions (m, n); a scene's force as it is at the beginning."""
-        from fastmech.models.drawing import drawing
-
-        made = self.mechanism(parameters, still=True)
-        if self.is_scene:
-            made.parameters["F0"] = self.at(parameters).F0
-        return drawing(made, q)
 
     @cached_property
     def _energy(self) -> Any:
@@ -110,29 +95,35 @@ class Device:
         found = self._energy(*np.moveaxis(states, -1, 0), *values)
         return np.broadcast_to(np.asarray(found, dtype=np.float64), states.shape[:-1])
 
-    def states(self, axes: Mapping[str, Floats], fixed: Mapping[str, float]) -> Floats:
-        """States (n1, n2, 2 n) over two of their components, the first along the first axis.
+    def states(self, axes: Mapping[str, Floats], others: Mapping[str, float]) -> Floats:
+        """States (n1, n2, 2 n) over two of their components, zero but for ``others``.
 
         Raises:
             InputError: a component is unknown.
         """
-        for name in (*axes, *fixed):
+        for name in (*axes, *others):
             if name not in self.state:
                 raise InputError(f"axes.{name}: unknown name; {nearest(name, list(self.state))}")
         made = np.empty((*(values.size for values in axes.values()), len(self.state)))
         for k, name in enumerate(self.state):
-            made[..., k] = fixed.get(name, 0.0)
+            made[..., k] = others.get(name, 0.0)
         for k, (name, values) in enumerate(axes.items()):
             made[..., self.state.index(name)] = values[:, None] if k == 0 else values
         return made
 
+    def _allows(self, name: str, value: float) -> bool:
+        """Whether a parameter can have a value."""
+        with suppress(InputError):
+            return self.system.replace(**{name: value}) is not None
+        return False
+
     def about(self) -> dict[str, Any]:
         """What a page must know: parameters and coordinates with units and ranges."""
         first = (Scene() if self.is_scene else self.system).described()
-        parameters = {
-            name: {"value": value, "reset": first[name][0], "unit": unit, "about": text}
-            for name, (value, unit, text) in self.system.described().items()
-        }
+        parameters = {}
+        for name, (value, unit, text) in self.system.described().items():
+            own = {"value": value, "reset": first[name][0], "unit": unit, "about": text}
+            parameters[name] = own | {"zero": self._allows(name, 0.0), "negative": self._allows(name, -1.0)}
         states = {}
         for k, name in enumerate(self.coordinates):
             low, high, periodic, unit = -math.pi, math.pi, True, "rad"
@@ -142,6 +133,6 @@ class Device:
                     low, high = (e if math.isfinite(e) else math.copysign(LENGTH, e) for e in ends)
                 unit = "m" if name in self.system.lengths else "rad"
             states[name] = {"unit": unit, "low": low, "high": high, "periodic": periodic}
-        results = self.results and self.results.name
-        told = {"name": self.name, "scene": self.is_scene, "rates": self.state[len(states) :]}
-        return told | {"parameters": parameters, "states": states, "results": results}
+        told = {"name": self.name, "scene": self.is_scene, "source": self.source, "dt": self.dt}
+        told |= {"rates": self.state[len(states) :], "results": self.results and self.results.name}
+        return told | {"parameters": parameters, "states": states}

@@ -36,7 +36,6 @@ class EquilibriaMessage(Message):
 
     kind: Literal["equilibria"]
     axes: Ranges
-    fixed: Annotated[dict[str, float], Field(max_length=8)] = {}
     num: Annotated[int, Field(ge=2, le=201)] = 101
 
 
@@ -54,9 +53,7 @@ class BasinsMessage(Message):
 
     kind: Literal["basins"]
     axes: Ranges
-    fixed: Annotated[dict[str, float], Field(max_length=8)] = {}
     halvings: Annotated[int, Field(ge=0, le=HALVINGS)] = 4
-    t_end: Annotated[float, Field(gt=0, le=600)] = 60.0
 
 
 class AtlasMessage(Message):
@@ -77,11 +74,12 @@ class PullMessage(Message):
 
 
 class StrikeMessage(Message):
-    """The state after a blow at rest that would give a free mass [kg] at a point this velocity [m/s]."""
+    """The state after a blow that would give a free mass [kg] at rest at a point this velocity [m/s]."""
 
     kind: Literal["strike"]
     point: Annotated[str, Field(max_length=100)]
     q: Annotated[list[float], Field(max_length=4)]
+    rates: Annotated[list[float], Field(max_length=4)]
     mass: Annotated[float, Field(gt=0)]
     velocity: Range
 

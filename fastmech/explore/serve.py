@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+import shutil
 import socket
 import sys
 import tempfile
@@ -16,6 +17,7 @@ import threading
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
 from functools import cache, partial
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +34,7 @@ from fastmech.errors import InputError, one_line
 from fastmech.explore.device import Device
 from fastmech.explore.messages import LONGEST, read_message
 from fastmech.explore.work import MODULES, load, replies
-from fastmech.interrupts import Cancelled, work_while
+from fastmech.interrupts import Cancelled, still_wanted, work_while
 
 PAGE = Path(__file__).parent / "page"
 
@@ -77,8 +79,8 @@ class Page:
 
     def __init__(self, device: Device, send: Callable[[str | bytes], None]) -> None:
         self._device, self._send = device, send
-        self._newest, self._waiting, self._busy = dict[str, int](), dict[str, Any](), set[str]()
-        self._counter, self._lock = 0, threading.Lock()
+        self._newest, self._waiting, self.busy = dict[str, int](), dict[str, Any](), set[str]()
+        self._counter, self._lock = count(), threading.Lock()
 
     def take(self, text: str | bytes) -> None:
         """Begin what a message asks for; what is wrong with it is told to the page.
@@ -89,19 +91,13 @@ class Page:
         message = read_message(text)
         kind = message.what if message.kind == "stop" else message.kind
         with self._lock:
-            self._counter += 1
-            self._newest[kind] = self._counter
+            self._newest[kind] = next(self._counter)
             self._waiting[kind] = message
             if message.kind == "stop":
                 del self._waiting[kind]
-            elif kind not in self._busy:
-                self._busy.add(kind)
+            elif kind not in self.busy:
+                self.busy.add(kind)
                 threading.Thread(target=self._work, args=(kind,), name=kind, daemon=True).start()
-
-    @property
-    def works(self) -> bool:
-        """Whether anything is being computed for it."""
-        return bool(self._busy)
 
     def close(self) -> None:
         """End all work."""
@@ -117,7 +113,7 @@ class Page:
             with self._lock:
                 message, number = self._waiting.pop(kind, None), self._newest.get(kind)
                 if message is None:
-                    self._busy.discard(kind)
+                    self.busy.discard(kind)
                     return
             work_while(partial(self._wants, kind, number))
             try:
@@ -136,17 +132,18 @@ def _error(line: str, **about: Any) -> str:
 
 def application(device: Device, port: int) -> Starlette:
     """The server's application."""
-    pages, kernels = set[Callable[..., None]](), list[str]()
+    pages, kernels = dict[Callable[..., None], Page](), list[str]()
 
     def compiling(name: str | None) -> None:
         kernels.extend([name] if name else [])
-        told: dict[str, Any] = {"kind": "compiling", "name": name, "of": threading.current_thread().name}
+        own = getattr(still_wanted(), "args", [""])[0]  # the view, which some threads that it starts know
+        of = [own] if own else sorted({kind for page in list(pages.values()) for kind in list(page.busy)})
+        told: dict[str, Any] = {"kind": "compiling", "name": name, "of": of}
         told |= {"number": len(kernels), "about": max(KERNELS, len(kernels))}
         for send in list(pages):
             send(json.dumps(told), 0.0)
 
     def prepare() -> None:
-        load("equilibria")
         from fastmech.jit import listeners
 
         listeners.append(compiling)
@@ -157,6 +154,8 @@ def application(device: Device, port: int) -> Starlette:
     async def listening(app: Starlette) -> AsyncIterator[None]:
         threading.Thread(target=prepare, daemon=True).start()
         yield
+        if device.results:
+            shutil.rmtree(folder, ignore_errors=True)
 
     async def sections(request: Request) -> Response:
         try:
@@ -180,7 +179,7 @@ def application(device: Device, port: int) -> Starlette:
                 await websocket.send({"type": "websocket.send", kind: content})
 
         page, delivery = Page(device, send), asyncio.create_task(deliver())
-        pages.add(send)
+        pages[send] = page
         await queue.put(json.dumps({"kind": "about", **device.about()}))
         try:
             while (got := await websocket.receive())["type"] != "websocket.disconnect":
@@ -189,7 +188,7 @@ def application(device: Device, port: int) -> Starlette:
                 except InputError as error:
                     await queue.put(_error(str(error)))
         finally:
-            pages.discard(send)
+            del pages[send]
             page.close()
             delivery.cancel()
 

@@ -7,14 +7,13 @@ message ends it between two calls of a kernel, some milliseconds later. What a v
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from importlib import import_module
 from typing import Any
 
 import numpy as np
 
 from fastmech.explore.device import Device, Floats
-from fastmech.explore.lines import grid, python_of, request_of
 from fastmech.explore.messages import COARSEST, frame
 from fastmech.interrupts import check
 
@@ -23,9 +22,9 @@ TILE, ATLAS = 5_000, 20
 
 #: What views import; one thread at a time, in this order unless a page asks for another.
 MODULES = {
-    "equilibria": ("models.equilibria", "models.stability", "models.drawing", "mechanisms"),
+    "equilibria": ("models.equilibria", "models.stability", "plots.animation", "mechanisms"),
     "motion": ("ensembles.integrate",),
-    "basins": ("basins.label",),
+    "basins": ("basins.label", "attractors.flow"),
     "atlas": ("slider.atlas.map", "slider.atlas.folds", "atlas.critical_curves"),
 }
 _LOADING = threading.Lock()
@@ -51,16 +50,19 @@ def replies(device: Device, message: Any) -> Iterator[bytes]:
         yield content
 
 
-def _header(device: Device, message: Any, divisions: int, /, **more: Any) -> dict[str, Any]:
-    python, request = (of(device, message, divisions) for of in (python_of, request_of))
-    return {"kind": message.kind, "id": message.id, "python": python, "request": request, **more}
+def _header(message: Any, **more: Any) -> dict[str, Any]:
+    return {"kind": message.kind, "id": message.id, **more}
 
 
-def _drawn(device: Device, message: Any, q: Any) -> tuple[dict[str, Any], Floats]:
-    drawn = device.drawn(message.parameters, q)
+def _drawn(device: Device, message: Any, q: Any, times: Floats) -> tuple[dict[str, Any], dict[str, Floats]]:
+    from fastmech.models.drawing import drawing
+    from fastmech.plots.animation import load_arrows
+
+    drawn = drawing(device.mechanism(message.parameters, still=True), q)
+    loads, forces = load_arrows(device.mechanism(message.parameters), q, times)
     masses = [float(m) if np.isfinite(m) else None for m in drawn.mass]
     told = {"elements": drawn.kind.tolist(), "names": drawn.name, "masses": masses, "angles": drawn.angles}
-    return told, drawn.ends
+    return told, {"ends": drawn.ends, "loads": loads, "forces": forces}
 
 
 def _equilibria(device: Device, message: Any) -> Iterator[bytes]:
@@ -78,12 +80,12 @@ def _equilibria(device: Device, message: Any) -> Iterator[bytes]:
         row |= {"decay_time": 1.0 / slowest if slowest > 0.0 else None, "position": [*map(float, e.position)]}
         rows.append(row)
         check()
-    told, ends = _drawn(device, message, [row["position"] for row in rows])
-    axes = {name: grid(ends, message.num - 1) for name, ends in message.axes.items()}
-    energy = device.energy(message.parameters, device.states(axes, message.fixed))
-    header = _header(device, message, message.num - 1, rows=rows, axes=message.axes, **told)
+    told, arrays = _drawn(device, message, [row["position"] for row in rows], np.zeros(len(rows)))
+    axes = {name: np.linspace(a, b, message.num) for name, (a, b) in message.axes.items()}
+    energy = device.energy(message.parameters, device.states(axes, {}))
+    header = _header(message, rows=rows, axes=message.axes, divisions=message.num - 1, **told)
     header |= {"certificate": found.certificate.sentence, "complete": bool(found.certificate.complete)}
-    yield frame(header, {"ends": ends} | ({} if energy is None else {"landscape": energy.T}))
+    yield frame(header, arrays | ({} if energy is None else {"landscape": energy.T}))
 
 
 def _motion(device: Device, message: Any) -> Iterator[bytes]:
@@ -96,7 +98,7 @@ def _motion(device: Device, message: Any) -> Iterator[bytes]:
         times = np.linspace(0.0, message.t_end, message.outputs)
         run = integrate(system, start[None], message.t_end, t_eval=times, dt=device.dt, method="dop853")
         y, status = run.y[:, 0], run.failures or ""
-    told, ends = _drawn(device, message, y[:, : len(device.coordinates)])
+    told, arrays = _drawn(device, message, y[:, : len(device.coordinates)], times)
     made = device.mechanism(message.parameters)
     energies, powers = made.energies(y), made.powers(times, y)
     # Works by the trapezoidal rule between the outputs.
@@ -104,46 +106,60 @@ def _motion(device: Device, message: Any) -> Iterator[bytes]:
         np.append(0.0, np.cumsum(0.5 * np.diff(times) * (one[1:] + one[:-1])))
         for one in (np.broadcast_to(power, times.shape) for power in powers)
     )
-    header = _header(device, message, 0, t_end=message.t_end, status=status, **told)
-    arrays = {"times": times, "y": y, "ends": ends, "kinetic": energies.kinetic}
-    yield frame(header, arrays | {"potential": energies.potential, "brought": brought, "lost": lost})
+    header = _header(message, t_end=message.t_end, outputs=len(times), status=status, **told)
+    arrays |= {"times": times, "y": y, "kinetic": energies.kinetic, "potential": energies.potential}
+    yield frame(header, arrays | {"brought": brought, "lost": lost})
 
 
 def _basins(device: Device, message: Any) -> Iterator[bytes]:
+    from fastmech.attractors.flow import keeps_moving
     from fastmech.basins.label import label_starts
+    from fastmech.basins.labels import of_attractors
 
-    system, finest = device.at(message.parameters), COARSEST * 2**message.halvings
-    states = device.states({name: grid(ends, finest) for name, ends in message.axes.items()}, message.fixed)
+    system = device.at(message.parameters)
+    moving, attractors = keeps_moving(system), None  # which the first starts tell
+    halvings, tile = (min(message.halvings, 2), TILE // 8) if moving else (message.halvings, TILE)
+    finest = COARSEST * 2**halvings
+    states = device.states({name: np.linspace(a, b, finest + 1) for name, (a, b) in message.axes.items()}, {})
     well, time = np.full(states.shape[:2], -2, dtype=np.int8), np.zeros(states.shape[:2], dtype=np.float32)
     turns = np.zeros((*well.shape, len(device.coordinates)), dtype=np.int8)
-    for step in (2**k for k in range(message.halvings, -1, -1)):
+    for step in (2**k for k in range(halvings, -1, -1)):
         starts, *fields = (one[::step, ::step] for one in (states, well, time, turns))
         missing = np.argwhere(fields[0] == -2)
-        for begin in range(0, len(missing), TILE):
-            i, j = missing[begin : begin + TILE].T
-            labels: Any = label_starts(system, starts[i, j], message.t_end)
+        for begin in range(0, len(missing), tile):
+            i, j = missing[begin : begin + tile].T
+            if attractors is None:
+                labels: Any = label_starts(system, starts[i, j])
+                attractors = labels.tree if moving else None
+            else:
+                labels = of_attractors(attractors, attractors.label_starts(starts[i, j]))
             found = labels.well, labels.time, np.clip(labels.turns, -127, 127)
             for field, values in zip(fields, found, strict=True):
                 field[i, j] = values
-            last, divisions = begin + TILE >= len(missing), finest // step
-            header = _header(device, message, divisions, axes=message.axes, divisions=divisions)
-            header |= {"wells": [int(one) for one in labels.tree.wells], "from": int(i[0]), "last": last}
+            last, divisions = begin + tile >= len(missing), finest // step
+            header = _header(message, axes=message.axes, divisions=divisions, last=last, final=step == 1)
+            header |= {"from": int(i[0]), "attractors": [one.name for one in labels.tree] if moving else None}
+            header["wells"] = [] if moving else [int(one) for one in labels.tree.wells]
+            header["t_end"] = labels.tree.t_end if moving else 60.0
             rows = slice(int(i[0]), len(starts) if last else int(i[-1]) + 1)
             arrays = {name: one[rows] for name, one in zip(("well", "time", "turns"), fields, strict=True)}
-            yield frame(header | {"final": step == 1}, arrays)
+            yield frame(header, arrays)
 
 
 def _atlas(device: Device, message: Any) -> Iterator[bytes]:
     from fastmech.atlas.critical_curves import critical_curves
+    from fastmech.slider.atlas.axes import check_axis
     from fastmech.slider.atlas.folds import trace_folds
     from fastmech.slider.atlas.map import map_equilibria
 
     system = device.at(message.parameters)
+    for name, ends in message.axes.items() if device.is_scene else ():
+        check_axis(system, name, ends)  # what its curves refuse, before numbers are shown
     for halving in range(message.halvings + 1):
         divisions = ATLAS * 2**halving
-        axes = {name: grid(ends, divisions) for name, ends in message.axes.items()}
+        axes = {name: np.linspace(a, b, divisions + 1) for name, (a, b) in message.axes.items()}
         found: Any = map_equilibria(system, axes, progress=lambda _: check())
-        header = _header(device, message, divisions, axes=message.axes, divisions=divisions, curves=[])
+        header = _header(message, axes=message.axes, divisions=divisions, curves=[])
         fields = {"count": found.count, "stable": found.count_stable}
         yield frame(header, fields)
     curves: Any = (trace_folds if device.is_scene else critical_curves)(system, *axes.items())
@@ -164,20 +180,18 @@ def _pull(device: Device, message: Any) -> Iterator[bytes]:
 
     q = least_squares(away, message.q, jac=lambda q: made.moved(message.point, q), max_nfev=30).x
     state = dict.fromkeys(device.state, 0.0) | dict(zip(device.coordinates, map(float, q), strict=True))
-    yield frame({"kind": "pull", "id": message.id, "state": state}, {})
+    yield frame(_header(message, state=state), {})
 
 
 def _strike(device: Device, message: Any) -> Iterator[bytes]:
-    """An impulse p on a point changes momenta by its slopes' transpose times p."""
+    """An impulse p on a point changes momenta by its slopes' transpose times p; rates stay as they were."""
     made = device.mechanism(message.parameters, still=True)
     slopes, metric = made.moved(message.point, message.q), made.metric(message.q)
-    momenta = slopes.T @ (message.mass * np.array(message.velocity))
-    rates = np.linalg.solve(metric, momenta)
-    state = dict(zip(device.state, [*message.q, *map(float, rates)], strict=True))
-    speed, energy = float(np.hypot(*(slopes @ rates))), float(0.5 * momenta @ rates)
-    header = {"kind": "strike", "id": message.id, "energy": energy, "speed": speed, "state": state}
-    yield frame(header, {})
+    momenta, before = slopes.T @ (message.mass * np.array(message.velocity)), np.array(message.rates)
+    change = np.linalg.solve(metric, momenta)
+    state = dict(zip(device.state, [*message.q, *map(float, before + change)], strict=True))
+    speed, energy = np.hypot(*(slopes @ (before + change))), momenta @ (before + 0.5 * change)
+    yield frame(_header(message, energy=float(energy), speed=float(speed), state=state), {})
 
 
-_VIEWS = (_equilibria, _motion, _basins, _atlas, _pull, _strike)
-_WORK: dict[str, Callable[[Device, Any], Iterator[bytes]]] = {one.__name__[1:]: one for one in _VIEWS}
+_WORK = {one.__name__[1:]: one for one in (_equilibria, _motion, _basins, _atlas, _pull, _strike)}

@@ -18,7 +18,8 @@ import sys
 import time
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,8 @@ import pytest
 
 import fastmech as fm
 from fastmech.runner import run_request
+from fastmech.scan_types import scan_kinds
+from fastmech.scan_types.request import request_of_text
 
 pytest.importorskip("starlette", reason="the extra explore is not installed")
 driver = pytest.importorskip("playwright.sync_api", reason="no Playwright: make test-browser")
@@ -259,7 +262,9 @@ def test_pictures_requests_and_python_are_taken_along(opened: Opened, tmp_path: 
     page = opened.page
     opened.press("#landscape", 0.6, 0.4)
     opened.until("explorer.mechanism.playing", 30)
-    for view in ("mechanism", "landscape", "basins", "atlas", "motion", "portrait"):
+    page.wait_for_timeout(1000)
+    opened.settle()  # lines follow a map that is refined
+    for view in ("mechanism", "landscape", "basins", "atlas", "motion", "energies", "portrait"):
         for form in ("PNG", "SVG"):
             with page.expect_download() as got:
                 page.locator(f"#{view} button", has_text=form).click()
@@ -278,16 +283,193 @@ def test_pictures_requests_and_python_are_taken_along(opened: Opened, tmp_path: 
         page.wait_for_timeout(100)
         lines = page.evaluate("navigator.clipboard.readText()")
         assert lines == page.evaluate(f"document.querySelector('#{view} pre').textContent")
+
+
+def lines_of(opened: Opened, view: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """What the Python lines of a view leave, and its request, if it is valid."""
+    import matplotlib.pyplot as plt
+
+    python, request = opened.page.locator(f"#{view} pre").all_text_contents()
+    monkeypatch.chdir(folder)
     names: dict[str, Any] = {}
-    exec(lines, names)  # the motion's
-    shown = page.evaluate("Array.from(explorer.motion.data)")
-    np.testing.assert_array_equal(np.float32(names["run"].y[:, 0].ravel()), np.float32(shown))
+    with redirect_stdout(StringIO()):
+        exec(python, names)
+    plt.close("all")
+    assert len(request_of_text(request, "request.toml", scan_kinds()).scans) == 1
+    return names | {"request": request}
+
+
+def test_lines_of_every_view_make_what_it_shows(
+    opened: Opened, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = opened.page
+    page.evaluate("explorer.choose(3); explorer.parameters.set('c2', 200)")
+    page.wait_for_timeout(3000)
+    rest = lines_of(opened, "mechanism", tmp_path, monkeypatch)
+    assert (tmp_path / "mechanism.png").stat().st_size > 5000
+    np.testing.assert_allclose(positions(opened), rest["found"].position, atol=1e-6)
+    page.evaluate("explorer.change({ t_end: 1 }, 't_end'); explorer.startAt({ phi: 1, theta_dot: -2 })")
+    opened.until("explorer.motion && explorer.mechanism.panel.python.includes('animate')", 30)
+    opened.settle()
+    shown = np.float32(page.evaluate("Array.from(explorer.motion.data)"))
+    for view in ("mechanism", "motion", "energies", "portrait"):
+        found = lines_of(opened, view, tmp_path, monkeypatch)
+        np.testing.assert_array_equal(np.float32(found["run"].y[:, 0].ravel()), shown)
+        if view == "energies":
+            for name in ("kinetic", "potential", "brought", "lost"):
+                drawn = page.evaluate(f"Array.from(explorer.histories.arrays.{name}.data)")
+                np.testing.assert_array_equal(np.float32(drawn), np.float32(found[name]))
+    assert all((tmp_path / f"{v}.png").is_file() for v in ("motion", "energies", "portrait"))
+    assert (tmp_path / "motion.gif").is_file()
+    (tmp_path / "motion.toml").write_text(found["request"], encoding="utf-8")
     run_request(tmp_path / "motion.toml", tmp_path / "motion.h5")
     with fm.open_results(tmp_path / "motion.h5") as results:
         computed = np.stack([results["swing"][name].data for name in ("phi", "theta")], axis=-1)
-    np.testing.assert_array_equal(
-        np.float32(computed.ravel()), np.float32(shown).reshape(-1, 4)[:, :2].ravel()
+    np.testing.assert_array_equal(np.float32(computed), shown.reshape(-1, 4)[:, :2])
+    found = lines_of(opened, "landscape", tmp_path, monkeypatch)
+    low, high = page.evaluate("explorer.landscape.span")
+    assert float(found["heights"].min()) == pytest.approx(low, rel=1e-6)
+    assert float(found["heights"].max()) == pytest.approx(high, rel=1e-6)
+    found = lines_of(opened, "basins", tmp_path, monkeypatch)
+    wells = page.evaluate("Array.from(explorer.basins.grid.well)")
+    np.testing.assert_array_equal(found["found"].well.ravel(), wells)
+    found = lines_of(opened, "atlas", tmp_path, monkeypatch)
+    assert len(found["curves"].curves) == page.evaluate("explorer.atlas.curves.length") > 0
+    assert found["found"].count.shape == (81, 81)
+    page.get_by_text("reset all").click()
+    page.evaluate("explorer.change({ t_end: 20 }, 't_end'); explorer.choose(0)")
+
+
+@pytest.mark.parametrize("what", ["von_mises_truss", "pendulum_chain_3"])
+def test_a_mechanism_without_dampers_says_so_where_the_basins_would_be(
+    browser: Any, what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with serving(what) as address:
+        made = Opened(browser.new_page(viewport={"width": 1600, "height": 1000}), address)
+        made.until("document.querySelector('#basins .refusal').textContent.includes('has no dampers')", 60)
+        assert made.page.inner_text("#error") == ""
+        assert made.page.locator("#basins button", has_text="copy Python").is_disabled()
+        made.until("document.querySelector('#atlas canvas').dataset.divisions === '80'", 60)
+        made.page.evaluate("explorer.change({ t_end: 0.5 }, 't_end')")
+        made.page.evaluate("explorer.startAt({ [explorer.about.coordinates[0]]: 0.3 })")
+        made.until("explorer.motion", 60)
+        views = ["equilibria", "mechanism", "landscape", "motion", "energies", "portrait"]
+        for view in [*views, *(["atlas"] if what == "von_mises_truss" else [])]:
+            lines_of(made, view, tmp_path, monkeypatch)
+        if what == "pendulum_chain_3":
+            assert "q3 = 0 rad" in made.page.inner_text("#landscape .note")
+            elsewhere = made.page.evaluate("explorer.rows.filter(r => !explorer.landscape.within(r)).length")
+            assert elsewhere == sum(abs(np.sin(r[2] / 2)) > 1e-6 for r in fm.find_equilibria(
+                fm.mechanisms.pendulum_chain(3)).position)  # fmt: skip
+        assert made.said == []
+        made.page.close()
+
+
+def test_an_atlas_over_a_mass_begins_above_zero_and_names_what_its_curves_are(
+    browser: Any, opened: Opened
+) -> None:
+    select = opened.page.get_by_label("Atlas of parameters, horizontal axis")
+    select.select_option("m1")
+    opened.until("explorer.atlas.current && explorer.atlas.shown.m1[0] > 0", 60)
+    assert opened.page.inner_text("#atlas .refusal") == ""
+    # Axes are those that are chosen even where nothing can be answered.
+    opened.page.evaluate("explorer.change({ atlas: ['alpha', 'c2'] }, 'atlas')")
+    opened.until("document.querySelector('#atlas .refusal').textContent.includes('alpha')", 60)
+    assert opened.page.evaluate("explorer.atlas.plane.labels") == ["alpha [1/s]", "c2 [N/m]"]
+    assert not opened.page.evaluate("explorer.atlas.current")
+    opened.page.evaluate("explorer.change({ atlas: ['m1', 'c2'] }, 'atlas')")
+    # What is typed beyond the range widens slider and atlas.
+    number = opened.page.get_by_label(re.compile("^m1: .*value$"))
+    number.fill("70")
+    number.press("Enter")
+    opened.until("explorer.atlas.shown.m1[1] === 70", 60)
+    opened.page.get_by_text("reset all").click()
+    select.select_option("F0")
+    opened.settle()
+    with serving("ziegler_column") as address:
+        made = Opened(browser.new_page(viewport={"width": 1600, "height": 1000}), address)
+        made.until("explorer.atlas?.curves?.length > 0", 120)
+        told = made.page.inner_text("#atlas .note")
+        assert "Hopf" in told
+        assert "equilibria appear" not in told
+        assert made.page.evaluate("explorer.about.parameters.b.low") == 0
+        made.page.close()
+
+
+def test_what_was_chosen_last_counts(opened: Opened) -> None:
+    page = opened.page
+    page.evaluate("explorer.change({ t_end: 300 }, 't_end'); explorer.startAt({ phi: 0.5, theta: 1 })")
+    page.wait_for_timeout(20)
+    page.evaluate("explorer.choose(1)")
+    page.wait_for_timeout(4000)
+    assert page.evaluate("[explorer.state.start, explorer.motion, explorer.mechanism.motion]") == [None] * 3
+    assert page.get_by_role("timer").inner_text() == ""
+    assert "Press on" in page.inner_text("#motion .note")
+    # A link that is opened in the open page is all that counts.
+    page.evaluate("explorer.startAt({ phi: 0.5, theta: 1 })")
+    opened.until("explorer.motion", 60)
+    link = "encodeURIComponent(JSON.stringify({ ...explorer.state, start: null, t_end: 7 }))"
+    page.evaluate(f"location.hash = '#' + {link}")
+    opened.until("explorer.state.start === null && explorer.motion === null", 10)
+    assert page.get_by_label("length of the motion [s]").input_value() == "7"
+    page.evaluate("explorer.change({ t_end: 20 }, 't_end'); explorer.choose(0)")
+
+
+def test_paused_views_show_one_moment_and_a_kick_adds_to_what_moves(opened: Opened) -> None:
+    page = opened.page
+    page.evaluate("explorer.startAt({ phi: 0.5, theta: 1 }); explorer.letGo()")
+    opened.until("explorer.mechanism.playing && explorer.mechanism.frame > 20", 30)
+    page.evaluate(
+        "{ const l = explorer.landscape.plane, m = explorer.mechanism.plane, a = l.over, b = m.over;"
+        " l.over = (p) => { globalThis.there = explorer.frame; a(p); };"
+        " m.over = (p) => { globalThis.here = explorer.mechanism.frame; b(p); }; }"
     )
+    for _ in range(4):
+        page.locator("#mechanism button", has_text="pause").click()
+        page.evaluate("scrollTo(0, 0)")
+        page.wait_for_timeout(300)
+        here, there = page.evaluate("[globalThis.here, globalThis.there]")
+        assert here == there
+        page.locator("#mechanism button", has_text="play").click()
+        page.wait_for_timeout(150)
+    page.locator("#mechanism button", has_text="pause").click()
+    before = page.evaluate("[...explorer.mechanism.position(), ...explorer.mechanism.rates()]")
+    page.get_by_label("velocity of the kick upwards [m/s]").fill("0.5")
+    page.get_by_text("kick [m/s]").click()
+    opened.until("explorer.state.start.phi !== 0.5 && explorer.mechanism.playing", 20)
+    start = page.evaluate("explorer.state.start")
+    point, mechanism = page.evaluate("explorer.mechanism.points.value"), fm.mechanisms.slider_pendulum()
+    mass = mechanism.parameters["m2" if point == "M2" else "m1"]
+    blow = mechanism.moved(point, before[:2]).T @ (mass * np.array([1.0, 0.5]))
+    expected = np.array(before[2:]) + np.linalg.solve(mechanism.metric(before[:2]), blow)
+    np.testing.assert_allclose([start["phi_dot"], start["theta_dot"]], expected, rtol=1e-5)
+    page.evaluate("explorer.choose(0)")
+
+
+def test_a_double_click_on_a_slider_does_not_move_it_and_labels_start_nothing(opened: Opened) -> None:
+    page = opened.page
+    box = page.get_by_label(re.compile("^m2: .*]$")).first.bounding_box()
+    page.mouse.dblclick(box["x"] + 0.8 * box["width"], box["y"] + 0.5 * box["height"])
+    opened.until("explorer.state.parameters.m2 === 12", 10)
+    assert "m2" in page.evaluate("document.activeElement.getAttribute('aria-label')")
+    page.keyboard.press("Tab")
+    page.evaluate("explorer.choose(0)")
+    opened.press("#landscape", 0.5, 0.98)
+    page.wait_for_timeout(300)
+    assert page.evaluate("explorer.state.start") is None
+
+
+def test_a_wrong_value_marks_what_is_still_shown(opened: Opened) -> None:
+    number = opened.page.get_by_label(re.compile("^m1: .*value$"))
+    number.fill("-3")
+    number.press("Enter")
+    for view in ("landscape", "equilibria", "mechanism", "basins"):
+        stale = f"document.querySelector('#{view}').classList.contains('stale')"
+        opened.until(
+            f"{stale} && document.querySelector('#{view} .refusal').textContent.includes('last valid')"
+        )
+    opened.page.get_by_text("reset all").click()
+    opened.until("!document.querySelector('.stale')", 30)
 
 
 @pytest.mark.parametrize("dark", [False, True])
@@ -352,7 +534,7 @@ def test_a_motion_that_a_kernel_cannot_follow_gives_a_line(opened: Opened) -> No
 
 
 def test_the_status_line_says_what_is_compiled(opened: Opened) -> None:
-    told = "{ name: 'march', of: 'basins', number: 3, about: 60 }"
+    told = "{ name: 'march', of: ['basins'], number: 3, about: 60 }"
     opened.page.evaluate(f"explorer.compiling({told})")
     assert (
         opened.page.inner_text("#status")

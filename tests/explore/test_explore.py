@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import json
+import os
 import random
 import re
 import signal
@@ -11,7 +12,6 @@ import subprocess
 import sys
 import threading
 import time
-import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,16 +19,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy
 
 import fastmech as fm
 from fastmech.cli.explore import opened
 from fastmech.errors import InputError
+from fastmech.explore.device import Device
 from fastmech.explore.messages import frame, read_message
 from fastmech.explore.work import replies
 from fastmech.interrupts import Cancelled, work_while
+from fastmech.models.drawing import drawing
 from fastmech.runner import run_request
-from fastmech.scan_types import scan_kinds
-from fastmech.scan_types.request import request_of_text
 
 pytest.importorskip("starlette")
 connection = pytest.importorskip("websockets.sync.client")
@@ -51,10 +52,10 @@ def numbers(content: bytes) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
 
 
 @contextmanager
-def serving() -> Iterator[tuple[str, int]]:
+def serving(*what: str, **settings: str) -> Iterator[tuple[str, int]]:
     """The command's server; Ctrl-C ends it within a second."""
-    command = [sys.executable, "-m", "fastmech", "explore", "--no-browser"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    command = [sys.executable, "-m", "fastmech", "explore", "--no-browser", *what]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=os.environ | settings)
     assert process.stdout is not None
     found = re.search(r"http://([\d.]+):(\d+)/", process.stdout.readline())
     assert found is not None
@@ -112,17 +113,20 @@ def test_equilibria_of_a_frame_are_those_of_the_library(server: tuple[str, int])
     np.testing.assert_allclose(arrays["landscape"], expected, rtol=1e-5, atol=1e-3)
 
 
-def test_motion_of_a_frame_is_that_of_its_lines(server: tuple[str, int]) -> None:
+def test_motion_of_a_frame_is_the_library_s(server: tuple[str, int]) -> None:
     with talk(server) as socket:
         told = {"kind": "motion", "id": 1, "start": {"phi": 1.0}, "t_end": 2.0, "outputs": 21}
         socket.send(json.dumps(told))
-        header, arrays = answer(socket, "motion")
-    names: dict[str, Any] = {}
-    exec(header["python"], names)
-    np.testing.assert_array_equal(arrays["y"], names["run"].y[:, 0].astype(np.float32))
+        _, arrays = answer(socket, "motion")
+    times = np.linspace(0.0, 2.0, 21)
+    run = fm.integrate(fm.Scene(), [[1.0, 0.0, 0.0, 0.0]], 2.0, t_eval=times, dt=0.01, method="dop853")
+    np.testing.assert_array_equal(arrays["y"], run.y[:, 0].astype(np.float32))
+    # The arrow's force fades as the load does.
+    np.testing.assert_allclose(arrays["forces"][:, 0], 100.0 * np.exp(-0.7 * times), rtol=1e-6)
+    np.testing.assert_allclose(np.diff(arrays["loads"][:, 0], axis=1)[:, 0], [[1.0, 0.0]] * 21, atol=1e-6)
 
 
-def test_basins_refine_and_their_request_gives_the_same(server: tuple[str, int], tmp_path: Path) -> None:
+def test_basins_refine_to_the_library_s(server: tuple[str, int]) -> None:
     with talk(server) as socket:
         told = {"kind": "basins", "id": 1, "axes": AXES, "halvings": 1, "parameters": {"alpha": 0.0}}
         socket.send(json.dumps(told))
@@ -133,13 +137,60 @@ def test_basins_refine_and_their_request_gives_the_same(server: tuple[str, int],
                 known[header["from"] : header["from"] + len(arrays["well"])] = arrays["well"]
                 if header["last"]:
                     break
-    names: dict[str, Any] = {}
-    exec(header["python"], names)
-    np.testing.assert_array_equal(known, names["found"].well)
-    (tmp_path / "request.toml").write_text(header["request"], encoding="utf-8")
-    run_request(tmp_path / "request.toml", tmp_path / "result.h5")
-    with fm.open_results(tmp_path / "result.h5") as results:
-        np.testing.assert_array_equal(known, results["basins"]["well"].data)
+    axes = {name: np.linspace(-3.0, 3.0, 51) for name in AXES}
+    found = fm.map_basins(fm.Scene(alpha=0.0), axes, header["t_end"])
+    np.testing.assert_array_equal(known, found.well)
+
+
+def duffing(force: float) -> Device:
+    """Two swings about either well, each with a basin of its own."""
+    x = fm.lengths("x")
+    made = fm.Mechanism(
+        x,
+        {"F": force, "b": 0.3},
+        points={"M": (x, 0)},
+        masses={"M": 1.0},
+        potential=-(x**2) / 2 + x**4 / 4,
+        dampers=[fm.Damper((0, 0), "M", sympy.Symbol("b"))],
+        forces=[fm.Force("M", fm.loads.Harmonic(sympy.Symbol("F"), 1.2), (1, 0))],
+    )
+    return Device(made, "duffing.py:made")
+
+
+def test_starts_under_a_load_that_repeats_are_labelled_by_attractors() -> None:
+    device, ranges = duffing(0.05), {"x": [-1.5, 1.5], "x_dot": [-1.0, 1.0]}
+    told = {"kind": "basins", "id": 1, "axes": ranges, "halvings": 0}
+    frames = [numbers(one) for one in replies(device, read_message(json.dumps(told)))]
+    header = frames[-1][0]
+    assert header["final"]
+    assert len(header["attractors"]) >= 2
+    known = np.full((26, 26), -2)
+    for about, arrays in frames:
+        known[about["from"] : about["from"] + len(arrays["well"])] = arrays["well"]
+    axes = {name: np.linspace(*ends, 26) for name, ends in ranges.items()}
+    found = fm.map_basins(device.system, axes, header["t_end"])
+    names = [one.name for one in found.tree]
+    assert {name.split(" at ")[0] for name in names} == {n.split(" at ")[0] for n in header["attractors"]}
+    for k, name in enumerate(header["attractors"]):
+        place = np.array(re.findall(r"-?[\d.]+(?:e-?\d+)?(?=[,)])", name), dtype=float)
+        (same,) = (j for j, one in enumerate(found.tree) if np.allclose(one.points[0], place, atol=1e-3))
+        assert np.mean((known == k) == (found.well == same)) > 0.99
+
+
+def test_arrows_are_the_loads_at_each_time() -> None:
+    told = {"kind": "motion", "id": 1, "start": {"x": 0.5}, "t_end": 3.0, "outputs": 31}
+    (content,) = replies(duffing(0.2), read_message(json.dumps(told)))
+    arrays = numbers(content)[1]
+    np.testing.assert_allclose(arrays["forces"][:, 0], 0.2 * np.sin(1.2 * np.linspace(0, 3, 31)), atol=1e-6)
+    np.testing.assert_allclose(arrays["loads"][:, 0, 0, 0], arrays["y"][:, 0], atol=1e-6)
+
+
+@pytest.mark.parametrize("what", [None, "double_pendulum"])
+def test_parameters_say_whether_they_can_be_zero_or_negative(what: str | None) -> None:
+    told = opened(what).about()["parameters"]
+    sure = {"m1": (False, False), "g": (True, what is not None)}
+    sure |= {"l1": (False, True)} if what else {"l": (False, False), "F0": (True, True), "c1": (True, False)}
+    assert {name: (told[name]["zero"], told[name]["negative"]) for name in sure} == sure
 
 
 @pytest.mark.parametrize("what", [None, "von_mises_truss"])
@@ -150,32 +201,19 @@ def test_an_atlas_is_the_library_s_with_its_curves(what: str | None) -> None:
     told = {"kind": "atlas", "id": 1, "axes": ranges, "halvings": 0, "parameters": parameters}
     *_, last = replies(device, read_message(json.dumps(told)))
     header, arrays = numbers(last)
-    names: dict[str, Any] = {}
-    exec(header["python"], names)
-    np.testing.assert_array_equal(arrays["count"], names["found"].count)
-    assert len(header["curves"]) == len(names["curves"].curves) > 0
-    np.testing.assert_array_equal(arrays["curve0"][0], names["curves"].curves[0].x.astype(np.float32))
+    system = device.at(parameters)
+    axes = {name: np.linspace(*ends, header["divisions"] + 1) for name, ends in ranges.items()}
+    curves: Any = (fm.critical_curves if what else fm.trace_folds)(system, *axes.items())
+    np.testing.assert_array_equal(arrays["count"], fm.map_equilibria(system, axes).count)
+    assert header["curves"] == [curve.kind for curve in curves.curves]
+    assert "fold" in header["curves"]
+    np.testing.assert_array_equal(arrays["curve0"][0], curves.curves[0].x.astype(np.float32))
 
 
-@pytest.mark.parametrize("what", [None, "von_mises_truss"])
-def test_requests_of_every_view_are_valid(what: str | None) -> None:
-    from fastmech.explore.lines import request_of
-
-    device = opened(what)
-    axes = {name: [0.1, 0.5] for name in device.coordinates}
-    others = [name for name in device.system.described() if name != "alpha"][-2:]
-    asked: list[dict[str, Any]] = [
-        {"kind": "equilibria", "axes": axes},
-        {"kind": "motion", "start": {device.state[0]: 0.2}},
-        {"kind": "basins", "axes": axes},
-        {"kind": "atlas", "axes": {name: [1.0, 2.0] for name in others}},
-    ]
-    parameters = {"b": 2.0} if what else {"alpha": 0.0}
-    for told in asked:
-        message = read_message(json.dumps({"id": 1, "parameters": parameters, **told}))
-        text = request_of(device, message, 4)
-        assert tomllib.loads(text)["scan"]
-        assert len(request_of_text(text, "request.toml", scan_kinds()).scans) == 1
+def test_an_atlas_over_what_moves_no_equilibrium_shows_nothing() -> None:
+    told = {"kind": "atlas", "id": 1, "axes": {"alpha": [0.0, 2.0], "c2": [1.0, 2.0]}, "halvings": 0}
+    with pytest.raises(InputError, match=r"axes\.alpha"):
+        next(replies(opened(None), read_message(json.dumps(told))))
 
 
 def test_newest_wins_and_two_pages_do_not_disturb_each_other(server: tuple[str, int]) -> None:
@@ -306,12 +344,21 @@ def test_a_pulled_point_follows_and_a_strike_brings_its_energy(server: tuple[str
         state = answer(socket, "pull")[0]["state"]
         assert state["phi"] == pytest.approx(1.25, abs=1e-6)
         assert state["theta"] == pytest.approx(0.35, abs=1e-6)
-        blow = {"kind": "strike", "id": 2, "point": "M2", "mass": scene.m2, "velocity": [0.5, -0.2], "q": q}
-        socket.send(json.dumps(blow))
+        blow = {"kind": "strike", "point": "M2", "mass": scene.m2, "velocity": [0.5, -0.2], "q": q}
+        socket.send(json.dumps({**blow, "id": 2, "rates": [0.0, 0.0]}))
         told = answer(socket, "strike")[0]
+        socket.send(json.dumps({**blow, "id": 3, "rates": [0.7, -1.1]}))
+        moving = answer(socket, "strike")[0]
     y = np.array([told["state"][name] for name in ("phi", "theta", "phi_dot", "theta_dot")])
-    energies = fm.mechanisms.slider_pendulum().energies(y)
+    mechanism = fm.mechanisms.slider_pendulum()
+    energies = mechanism.energies(y)
     assert told["energy"] == pytest.approx(float(energies.kinetic), rel=1e-12)
+    # In motion the blow is added to the rates that are there.
+    after = np.array([moving["state"][name] for name in ("phi", "theta", "phi_dot", "theta_dot")])
+    np.testing.assert_allclose(after[2:], y[2:] + np.array([0.7, -1.1]), rtol=1e-12)
+    before = np.array([*q, 0.7, -1.1])
+    gained = mechanism.energies(after).kinetic - mechanism.energies(before).kinetic
+    assert moving["energy"] == pytest.approx(float(gained), rel=1e-9)
     assert told["energy"] < 0.5 * scene.m2 * (
         0.5**2 + 0.2**2
     )  # rods hold back a part of what a free mass takes
@@ -397,17 +444,24 @@ def test_whatever_goes_wrong_is_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(serve, "replies", broken)
     sent = list[str | bytes]()
     page = serve.Page(opened(None), sent.append)
-    for _ in range(2):  # it goes on
+    for count in (1, 2):  # it goes on
         page.take(json.dumps({"kind": "motion", "id": 7, "start": {"phi": 1.0}, "t_end": 1.0}))
-        while page.works:
+        end = time.monotonic() + 60.0
+        while len(sent) < count and time.monotonic() < end:
             time.sleep(0.01)
     line = {"kind": "error", "line": "FloatingPointError: in a kernel", "of": "motion", "id": 7}
     assert [json.loads(text) for text in sent] == [line] * 2
 
 
-def test_kernels_that_are_made_are_told_with_their_number() -> None:
+@pytest.mark.parametrize("kind", ["motion", "basins", "atlas"])
+def test_kernels_that_are_made_are_told_with_their_number_and_view(kind: str) -> None:
+    asked: dict[str, Any] = {"kind": kind, "id": 1, "parameters": {"alpha": 0.0}}
+    if kind == "motion":
+        asked |= {"start": {"phi": 1.0}, "t_end": 1.0}
+    else:
+        asked |= {"axes": AXES if kind == "basins" else {"c1": [1.0, 9.0], "c2": [1.0, 9.0]}, "halvings": 0}
     with serving() as server, talk(server) as socket:
-        socket.send(json.dumps({"kind": "motion", "id": 1, "start": {"phi": 1.0}, "t_end": 1.0}))
+        socket.send(json.dumps(asked))
         told = list[dict[str, Any]]()
         while True:
             content = socket.recv(timeout=120)
@@ -416,16 +470,29 @@ def test_kernels_that_are_made_are_told_with_their_number() -> None:
             told += [json.loads(content)]
     kernels = [one for one in told if one["kind"] == "compiling" and one["name"]]
     assert kernels
-    assert {one["of"] for one in kernels} == {"motion"}
+    assert all(one["of"] == [kind] for one in kernels)  # threads that a view starts have other names
     assert [one["number"] for one in kernels] == list(range(1, len(kernels) + 1))
     assert all(one["number"] <= one["about"] for one in kernels)
+
+
+def test_pictures_of_a_result_file_are_gone_with_the_server(tmp_path: Path) -> None:
+    (tmp_path / "r.toml").write_text('[scan.rest]\nkind = "equilibria"\n')
+    run_request(tmp_path / "r.toml", tmp_path / "r.h5")
+    (tmp_path / "made").mkdir()
+    with serving(str(tmp_path / "r.h5"), TMPDIR=str(tmp_path / "made")) as (host, port):
+        asked = http.client.HTTPConnection(host, port)
+        asked.request("GET", "/sections")
+        assert json.loads(asked.getresponse().read())[0]["pictures"]
+        asked.close()
+        assert list((tmp_path / "made").glob("fastmech-explore-*"))
+    assert not list((tmp_path / "made").glob("fastmech-explore-*"))
 
 
 @pytest.mark.parametrize("what", ["double_pendulum", "ziegler_column", None])
 def test_angles_of_a_drawing_are_the_coordinates(what: str | None) -> None:
     device = opened(what)
     q = np.random.default_rng(3).uniform(-0.7, 0.7, (5, 2))
-    drawn = device.drawn({}, q)
+    drawn = drawing(device.mechanism({}, still=True), q)
     assert sorted(angle.coordinate for angle in drawn.angles) == [0, 1]
     for rod, end, k, sign, origin in drawn.angles:
         away = drawn.ends[:, rod, 1 - end] - drawn.ends[:, rod, end]

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 from PIL import Image
 
 import fastmech as fm
@@ -30,6 +32,35 @@ def test_a_gif_has_the_motion_s_pictures_and_they_differ(run: object, tmp_path: 
 def test_a_page_holds_its_pictures(run: object, tmp_path: Path) -> None:
     text = fm.animate(SCENE, run, tmp_path / "motion.html", fps=3).read_text(encoding="utf-8")
     assert text.count("data:image/png;base64") == 3
+
+
+def test_arrows_and_angles_are_those_of_the_moment(run: object, tmp_path: Path) -> None:
+    """Arrows are as long as the load's value asks for, arcs as wide as the coordinates are large."""
+    forces, arrows, turns = list[float](), list[float](), list[float]()
+    annotate, plot = Axes.annotate, Axes.plot
+
+    def noted(self: Any, words: str, xy: Any, *rest: Any, **how: Any) -> Any:
+        if "arrowprops" in how:
+            arrows.append(xy[0] - how["xytext"][0])
+        elif words.endswith(" N"):
+            forces.append(float(words.removesuffix(" N")))
+        return annotate(self, words, xy, *rest, **how)
+
+    def drawn(self: Any, x: Any, y: Any, *rest: Any, **how: Any) -> Any:
+        if np.size(x) == 33:
+            whole, half = (np.hypot(x[k] - x[0], y[k] - y[0]) for k in (32, 16))
+            turns.append(4.0 * np.arccos(0.5 * whole / half))
+        return plot(self, x, y, *rest, **how)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Axes, "annotate", noted)
+        patch.setattr(Axes, "plot", drawn)
+        fm.animate(SCENE, run, tmp_path / "motion.gif", fps=5)
+    fades = np.exp(-SCENE.alpha * np.linspace(0.0, 0.8, 5))
+    np.testing.assert_allclose(forces[-5:], SCENE.F0 * fades, rtol=5e-3)
+    np.testing.assert_allclose(np.array(arrows[-5:]) / arrows[-5], fades, rtol=1e-6)
+    angles = np.abs(run.y[::4, 0, :2][:5])  # type: ignore[attr-defined]
+    np.testing.assert_allclose(np.sort(np.reshape(turns[-10:], (5, 2))), np.sort(angles), atol=1e-6)
 
 
 def test_wrong_arguments_give_a_line(run: object, tmp_path: Path) -> None:

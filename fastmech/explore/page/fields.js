@@ -5,6 +5,10 @@ import { Plane, canvas, choice, css, draggable, element, panel, short } from "./
 const COLORS = ["#56B4E9", "#E69F00", "#009E73", "#F0E442", "#CC79A7", "#0072B2", "#D55E00", "#a7d8ba", "#6200ff", "#4e89ff", "#3b766c", "#a7ffb1", "#62d8ff", "#a7450a", "#76c480", "#ce00a7", "#c4d880", "#62c4c4"];
 const CIVIDIS = [[0, 34, 78], [53, 69, 108], [102, 105, 112], [148, 142, 119], [200, 184, 102], [254, 232, 56]];
 
+// What happens on curves of the atlas, and their dashes in the order in which kinds come.
+const MEANS = { fold: "two equilibria meet", pitchfork: "three become one", Hopf: "a swing grows", coalescence: "two modes meet and one grows", transcritical: "two exchange stability" };
+const DASHES = [[], [7, 4], [2, 4], [9, 3, 2, 3]];
+
 const STEPS = 15; // of height in the landscape
 
 const rgb = (hex) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16));
@@ -70,17 +74,29 @@ class Field {
     this.panel.body.append(this.canvas, this.note);
   }
   axes() { return Object.fromEntries(this.app.state[this.key].map((n) => [n, [this.about[n].low, this.about[n].high]])); }
+  // Whether what was answered is over the axes that are chosen.
+  get current() { return Boolean(this.shown) && Object.keys(this.shown).join() === this.app.state[this.key].join(); }
   set() {
-    const names = this.app.state[this.key];
+    const names = this.app.state[this.key], labels = names.map((n) => `${n} [${this.about[n].unit}]`);
+    if (labels.join() !== this.plane.labels.join()) this.plane.later();
     this.selects.forEach((s, k) => { s.value = names[k]; });
     this.plane.range = names.map((n) => [this.about[n].low, this.about[n].high]);
-    this.plane.labels = names.map((n) => `${n} [${this.about[n].unit}]`);
+    this.plane.labels = labels;
   }
   put(image) {
     const p = this.plane, [nx, ny] = [image.width - 1, image.height - 1], names = Object.keys(this.shown);
     const [a, b] = names.map((n) => this.shown[n]);
     const hx = (p.x(a[1]) - p.x(a[0])) / nx, hy = (p.y(b[0]) - p.y(b[1])) / ny;
     p.ink.image(image, p.x(a[0]) - hx / 2, p.y(b[1]) - hy / 2, hx * (nx + 1), hy * (ny + 1));
+  }
+  // What the picture is a slice at, and which equilibria lie in it.
+  slice() {
+    const names = this.app.state[this.key], { coordinates, states } = this.app.about, held = coordinates.filter((n) => !names.includes(n));
+    return held.length ? ` Held: ${held.map((n) => `${n} = 0 ${states[n].unit}`).join(", ")}; equilibria elsewhere are pale.` : "";
+  }
+  within(row) {
+    const { coordinates, states } = this.app.about, names = this.app.state[this.key];
+    return coordinates.every((n, k) => names.includes(n) || Math.abs(row.position[k] - (states[n].periodic ? 2 * Math.PI * Math.round(row.position[k] / (2 * Math.PI)) : 0)) < 1e-6);
   }
   // The equilibria and the motion's path, over the states that are the axes.
   marks() {
@@ -89,12 +105,19 @@ class Field {
     if (this.path) { p.curve(...this.path, { color: "#000000", width: 3 }); p.curve(...this.path, { color: "#ffffff", width: 1.4 }); }
     (this.app.rows ?? []).forEach((row, k) => {
       const [x, y] = names.map((n) => (coordinates.includes(n) ? row.position[coordinates.indexOf(n)] : 0));
+      if (!this.within(row)) {
+        for (const [color, width] of [["#ffffff", 4], ["#000000", 1.2]]) p.ink.circle(p.x(x), p.y(y), 8, { color, width, fill: width < 2 ? "rgba(255, 255, 255, 0.6)" : null });
+        p.ink.text(p.x(x), p.y(y), `${k + 1}`, { color: "#000000", size: 10 });
+        return;
+      }
       const stable = row.verdict.includes("stable") && !row.verdict.includes("unstable"), chosen = k === this.app.state.chosen;
       if (chosen) p.ink.circle(p.x(x), p.y(y), 12, { color: "#ffffff", width: 3 });
       p.ink.circle(p.x(x), p.y(y), 8, { fill: stable ? "#000000" : "#ffffff", color: stable ? "#ffffff" : "#000000", width: 1.5 });
       p.ink.text(p.x(x), p.y(y), `${k + 1}`, { color: stable ? "#ffffff" : "#000000", size: 11 });
     });
   }
+  // Said until the first answer is there.
+  waits(words) { if (!this.shown) this.note.textContent = words; }
   // The path within one turn, broken where it leaves at one side and comes back at the other.
   wrapped() {
     const motion = this.app.motion, names = this.app.state[this.key], key = names.join();
@@ -137,7 +160,7 @@ export class Landscape extends Field {
     this.starts();
   }
   take(header, arrays) {
-    this.panel.told(header);
+    this.panel.tell(this.app.about, "landscape", { ...header.asked, divisions: header.divisions });
     this.shown = header.axes;
     this.proof = header.certificate;
     this.complete = header.complete;
@@ -149,10 +172,12 @@ export class Landscape extends Field {
       for (const v of data) { if (v < low) low = v; if (v > high) high = v; }
       this.note.textContent += ` Energy from ${short(low)} J (dark) to ${short(high)} J (bright), lines every ${short((high - low) / STEPS)} J.`;
       this.image = heights(data, nx, ny, low, high);
+      this.span = [low, high];
     } else this.note.textContent += " The forces are not known to have a potential.";
+    this.note.textContent += this.slice();
     this.plane.later();
   }
-  draw() { if (this.image) this.put(this.image); this.marks(); }
+  draw() { if (this.image && this.current) this.put(this.image); this.marks(); }
 }
 
 export class Basins extends Field {
@@ -172,7 +197,7 @@ export class Basins extends Field {
   }
   take(header, arrays) {
     const n = header.divisions + 1, rows = arrays.well.shape[0], q = arrays.turns.shape[2];
-    if (this.shownId !== header.id) { this.colors.clear(); this.turned = 0; this.wells = header.wells; this.shownId = header.id; this.grid = null; }
+    if (this.shownId !== header.id) { this.colors.clear(); this.turned = 0; this.wells = header.attractors ? header.attractors.map((_, k) => k) : header.wells; this.shownId = header.id; this.grid = null; }
     this.shown = header.axes;
     if (!this.grid || this.grid.n !== n) {
       const before = this.grid;
@@ -196,16 +221,16 @@ export class Basins extends Field {
     c.getContext("2d").putImageData(strip, 0, 0);
     image.getContext("2d").drawImage(c, header.from, 0);
     if (header.last) {
-      this.panel.told(header);
-      const shown = [...this.colors.values()].slice(0, 8).flatMap(({ color, well: w, turns }) => [swatch(color), `${w + 1}${turns.some((t) => t) ? ` after ${turns.join(", ")} turns` : ""}   `]);
+      this.panel.tell(this.app.about, "basins", { ...header, ...header.asked });
+      const shown = [...this.colors.values()].slice(0, 8).flatMap(({ color, well: w, turns }) => [swatch(color), `${header.attractors ? header.attractors[w] : w + 1}${turns.some((t) => t) ? ` after ${turns.join(", ")} turns` : ""}   `]);
       const none = well.filter((w) => w === -1).length;
-      this.note.replaceChildren(`${n} × ${n} starts${header.final ? "" : ", refining"}. Proved to end at equilibrium `, ...shown, this.colors.size > 8 ? `and ${this.colors.size - 8} more. ` : "", "Darker: later. ", ...(none ? [swatch([120, 120, 120]), `undecided: ${none}.`] : []));
+      this.note.replaceChildren(`${n} × ${n} starts${header.final ? "" : ", refining"}. ${header.attractors ? "They come to " : "Proved to end at equilibrium "}`, ...shown, this.colors.size > 8 ? `and ${this.colors.size - 8} more. ` : "", "Darker: later. ", ...(none ? [swatch([120, 120, 120]), `undecided: ${none}.`] : []), this.slice());
       this.levels = { ...(this.levels ?? {}), [n]: header.waited };
       this.canvas.dataset.divisions = header.divisions;
     }
     this.plane.later();
   }
-  draw() { if (this.grid) this.put(this.grid.image); this.marks(); }
+  draw() { if (this.grid && this.current) this.put(this.grid.image); this.marks(); }
 }
 
 export class Atlas extends Field {
@@ -218,7 +243,7 @@ export class Atlas extends Field {
     });
   }
   take(header, arrays) {
-    this.panel.told(header);
+    this.panel.tell(this.app.about, "atlas", { ...header.asked, divisions: header.divisions });
     this.shown = header.axes;
     const { data, shape } = arrays.count, [nx, ny] = shape, stable = arrays.stable.data;
     const seen = new Map();
@@ -226,23 +251,28 @@ export class Atlas extends Field {
     const kinds = [...seen.keys()].sort((a, b) => a - b);
     const color = (i, j) => rgb(COLORS[kinds.indexOf(100 * data[i * ny + j] + stable[i * ny + j]) % COLORS.length]);
     this.image = picture(nx, ny, color);
-    this.legend = kinds.map((k, index) => [COLORS[index % COLORS.length], `${seen.get(k)[0]} equilibria, ${seen.get(k)[1]} stable`]);
+    this.legend = kinds.map((k, index) => [COLORS[index % COLORS.length], `${seen.get(k)[0]} equilibri${seen.get(k)[0] === 1 ? "um" : "a"}, ${seen.get(k)[1]} stable`]);
     this.curves = header.curves.map((kind, k) => ({ kind, xy: arrays[`curve${k}`] }));
-    this.note.textContent = `${nx} x ${ny} points.${this.curves.length ? ` ${this.curves.length} curves on which equilibria appear${header.curves_complete ? ": proved to be all" : ""}.` : ""} The cross is the present point.${this.app.held() ? " The force is held at its first value." : ""}`;
+    this.kinds = [...new Set(header.curves)];
+    const told = this.kinds.map((kind) => `${header.curves.filter((k) => k === kind).length} of kind ${kind} (${MEANS[kind] ?? "several at once"})`).join(", ");
+    this.note.textContent = `${nx} × ${ny} points.${told ? ` Curves: ${told}${header.curves_complete ? "; proved to be all" : ""}.` : ""} The cross is the present point.${this.app.held() ? " The force is held at its first value." : ""}`;
     this.canvas.dataset.divisions = header.divisions;
     this.plane.later();
   }
   draw(p) {
-    if (this.image) this.put(this.image);
-    for (const { xy } of this.curves ?? []) {
+    if (!this.image || !this.current) return;
+    this.put(this.image);
+    for (const { kind, xy } of this.curves) {
       const n = xy.shape[1];
-      p.curve(xy.data.subarray(0, n), xy.data.subarray(n), { color: "#000000", width: 1.8 });
+      p.curve(xy.data.subarray(0, n), xy.data.subarray(n), { color: "#000000", width: 1.8, dash: DASHES[this.kinds.indexOf(kind) % DASHES.length] });
     }
-    (this.legend ?? []).forEach(([color, words], k) => {
+    const entries = [...this.legend, ...this.kinds.map((kind, k) => [null, kind, DASHES[k % DASHES.length]])];
+    entries.forEach(([color, words, dash], k) => {
       const at = [p.box.left + 8, p.box.top + 8 + 18 * k];
       p.ink.line([[0, 0], [196, 0], [196, 18], [0, 18]].map((d) => [at[0] - 4 + d[0], at[1] - 4 + d[1]]), { fill: css("paper"), closed: true });
-      p.ink.line([[0, 0], [12, 0], [12, 10], [0, 10]].map((d) => [at[0] + d[0], at[1] + d[1]]), { fill: color, color: css("ink"), width: 0.5, closed: true });
-      p.ink.text(at[0] + 18, at[1] + 5, words, { color: css("ink"), align: "left", size: 11 });
+      if (dash) p.ink.line([[at[0] - 2, at[1] + 5], [at[0] + 28, at[1] + 5]], { color: css("ink"), width: 1.8, dash });
+      else p.ink.line([[0, 0], [12, 0], [12, 10], [0, 10]].map((d) => [at[0] + d[0], at[1] + d[1]]), { fill: color, color: css("ink"), width: 0.5, closed: true });
+      p.ink.text(at[0] + (dash ? 34 : 18), at[1] + 5, words, { color: css("ink"), align: "left", size: 11 });
     });
   }
   over(p) {

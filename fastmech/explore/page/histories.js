@@ -3,6 +3,8 @@ import { Plane, canvas, choice, css, element, panel, short } from "./ink.js";
 
 const COLORS = ["blue", "vermillion", "green", "purple"], DASHES = [[], [7, 4], [2, 4], [9, 3, 2, 3]];
 
+const NONE = "Press on the landscape or the basin map to start a motion.";
+
 export class Histories {
   constructor(app) {
     this.app = app;
@@ -19,22 +21,33 @@ export class Histories {
       return made;
     });
     this.of = coordinates[0];
-    this.note = element("p", { class: "note" }, "Press on the landscape or the basin map to start a motion.");
+    this.note = element("p", { class: "note" }, NONE);
     this.sums = element("p", { class: "note" });
-    const until = element("input", { type: "number", class: "number", min: 1, max: 300, value: app.state.t_end, "aria-label": "length of the motion [s]" });
+    const until = this.until = element("input", { type: "number", class: "number", min: 1, max: 300, value: app.state.t_end, "aria-label": "length of the motion [s]" });
     until.addEventListener("change", () => app.change({ t_end: Math.min(300, Math.max(0.1, Number(until.value) || 20)) }, "t_end"));
     this.panels[0].tools.append(until, " s");
     this.panels[0].body.append(this.note);
     this.panels[1].body.append(this.sums);
-    this.panels[2].tools.append(choice("coordinate of the phase portrait", coordinates, this.of, (name) => { this.of = name; this.set(); }));
+    this.panels[2].tools.append(choice("coordinate of the phase portrait", coordinates, this.of, (name) => { this.of = name; this.set(); this.tell(); }));
   }
   take(header, arrays) {
-    for (const one of this.panels) one.told(header);
     Object.assign(this, { header, arrays });
+    this.tell();
     const last = arrays.times.data.length - 1, { brought, lost } = arrays;
     this.note.textContent = header.status || Object.entries(this.app.state.start ?? {}).map(([n, v]) => `${n} = ${short(v)}`).join(", ").replace(/^/, "From ");
     this.sums.textContent = `Kinetic and potential energy: ${short(this.total(0))} J at first, ${short(this.total(last))} J at the end. Loads bring ${short(brought.data[last])} J, dampers take ${short(lost.data[last])} J.`;
     this.set();
+  }
+  tell() {
+    for (const one of this.arrays ? this.panels : []) one.tell(this.app.about, one.section.id, { ...this.header.asked, of: this.of });
+  }
+  // No motion is there any more.
+  clear() {
+    Object.assign(this, { header: null, arrays: null, columns: null, pair: null });
+    for (const one of this.panels) { one.filled = false; one.put("", ""); }
+    this.note.textContent = NONE;
+    this.sums.textContent = "";
+    this.later();
   }
   total(k) { return this.arrays.kinetic.data[k] + this.arrays.potential.data[k]; }
   column(k) {

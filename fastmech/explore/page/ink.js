@@ -1,5 +1,7 @@
 // Drawing in plane coordinates with axes, onto a canvas or into an SVG text.
 
+import { pythonOf, requestOf } from "./lines.js";
+
 const SVG = "http://www.w3.org/2000/svg";
 
 const scheme = matchMedia("(prefers-color-scheme: dark)"), colors = new Map();
@@ -91,6 +93,9 @@ export function ticks(low, high, most) {
 
 export const short = (v) => (v === null || !Number.isFinite(v) ? "–" : Number(v.toPrecision(4)).toString());
 
+// Decimals without a sign before nothing.
+export const fixed = (v, digits) => v.toFixed(digits).replace(/^-(0\.?0*)$/, "$1");
+
 // On wide screens all is larger, words too.
 const zoom = () => (innerWidth >= 2200 ? 1.3 : 1);
 
@@ -174,6 +179,12 @@ export class Plane {
     const share = (v, a, z) => Math.min(1, Math.max(0, (v - a) / (z - a)));
     return [x0 + share((event.clientX - r.left) / zoom(), b.left, b.right) * (x1 - x0), y0 + share((event.clientY - r.top) / zoom(), b.bottom, b.top) * (y1 - y0)];
   }
+  // Whether a press is within the axes, or on their edge.
+  holds(event) {
+    const r = this.canvas.getBoundingClientRect(), b = this.box, e = this.edge;
+    const [x, y] = [(event.clientX - r.left) / zoom(), (event.clientY - r.top) / zoom()];
+    return b && x >= b.left - e && x <= b.right + e && y >= b.top - e && y <= b.bottom + e;
+  }
   svg() {
     const [w, h] = this.size(), ink = new SvgInk(w, h, css("paper"));
     this.paint(ink, w, h);
@@ -187,7 +198,7 @@ export function draggable(plane, { begin = () => true, move, end = () => {}, key
   const canvas = plane.canvas;
   let held = false;
   canvas.addEventListener("pointerdown", (e) => {
-    held = begin(plane.at(e), e);
+    held = plane.holds(e) && begin(plane.at(e), e);
     if (held) { canvas.setPointerCapture(e.pointerId); move(plane.at(e), e); }
   });
   canvas.addEventListener("pointermove", (e) => { if (held) move(plane.at(e), e); });
@@ -228,28 +239,34 @@ export function savePicture(name, image) {
 export function panel(id, title, { planes = () => [], lines = true } = {}) {
   const tools = element("div", { class: "tools" }), body = element("div"), code = element("pre"), request = element("pre");
   const section = element("section", { id, "aria-label": title });
-  const head = element("div", { class: "head" }, element("h2", {}, title));
+  const head = element("div", { class: "head" }, element("h2", {}, title)), refusal = element("p", { class: "refusal", role: "status" });
   const told = element("span", { role: "status" });
-  section.append(head, tools, body);
-  const made = { section, tools, body, say: {}, python: "", request: "" };
-  const button = (words, act) => head.append(element("button", { onclick: act, "aria-label": `${words.length > 3 ? words : `save picture as ${words}`}: ${title}`, title: words.length > 3 ? null : `save picture as ${words}` }, words));
+  section.append(head, tools, refusal, body);
+  const made = { section, tools, body, python: "", request: "", ways: [] };
+  const button = (words, act) => { const one = element("button", { onclick: act, "aria-label": `${words.length > 3 ? words : `save picture as ${words}`}: ${title}`, title: words.length > 3 ? null : `save picture as ${words}` }, words); head.append(one); return one; };
   if (lines) {
-    button("copy Python", async () => {
+    made.ways.push(button("copy Python", async () => {
       try { await navigator.clipboard.writeText(made.python); told.textContent = "copied"; } catch { download(`${id}.py`, made.python, "text/plain"); told.textContent = "saved as a file"; }
       setTimeout(() => { told.textContent = ""; }, 2000);
-    });
-    button("save request", () => download(`${id}.toml`, made.request, "text/plain"));
+    }));
+    made.ways.push(button("save request", () => download(`${id}.toml`, made.request, "text/plain")));
     section.append(element("details", {}, element("summary", {}, "Python and request"), code, request));
   }
   if (planes().length) {
     button("PNG", () => planes().forEach((p, k) => p.now() ?? p.canvas.toBlob((b) => download(`${id}${k || ""}.png`, b))));
     button("SVG", () => planes().forEach((p, k) => download(`${id}${k || ""}.svg`, p.svg(), "image/svg+xml")));
   }
-  made.told = (header) => {
-    if (header.python === undefined) return;
-    made.python = code.textContent = header.python;
-    made.request = request.textContent = header.request;
+  // Without lines and a request the ways back to work are closed.
+  made.put = (python, text, line = "") => {
+    made.python = code.textContent = python;
+    made.request = request.textContent = text;
+    made.ways.forEach((one) => { one.disabled = !python; });
+    section.classList.toggle("stale", line !== "" && made.filled === true);
+    refusal.textContent = line;
   };
+  made.tell = (about, view, asked) => { made.filled = true; made.put(pythonOf(about, view, asked), requestOf(about, view, asked)); };
+  made.refuse = (line) => made.put("", "", `${line}${/[.!]$/.test(line) ? "" : "."}${made.filled ? " Shown is the answer to the last valid parameters." : ""}`);
+  made.put("", "");
   head.append(told);
   document.getElementById("panels").append(section);
   return made;

@@ -9,7 +9,18 @@ import { Table, sections } from "./table.js";
 const status = document.getElementById("status"), error = document.getElementById("error");
 
 const RATE = 5; // end of the range of a rate [rad/s or m/s]
-const VIEWS = { equilibria: "the equilibria", motion: "the motion", basins: "the basin map", atlas: "the atlas" };
+const VIEWS = { equilibria: "the equilibria", motion: "the motion", basins: "the basin map", atlas: "the atlas", pull: "a start", strike: "a kick" };
+
+// A size that a parameter without one may have: the largest of its unit, or what the others make of it.
+function usual(name, parameters) {
+  const of = (unit, best = Math.max) => best(...Object.entries(parameters).filter(([n, p]) => n !== name && p.unit === unit && p.reset).map(([, p]) => Math.abs(p.reset)));
+  const [m, g, k, kt, long, short] = [of("kg"), of("m/s2"), of("N/m"), of("N m"), of("m"), of("m", Math.min)], { unit } = parameters[name];
+  const made = {
+    N: [m * g, k * short ** 3 / long ** 2, kt / long], "N/m": [m * g / long, kt / long ** 2], "N m": [m * g * long, k * long ** 2],
+    "N s/m": [Math.sqrt(k * m), m * Math.sqrt(g / long)], "N m s": [long * Math.sqrt(kt * m), m * long * Math.sqrt(g * long)],
+  };
+  return [of(unit), ...(made[unit] ?? []), 1].find((v) => v > 0 && Number.isFinite(v));
+}
 
 class App {
   constructor() {
@@ -23,19 +34,28 @@ class App {
       atlas: (header, arrays) => { this.clear(header.kind); this.atlas.take(header, arrays); },
       pull: (header) => { this.clear("pull"); this.from(header.state, true); },
       strike: (header) => { this.clear("strike"); this.mechanism.kicked(header); },
-      error: (message) => { this.failed = message.of; error.textContent = message.line; },
+      error: (message) => this.refused(message),
       compiling: (told) => this.compiling(told),
       closed: () => { status.textContent = "the server has ended"; },
     });
   }
-  // Ranges of sliders: from zero to some times the usual value, wider where the value lies outside.
+  // Ranges of sliders and of the atlas: from zero, or above where it must be, to some times the usual value.
   ranges(about) {
     for (const [name, p] of Object.entries(about.parameters)) {
-      p.high = Number((2.5 * (Math.max(Math.abs(p.reset), Math.abs(p.value)) || 1)).toPrecision(1));
-      p.low = (about.scene && name === "F0") || Math.min(p.reset, p.value) < 0 ? -p.high : 0;
+      p.high = Number((2.5 * (Math.max(Math.abs(p.reset), Math.abs(p.value)) || usual(name, about.parameters))).toPrecision(1));
+      p.low = !p.zero ? p.high / 100 : (p.negative && p.unit === "N") || Math.min(p.reset, p.value) < 0 ? -p.high : 0;
     }
+    // The force of the arrow that says how long the others are.
+    const force = Object.values(about.parameters).find((p) => p.unit === "N");
+    this.arrow = Number((Math.abs(force?.reset ?? 0) || (force?.high ?? 3) / 3).toPrecision(2));
     about.coordinates = Object.keys(about.states);
     about.rates.forEach((rate, k) => { about.states[rate] = { unit: `${about.states[about.coordinates[k]].unit}/s`, low: -RATE, high: RATE, periodic: false }; });
+  }
+  // Ranges hold every value that the mechanism can have.
+  widen(parameters) {
+    const wider = Object.entries(parameters).filter(([n, v]) => v < this.about.parameters[n].low || v > this.about.parameters[n].high);
+    for (const [n, v] of wider) { const p = this.about.parameters[n]; p.low = Math.min(p.low, v); p.high = Math.max(p.high, v); }
+    if (wider.some(([n]) => this.state.atlas.includes(n))) this.askAtlas();
   }
   begin(about) {
     this.about = about;
@@ -53,7 +73,13 @@ class App {
     if (atlas.length > 1) this.atlas = new Atlas(this);
     this.histories = new Histories(this);
     this.table = new Table(this);
-    addEventListener("hashchange", () => { if (location.hash !== this.hash) { this.restore(); this.all(); } });
+    addEventListener("hashchange", () => {
+      if (location.hash === this.hash) return;
+      this.restore();
+      this.rests();
+      this.histories.until.value = this.state.t_end;
+      this.all();
+    });
     status.textContent = "ready";
     performance.mark("usable");
     sections(about);
@@ -69,6 +95,7 @@ class App {
       if (pair(kept.atlas, new Set(Object.keys(this.about.parameters)))) this.state.atlas = kept.atlas;
       if (Number.isInteger(kept.chosen) && kept.chosen >= 0) this.state.chosen = kept.chosen;
       if (kept.t_end > 0 && kept.t_end <= 300) this.state.t_end = kept.t_end;
+      this.state.start = null;
       if (kept.start && Object.entries(kept.start).every(([n, v]) => known.has(n) && Number.isFinite(v))) this.state.start = kept.start;
     } catch { error.textContent = "the address holds no state that can be read"; }
   }
@@ -79,11 +106,20 @@ class App {
       history.replaceState(null, "", this.hash);
     }, 150);
   }
+  // What cannot be answered is said where the answer would be; of what all hangs on, and of a hand, at the top too.
+  refused({ line, of }) {
+    const { landscape, table, mechanism, basins, atlas, histories } = this, still = this.motion ? [] : [mechanism];
+    const views = { equilibria: [landscape, table, ...still], basins: [basins], atlas: [atlas], motion: [...histories.panels.map((one) => ({ panel: one })), mechanism] }[of] ?? [];
+    views.forEach((one) => { one.waits?.(""); one.panel.refuse(line); });
+    if (of === "equilibria" || !views.length) { this.failed = of; error.textContent = line; }
+    if (of === "equilibria") this.free();
+    if (of === "motion") this.stood();
+  }
   clear(kind) { if (this.failed === kind || this.failed === undefined) error.textContent = ""; }
   compiling({ name, of, number, about }) {
     clearTimeout(this.told);
     if (name === null) this.told = setTimeout(() => { status.textContent = "ready"; }, 300);
-    else status.textContent = `loading or compiling for ${VIEWS[of] ?? of}: ${name}, kernel ${number} of about ${about}`;
+    else status.textContent = `loading or compiling for ${of.map((kind) => VIEWS[kind]).join(" and ") || "the page"}: ${name}, kernel ${number} of about ${about}`;
   }
   all() {
     this.parameters.show();
@@ -136,16 +172,19 @@ class App {
   askBasins() {
     this.mapped = true;
     this.basins.set();
+    this.basins.waits("Starts are being followed.");
     this.talk.ask("basins", { parameters: this.state.parameters, axes: this.basins.axes() });
   }
   askAtlas() {
     if (!this.atlas) return;
     this.atlas.set();
+    this.atlas.waits("Equilibria are being counted.");
     this.talk.ask("atlas", { parameters: this.held() ? { ...this.state.parameters, alpha: 0 } : this.state.parameters, axes: this.atlas.axes() });
   }
   // Over the force of a scene the atlas is of one that stays: of one that fades nothing is left at rest.
   held() { return this.about.scene && this.state.parameters.alpha > 0 && this.state.atlas.includes("F0"); }
   askMotion() {
+    if (!this.state.start) return;
     if (this.moving) { this.movingAgain = true; return; }
     this.moving = true;
     const { t_end } = this.state;
@@ -158,6 +197,7 @@ class App {
     const asked = performance.now() - header.waited;
     this.waits.answers.push(header.waited);
     this.rows = header.rows;
+    this.widen(header.asked.parameters);
     this.state.chosen = Math.min(this.state.chosen, Math.max(0, this.rows.length - 1));
     this.landscape.take(header, arrays);
     this.table.take(header);
@@ -191,10 +231,17 @@ class App {
   }
   choose(k) {
     this.state = { ...this.state, chosen: k, start: null };
-    this.motion = null;
     this.keep();
-    this.mechanism.atRest();
+    this.rests();
     this.table.take();
+  }
+  // The motion is over, and what is under way of it too.
+  rests() {
+    clearTimeout(this.following);
+    for (const kind of ["motion", "pull", "strike"]) this.talk.drop(kind);
+    Object.assign(this, { motion: null, moving: false, movingAgain: false, play: false });
+    this.histories.clear();
+    this.mechanism.atRest();
     this.landscape.plane.later();
     this.basins.plane.later();
   }

@@ -1,7 +1,11 @@
 // The mechanism to scale, at an equilibrium or in motion; its masses can be dragged, and it can be struck.
-import { Plane, canvas, css, draggable, element, panel } from "./ink.js";
+import { Plane, canvas, css, draggable, element, fixed, panel } from "./ink.js";
 
 const [FIXED, POINT, GUIDE, ROD, SPRING, DAMPER, LOAD, MASS] = [0, 1, 2, 3, 4, 5, 6, 7];
+
+// Names as in the package's pictures.
+const SYMBOLS = { phi: "φ", theta: "θ" };
+const named = (name) => name.replace(/^([A-Za-z])(\d+)$/, (_, letter, digits) => letter + digits.replace(/\d/g, (d) => "₀₁₂₃₄₅₆₇₈₉"[d]));
 
 export class MechanismView {
   constructor(app) {
@@ -30,9 +34,9 @@ export class MechanismView {
     requestAnimationFrame((t) => this.tick(t));
   }
   rest(header, arrays) {
-    this.resting = { ...header, ends: arrays.ends };
+    this.resting = { ...header, ...arrays };
     this.extent();
-    if (!this.motion) this.panel.told(header);
+    this.tell();
     const movable = this.masses(this.resting).map((m) => m.point), before = this.points.value;
     if (movable.join() !== [...this.points.options].map((o) => o.value).join()) {
       this.points.replaceChildren(...movable.map((name) => element("option", { value: name }, name)));
@@ -40,14 +44,18 @@ export class MechanismView {
     }
   }
   moves(header, arrays) {
-    this.panel.told(header);
-    this.motion = { ...header, ends: arrays.ends, times: arrays.times.data, y: arrays.y };
+    this.motion = { ...header, ...arrays, times: arrays.times.data };
+    this.tell();
     this.scrub.max = arrays.times.data.length - 1;
     if (header.t_end === 0 || this.frame >= arrays.times.data.length) this.frame = 0;
     this.extent();
     this.moved();
   }
-  atRest() { this.motion = null; this.pause(); this.extent(); this.plane.moved(); }
+  atRest() { this.motion = null; this.struck = null; this.fire = false; this.frame = 0; this.time.textContent = ""; this.pause(); this.extent(); this.tell(); }
+  tell() {
+    if (this.motion) this.panel.tell(this.app.about, this.motion.t_end > 0 ? "mechanism" : "rest", { ...this.motion.asked, chosen: this.app.state.chosen });
+    else if (this.resting) this.panel.tell(this.app.about, "rest", { ...this.resting.asked, chosen: this.app.state.chosen });
+  }
   extent() {
     const found = [[Infinity, -Infinity], [Infinity, -Infinity]];
     // The motion's whole extent, or that of the chosen equilibrium.
@@ -68,7 +76,7 @@ export class MechanismView {
     this.plane.later();
   }
   toggle() { if (this.playing) this.pause(); else if (this.motion) { this.playing = true; this.play.textContent = "pause"; this.exact = null; } }
-  pause() { this.playing = false; this.play.textContent = "play"; }
+  pause() { this.playing = false; this.play.textContent = "play"; this.moved(); }
   start() { this.frame = 0; this.exact = 0; if (!this.playing) this.toggle(); }
   tick(now) {
     const passed = Math.min(0.1, (now - this.last) / 1000);
@@ -97,14 +105,14 @@ export class MechanismView {
     if (which < 0) return null;
     const d = of.ends.data, at = [];
     for (let k = 0, p = 4 * n * which; k < n; k++, p += 4) at.push([[d[p], d[p + 1]], [d[p + 2], d[p + 3]]]);
-    return { ...of, at };
+    return { ...of, at, which };
   }
   draw() {
     const of = this.shown();
     if (!of) return;
     const { ink } = this.plane, X = (p) => [this.plane.x(p[0]), this.plane.y(p[1])], unit = Math.abs(this.plane.x(this.size) - this.plane.x(0));
     const heaviest = Math.max(...of.masses.map((m) => m ?? 0), 1e-30);
-    const order = [GUIDE, SPRING, DAMPER, ROD, FIXED, MASS, LOAD, POINT];
+    const order = [GUIDE, SPRING, DAMPER, ROD, FIXED, MASS, POINT];
     const indices = of.elements.map((_, k) => k).sort((a, b) => order.indexOf(of.elements[a]) - order.indexOf(of.elements[b]));
     for (const k of indices) {
       const kind = of.elements[k], [a, b] = of.at[k].map(X), ax = [b[0] - a[0], b[1] - a[1]], length = Math.hypot(...ax) || 1;
@@ -123,12 +131,19 @@ export class MechanismView {
         ink.line([along(0, 0), along(0.55, 0)], look); ink.line([along(0.55, -7), along(0.55, 7)], look);
         ink.line([along(0.3, 9), along(0.8, 9), along(0.8, -9), along(0.3, -9)], look); ink.line([along(0.8, 0), along(1, 0)], look);
       }
-      if (kind === LOAD) this.arrow(a, [a[0] + 0.17 * unit * ax[0] / length, a[1] + 0.17 * unit * ax[1] / length], css("vermillion"));
+    }
+    for (let k = 0, count = of.forces.shape[1]; k < count; k++) {
+      const at = 4 * (of.which * count + k), [x, y, u, v] = of.loads.data.subarray(at, at + 4), force = of.forces.data[at / 4];
+      const [a, b] = [[x, y], [u, v]].map(X), far = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1;
+      const long = 0.17 * unit * Math.max(-3, Math.min(3, force / this.app.arrow)) / far, [dx, dy] = [long * (b[0] - a[0]), long * (b[1] - a[1])];
+      if (!force) continue;
+      this.arrow(a, [a[0] + dx, a[1] + dy], css("vermillion"));
+      ink.text(a[0] + dx + 12 * Math.sign(dx), a[1] + dy + (Math.abs(dx) > Math.abs(dy) ? -12 : 12 * Math.sign(dy)), `${Number(force.toPrecision(3))} N`, { color: css("vermillion") });
     }
     of.names.forEach((name, k) => {
       // Names of fixed points stand below them on the left, of others above on the right: both can be read where they meet.
-      const fixed = of.elements[k] === FIXED, [x, y] = X(of.at[k][0]);
-      if (name) ink.text(x + (fixed ? -15 : 15), y + (fixed ? 16 : -16), name, { color: css("ink"), size: 13 });
+      const ground = of.elements[k] === FIXED, [x, y] = X(of.at[k][0]);
+      if (name) ink.text(x + (ground ? -15 : 15), y + (ground ? 16 : -16), named(name), { color: css(ground ? "ink" : "blue"), size: 13 });
     });
     const { coordinates, states } = this.app.about, y = this.position();
     if (y) {
@@ -139,12 +154,17 @@ export class MechanismView {
         ink.line([[x0, y0], on(origin, 1.25 * r)], { color, width: 1, dash: [4, 3] });
         ink.line(arc, { color, width: 2 });
         if (Math.abs(q) > 0.25) this.head(arc[28], arc[32], color);
-        ink.text(...on(origin + 0.5 * sign * q, 1.3 * r), coordinates[k], { color: css("ink"), size: 13 });
+        ink.text(...on(origin + 0.5 * sign * q, 1.3 * r), SYMBOLS[coordinates[k]] ?? coordinates[k], { color: css("ink"), size: 13 });
       }
       coordinates.forEach((n, k) => {
-        const degrees = states[n].unit === "rad" ? ` (${(y[k] * 180 / Math.PI).toFixed(1)}°)` : "";
-        ink.text(this.plane.box.left + 6, this.plane.box.top + 10 + 16 * k, `${n} = ${y[k].toFixed(3)} ${states[n].unit}${degrees}`, { color: css("ink"), align: "left" });
+        const degrees = states[n].unit === "rad" ? ` (${fixed(y[k] * 180 / Math.PI, 1)}°)` : "";
+        ink.text(this.plane.box.left + 6, this.plane.box.top + 10 + 16 * k, `${SYMBOLS[n] ?? n} = ${fixed(y[k], 3)} ${states[n].unit}${degrees}`, { color: css("ink"), align: "left" });
       });
+    }
+    if (of.forces.shape[1]) {
+      const at = [this.plane.box.left + 10, this.plane.box.bottom - 12];
+      this.arrow(at, [at[0] + 0.17 * unit, at[1]], css("vermillion"));
+      ink.text(at[0] + 0.17 * unit + 8, at[1], `${this.app.arrow} N, arrows are at most three times as long`, { color: css("soft"), align: "left", size: 11 });
     }
     if (this.struck) {
       const [a, b] = [X(this.struck.from), X(this.struck.to)];
@@ -157,13 +177,17 @@ export class MechanismView {
     this.head(a, b, color);
   }
   head(a, b, color) {
-    const d = Math.atan2(b[1] - a[1], b[0] - a[0]), h = (t) => [b[0] - 10 * Math.cos(d + t), b[1] - 10 * Math.sin(d + t)];
+    const d = Math.atan2(b[1] - a[1], b[0] - a[0]), size = Math.min(10, Math.hypot(b[0] - a[0], b[1] - a[1])), h = (t) => [b[0] - size * Math.cos(d + t), b[1] - size * Math.sin(d + t)];
     this.plane.ink.line([b, h(0.45), h(-0.45)], { fill: color, closed: true });
   }
   position() {
     const n = this.app.about.coordinates.length;
     if (this.motion) return Array.from({ length: n }, (_, k) => this.motion.y.data[this.frame * 2 * n + k]);
     return this.app.rows?.[this.app.state.chosen]?.position;
+  }
+  rates() {
+    const n = this.app.about.coordinates.length;
+    return Array.from({ length: n }, (_, k) => (this.motion ? this.motion.y.data[this.frame * 2 * n + n + k] : 0));
   }
   // Masses at points that have names and move.
   masses(of) {
@@ -207,14 +231,14 @@ export class MechanismView {
   }
   strike(point, velocity) {
     const one = this.resting && this.masses(this.resting).find((m) => m.point === point);
-    if (one) this.app.strike({ point, mass: one.mass, velocity, q: this.position() });
+    if (one) this.app.strike({ point, mass: one.mass, velocity, q: this.position(), rates: this.rates() });
     this.asked = Math.hypot(...velocity);
   }
   // The server has said what a kick brings: told beside the arrow until it is let go.
   kicked(header) {
     this.told = header;
     const words = `${this.asked.toFixed(2)} m/s, ${header.energy.toPrecision(3)} J`;
-    this.kick.textContent = `Kick of ${words}: the point starts with ${header.speed.toFixed(2)} m/s, as its rods let it.`;
+    this.kick.textContent = `Kick of ${words}: the point then has ${header.speed.toFixed(2)} m/s, as its rods let it.`;
     if (this.struck) this.struck.words = words;
     this.plane.moved();
     if (this.fire) this.go();

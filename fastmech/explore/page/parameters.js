@@ -15,7 +15,10 @@ export class Parameters {
     const range = element("input", { type: "range", min: about.low, max: about.high, step: (about.high - about.low) / 1000, "aria-label": label });
     const number = element("input", { type: "number", step: "any", "aria-label": `${label}, value` });
     range.addEventListener("input", () => this.set(name, Number(range.value)));
-    range.addEventListener("dblclick", () => number.select());
+    // The first press of a double click has moved it: back to where it was.
+    let before, pressed = -1e9;
+    range.addEventListener("pointerdown", (e) => { if (e.timeStamp - pressed > 600) before = this.app.state.parameters[name]; pressed = e.timeStamp; });
+    range.addEventListener("dblclick", () => { this.set(name, before); number.focus(); number.select(); });
     number.addEventListener("change", () => { if (number.value !== "") this.set(name, Number(number.value)); });
     const back = element("button", { title: `back to ${about.reset}`, "aria-label": `reset ${name} to ${about.reset}`, onclick: () => this.set(name, about.reset) }, "↺");
     this.rows[name] = { range, number };
@@ -30,11 +33,11 @@ export class Parameters {
   }
   show() {
     for (const [name, { range, number }] of Object.entries(this.rows)) {
-      const value = this.app.state.parameters[name];
-      if (value > Number(range.max)) range.max = value;
-      if (value < Number(range.min)) range.min = value;
+      const value = this.app.state.parameters[name], about = this.app.about.parameters[name];
+      range.max = Math.max(about.high, value);
+      range.min = Math.min(about.low, value);
       range.value = value;
-      range.setAttribute("aria-valuetext", `${short(value)} ${this.app.about.parameters[name].unit}`);
+      range.setAttribute("aria-valuetext", `${short(value)} ${about.unit}`);
       if (document.activeElement !== number) number.value = Number(value.toPrecision(12));
     }
   }

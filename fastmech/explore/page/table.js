@@ -1,5 +1,5 @@
 // Equilibria with stability and decay times; and the sections of a result file.
-import { element, panel, savePicture, short } from "./ink.js";
+import { element, fixed, panel, savePicture, short } from "./ink.js";
 
 export class Table {
   constructor(app) {
@@ -8,13 +8,13 @@ export class Table {
     this.panel.body.setAttribute("aria-live", "off");
   }
   take(header) {
-    if (header) this.panel.told(header);
+    if (header) this.panel.tell(this.app.about, "equilibria", header.asked);
     const held = this.panel.body.contains(document.activeElement);
     const { coordinates, states } = this.app.about;
     const heads = ["", ...coordinates.map((c) => `${c} [${states[c].unit}]`), "energy [J]", "kind", "stability", "decays in [s]"];
     const body = this.app.rows.map((row, k) => {
       const button = element("button", { onclick: () => this.app.choose(k), "aria-label": `show equilibrium ${k + 1}`, "aria-pressed": k === this.app.state.chosen ? "true" : "false" }, `${k + 1}`);
-      const cells = [...row.position.map((v) => v.toFixed(6).replace(/^-(0\.0*)$/, "$1")), short(row.energy), row.kind, row.verdict, short(row.decay_time)];
+      const cells = [...row.position.map((v) => fixed(v, 6)), short(row.energy), row.kind, row.verdict, short(row.decay_time)];
       return element("tr", { class: k === this.app.state.chosen ? "chosen" : null, title: row.explanation }, element("th", {}, button), ...cells.map((c) => element("td", {}, c)));
     });
     const table = element("table", {}, element("thead", {}, element("tr", {}, ...heads.map((h) => element("th", { scope: "col" }, h)))), element("tbody", {}, ...body));
@@ -32,7 +32,7 @@ export async function sections(about) {
   waiting.section.remove();
   for (const { name, pictures, python, request } of found) {
     const made = panel(`section-${name}`, `${name} in ${about.results}`);
-    made.told({ python, request });
+    made.put(python, request);
     for (const [k, one] of pictures.entries()) {
       const image = element("img", { src: `/pictures/${one.split("/").map(encodeURIComponent).join("/")}`, alt: `${name}, picture ${k + 1} of ${pictures.length}` });
       const save = element("button", { onclick: () => savePicture(`${name}${k || ""}`, image), "aria-label": `save PNG: ${name}, picture ${k + 1}` }, "save PNG");

@@ -19,6 +19,7 @@ export class Talk {
     this.newest = {};
     this.counter = 0;
     this.asked = {};
+    this.sent = {};
     this.open();
   }
 
@@ -39,13 +40,21 @@ export class Talk {
     }
     const { header, arrays } = readFrame(data);
     if (this.newest[header.kind] !== header.id) return;
+    header.asked = this.sent[header.kind];
     header.waited = performance.now() - this.asked[header.kind];
     this.handlers[header.kind](header, arrays);
+  }
+
+  // Answers of a kind that are under way count no more.
+  drop(kind) {
+    this.newest[kind] = ++this.counter;
+    this.ask("stop", { what: kind });
   }
 
   ask(kind, message) {
     this.newest[kind] = ++this.counter;
     this.asked[kind] = performance.now();
+    this.sent[kind] = message;
     if (this.socket.readyState === WebSocket.OPEN) {
       this.socket.send(JSON.stringify({ kind, id: this.counter, ...message }));
     }
