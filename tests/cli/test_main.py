@@ -154,7 +154,9 @@ def refused_without_kernels(arguments, fragments, after=""):
         check=False,
     )
     assert done.returncode == 2
-    assert len(done.stderr.splitlines()) == 1
+    # A loaded machine may need so long to import that the command says so first.
+    said = [line for line in done.stderr.splitlines() if not line.startswith("fastmech: loading, ")]
+    assert len(said) == 1
     for fragment in fragments:
         assert fragment in done.stderr
     assert not list(cache.iterdir())
