@@ -28,7 +28,7 @@ CROSSING = 1e-3
 How = Literal["disappears", "turns unstable", "begins to flutter", "leaves its range"]
 
 
-class FoldBranch(NamedTuple):
+class RestBranch(NamedTuple):
     """What is known of the equilibria over one parameter; points are (coordinates, part of its range)."""
 
     rest: Equations
@@ -40,7 +40,7 @@ class FoldBranch(NamedTuple):
     in_range: Callable[[Floats], bool] = lambda z: bool(0.0 <= z[-1] <= 1.0)
 
 
-def ending(branch: FoldBranch, start: Floats, direction: float) -> tuple[float | None, How]:
+def ending(branch: RestBranch, start: Floats, direction: float) -> tuple[float | None, How]:
     """Value at which the branch from ``start`` ceases to be stable, and what it does there.
 
     None if it leaves the parameter's range before. A minimum can always be followed a little further. Where
@@ -93,7 +93,7 @@ def ending(branch: FoldBranch, start: Floats, direction: float) -> tuple[float |
     return branch.value(z), "turns unstable" if crosses else "disappears"
 
 
-def _successor(branch: FoldBranch, z: Floats, direction: float) -> Floats | None:
+def _successor(branch: RestBranch, z: Floats, direction: float) -> Floats | None:
     """The stable position a little past z that Newton's method finds from there, if it does.
 
     So near to where equilibria meet, rounding in the gradient moves them by far more than rounding.

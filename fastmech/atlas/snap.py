@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fastmech.arrays import Floats
-from fastmech.atlas.branch import NEAR, FoldBranch, How, ending
+from fastmech.atlas.branch import NEAR, How, RestBranch, ending
 from fastmech.atlas.defining import Balance
 from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import RestingPlace
@@ -124,7 +124,7 @@ def _of_mechanism(
     balance.rescale(start)
     side = np.sign(balance.determinant(start))
     follows = not mechanism.statics().conservative
-    branch = FoldBranch(
+    branch = RestBranch(
         balance.rest,
         balance.singular,
         lambda z: float(side * balance.determinant(z)),
@@ -172,7 +172,7 @@ def _stable_place(balance: Balance, wanted: Any, present: float) -> RestingPlace
 
 
 def _snap(
-    branch: FoldBranch, start: Floats, parameter: str, unit: str, position: tuple[float, ...],
+    branch: RestBranch, start: Floats, parameter: str, unit: str, position: tuple[float, ...],
     present: float, searched: tuple[float, float], exhaustive: bool,
 ) -> Snap:  # fmt: skip
     below, above = (ending(branch, start, direction) for direction in (-1.0, 1.0))

@@ -43,6 +43,12 @@ SHOWN = 6
 LINES = 5
 
 
+def place_of(point: Floats, digits: int) -> str:
+    """A state (dim,) in words, of many states the first ones."""
+    where = ", ".join(f"{x:.{digits}g}" for x in np.round(point[:SHOWN], 9) + 0.0)
+    return where + ", ..." * (point.size > SHOWN)
+
+
 @dataclass(frozen=True, repr=False)
 class Attractor(Printed):
     """A place of rest, a periodic motion, a torus or chaos that motions come to."""
@@ -66,8 +72,7 @@ class Attractor(Printed):
     @property
     def name(self) -> str:
         """Kind, period and place in a few words."""
-        where = ", ".join(f"{x:.4g}" for x in np.round(self.points[0, :SHOWN], 9) + 0.0)
-        where += ", ..." * (self.points.shape[1] > SHOWN)
+        where = place_of(self.points[0], 4)
         period = "" if self.period is None else f", period {self.period:.6g} s"
         if self.forcing_periods is not None:
             period = f", period {self.forcing_periods} of the forcing"
@@ -129,14 +134,19 @@ class Attractors(Drawn, Sequence[Attractor]):
         return np.array([one.found for one in self.attractors]) / max(self.status.size, 1)
 
     def told(self) -> str:
-        """The shares of the attractors, the most frequent first."""
+        """The shares of the attractors, the most frequent first.
+
+        The 95 % Wilson interval of a share counts unsure and undecided starts as none, and as all.
+        """
         n = self.status.size
         told = ", ".join(f"{count:,} {name}" for name, count in self.counts.items() if count)
         lines = [f"{len(self)} attractor{'s' * (len(self) != 1)} of {n:,} starts: {told}"]
         open_ = sum(self.counts[name] for name in ("unsure", "undecided"))
         for one in self.attractors[: LINES if len(self) <= LINES else LINES - 1]:
-            low, high = binomtest(one.found, n).proportion_ci(method="wilson")
-            high = binomtest(one.found + open_, n).proportion_ci(method="wilson").high if open_ else high
+            least, most = (
+                binomtest(count, n).proportion_ci(method="wilson") for count in (one.found, one.found + open_)
+            )
+            low, high = least.low, most.high
             lines.append(f"  {one.found / n:.4f} ({low:.4f} to {high:.4f}): {one.name}")
         if len(self) > LINES:
             rest = sum(one.found for one in self.attractors[LINES - 1 :])

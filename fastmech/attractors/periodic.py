@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.attractors.find import SHOWN
+from fastmech.attractors.find import place_of
 from fastmech.attractors.flow import DIFFERENCE, Flow, flow_of
 from fastmech.attractors.orbits import RESIDUAL, SAME, Orbit, cycle, periodic, same, visits
 from fastmech.attractors.search import DENSE, time_back
@@ -53,8 +53,7 @@ class PeriodicOrbit(Printed):
     @property
     def name(self) -> str:
         """Stability, period and place in a few words."""
-        where = ", ".join(f"{x:.6g}" for x in np.round(self.points[0, :SHOWN], 9) + 0.0)
-        where += ", ..." * (self.points.shape[1] > SHOWN)
+        where = place_of(self.points[0], 6)
         kind = "rests" if self.period is None else f"period {self.period:.6g} s"
         if self.forcing_periods is not None:
             kind = f"period {self.forcing_periods} of the forcing"

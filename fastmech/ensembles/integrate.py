@@ -227,9 +227,17 @@ def _needed(n: int, kept: int, own: int, tol: float | None) -> tuple[int, int]:
 
 
 def memory(scene: Scene | Mechanism | System, n: int, times: int = 1, *, tol: float | None = None) -> int:
-    """Bytes that :func:`integrate` takes at most on the way for n trajectories at so many output times.
+    """Memory [bytes] that :func:`integrate` takes on the way, as it is checked before a run.
 
-    Attractors and labels take as much for one output time, and half a gigabyte, however many starts.
+    Args:
+        scene: what would be integrated.
+        n: number of trajectories.
+        times: number of output times.
+        tol: the tolerance, where one is given: then every trajectory runs twice.
+
+    Returns:
+        bytes of states and of what is known of each trajectory; the interpreter, compiled kernels and
+        parameters of each trajectory's own come on top.
 
     Raises:
         InputError: an argument is wrong.
@@ -237,8 +245,7 @@ def memory(scene: Scene | Mechanism | System, n: int, times: int = 1, *, tol: fl
     if not isinstance(scene, Scene | Mechanism | System):
         raise InputError(f"scene = {shown(scene)}: must be a Scene, a Mechanism or a System")
     n, times = checks.whole_number("n", n, least=1), checks.whole_number("times", times, least=1)
-    dim = len(STATE if isinstance(scene, Scene) else scene.state)
-    numbers, copies = _needed(n, dim * times, 0, tol)
+    numbers, copies = _needed(n, len(scene.state) * times, 0, tol)
     return 8 * numbers * copies
 
 

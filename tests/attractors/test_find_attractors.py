@@ -347,3 +347,19 @@ def test_the_smallest_shock_out_of_a_place_of_rest_reaches_the_saddle_s_manifold
         away[:, 0] -= 2.0 * math.pi * np.round(away[:, 0] / (2.0 * math.pi))
         distance = min(distance, float(np.linalg.norm(away, axis=1).min()))
     assert shock.size == pytest.approx(distance, abs=2e-3)
+
+
+def test_intervals_of_shares_count_the_unsure_as_none_and_as_all() -> None:
+    """A driven pendulum whose transient chaos lasts: most starts are unsure, and the interval says so."""
+
+    def driven(t, x, v, F, w):  # type: ignore[no-untyped-def]
+        return v, -0.1 * v - fm.sin(x) + F * fm.cos(w * t)
+
+    period = 2.0 * np.pi / 0.7
+    system = fm.System(driven, ["x", "v"], {"F": 0.5, "w": 0.7}, period=period, angles=["x"])
+    found = fm.find_attractors(system, {"x": (-np.pi, np.pi), "v": (-3.0, 3.0)}, n=300)
+    unsure = found.counts["unsure"] + found.counts["undecided"]
+    assert unsure > 30
+    low, high = fm.wilson(found[0].found, 300)[0], fm.wilson(found[0].found + unsure, 300)[1]
+    assert f"({float(low):.4f} to {float(high):.4f})" in str(found)
+    assert fm.basin_fractions(found)[1].missing == 300 - sum(one.found for one in found)

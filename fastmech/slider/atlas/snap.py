@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fastmech.arrays import Floats
-from fastmech.atlas.branch import NEAR, FoldBranch
+from fastmech.atlas.branch import NEAR, RestBranch
 from fastmech.errors import InputError, shown
 from fastmech.scene import Scene, nearest
 from fastmech.slider.atlas.systems import Plane, fold, point_at, rest
@@ -35,10 +35,10 @@ def moving(parameter: object) -> str:
 
 def branch_of(
     scene: Scene, parameter: str, chosen: Equilibrium, searched: tuple[float, float]
-) -> tuple[FoldBranch, Floats]:
+) -> tuple[RestBranch, Floats]:
     """The equilibria of a scene with a constant force over a parameter's range, and the one to begin with."""
     plane = Plane(scene, (parameter,), searched[:1], searched[1:])
-    branch = FoldBranch(
+    branch = RestBranch(
         rest(plane),
         fold(plane),
         lambda z: float(point_at(plane, z[:, None]).determinant[0]),
