@@ -47,9 +47,14 @@ class SvgInk {
   constructor(width, height, paper) {
     this.root = document.createElementNS(SVG, "svg");
     for (const [k, v] of Object.entries({ xmlns: SVG, width, height, viewBox: `0 0 ${width} ${height}` })) this.root.setAttribute(k, v);
-    this.at = this.root;
+    this.at = this.page = this.root;
     this.clips = 0;
     this.add("rect", { width, height, fill: paper });
+  }
+  // What follows is drawn from this height on.
+  from(y) {
+    this.at = this.root;
+    this.at = this.page = this.add("g", { transform: `translate(0 ${y})` });
   }
   add(tag, attributes, words) {
     const e = document.createElementNS(SVG, tag);
@@ -80,7 +85,7 @@ class SvgInk {
     this.at = path; this.add("rect", { x, y, width, height }); this.at = outer;
     this.at = this.add("g", { "clip-path": `url(#${id})` });
   }
-  unclip() { this.at = this.root; }
+  unclip() { this.at = this.page; }
 }
 
 export function ticks(low, high, most) {
@@ -185,12 +190,6 @@ export class Plane {
     const [x, y] = [(event.clientX - r.left) / zoom(), (event.clientY - r.top) / zoom()];
     return b && x >= b.left - e && x <= b.right + e && y >= b.top - e && y <= b.bottom + e;
   }
-  svg() {
-    const [w, h] = this.size(), ink = new SvgInk(w, h, css("paper"));
-    this.paint(ink, w, h);
-    this.cover(ink);
-    return new XMLSerializer().serializeToString(ink.root);
-  }
 }
 
 // Drag with the pointer, and arrow keys for who has none.
@@ -227,6 +226,21 @@ function download(name, content, type) {
   setTimeout(() => URL.revokeObjectURL(url), 10000);
 }
 
+// The canvases of a view as one picture, below each other.
+function svg(planes) {
+  const sizes = planes.map((p) => p.size()), ink = new SvgInk(Math.max(...sizes.map(([w]) => w)), sizes.reduce((sum, [, h]) => sum + h, 0), css("paper"));
+  let y = 0;
+  planes.forEach((p, k) => { ink.from(y); p.paint(ink, ...sizes[k]); p.cover(ink); y += sizes[k][1]; });
+  return new XMLSerializer().serializeToString(ink.root);
+}
+function raster(planes) {
+  const all = planes.map((p) => { p.now(); return p.canvas; });
+  const picture = element("canvas", { width: Math.max(...all.map((c) => c.width)), height: all.reduce((sum, c) => sum + c.height, 0) }), context = picture.getContext("2d");
+  let y = 0;
+  for (const c of all) { context.drawImage(c, 0, y); y += c.height; }
+  return picture;
+}
+
 // A picture that the page has as SVG.
 export function savePicture(name, image) {
   const c = element("canvas", { width: 2 * image.naturalWidth, height: 2 * image.naturalHeight }), context = c.getContext("2d");
@@ -253,8 +267,8 @@ export function panel(id, title, { planes = () => [], lines = true } = {}) {
     section.append(element("details", {}, element("summary", {}, "Python and request"), code, request));
   }
   if (planes().length) {
-    button("PNG", () => planes().forEach((p, k) => p.now() ?? p.canvas.toBlob((b) => download(`${id}${k || ""}.png`, b))));
-    button("SVG", () => planes().forEach((p, k) => download(`${id}${k || ""}.svg`, p.svg(), "image/svg+xml")));
+    button("PNG", () => raster(planes()).toBlob((b) => download(`${id}.png`, b)));
+    button("SVG", () => download(`${id}.svg`, svg(planes()), "image/svg+xml"));
   }
   // Without lines and a request the ways back to work are closed.
   made.put = (python, text, line = "") => {
