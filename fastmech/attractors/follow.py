@@ -7,6 +7,7 @@ moved, no start ends there any more, or steps become ever shorter before a value
 Over two parameters lines along the first are joined in the same way along the second. Two attractors of lines
 next to each other become one at the values of the first parameter where one goes on in the other; what has
 most such values is joined first, and never two that are there together: around a cusp one goes on in both.
+Where one is there on a line and not on the next, it is followed towards it along the second parameter.
 """
 
 from __future__ import annotations
@@ -98,6 +99,7 @@ class BasinsOver(Drawn):
     second: str  #: the second parameter
     values: Floats  #: of it (lines,)
     lines: tuple[BasinsAlong, ...]  #: along the first one, at each value of the second
+    tipping: tuple[tuple[Tipping, ...], ...]  #: along the second one, at each value of the first
 
     @property
     def fractions(self) -> Floats:
@@ -111,10 +113,11 @@ class BasinsOver(Drawn):
     def told(self) -> str:
         """How many attractors there are, and how many come and go."""
         lines, m, number = self.fractions.shape
-        tipping = sum(len(line.tipping) for line in self.lines)
+        first, tips = self.lines[0].parameter, [len(line.tipping) for line in self.lines]
         return (
-            f"{number} attractors over {self.lines[0].parameter} and {self.second} ({m} x {lines} values)\n"
-            f"  {tipping} times one comes or goes along {self.lines[0].parameter}"
+            f"{number} attractors over {first} and {self.second} ({m} x {lines} values)\n"
+            f"  one comes or goes {sum(tips)} times along {first}, {sum(map(len, self.tipping))} times"
+            f" along {self.second}"
         )
 
 
@@ -277,7 +280,29 @@ def joined(
         _renumbered(line, {j: number_of[id(members[k, j])] for j in _where(line)}, len(number_of))
         for k, line in enumerate(lines)
     ]
-    return BasinsOver(second, across, tuple(renumbered))
+    tipping = tuple(
+        _tipping(
+            _Tracer(system.replace(**{lines[0].parameter: value}), second, y, threads),
+            across,
+            [line.attractors[i] for line in renumbered],
+        )
+        for i, value in enumerate(along.tolist())
+    )
+    return BasinsOver(second, across, tuple(renumbered), tipping)
+
+
+def _tipping(
+    tracer: _Tracer, values: Floats, there: Sequence[Mapping[int, Attractor | AttractorPlace]]
+) -> tuple[Tipping, ...]:
+    """Where attractors with numbers come and go between values at which they are there."""
+    found = []
+    for k in range(1, len(there)):
+        for kind, at, other in (("dies", k - 1, k), ("born", k, k - 1)):
+            for number in sorted(set(there[at]) - set(there[other])):
+                last, gone, _ = tracer.follow(there[at][number], float(values[at]), float(values[other]))
+                if gone is not None:  # else it goes on in one with another number
+                    found.append(Tipping(number, kind, *sorted((last, gone))))
+    return tuple(found)
 
 
 def _where(line: BasinsAlong) -> dict[int, list[int]]:

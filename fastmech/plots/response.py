@@ -90,7 +90,7 @@ def _fractions(dataset: Dataset, ax: style.Axes, line: int) -> None:
     areas = ax.stackplot(values, shares, labels=names, colors=colors, alpha=0.85)
     for k, area in enumerate(areas[:number]):
         area.set_hatch(HATCHES[k // len(style.LINES) % len(HATCHES)])
-    there = tips["tipping_line"].data == line
+    there = (tips["tipping_along"].data == name) & (tips["tipping_line"].data == line)
     for change in 0.5 * (tips["tipping_low"].data + tips["tipping_high"].data)[there]:
         ax.axvline(change, color="black", lw=0.8, ls=":")
     low, high = sorted((values[0], values[-1]))
@@ -108,6 +108,11 @@ def draw_numbers(over: Any, ax: style.Axes) -> None:
         (0.5 * (t.low + t.high), v)
         for v, line in zip(over.values, over.lines, strict=True)
         for t in line.tipping
+    ]
+    tips += [
+        (v, 0.5 * (t.low + t.high))
+        for v, column in zip(first.values, over.tipping, strict=True)
+        for t in column
     ]
     ax.plot(*np.reshape(tips, (-1, 2)).T, "k.", ms=4, label="one comes or goes")
     ax.figure.colorbar(mesh, ax=ax, label="attractors")

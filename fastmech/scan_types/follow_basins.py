@@ -59,30 +59,38 @@ class FollowBasins(Starts):
         def join(scene: Mechanism | System, tiles: list[Dataset]) -> Dataset:
             lines = [_read(tile, name, values) for tile in tiles]
             for second, axis in self.each.items():
-                lines = list(joined(scene, second, axis.array, lines, starts).lines)
+                over = joined(scene, second, axis.array, lines, starts)
+                return self._joined(scene, over.lines, over.tipping)
             return self._joined(scene, lines)
 
         return lines_over(scene, self.each, "values of the second parameter", line, join)
 
-    def _joined(self, scene: Mechanism | System, lines: Sequence[BasinsAlong]) -> Dataset:
+    def _joined(
+        self,
+        scene: Mechanism | System,
+        lines: Sequence[BasinsAlong],
+        across: Sequence[Sequence[Tipping]] = (),
+    ) -> Dataset:
         (name,) = self.along
         dims, where = shared_axes(scene, self.along, self.each)
         share = np.stack([one.fractions for one in lines])
         most = share.shape[2]
-        rows = np.concatenate([_tipping(one) for one in lines])
-        line = np.repeat(np.arange(len(lines), dtype=np.int32), [len(one.tipping) for one in lines])
+        tips = {name: [one.tipping for one in lines]} | {second: list(across) for second in self.each}
+        rows = _tipping([t for own in tips.values() for line in own for t in line])
+        line = [np.repeat(np.arange(len(own)), [len(one) for one in own]) for own in tips.values()]
+        along = np.repeat(np.array(list(tips), dtype=object), [len(one) for one in line])
         unlabelled = np.stack([one.unlabelled for one in lines])
         shape = tuple(len(where[d].data) for d in dims)
-        each, unit = ("tipping",), where[name].units
         kinds = np.where(rows[:, 1] == 1.0, "born", "dies").astype(object)
         changes = {
-            "tipping_line": (line, "1", "index of the second parameter's value"),
+            "tipping_along": (along, "1", "parameter along which it happens"),
+            "tipping_line": (np.concatenate(line).astype(np.int32), "1", "index of the other one's value"),
             "tipping_attractor": (rows[:, 0].astype(np.int32), "1", "number of the attractor"),
-            "tipping_kind": (kinds, "1", f"born or dies as {name} rises"),
-            "tipping_low": (rows[:, 2], unit, "it happens above"),
-            "tipping_high": (rows[:, 3], unit, "it happens below"),
+            "tipping_kind": (kinds, "1", "born or dies in the order of the values"),
+            "tipping_low": (rows[:, 2], "1", "it happens above, in the parameter's unit"),
+            "tipping_high": (rows[:, 3], "1", "it happens below, in the parameter's unit"),
         }
-        tipping = numbers("tipping", len(rows), "number of the change") | columns(each, changes)
+        tipping = numbers("tipping", len(rows), "number of the change") | columns(("tipping",), changes)
         ends, about = share.reshape(*shape, most), "share of the starts that end there, NaN: it is not there"
         none = unlabelled.reshape(shape)
         variables = {
@@ -105,17 +113,20 @@ def over_dataset(found: BasinsOver) -> Dataset:
     """The section of attractors over two parameters."""
     along = {found.lines[0].parameter: Axis(values=found.lines[0].values.tolist())}
     each = {found.second: Axis(values=found.values.tolist())}
-    return _section(FollowBasins.model_construct(along=along, each=each), found.system, found.lines)
+    request = FollowBasins.model_construct(along=along, each=each)
+    return _section(request, found.system, found.lines, found.tipping)
 
 
-def _section(request: FollowBasins, system: Any, lines: Sequence[BasinsAlong]) -> Dataset:
-    made = request._joined(system, lines)
+def _section(
+    request: FollowBasins, system: Any, lines: Sequence[BasinsAlong], across: Sequence[Sequence[Tipping]] = ()
+) -> Dataset:
+    made = request._joined(system, lines, across)
     attrs = {name: value for name, value in made.attrs.items() if name != "starts"}  # it does not know them
     return Dataset(made.variables, attrs, made.groups)
 
 
-def _tipping(found: BasinsAlong) -> Floats:
-    rows = [[t.attractor, t.kind == "born", t.low, t.high] for t in found.tipping]
+def _tipping(tipping: Sequence[Tipping]) -> Floats:
+    rows = [[t.attractor, t.kind == "born", t.low, t.high] for t in tipping]
     return np.array(rows, dtype=np.float64).reshape(-1, 4)
 
 
@@ -124,7 +135,7 @@ def _tile(found: BasinsAlong) -> Dataset:
     places = [(i, j, one) for i, there in enumerate(found.attractors) for j, one in there.items()]
     points = [one.points[:: -(-len(one.points) // POINTS)] for *_, one in places]
     rows = [(i, j, one.period or 0.0, len(own)) for (i, j, one), own in zip(places, points, strict=True)]
-    arrays = {"share": found.fractions, "unlabelled": found.unlabelled, "tipping": _tipping(found)}
+    arrays = {"share": found.fractions, "unlabelled": found.unlabelled, "tipping": _tipping(found.tipping)}
     return tile_of(arrays | {"places": np.array(rows, dtype=np.float64), "points": np.concatenate(points)})
 
 

@@ -58,6 +58,11 @@ def test_attractors_have_the_same_numbers_over_two_parameters() -> None:
         (t.kind, t.attractor): shift for line, shift in zip(found.lines, s, strict=True) for t in line.tipping
     }
     assert len(tips) == 2
+    # Along the second parameter too: the folds are at r + s = +-FOLD, beyond one of them for r = -0.3 and 0.3.
+    across = [(value, t) for value, column in zip(r, found.tipping, strict=True) for t in column]
+    assert sorted((value, t.kind) for value, t in across) == [(-0.3, "born"), (0.3, "dies")]
+    for value, t in across:
+        assert t.low <= np.sign(value) * FOLD - value <= t.high < t.low + 1e-3
     assert found.plot().get_ylabel() == "s"
     dataset = found.to_xarray()
     np.testing.assert_array_equal(dataset["share"], found.fractions)

@@ -84,6 +84,7 @@ def test_attractors_are_followed_over_two_parameters(tmp_path: Path) -> None:
     assert isinstance(expected, fm.BasinsOver)
     np.testing.assert_array_equal(section["share"].data, expected.fractions)
     low = [t.low for line in expected.lines for t in line.tipping]
+    low += [t.low for column in expected.tipping for t in column]
     np.testing.assert_array_equal(tipping["tipping_low"].data, low)
     assert section["share"].dims == ("delta", "A", "attractor")
     assert {p.name for p in draw_results(tmp_path / "scan.h5")} == {"it_shares.png"}
