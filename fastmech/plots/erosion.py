@@ -26,8 +26,7 @@ def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, styl
             handles.append(style.entry(_name(dataset, well), color=color, lw=3.0))
         _axes(panels, dataset, name)
         handles += [
-            style.swatch("95 % Wilson interval, undecided starts as none or all", "#bdbdbd"),
-            style.entry("if all undecided starts ended there", lw=1.0, ls=":"),
+            *_shares(),
             style.entry("about the well: LIM; shock of all four states", marker="o", ms=5),
             style.entry("anywhere: IF; kick of the rates alone", ls="--", marker="s", ms=5),
             style.entry("limited by the window", marker="o", mfc="white", ms=5, ls="none"),
@@ -48,7 +47,17 @@ def draw_stability(axes: style.Axes, dataset: Dataset) -> list[style.Artist]:
     for well, color in colors.items():
         _stability(axes, dataset, well, color)
     axes.set(xlabel=_along(dataset, name), ylabel="share of the starts [%]", ylim=(0.0, 102.0))
-    return [style.entry(_name(dataset, well), color=color, lw=3.0) for well, color in colors.items()]
+    axes.set_title(f"Basin stability along {name}")
+    wells = [style.entry(_name(dataset, well), color=color, lw=3.0) for well, color in colors.items()]
+    return [*wells, *_shares()]
+
+
+def _shares() -> list[style.Artist]:
+    """What stands beside a share's line."""
+    return [
+        style.swatch("95 % Wilson interval, undecided starts as none or all", "#bdbdbd"),
+        style.entry("if all undecided starts ended there", lw=1.0, ls=":"),
+    ]
 
 
 def _along(dataset: Dataset, name: str) -> str:
