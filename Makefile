@@ -51,7 +51,7 @@ test: $(VENV)/.test
 # The explorer in a real browser, Debian's chromium.
 test-browser: $(VENV)/.test
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[browser]'
-	$(BIN)/python -m pytest tests/explore -s
+	$(BIN)/python -m pytest tests/explore/test_browser.py -s
 
 # Warnings are errors; nothing is fetched from a network.
 docs: $(VENV)/.test
