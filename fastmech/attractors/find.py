@@ -30,8 +30,9 @@ Integers = NDArray[np.int64]
 #: Starts by default, those of a sample that is searched, and searches of what arrives nowhere.
 STARTS, SAMPLE, ROUNDS = 10_000, 256, 4
 
-#: States at which the map over a period is looked at, whether it preserves volume.
-PRESERVING = 16
+#: States at which the map is looked at, whether it preserves volume, over so many periods, and the share of
+#: all growth and shrinking of volume that is none: what a conservative motion gains it loses again.
+PRESERVING, OVER, BALANCE = 16, 32, 0.05
 
 #: Periods that motions have to arrive: so many times those of the sample's last, and at least and at most.
 LATER, FEWEST, MOST = 8, 256, 1 << 14
@@ -215,13 +216,26 @@ def search_of(
         raise InputError("starts: none is finite")
     sample = starts[usable[np.unique(np.linspace(0, usable.size - 1, SAMPLE).astype(np.int64))]]
     flow = flow_of(system, sample, {}, method, threads)
-    _, jacobians = flow.derivative(sample[:PRESERVING], 1.0)
-    jacobians = jacobians[np.isfinite(jacobians).all(axis=(1, 2))]
-    if len(jacobians) and np.median(np.abs(np.linalg.det(jacobians) - 1.0)) < 1e-6:
+    if _preserves_volume(flow, sample[:PRESERVING]):
         raise InputError("system: preserves volume, so that nothing attracts; give it some damping")
     search = Search(flow)
     search.look(sample)
     return search
+
+
+def _preserves_volume(flow: Flow, y: Floats) -> bool:
+    """Whether volume about most motions from y (n, dim) neither grows nor shrinks in the long run."""
+    total, size = np.zeros(len(y)), np.zeros(len(y))
+    for k in range(OVER):
+        y, jacobians = flow.derivative(y, 1.0)
+        grown = np.full(len(y), np.nan)
+        usable = np.isfinite(jacobians).all(axis=(1, 2))
+        grown[usable] = np.log(np.maximum(np.abs(np.linalg.det(jacobians[usable])), 1e-300))
+        if k == 0 and not (grown > -1e-6).any():
+            return False
+        total, size = total + grown, size + np.abs(grown)
+    known = np.isfinite(total)
+    return bool(np.median((np.abs(total) - BALANCE * size)[known]) < 1e-6 * OVER) if known.any() else False
 
 
 def labelled(
@@ -234,9 +248,12 @@ def labelled(
         if t_end is not None:
             periods = max(1, math.ceil(t_end / flow.period))
         ends = settle(search, starts, periods, progress if attempt == 0 else None)
+        if attempt == ROUNDS - 1:
+            break
         before = search.changes
         if len(ends.last):
             search.look(ends.last)
+        search.leave_transients()
         if search.changes == before:
             break
     every = [_of_orbit(flow, orbit, ball) for orbit, ball in search.orbits]
@@ -291,8 +308,8 @@ def _of_orbit(flow: Flow, orbit: Orbit, ball: Balls) -> Attractor:
         over = float(flow.passages(orbit.points[:1], np.array([orbit.periods]), FINER)[1][0])
     largest = float(np.abs(orbit.multipliers).max()) if orbit.multipliers.size else 0.0
     # Differences give multipliers to about 1e-8; along a cycle nothing grows or falls.
-    exponent = 0.0 if orbit.cycle else math.log(max(largest, 1e-300)) / over
-    error = 1e-8 / (over * max(largest, 1e-300))
+    exponent = 0.0 if orbit.cycle else math.log(max(largest, 1e-8)) / over
+    error = 0.0 if orbit.cycle else 1e-8 / (over * max(largest, 1e-8))
     points = orbit.points.copy()
     points[:, flow.angles] = flow.away(points, np.zeros_like(points))[:, flow.angles]
     return Attractor(

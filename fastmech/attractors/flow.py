@@ -21,7 +21,7 @@ from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError
 from fastmech.generated import new_module, run_module
-from fastmech.integrators.methods import Method, find_method
+from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method
 from fastmech.jit import FLAGS
 from fastmech.kernels.rebuilding import fingerprint, rebuilt
 from fastmech.models.mechanism import Mechanism
@@ -39,6 +39,9 @@ FINER = 4
 #: Steps of a period in the second of two runs, times those of the first.
 COARSER = 2.0 / 3.0
 
+#: Relative difference of rates a period apart that is rounding.
+REPEATS = 1e-6
+
 #: States of a sample that choose steps, and the share of them that must keep the error.
 CHOOSING, MOSTLY = 64, 0.9
 
@@ -54,7 +57,7 @@ MULTIPLES = 64
 #: Times in which states change by about their size that a motion has to come back to a section.
 WAITED = 64.0
 
-#: Motions beyond so many times the scale have escaped.
+#: Motions beyond so many times what a sample went through have escaped.
 FAR = 1e3
 
 
@@ -63,7 +66,12 @@ class Reached(NamedTuple):
 
     y: Floats  #: (outputs, n, dim); NaN from the first output on at which a motion is not finite
     stopped: Flags  #: by the system's stopping condition (n,)
-    far: Flags  #: beyond :data:`FAR` scales, or on the way to infinity, when last finite (n,)
+    far: Flags  #: beyond :data:`FAR` times the reach, or on the way to infinity, when last finite (n,)
+
+    @property
+    def goes_on(self) -> Flags:
+        """Which motions are there after the last period (n,)."""
+        return np.asarray(np.isfinite(self.y[-1]).all(axis=1) & ~self.far & ~self.stopped)
 
 
 @dataclass(frozen=True)
@@ -78,6 +86,7 @@ class Flow:
     scale: Floats  #: typical size of each state (dim,)
     middle: Floats  #: about where motions are (dim,)
     method: Method
+    reach: Floats  #: half the range of all that a sample went through (dim,)
     steps: int = FEWEST  #: of a period
     threads: int | None = None
 
@@ -104,7 +113,7 @@ class Flow:
     def is_far(self, y: Floats) -> Flags:
         """Which states (n, dim) lie far out."""
         with np.errstate(invalid="ignore"):
-            return np.asarray((np.abs(y - self.middle) > FAR * self.scale)[:, ~self.angles].any(axis=1))
+            return np.asarray((np.abs(y - self.middle) > FAR * self.reach)[:, ~self.angles].any(axis=1))
 
     def away(self, a: Floats, b: Floats) -> Floats:
         """a - b with turns taken off angles."""
@@ -223,17 +232,19 @@ def flow_of(
     scale = spread(sample, angles)
     flow = Flow(
         scene, problem, period or 1.0, period is not None, angles, scale, np.median(sample, axis=0),
-        find_method(method), threads=threads,
+        find_method(method), scale, threads=threads,
     )  # fmt: skip
-    if period is None:
-        few = sample[:CHOOSING]
+    few = sample[:CHOOSING]
+    if period is not None:
+        _require_repeats(flow, few)
+    else:
         if any(not _alike(flow.rates(few), flow.rates(few, t)) for t in (0.7320508, 5.1961524, 31.4159)):
             raise InputError(
                 "period: missing; the right-hand side depends on the time, System(period=...) tells after "
                 "how many seconds it repeats"
             )
         flow = replace(flow, period=_time_of_change(flow, few))
-    flow = _settled(_with_steps(flow, sample[:CHOOSING]), sample[:CHOOSING])
+    flow = _settled(_with_steps(flow, few), few)
     if isinstance(scene, System) and scene.section is not None:
         return _section_flow(scene, flow, sample)
     return flow
@@ -265,17 +276,28 @@ def spread(sample: Floats, angles: Flags) -> Floats:
     return np.where(angles, np.pi, np.where(scale > 1e-250, scale, 1.0))
 
 
+def _require_repeats(flow: Flow, sample: Floats) -> None:
+    """Refuse a period after which the right-hand side is another one."""
+    t, period = 0.7320508 * flow.period, flow.period
+    one, two = (np.nan_to_num(flow.rates(sample, at)) for at in (t, t + period))
+    size = np.abs(one) + np.abs(flow.rates(sample, 0.0) - one)
+    differ = np.abs(two - one) > REPEATS * np.nan_to_num(size)
+    if np.median(differ.any(axis=1)) > 0.5:
+        raise InputError(f"period = {period:.6g}: the right-hand side does not repeat after so many seconds")
+
+
 def _settled(flow: Flow, sample: Floats) -> Flow:
     """The same with the scale of where the sample's motions are after some periods, if they are there."""
-    paths = flow.run(sample, SLOWER * np.arange(1.0, 33.0) / 32.0).y
+    reached = flow.run(sample, SLOWER * np.arange(1.0, 33.0) / 32.0)
+    paths, kept = reached.y, reached.goes_on
     y = paths[-1]
-    kept = np.isfinite(y).all(axis=1) & ~flow.is_far(y)
     if np.count_nonzero(kept) < 2:
         return flow
     both = np.concatenate([sample, paths[:, kept].reshape(-1, sample.shape[1])])
     low, high = np.quantile(both, [0.02, 0.98], axis=0)
     scale = np.where(flow.angles, np.pi, np.maximum(0.5 * (high - low), 1e-6 * flow.scale))
-    now = replace(flow, scale=scale, middle=0.5 * (low + high))
+    reach = np.maximum(flow.reach, 0.5 * np.ptp(both, axis=0))
+    now = replace(flow, scale=scale, middle=0.5 * (low + high), reach=reach)
     if not flow.forced:  # at least as long as motions took to get there
         now = replace(now, period=max(flow.period, min(_time_of_change(now, y[kept]), SLOWER * flow.period)))
     return _with_steps(now, np.concatenate([sample[kept], y[kept]]), int(np.count_nonzero(kept)))
@@ -291,25 +313,33 @@ def _time_of_change(flow: Flow, states: Floats) -> float:
 def _with_steps(flow: Flow, sample: Floats, stay: int = 0) -> Flow:
     """The same with as many steps of a period as keep :data:`ERROR` for nearly all of a sample.
 
-    The first ``stay`` states are known to stay finite.
+    The first ``stay`` states are known to go on. Steps that are too long for it send a motion to infinity
+    too: what is lost is lost with the shortest ones as well.
 
     Raises:
         InputError: no number of steps does.
     """
-    before = flow.after(sample)
+    one = np.array([1.0])
+    before = flow.run(sample, one)
     while flow.steps < MOST:
         finer = replace(flow, steps=2 * flow.steps)
-        now = finer.after(sample)
-        usable = np.isfinite(now).all(axis=1) & ~flow.is_far(now)
-        settled = usable[:stay].all() and np.array_equal(usable, np.isfinite(before).all(axis=1) & usable)
-        error = np.sort(np.nan_to_num(flow.distance(before[usable], now[usable]), nan=np.inf))
+        now = finer.run(sample, one)
+        usable = now.goes_on
+        settled = usable[:stay].all() and np.array_equal(usable, before.goes_on)
+        away = flow.distance(before.y[-1, usable], now.y[-1, usable])
+        error = np.sort(np.nan_to_num(away, nan=np.inf))
         allowed = ERROR * max(1.0, flow.steps / ROUGH)
         if settled and (not error.size or error[int(MOSTLY * (error.size - 1))] <= allowed):
-            return flow
+            lost = sample[~usable & ~now.stopped]
+            if not len(lost) or not replace(flow, steps=MOST).run(lost, one).goes_on.any():
+                return flow
         flow, before = finer, now
+    stiff = "" if isinstance(flow.method, ImplicitRungeKutta) else (
+        "choose an implicit method (method='radau5') where motion is stiff, "
+    )
     raise InputError(
         f"dt: even steps of {flow.period / MOST:.3g} s leave errors above {ERROR:g} of the states' size in a "
-        f"period of {flow.period:.3g} s; choose an implicit method (method='radau5') where motion is stiff"
+        f"period of {flow.period:.3g} s; {stiff}smooth a right-hand side that jumps (tanh for sign)"
     )
 
 

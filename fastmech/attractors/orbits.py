@@ -6,6 +6,7 @@ lie inside the unit circle attracts (Guckenheimer, Holmes, *Nonlinear Oscillatio
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,10 +24,10 @@ ATTRACTS = 1.0 - 1e-5
 SAME = 1e-5
 
 #: Times at most that what was found may go around a cycle.
-WOUND = 16
+WOUND = 64
 
-#: Places along a cycle that are kept.
-ALONG = 256
+#: Places along a cycle that are kept in so many periods of the flow, and at most so many times these.
+ALONG, TURNS, LONGER = 256, 4.0, 8
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,7 @@ def visits(flow: Flow, orbit: Orbit, place: Floats) -> bool:
     j = int(np.argmin(distance))
     if not orbit.cycle:
         return bool(distance[j] < SAME)
-    ahead, behind = orbit.points[(j + 1) % ALONG], orbit.points[j - 1]
+    ahead, behind = orbit.points[(j + 1) % len(distance)], orbit.points[j - 1]
     along = flow.away(ahead, behind) / flow.scale
     e = flow.away(place, orbit.points[j]) / flow.scale
     length = float(np.linalg.norm(along))
@@ -143,15 +144,15 @@ def cycle(flow: Flow, guess: Floats, periods: float) -> Orbit | None:
             return None
     if not best < RESIDUAL:
         return None
-    for k in range(WOUND, 1, -1):  # it may have gone around several times
-        if flow.distance(flow.after(y[None], T / k, FINER), y[None])[0] < SAME:
-            T /= k
-            break
-    times = T * np.arange(1, ALONG) / ALONG
+    parts = T / np.arange(WOUND, 1.0, -1.0)  # it may have gone around several times
+    back = flow.distance(flow.run(y[None], parts, FINER).y[:, 0], y) < SAME
+    T = float(parts[np.argmax(back)]) if back.any() else T
+    along = ALONG * min(LONGER, math.ceil(T / TURNS))
+    times = T * np.arange(1, along) / along
     points = np.concatenate([y[None], flow.run(y[None], times, FINER).y[:, 0]])
     if np.abs(flow.away(points, y) / flow.scale).max() < SAME:
         return None  # a place of rest
-    jacobians = _around(flow.derivative(points, T / ALONG)[1])
+    jacobians = _around(flow.derivative(points, T / along)[1])
     values = np.linalg.eigvals(jacobians[0])
     multipliers = np.delete(values, np.argmin(np.abs(values - 1.0)))
     return Orbit(points, T, jacobians, multipliers, best, cycle=True)
@@ -172,7 +173,7 @@ def same(flow: Flow, one: Orbit, two: Orbit) -> bool:
     """Whether two orbits are one: most of some places along a cycle lie on the other."""
     if one.cycle != two.cycle:
         return False
-    some = two.points[:: ALONG // 16] if two.cycle else two.points[:1]
+    some = two.points[:: len(two.points) // 16] if two.cycle else two.points[:1]
     return sum(visits(flow, one, place) for place in some) > len(some) // 2
 
 

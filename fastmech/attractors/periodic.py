@@ -12,7 +12,7 @@ from fastmech.arrays import Floats
 from fastmech.attractors.find import place_of
 from fastmech.attractors.flow import DIFFERENCE, Flow, flow_of
 from fastmech.attractors.orbits import RESIDUAL, SAME, Orbit, cycle, periodic, same, visits
-from fastmech.attractors.search import DENSE, time_back
+from fastmech.attractors.search import DENSE, times_back
 from fastmech.ensembles import checks
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
@@ -187,8 +187,9 @@ def _add_cycles(flow: Flow, starts: Floats, found: list[Orbit]) -> None:
     for end in WINDOWS:
         part = paths[: end * DENSE]
         for i in np.flatnonzero(np.isfinite(part).all(axis=(0, 2)) & ~flow.is_far(part[-1])):
-            back = time_back(flow, part[:, i])
-            if back and not any(visits(flow, orbit, part[-1, i]) for orbit in found):
+            if any(visits(flow, orbit, part[-1, i]) for orbit in found):
+                continue
+            for back in times_back(flow, part[:, i]):
                 new = cycle(flow, part[-1, i], back / DENSE)
                 if new is not None and not _known(flow, found, new):
                     found.append(new)

@@ -47,14 +47,17 @@ Integers = NDArray[np.int64]
 #: Periods of the first window, and of all together; strobes in a period of a system that knows no time.
 WINDOW, PATIENCE, DENSE = 64, 4096, 8
 
+#: How near to its end a path comes that is back, as a share of how far it had gone.
+NEAR = 0.15
+
 #: Longest period looked for, in forcing periods; guesses for Newton's method in a window.
 LONGEST, GUESSES = 32, 32
 
 #: Numbers that paths may have: half a gigabyte. Of many states fewer motions are followed, not below so many.
 HELD, FEWEST = 1 << 26, 16
 
-#: Windows before cells are looked at, and periods in which motions must stay in them.
-WINDOWS, STAYS = 3, 512
+#: Windows before cells are looked at; motions that must stay in them, and for how many periods.
+WINDOWS, STAYING, STAYS = 3, 64, 1024
 
 #: Sizes of cells as shares of the scale: the smallest that motions fill is taken.
 SIZES = (1 / 128, 1 / 64, 1 / 32, 1 / 16, 1 / 8)
@@ -150,15 +153,16 @@ class Search:
         if not flow.angles.any():  # a slow spiral goes around it
             self._try(strobes[len(strobes) // 2 :].mean(axis=0), 1)
         tried = 0
-        for i in np.flatnonzero((self.arrived(paths[-1]) < 0) & ~known) if not forced else ():
-            if tried == GUESSES or self._known(paths[-1, i]):
+        for i in np.flatnonzero(self.arrived(paths[-1]) < 0) if not forced else ():
+            if tried >= GUESSES or self._known(paths[-1, i]):
                 continue
-            back = time_back(flow, paths[:, i])
-            if back:
+            for back in times_back(flow, paths[:, i]):
                 tried += 1
                 found = cycle(flow, paths[-1, i], back / DENSE)
                 if found is not None:
                     self._add(found)
+                    if attracts(found):
+                        break
 
     def seek(self, places: Floats, period: float | None) -> None:
         """Look for orbits near places (n, dim), of a period [s] that a cycle has; None: a place of rest."""
@@ -218,14 +222,31 @@ class Search:
             return
         for group in _groups([np.unique(own) for own in keys[:, filling].T]):
             members = filling[group]
-            stays = flow.run(paths[-1, members[:16]], np.arange(1, STAYS * dense + 1) / dense).y
             dim = paths.shape[2]
-            points = np.concatenate([paths[half:, members].reshape(-1, dim), stays.reshape(-1, dim)])
+            seen = paths[half:, members].reshape(-1, dim)
+            stays = self._later(seen, np.arange(1, STAYS * dense + 1) / dense)
+            points = np.concatenate([seen, stays.reshape(-1, dim)])
             points = points[:: -(-len(points) // MOST_POINTS)]
             left = ~np.isin(keys_of(flow, size, stays), np.unique(keys[:, members]))
-            if np.isfinite(stays).all() and left.mean() < 0.2 and (self.arrived(stays[-1]) < 0).all():
+            if left.mean() < 0.2 and self._stay(stays[-1]):
                 still = bool((np.ptp(stays, axis=0) < size).all())
                 self._add_cloud(Cloud(points, size, still), stays[-1])
+
+    def _later(self, points: Floats, times: Floats) -> Floats:
+        """Where motions from some of the points (n, dim) are at times [periods] (k, m, dim)."""
+        some = points[np.unique(np.linspace(0, len(points) - 1, STAYING).astype(np.int64))]
+        return self.flow.run(some, times).y
+
+    def _stay(self, states: Floats) -> bool:
+        """Whether none of such motions has gone to an orbit or to infinity by now (n, dim)."""
+        return bool(np.isfinite(states).all() and (self.arrived(states) < 0).all())
+
+    def leave_transients(self) -> None:
+        """Take clouds away that motions leave for an orbit, which may have been found later."""
+        times = np.array([float(STAYS)])
+        kept = [c for c in self.clouds if c.still or self._stay(self._later(c.points, times)[-1])]
+        self.changes += len(self.clouds) - len(kept)
+        self.clouds = kept
 
     def _have_neighbours(self, places: Floats) -> Flags:
         """Which fixed points of the map, near places (n, dim), have others beside them."""
@@ -308,15 +329,16 @@ def _groups(cells: list[Integers]) -> list[Flags]:
     return [group == k for k in np.unique(group)]
 
 
-def time_back(flow: Flow, path: Floats) -> int:
-    """Strobes back to where a path (k, dim) was nearest to its end after it had gone away; 0: never near."""
+def times_back(flow: Flow, path: Floats) -> list[int]:
+    """Strobes back to where a path (k, dim) first came near to its end, and where it came nearest."""
     distance = flow.distance(path[::-1][1:], path[-1])
-    gone = np.flatnonzero(distance > 0.5 * distance.max())
-    later = distance[gone[0] :] if gone.size else np.zeros(0)
-    for k in range(1, later.size - 1):
-        if later[k] <= min(later[k - 1], later[k + 1]) and later[k] < 0.15 * distance.max():
-            return int(gone[0] + k + 1)
-    return 0
+    inner = distance[1:-1]
+    near = 1 + np.flatnonzero((inner <= distance[:-2]) & (inner <= distance[2:]))
+    farthest = np.maximum.accumulate(distance)
+    near = near[distance[near] < NEAR * farthest[near]]
+    nearest = near[: LONGEST + 1]
+    found = [*near[:1].tolist(), *nearest[np.argsort(distance[nearest], kind="stable")[:1]].tolist()]
+    return [back + 1 for back in dict.fromkeys(found)]
 
 
 def _exponent(flow: Flow, starts: Floats) -> tuple[float, float]:

@@ -1,8 +1,9 @@
 """Who ends at which attractor: motions run until they have arrived, each with two lengths of steps.
 
 A label counts where both runs arrive at the same attractor and have stayed together on the way. Where they
-have not, a disturbance as small as the steps' error has grown, and the motions run again with finer steps.
-Cells of the second run are twice as wide. Motions that still come apart are unsure.
+have not, a disturbance as small as the steps' error has grown, and the motions run again with finer steps, as
+do those that escaped, once: steps that are too long send a motion away. Cells of the second run are twice as
+wide. Motions that still come apart are unsure.
 """
 
 from __future__ import annotations
@@ -100,7 +101,8 @@ def settle(search: Search, starts: Floats, periods: int, progress: Progress | No
                 own[members] = new
             steps += found.steps
             last.append(undecided[: max(0, 256 - sum(map(len, last)))])
-            members = members[apart]
+            lost = np.isin(found.status, (Status.ESCAPED, Status.NOT_FINITE)) & (finer == REPEATED[0])
+            members = members[apart | lost]
         if progress is not None:
             progress(done)
     return Ends(label, status, time * flow.period, np.concatenate(last), steps)
