@@ -50,6 +50,9 @@ FIRST, SHORTEST, LONGEST = 0.01, 1e-7, 0.03
 #: Newton's iterations of a step, and points of a branch, at most; cosine between tangents at least.
 CORRECTIONS, POINTS, BEND = 6, 1000, 0.95
 
+#: Distance over the scale of a motion after half its period to where it began, that is twice a shorter one.
+HALVED = 0.02
+
 #: Outputs over a period for amplitudes.
 OUTPUTS = 256
 
@@ -137,19 +140,22 @@ def frequency_response(
     """Periodic motions over a range of a parameter, such as the frequency or amplitude of a load.
 
     Args:
-        system: a system of your own with a ``period``, or a mechanism under loads that repeat.
+        system: a system of your own with a ``period`` whose ``rhs`` gives a tuple, or a mechanism under loads
+            that repeat.
         parameter: its name.
         between: least and greatest value.
         starts: ranges by name, a sampler or states (n, dim), as for :func:`fastmech.find_attractors`.
             Newton's method begins at 64 of them, and at where these are after 48 periods, at nine values.
         periods: how many periods of the forcing a motion takes; motions that take a part of them are branches
-            too.
+            too. A branch that begins where a shorter motion doubles its period ends there.
         seed: of the sampler, by default its own.
         threads: threads to use, all processors by default.
 
     Returns:
         branches with multipliers, amplitudes, and folds, period doublings and Neimark-Sacker points located
-        to rounding of the map. A branch that no start leads to is not found.
+        to rounding of the map; at the end of a branch of twice the period, to the root of rounding: the
+        shorter motion's branch tells more. A branch that no start leads to is not found, and one of more than
+        2,000 motions is cut off.
 
     Raises:
         InputError: an argument is wrong, or the system does not depend on the time.
@@ -344,7 +350,7 @@ def _branch(family: OrbitFamily, place: Floats, value: float) -> Branch:
         places,
         np.array([np.linalg.eigvals(p.J) for p in points]),
         _amplitudes(family, places, values),
-        tuple(special),
+        _each_once(family, special),
         end == "closed",
         "cut" in (begin, end),
     )
@@ -411,8 +417,26 @@ def _between(family: OrbitFamily, one: _Point, two: _Point) -> list[Special]:
             continue  # two real multipliers with the product 1: a neutral saddle
         value = family.between[0] + p.u[-1] * (family.between[1] - family.between[0])
         place = p.u[:-1] * family.scale
+        if k == 0 and family.periods % 2 == 0:
+            half = family.run(place[None], np.array([value]), np.array([0.5]))[0, 0]
+            kind = "period doubling" if family.distance(half, place) < HALVED else kind
         found.append(Special(kind, value, place, _amplitudes(family, place[None], np.array([value]))[0]))
     return found
+
+
+def _each_once(family: OrbitFamily, special: list[Special]) -> tuple[Special, ...]:
+    """Special points without those of the same motions begun half a period later, beyond a doubling."""
+    kept: list[Special] = []
+    for one in special:
+        again = (
+            one.kind == other.kind
+            and abs(one.value - other.value) < 1e-5 * (family.between[1] - family.between[0])
+            and float(np.abs((one.amplitude - other.amplitude) / family.scale).max()) < HALVED
+            for other in kept
+        )
+        if family.periods % 2 or not any(again):
+            kept.append(one)
+    return tuple(kept)
 
 
 def _amplitudes(family: OrbitFamily, places: Floats, values: Floats) -> Floats:

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from fastmech.attractors.arrival import Balls, Cloud
-from fastmech.attractors.flow import FINER, Floats, Flow, SectionFlow, flow_of
+from fastmech.attractors.flow import DIFFERENCE, FINER, Floats, Flow, SectionFlow, flow_of
 from fastmech.attractors.orbits import Orbit
 from fastmech.attractors.proof import RestProof
-from fastmech.attractors.search import Search
+from fastmech.attractors.search import DENSE, Search
 from fastmech.attractors.settle import Ends, settle
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
@@ -225,17 +225,19 @@ def search_of(
 
 def _preserves_volume(flow: Flow, y: Floats) -> bool:
     """Whether volume about most motions from y (n, dim) neither grows nor shrinks in the long run."""
-    total, size = np.zeros(len(y)), np.zeros(len(y))
-    for k in range(OVER):
-        y, jacobians = flow.derivative(y, 1.0)
-        grown = np.full(len(y), np.nan)
-        usable = np.isfinite(jacobians).all(axis=(1, 2))
-        grown[usable] = np.log(np.maximum(np.abs(np.linalg.det(jacobians[usable])), 1e-300))
-        if k == 0 and not (grown > -1e-6).any():
-            return False
-        total, size = total + grown, size + np.abs(grown)
+    n, dim = y.shape
+    h = DIFFERENCE * flow.scale
+    shifts = np.concatenate([np.diag(h), np.diag(-h)])
+    times = np.arange(OVER * DENSE) / DENSE
+    total, size = np.zeros(n), np.zeros(n)
+    for k, states in enumerate(np.concatenate([y[None], flow.run(y, times[1:]).y])):
+        rates = flow.rates((states[:, None] + shifts).reshape(-1, dim), float(times[k] * flow.period))
+        both = np.diagonal(rates.reshape(n, 2, dim, dim), axis1=2, axis2=3)
+        divergence = ((both[:, 0] - both[:, 1]) / (2.0 * h)).sum(axis=1) * flow.period
+        total, size = total + divergence, size + np.abs(divergence)
     known = np.isfinite(total)
-    return bool(np.median((np.abs(total) - BALANCE * size)[known]) < 1e-6 * OVER) if known.any() else False
+    balance = (np.abs(total) - BALANCE * size)[known] / len(times)
+    return bool(np.median(balance) < 1e-6) if known.any() else False
 
 
 def labelled(

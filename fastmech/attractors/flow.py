@@ -334,8 +334,10 @@ def _with_steps(flow: Flow, sample: Floats, stay: int = 0) -> Flow:
             if not len(lost) or not replace(flow, steps=MOST).run(lost, one).goes_on.any():
                 return flow
         flow, before = finer, now
-    stiff = "" if isinstance(flow.method, ImplicitRungeKutta) else (
-        "choose an implicit method (method='radau5') where motion is stiff, "
+    stiff = (
+        ""
+        if isinstance(flow.method, ImplicitRungeKutta)
+        else ("choose an implicit method (method='radau5') where motion is stiff, ")
     )
     raise InputError(
         f"dt: even steps of {flow.period / MOST:.3g} s leave errors above {ERROR:g} of the states' size in a "

@@ -23,7 +23,7 @@ from scipy.optimize import linear_sum_assignment
 
 from fastmech.attractors.find import Attractor, find_attractors
 from fastmech.attractors.flow import Floats, Flow, flow_at, flow_of, spread
-from fastmech.attractors.search import Search
+from fastmech.attractors.search import LEFT, Search
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.system import System
@@ -41,6 +41,9 @@ STARTS = 1000
 #: Points of an attractor from which motions begin, distance over the scale within which it is the same,
 #: and halvings of the step to where it comes or goes.
 SEEDS, NEAR, HALVINGS = 16, 0.05, 12
+
+#: How far from an orbit that has begun to repel motions begin, over the scale.
+ASIDE = 0.005
 
 #: The same where lines are joined, which does not ask where it comes or goes.
 JOINING = 7
@@ -135,6 +138,8 @@ def follow_basins(
     progress: Progress | None = None,
 ) -> BasinsAlong | BasinsOver:
     """Attractors and basin fractions along a parameter, or over two.
+
+    Chaos counts as there while 64 motions on it stay for 1,024 periods: before a crisis it comes earlier.
 
     Args:
         system: a system of your own or a mechanism.
@@ -374,8 +379,14 @@ class _Tracer(NamedTuple):
         search = Search(flow)
         search.seek(seeds[:1], period)
         if not search.count:
+            if search.repelling:  # from beside it, as motions may take long to leave
+                seeds = seeds + ASIDE * flow.scale * np.random.default_rng(0).uniform(-1.0, 1.0, seeds.shape)
             search.look(seeds)
-        return [o.points for o, _ in search.orbits] + [c.points for c in search.clouds], search.flow
+        clouds = [c.points for c in search.clouds]
+        if not flow.forced:  # what still circles a place of rest that repels has not left yet
+            rests = [o.points for o in search.repelling if not o.cycle]
+            clouds = [one for one in clouds if all(flow.distance(one, rest).max() > LEFT for rest in rests)]
+        return [o.points for o, _ in search.orbits] + clouds, search.flow
 
 
 def _apart(flow: Flow, a: Floats, b: Floats) -> float:

@@ -105,16 +105,14 @@ def periodic(flow: Flow, guesses: Floats, periods: int) -> list[Orbit]:
 
 def visits(flow: Flow, orbit: Orbit, place: Floats) -> bool:
     """Whether an orbit comes to a place, to within :data:`SAME` or a twentieth of a step along a cycle."""
-    distance = flow.distance(orbit.points, place)
-    j = int(np.argmin(distance))
     if not orbit.cycle:
-        return bool(distance[j] < SAME)
-    ahead, behind = orbit.points[(j + 1) % len(distance)], orbit.points[j - 1]
-    along = flow.away(ahead, behind) / flow.scale
-    e = flow.away(place, orbit.points[j]) / flow.scale
-    length = float(np.linalg.norm(along))
-    e -= along * (e @ along) / length**2
-    return float(np.linalg.norm(e)) < max(0.05 * length, SAME)
+        return bool(flow.distance(orbit.points, place).min() < SAME)
+    steps = flow.away(np.roll(orbit.points, -1, axis=0), orbit.points) / flow.scale
+    e = flow.away(place, orbit.points) / flow.scale
+    squares = (steps**2).sum(axis=1)
+    share = np.clip((e * steps).sum(axis=1) / squares, 0.0, 1.0)
+    beside = np.linalg.norm(e - share[:, None] * steps, axis=1)
+    return bool((beside < np.maximum(0.1 * np.sqrt(squares), SAME)).any())
 
 
 def cycle(flow: Flow, guess: Floats, periods: float) -> Orbit | None:

@@ -50,8 +50,14 @@ WINDOW, PATIENCE, DENSE = 64, 4096, 8
 #: How near to its end a path comes that is back, as a share of how far it had gone.
 NEAR = 0.15
 
-#: Longest period looked for, in forcing periods; guesses for Newton's method in a window.
-LONGEST, GUESSES = 32, 32
+#: How far from an orbit that repels motions have to be, over the scale, to have left it.
+LEFT = 0.05
+
+#: Longest period looked for, in forcing periods; guesses for Newton's method in a window, of cycles too.
+LONGEST, GUESSES, CYCLES = 32, 32, 16
+
+#: Multipliers beyond this are no rounding of 1: motions leave.
+REPELS = 1.0 + 1e-7
 
 #: Numbers that paths may have: half a gigabyte. Of many states fewer motions are followed, not below so many.
 HELD, FEWEST = 1 << 26, 16
@@ -93,6 +99,7 @@ class Search:
         self.flow = flow
         self.orbits: list[tuple[Orbit, Balls]] = []
         self.clouds: list[Cloud] = []
+        self.repelling: list[Orbit] = []  #: orbits that motions leave, seen on the way
         self.changes = 0  #: times that one was found, or more of one
         self.latest = 0  #: periods after which the last motion of a sample had arrived
 
@@ -154,7 +161,7 @@ class Search:
             self._try(strobes[len(strobes) // 2 :].mean(axis=0), 1)
         tried = 0
         for i in np.flatnonzero(self.arrived(paths[-1]) < 0) if not forced else ():
-            if tried >= GUESSES or self._known(paths[-1, i]):
+            if tried >= CYCLES or self._known(paths[-1, i]):
                 continue
             for back in times_back(flow, paths[:, i]):
                 tried += 1
@@ -189,6 +196,8 @@ class Search:
         return any(visits(self.flow, orbit, place) for orbit, _ in self.orbits)
 
     def _add(self, orbit: Orbit) -> None:
+        if np.abs(orbit.multipliers).max(initial=0.0) > REPELS:
+            self.repelling.append(orbit)
         if not attracts(orbit) or any(same(self.flow, own, orbit) for own, _ in self.orbits):
             return
         own = balls(self.flow, orbit)
@@ -309,6 +318,9 @@ class Search:
                 self.changes += 1
                 self.clouds[k] = cloud._replace(points=points, size=np.maximum(cloud.size, new.size))
                 return
+        near = [o for o in self.repelling if self.flow.distance(o.points, new.points[-1]).min() < LEFT]
+        if new.still and near:
+            return  # motions are about to leave
         exponent, error = _exponent(self.flow, last)
         if new.still and exponent > 3.0 * error:
             return  # a saddle, beside which each turn of a heteroclinic cycle takes longer than the last

@@ -1,4 +1,4 @@
-"""The paper's mechanism under a force that never fades: F0 cos(omega t) on M2, along +x."""
+"""The paper's mechanism under a force that never fades: F0 sin(omega t) on M2, along +x."""
 
 import sympy
 

@@ -363,3 +363,109 @@ def test_intervals_of_shares_count_the_unsure_as_none_and_as_all() -> None:
     low, high = fm.wilson(found[0].found, 300)[0], fm.wilson(found[0].found + unsure, 300)[1]
     assert f"({float(low):.4f} to {float(high):.4f})" in str(found)
     assert fm.basin_fractions(found)[1].missing == 300 - sum(one.found for one in found)
+
+
+@pytest.mark.parametrize("damping", [7.0, 50.0])
+def test_motions_that_begin_at_rest_and_creep_have_not_escaped(damping: float) -> None:
+    """Rates stay near nothing: what goes far is judged by what motions went through, in all states."""
+
+    def creeping(t, x, v, b):  # type: ignore[no-untyped-def]
+        return v, -b * v + x - x * x * x
+
+    starts = np.stack([np.linspace(-2.0, 2.0, 20), np.zeros(20)], axis=1)
+    found = fm.find_attractors(fm.System(creeping, ["x", "v"], {"b": damping}), starts)
+    own = np.array([found[label].points[0, 0] for label in found.label])
+    np.testing.assert_allclose(own, np.sign(starts[:, 0]), atol=1e-9)
+
+
+def test_a_start_far_away_does_not_change_its_neighbours_label() -> None:
+    damped = fm.System(lambda t, x, v: (v, -0.3 * v - fm.sin(x)), ["x", "v"], {}, angles=["x"])
+    for starts in ([[0.3, 0.0]], [[0.3, 0.0], [25.0, 0.0]]):
+        found = fm.find_attractors(damped, np.array(starts))
+        assert (found.status == Status.CAPTURED).all()
+
+
+@pytest.mark.parametrize("omega", [0.02, 0.1])
+def test_steps_too_long_for_a_slow_load_send_nothing_away(omega: float) -> None:
+    """A damped oscillator in two wells is bounded; ends of some starts as SciPy has them."""
+
+    def slow(t, x, v, w):  # type: ignore[no-untyped-def]
+        return v, -0.2 * v + x - x * x * x + 0.3 * fm.cos(w * t)
+
+    system = fm.System(slow, ["x", "v"], {"w": omega}, period=lambda w: 2.0 * math.pi / w)
+    starts = fm.samplers.Uniform({"x": (-3.0, 3.0), "v": (-3.0, 3.0)}).draw(60, ("x", "v"))
+    found = fm.find_attractors(system, starts)
+    assert (found.status == Status.CAPTURED).all()
+    for k in range(6):
+        run = solve_ivp(
+            lambda t, y: [y[1], -0.2 * y[1] + y[0] - y[0] ** 3 + 0.3 * np.cos(omega * t)],
+            (0.0, 10.0 * 2.0 * math.pi / omega), starts[k], method="DOP853", rtol=1e-11, atol=1e-12,
+        )  # fmt: skip
+        np.testing.assert_allclose(found[found.label[k]].points[0], run.y[:, -1], atol=1e-6)
+
+
+def test_a_chaotic_transient_is_no_chaos() -> None:
+    """Below r = 24.06 all motions come to rest, after a thousand seconds at 23.5 (Yorke and Yorke 1979)."""
+    system = fm.System(lorenz, ["x", "y", "z"], {"sigma": 10.0, "r": 23.5, "b": 8.0 / 3.0})
+    found = fm.find_attractors(system, {"x": (-20.0, 20.0), "y": (-25.0, 25.0), "z": (0.0, 45.0)}, 100)
+    assert {one.kind for one in found} == {"fixed point"}
+
+
+@pytest.mark.parametrize("m", [1e-3, 3e-3])
+def test_a_cycle_that_attracts_slowly_is_no_torus(m: float) -> None:
+    """Of r' = m r - r^3: radius sqrt(m), multiplier exp(-4 pi m)."""
+
+    def born(t, x, y, m):  # type: ignore[no-untyped-def]
+        g = m - x * x - y * y
+        return g * x - y, g * y + x
+
+    (cycle,) = fm.find_attractors(
+        fm.System(born, ["x", "y"], {"m": m}), {"x": (-1.5, 1.5), "y": (-1.5, 1.5)}, 50
+    )
+    assert cycle.period == pytest.approx(2.0 * math.pi, rel=1e-9)
+    assert cycle.multipliers == pytest.approx(math.exp(-4.0 * math.pi * m), rel=1e-6)
+    assert cycle.exponent == cycle.exponent_error == 0.0
+
+
+def test_a_cycle_of_many_turns_is_found_once() -> None:
+    """Roessler's system with a = b = 0.2 after several doublings."""
+
+    def roessler(t, x, y, z, c):  # type: ignore[no-untyped-def]
+        return -y - z, x + 0.2 * y, 0.2 + z * (x - c)
+
+    ranges = {"x": (-5.0, 5.0), "y": (-5.0, 5.0), "z": (0.0, 2.0)}
+    (cycle,) = fm.find_attractors(fm.System(roessler, ["x", "y", "z"], {"c": 4.2}), ranges, 60)
+    assert cycle.kind == "periodic"
+    run = solve_ivp(
+        lambda t, y: [-y[1] - y[2], y[0] + 0.2 * y[1], 0.2 + y[2] * (y[0] - 4.2)], (0.0, cycle.period),
+        cycle.points[0], method="DOP853", rtol=1e-12, atol=1e-12,
+    )  # fmt: skip
+    np.testing.assert_allclose(run.y[:, -1], cycle.points[0], atol=1e-7)
+
+
+def test_a_stopping_condition_ends_motions_that_leave() -> None:
+    def escape(t, x, v, F):  # type: ignore[no-untyped-def]
+        return v, -0.1 * v - x + x * x + F * fm.sin(0.85 * t)
+
+    ranges, period = {"x": (-0.8, 1.2), "v": (-0.8, 0.8)}, 2.0 * math.pi / 0.85
+    free = fm.find_attractors(fm.System(escape, ["x", "v"], {"F": 0.05}, period=period), ranges, 200)
+    ended = fm.find_attractors(
+        fm.System(escape, ["x", "v"], {"F": 0.05}, lambda t, x, v: x > 2.0, period=period), ranges, 200
+    )
+    np.testing.assert_array_equal(free.status, ended.status)
+    np.testing.assert_array_equal(free.label, ended.label)
+    assert {"captured", "escaped"} == {name for name, count in ended.counts.items() if count}
+
+
+def test_what_keeps_volume_in_the_long_run_is_refused() -> None:
+    """Lotka and Volterra's equations shrink volume here and swell it there."""
+    system = fm.System(lambda t, x, y: (x * (1.0 - y), y * (x - 1.0)), ["x", "y"], {})
+    with pytest.raises(fm.InputError, match="preserves volume"):
+        fm.find_attractors(system, {"x": (0.2, 3.0), "y": (0.2, 3.0)}, 50)
+
+
+def test_a_period_after_which_nothing_repeats_is_refused() -> None:
+    values = {"delta": 0.2, "A": 0.3}
+    system = fm.System(duffing, ["x", "x_dot"], values, period=math.pi)
+    with pytest.raises(fm.InputError, match=r"period = 3\.14159: the right-hand side does not repeat"):
+        fm.find_attractors(system, {"x": (-1.0, 1.0)}, 50)

@@ -58,7 +58,7 @@ def test_attractors_have_the_same_numbers_over_two_parameters() -> None:
         (t.kind, t.attractor): shift for line, shift in zip(found.lines, s, strict=True) for t in line.tipping
     }
     assert len(tips) == 2
-    # Along the second parameter too: the folds are at r + s = +-FOLD, beyond one of them for r = -0.3 and 0.3.
+    # Along the second parameter too: the folds are at r + s = +-FOLD, one of them for r = +-0.3.
     across = [(value, t) for value, column in zip(r, found.tipping, strict=True) for t in column]
     assert sorted((value, t.kind) for value, t in across) == [(-0.3, "born"), (0.3, "dies")]
     for value, t in across:
@@ -114,3 +114,19 @@ def test_wrong_values_get_one_line(values: object) -> None:
     system = fm.System(two_wells, ["x"], {"r": 0.0})
     with pytest.raises(fm.InputError, match="values"):
         fm.follow_basins(system, "r", values, {"x": (-1.0, 1.0)})  # type: ignore[arg-type]
+
+
+def test_a_place_of_rest_ends_where_it_turns_unstable() -> None:
+    """r' = m r + r^3 - r^5: the cycle is born at m = -1/4, the place of rest loses its stability at 0."""
+
+    def bautin(t, x, y, m):  # type: ignore[no-untyped-def]
+        r2 = x * x + y * y
+        g = m + r2 - r2 * r2
+        return g * x - y, g * y + x
+
+    system = fm.System(bautin, ["x", "y"], {"m": 0.0})
+    found = fm.follow_basins(system, "m", [-0.4, -0.1, 0.1], {"x": (-1.5, 1.5), "y": (-1.5, 1.5)}, 60)
+    ends = {t.kind: t for t in found.tipping}
+    assert ends["born"].low <= -0.25 <= ends["born"].high
+    assert ends["dies"].low <= 0.0 <= ends["dies"].high
+    assert all(t.high - t.low < 2e-4 for t in found.tipping)
