@@ -363,3 +363,19 @@ def test_intervals_of_shares_count_the_unsure_as_none_and_as_all() -> None:
     low, high = fm.wilson(found[0].found, 300)[0], fm.wilson(found[0].found + unsure, 300)[1]
     assert f"({float(low):.4f} to {float(high):.4f})" in str(found)
     assert fm.basin_fractions(found)[1].missing == 300 - sum(one.found for one in found)
+
+
+def test_angles_in_degrees_get_a_line_wherever_they_are_given() -> None:
+    grid = {"x": np.linspace(-180.0, 180.0, 4), "x_dot": [0.0, 1.0]}
+    with pytest.raises(fm.InputError, match=r"axes\.x: reaches 180, beyond 4 turns; angles are in radians"):
+        fm.map_basins(PENDULUM, grid)
+    with pytest.raises(fm.InputError, match=r"fixed\.x: reaches 90, beyond 4 turns"):
+        fm.map_basins(PENDULUM, {"x_dot": [0.0, 1.0]}, fixed={"x": 90.0})
+    with pytest.warns(UserWarning, match="starts: reaches 90, beyond 4 turns"):
+        fm.label_starts(PENDULUM, [[90.0, 0.0]])
+    with pytest.warns(UserWarning, match=r"starts: reaches 1[0-9.]+, beyond 4 turns"):
+        fm.find_attractors(PENDULUM, {"x": (-180.0, 180.0)}, 40)
+    chain = fm.mechanisms.pendulum_chain(1)
+    name = chain.state[0]
+    with pytest.raises(fm.InputError, match=rf"axes\.{name}: reaches 180, beyond 4 turns"):
+        fm.map_basins(chain, {name: [-180.0, 180.0]})
