@@ -108,6 +108,9 @@ class ErosionProfile(Drawn):
                     f"{self.stability[a, w]:.1%} to {self.stability[b, w]:.1%}, smallest shock "
                     f"{self.shock[a, w]:.3g} to {self.shock[b, w]:.3g} rad"
                 )
+        unknown = float(np.max(self.undecided, initial=0.0, where=np.isfinite(self.undecided)))
+        if unknown > 0.0:
+            lines.insert(1, f"  up to {unknown:.1%} of the starts have no label: a longer t_end may tell")
         return "\n".join(lines)
 
 
@@ -242,7 +245,8 @@ def erosion(
         axes: the map and its window: names of states, as ``scene.state`` has them, with their values
             [rad or m, and per s], rising in equal steps. States that are no axis are the well's own.
         most_shock: largest shock to look for [rad].
-        t_end: end of the runs [s]; what is not captured by then has no label.
+        t_end: end of the runs [s]; what is not captured by then has no label, of which the result tells: a
+            slow device needs more.
         label_starts: where starts of a scene end, if not :func:`fastmech.label_starts` shall tell.
         n: random starts, uniform in the window, the same for all values.
         directions: random directions of the search for a shock. It also begins with those to the saddles,

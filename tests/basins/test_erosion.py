@@ -104,6 +104,8 @@ def test_starts_without_a_label_leave_room_above_the_measures() -> None:
         assert (most >= getattr(whole, name)).all()
         np.testing.assert_array_equal(getattr(whole, f"{name}_at_most"), getattr(whole, name))
     np.testing.assert_array_equal(ring.lim_at_most, whole.lim)
+    assert "of the starts have no label: a longer t_end may tell" in " ".join(str(ring).split())
+    assert "no label" not in str(whole)
 
 
 def test_a_slice_of_rates_goes_through_the_well() -> None:
