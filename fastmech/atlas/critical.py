@@ -2,20 +2,25 @@
 
 Proved lists of equilibria at the values of a grid are compared by what they hold: how many of which Morse
 index and verdict. Between neighbours that differ, values are proved in the middle again and again until
-rounding ends it. What changes twice between neighbours that do not differ is not seen.
+rounding ends it. Where two equilibria only exchange their stability lists hold the same; then equilibria are
+followed from one list to the next by their tangents, and differ where they come to a place of another index.
+What changes twice between neighbours that do not differ is not seen.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import linear_sum_assignment
 
 from fastmech.arrays import Floats
+from fastmech.atlas.defining import Balance
 from fastmech.atlas.resting_map import RestingMap, map_resting_places, resting_places_at
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism, short_way
@@ -23,11 +28,15 @@ from fastmech.models.stability import VERDICTS
 from fastmech.objects import Field, Printed, Result
 from fastmech.outcome import Outcome
 
-#: Relative width at which a value is located, and halvings at most.
+#: Width at which a value is located, over the larger of the neighbours on the grid: a value may be zero; and
+#: halvings at most.
 WIDTH, HALVINGS = 4.0 * 2.0**-52, 120
 
-#: Relative distance of located values that are one.
+#: Distance of located values that are one, over the same.
 SAME = 1e-9
+
+#: How near to an end of its coordinate's range an equilibrium is on it, over the range.
+AT_END = 1e-6
 
 #: Where between two values the next one lies: where rounding hides the list in the middle, beside it.
 BETWEEN = (0.5, 0.38, 0.62, 0.46, 0.54)
@@ -39,13 +48,18 @@ EVENLY = 0.1
 STEADY = 1e-6
 
 
+Kind = Literal[
+    "fold", "pitchfork", "Hopf", "coalescence", "divergence", "exchange", "end of range", "several"
+]
+
+
 @dataclass(frozen=True, repr=False)
 class CriticalValue(Printed):
     """A value of a parameter at which something changes."""
 
     value: float
     width: float  #: of the interval in which the lists differ, about the value
-    kind: Literal["fold", "pitchfork", "Hopf", "coalescence", "divergence", "exchange", "several"]
+    kind: Kind
     position: tuple[float, ...]  #: of the equilibrium at which it happens, NaN where there are several
 
     def told(self) -> str:
@@ -88,7 +102,10 @@ def critical_values(
 
     Folds and pitchforks change how many there are; at a Hopf point a pair of eigenvalues crosses the
     imaginary axis; where nothing damps two frequencies coalesce instead; a divergence is an eigenvalue
-    through zero. An exchange changes Morse indices and no number. ``several`` at once are not told apart.
+    through zero. At an exchange two equilibria pass through each other and take over each other's stability
+    (a transcritical point): it is seen where their tangents at neighbouring values tell which is which. At an
+    ``end of range`` nothing happens but that equilibria cross an end of a coordinate's range. ``several`` at
+    once are not told apart.
 
     Args:
         mechanism: gives the other parameters; loads are at their means.
@@ -108,17 +125,25 @@ def critical_values(
     if grid.size < 2 or grid[-1] < grid[0]:
         raise InputError(f"values = {shown(values)}: must be two or more rising values")
     known = [Known(grid[[k]], first, k) for k in range(grid.size) if first.outcome[k] == Outcome.COMPLETE]
-    located = narrowed(mechanism, first.axes, changes(known), HALVINGS, threads=threads)
+    passed = Passed(mechanism, parameter, grid)
+    located = narrowed(
+        mechanism, first.axes, changes(known, passed.differ), HALVINGS, threads=threads, differ=passed.differ
+    )
     merged: list[tuple[Known, Known]] = []
     for a, b in sorted(located, key=lambda pair: float(pair[0].at[0])):
         # Within rounding of one value lists may change more than once.
-        if merged and a.at[0] - merged[-1][1].at[0] <= SAME * max(abs(a.at[0]), abs(b.at[0])):
+        right = min(int(np.searchsorted(grid, a.at[0], "right")), grid.size - 1)
+        size = np.abs(grid[max(right - 1, 0) : right + 1]).max()
+        if merged and a.at[0] - merged[-1][1].at[0] <= SAME * size:
             a = merged.pop()[0]
         merged.append((a, b))
     found = []
     for a, b in merged:
-        if a.holds != b.holds:
-            kind, position, _ = named(mechanism, [parameter], a, b)
+        exchanging = passed.exchanging(a, b) if a.holds == b.holds else []
+        if a.holds != b.holds or exchanging:
+            kind, position, _ = (
+                named(mechanism, [parameter], a, b) if not exchanging else exchange(exchanging)
+            )
             value, width = 0.5 * a.at[0] + 0.5 * b.at[0], b.at[0] - a.at[0]
             found.append(CriticalValue(float(value), float(width), kind, tuple(map(float, position))))
     told = CriticalValues(found).of(mechanism)
@@ -147,16 +172,78 @@ class Known:
 Pairs = list[tuple[Known, Known]]
 
 
-def changes(known: list[Known]) -> Pairs:
+def hold_different(a: Known, b: Known) -> bool:
+    """Whether lists differ by what they hold."""
+    return bool(a.holds != b.holds)
+
+
+def changes(known: list[Known], differ: Callable[[Known, Known], bool] = hold_different) -> Pairs:
     """Neighbours whose lists differ."""
-    return [(a, b) for a, b in pairwise(known) if a.holds != b.holds]
+    return [(a, b) for a, b in pairwise(known) if differ(a, b)]
+
+
+class Passed:
+    """Equilibria that pass through each other from one value of a parameter to another."""
+
+    def __init__(self, mechanism: Mechanism, parameter: str, grid: Floats) -> None:
+        self._of = mechanism, {parameter: float(grid[0])}, {parameter: float(grid[-1])}
+
+    @cached_property
+    def balance(self) -> Balance:
+        """Made where lists hold the same at last."""
+        return Balance(*self._of)
+
+    def differ(self, a: Known, b: Known) -> bool:
+        """Whether lists hold different things, or the same in places that have passed each other."""
+        return hold_different(a, b) or bool(self.exchanging(a, b))
+
+    def exchanging(self, a: Known, b: Known) -> list[Floats]:
+        """Where equilibria at ``b`` are, of two lists that hold the same, to which those of others come."""
+        if len(set(a.index.tolist())) < 2 and len(set(a.orientation.tolist())) < 2:
+            return []
+        balance, step = self.balance, float(b.at[0] - a.at[0]) / float(self.balance.span[0])
+        ahead, back = (
+            np.array([self._led(known, k, part * step) for k in range(len(known.position))])
+            for known, part in ((a, 0.5), (b, -0.5))
+        )
+        if not (np.isfinite(ahead).all() and np.isfinite(back).all()):
+            return []
+        apart = np.linalg.norm(balance.apart(ahead[:, None], back), axis=2)
+        return [
+            b.position[j]
+            for i, j in zip(*linear_sum_assignment(apart), strict=True)
+            if a.index[i] != b.index[j] or a.orientation[i] != b.orientation[j]
+        ]
+
+    def _led(self, known: Known, k: int, step: float) -> Floats:
+        """Where its tangent leads an equilibrium."""
+        z = self.balance.point(known.position[k], known.at)
+        slopes, n = self.balance.forces(z)[1], self.balance.n
+        try:
+            return np.asarray(z[:n] - step * np.linalg.solve(slopes[:, :n], slopes[:, n]))
+        except np.linalg.LinAlgError:
+            return np.full(n, np.nan)
+
+
+def exchange(places: list[Floats]) -> tuple[Kind, Floats, float]:
+    """What happens where these equilibria have passed each other, as :func:`named`."""
+    if len(places) > 2:
+        return "several", np.full_like(places[0], np.nan), 0.0
+    return "exchange", places[0], 0.0
 
 
 def narrowed(
-    mechanism: Mechanism, axes: dict[str, Floats], todo: Pairs, halvings: int, *, threads: int | None = None
+    mechanism: Mechanism,
+    axes: dict[str, Floats],
+    todo: Pairs,
+    halvings: int,
+    *,
+    threads: int | None = None,
+    differ: Callable[[Known, Known], bool] = hold_different,
 ) -> Pairs:
     """Pairs whose lists differ, nearer to each other by so many halvings, or within rounding."""
     located: Pairs = []
+    sizes = [np.maximum(np.abs(a.at), np.abs(b.at)) for a, b in todo]
     for _ in range(halvings):
         between: list[Known | None] = [None] * len(todo)
         for share in BETWEEN:
@@ -170,14 +257,14 @@ def narrowed(
                 inside = (at[row] != a.at).any() and (at[row] != b.at).any()
                 if inside and found.outcome[row] == Outcome.COMPLETE:
                     between[k] = Known(at[row], found, row)
-        following: Pairs = []
-        for (a, b), middle in zip(todo, between, strict=True):
-            size = np.maximum(np.abs(a.at), np.abs(b.at))
+        following, scales = Pairs(), list[Floats]()
+        for (a, b), middle, size in zip(todo, between, sizes, strict=True):
             if middle is None or (np.abs(b.at - a.at) <= WIDTH * size).all():
                 located.append((a, b))
             else:
-                following += changes([a, middle, b])
-        todo = following
+                left = changes([a, middle, b], differ)
+                following, scales = following + left, scales + [size] * len(left)
+        todo, sizes = following, scales
         if not todo:
             break
     return located + todo
@@ -198,6 +285,8 @@ def named(mechanism: Mechanism, names: Iterable[str], a: Known, b: Known) -> tup
         j = left[int(np.argmin(distance[i, left]))]
         left.remove(j)
         pairs.append((int(i), j))
+    if left and all(at_end(mechanism, more.position[j]) for j in left):
+        return "end of range", more.position[left[0]], 0.0
     if len(left) == 2:
         one, other = more.position[left]
         size = float(apart(one[None], other[None])[0, 0])
@@ -222,3 +311,13 @@ def named(mechanism: Mechanism, names: Iterable[str], a: Known, b: Known) -> tup
     swings = "Hopf" if damping.any() else "coalescence"
     kind = "divergence" if abs(roots[0].imag) < STEADY * fast else swings
     return kind if len(verdicts) == 1 else "several", more.position[j], abs(float(roots[0].imag))
+
+
+def at_end(mechanism: Mechanism, position: Floats) -> bool:
+    """Whether a position is at an end of a coordinate's range."""
+    return any(
+        not coordinate.periodic
+        and min(abs(x - coordinate.low), abs(x - coordinate.high))
+        <= AT_END * (coordinate.high - coordinate.low)
+        for x, coordinate in zip(position.tolist(), mechanism.coordinates, strict=True)
+    )

@@ -175,6 +175,8 @@ class _CurveSearch:
     def begin(self, kind: Any, position: Floats, frequency: float, at: Floats) -> None:
         """Trace the curve through a critical point that is about here, unless it is known."""
         balance, n = self._balance, self._balance.n
+        if kind == "end of range":
+            return
         if not np.isfinite(position).all():
             self.lost.append(at)
             return

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -168,6 +169,8 @@ def find_attractors(
 ) -> Attractors:
     """Find the attractors of a system and the starts that end at each.
 
+    Angles beyond four turns give a warning: they may be degrees.
+
     Args:
         system: a system of your own or a mechanism. One that depends on the time needs its ``period``; a
             mechanism's is that of its loads. States that count modulo a turn are its ``angles``.
@@ -197,6 +200,8 @@ def find_attractors(
         raise InputError(f"system = {shown(system)}: must be a System or a Mechanism")
     y = checks.starts("starts", starts, system.state, n=n, seed=seed, default=STARTS)
     checks.progress_function(progress, "starts")
+    turning = system.angles if isinstance(system, System) else compress(system.state, system.turning)
+    checks.warn_of_turns("starts", y, [system.state.index(name) for name in turning])
     if t_end is not None:
         t_end = checks.number("t_end", t_end, "s", above=0.0)
     return labelled(search_of(system, y, method, threads), y, t_end, progress)

@@ -47,6 +47,9 @@ Integers = NDArray[np.int64]
 #: Periods of the first window, and of all together; strobes in a period of a system that knows no time.
 WINDOW, PATIENCE, DENSE = 64, 4096, 8
 
+#: Returns of a path, each nearer than the one before, from which a cycle is looked for.
+RECORDS = 6
+
 #: How near to its end a path comes that is back, as a share of how far it had gone.
 NEAR = 0.15
 
@@ -342,15 +345,14 @@ def _groups(cells: list[Integers]) -> list[Flags]:
 
 
 def times_back(flow: Flow, path: Floats) -> list[int]:
-    """Strobes back to where a path (k, dim) first came near to its end, and where it came nearest."""
+    """Strobes back to where a path (k, dim) came near to its end, each nearer than all after it."""
     distance = flow.distance(path[::-1][1:], path[-1])
     inner = distance[1:-1]
     near = 1 + np.flatnonzero((inner <= distance[:-2]) & (inner <= distance[2:]))
     farthest = np.maximum.accumulate(distance)
     near = near[distance[near] < NEAR * farthest[near]]
-    nearest = near[: LONGEST + 1]
-    found = [*near[:1].tolist(), *nearest[np.argsort(distance[nearest], kind="stable")[:1]].tolist()]
-    return [back + 1 for back in dict.fromkeys(found)]
+    nearer = distance[near] <= np.minimum.accumulate(distance[near])
+    return [int(back) + 1 for back in near[nearer][:RECORDS]]
 
 
 def _exponent(flow: Flow, starts: Floats) -> tuple[float, float]:

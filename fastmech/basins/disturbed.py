@@ -176,7 +176,7 @@ def disturb(
         n: number of disturbances.
         disturbances: departures of the state from the equilibrium, a sampler or shape (n, states), in place
             of those that are uniform in the ball; a sampler's number and seed are its own.
-        radius: size of the largest disturbance [rad].
+        radius: size of the largest disturbance [rad]; of more than four turns one is warned.
         seed: seed of the starts.
         t_end: end of the run [s].
         dt: longest step [s]; by default each start's own, from the scene's frequencies, its damping and the
@@ -209,6 +209,8 @@ def disturb(
         raise InputError(
             f"radius = {radius:g} rad: must not exceed {MOST_RADIUS:g} rad; no step follows that"
         )
+    if scene.turning[-1] and away is None and radius > 2.0 * np.pi * checks.FEW_TURNS:
+        warnings.warn(f"radius: {checks.beyond_turns(radius)}", stacklevel=2)
     return_radius = checks.number("return_radius", return_radius, "rad", above=0.0)
     t_end = checks.number("t_end", t_end, "s", above=0.0)
     method = certificate.method(method)

@@ -29,6 +29,7 @@ from fastmech.basins.measures.norm import (
     state_index,
 )
 from fastmech.basins.shock import minimal_shock
+from fastmech.capture.mechanism import require_potential
 from fastmech.capture.select import require_damper
 from fastmech.disturbance.motion import require_constant_force
 from fastmech.ensembles import checks
@@ -107,11 +108,17 @@ class ErosionProfile(Drawn):
                     f"{self.stability[a, w]:.1%} to {self.stability[b, w]:.1%}, smallest shock "
                     f"{self.shock[a, w]:.3g} to {self.shock[b, w]:.3g} rad"
                 )
+        unknown = float(np.max(self.undecided, initial=0.0, where=np.isfinite(self.undecided)))
+        if unknown > 0.0:
+            lines.insert(1, f"  up to {unknown:.1%} of the starts have no label: a longer t_end may tell")
         return "\n".join(lines)
 
 
 #: Names of an :class:`ErosionProfile`'s arrays over values and wells.
 MEASURES = tuple(field.name for field in fields(ErosionProfile)[4:])
+
+#: What coordinates' names are told by among these: a coordinate may be named as one of them is.
+PLACE = "place_"
 
 #: Those that are yes or no.
 FLAGS = ("lim_at_window", "factor_at_window")
@@ -132,11 +139,11 @@ class Survey:
     def of_wells(self, scene: Scene | Mechanism, places: Floats) -> dict[str, NDArray[Any]]:
         """Every measure of wells at ``places`` (wells, n) [rad or m], arrays (wells,); NaN where that is NaN.
 
-        Coordinates, by their names, are among the measures.
+        Coordinates, by their names behind :data:`PLACE`, are among the measures.
         """
         measured: dict[str, NDArray[Any]] = {
             name: np.zeros(len(places), dtype=bool) if name in FLAGS else np.full(len(places), np.nan)
-            for name in (*scene.state[: places.shape[1]], *MEASURES)
+            for name in (*(PLACE + state for state in scene.state[: places.shape[1]]), *MEASURES)
         }
         equilibria = find_equilibria(scene)
         for w in np.flatnonzero(np.isfinite(places[:, 0])):
@@ -173,7 +180,7 @@ class Survey:
         guess = np.concatenate([kick.shock[None], _saddles_from(scene, equilibria, place)])
         shock = search(guess=guess[np.isfinite(guess).all(axis=1)])
         return {
-            **dict(zip(scene.state[:n], e.position.tolist(), strict=True)),
+            **{PLACE + name: float(x) for name, x in zip(scene.state[:n], e.position, strict=True)},
             "stability": float(share.fraction),
             "stability_at_most": float(share.at_most),
             "lower": float(share.lower),
@@ -238,7 +245,8 @@ def erosion(
         axes: the map and its window: names of states, as ``scene.state`` has them, with their values
             [rad or m, and per s], rising in equal steps. States that are no axis are the well's own.
         most_shock: largest shock to look for [rad].
-        t_end: end of the runs [s]; what is not captured by then has no label.
+        t_end: end of the runs [s]; what is not captured by then has no label, of which the result tells: a
+            slow device needs more.
         label_starts: where starts of a scene end, if not :func:`fastmech.label_starts` shall tell.
         n: random starts, uniform in the window, the same for all values.
         directions: random directions of the search for a shock. It also begins with those to the saddles,
@@ -247,7 +255,8 @@ def erosion(
         progress: called with the number of values that are done since the last call.
 
     Raises:
-        InputError: an argument is wrong, a load changes, there is no damper, or wells are not certain.
+        InputError: an argument is wrong, a load changes, there is no damper, forces are not known to have a
+            potential, or wells are not certain.
     """
     require_constant_force(scene)
     checks.progress_function(progress, "values")
@@ -270,7 +279,7 @@ def erosion(
         if progress is not None:
             progress(1)
     profile: Any = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
-    position = {name: profile.pop(name) for name in scene.state[: places.shape[2]]}
+    position = {name: profile.pop(PLACE + name) for name in scene.state[: places.shape[2]]}
     return ErosionProfile(parameter, along, sheets, position, **profile).of(scene)
 
 
@@ -311,10 +320,12 @@ def wells_along(scene: Scene | Mechanism, parameter: str, values: Floats) -> tup
     """Sheets of all wells along a parameter (wells,), and where they are (values, wells, n), or NaN.
 
     Raises:
-        InputError: the parameter or a value of it is none, or the scene has no damper.
+        InputError: the parameter or a value of it is none, the scene has no damper, or its forces are not
+            known to have a potential.
     """
     require_damper(scene)
     if isinstance(scene, Mechanism):
+        require_potential(scene)
         places = follow_wells(scene, parameter, values)
         return np.arange(places.shape[1]), places
     return sheets_of_wells(scene, parameter, values)

@@ -24,7 +24,6 @@ from fastmech.attractors.flow import keeps_moving
 from fastmech.attractors.settle import Ends
 from fastmech.basins.convergence import SUBSTEPS, Computations, Indices, lingering, tell_the_same
 from fastmech.basins.labels import Labels, of_attractors, pieces_of
-from fastmech.basins.measures.norm import FEW_TURNS, beyond_turns
 from fastmech.basins.runs import Paths, follow, rounds_until
 from fastmech.basins.system import label_system_starts
 from fastmech.capture.certificate import CaptureCertificate
@@ -53,9 +52,6 @@ TURN = (_FIRST, _SECOND, 2.0 * np.pi - _FIRST - _SECOND + 2.4492935982947064e-16
 
 #: Least growth from step to step while a strong damper stops part of a motion.
 FINEST_GROWTH = 0.2
-
-#: Angles larger than this are none in degrees either.
-MOST_DEGREES = 720.0
 
 #: Numbers of 8 bytes that memory holds of every start on the way.
 START_NUMBERS = 20
@@ -103,16 +99,13 @@ def label_starts(
     t_end = 60.0 if t_end is None else t_end
     if isinstance(scene, System):
         states = checks.starts("starts", starts, scene.state)
+        checks.warn_of_turns("starts", states, [scene.state.index(name) for name in scene.angles])
         return label_system_starts(
             scene, states, t_end, dt=dt, method=method or "dop853", threads=threads, progress=progress
         )
     require_damper(scene)
-    turning = list(scene.turning)
     states = checks.starts("starts", starts, scene.state)
-    angles = np.abs(states[:, : len(turning)][:, turning])
-    largest = float(np.max(angles, initial=0.0, where=np.isfinite(angles)))
-    if 2.0 * np.pi * FEW_TURNS < largest <= MOST_DEGREES:
-        warnings.warn(f"starts: {beyond_turns(largest)}", stacklevel=2)
+    checks.warn_of_turns("starts", states, np.flatnonzero(scene.turning).tolist())
     return label_states(scene, states, t_end, How(dt, method, settle_radius, threads), progress)
 
 

@@ -16,7 +16,7 @@ from fastmech.attractors.settle import Ends
 from fastmech.basins.label import How, label_states
 from fastmech.basins.labels import Labels, of_attractors, told_ends
 from fastmech.basins.measures.labels import number_turns
-from fastmech.basins.measures.norm import check_angles
+from fastmech.basins.measures.norm import angles_of, check_angles
 from fastmech.basins.refine import LevelProgress, refine_grid
 from fastmech.basins.system import label_system_starts
 from fastmech.basins.well_numbers import number_wells
@@ -27,7 +27,7 @@ from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Field
-from fastmech.scene import STATE, Scene, nearest
+from fastmech.scene import Scene, nearest
 
 Floats = NDArray[np.float64]
 
@@ -127,10 +127,10 @@ def map_basins(
     """
     if not isinstance(scene, Scene | Mechanism | System):
         raise InputError(f"scene = {shown(scene)}: must be a Scene, a Mechanism or a System")
-    names = tuple(scene.state)
-    values = _checked_axes(axes, names, least=2 if isinstance(scene, Scene) else 1)
+    names, angles = tuple(scene.state), angles_of(scene)
+    values = _checked_axes(axes, names, angles, least=2 if isinstance(scene, Scene) else 1)
     checks.progress_function(progress, "starts")
-    held = _checked_fixed({} if fixed is None else fixed, values, names)
+    held = _checked_fixed({} if fixed is None else fixed, values, names, angles)
     shape = tuple(v.size for v in values.values())
     size = math.prod(shape)
     if size > MOST_POINTS:
@@ -240,7 +240,9 @@ class _Collected:
         return number_wells(part)
 
 
-def _checked_axes(axes: Mapping[str, ArrayLike], names: tuple[str, ...], least: int) -> dict[str, Floats]:
+def _checked_axes(
+    axes: Mapping[str, ArrayLike], names: tuple[str, ...], angles: tuple[str, ...], least: int
+) -> dict[str, Floats]:
     """Axes as rising arrays.
 
     Raises:
@@ -263,8 +265,7 @@ def _checked_axes(axes: Mapping[str, ArrayLike], names: tuple[str, ...], least: 
         checks.one_way(f"axes.{name}", values, array)
         if array[-1] < array[0]:
             raise InputError(f"axes.{name}: falls from {array[0]:g} to {array[-1]:g}, must rise")
-        if names == STATE:
-            check_angles(f"axes.{name}", name, array)
+        check_angles(f"axes.{name}", name, array, angles)
         checked[name] = array
     return checked
 
@@ -293,7 +294,10 @@ def _checked_parameters(
 
 
 def _checked_fixed(
-    fixed: Mapping[str, float], axes: Mapping[str, Floats], names: tuple[str, ...]
+    fixed: Mapping[str, float],
+    axes: Mapping[str, Floats],
+    names: tuple[str, ...],
+    angles: tuple[str, ...],
 ) -> dict[str, float]:
     """Values of the coordinates that are no axes.
 
@@ -313,7 +317,6 @@ def _checked_fixed(
         for name in names
         if name not in axes
     }
-    if names == STATE:
-        for name, value in held.items():
-            check_angles(f"fixed.{name}", name, value)
+    for name, value in held.items():
+        check_angles(f"fixed.{name}", name, value, angles)
     return held

@@ -53,6 +53,20 @@ class Shock(Printed):
     undecided_from: float  #: size of the smallest disturbance tried whose end is not known; NaN: none
     trajectories: int  #: starts that were labelled
 
+    def told(self) -> str:
+        """The size, and whether smaller shocks were tried whose ends are not known."""
+        if np.isfinite(self.size):
+            found = f"smallest shock found: {self.size:.6g}, to label {self.label}"
+        else:
+            found = "no shock found that leaves the basin"
+        line = f"{found}; {self.trajectories:,} starts labelled"
+        if not self.undecided_from < (self.size if np.isfinite(self.size) else np.inf):
+            return line
+        return (
+            f"{line}\n  undecided from {self.undecided_from:.6g} on: smaller ones may leave; "
+            "a longer t_end may tell"
+        )
+
 
 def minimal_shock(
     label_of: LabelOf | Scene | Mechanism,
@@ -64,6 +78,7 @@ def minimal_shock(
     guess: ArrayLike | None = None,
     directions: int = 128,
     tolerance: float = 1e-4,
+    t_end: float | None = None,
     seed: int = 0,
 ) -> Shock:
     """Search for the minimal critical shock of an attractor.
@@ -76,7 +91,7 @@ def minimal_shock(
     Args:
         label_of: labels (n,) of starts (n, dim), negative: none. A start without a label is not taken to have
             left the basin; ``undecided_from`` tells of it. Of a scene: which copy of which well captures
-            them within 60 s, see :func:`fastmech.basins.well_numbers.well_numbers`.
+            them by ``t_end``, see :func:`fastmech.basins.well_numbers.well_numbers`.
         attractor: the resting state (dim,), or a scene's equilibrium; its own label must be known.
         norm: matrix N (dim, dim): ``|d @ N|`` is the size of a disturbance d. By default, for a scene's
             equilibrium, the kinetic-energy norm there (:func:`fastmech.basins.measures.norm.kinetic_norm`).
@@ -85,12 +100,14 @@ def minimal_shock(
         guess: disturbances (n, dim) whose directions are tried too.
         directions: random directions to begin with.
         tolerance: relative, of the size along a direction.
+        t_end: of a scene or mechanism, end of the runs [s], 60 by default: too short for a slow device, of
+            which the result tells.
         seed: of NumPy's ``default_rng``.
 
     Raises:
         InputError: an argument is wrong or missing, or the attractor itself has no label.
     """
-    rays = Rays.of(label_of, attractor, norm, coordinates, tolerance)
+    rays = Rays.of(label_of, attractor, norm, coordinates, tolerance=tolerance, t_end=t_end)
     units, rng = rays.random_units(directions, seed)
     if guess is not None:
         units = np.concatenate([rays.directions(guess), units])
@@ -106,6 +123,7 @@ def brute_force_shock(
     coordinates: Sequence[int] | None = None,
     directions: int = 4096,
     tolerance: float = 1e-4,
+    t_end: float | None = None,
     seed: int = 0,
 ) -> Shock:
     """The smallest shock over many random directions, each followed to its first way out: a check.
@@ -113,7 +131,7 @@ def brute_force_shock(
     Arguments, result and errors as :func:`minimal_shock`. It approaches the minimum from above as the number
     of directions grows.
     """
-    rays = Rays.of(label_of, attractor, norm, coordinates, tolerance)
+    rays = Rays.of(label_of, attractor, norm, coordinates, tolerance=tolerance, t_end=t_end)
     units, _ = rays.random_units(directions, seed)
     limit = np.array([checks.number("most", most, "", above=0.0)])
     sizes, labels = rays.first_exits(units[None], limit, LEVELS, 1)
@@ -134,10 +152,17 @@ class Rays:
 
     @classmethod
     def of(
-        cls, label_of: Any, attractor: Any, norm: Any, coordinates: Sequence[int] | None, tolerance: float
+        cls,
+        label_of: Any,
+        attractor: Any,
+        norm: Any,
+        coordinates: Sequence[int] | None,
+        *,
+        tolerance: float,
+        t_end: float | None,
     ) -> Rays:
         """Of all disturbances of some coordinates in a norm."""
-        label_of, place, norm = with_defaults(label_of, attractor, norm)
+        label_of, place, norm = with_defaults(label_of, attractor, norm, t_end)
         matrix = norm_on(norm, place.size, coordinates)
         to_state = np.zeros((len(matrix), place.size))
         to_state[:, list(range(place.size) if coordinates is None else coordinates)] = np.linalg.inv(matrix)

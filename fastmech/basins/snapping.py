@@ -196,6 +196,9 @@ MOTION_NUMBERS = 40
 #: Forces between two known ones that are tried at once.
 BETWEEN = 32
 
+#: Tolerance of critical forces by default, over the first force of the map that leaves.
+CLOSE = 1e-4
+
 
 class Window(NamedTuple):
     """Neighbouring forces of one map that end alike."""
@@ -352,7 +355,7 @@ def critical_forces(
     snapping: SnappingMap,
     scene: Scene,
     *,
-    tolerance: float = 0.1,
+    tolerance: float | None = None,
     t_end: float | None = None,
     dt: float | None = None,
     method: str | None = None,
@@ -366,7 +369,7 @@ def critical_forces(
     Args:
         snapping: a map of the same scene.
         scene: the mechanism.
-        tolerance: N.
+        tolerance: N; by default a ten-thousandth of the map's least force that leaves, for every alpha.
         t_end, dt, method, threads: as for :func:`map_snapping`.
 
     Raises:
@@ -374,7 +377,8 @@ def critical_forces(
     """
     if not isinstance(snapping, SnappingMap):
         raise InputError(f"snapping = {shown(snapping)}: must be what fastmech.map_snapping gives")
-    tolerance = checks.number("tolerance", tolerance, "N", above=0.0)
+    if tolerance is not None:
+        tolerance = checks.number("tolerance", tolerance, "N", above=0.0)
     start = snapping.equilibria[snapping.start]
     sign = float(np.sign(snapping.F0[0]))
     order = np.argsort(np.abs(snapping.F0))
@@ -393,7 +397,8 @@ def critical_forces(
             return part.left[0, :: int(sign)]
 
         first = int(leaves[0])
-        found[k] = sign * _narrowed(left, float(size[first]), float(size[first + 1]), tolerance)
+        low, high = float(size[first]), float(size[first + 1])
+        found[k] = sign * _narrowed(left, low, high, CLOSE * high if tolerance is None else tolerance)
     return found
 
 

@@ -14,11 +14,14 @@ from fastmech.basins.measures.labels import LabelOf, check_point
 from fastmech.basins.measures.norm import kinetic_norm
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.ensembles import checks
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
 from fastmech.slider.equilibria import Equilibrium
+
+#: End of the runs by default [s].
+LONG = 60.0
 
 #: Bits for the well (there are at most 128 equilibria), and for the turns of all coordinates together.
 WELL_BITS, TURN_BITS = 7, 56
@@ -37,7 +40,7 @@ class WellNumbers:
         return number_wells(label_states(self.scene, starts, self.t_end, How(threads=self.threads)))
 
 
-def well_numbers(scene: Scene | Mechanism, t_end: float = 60.0, *, threads: int | None = None) -> WellNumbers:
+def well_numbers(scene: Scene | Mechanism, t_end: float = LONG, *, threads: int | None = None) -> WellNumbers:
     """A function that labels starts (n, states) with a number for each copy of each well, -1: not proved.
 
     It is what :func:`fastmech.basins.shock.minimal_shock`, :func:`fastmech.basins.edge.track_edge` and
@@ -99,11 +102,13 @@ def with_defaults(
     label_of: LabelOf | Scene | Mechanism,
     attractor: ArrayLike | Equilibrium | RestingPlace,
     norm: ArrayLike | None,
+    t_end: float | None = None,
 ) -> tuple[LabelOf, Floats, ArrayLike]:
     """Labels, place (dim,) and norm; of an equilibrium the copies' labels and the kinetic-energy norm.
 
     Raises:
-        InputError: no norm is given, and there is no equilibrium to give one.
+        InputError: no norm is given, and there is no equilibrium to give one; or an end of the runs is given
+            with labels of their own.
     """
     if isinstance(attractor, Equilibrium | RestingPlace):
         place = np.concatenate([attractor.position, np.zeros(len(attractor.position))])
@@ -117,5 +122,7 @@ def with_defaults(
             "kinetic-energy norm"
         )
     if isinstance(label_of, Scene | Mechanism):
-        return well_numbers(label_of), place, norm
+        return well_numbers(label_of, LONG if t_end is None else t_end), place, norm
+    if t_end is not None:
+        raise InputError(f"t_end = {shown(t_end)}: is for a scene or mechanism; label_of has its own")
     return label_of, place, norm

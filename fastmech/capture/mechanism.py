@@ -139,6 +139,19 @@ class Wells(Printed):
         return found
 
 
+def require_potential(mechanism: Mechanism) -> None:
+    """Refuse what has no wells.
+
+    Raises:
+        InputError: its forces are not known to have a potential.
+    """
+    if mechanism.energy() is None:
+        raise InputError(
+            f"{mechanism.name}: has forces that are not known to come from a potential; wells and labels "
+            "are for potentials, gravity, springs and loads in fixed directions"
+        )
+
+
 def prove_wells(mechanism: Mechanism) -> Wells:
     """The wells of a mechanism, loads at their means, with proved barriers.
 
@@ -147,11 +160,7 @@ def prove_wells(mechanism: Mechanism) -> Wells:
             finite, or no well is proved. Places of which it is not decided what equilibria they hold, such as
             a spring at length zero, count as further wells and as passes at the least U there.
     """
-    if mechanism.energy() is None:
-        raise InputError(
-            f"{mechanism.name}: has forces that are not known to come from a potential; wells and labels "
-            "are for potentials, gravity, springs and loads in fixed directions"
-        )
+    require_potential(mechanism)
     equilibria = find_equilibria(mechanism)
     assert isinstance(equilibria, RestingPlaces)
     left = equilibria.certificate.places

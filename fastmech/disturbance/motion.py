@@ -333,6 +333,13 @@ class LinearRange(Result):
         "tolerance": Field("", "1", "relative deviation allowed"),
     }
 
+    def told(self) -> str:
+        """The limits, and whether the horizon is too short for the small motion to turn."""
+        short = self.horizon * self.size.omega < 1.0
+        turn = f"{1.0 / self.size.omega:.3g} s a radian"
+        more = f"\n  the fastest small motion takes {turn}: a longer horizon tells"
+        return super().told() + (more if short else "")
+
 
 def linear_range(
     scene: Scene | Mechanism,
@@ -354,7 +361,8 @@ def linear_range(
     1e-6 rad to pi rad are tried upwards, and the first crossing of the tolerance is refined by bisection to
     one part in 10,000. ``dt`` is the longest step [s], by default that of
     :func:`fastmech.disturbance.motion.disturbed_motion`. ``part`` says which of the directions to try, all by
-    default.
+    default. A ``horizon`` [s] in which the fastest small motion turns by less than a radian is too short for
+    a slow device: the linearized motion has had no time to go astray, and the result says so.
 
     Raises:
         InputError: an argument is wrong, the scene's force decays, or the equilibrium is not the scene's.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
 from numbers import Integral, Real
 from pathlib import Path
@@ -16,6 +17,10 @@ from fastmech.samplers import Starts, sampler_of
 
 #: Bytes for which the machine is not asked whether it has them: the question takes longer than a small run.
 UNASKED = 2**26
+
+#: Angles lie within so many turns of zero: what is beyond was meant in degrees. Angles larger than the second
+#: number are none in degrees either.
+FEW_TURNS, MOST_DEGREES = 4, 720.0
 
 
 def number(name: str, value: Any, unit: str, *, above: float = -math.inf, least: float = -math.inf) -> float:
@@ -120,6 +125,19 @@ def starts(
     return sampler.draw(
         count, tuple(names), whole_number("seed", sampler.seed if seed is None else seed, least=0)
     )
+
+
+def beyond_turns(largest: float) -> str:
+    """What is wrong with an angle so large."""
+    return f"reaches {largest:g}, beyond {FEW_TURNS} turns; angles are in radians (numpy.deg2rad)"
+
+
+def warn_of_turns(name: str, given: NDArray[np.float64], angles: Sequence[int]) -> None:
+    """Warn of states (n, dim) whose angles, columns of them, may be degrees."""
+    sizes = np.abs(given[:, list(angles)])
+    largest = float(np.max(sizes, initial=0.0, where=np.isfinite(sizes)))
+    if 2.0 * np.pi * FEW_TURNS < largest <= MOST_DEGREES:
+        warnings.warn(f"{name}: {beyond_turns(largest)}", stacklevel=3)
 
 
 def memory(

@@ -383,14 +383,19 @@ class Runs:
         return True
 
     def _ask_rounding(self, who: Members) -> None:
-        """By how much motions magnify a small change of their start, and so the rounding of their steps."""
+        """By how much motions magnify a small change of their start, and so the rounding of their steps.
+
+        Steps that are not stable magnify changes beyond all motion: of their runs nothing is learnt, and
+        those with shorter steps are asked again.
+        """
         if not who.size:
             return
         kept, part = part_of(self.kept, who), self.case.part(who)
         size = np.fmax(np.abs(kept.y).max(axis=0), np.abs(part.starts))
         moved = part._replace(starts=part.starts + MOVED * size)
         run = solve_at(moved, replace(self.settings, dt=self.dt[who]))
-        self.floor[who] = distances(run, kept) / MOVED * A_STEP * np.sqrt(kept.steps)
+        floor = distances(run, kept) / MOVED * A_STEP * np.sqrt(kept.steps)
+        self.floor[who] = np.where(floor <= MAGNIFIED * size.max(axis=1), floor, np.nan)
 
     def _remark(self) -> str:
         """Why trajectories miss the tolerance; those that do not converge have no error that is known."""

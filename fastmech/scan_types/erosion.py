@@ -13,7 +13,15 @@ import numpy as np
 from pydantic import AfterValidator, Field
 
 from fastmech.basins.disturbed import MOST_RADIUS
-from fastmech.basins.erosion import FLAGS, MEASURES, ErosionEnds, ErosionProfile, survey_of, wells_along
+from fastmech.basins.erosion import (
+    FLAGS,
+    MEASURES,
+    PLACE,
+    ErosionEnds,
+    ErosionProfile,
+    survey_of,
+    wells_along,
+)
 from fastmech.basins.label import How, label_states
 from fastmech.capture.select import require_damper
 from fastmech.disturbance.motion import require_constant_force
@@ -166,7 +174,7 @@ class ErosionTiling(scans.Tiling):
         tiles = [tile(index) for index in range(self.count)]
         shape = (self.values.size, -1)
         arrays = {key: np.array([part[key].data for part in tiles]).reshape(shape) for key in tiles[0]}
-        position = {key: arrays.pop(key) for key in STATE[:2]}
+        position = {key: arrays.pop(PLACE + key) for key in STATE[:2]}
         arrays |= {key: arrays[key].astype(np.bool_) for key in FLAGS}
         found = ErosionProfile(name, self.values, self.sheets, position, **arrays).of(self.scene)
         attrs: dict[str, Any] = {"axes": tuple(self.window), "t_end": self.request.t_end}
@@ -178,5 +186,5 @@ class ErosionTiling(scans.Tiling):
 
     def missing(self, index: int) -> Dataset:
         """A well that has not been measured."""
-        keys = (*STATE[:2], *MEASURES)
+        keys = (*(PLACE + key for key in STATE[:2]), *MEASURES)
         return scans.tile_of({key: False if key in FLAGS else np.nan for key in keys})

@@ -14,7 +14,14 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from fastmech.basins.shock_limit import shock_limit
-from fastmech.basins.snapping import SnappingMap, critical_forces, default_end, force_free, map_snapping
+from fastmech.basins.snapping import (
+    CLOSE,
+    SnappingMap,
+    critical_forces,
+    default_end,
+    force_free,
+    map_snapping,
+)
 from fastmech.capture.select import require_damper
 from fastmech.ensembles.status import FAILURES, LABELS, Status
 from fastmech.errors import InputError
@@ -61,7 +68,9 @@ class Snapping(scans.Scan):
 
     F0: scans.Axis = Field(description="forces, of one sign [N]")
     alpha: DecayRates = Field(description="decay rates, evenly spaced in their logarithm [1/s]")
-    tolerance: Annotated[float, Field(gt=0)] = Field(0.1, description="of the critical forces [N]")
+    tolerance: Annotated[float, Field(gt=0)] | None = Field(
+        None, description="of the critical forces [N]; by default a ten-thousandth of the least that leaves"
+    )
     t_end: Annotated[float, Field(gt=0)] | None = Field(
         None, description="end of the runs [s]; by default 200 s after a millionth of the force is left"
     )
@@ -89,7 +98,7 @@ class Snapping(scans.Scan):
         if slowest <= 0.0:
             raise InputError(f"alpha: begins at {slowest:g} 1/s: must be greater than 0 1/s")
         least = ROUNDING * float(np.abs(self.forces).max())
-        if self.tolerance < least:
+        if self.tolerance is not None and self.tolerance < least:
             raise InputError(
                 f"tolerance = {self.tolerance:g}: must not be less than {least:.2g} N, for rounding"
             )
@@ -147,8 +156,10 @@ class SnappingTiling(scans.Planes):
         variables["critical_F0"] = Variable(("alpha",), joined["critical"], "N", about)
         about = "limit of the critical F0/alpha for fast decay, NaN: none was found"
         variables["critical_impulse"] = Variable((), np.array(limit), "N s", about)
-        attrs = {"tolerance": self.request.tolerance, "method": method_for(free, self.request.method)}
-        return Dataset(variables, {**dataset.attrs, **attrs}, dataset.groups)
+        asked = self.request.tolerance
+        attrs = {"relative_tolerance": CLOSE} if asked is None else {"tolerance": asked}
+        method = method_for(free, self.request.method)
+        return Dataset(variables, {**dataset.attrs, **attrs, "method": method}, dataset.groups)
 
     def missing(self, index: int) -> Dataset:
         """Rates that have not been computed."""

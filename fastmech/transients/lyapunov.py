@@ -20,10 +20,15 @@ from numpy.typing import ArrayLike, NDArray
 from fastmech.arrays import Floats
 from fastmech.callee import callee
 from fastmech.ensembles import checks
-from fastmech.ensembles.fitting import breaks_energy_bounds
+from fastmech.ensembles.fitting import (
+    breaks_energy_bounds,
+    damping_rate,
+    speed_bound,
+    vibration_frequency,
+)
 from fastmech.ensembles.integrate import problem_of
 from fastmech.ensembles.lanes import finite_rows
-from fastmech.ensembles.problem import extreme_scenes
+from fastmech.ensembles.problem import Problem, extreme_scenes
 from fastmech.ensembles.status import Status, failure_counts, failure_line
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError
@@ -133,6 +138,10 @@ MOST_STEPS = 1e13
 #: Estimates kept along the way.
 PIECES = 20
 
+#: Default step times the fastest rate, which is of starts at most so many times faster than a scene's own
+#: rates; and starts whose Jacobians are asked for it.
+STEP, MOST_TIMES, LOOKED_AT = 0.2, 1000.0, 1024
+
 
 @dataclass(frozen=True, repr=False)
 class LyapunovExponents(Drawn):
@@ -171,7 +180,7 @@ def largest_lyapunov(
     scene: Scene | Mechanism | System,
     y0: Starts,
     t_end: float,
-    dt: float = 0.01,
+    dt: float | None = None,
     *,
     parameters: Mapping[str, ArrayLike] | None = None,
 ) -> LyapunovExponents:
@@ -181,7 +190,9 @@ def largest_lyapunov(
         scene: the mechanism, whose Jacobian is known, or a system of your own (differences).
         y0: starts, a sampler or of shape (n, dim) or (dim,).
         t_end: length of the motion [s]; estimates converge like 1/t.
-        dt: longest step [s] of ``dop853``.
+        dt: longest step [s] of ``dop853``; by default a fifth of the time in which the fastest start's motion
+            turns or dies out by one radian or factor e: of a scene for all time, by its energy; of others by
+            the Jacobian at the starts, so that motion which becomes faster on its way needs a step.
         parameters: as in :func:`fastmech.ensembles.integrate.integrate`.
 
     Returns:
@@ -193,9 +204,9 @@ def largest_lyapunov(
         InputError: an argument is wrong.
     """
     t_end = checks.number("t_end", t_end, "s", above=0.0)
-    dt = checks.number("dt", dt, "s", above=0.0)
     parameters = {} if parameters is None else parameters
     starts, problem, own = problem_of(scene, y0, parameters, None)
+    dt = default_step(problem, starts, t_end) if dt is None else checks.number("dt", dt, "s", above=0.0)
     if isinstance(scene, Scene):
         warn_of_step(extreme_scenes(scene, own, problem), dt, METHOD, starts)
     Y = np.array(starts.T, order="C")
@@ -225,6 +236,29 @@ def largest_lyapunov(
         beyond |= breaks_energy_bounds(problem.coefficients, starts, Y.T)
         status[beyond & (status == Status.OK)] = Status.STEP_TOO_LARGE
     return LyapunovExponents(times[1:], exponents, status).of(scene)
+
+
+def default_step(problem: Problem, starts: Floats, t_end: float) -> float:
+    """Step [s] that follows from how fast starts (n, dim) move, see :func:`largest_lyapunov`."""
+    if problem.coefficients is not None:
+        c = problem.coefficients
+        own = np.maximum(vibration_frequency(c), damping_rate(c))
+        speed = speed_bound(c, starts)
+        # What moves so fast needs a step of its own.
+        slow = speed <= MOST_TIMES * own
+        fastest = float(max(np.max(own), np.max(speed, initial=0.0, where=slow)))
+    else:
+        some = np.array(starts[finite_rows(starts)][:LOOKED_AT].T, order="C")
+        J = np.zeros((len(some) ** 2, some.shape[1]))
+        params = problem.params.block(some.shape[1])
+        if problem.jacobian is not None:
+            problem.jacobian(0.0, some, J, params)
+        else:
+            difference_jacobian(callee(problem.rhs), 0.0, some, J, params)
+        matrices = J.T.reshape(-1, len(some), len(some))
+        usable = matrices[np.isfinite(matrices).all(axis=(1, 2))]
+        fastest = float(np.abs(np.linalg.eigvals(usable)).max(initial=0.0))
+    return min(t_end / PIECES, STEP / fastest) if fastest > 0.0 else t_end / PIECES
 
 
 #: Times looked at between 0 and the end.

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+import sympy
 
 import fastmech as fm
 
@@ -49,6 +50,53 @@ def test_folds_of_the_papers_mechanism_are_the_scenes(parameter: str) -> None:
     expected = sorted(fold.value for fold in fm.find_folds(scene, parameter, values))
     found = [one.value for one in fm.critical_values(mechanism, parameter, values) if one.kind == "fold"]
     np.testing.assert_allclose(found, expected, rtol=1e-10)
+
+
+X = fm.lengths("x", -3.0, 3.0)
+A, FORM = sympy.Symbol("a"), X**4 / 4
+
+
+def sliding(potential: sympy.Expr) -> fm.Mechanism:
+    """A damped mass on a line, with a potential of one parameter."""
+    c = sympy.Symbol("c")
+    values = {"a": 1.0, "c": 0.3}
+    return fm.Mechanism(X, values, kinetic=X.dot**2 / 2, potential=potential, dissipation=c * X.dot**2 / 2)
+
+
+def test_equilibria_that_cross_an_end_of_the_range_meet_nothing() -> None:
+    """x^2 = 5 +- sqrt(25 - 10 a): two cross +-3 at a = 0.9, and pairs meet at a = 2.5."""
+    mechanism = sliding(A * X**2 / 2 - FORM + X**6 / 60)
+    found = fm.critical_values(mechanism, "a", np.linspace(0.5, 3.0, 6))
+    assert [one.kind for one in found] == ["end of range", "several"]
+    assert [one.value for one in found] == pytest.approx([0.9, 2.5], rel=1e-9)
+    assert abs(found[0].position[0]) == pytest.approx(3.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("at", [0.0, 1.0])
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("grid", [np.linspace(-1.0, 1.3, 8), np.linspace(-1.0, 1.0, 9)])
+def test_a_pitchfork_is_one_wherever_it_is(at: float, sign: int, grid: np.ndarray) -> None:
+    mechanism = sliding((A - sympy.Float(at)) * X**2 / 2 + sign * FORM)
+    (found,) = fm.critical_values(mechanism, "a", grid + at)
+    assert found.kind == "pitchfork"
+    assert found.value == pytest.approx(at, abs=1e-12)
+    assert found.position[0] == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("at", [0.0, 1.0])
+def test_an_exchange_is_seen(at: float) -> None:
+    """x = 0 and x = at - a pass through each other; a little apart they do not, and two folds are there."""
+    grid = at + np.linspace(-0.9, 0.93, 9)
+    crossing = (A - sympy.Float(at)) * X**2 / 2 + X**3 / 3
+    (found,) = fm.critical_values(sliding(crossing), "a", grid)
+    assert found.kind == "exchange"
+    assert found.value == pytest.approx(at, abs=1e-6)
+    assert abs(found.value - at) <= found.width
+    assert found.position[0] == pytest.approx(0.0, abs=1e-6)
+    assert not fm.critical_values(sliding(crossing - X / 1000), "a", grid)
+    folds = fm.critical_values(sliding(crossing + X / 1000), "a", np.sort(np.append(grid, at)))
+    assert [one.kind for one in folds] == ["fold", "fold"]
+    assert [one.value - at for one in folds] == pytest.approx([-(0.004**0.5), 0.004**0.5], rel=1e-9)
 
 
 def test_what_is_wrong_gets_a_line() -> None:

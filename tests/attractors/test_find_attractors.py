@@ -469,3 +469,19 @@ def test_a_period_after_which_nothing_repeats_is_refused() -> None:
     system = fm.System(duffing, ["x", "x_dot"], values, period=math.pi)
     with pytest.raises(fm.InputError, match=r"period = 3\.14159: the right-hand side does not repeat"):
         fm.find_attractors(system, {"x": (-1.0, 1.0)}, 50)
+
+
+def test_angles_in_degrees_get_a_line_wherever_they_are_given() -> None:
+    grid = {"x": np.linspace(-180.0, 180.0, 4), "x_dot": [0.0, 1.0]}
+    with pytest.raises(fm.InputError, match=r"axes\.x: reaches 180, beyond 4 turns; angles are in radians"):
+        fm.map_basins(PENDULUM, grid)
+    with pytest.raises(fm.InputError, match=r"fixed\.x: reaches 90, beyond 4 turns"):
+        fm.map_basins(PENDULUM, {"x_dot": [0.0, 1.0]}, fixed={"x": 90.0})
+    with pytest.warns(UserWarning, match="starts: reaches 90, beyond 4 turns"):
+        fm.label_starts(PENDULUM, [[90.0, 0.0]])
+    with pytest.warns(UserWarning, match=r"starts: reaches 1[0-9.]+, beyond 4 turns"):
+        fm.find_attractors(PENDULUM, {"x": (-180.0, 180.0)}, 40)
+    chain = fm.mechanisms.pendulum_chain(1)
+    name = chain.state[0]
+    with pytest.raises(fm.InputError, match=rf"axes\.{name}: reaches 180, beyond 4 turns"):
+        fm.map_basins(chain, {name: [-180.0, 180.0]})

@@ -387,3 +387,9 @@ def test_excursions_of_steps_by_default_are_those_of_scipy() -> None:
     # One reaches its largest long after the coarse run's largest, which is as far as half the step looks.
     assert np.mean(np.array(error) < 0.01) > 0.95
     assert max(error) < 0.1
+
+
+def test_a_radius_in_degrees_gets_a_line() -> None:
+    (stable,) = equilibria("table_1", 0)
+    with pytest.warns(UserWarning, match="radius: reaches 30, beyond 4 turns; angles are in radians"):
+        disturb(SCENE, stable, 8, radius=30.0, t_end=1.0)

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+import sympy
 from own_ends import depths
 
 import fastmech as fm
@@ -103,6 +104,8 @@ def test_starts_without_a_label_leave_room_above_the_measures() -> None:
         assert (most >= getattr(whole, name)).all()
         np.testing.assert_array_equal(getattr(whole, f"{name}_at_most"), getattr(whole, name))
     np.testing.assert_array_equal(ring.lim_at_most, whole.lim)
+    assert "of the starts have no label: a longer t_end may tell" in " ".join(str(ring).split())
+    assert "no label" not in str(whole)
 
 
 def test_a_slice_of_rates_goes_through_the_well() -> None:
@@ -202,3 +205,26 @@ def test_a_truss_s_well_lasts_until_it_snaps() -> None:
     np.testing.assert_allclose(profile.stability[:3, upper], 0.5, atol=0.1)
     with pytest.raises(fm.InputError, match=r"axes\.z: unknown name; allowed: x, y, x_dot, y_dot"):
         erosion(truss, "P", values, {"z": [0.0, 1.0]}, most_shock=1.0)
+
+
+def test_a_column_under_a_following_force_has_no_wells() -> None:
+    column = fm.mechanisms.ziegler_column().replace(b=0.3)
+    axes = {"lower": np.linspace(-1.0, 1.0, 5), "upper": np.linspace(-1.0, 1.0, 5)}
+    with pytest.raises(fm.InputError, match="ziegler_column: has forces that are not known to come from a"):
+        erosion(column, "P", [0.1, 0.5], axes, most_shock=1.0)
+
+
+def test_a_coordinate_may_be_named_as_a_measure_is() -> None:
+    shock, (k, b) = fm.angles("shock", -1.0, 1.0), sympy.symbols("k b")
+    hinge = fm.Mechanism(
+        [shock], {"k": 1.0, "b": 0.5}, kinetic=shock.dot**2 / 2, potential=k * shock**2 / 2 - shock**4 / 4,
+        dissipation=b * shock.dot**2 / 2,
+    )  # fmt: skip
+
+    def stay(system: fm.Mechanism, y: np.ndarray) -> Ends:
+        return Ends(np.where(np.abs(y[:, 0]) < 0.5, 0, 1), np.zeros((len(y), 1), dtype=int))
+
+    axes = {"shock": np.linspace(-0.9, 0.9, 5)}
+    profile = erosion(hinge, "k", [0.5], axes, label_starts=stay, most_shock=1.0, n=40, directions=4)
+    np.testing.assert_allclose(profile.position["shock"], 0.0, atol=1e-12)
+    assert profile.shock[0, 0] == pytest.approx(0.5, rel=1e-2)

@@ -124,6 +124,25 @@ def test_an_equilibrium_of_a_scene_needs_neither_labels_nor_norm() -> None:
         minimal_shock(scene, place, most=1.0)
 
 
+def test_a_slow_device_s_shock_needs_its_own_time() -> None:
+    """All times 1,000 times as long: nothing is known after 60 s, all after 1,000 times as many."""
+    scene, T = fm.Scene(alpha=0.0), 1000.0
+    slow = scene.replace(
+        g=scene.g / T**2, c1=scene.c1 / T**2, c2=scene.c2 / T**2, beta=scene.beta / T, F0=scene.F0 / T**2
+    )
+    few = {"most": 3.0, "coordinates": (2, 3), "directions": 8, "tolerance": 1e-2}
+    right = minimal_shock(scene, fm.find_equilibria(scene)[0], **few)
+    well = fm.find_equilibria(slow)[0]
+    found = minimal_shock(slow, well, t_end=60.0 * T, **few)
+    assert found.size == pytest.approx(right.size, rel=1e-2)
+    short = minimal_shock(slow, well, **few)
+    assert np.isnan(short.size)
+    assert "undecided from" in str(short)
+    assert "a longer t_end may tell" in " ".join(str(short).split())
+    with pytest.raises(fm.InputError, match=r"^t_end = 5.0: is for a scene or mechanism"):
+        minimal_shock(ellipsoid, PLACE, np.eye(3), most=1.0, t_end=5.0)
+
+
 @pytest.mark.nojit
 def test_copies_have_numbers_of_their_own() -> None:
     ends = SimpleNamespace(

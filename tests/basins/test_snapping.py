@@ -78,6 +78,21 @@ def test_the_critical_force_is_narrowed_down() -> None:
     assert sides.left.tolist() == [[False, True]]
 
 
+def test_a_small_device_s_forces_are_told_as_exactly_as_a_large_one_s() -> None:
+    """Lengths over 100 and forces over 1e4, times as they are: an exactly similar device."""
+    own, k = fm.Scene(c1=294.9, c2=92.85, F0=100.0), 1e-4
+    masses = {name: k * getattr(own, name) for name in ("m1", "m2", "m3")}
+    small = own.replace(
+        **masses, l=own.l / 100, g=own.g / 100, c1=k * own.c1, c2=k * own.c2, beta=k * own.beta, F0=1.0
+    )
+    found = [
+        critical_forces(map_snapping(scene, size * np.array([500.0, 1000.0]), [0.7]), scene)[0] / size
+        for scene, size in ((own, 1.0), (small, k / 100))
+    ]
+    assert found[0] == pytest.approx(312.94, abs=0.05)
+    assert found[1] == pytest.approx(found[0], rel=1e-9)
+
+
 def test_the_impulse_is_the_limit_of_fast_forces() -> None:
     """State differences fall as 1/alpha; far from the critical impulse the ends are the same."""
     scene = fm.Scene(F0=0.0, alpha=0.0)

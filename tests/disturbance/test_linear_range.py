@@ -43,6 +43,13 @@ def test_limit_grows_with_the_tolerance_and_ends_are_told_apart() -> None:
     assert np.all(np.isinf(linear_range(SCENE, e, directions=5, tolerance=1e6).limit))
 
 
+def test_a_horizon_too_short_for_a_slow_device_is_told() -> None:
+    (e,) = equilibria("table_1", 0)
+    said = "a longer horizon tells"
+    assert said not in str(linear_range(SCENE, e, directions=2))
+    assert said in " ".join(str(linear_range(SCENE, e, directions=2, horizon=0.01)).split())
+
+
 def test_the_seed_decides_and_threads_do_not() -> None:
     (e,) = equilibria("table_1", 0)
     first, again, other = (

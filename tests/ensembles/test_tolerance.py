@@ -353,3 +353,16 @@ def test_a_sample_has_the_bits_of_an_ensemble() -> None:
         found = Sample(problem.rhs, problem.params, starts).run(method, times, 0.1)
         assert np.array_equal(found, run.states)
     assert Sample(problem.rhs, problem.params, starts).run(method, times, 1e-3) is None
+
+
+def test_steps_at_the_limit_of_stability_tell_no_errors_beyond_all_motion() -> None:
+    """The step that is chosen blows some of these motions up; what runs after it keeps the tolerance."""
+    truss = fm.mechanisms.von_mises_truss().replace(b=2.0, P=20.0)
+    x = [-0.0392633, 0.0650998, -0.2214799, -0.1541906, 0.2042139, -0.0021147, -0.1248495, -0.2837591]
+    y = [0.23096818, 0.72528544, 0.15967762, 1.17729693, 0.97970882, 0.31237099, 0.59079058, 0.37075742]
+    starts = np.column_stack([x, y, np.zeros((8, 2))])
+    run = fm.integrate(truss, starts, 20.0, tol=1e-6)
+    true = np.abs(run.y[-1] - fm.integrate(truss, starts, 20.0, 1e-3, "dop853").y[-1]).max(axis=1)
+    assert (true <= 1e-6).all()
+    assert run.error is not None
+    assert (run.error <= 1e-6).all()

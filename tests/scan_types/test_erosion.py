@@ -63,7 +63,7 @@ def test_a_tile_needs_no_other_one() -> None:
     tiling = Erosion(along=ALONG, axes=AXES, **SMALL).tiling(BISTABLE)
     assert tiling.count == 3 * 2
     last = [tiling.compute(index, RunContext(threads=1)) for index in (4, 5)]
-    assert sum(np.isnan(alone["phi"].data) for alone in last) == 1, "one of the wells has ended"
+    assert sum(np.isnan(alone["place_phi"].data) for alone in last) == 1, "one of the wells has ended"
     look = tiling.assemble(lambda index: last[index - 4] if index >= 4 else tiling.missing(index))
     assert isinstance(look, Dataset)
     assert np.isnan(look["well_stability"].data[:2]).all()

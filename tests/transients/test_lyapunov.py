@@ -82,6 +82,26 @@ def test_wrong_arguments() -> None:
         largest_lyapunov(3, [0, 0, 0, 0], 1.0)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("slower", [0.01, 50.0])
+def test_the_default_step_follows_the_scene(slower: float) -> None:
+    """The same device with all times so many times as long has exponents over that."""
+    scene, start = fm.Scene(alpha=0.0), np.array([0.9, 0.4, 1.0, 0.5])
+    T = slower
+    similar = scene.replace(
+        g=scene.g / T**2, c1=scene.c1 / T**2, c2=scene.c2 / T**2, beta=scene.beta / T, F0=scene.F0 / T**2
+    )
+    names = ("m1", "m2", "m3", "l", "c1", "c2", "beta", "g", "F0")
+    values = {name: getattr(similar, name) for name in names}
+    mechanism = fm.mechanisms.slider_pendulum().replace(**values, alpha=0.0)
+    there = start / [1.0, 1.0, T, T]
+    for system in (similar, mechanism):
+        found = largest_lyapunov(system, there, 5.0 * T)
+        assert found.status.tolist() == [fm.Status.OK]
+        assert np.isfinite(found.largest).all()
+        fine = largest_lyapunov(system, there, 5.0 * T, 0.005 * T)
+        np.testing.assert_allclose(found.exponents, fine.exponents, rtol=1e-4, atol=1e-6 / T)
+
+
 def test_motions_that_fail_have_a_status() -> None:
     """Two fail, one of them at the start; steps too long are warned of; what shows has a status."""
     starts = [[0.9, 0.4, 0.0, 0.0], [np.nan, 0.0, 0.0, 0.0], [0.0, 0.0, 1e200, 0.0]]

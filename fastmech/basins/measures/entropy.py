@@ -8,7 +8,9 @@ Two tests tell a fractal boundary from a smooth one by the boundary basin entrop
 
 - the ln 2 criterion of that paper: almost all boxes on a smooth boundary hold two labels, so S_i <= ln 2, and
   a mean above ln 2 shows a fractal boundary. With two labels on the whole map no box can exceed ln 2: then
-  the criterion can never fire, and says nothing.
+  the criterion can never fire, and says nothing. Smooth boundaries so near to each other that boxes hold
+  several of them, or corners where they meet in many boxes, exceed ln 2 too: it is believed only where the
+  boundary's box-counting dimension is that of no smooth one.
 - that of Puy, Daza, Wagemakers, Sanjuan, Commun. Nonlinear Sci. Numer. Simul. 95 (2021) 105588, which works
   for two labels too: over balls at random places that meet a smooth boundary the mean has a known value,
   0.4395093 for discs; a mean that differs from it speaks for a fractal boundary, if the balls are smaller
@@ -26,7 +28,14 @@ from scipy.special import entr
 
 from fastmech.arrays import Floats, Integers
 from fastmech.basins.measures.labels import LabelsLike, check_map, check_point, known_labels
-from fastmech.basins.measures.slopes import PARTS, BoundaryDimension, boundary_dimension, half_width, part_of
+from fastmech.basins.measures.slopes import (
+    PARTS,
+    BoundaryDimension,
+    boundary_dimension,
+    half_width,
+    not_smooth,
+    part_of,
+)
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
 from fastmech.objects import Printed
@@ -43,7 +52,7 @@ class BasinEntropy(Printed):
     boxes: int  #: boxes with a label
     boundary_boxes: int  #: boxes with more than one label
     most_labels: int  #: labels in the richest box
-    fractal: bool | None  #: the ln 2 criterion; None: it cannot tell, no box has more than two labels
+    fractal: bool | None  #: the ln 2 criterion; None: it cannot tell
 
 
 def basin_entropy(labels: LabelsLike, edge: int = 5) -> BasinEntropy:
@@ -56,9 +65,11 @@ def basin_entropy(labels: LabelsLike, edge: int = 5) -> BasinEntropy:
             used.
 
     Returns:
-        Entropies and the ln 2 criterion: ``fractal`` is True where it shows a fractal boundary, False where
-        it could have and did not, None where no box holds more than two labels, in which case
-        :func:`fractal_boundary_test` can tell.
+        Entropies and the ln 2 criterion: ``fractal`` is True where the boundary exceeds it and
+        :func:`boundary_dimension` says too that it is not smooth; False where no excess was seen that could
+        have been; None where no box holds more than two labels, or an excess is not borne out: basins may be
+        as narrow as boxes, or the map has less than 32 points an axis. There :func:`fractal_boundary_test`
+        or a finer map can tell.
 
     Raises:
         InputError: the labels are no map, or a box is larger than it.
@@ -81,8 +92,15 @@ def basin_entropy(labels: LabelsLike, edge: int = 5) -> BasinEntropy:
         boxes=entropy.size,
         boundary_boxes=int(np.count_nonzero(mixed)),
         most_labels=int(kinds.max()),
-        fractal=bool(boundary > LN2) if kinds.max() > 2 else None,
+        fractal=_exceeds(array, boundary) if kinds.max() > 2 else None,
     )
+
+
+def _exceeds(labels: Integers, boundary: float) -> bool | None:
+    """The ln 2 criterion where boxes hold more than two labels, if the boundary's dimension bears it out."""
+    if not boundary > LN2:
+        return False
+    return True if not_smooth(labels) else None
 
 
 @dataclass(frozen=True, repr=False)

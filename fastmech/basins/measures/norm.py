@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from fastmech.arrays import Floats
 from fastmech.disturbance.motion import size_of
 from fastmech.ensembles import checks
+from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
@@ -23,9 +24,6 @@ from fastmech.models.stability import require_own
 from fastmech.scene import STATE, Scene, nearest
 from fastmech.slider.equilibria import Equilibrium, held
 from fastmech.slider.linearize import require_rest
-
-#: Angles lie within so many turns of zero: what is beyond was meant in degrees.
-FEW_TURNS = 4
 
 
 def check_angles(field: str, name: str, values: ArrayLike, angles: Sequence[str] = STATE[:2]) -> None:
@@ -35,13 +33,8 @@ def check_angles(field: str, name: str, values: ArrayLike, angles: Sequence[str]
         InputError: one is beyond ``FEW_TURNS`` turns.
     """
     largest = float(np.abs(values).max())
-    if name in angles and largest > 2.0 * np.pi * FEW_TURNS:
-        raise InputError(f"{field}: {beyond_turns(largest)}")
-
-
-def beyond_turns(largest: float) -> str:
-    """What is wrong with an angle so large."""
-    return f"reaches {largest:g}, beyond {FEW_TURNS} turns; angles are in radians (numpy.deg2rad)"
+    if name in angles and largest > 2.0 * np.pi * checks.FEW_TURNS:
+        raise InputError(f"{field}: {checks.beyond_turns(largest)}")
 
 
 def states_of(system: Scene | Mechanism | None) -> tuple[str, ...]:
@@ -49,8 +42,10 @@ def states_of(system: Scene | Mechanism | None) -> tuple[str, ...]:
     return STATE if system is None else system.state
 
 
-def angles_of(system: Scene | Mechanism) -> tuple[str, ...]:
+def angles_of(system: Scene | Mechanism | System) -> tuple[str, ...]:
     """Names of the coordinates that turn fully."""
+    if isinstance(system, System):
+        return tuple(system.angles)
     return tuple(compress(system.state, system.turning))
 
 

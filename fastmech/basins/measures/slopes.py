@@ -125,6 +125,9 @@ def line(x: Floats, y: Floats, weight: Floats) -> tuple[Floats, float]:
     return np.asarray(np.tensordot(weight * away, y, 1) / square), float(1.0 / square)
 
 
+#: Points an axis that boxes of the usual sizes need.
+SMALLEST_MAP = 32
+
 #: Parts of a map along every axis; odd, for many a map has a boundary in its middle.
 PARTS = 5
 
@@ -205,8 +208,10 @@ def boundary_dimension(labels: LabelsLike, edges: ArrayLike | None = None) -> Bo
     given = 2 ** np.arange(max(int(np.log2(shortest / 16)), 3) + 1) if edges is None else np.asarray(edges)
     if given.ndim != 1 or given.size < 3 or not np.issubdtype(given.dtype, np.integer):
         raise InputError("edges: must be three or more integers")
-    if edges is None and shortest < 32:
-        raise InputError(f"labels: has shape {array.shape}; without edges, 32 points an axis are needed")
+    if edges is None and shortest < SMALLEST_MAP:
+        raise InputError(
+            f"labels: has shape {array.shape}; without edges, {SMALLEST_MAP} points an axis are needed"
+        )
     if given[0] < 1 or (np.diff(given) < 1).any() or given[-1] > shortest // 4:
         raise InputError(f"edges: must rise from 1 or more to at most a quarter of {shortest} points")
     counts = np.array([_count(array, int(edge)) for edge in given])
@@ -229,6 +234,11 @@ def boundary_dimension(labels: LabelsLike, edges: ArrayLike | None = None) -> Bo
         codimension=float(slope),
         thin=too_thin(array),
     )
+
+
+def not_smooth(labels: Integers) -> bool:
+    """Whether boxes of several sizes show that a map's boundaries are not smooth; small maps show nothing."""
+    return min(labels.shape) >= SMALLEST_MAP and boundary_dimension(labels).smooth is False
 
 
 def _count(labels: Integers, edge: int) -> Floats:

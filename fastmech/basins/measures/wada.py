@@ -8,7 +8,9 @@ boundaries (their Hausdorff distance, in steps of the grid along the axes: fatte
 
 Bands that merely touch are near each other too. What tells them apart is the resolution: seen with every
 second point of the map, boundaries of Wada basins lie twice as far apart, as boundaries that are one set do
-for want of points, those of bands as far as before, the width of a band.
+for want of points, those of bands as far as before, the width of a band. Bands hardly wider than points
+come nearer in that way too; so boundaries are taken for one set only where boxes of several sizes show that
+they are no smooth lines.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from scipy.ndimage import distance_transform_cdt
 
 from fastmech.arrays import Floats, Integers
 from fastmech.basins.measures.labels import LabelsLike, check_map, known_labels, too_thin
+from fastmech.basins.measures.slopes import not_smooth
 from fastmech.ensembles import checks
 from fastmech.objects import Printed
 
@@ -30,6 +33,9 @@ STRIDES = (4, 2, 1)
 #: Share of their distance with which boundaries that are one set remain at half the stride, at most; those of
 #: bands, at least, from every second to every point and from every fourth.
 SHRINKS, STAYS, STAYED = 0.65, 0.8, 0.45
+
+#: What is said of boundaries that come together without being seen to be rough.
+STRAIGHT = "boundaries may be smooth ones as near to each other as points are: a finer map can tell"
 
 #: So many neighbours may differ, lest bands be thinner than points.
 FULL = 0.5
@@ -60,11 +66,13 @@ def wada_merge_test(labels: LabelsLike, fattening: int = 5) -> WadaTest:
     """Merge test of a map, at its resolution and two coarser ones.
 
     - True: three or more basins; no boundary is further from another than the fattening, and each time that
-      the stride is halved the largest mean distance of two boundaries shrinks to 0.65 of itself or less. A
-      map of finite resolution cannot prove the property: the answer holds at its scale.
+      the stride is halved the largest mean distance of two boundaries shrinks to 0.65 of itself or less, and
+      :func:`boundary_dimension` says that boundaries are not smooth. A map of finite resolution cannot prove
+      the property: the answer holds at its scale.
     - False: less than three basins, or the distance stays (from every second point to every point 0.8 of it
       or more, from every fourth 0.45): boundaries do lie apart.
-    - None: neither, or more than half of the neighbours along an axis differ.
+    - None: neither, or more than half of the neighbours along an axis differ, or the map has less than 32
+      points an axis.
 
     Args:
         labels: on a grid of any number of axes, with any gaps; negative: no label, belongs to no basin and
@@ -82,7 +90,7 @@ def wada_merge_test(labels: LabelsLike, fattening: int = 5) -> WadaTest:
     _, distance, far, points = looks[-1]
     full = max(float(np.mean(np.diff(array, axis=axis) != 0)) for axis in range(array.ndim))
     wada, reason = _judge(len(which), apart, float(distance.max(initial=0.0)), full, fattening)
-    if wada and (thin := too_thin(array)):
+    if wada and (thin := too_thin(array) or ("" if not_smooth(array) else STRAIGHT)):
         wada, reason = None, thin
     return WadaTest(
         wada=wada,

@@ -36,7 +36,8 @@ def test_maps_done_by_hand() -> None:
     assert (result.boxes, result.boundary_boxes, result.most_labels) == (5, 4, 4)
     assert result.basin == pytest.approx((3 * LN2 - LN2 + quarter + np.log(4)) / 5, abs=1e-15)
     assert result.boundary == pytest.approx((2 * LN2 + quarter + np.log(4)) / 4, abs=1e-15)
-    assert result.fractal is True  # (2 ln 2 + 0.562 + 2 ln 2)/4 = 0.834 > ln 2
+    assert result.boundary > LN2  # (2 ln 2 + 0.562 + 2 ln 2)/4 = 0.834
+    assert result.fractal is None  # so few boxes do not show that the boundary is no smooth one
 
 
 def test_two_labels_never_reach_the_ln_2_criterion() -> None:
@@ -54,6 +55,20 @@ def test_three_smooth_stripes_are_not_fractal() -> None:
     result = basin_entropy(labels, 4)
     assert result.most_labels == 3
     assert result.fractal is False
+
+
+@pytest.mark.parametrize("angle", ANGLES)
+@pytest.mark.parametrize("width", [1.0, 2.0, 3.0, 4.0, 6.0])
+def test_straight_boundaries_are_neither_fractal_nor_one(angle: float, width: float) -> None:
+    """Stripes of three labels and of uneven widths, in boxes that hold several of them, and checkerboards."""
+    for seed in range(3):
+        edges = np.cumsum(np.random.default_rng(seed).uniform(0.5, 1.5, 2000)) * width
+        labels = np.searchsorted(edges - edges[-1] / 2, along(300, angle)) % 3
+        assert not basin_entropy(labels).fractal
+        assert not wada_merge_test(labels).wada
+    board = sum(np.floor(along(300, angle + turn) / width).astype(int) for turn in (0.0, np.pi / 2)) % 3
+    assert not basin_entropy(board).fractal
+    assert not wada_merge_test(board).wada
 
 
 def test_a_pure_map_has_no_entropy() -> None:
