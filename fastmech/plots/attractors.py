@@ -50,7 +50,7 @@ def _shares(dataset: Dataset, scene: Mapping[str, float]) -> style.Figure:
     axes.set_yticks(range(n + 1), [*(_name(table, k) for k in range(n)), "without a label"])
     axes.invert_yaxis()
     axes.set_xlabel(f"share of the {total:,} starts [%], with 95 % Wilson interval")
-    figure.suptitle(f"Where motions settle\n{style.setting_of(dataset, scene)}")
+    style.suptitle(figure, f"Where motions settle\n{style.setting_of(dataset.attrs, scene)}")
     return figure
 
 
@@ -90,7 +90,7 @@ def _labels(dataset: Dataset, scene: Mapping[str, float]) -> style.Figure:
     axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]), xlabel=told[0], ylabel=told[1])
     held = {k.removeprefix("fixed_"): v for k, v in dataset.attrs.items() if k.startswith("fixed_")}
     fixed = "".join(f"; {style.symbol(k)} = {v:g}" for k, v in held.items())
-    axes.set_title(f"Where each start ends\n{style.setting_of(dataset, scene)}{fixed}")
+    style.title(axes, f"Where each start ends\n{style.setting_of(dataset.attrs, scene)}{fixed}")
     axes.grid(visible=False)
     style.legend_below(figure, handles)
     return figure
