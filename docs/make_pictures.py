@@ -73,6 +73,9 @@ def sketch() -> None:
         axes.text(*(0.5 * (first + np.array([0.0, l])) + [0.02, 0.17]), "$c_2$", **named)
         axes.text(*(0.5 * first + [0.12, -0.06]), "$l$", **named)
         axes.text(*(0.5 * (first + second) + [-0.02, 0.12]), "$l$", **named)
+        axes.text(*(0.5 * first + [1.36, 0.14]), "$2l$", **named)
+        axes.text(1.7, -0.22, r"$\beta$", **named)
+        axes.text(second[0] + 0.5, second[1] + 0.1, "$F$", **named)
         axes.annotate("", (-1.2, 0.55), (-1.2, 1.05), arrowprops={"arrowstyle": "->", "lw": 1.2})
         axes.text(-1.1, 0.8, "$g$", **named)
         axes.set_aspect("equal")
@@ -101,10 +104,9 @@ def basins() -> None:
 def motion() -> None:
     """A motion under the decaying force."""
     scene = fm.Scene(c2=1100 / 3)
-    run = fm.integrate(
-        scene, [4 * np.pi / 13, np.pi / 7, 0.0, 0.0], t_eval=np.linspace(0.0, 5.0, 76), tol=1e-6
-    )
-    fm.animate(scene, run, HERE / "motion.gif")
+    times = np.linspace(0.0, 4.0, 61)
+    run = fm.integrate(scene, [4 * np.pi / 13, np.pi / 7, 0.0, 0.0], t_eval=times, tol=1e-6)
+    fm.animate(scene, run, HERE / "motion.gif", fps=8)
 
 
 def general(scene: fm.Scene) -> fm.Mechanism:
@@ -246,9 +248,7 @@ def step_limits() -> None:
         axes.set_xlabel("step dt [s]")
         axes.set_ylabel("error of the state after 1 s [rad or rad/s]")
         axes.set_ylim(1e-15, 1e2)
-        axes.set_title(
-            f"{setting(scene)}; dashed: fm.largest_stable_step\nof the method (radau5 is stable at every step)"
-        )
+        axes.set_title(f"{setting(scene)}\ndashed: fm.largest_stable_step of the method; radau5 has no limit")
         figure.legend(loc="outside lower center", ncols=4)
         save(figure, HERE / "step_limits.png")
 

@@ -29,7 +29,9 @@ def _name(table: Dataset, k: int) -> str:
     """Kind, period and place of an attractor."""
     kind, forcing = str(table["kind"].data[k]), int(table["forcing_periods"].data[k])
     period = float(table["period"].data[k])
-    told = f", {forcing} T" if forcing > 0 else f", {period:.4g} s" if np.isfinite(period) else ""
+    told = f", period {period:.4g} s" if np.isfinite(period) else ""
+    if forcing > 0:
+        told = f", period {forcing} of the forcing"
     names = [name for name in table if name.startswith("place_")]
     place = ", ".join(f"{table[name].data[k]:.3g}" for name in names[:4])
     return f"{k}: {kind}{told} at ({place}{', ...' * (len(names) > 4)})"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
 from fastmech.plots import style
-from fastmech.results import STATE_UNITS, Dataset
+from fastmech.results import Dataset
 from fastmech.scene import Scene
 from fastmech.slider.lagrange import kinetic_energy, potential_energy
 
@@ -326,7 +326,10 @@ def describe(axes: style.Axes, view: Slice, parameters: Mapping[str, float]) -> 
     """Labels with units, the decisive parameters, and what is held."""
     told = style.setting_of(view.dataset.attrs, parameters)
     at_rest = all(value == 0.0 for value in view.held.values()) and not set(view.coordinates) & set(view.held)
-    units = {n: view.dataset[n].units if n in view.dataset else STATE_UNITS.get(n, "") for n in view.held}
+    units = {
+        n: view.dataset[f"equilibrium_{n.removesuffix('_dot')}"].units + "/s" * n.endswith("_dot")
+        for n in view.held
+    }
     each = ", ".join(f"{style.symbol(n)} = {value:.4g} {units[n]}" for n, value in view.held.items())
     held = f"starts with {each}" if each else ""
     if at_rest and set(view.axes) == set(view.coordinates):

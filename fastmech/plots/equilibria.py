@@ -243,9 +243,10 @@ def _positions(dataset: Dataset, drawn: Drawing, setting: str) -> style.Figure:
         for of in ("verdict", "kind")
     ]
     few = len(names) <= 6
-    columns = min(2 if few else 5, len(names))
-    rows, side = -(-len(names) // columns), 3.9 if few else 2.6
-    figure = style.new_figure(1.2 + (side + 0.3) * columns, side * rows + 0.6)
+    columns = min(2 if few else 7, len(names))
+    width, height = (4.2, 3.9) if few else (1.9, 3.0)
+    rows = -(-len(names) // columns)
+    figure = style.new_figure(1.2 + width * columns, height * rows + 0.6)
     style.suptitle(figure, f"Positions of rest, {setting}")
     panels = figure.subplots(rows, columns, squeeze=False)
     for axes in panels.flat[len(names) :]:
@@ -257,7 +258,7 @@ def _positions(dataset: Dataset, drawn: Drawing, setting: str) -> style.Figure:
             words.get(int(dataset[of].data[i]), "unknown")
             for words, of in zip(told, ("verdict", "kind"), strict=True)
         )
-        axes.title.set_fontsize(10 if few else 8)
-        style.title(axes, f"{name}\n{verdict} ({kind})")
+        axes.label_outer()
+        style.title(axes, f"{name}\n{verdict} ({kind})", 10 if few else 7)
     style.legend_below(figure, legend_handles(drawn), 2 * columns)
     return figure

@@ -51,6 +51,9 @@ FIELD = "cividis"
 
 DPI = 150
 
+#: Rows of a legend for which figures have room; for more they grow.
+ROWS = 9
+
 _SETTINGS: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 10.0,
@@ -99,23 +102,31 @@ def new_panel(width: float = 7.2, height: float = 4.2) -> tuple[Figure, Axes]:
 
 def legend_below(figure: Figure, of: Axes | Sequence[Artist], columns: int = 2) -> None:
     """A legend of what axes have, or of some entries, under the whole figure, where it covers nothing."""
-    handles = of if isinstance(of, Sequence) else of.get_legend_handles_labels()[0]
-    figure.legend(handles=list(handles), loc="outside lower center", ncols=columns)
+    handles = list(of if isinstance(of, Sequence) else of.get_legend_handles_labels()[0])
+    fit = _fitting(handles, columns, 72.0 * figure.get_figwidth())
+    beyond = max(0, -(-len(handles) // fit) - ROWS)
+    figure.set_figheight(figure.get_figheight() + 0.19 * beyond)
+    figure.legend(handles=handles, loc="outside lower center", ncols=fit)
+
+
+def _fitting(handles: Sequence[Artist], columns: int, points: float) -> int:
+    """How many columns of a legend fit over so many points, not more than asked for."""
+    from matplotlib import rcParams
+
+    longest = max((len(str(one.get_label())) for one in handles), default=0)
+    return max(1, min(columns, _letters(points, rcParams["legend.fontsize"]) // (longest + 6)))
 
 
 def legend_under(axes: Axes, handles: Sequence[Artist] | None = None, columns: int = 2) -> None:
     """A legend under axes that may be one panel of a user's figure, in as many columns as fit."""
-    from matplotlib import rcParams
     from matplotlib.transforms import ScaledTranslation
 
     known = axes.get_legend_handles_labels()[0] if handles is None else handles
     if known:
-        longest = max(len(str(one.get_label())) for one in known)
         # Below the ticks' labels and the axis' own, however high the axes are.
         below = -3.8 * float(axes.xaxis.label.get_fontsize()) / 72.0
         place = axes.transAxes + ScaledTranslation(0.0, below, axes.figure.dpi_scale_trans)
-        fit = _letters(axes, rcParams["legend.fontsize"]) // (longest + 6)
-        look: dict[str, Any] = {"bbox_transform": place, "ncols": max(1, min(columns, fit))}
+        look: dict[str, Any] = {"bbox_transform": place, "ncols": _fitting(known, columns, _points(axes))}
         axes.legend(handles=list(known), loc="upper center", bbox_to_anchor=(0.5, 0.0), **look)
 
 
@@ -215,17 +226,24 @@ def setting(system: Any, varied: Container[str | None] = (), decayed: bool = Fal
     )
 
 
-def _letters(axes: Axes, size: Any) -> int:
-    """How many letters of this size fit over axes."""
+def _points(axes: Axes) -> float:
+    """How wide axes are."""
+    return 72.0 * axes.get_window_extent().width / axes.figure.dpi
+
+
+def _letters(points: float, size: Any) -> int:
+    """How many letters of this size fit over so many points."""
     from matplotlib.font_manager import FontProperties
 
-    points = 72.0 * axes.get_window_extent().width / axes.figure.dpi
     return int(points / (0.57 * FontProperties(size=size).get_size_in_points()))
 
 
-def title(axes: Axes, text: str) -> None:
+def title(axes: Axes, text: str, size: float | None = None) -> None:
     """A title over axes, in as many lines as it takes."""
-    axes.set_title(_in_lines(text, _letters(axes, axes.title.get_fontsize())))
+    from matplotlib import rcParams
+
+    of = rcParams["axes.titlesize"] if size is None else size
+    axes.set_title(_in_lines(text, _letters(_points(axes), of)), fontsize=of)
 
 
 def _in_lines(text: str, width: int) -> str:
