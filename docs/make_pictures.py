@@ -2,7 +2,7 @@
 
 python docs/make_pictures.py [readme] [explanations] [gallery]
 
-Without a word it draws all. The gallery runs every shipped request, which takes half an hour on two cores.
+Without a word it draws all. The gallery runs every shipped request, which takes 15 minutes on two cores.
 """
 
 from __future__ import annotations

@@ -187,7 +187,9 @@ def draw_attractors(found: Any, axes: style.Axes) -> None:
             label=one.name,
             **look,
         )
-    axes.set(**{f"{x}label": found.names[c] for x, c in zip("xy", columns, strict=True)})
+    units = state_units(found.system)
+    told = [style.with_unit(style.symbol(n), units.get(n, "1")) for n in (found.names[c] for c in columns)]
+    axes.set(xlabel=told[0], ylabel=told[1])
     style.title(axes, f"Attractors\n{style.setting(found.system)}")
     style.legend_under(axes, columns=1)
 
@@ -209,7 +211,9 @@ def draw_basin_map(found: Any, axes: style.Axes) -> None:
     colors = ["#d9d9d9" if k < 0 else style.color(k) for k in there]
     y = found.axes[names[1]] if len(names) > 1 else np.zeros(1)
     style.paint(axes, found.axes[names[0]], y, np.searchsorted(there, well), colors)
-    axes.set(xlabel=names[0], ylabel=names[1] if len(names) > 1 else "")
+    units = state_units(found.system)
+    labels = [f"{style.with_unit(style.symbol(name), units.get(name, '1'))} at the start" for name in names]
+    axes.set(xlabel=labels[0], ylabel=labels[1] if len(names) > 1 else "")
     told = ["no label" if k < 0 else f"code {k}" if found.tree is None else found.tree[k].name for k in there]
     shares = [f"{text}: {np.mean(well == k):.1%}" for k, text in zip(there, told, strict=True)]
     handles = [style.swatch(t, c, "black") for c, t in zip(colors, shares, strict=True)]
