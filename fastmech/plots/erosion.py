@@ -20,25 +20,32 @@ def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, styl
     with style.style():
         figure = style.new_figure(8.2, 10.0)
         panels = figure.subplots(3, 1, sharex=True)
-        handles: list[style.Artist] = []
+        handles = draw_stability(panels[0], dataset)
         for well in range(dataset.sizes["well"]):
             color = style.color(well)
-            _stability(panels[0], dataset, well, color)
             _lines(panels[1], dataset, well, color, {"lim": ("-", "o"), "factor": ("--", "s")})
             _lines(panels[2], dataset, well, color, {"shock": ("-", "o"), "kick": ("--", "s")})
-            handles.append(style.entry(_name(dataset, well), color=color, lw=3.0))
+        for axes in panels[1:]:
+            _mark_events(axes, dataset)
         _axes(panels, dataset, name)
         handles += [
-            *_shares(),
             style.entry("about the well: LIM; shock of all four states", marker="o", ms=5),
             style.entry("anywhere: IF; kick of the rates alone", ls="--", marker="s", ms=5),
-            style.entry("limited by the window", marker="o", mfc="white", ms=5, ls="none"),
-            style.entry("smaller one tried is undecided", marker="x", ms=6, ls="none"),
         ]
-        if _limited(dataset):
-            look: dict[str, Any] = {"marker": "^", "mfc": "white", "ms": 6, "lw": 1.0, "ls": ":"}
-            handles.append(style.entry("radius, if all undecided starts ended there", **look))
-        handles += [_mark_events(axes, dataset) for axes in panels].pop()
+        lines = [line for axes in panels[1:] for line in axes.lines if np.size(line.get_xdata())]
+        looks: dict[str, dict[str, Any]] = {
+            "limited by the window": {"marker": "o", "mfc": "white", "ms": 5, "ls": "none"},
+            "smaller one tried is undecided": {"marker": "x", "ms": 6, "ls": "none"},
+            "radius, if all undecided starts ended there": {
+                "marker": "^",
+                "mfc": "white",
+                "ms": 6,
+                "ls": ":",
+            },
+        }
+        for text, look in looks.items():
+            if any(line.get_marker() == look["marker"] for line in lines if line.get_linestyle() == "None"):
+                handles.append(style.entry(text, **look))
         style.legend_below(figure, handles)
         style.suptitle(figure, _title(dataset, scene, name))
         return {"profile": figure}
@@ -53,15 +60,10 @@ def draw_stability(axes: style.Axes, dataset: Dataset) -> list[style.Artist]:
     axes.set(xlabel=_along(dataset, name), ylabel="share of the starts [%]", ylim=(0.0, 102.0))
     axes.set_title(f"Basin stability along {name}")
     wells = [style.entry(_name(dataset, well), color=color, lw=3.0) for well, color in colors.items()]
-    return [*wells, *_shares(), *_mark_events(axes, dataset)]
-
-
-def _shares() -> list[style.Artist]:
-    """What stands beside a share's line."""
-    return [
-        style.swatch("95 % Wilson interval, undecided starts as none or all", "#bdbdbd"),
-        style.entry("if all undecided starts ended there", lw=1.0, ls=":"),
-    ]
+    wells.append(style.swatch("95 % Wilson interval, undecided starts as none or all", "#bdbdbd"))
+    if np.nansum(dataset["well_undecided"].data):
+        wells.append(style.entry("if all undecided starts ended there", lw=1.0, ls=":"))
+    return [*wells, *_mark_events(axes, dataset)]
 
 
 def _along(dataset: Dataset, name: str) -> str:
@@ -130,12 +132,6 @@ def _lines(
             axes.plot(x[early], first[early], "x", color=color, ms=6)
 
 
-def _limited(dataset: Dataset) -> bool:
-    """Whether starts of the map without a label limit a radius."""
-    names = [name for name in ("well_lim", "well_factor") if f"{name}_at_most" in dataset]
-    return any(bool((dataset[f"{name}_at_most"].data > dataset[name].data).any()) for name in names)
-
-
 def _axes(panels: np.ndarray, dataset: Dataset, name: str) -> None:
     titles = (
         ("share of the starts [%]", "Basin stability: random starts in the window"),
@@ -146,7 +142,7 @@ def _axes(panels: np.ndarray, dataset: Dataset, name: str) -> None:
         axes.set_ylabel(label)
         axes.set_title(title)
         axes.set_ylim(bottom=0.0)
-    panels[0].set_ylim(0.0, 102.0)
+    panels[0].set(xlabel="", ylim=(0.0, 102.0))
     panels[-1].set_xlabel(_along(dataset, name))
 
 
