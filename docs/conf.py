@@ -64,6 +64,7 @@ def _commands(folder: Path) -> None:
 
 def _gallery(folder: Path) -> None:
     """Every shipped request with its title and command."""
+    shown = tomllib.loads((ROOT / "docs" / "pictures" / "gallery.toml").read_text(encoding="utf-8"))
     lines = ["# Gallery", "", "Every request in `scans/`, with the command that computes and draws it.", ""]
     for path in sorted((ROOT / "scans").rglob("*.toml")):
         text, where = path.read_text(encoding="utf-8"), path.relative_to(ROOT)
@@ -83,8 +84,13 @@ def _gallery(folder: Path) -> None:
             f"Scans: {kinds}.{coarse}",
             "",
         ]
-        if (picture := ROOT / "docs" / "pictures" / "gallery" / f"{path.stem}.png").exists():
-            lines += [f"![{table.get('title', path.stem)}](../pictures/gallery/{picture.name})", ""]
+        section = shown[path.stem]["picture"].partition("/")[0]
+        lines += [
+            f"![{table.get('title', path.stem)}](../pictures/gallery/{path.stem}.png)",
+            "",
+            f"{shown[path.stem]['about']} (scan `{section}`; the other pictures are drawn too)",
+            "",
+        ]
         lines += ["```sh", f"fastmech run {where}{how}", f"fastmech plot results/{path.stem}.h5", "```", ""]
     (folder / "gallery.md").write_text("\n".join(lines), encoding="utf-8")
 

@@ -132,6 +132,7 @@ class Drawn(Result):
         Raises:
             InputError: ``ax`` are no axes, or there is nothing to draw.
         """
+        own = ax is None
         if ax is None:
             from matplotlib import pyplot
 
@@ -139,6 +140,8 @@ class Drawn(Result):
         elif not callable(getattr(ax, "plot", None)):
             raise InputError(f"ax = {shown(ax)}: must be the axes of a matplotlib figure")
         _load(self.PICTURE)(self, ax, **how)
+        if own:
+            _load("plots.style:make_room")(ax)
         return ax
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from fastmech.ensembles.run import Progress
@@ -104,6 +105,8 @@ def draw_results(
         for name in names:
             kind, scene = kinds[results[name].attrs["kind"]], results.scene_of(name)
             dataset = as_today(kind.read(results[name], scene), int(results.attrs["schema_version"]))
+            units = {f"unit_{key}": one.units for key, one in results.parameters.items()}
+            dataset = replace(dataset, attrs={**dataset.attrs, **units})
             figures = kind.draw(dataset, scene)
             if not figures and section is not None:
                 kind_name = results[name].attrs["kind"]

@@ -29,7 +29,9 @@ def _name(table: Dataset, k: int) -> str:
     """Kind, period and place of an attractor."""
     kind, forcing = str(table["kind"].data[k]), int(table["forcing_periods"].data[k])
     period = float(table["period"].data[k])
-    told = f", {forcing} T" if forcing > 0 else f", {period:.4g} s" if np.isfinite(period) else ""
+    told = f", period {period:.4g} s" if np.isfinite(period) else ""
+    if forcing > 0:
+        told = f", period {forcing} of the forcing"
     names = [name for name in table if name.startswith("place_")]
     place = ", ".join(f"{table[name].data[k]:.3g}" for name in names[:4])
     return f"{k}: {kind}{told} at ({place}{', ...' * (len(names) > 4)})"
@@ -50,7 +52,7 @@ def _shares(dataset: Dataset, scene: Mapping[str, float]) -> style.Figure:
     axes.set_yticks(range(n + 1), [*(_name(table, k) for k in range(n)), "without a label"])
     axes.invert_yaxis()
     axes.set_xlabel(f"share of the {total:,} starts [%], with 95 % Wilson interval")
-    figure.suptitle(f"Where motions settle\n{style.setting_of(dataset, scene)}")
+    style.suptitle(figure, f"Where motions settle\n{style.setting_of(dataset.attrs, scene)}")
     return figure
 
 
@@ -90,7 +92,7 @@ def _labels(dataset: Dataset, scene: Mapping[str, float]) -> style.Figure:
     axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]), xlabel=told[0], ylabel=told[1])
     held = {k.removeprefix("fixed_"): v for k, v in dataset.attrs.items() if k.startswith("fixed_")}
     fixed = "".join(f"; {style.symbol(k)} = {v:g}" for k, v in held.items())
-    axes.set_title(f"Where each start ends\n{style.setting_of(dataset, scene)}{fixed}")
+    style.title(axes, f"Where each start ends\n{style.setting_of(dataset.attrs, scene)}{fixed}")
     axes.grid(visible=False)
     style.legend_below(figure, handles)
     return figure

@@ -67,7 +67,7 @@ def basin_color(dataset: Dataset, well: int, turns: tuple[int, ...]) -> str:
 def basin_name(dataset: Dataset, well: int, turns: tuple[int, ...]) -> str:
     """Name of a copy of a well; ``well`` is an index among the dataset's equilibria."""
     wells = int(np.count_nonzero(dataset["equilibrium_morse_index"].data == 0))
-    text = f"well {well_number(dataset, well) + 1}" if wells > 1 else "the well"
+    text = f"well {well_number(dataset, well)}" if wells > 1 else "the well"
     names = map(style.symbol, style.coordinates_of(dataset))
     made = [f"{t:+d} {name}" for t, name in zip(turns, names, strict=True) if t]
     return f"{text}, {', '.join(made)} turn{'s' * (len(made) > 1 or abs(sum(turns)) > 1)}" if made else text
@@ -143,7 +143,7 @@ def decisive(axes: style.Axes, view: Slice) -> list[style.Artist]:
         if energy.min() < level < energy.max():
             look = DASHES[number % len(DASHES)]
             axes.contour(x, y, energy.T, levels=[level], colors="black", linewidths=1.6, linestyles=look)
-            which = " and ".join(str(i + 1) for i in np.flatnonzero(barriers == level))
+            which = " and ".join(str(i) for i in np.flatnonzero(barriers == level))
             of = f" of well{'s' * (' ' in which)} {which}" if wells.size > 1 else ""
             handles.append(style.entry(f"barrier energy{of}, {level:.4g} J", lw=1.6, ls=look))
     for index, (marker, name) in MARKERS.items():
@@ -158,7 +158,7 @@ def decisive(axes: style.Axes, view: Slice) -> list[style.Artist]:
         for number, well in enumerate(wells):
             for place in _places(view, 0, True, int(well)):
                 axes.annotate(
-                    str(number + 1), place, xytext=(6, 5), textcoords="offset points", weight="bold", zorder=6
+                    str(number), place, xytext=(6, 5), textcoords="offset points", weight="bold", zorder=6
                 )
     return handles
 
@@ -324,18 +324,17 @@ def _times(view: Slice, name: str, title: str) -> style.Figure:
 
 def describe(axes: style.Axes, view: Slice, parameters: Mapping[str, float]) -> None:
     """Labels with units, the decisive parameters, and what is held."""
-    if view.scene is not None:
-        scene = view.scene
-        force = f"F0 = {scene.F0:g} N" + (f" exp(-{scene.alpha:g} t)" if scene.F0 and scene.alpha else "")
-        told = f"{force}, c1 = {scene.c1:g} N/m, c2 = {scene.c2:g} N/m"
-    else:
-        told = style.setting_of(view.dataset, parameters)
+    told = style.setting_of(view.dataset.attrs, parameters)
     at_rest = all(value == 0.0 for value in view.held.values()) and not set(view.coordinates) & set(view.held)
-    each = ", ".join(f"{style.symbol(name)} = {value:.4g}" for name, value in view.held.items())
+    units = {
+        n: view.dataset[f"equilibrium_{n.removesuffix('_dot')}"].units + "/s" * n.endswith("_dot")
+        for n in view.held
+    }
+    each = ", ".join(f"{style.symbol(n)} = {value:.4g} {units[n]}" for n, value in view.held.items())
     held = f"starts with {each}" if each else ""
     if at_rest and set(view.axes) == set(view.coordinates):
         held = "starts at rest"
-    axes.set_title(f"{axes.get_title()}\n{told}; {held}" if held else f"{axes.get_title()}\n{told}")
+    style.title(axes, f"{axes.get_title()}\n{told}{f'; {held}' if held else ''}")
     for axis, name in (("x", view.axes[0]), ("y", view.axes[1])):
         getattr(axes, f"set_{axis}label")(style.quantity(view.dataset, name).replace(" [", " at the start ["))
     axes.grid(visible=False)
@@ -364,10 +363,9 @@ def draw_ends(axes: style.Axes, dataset: Dataset, scene: Mapping[str, float]) ->
     style.in_fifths(axes.xaxis)
     axes.set_xlabel("rate α at which the force decays [1/s]")
     axes.set_ylabel("force F0 when it is switched on [N]")
-    axes.set_title(
-        "Where the mechanism ends that rests until F0 exp(-α t) is switched on\n"
-        f"c1 = {scene['c1']:g} N/m, c2 = {scene['c2']:g} N/m"
-    )
+    own = {name: value for name, value in scene.items() if name not in ("F0", "alpha")}
+    about = "Where the mechanism ends that rests until F0 exp(-α\xa0t) is switched on"
+    style.title(axes, f"{about}\n{style.setting_of(dataset.attrs, own)}")
     axes.grid(visible=False)
     return handles
 

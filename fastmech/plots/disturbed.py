@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -153,9 +152,7 @@ def _time_to_return(dataset: Dataset) -> style.Figure:
     if axes.lines:
         style.legend_below(figure, axes, 1)
     else:
-        axes.text(
-            0.5, 0.5, "no trajectory was back by the end of the run", transform=axes.transAxes, ha="center"
-        )
+        style.message(axes, "no trajectory was back by the end of the run")
     axes.set_title("Time after which a disturbed trajectory stays near its equilibrium")
     return figure
 
@@ -279,7 +276,7 @@ def _draw_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.F
     ]
     farthest = {angle: view.data(f"largest_excursion_{angle}").astype(np.float64) for angle in style.ANGLES}
     excursions = [
-        (f"farthest |{style.symbol(angle)} - {style.symbol(angle)} there|", field, "excursion [rad]")
+        (f"largest departure of {style.symbol(angle)}", field, "excursion [rad]")
         for angle, field in farthest.items()
     ]
     rows = {
@@ -327,7 +324,7 @@ def _panels(
                 style.logarithmic(bar.ax.yaxis)
     if handles := _marks(view, sheets, fields):
         style.legend_below(figure, handles)
-    _title(figure, _setting(view))
+    style.suptitle(figure, _setting(view))
     return figure
 
 
@@ -371,14 +368,8 @@ def _lines(
         panels[0].plot([], [], UNTOLD, color="black", label=ABOUT_UNTOLD)
     style.legend_below(figure, panels[0], 2)
     band = "\nband: 95 % Wilson interval, undecided ones as none or all" if name == "share_returned" else ""
-    _title(figure, _setting(view) + band)
+    style.suptitle(figure, _setting(view) + band)
     return figure
-
-
-def _title(figure: style.Figure, text: str) -> None:
-    """Over all panels, in as many lines as it takes."""
-    width = int(12 * figure.get_figwidth())
-    figure.suptitle("\n".join(fill(line, width) for line in text.splitlines()), fontsize=10.0)
 
 
 def _look(name: str, field: Floats) -> dict[str, Any]:

@@ -151,6 +151,8 @@ def legend_handles(drawn: Drawing, load: str = "load") -> list[Any]:
 
 
 MARKERS = {"minimum": "o", "saddle": "D", "maximum": "^", "degenerate": "X"}
+#: Kinds by the sign of the stiffness matrix' determinant.
+WITHOUT_POTENTIAL = {"positive": "no potential, det K > 0", "negative": "no potential, det K < 0"}
 SHAPES = ["o", "s", "^", "D", "v", "P"]
 GRID = 241
 
@@ -171,10 +173,11 @@ def draw_equilibria(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, s
                 force = float(dataset.attrs["force"])
                 places = np.stack([dataset["phi"].data, dataset["theta"].data], axis=-1)
                 drawn = drawing_of(Scene(**scene), places, force)
-                figures["positions"] = _positions(dataset, drawn, f"force F = {force:g} N on M2")
+                told = style.setting_of({}, {**scene, "F0": force, "alpha": 0.0})
+                figures["positions"] = _positions(dataset, drawn, told)
             elif "drawing" in dataset.groups:
                 drawn = drawing_of(dataset.groups["drawing"])
-                figures["positions"] = _positions(dataset, drawn, style.setting_of(dataset, scene))
+                figures["positions"] = _positions(dataset, drawn, style.setting_of(dataset.attrs, scene))
     return figures
 
 
@@ -183,14 +186,15 @@ def draw_potential(axes: style.Axes, dataset: Dataset, scene: Scene) -> None:
     angle = np.linspace(-np.pi, np.pi, GRID)
     q = np.stack(np.meshgrid(angle, angle), axis=-1)
     energy = potential_energy(scene, q, float(dataset.attrs["force"]))
-    filled = axes.contourf(angle, angle, energy, levels=24)
+    filled = axes.contourf(angle, angle, energy, levels=24, cmap=style.FIELD)
     axes.contour(angle, angle, energy, levels=24, colors="white", linewidths=0.4, alpha=0.6)
     axes.figure.colorbar(filled, ax=axes, label="potential energy Π - F x2 [J]")
     mark_kinds(axes, dataset, style.ANGLES)
     axes.set_xticks(*style.PI_TICKS)
     axes.set_yticks(*style.PI_TICKS)
     axes.set(xlabel="angle φ [rad]", ylabel="angle θ [rad]")
-    axes.set_title(f"Equilibria and potential, force F = {dataset.attrs['force']:g} N")
+    own = {**scene.parameters, "F0": float(dataset.attrs["force"]), "alpha": 0.0}
+    style.title(axes, f"Equilibria and potential\n{style.setting_of({}, own)}")
     axes.grid(visible=False)
 
 
@@ -201,7 +205,8 @@ def mark_kinds(axes: style.Axes, dataset: Dataset, names: Sequence[str]) -> None
         of_kind = dataset["kind"].data == codes[kind]
         if of_kind.any():
             place = [dataset[name].data[of_kind] for name in names]
-            axes.plot(*place, marker, color="white", mec="black", mew=1.4, ms=10, clip_on=False, label=kind)
+            look: Any = {"color": "white", "mec": "black", "mew": 1.4, "ms": 10, "clip_on": False}
+            axes.plot(*place, marker, label=WITHOUT_POTENTIAL.get(kind, kind), **look)
     for number, (x, y) in enumerate(zip(*(dataset[name].data for name in names), strict=True), start=1):
         # Towards the middle, so that none leaves the picture.
         offset = (-13.0 if x > 0 else 13.0, -13.0 if y > 0 else 13.0)
@@ -237,9 +242,12 @@ def _positions(dataset: Dataset, drawn: Drawing, setting: str) -> style.Figure:
         {code: word.replace("_", " ") for word, code in style.flag_codes(dataset[of]).items()}
         for of in ("verdict", "kind")
     ]
-    rows, columns = -(-len(names) // 2), min(2, len(names))
-    figure = style.new_figure(1.2 + 4.2 * columns, 3.9 * rows + 0.6)
-    figure.suptitle("Positions of rest, " + setting.replace(": ", ":\n" if columns == 1 else ": "))
+    few = len(names) <= 6
+    columns = min(2 if few else 7, len(names))
+    width, height = (4.2, 3.9) if few else (1.9, 3.0)
+    rows = -(-len(names) // columns)
+    figure = style.new_figure(1.2 + width * columns, height * rows + 0.6)
+    style.suptitle(figure, f"Positions of rest, {setting}")
     panels = figure.subplots(rows, columns, squeeze=False)
     for axes in panels.flat[len(names) :]:
         axes.remove()
@@ -250,6 +258,7 @@ def _positions(dataset: Dataset, drawn: Drawing, setting: str) -> style.Figure:
             words.get(int(dataset[of].data[i]), "unknown")
             for words, of in zip(told, ("verdict", "kind"), strict=True)
         )
-        axes.set_title(f"{name}\n{verdict} ({kind})", fontsize=10)
+        axes.label_outer()
+        style.title(axes, f"{name}\n{verdict} ({kind})", 10 if few else 7)
     style.legend_below(figure, legend_handles(drawn), 2 * columns)
     return figure

@@ -57,7 +57,7 @@ def draw_bifurcation(view: View) -> style.Figure:
     if third:
         _decay_times(panels[2], view, name)
     panels[-1].set_xlabel(view.label(name))
-    panels[0].set_title(f"Equilibria over {name}{_told(view, folds, name)}\n{view.setting}")
+    style.title(panels[0], f"Equilibria over {name}{_told(view, folds, name)}\n{view.setting}")
     style.legend_below(figure, panels[0], 4)
     return figure
 
@@ -93,7 +93,7 @@ def draw_places(view: View) -> style.Figure:
     for axes, variable in zip(panels, rows, strict=True):
         draw_verdicts(axes, view, variable)
     panels[-1].set_xlabel(view.label(name))
-    panels[0].set_title(f"Equilibria over {name}\n{view.setting}")
+    style.title(panels[0], f"Equilibria over {name}\n{view.setting}")
     style.legend_below(figure, panels[0], 4)
     return figure
 
@@ -139,7 +139,7 @@ def _looks(
             yield LOOKS[index], x, y
             continue
         several = 1 < stable <= len(STABLE)
-        label = f"stable, number {seen + 1}" if several else "stable"
+        label = f"stable, number {seen}" if several else "stable"
         yield (STABLE[seen if several else 0], "-", 2.2, label), x, y
         seen += 1
 
@@ -276,7 +276,8 @@ def draw_equilibrium_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[s
         stability = "verdict" if "mechanism" in dataset.attrs else "morse_index"
         if not view.has("count_stable", "energy", first, stability) or not view.ranks:
             return figures
-        if view.has(*others):
+        moves = any(np.ptp(np.nan_to_num(view.data(name))) > LEAST_SPAN for name in (first, *others))
+        if view.has(*others) and moves:
             figures["angles"] = _angles(view)
         for name, variable, draw in (("barrier", "depth", _barrier), ("decay", "decay_time", _decay)):
             if view.has(variable) and np.isfinite(view.stable(0, view.data(variable))).any():
@@ -288,13 +289,16 @@ def _counts(view: View) -> style.Figure:
     figure = style.new_figure(9.6, 5.6)
     titles = {"count": "Number of equilibria", "count_stable": "Number of stable equilibria"}
     for axes, (name, title) in zip(figure.subplots(1, 2), titles.items(), strict=True):
-        curves = draw_count(axes, view, name, title)
+        handles, curves = draw_count(axes, view, name, title)
+        style.legend_under(axes, handles, 3)
     _finish(figure, view, curves)
     return figure
 
 
-def draw_count(axes: style.Axes, view: View, name: str, title: str) -> list[style.Artist]:
-    """Draw a number of equilibria over two parameters; returns the curves' entries of a legend."""
+def draw_count(
+    axes: style.Axes, view: View, name: str, title: str
+) -> tuple[list[style.Artist], list[style.Artist]]:
+    """Draw a number of equilibria over two parameters; returns what the colours mean, and the curves."""
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 
@@ -308,9 +312,8 @@ def draw_count(axes: style.Axes, view: View, name: str, title: str) -> list[styl
         for n in np.unique(counts)
     ]
     curves = draw_curves(axes, view)
-    style.legend_under(axes, handles + _mark_unsettled(axes, view) + _mark_own(axes, view), 3)
     _label(axes, view, title)
-    return curves
+    return handles + _mark_unsettled(axes, view) + _mark_own(axes, view), curves
 
 
 def _mark_unsettled(axes: style.Axes, view: View) -> list[style.Artist]:
@@ -415,7 +418,7 @@ def _nothing(view: View) -> list[style.Artist]:
     """What white means where not every point has as many stable equilibria as panels."""
     if int(view.data("count_stable").min()) == len(view.ranks):
         return []
-    return [style.swatch("white: no such equilibrium", "white", "#808080")]
+    return [style.swatch("white: no such stable equilibrium", "white", "#808080")]
 
 
 def _label(axes: style.Axes, view: View, title: str) -> None:
@@ -426,7 +429,7 @@ def _label(axes: style.Axes, view: View, title: str) -> None:
 
 def _finish(figure: style.Figure, view: View, handles: list[style.Artist]) -> None:
     """The scene above everything, the legend below."""
-    figure.suptitle(view.setting + not_proved(view), fontsize=10.0)
+    style.suptitle(figure, view.setting + not_proved(view))
     for axes in figure.axes:
         if axes.get_subplotspec() is not None:
             axes.label_outer()

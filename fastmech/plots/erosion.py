@@ -10,6 +10,9 @@ import numpy as np
 from fastmech.plots import style
 from fastmech.results import STATE_UNITS, Dataset
 
+#: Between the values of the parameter where a well comes or goes.
+EVENT = "#eeeeee"
+
 
 def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Picture of a dataset of the scan type ``erosion`` about the scene with these parameters."""
@@ -17,26 +20,34 @@ def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, styl
     with style.style():
         figure = style.new_figure(8.2, 10.0)
         panels = figure.subplots(3, 1, sharex=True)
-        handles: list[style.Artist] = []
+        handles = draw_stability(panels[0], dataset)
         for well in range(dataset.sizes["well"]):
             color = style.color(well)
-            _stability(panels[0], dataset, well, color)
             _lines(panels[1], dataset, well, color, {"lim": ("-", "o"), "factor": ("--", "s")})
             _lines(panels[2], dataset, well, color, {"shock": ("-", "o"), "kick": ("--", "s")})
-            handles.append(style.entry(_name(dataset, well), color=color, lw=3.0))
+        for axes in panels[1:]:
+            _mark_events(axes, dataset)
         _axes(panels, dataset, name)
         handles += [
-            *_shares(),
             style.entry("about the well: LIM; shock of all four states", marker="o", ms=5),
             style.entry("anywhere: IF; kick of the rates alone", ls="--", marker="s", ms=5),
-            style.entry("limited by the window", marker="o", mfc="white", ms=5, ls="none"),
-            style.entry("smaller one tried is undecided", marker="x", ms=6, ls="none"),
         ]
-        if _limited(dataset):
-            look: dict[str, Any] = {"marker": "^", "mfc": "white", "ms": 6, "lw": 1.0, "ls": ":"}
-            handles.append(style.entry("radius, if all undecided starts ended there", **look))
+        lines = [line for axes in panels[1:] for line in axes.lines if np.size(line.get_xdata())]
+        looks: dict[str, dict[str, Any]] = {
+            "limited by the window": {"marker": "o", "mfc": "white", "ms": 5, "ls": "none"},
+            "smaller one tried is undecided": {"marker": "x", "ms": 6, "ls": "none"},
+            "radius, if all undecided starts ended there": {
+                "marker": "^",
+                "mfc": "white",
+                "ms": 6,
+                "ls": ":",
+            },
+        }
+        for text, look in looks.items():
+            if any(line.get_marker() == look["marker"] for line in lines if line.get_linestyle() == "None"):
+                handles.append(style.entry(text, **look))
         style.legend_below(figure, handles)
-        figure.suptitle(_title(dataset, scene, name))
+        style.suptitle(figure, _title(dataset, scene, name))
         return {"profile": figure}
 
 
@@ -49,20 +60,16 @@ def draw_stability(axes: style.Axes, dataset: Dataset) -> list[style.Artist]:
     axes.set(xlabel=_along(dataset, name), ylabel="share of the starts [%]", ylim=(0.0, 102.0))
     axes.set_title(f"Basin stability along {name}")
     wells = [style.entry(_name(dataset, well), color=color, lw=3.0) for well, color in colors.items()]
-    return [*wells, *_shares()]
-
-
-def _shares() -> list[style.Artist]:
-    """What stands beside a share's line."""
-    return [
-        style.swatch("95 % Wilson interval, undecided starts as none or all", "#bdbdbd"),
-        style.entry("if all undecided starts ended there", lw=1.0, ls=":"),
-    ]
+    wells.append(style.swatch("95 % Wilson interval, undecided starts as none or all", "#bdbdbd"))
+    if np.nansum(dataset["well_undecided"].data):
+        wells.append(style.entry("if all undecided starts ended there", lw=1.0, ls=":"))
+    return [*wells, *_mark_events(axes, dataset)]
 
 
 def _along(dataset: Dataset, name: str) -> str:
     greek = {"alpha": "α", "beta": "β"}.get(name, name)
-    return f"{dataset[name].long_name}, {greek} [{dataset[name].units}]"
+    about = str(dataset[name].long_name)
+    return f"{'' if about.startswith('parameter of') else f'{about}, '}{greek} [{dataset[name].units}]"
 
 
 def _name(dataset: Dataset, well: int) -> str:
@@ -71,17 +78,37 @@ def _name(dataset: Dataset, well: int) -> str:
     there = np.isfinite(dataset["well_stability"].data[:, well])
     values = dataset[name].data[there]
     if not values.size:
-        return f"well {well + 1}: not at these values"
-    return f"well {well + 1}, seen from {values[0]:g} to {values[-1]:g} {dataset[name].units}"
+        return f"well {well}: not at these values"
+    return f"well {well}, seen from {values[0]:g} to {values[-1]:g} {dataset[name].units}"
 
 
 def _stability(axes: style.Axes, dataset: Dataset, well: int, color: str) -> None:
     x = dataset[str(dataset.attrs["along"])].data
     names = ("stability", "lower", "upper", "undecided")
     share, lower, upper, undecided = (100.0 * dataset[f"well_{name}"].data[:, well] for name in names)
-    axes.fill_between(x, lower, upper, color=color, alpha=0.3, lw=0)
-    axes.plot(x, share, color=color, marker="o", ms=4)
-    axes.plot(x, share + undecided, color=color, lw=1.0, ls=":")
+    broken, low, high = _broken(dataset, x, lower, upper)
+    axes.fill_between(broken, low, high, color=color, alpha=0.3, lw=0)
+    axes.plot(*_broken(dataset, x, share), color=color, marker="o", ms=4)
+    axes.plot(*_broken(dataset, x, share + undecided), color=color, lw=1.0, ls=":")
+
+
+def _events(dataset: Dataset) -> np.ndarray:
+    """Indices of the values since which a well has come or gone."""
+    there = np.isfinite(dataset["well_stability"].data)
+    return np.flatnonzero((there[1:] != there[:-1]).any(axis=1)) + 1
+
+
+def _broken(dataset: Dataset, *lines: np.ndarray) -> list[np.ndarray]:
+    """Lines that break where a well comes or goes."""
+    return [np.insert(line.astype(np.float64), _events(dataset), np.nan) for line in lines]
+
+
+def _mark_events(axes: style.Axes, dataset: Dataset) -> list[style.Artist]:
+    """Where a well comes or goes; returns the legend's entry."""
+    x = dataset[str(dataset.attrs["along"])].data
+    for k in _events(dataset):
+        axes.axvspan(x[k - 1], x[k], color=EVENT, lw=0, zorder=0)
+    return [style.swatch("a well comes or goes in between", EVENT)] * bool(_events(dataset).size)
 
 
 def _lines(
@@ -90,7 +117,7 @@ def _lines(
     x = dataset[str(dataset.attrs["along"])].data
     for measure, (dashes, marker) in looks.items():
         y = dataset[f"well_{measure}"].data[:, well]
-        axes.plot(x, y, color=color, ls=dashes, marker=marker, ms=5)
+        axes.plot(*_broken(dataset, x, y), color=color, ls=dashes, marker=marker, ms=5)
         if f"well_{measure}_at_window" in dataset:
             cut = dataset[f"well_{measure}_at_window"].data[:, well].astype(np.bool_)
             axes.plot(x[cut], y[cut], marker, color=color, mfc="white", ms=5, ls="none")
@@ -105,12 +132,6 @@ def _lines(
             axes.plot(x[early], first[early], "x", color=color, ms=6)
 
 
-def _limited(dataset: Dataset) -> bool:
-    """Whether starts of the map without a label limit a radius."""
-    names = [name for name in ("well_lim", "well_factor") if f"{name}_at_most" in dataset]
-    return any(bool((dataset[f"{name}_at_most"].data > dataset[name].data).any()) for name in names)
-
-
 def _axes(panels: np.ndarray, dataset: Dataset, name: str) -> None:
     titles = (
         ("share of the starts [%]", "Basin stability: random starts in the window"),
@@ -121,16 +142,15 @@ def _axes(panels: np.ndarray, dataset: Dataset, name: str) -> None:
         axes.set_ylabel(label)
         axes.set_title(title)
         axes.set_ylim(bottom=0.0)
-    panels[0].set_ylim(0.0, 102.0)
+    panels[0].set(xlabel="", ylim=(0.0, 102.0))
     panels[-1].set_xlabel(_along(dataset, name))
 
 
 def _title(dataset: Dataset, scene: Mapping[str, float], name: str) -> str:
-    units = {"F0": "N", "c1": "N/m", "c2": "N/m", "beta": "N s/m"}
-    held = ", ".join(f"{key} = {scene[key]:g} {unit}" for key, unit in units.items() if key != name)
+    held = style.setting_of(dataset.attrs, {key: value for key, value in scene.items() if key != name})
     spans = []
     for axis in dataset.attrs["axes"]:
         low, high = dataset.attrs[f"window_{axis}"]
         spans.append(f"{style.symbol(axis)} from {low:.3g} to {high:.3g} {STATE_UNITS[axis]}")
     window = f"window: {', '.join(spans)}; runs to {dataset.attrs['t_end']:g} s"
-    return f"Erosion of the wells along {name}; {held}\n{window}"
+    return f"Erosion of the wells along {name}, {held}\n{window}"

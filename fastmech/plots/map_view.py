@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from fastmech.arrays import Floats
 from fastmech.plots import style
 from fastmech.results import Dataset, Variable
-from fastmech.scene import Scene
 from fastmech.store.read import Section
 
 #: Points of an axis that are drawn at most; of longer ones every n-th is read.
@@ -44,21 +43,11 @@ class View:
 
     @property
     def setting(self) -> str:
-        """For titles: what is not on the axes, as far as it differs from Table 1, and what is left out."""
-        own = {name: value for name, value in self.scene.items() if name not in self.axes and name != "alpha"}
+        """For titles: what differs from the defaults and is not on the axes, and what is left out."""
+        own = {name: value for name, value in self.scene.items() if name not in self.axes}
         own |= {name: float(self.axis(name)[i]) for name, i in self.held.items()}
         left_out = str(self.dataset.attrs.get("drawn", ""))
-        if "mechanism" in self.dataset.attrs:
-            return style.setting_of(self.dataset, own) + left_out
-        decayed = own.get("alpha", self.scene["alpha"]) > 0.0 and "alpha" not in self.axes
-        told = [
-            f"{name} = {own[name]:.6g} {unit}"
-            for name, (value, unit, _) in Scene().described().items()
-            if name in own and own[name] != value and not (decayed and name in ("F0", "alpha"))
-        ]
-        if decayed:
-            told.append("the force decayed")
-        return " with ".join(["Table 1", *([", ".join(told)] if told else [])]) + left_out
+        return style.setting_of(self.dataset.attrs, own, decayed=True) + left_out
 
     def data(self, name: str) -> NDArray[np.generic]:
         """A variable over the axes drawn."""

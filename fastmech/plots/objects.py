@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fastmech.plots import style
-from fastmech.plots.basins import COLORS, Slice, describe, draw_ends, draw_labels
+from fastmech.plots.basins import Slice, describe, draw_ends, draw_labels
 from fastmech.plots.equilibria import draw_potential, mark_kinds
 from fastmech.plots.equilibrium_map import LEAST_SPAN, draw_branches, draw_count, draw_verdicts, folds_of
 from fastmech.plots.erosion import draw_stability
@@ -15,6 +15,9 @@ from fastmech.plots.map_view import draw_curves, make_view
 from fastmech.plots.motion import TIME, draw_states
 from fastmech.results import coordinate_units, state_units
 from fastmech.scene import Scene
+
+#: Points of an attractor up to which each is drawn as a mark.
+FEW_POINTS = 32
 
 #: Trajectories that are drawn at most: evenly chosen ones.
 MOST_LINES = 50
@@ -25,13 +28,6 @@ def _parameters(system: Any) -> dict[str, float]:
     return {name: value for name, (value, *_) in system.described().items()}
 
 
-def _setting(system: Any) -> str:
-    """The name of a mechanism or a system, with some of its parameters, for titles."""
-    values = list(_parameters(system).items())
-    each = ", ".join(f"{name} = {value:g}" for name, value in values[: style.MOST_TOLD])
-    return f"{system.name}: {each}{', ...' * (len(values) > style.MOST_TOLD)}"
-
-
 def draw_trajectories(found: Any, axes: style.Axes) -> None:
     """Coordinates over time, of at most 50 trajectories; of a system of one's own all states."""
     units = state_units(found.system)
@@ -40,18 +36,19 @@ def draw_trajectories(found: Any, axes: style.Axes) -> None:
     values = {n: found.y[:, kept, k] for k, (n, u) in enumerate(units.items()) if u == unit}
     draw_states(axes, found.t, values, unit)
     axes.set_xlabel(TIME)
+    style.title(axes, f"Motion\n{style.setting(found.system)}")
     axes.legend()
 
 
 def draw_disturbances(found: Any, axes: style.Axes) -> None:
     """Share of all disturbances that are back for good, over time."""
     times = np.sort(found.time_to_return[np.isfinite(found.time_to_return)])
-    share = 100.0 * np.arange(1, times.size + 1) / found.outcome.size
-    axes.step(
-        np.append(times, found.t_end), np.append(share, share[-1:] if times.size else 0.0), where="post"
-    )
+    share = 100.0 * np.arange(times.size + 1) / found.outcome.size
+    by_then = np.append(share, share[-1])
+    axes.step([0.0, *times, found.t_end], by_then, where="post", label="back by then")
     axes.axhline(100.0 * found.share_returned, color=style.LINES[1], ls="--", label="proved to return")
-    axes.set(xlabel=TIME, ylabel="share of the disturbances back [%]", xlim=(0.0, None), ylim=(0.0, 103.0))
+    axes.set(xlabel=TIME, ylabel="share of the disturbances back [%]", xlim=(0.0, None), ylim=(-3.0, 103.0))
+    style.title(axes, f"Disturbed motions\n{style.setting(found.system)}")
     axes.legend()
 
 
@@ -60,15 +57,21 @@ def draw_departures(found: Any, axes: style.Axes) -> None:
     names = list(coordinate_units(found.system).items())
     for k, (name, unit) in enumerate(names):
         nonlinear, linearized = (motion[:, :MOST_LINES, k] for motion in (found.nonlinear, found.linearized))
-        axes.plot(found.t, nonlinear, color=style.LINES[k])[0].set_label(f"{style.symbol(name)} [{unit}]")
-        axes.plot(found.t, linearized, color=style.LINES[k], ls="--")
-    axes.plot([], [], color="black", ls="--", label="linearized")
-    axes.set(xlabel=TIME, ylabel="departure from the equilibrium")
+        look: Any = {"color": style.LINES[k], "marker": "o" if found.t.size == 1 else ""}
+        axes.plot(found.t, nonlinear, **look)[0].set_label(f"{style.symbol(name)} [{unit}]")
+        axes.plot(found.t, linearized, ls="--", mfc="white", **look)
+    told: Any = {"marker": "o", "mfc": "white"} if found.t.size == 1 else {}
+    axes.plot([], [], color="black", ls="--", label="linearized", **told)
+    units = dict.fromkeys(unit for _, unit in names)
+    axes.set(xlabel=TIME, ylabel=f"departure from the equilibrium [{', '.join(units)}]")
+    style.title(axes, f"Disturbed motion\n{style.setting(found.system)}")
     axes.legend()
 
 
 def draw_resting(found: Any, axes: style.Axes) -> None:
     """Equilibria by kind: on a scene's potential, else over two coordinates, or one and the energy."""
+    from matplotlib.ticker import MaxNLocator
+
     dataset = found.dataset()
     if isinstance(found.system, Scene):
         draw_potential(axes, dataset, found.system)
@@ -81,14 +84,23 @@ def draw_resting(found: Any, axes: style.Axes) -> None:
             low, high = dataset[name].data.min(), dataset[name].data.max()
             room = 0.15 * (high - low) + LEAST_SPAN
             getattr(axes, f"set_{axis}lim")(low - room, high + room)
+            getattr(axes, f"{axis}axis").set_major_locator(MaxNLocator(5))
+        style.title(axes, f"Equilibria\n{style.setting(found.system)}")
     style.legend_under(axes, columns=4)
 
 
 def draw_map(found: Any, axes: style.Axes) -> None:
-    """Numbers of equilibria over two parameters; over one phi, or the coordinate that varies most."""
+    """Numbers of equilibria over two parameters; over one phi, or the coordinate that varies most.
+
+    Where their number is the same everywhere, the number of stable ones is drawn.
+    """
     view = make_view(found.dataset(), _parameters(found.system))
+    about = f"\n{view.setting}"
     if len(view.axes) == 2:
-        draw_count(axes, view, "count", "Number of equilibria")
+        name, kind = ("count", "") if np.ptp(view.data("count")) else ("count_stable", "stable ")
+        handles, curves = draw_count(axes, view, name, "")
+        style.title(axes, f"Number of {kind}equilibria{about}")
+        style.legend_under(axes, handles + curves)
         return
     if isinstance(found.system, Scene):
         draw_branches(axes, view, "phi", folds_of(view, view.axes[0]))
@@ -96,6 +108,7 @@ def draw_map(found: Any, axes: style.Axes) -> None:
         names = style.coordinates_of(view.dataset)
         draw_verdicts(axes, view, max(names, key=lambda name: np.ptp(np.nan_to_num(view.axis(name)))))
     axes.set_xlabel(view.label(view.axes[0]))
+    style.title(axes, f"Equilibria over {view.axes[0]}{about}")
     style.legend_under(axes)
 
 
@@ -104,13 +117,21 @@ def draw_curves_of(found: Any, axes: style.Axes) -> None:
     dataset = found.dataset()
     units = found.system.described()
     names = dataset.attrs["axes"]
+    style.title(
+        axes, f"{'Folds' if len(names) == 1 else 'Curves'}\n{style.setting(found.system, names, True)}"
+    )
     if len(names) == 1:
-        axes.plot(dataset[f"fold_{names[0]}"].data, dataset["fold_phi"].data, "o", label="fold")
+        places = dataset[f"fold_{names[0]}"].data
+        axes.plot(places, dataset["fold_phi"].data, "o", label="fold")
         axes.set(xlabel=f"{names[0]} [{units[names[0]][1]}]", ylabel="angle φ [rad]")
+        if not places.size:
+            style.message(axes, "no fold between these values")
         return
     from fastmech.plots.map_view import View
 
     handles = draw_curves(axes, View(dataset, {}, names, {}))
+    if not handles:
+        style.message(axes, "no curve between these values")
     axes.set(**{f"{k}label": f"{n} [{units[n][1]}]" for k, n in zip("xy", names, strict=True)})
     style.legend_under(axes, handles)
 
@@ -126,12 +147,17 @@ def draw_critical_curves(found: Any, axes: style.Axes) -> None:
         axes.plot(*found.cusps[:, :2].T, "D", color="white", mec="black", ls="none", label="cusp")
     units = found.system.described()
     axes.set(**{f"{k}label": f"{n} [{units[n][1]}]" for k, n in zip("xy", found.names, strict=True)})
+    style.title(axes, f"Critical curves\n{style.setting(found.system, found.names)}")
+    if not found.curves:
+        style.message(axes, "no curve between these values")
     style.legend_under(axes)
 
 
 def draw_erosion_profile(found: Any, axes: style.Axes) -> None:
     """Shares of the starts that end in each well, with their intervals."""
-    style.legend_under(axes, draw_stability(axes, found.dataset()), 1)
+    handles = draw_stability(axes, found.dataset())
+    style.title(axes, f"{axes.get_title()}\n{style.setting(found.system, [found.parameter])}")
+    style.legend_under(axes, handles)
 
 
 def draw_snapping_map(found: Any, axes: style.Axes) -> None:
@@ -143,13 +169,17 @@ def draw_exponents(found: Any, axes: style.Axes) -> None:
     """Estimates of the largest Lyapunov exponent over time."""
     axes.plot(found.t, found.exponents[:, :MOST_LINES], color=style.LINES[0])
     axes.set(xlabel=TIME, ylabel="largest Lyapunov exponent [1/s]")
+    style.title(axes, f"Estimates over time\n{style.setting(found.system)}")
 
 
 def draw_attractors(found: Any, axes: style.Axes) -> None:
     """Points of the attractors over the first two states."""
     columns = [0, min(1, len(found.names) - 1)]
     for k, one in enumerate(found.attractors):
-        look: Any = {"marker": "o", "ms": 8} if len(one.points) == 1 else {"marker": ".", "ms": 3}
+        look: Any = {
+            "marker": "o",
+            "ms": 8 if len(one.points) == 1 else 5 if len(one.points) < FEW_POINTS else 1,
+        }
         axes.plot(
             *one.points[:, columns].T,
             ls="none",
@@ -157,8 +187,10 @@ def draw_attractors(found: Any, axes: style.Axes) -> None:
             label=one.name,
             **look,
         )
-    axes.set(**{f"{x}label": found.names[c] for x, c in zip("xy", columns, strict=True)})
-    axes.set_title(_setting(found.system))
+    units = state_units(found.system)
+    told = [style.with_unit(style.symbol(n), units.get(n, "1")) for n in (found.names[c] for c in columns)]
+    axes.set(xlabel=told[0], ylabel=told[1])
+    style.title(axes, f"Attractors\n{style.setting(found.system)}")
     style.legend_under(axes, columns=1)
 
 
@@ -168,28 +200,34 @@ def draw_basin_map(found: Any, axes: style.Axes) -> None:
     if "equilibria" in dataset.groups:
         scene = found.system if isinstance(found.system, Scene) else None
         view = Slice(dataset.merged, scene)
-        style.legend_under(axes, draw_labels(axes, view))
+        handles = draw_labels(axes, view)
+        style.legend_under(axes, handles)
         describe(axes, view, _parameters(found.system))
         return
     names = [*found.axes][:2]
     well = found.well.reshape(*(found.axes[n].size for n in names), -1)
     well = well[..., well.shape[-1] // 2].reshape(found.axes[names[0]].size, -1)
     there = np.unique(well)
-    colors = ["#d9d9d9" if k < 0 else COLORS[i % len(COLORS)] for i, k in enumerate(there)]
+    colors = ["#d9d9d9" if k < 0 else style.color(k) for k in there]
     y = found.axes[names[1]] if len(names) > 1 else np.zeros(1)
     style.paint(axes, found.axes[names[0]], y, np.searchsorted(there, well), colors)
-    axes.set(xlabel=names[0], ylabel=names[1] if len(names) > 1 else "")
+    units = state_units(found.system)
+    labels = [f"{style.with_unit(style.symbol(name), units.get(name, '1'))} at the start" for name in names]
+    axes.set(xlabel=labels[0], ylabel=labels[1] if len(names) > 1 else "")
     told = ["no label" if k < 0 else f"code {k}" if found.tree is None else found.tree[k].name for k in there]
     shares = [f"{text}: {np.mean(well == k):.1%}" for k, text in zip(there, told, strict=True)]
     handles = [style.swatch(t, c, "black") for c, t in zip(colors, shares, strict=True)]
     if found.tree is not None and len(names) > 1:
         columns = [found.tree.names.index(name) for name in names]
-        looks: Any = {"ls": "none", "marker": "o", "mfc": "white", "mec": "black", "ms": 5}
+        looks: Any = {"ls": "none", "marker": "o", "mfc": "white", "mec": "black"}
         low, high = np.array([[found.axes[name][k] for name in names] for k in (0, -1)])
-        points = np.concatenate([one.points[:64, columns] for one in found.tree.attractors])
-        points = points[((points >= low) & (points <= high)).all(axis=1)]
-        if len(points):
-            axes.plot(*points.T, **looks)
-            handles.append(style.entry("points of attractors", **looks))
-    axes.set_title(_setting(found.system))
+        inside = False
+        for one in found.tree.attractors:
+            points = one.points[:, columns]
+            points = points[((points >= low) & (points <= high)).all(axis=1)]
+            axes.plot(*points.T, ms=5 if len(one.points) < FEW_POINTS else 1.5, **looks)
+            inside |= len(points) > 0
+        if inside:
+            handles.append(style.entry("points of attractors", ms=5, **looks))
+    style.title(axes, f"Where each start ends\n{style.setting(found.system)}")
     style.legend_under(axes, handles, 1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,7 @@ def draw_response(response: Any, ax: style.Axes, state: str | None = None) -> No
     if state is not None and state not in response.names:
         raise InputError(f"state: {nearest(str(state), list(response.names))}")
     _response(response.dataset(), ax, 0, state)
+    style.title(ax, f"{ax.get_title()}\n{style.setting(response.system, [response.parameter])}")
 
 
 def _response(dataset: Dataset, ax: style.Axes, line: int, state: str | None = None) -> None:
@@ -56,7 +57,7 @@ def _response(dataset: Dataset, ax: style.Axes, line: int, state: str | None = N
         if there.any():
             x, y = special["special_value"].data[there], special[f"special_{amplitude}"].data[there]
             ax.plot(x, y, marker, ls="none", mfc="white", mec="black", ms=5, label=kind, zorder=4)
-    ax.plot([], [], "-", color="black", lw=1.8, label="stable")
+    ax.plot([], [], "-", color="black", lw=1.8, label="stable (a colour for each branch)")
     ax.plot([], [], "--", color="black", lw=1.2, label="unstable")
     parameter = style.with_unit(str(dataset.attrs["parameter"]), points["point_value"].units)
     about = style.with_unit(amplitude.removeprefix(prefix), points[f"point_{amplitude}"].units)
@@ -73,30 +74,49 @@ def draw_shares(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style
 
 def draw_fractions(along: Any, ax: style.Axes) -> None:
     """Draw shares stacked over the parameter."""
-    _fractions(along.dataset(), ax, 0)
+    _fractions(along.dataset(), ax, 0, [told_attractor(along, k) for k in range(along.fractions.shape[1])])
+    style.title(ax, f"{ax.get_title()}\n{style.setting(along.system, [along.parameter])}")
 
 
-def _fractions(dataset: Dataset, ax: style.Axes, line: int) -> None:
+def told_attractor(along: Any, number: int) -> str:
+    """An attractor's number, with its kind where it is first met."""
+    first = next((one[number] for one in along.attractors if number in one), None)
+    period = getattr(first, "forcing_periods", None)
+    told = f", period {period} of the forcing" if period else f", {getattr(first, 'kind', '')}"
+    return f"{number}{told.rstrip(', ')}"
+
+
+def _fractions(dataset: Dataset, ax: style.Axes, line: int, names: Sequence[str] = ()) -> None:
     name, tips = str(dataset.attrs["along"]), dataset.groups["tipping"]
     values, every = dataset[name].data, dataset["share"].data
     share = every.reshape(-1, *every.shape[-2:])[line]
-    shares = np.nan_to_num(share[:, np.isfinite(share).any(axis=0)]).T
-    number = len(shares)
-    names = [f"attractor {k}" for k in range(number)]
+    known = np.flatnonzero(np.isfinite(share).any(axis=0))
+    shares, number = np.nan_to_num(share[:, known]).T, known.size
+    names = [f"attractor {names[k] if names else k}" for k in known.tolist()]
     colors = [style.color(k) for k in range(number)]
     rest = np.maximum(dataset["unlabelled"].data.reshape(-1, values.size)[line], 0.0)
     if (rest > 0.0).any():
         shares, names, colors = np.vstack([shares, rest]), [*names, "without a label"], [*colors, "#d9d9d9"]
-    areas = ax.stackplot(values, shares, labels=names, colors=colors, alpha=0.85)
+    there = (tips["tipping_along"].data == name) & (tips["tipping_line"].data == line)
+    events = np.unique(0.5 * (tips["tipping_low"].data + tips["tipping_high"].data)[there])
+    # Areas break where an attractor comes or goes.
+    order = np.argsort(values)
+    x, shares = values[order], shares[:, order]
+    after = np.searchsorted(x, events)
+    after, one = np.unique(after, return_index=True)
+    breaks, after = np.repeat(events[one], 2), np.repeat(after, 2)
+    shares = np.insert(shares, after, shares[:, after - 1 + np.arange(after.size) % 2], axis=1)
+    areas = ax.stackplot(np.insert(x, after, breaks), shares, labels=names, colors=colors, alpha=0.85)
     for k, area in enumerate(areas[:number]):
         area.set_hatch(HATCHES[k // len(style.LINES) % len(HATCHES)])
-    there = (tips["tipping_along"].data == name) & (tips["tipping_line"].data == line)
-    for change in 0.5 * (tips["tipping_low"].data + tips["tipping_high"].data)[there]:
+    for change in events:
         ax.axvline(change, color="black", lw=0.8, ls=":")
+    if events.size:
+        ax.plot([], [], color="black", lw=0.8, ls=":", label="one comes or goes")
     low, high = sorted((values[0], values[-1]))
     ax.set(xlabel=name, ylabel="share of the starts", xlim=(low, high), ylim=(0.0, 1.0))
     ax.set_title("Where starts end")
-    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    style.legend_under(ax)
 
 
 def draw_numbers(over: Any, ax: style.Axes) -> None:
@@ -116,7 +136,8 @@ def draw_numbers(over: Any, ax: style.Axes) -> None:
     ]
     ax.plot(*np.reshape(tips, (-1, 2)).T, "k.", ms=4, label="one comes or goes")
     ax.figure.colorbar(mesh, ax=ax, label="attractors")
-    ax.set(xlabel=first.parameter, ylabel=over.second, title="Attractors")
+    ax.set(xlabel=first.parameter, ylabel=over.second)
+    style.title(ax, f"Attractors\n{style.setting(over.system, [first.parameter, over.second])}")
 
 
 def _lines(
@@ -138,5 +159,6 @@ def _lines(
                 unit = "" if values.units == "1" else f" {values.units}"
                 ax.set_title(f"{ax.get_title()}; {name} = {values.data[k]:g}{unit}")
         changes = {*dataset.variables, dataset.attrs.get("parameter")}
-        figure.suptitle(style.setting_of(dataset, {k: v for k, v in scene.items() if k not in changes}))
+        held = {name: value for name, value in scene.items() if name not in changes}
+        style.suptitle(figure, style.setting_of(dataset.attrs, held))
     return figure

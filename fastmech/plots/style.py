@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from io import BytesIO
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fastmech.results import Dataset, Variable
+from fastmech.scene import Scene
 
 if TYPE_CHECKING:  # matplotlib is loaded where something is drawn
     from matplotlib.artist import Artist as Artist
@@ -46,6 +50,9 @@ def color(number: int) -> str:
 FIELD = "cividis"
 
 DPI = 150
+
+#: Rows of a legend for which figures have room; for more they grow.
+ROWS = 9
 
 _SETTINGS: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
@@ -95,15 +102,42 @@ def new_panel(width: float = 7.2, height: float = 4.2) -> tuple[Figure, Axes]:
 
 def legend_below(figure: Figure, of: Axes | Sequence[Artist], columns: int = 2) -> None:
     """A legend of what axes have, or of some entries, under the whole figure, where it covers nothing."""
-    handles = of if isinstance(of, Sequence) else of.get_legend_handles_labels()[0]
-    figure.legend(handles=list(handles), loc="outside lower center", ncols=columns)
+    handles = list(of if isinstance(of, Sequence) else of.get_legend_handles_labels()[0])
+    fit = _fitting(handles, columns, 72.0 * figure.get_figwidth())
+    beyond = max(0, -(-len(handles) // fit) - ROWS)
+    figure.set_figheight(figure.get_figheight() + 0.19 * beyond)
+    figure.legend(handles=handles, loc="outside lower center", ncols=fit)
+
+
+def _fitting(handles: Sequence[Artist], columns: int, points: float) -> int:
+    """How many columns of a legend fit over so many points, not more than asked for."""
+    from matplotlib import rcParams
+
+    longest = max((len(str(one.get_label())) for one in handles), default=0)
+    return max(1, min(columns, _letters(points, rcParams["legend.fontsize"]) // (longest + 6)))
 
 
 def legend_under(axes: Axes, handles: Sequence[Artist] | None = None, columns: int = 2) -> None:
-    """A legend under axes that may be one panel of a user's figure."""
+    """A legend under axes that may be one panel of a user's figure, in as many columns as fit."""
+    from matplotlib.transforms import ScaledTranslation
+
     known = axes.get_legend_handles_labels()[0] if handles is None else handles
     if known:
-        axes.legend(handles=list(known), loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=columns)
+        # Below the ticks' labels and the axis' own, however high the axes are.
+        below = -3.8 * float(axes.xaxis.label.get_fontsize()) / 72.0
+        place = axes.transAxes + ScaledTranslation(0.0, below, axes.figure.dpi_scale_trans)
+        look: dict[str, Any] = {"bbox_transform": place, "ncols": _fitting(known, columns, _points(axes))}
+        axes.legend(handles=list(known), loc="upper center", bbox_to_anchor=(0.5, 0.0), **look)
+
+
+def make_room(axes: Axes) -> None:
+    """Make the axes' own figure as much higher as their legend and title are."""
+    figure: Any = axes.figure
+    legend = axes.get_legend()
+    heights = [axes.title.get_window_extent().height]
+    if legend is not None and legend.get_window_extent().y1 < axes.get_window_extent().y0:
+        heights.append(legend.get_window_extent().height)
+    figure.set_figheight(figure.get_figheight() + sum(heights) / figure.dpi)
 
 
 def save(figure: Figure, path: Path) -> None:
@@ -120,9 +154,6 @@ def png(figure: Figure) -> bytes:
         figure.savefig(buffer, format="png", dpi=DPI)
     return buffer.getvalue()
 
-
-#: Parameters of a mechanism that a title tells.
-MOST_TOLD = 6
 
 #: A code that no variable has.
 NOWHERE = 1 << 40
@@ -147,11 +178,89 @@ def coordinates_of(dataset: Dataset | Section) -> tuple[str, ...]:
     return tuple(dataset.attrs.get("coordinate_names", ANGLES))
 
 
-def setting_of(dataset: Dataset, parameters: Mapping[str, float]) -> str:
-    """A mechanism and some of its parameters, for titles."""
-    each = ", ".join(f"{name} = {value:g}" for name, value in list(parameters.items())[:MOST_TOLD])
-    name = dataset.attrs.get("mechanism", dataset.attrs.get("system", ""))
-    return f"{name}: {each}{', ...' * (len(parameters) > MOST_TOLD)}"
+def _defaults(name: str) -> dict[str, tuple[float, str, str]]:
+    """Value and unit of every parameter of Table 1, or of a shipped mechanism."""
+    from fastmech import mechanisms
+    from fastmech.models.mechanism import MOST_COORDINATES
+
+    if not name:
+        return Scene().described()
+    shipped: dict[str, Any] = {made: getattr(mechanisms, made) for made in mechanisms.__all__}
+    chain = shipped.pop("pendulum_chain")
+    shipped |= {f"pendulum_chain_{n}": partial(chain, n) for n in range(1, MOST_COORDINATES + 1)}
+    return shipped[name]().described() if name in shipped else {}
+
+
+def setting_of(about: Mapping[str, Any], parameters: Mapping[str, float], decayed: bool = False) -> str:
+    """What differs from the defaults among these parameters, with units, for titles.
+
+    Args:
+        about: a section's attributes; of a mechanism or a system its name, and ``unit_*`` of its parameters.
+        parameters: all but those on axes; those of a system of one's own have no defaults.
+        decayed: what is shown is without a force that fades.
+    """
+    name = str(about.get("mechanism", about.get("system", "")))
+    known, own = _defaults(name), dict(parameters)
+    told = []
+    if not name and "alpha" in own:
+        alpha, force = own.pop("alpha"), own.pop("F0", None)
+        decayed = decayed and alpha > 0.0
+        if not decayed and force is not None and (force, alpha) != (known["F0"][0], known["alpha"][0]):
+            told = [f"F = {force:.5g} N" + f" exp(-{alpha:.5g} t/s)" * bool(force and alpha)]
+    for one, value in own.items():
+        default, unit = (*known.get(one, (np.nan, "1")), "")[:2]
+        if f"{value:.5g}" != f"{default:.5g}":  # 1100/3 N/m is printed as 366.67 N/m
+            unit = str(about.get(f"unit_{one}", unit))
+            told.append(f"{one} = {value:.5g}" + f" {unit}" * (unit != "1"))
+    told += ["the force decayed"] * (decayed and not name)
+    return (name or "Table 1") + (f" with {', '.join(told)}" if told else "")
+
+
+def setting(system: Any, varied: Container[str | None] = (), decayed: bool = False) -> str:
+    """The same of a scene, a mechanism or a system, but for the parameters that vary."""
+    known = system.described()
+    about = {} if isinstance(system, Scene) else {"system": system.name}
+    about |= {f"unit_{name}": unit for name, (_, unit, _) in known.items()}
+    return setting_of(
+        about, {name: value for name, (value, *_) in known.items() if name not in varied}, decayed
+    )
+
+
+def _points(axes: Axes) -> float:
+    """How wide axes are."""
+    return 72.0 * axes.get_window_extent().width / axes.figure.dpi
+
+
+def _letters(points: float, size: Any) -> int:
+    """How many letters of this size fit over so many points."""
+    from matplotlib.font_manager import FontProperties
+
+    return int(points / (0.57 * FontProperties(size=size).get_size_in_points()))
+
+
+def title(axes: Axes, text: str, size: float | None = None) -> None:
+    """A title over axes, in as many lines as it takes."""
+    from matplotlib import rcParams
+
+    of = rcParams["axes.titlesize"] if size is None else size
+    axes.set_title(_in_lines(text, _letters(_points(axes), of)), fontsize=of)
+
+
+def _in_lines(text: str, width: int) -> str:
+    """Lines of so many letters, with values and their units beside their names."""
+    whole = re.sub(r"\S+ = [^,;\n]+", lambda found: found[0].replace(" ", "\xa0"), text)
+    return "\n".join(fill(line, width) for line in whole.split("\n")).replace("\xa0", " ")
+
+
+def suptitle(figure: Figure, text: str) -> None:
+    """A title over all panels, in as many lines as it takes."""
+    figure.suptitle(_in_lines(text, int(12 * figure.get_figwidth())), fontsize=10.0)
+
+
+def message(axes: Axes, text: str) -> None:
+    """Why there is nothing to draw."""
+    axes.set(xticks=[], yticks=[])
+    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", wrap=True)
 
 
 def with_unit(name: str, unit: str) -> str:

@@ -285,7 +285,7 @@ def test_pictures_tell_their_scene():
     assert line.get_title() == (
         "Equilibria over F0; folds at -671.163, 671.163 N\nTable 1 with c1 = 294.9 N/m, c2 = 92.85 N/m"
     )
-    assert {"stable, number 1", "stable, number 2"} <= {curve.get_label() for curve in line.lines}
+    assert {"stable, number 0", "stable, number 1"} <= {curve.get_label() for curve in line.lines}
 
 
 def test_pitchforks_are_named_and_missing_proofs_told():
