@@ -104,7 +104,7 @@ class ErosionProfile(Drawn):
             if there.size:
                 a, b = there[0], there[-1]
                 lines.append(
-                    f"  well {w + 1}, {self.values[a]:g} to {self.values[b]:g}{unit}: share of the starts "
+                    f"  well {w}, {self.values[a]:g} to {self.values[b]:g}{unit}: share of the starts "
                     f"{self.stability[a, w]:.1%} to {self.stability[b, w]:.1%}, smallest shock "
                     f"{self.shock[a, w]:.3g} to {self.shock[b, w]:.3g} rad"
                 )
