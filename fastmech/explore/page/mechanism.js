@@ -18,7 +18,7 @@ export class MechanismView {
     this.panel = panel("mechanism", "Mechanism", { planes: () => [this.plane] });
     this.play = element("button", { onclick: () => this.toggle() }, "play");
     this.scrub = element("input", { type: "range", min: 0, max: 1, value: 0, "aria-label": "time" });
-    this.scrub.addEventListener("input", () => { this.pause(); this.frame = Number(this.scrub.value); this.moved(); });
+    this.scrub.addEventListener("input", () => { this.frame = Number(this.scrub.value); this.exact = null; this.pause(); });
     this.speed = element("select", { "aria-label": "speed" }, ...[0.1, 0.25, 0.5, 1, 2, 4].map((s) => element("option", { value: s }, `${s}×`)));
     this.speed.value = 1;
     this.time = element("span", { role: "timer" });
@@ -54,7 +54,7 @@ export class MechanismView {
   atRest() { this.motion = null; this.struck = null; this.fire = false; this.frame = 0; this.time.textContent = ""; this.pause(); this.extent(); this.tell(); }
   tell() {
     if (this.motion) this.panel.tell(this.app.about, this.motion.t_end > 0 ? "mechanism" : "rest", { ...this.motion.asked, chosen: this.app.state.chosen });
-    else if (this.resting) this.panel.tell(this.app.about, "rest", { ...this.resting.asked, chosen: this.app.state.chosen });
+    else if (this.resting) this.panel.tell(this.app.about, "rest", { ...this.resting.asked, chosen: this.app.state.chosen, none: !this.app.rows.length });
   }
   extent() {
     const found = [[Infinity, -Infinity], [Infinity, -Infinity]];
@@ -161,6 +161,7 @@ export class MechanismView {
         ink.text(this.plane.box.left + 6, this.plane.box.top + 10 + 16 * k, `${SYMBOLS[n] ?? n} = ${fixed(y[k], 3)} ${states[n].unit}${degrees}`, { color: css("ink"), align: "left" });
       });
     }
+    if (!this.motion && !this.app.rows.length) ink.text(this.plane.box.right - 6, this.plane.box.top + 10, "no equilibrium is proved: drawn at zero", { color: css("ink"), align: "right" });
     if (of.forces.shape[1]) {
       const at = [this.plane.box.left + 10, this.plane.box.bottom - 12];
       this.arrow(at, [at[0] + 0.17 * unit, at[1]], css("vermillion"));
@@ -183,7 +184,7 @@ export class MechanismView {
   position() {
     const n = this.app.about.coordinates.length;
     if (this.motion) return Array.from({ length: n }, (_, k) => this.motion.y.data[this.frame * 2 * n + k]);
-    return this.app.rows?.[this.app.state.chosen]?.position;
+    return this.app.rows?.[this.app.state.chosen]?.position ?? Array(n).fill(0);
   }
   rates() {
     const n = this.app.about.coordinates.length;
