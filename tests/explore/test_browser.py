@@ -27,6 +27,7 @@ import numpy as np
 import pytest
 
 import fastmech as fm
+from fastmech.cli.run import mechanism_named
 from fastmech.runner import run_request
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import request_of_text
@@ -564,6 +565,67 @@ def test_a_page_whose_server_has_ended_says_so_and_cannot_be_moved(browser: Any)
     made.page.mouse.click(box["x"] + 0.9 * box["width"], box["y"] + 0.5 * box["height"])
     assert made.page.evaluate("explorer.state.parameters.m1") == 10.0
     made.page.close()
+
+
+OVERLAPS = """(() => {
+  const all = explorer.mechanism.labels.words, both = (a, b, k) => Math.min(a[k] + a[k + 2], b[k] + b[k + 2]) - Math.max(a[k], b[k]);
+  return all.flatMap((a, i) => all.slice(0, i).filter((b) => both(a, b, 0) > 1 && both(a, b, 1) > 1)).length;
+})()"""  # fmt: skip  # noqa: E501
+
+
+def test_words_in_the_drawing_lie_beside_each_other(opened: Opened) -> None:
+    page = opened.page
+    for width in (1000, 1600):
+        page.set_viewport_size({"width": width, "height": 1000})
+        page.evaluate("explorer.startAt({ phi: 1, theta: 0.1 })")
+        opened.until("explorer.motion && explorer.motion.shape[0] === 1201", 30)
+        page.locator("#mechanism canvas").scroll_into_view_if_needed()
+        for frame in range(0, 300, 12):  # the force fades: 32.6 N at 1.6 s
+            page.evaluate(f"explorer.mechanism.frame = {frame}; explorer.mechanism.moved()")
+            page.wait_for_timeout(40)
+            assert page.evaluate("explorer.mechanism.labels.words.length") >= 9
+            assert page.evaluate(OVERLAPS) == 0, frame
+        page.evaluate("explorer.choose(0)")
+        page.wait_for_timeout(200)
+        for way in (-30, 30):
+            x, y = of_point(opened, "M2")
+            page.keyboard.down("Shift")
+            page.mouse.move(x, y)
+            page.mouse.down()
+            page.mouse.move(x + way, y - 20, steps=3)
+            opened.until("explorer.mechanism.struck?.words.includes(' J')", 20)
+            page.wait_for_timeout(100)
+            assert page.evaluate(OVERLAPS) == 0, way
+            page.mouse.up()
+            page.keyboard.up("Shift")
+            page.wait_for_timeout(300)
+            page.evaluate("explorer.choose(0)")
+            page.wait_for_timeout(200)
+    page.set_viewport_size({"width": 1600, "height": 1000})
+
+
+DUFFING = """import fastmech as fm, sympy
+
+x = fm.lengths("x", -3, 3)
+made = fm.Mechanism(x, {"F": 0.05, "b": 0.3}, points={"M": (x, 0)}, masses={"M": 1.0},
+                    potential=-(x**2) / 2 + x**4 / 4, dampers=[fm.Damper((0, 0), "M", sympy.Symbol("b"))],
+                    forces=[fm.Force("M", fm.loads.Harmonic(sympy.Symbol("F"), 1.2), (1, 0))])
+"""
+
+
+def test_the_request_of_basins_under_a_load_that_repeats_runs(browser: Any, tmp_path: Path) -> None:
+    (tmp_path / "duffing.py").write_text(DUFFING)
+    with serving(f"{tmp_path}/duffing.py:made") as address:
+        made = Opened(browser.new_page(viewport={"width": 1600, "height": 1000}), address)
+        made.until("document.querySelector('#basins canvas').dataset.divisions === '25'", 120)
+        made.until("explorer.basins.panel.request", 30)
+        request = made.page.evaluate("explorer.basins.panel.request")
+        made.page.close()
+    (tmp_path / "r.toml").write_text(request)
+    own = mechanism_named(f"{tmp_path}/duffing.py:made")
+    run_request(tmp_path / "r.toml", tmp_path / "r.h5", mechanism=own)
+    with fm.open_results(tmp_path / "r.h5") as results:
+        assert len(results["basins"].groups["attractors"].sizes) >= 1
 
 
 def test_a_bad_address_is_told_until_something_changes(browser: Any) -> None:
