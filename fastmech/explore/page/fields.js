@@ -176,7 +176,7 @@ export class Landscape extends Field {
       const top = Math.max(low, ...this.app.rows.filter((row) => row.energy !== null && row.energy < high && this.within(row)).map((row) => row.energy)), deep = top - low;
       this.knee = deep > 1e-6 * (high - low) && deep < 0.4 * (high - low) ? top : null;
       const [one, two] = this.knee === null ? [(high - low) / STEPS || 1, 1] : [deep / LOWER, (high - top) / (STEPS - LOWER)];
-      this.note.textContent += ` Energy from ${short(low)} J (dark) to ${short(high)} J (bright), lines every ${short(one)} J${this.knee === null ? "" : ` up to the highest equilibrium at ${short(top)} J, every ${short(two)} J above`}.`;
+      this.note.textContent += ` Energy from ${short(low)} J (dark) to ${short(high)} J (bright)${high > low ? `, lines every ${short(one)} J` : ""}${this.knee === null ? "" : ` up to the highest equilibrium at ${short(top)} J, every ${short(two)} J above`}.`;
       this.image = heights(data, nx, ny, this.knee === null ? (v) => (v - low) / one : (v) => (v < top ? (v - low) / one : LOWER + (v - top) / two));
       this.span = [low, high];
     } else { this.span = [0, 0]; this.note.textContent += " The forces are not known to have a potential."; }
