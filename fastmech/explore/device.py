@@ -50,7 +50,10 @@ class Device:
         """
         last = self._last
         if last[0] != parameters:
-            last = self._last = dict(parameters), self.system.replace(**parameters)
+            made, before = self.system.replace(**parameters), last[1]
+            if not self.is_scene and [*map(str, made._means())] == [*map(str, before._means())]:
+                vars(made).update({**vars(before), **vars(made)})  # what copies of equal equations make again
+            last = self._last = dict(parameters), made
         return last[1]
 
     def mechanism(self, parameters: Mapping[str, float], *, still: bool = False) -> Mechanism:

@@ -19,6 +19,7 @@ LONGEST = 20_000
 COARSEST, HALVINGS = 25, 5
 
 Range = Annotated[list[float], Field(min_length=2, max_length=2)]
+Speeds = list[Annotated[float, Field(ge=-1e9, le=1e9)]]
 Ranges = Annotated[dict[str, Range], Field(min_length=2, max_length=2)]
 
 
@@ -79,9 +80,9 @@ class StrikeMessage(Message):
     kind: Literal["strike"]
     point: Annotated[str, Field(max_length=100)]
     q: Annotated[list[float], Field(max_length=4)]
-    rates: Annotated[list[float], Field(max_length=4)]
+    rates: Annotated[Speeds, Field(max_length=4)]
     mass: Annotated[float, Field(gt=0)]
-    velocity: Range
+    velocity: Annotated[Speeds, Field(min_length=2, max_length=2)]
 
 
 class StopMessage(Message):

@@ -209,11 +209,15 @@ def _sections(path: Path, folder: Path) -> list[dict[str, Any]]:
         names, request = list(results), results.request
     told = []
     for k, name in enumerate(names):
-        drawn = draw_results(path, folder / str(k), form="svg", section=name)
+        pictures, line = list[str](), ""
+        try:
+            drawn = draw_results(path, folder / str(k), form="svg", section=name)
+            pictures = [f"{k}/{one.name}" for one in drawn]
+        except InputError as error:  # of this section alone
+            line = str(error)
         python = f"import fastmech as fm\n\nwith fm.open_results({str(path)!r}) as results:\n"
         python += f"    print(results[{name!r}].to_xarray())\n"
-        pictures = [f"{k}/{one.name}" for one in drawn]
-        told.append({"name": name, "pictures": pictures, "python": python, "request": request})
+        told.append({"name": name, "pictures": pictures, "line": line, "python": python, "request": request})
     return told
 
 

@@ -80,7 +80,8 @@ def _equilibria(device: Device, message: Any) -> Iterator[bytes]:
         row |= {"decay_time": 1.0 / slowest if slowest > 0.0 else None, "position": [*map(float, e.position)]}
         rows.append(row)
         check()
-    told, arrays = _drawn(device, message, [row["position"] for row in rows], np.zeros(len(rows)))
+    places = [row["position"] for row in rows] or [[0.0] * len(device.coordinates)]
+    told, arrays = _drawn(device, message, places, np.zeros(len(places)))
     axes = {name: np.linspace(a, b, message.num) for name, (a, b) in message.axes.items()}
     energy = device.energy(message.parameters, device.states(axes, {}))
     header = _header(message, rows=rows, axes=message.axes, divisions=message.num - 1, **told)
@@ -148,6 +149,7 @@ def _basins(device: Device, message: Any) -> Iterator[bytes]:
 
 def _atlas(device: Device, message: Any) -> Iterator[bytes]:
     from fastmech.atlas.critical_curves import critical_curves
+    from fastmech.outcome import Outcome
     from fastmech.slider.atlas.axes import check_axis
     from fastmech.slider.atlas.folds import trace_folds
     from fastmech.slider.atlas.map import map_equilibria
@@ -159,12 +161,13 @@ def _atlas(device: Device, message: Any) -> Iterator[bytes]:
         divisions = ATLAS * 2**halving
         axes = {name: np.linspace(a, b, divisions + 1) for name, (a, b) in message.axes.items()}
         found: Any = map_equilibria(system, axes, progress=lambda _: check())
-        header = _header(message, axes=message.axes, divisions=divisions, curves=[])
-        fields = {"count": found.count, "stable": found.count_stable}
+        header = _header(message, axes=message.axes, divisions=divisions, curves=[], final=False)
+        decided = found.outcome == Outcome.COMPLETE
+        fields = {"count": found.count, "stable": found.count_stable, "decided": decided}
         yield frame(header, fields)
     curves: Any = (trace_folds if device.is_scene else critical_curves)(system, *axes.items())
     complete = bool(getattr(curves, "complete", False))
-    header |= {"curves": [curve.kind for curve in curves.curves], "curves_complete": complete}
+    header |= {"curves": [curve.kind for curve in curves.curves], "curves_complete": complete, "final": True}
     lines = {f"curve{k}": np.stack([c.x, c.y]) for k, c in enumerate(curves.curves)}
     yield frame(header, fields | lines)
 

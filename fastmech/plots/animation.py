@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
+#: Half the width of a letter, and how far words stay from lines and other words, over the extent of all.
+LETTER, APART = 0.012, 0.045
+
 #: Matplotlib's writer by ending of the file.
 WRITERS = {".mp4": "ffmpeg", ".gif": "pillow", ".html": "html"}
 
@@ -130,9 +133,26 @@ def _mark(axes: Axes, mechanism: Mechanism, drawn: Drawing, q: Floats, frame: in
         far, middle = 1.25 * radius, turns[16]
         axes.plot([x, x + far * np.cos(origin)], [y, y + far * np.sin(origin)], ls="--", lw=0.9, **look)
         axes.plot(x + radius * np.cos(turns), y + radius * np.sin(turns), lw=1.6, **look)
-        place = x + 1.3 * radius * np.cos(middle), y + 1.3 * radius * np.sin(middle)
         name = symbol(str(mechanism.coordinates[k].symbol))
+        ways = [(middle, 1.3), (middle, 0.65), *((middle + turn, 1.5) for turn in (0.6, -0.6, 1.2, -1.2))]
+        spots = [(x + far * radius * np.cos(way), y + far * radius * np.sin(way)) for way, far in ways]
+        place = _free(axes, drawn, frame, spots, 1)
         axes.text(place[0], place[1], name, ha="center", va="center")
+
+
+def _free(
+    axes: Axes, drawn: Drawing, frame: int, spots: list[tuple[float, float]], letters: int
+) -> tuple[float, float]:
+    """The first of some places [m] for words where neither lines nor other words are, or the freest."""
+    size = _size(drawn)
+    lines = drawn.ends[frame, np.isin(drawn.kind, (Element.ROD, Element.SPRING, Element.DAMPER))]
+    along = np.linspace(0.0, 1.0, 41)[:, None]
+    taken = [a + along * (b - a) for a, b in lines]
+    taken += [np.array([one.get_position()], dtype=float) for one in axes.texts if one.get_text()]
+    half = LETTER * size * letters
+    ways = np.array(spots)[:, None] + np.array([[-half, 0.0], [0.0, 0.0], [half, 0.0]])
+    away = np.linalg.norm(ways[:, :, None] - np.concatenate([np.empty((0, 2)), *taken]), axis=-1)
+    return spots[int(np.argmax(np.minimum(away.min(axis=(1, 2), initial=np.inf), APART * size)))]
 
 
 def _told(mechanism: Mechanism, q: Floats) -> str:
@@ -153,10 +173,8 @@ def _push(axes: Axes, drawn: Drawing, ends: Floats, values: Floats, frame: int) 
         look["mutation_scale"] = 14.0 * min(1.0, 3.0 * float(np.hypot(*(tip - a))) / (ARROW * _size(drawn)))
         if value:
             axes.annotate("", xy=tuple(tip), xytext=tuple(a), arrowprops=look, zorder=6)
-            words: dict[str, Any] = {
-                "xytext": (0.0, 7.0),
-                "textcoords": "offset points",
-                "ha": "center",
-                "fontsize": 8,
-            }
-            axes.annotate(f"{value:.3g} N", tuple(tip), color=FORCE, **words)
+            words, step = f"{value:.3g} N", APART * _size(drawn)
+            ways = [(0.0, 1.0), (0.0, -1.0), (1.5, 1.0), (1.5, -1.0), (-1.5, 1.0), (-1.5, -1.0), (0.0, 2.0)]
+            spots = [(float(tip[0] + step * u), float(tip[1] + step * v)) for u, v in [*ways, (0.0, -2.0)]]
+            place = _free(axes, drawn, frame, spots, len(words))
+            axes.annotate(words, place, color=FORCE, ha="center", va="center", fontsize=8)

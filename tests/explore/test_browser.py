@@ -27,6 +27,7 @@ import numpy as np
 import pytest
 
 import fastmech as fm
+from fastmech.cli.run import mechanism_named
 from fastmech.runner import run_request
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import request_of_text
@@ -445,6 +446,200 @@ def test_paused_views_show_one_moment_and_a_kick_adds_to_what_moves(opened: Open
     expected = np.array(before[2:]) + np.linalg.solve(mechanism.metric(before[:2]), blow)
     np.testing.assert_allclose([start["phi_dot"], start["theta_dot"]], expected, rtol=1e-5)
     page.evaluate("explorer.choose(0)")
+
+
+def test_the_scrub_moves_a_paused_motion(opened: Opened) -> None:
+    page = opened.page
+    page.evaluate("explorer.startAt({ phi: 0.5, theta: 1 }); explorer.letGo()")
+    opened.until("explorer.mechanism.playing && explorer.mechanism.frame > 5", 30)
+    page.locator("#mechanism button", has_text="pause").click()
+    scrub, timer = page.get_by_label("time", exact=True), page.get_by_role("timer")
+    for key, frame, time_ in (("End", 1200, "20.00 s"), ("Home", 0, "0.00 s"), ("ArrowRight", 1, "0.02 s")):
+        scrub.press(key)
+        assert page.evaluate("explorer.frame") == frame
+        assert timer.inner_text() == time_
+    box = scrub.bounding_box()
+    page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+    assert page.evaluate("explorer.frame") == pytest.approx(600, abs=30)
+    page.locator("#mechanism button", has_text="play").click()
+    opened.until("explorer.mechanism.frame > 640", 10)  # and goes on from there
+    page.evaluate("explorer.choose(0)")
+
+
+def test_a_change_of_a_parameter_cancels_the_atlas(opened: Opened) -> None:
+    page = opened.page
+    page.evaluate(
+        "{ globalThis.older = 0; const a = explorer.atlas, take = a.take.bind(a); a.take = (h, s) => {"
+        " globalThis.older += h.asked.parameters.m1 !== explorer.state.parameters.m1; take(h, s); }; } null"
+    )
+    for axes in ("explorer.state.atlas", "['m2', 'c1']"):
+        page.evaluate(f"explorer.change({{ atlas: {axes} }}, 'atlas')")
+        for k in range(20):
+            page.evaluate(f"explorer.parameters.set('m1', {10 + 0.1 * k})")
+            assert not page.evaluate("explorer.talk.pending.has('atlas')")
+            page.wait_for_timeout(30)
+    opened.until("!explorer.talk.pending.has('atlas') && !explorer.uncounted", 60)
+    # The dragged point stops it too, and it is counted again when the point rests.
+    page.evaluate("explorer.askAtlas(); explorer.parameters.set('m2', 13)")
+    assert not page.evaluate("explorer.talk.pending.has('atlas')")
+    opened.until("document.querySelector('#atlas canvas').dataset.divisions === '80'", 60)
+    assert page.evaluate("globalThis.older") == 0
+    page.get_by_text("reset all").click()
+    page.evaluate("explorer.change({ atlas: ['F0', 'c2'] }, 'atlas')")
+    opened.settle()
+
+
+def test_slow_equilibria_follow_a_drag(browser: Any) -> None:
+    with serving("pendulum_chain_4") as address:
+        made = Opened(browser.new_page(viewport={"width": 1600, "height": 1000}), address)
+        made.page.wait_for_timeout(2000)
+        made.page.evaluate("explorer.waits.answers = []")
+        end, k = time.monotonic() + 6.0, 0
+        while time.monotonic() < end:
+            k += 1
+            made.page.evaluate(f"explorer.parameters.set('g', {9 + 0.001 * k})")
+            made.page.wait_for_timeout(16)
+        count = made.page.evaluate("explorer.waits.answers.length")
+        print(f"\npendulum_chain_4, dragged: {count / 6.0:.1f} answers a second, wanted 2")
+        assert count >= 4
+        # However late answers are, one comes in the end.
+        asking = "explorer.resting.patience = explorer.resting.least = 1; explorer.parameters.set('g', 9.5)"
+        made.page.evaluate(f"{asking}; explorer.parameters.set('g', 9.81)")
+        made.until("explorer.landscape.panel.request.includes('g = 9.81')", 30)
+        made.page.close()
+
+
+def test_a_page_without_a_proved_equilibrium_says_so(
+    browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with serving("double_pendulum") as address:
+        made = Opened(browser.new_page(viewport={"width": 1600, "height": 1000}), address)
+        made.page.get_by_label(re.compile("^g: .*]$")).press("Home")
+        made.until("document.querySelector('#landscape .note').textContent.includes('not decided')", 30)
+        assert made.page.inner_text("#error") == ""
+        assert made.page.inner_text("#equilibria tbody") == "No equilibrium is proved."
+        assert made.page.locator(".stale").count() == 0
+        for view in ("equilibria", "landscape", "mechanism"):
+            lines_of(made, view, tmp_path, monkeypatch)
+        assert made.said == []
+        made.page.close()
+
+
+def test_lines_of_a_landscape_without_a_potential_work(
+    browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with serving("ziegler_column") as address:
+        made = Opened(browser.new_page(viewport={"width": 1600, "height": 1000}), address)
+        found = lines_of(made, "landscape", tmp_path, monkeypatch)
+        assert len(found["found"]) == made.page.locator("#equilibria tbody tr").count()
+        assert (tmp_path / "landscape.png").is_file()
+        made.page.close()
+
+
+def test_shallow_wells_have_lines_between_them(
+    browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with serving("von_mises_truss") as address:
+        made = Opened(browser.new_page(viewport={"width": 1600, "height": 1000}), address)
+        found = fm.find_equilibria(fm.mechanisms.von_mises_truss())
+        top = max(e.energy for e in found)
+        assert made.page.evaluate("explorer.landscape.knee") == pytest.approx(top, rel=1e-6)
+        assert f"lines every {top / 9:.3g}"[:15] in made.page.inner_text("#landscape .note")
+        levels = lines_of(made, "landscape", tmp_path, monkeypatch)["levels"]
+        assert sum(level < top for level in levels) == 9
+        energies = made.page.evaluate(
+            "[...document.querySelectorAll('#equilibria tbody tr')].map(r => r.children[3].textContent)"
+        )
+        assert "e-" not in "".join(energies)  # rounding is nothing
+        made.page.close()
+
+
+def test_a_page_whose_server_has_ended_says_so_and_cannot_be_moved(browser: Any) -> None:
+    with serving() as address:
+        made = Opened(browser.new_page(viewport={"width": 1600, "height": 1000}), address)
+    made.until("document.querySelector('#error').textContent.includes('The server has ended')", 10)
+    assert made.page.evaluate("[...document.querySelectorAll('section')].every(s => s.matches('.stale'))")
+    slider = made.page.get_by_label(re.compile("^m1: .*]$"))
+    slider.scroll_into_view_if_needed()
+    box = slider.bounding_box()
+    made.page.mouse.click(box["x"] + 0.9 * box["width"], box["y"] + 0.5 * box["height"])
+    assert made.page.evaluate("explorer.state.parameters.m1") == 10.0
+    made.page.close()
+
+
+OVERLAPS = """(() => {
+  const all = explorer.mechanism.labels.words, both = (a, b, k) => Math.min(a[k] + a[k + 2], b[k] + b[k + 2]) - Math.max(a[k], b[k]);
+  return all.flatMap((a, i) => all.slice(0, i).filter((b) => both(a, b, 0) > 1 && both(a, b, 1) > 1)).length;
+})()"""  # fmt: skip  # noqa: E501
+
+
+def test_words_in_the_drawing_lie_beside_each_other(opened: Opened) -> None:
+    page = opened.page
+    for width in (1000, 1600):
+        page.set_viewport_size({"width": width, "height": 1000})
+        page.evaluate("explorer.startAt({ phi: 1, theta: 0.1 })")
+        opened.until("explorer.motion && explorer.motion.shape[0] === 1201", 30)
+        page.locator("#mechanism canvas").scroll_into_view_if_needed()
+        for frame in range(0, 300, 12):  # the force fades: 32.6 N at 1.6 s
+            page.evaluate(f"explorer.mechanism.frame = {frame}; explorer.mechanism.moved()")
+            page.wait_for_timeout(40)
+            assert page.evaluate("explorer.mechanism.labels.words.length") >= 9
+            assert page.evaluate(OVERLAPS) == 0, frame
+        page.evaluate("explorer.choose(0)")
+        page.wait_for_timeout(200)
+        for way in (-30, 30):
+            x, y = of_point(opened, "M2")
+            page.keyboard.down("Shift")
+            page.mouse.move(x, y)
+            page.mouse.down()
+            page.mouse.move(x + way, y - 20, steps=3)
+            opened.until("explorer.mechanism.struck?.words.includes(' J')", 20)
+            page.wait_for_timeout(100)
+            assert page.evaluate(OVERLAPS) == 0, way
+            page.mouse.up()
+            page.keyboard.up("Shift")
+            page.wait_for_timeout(300)
+            page.evaluate("explorer.choose(0)")
+            page.wait_for_timeout(200)
+    page.set_viewport_size({"width": 1600, "height": 1000})
+
+
+DUFFING = """import fastmech as fm, sympy
+
+x = fm.lengths("x", -3, 3)
+made = fm.Mechanism(x, {"F": 0.05, "b": 0.3}, points={"M": (x, 0)}, masses={"M": 1.0},
+                    potential=-(x**2) / 2 + x**4 / 4, dampers=[fm.Damper((0, 0), "M", sympy.Symbol("b"))],
+                    forces=[fm.Force("M", fm.loads.Harmonic(sympy.Symbol("F"), 1.2), (1, 0))])
+"""
+
+
+def test_the_request_of_basins_under_a_load_that_repeats_runs(browser: Any, tmp_path: Path) -> None:
+    (tmp_path / "duffing.py").write_text(DUFFING)
+    with serving(f"{tmp_path}/duffing.py:made") as address:
+        made = Opened(browser.new_page(viewport={"width": 1600, "height": 1000}), address)
+        made.until("document.querySelector('#basins canvas').dataset.divisions === '25'", 120)
+        made.until("explorer.basins.panel.request", 30)
+        request = made.page.evaluate("explorer.basins.panel.request")
+        made.page.close()
+    (tmp_path / "r.toml").write_text(request)
+    own = mechanism_named(f"{tmp_path}/duffing.py:made")
+    run_request(tmp_path / "r.toml", tmp_path / "r.h5", mechanism=own)
+    with fm.open_results(tmp_path / "r.h5") as results:
+        assert len(results["basins"].groups["attractors"].sizes) >= 1
+
+
+def test_a_bad_address_is_told_until_something_changes(browser: Any) -> None:
+    with serving() as address:
+        made = Opened(browser.new_page(viewport={"width": 1600, "height": 1000}), f"{address}#nothing")
+        made.until("document.querySelector('#basins canvas').dataset.divisions", 60)
+        assert "holds no state" in made.page.inner_text("#error")
+        number = made.page.get_by_label("length of the motion [s]")
+        for typed, counts in (("-5", "0.1"), ("1000", "300")):
+            number.fill(typed)
+            number.press("Enter")
+            assert number.input_value() == counts
+        assert made.page.inner_text("#error") == ""
+        made.page.close()
 
 
 def test_a_double_click_on_a_slider_does_not_move_it_and_labels_start_nothing(opened: Opened) -> None:

@@ -23,6 +23,7 @@ import sympy
 
 import fastmech as fm
 from fastmech.cli.explore import opened
+from fastmech.cli.run import mechanism_named
 from fastmech.errors import InputError
 from fastmech.explore.device import Device
 from fastmech.explore.messages import frame, read_message
@@ -498,3 +499,106 @@ def test_angles_of_a_drawing_are_the_coordinates(what: str | None) -> None:
         away = drawn.ends[:, rod, 1 - end] - drawn.ends[:, rod, end]
         direction = np.arctan2(away[:, 1], away[:, 0])
         np.testing.assert_allclose(np.exp(1j * direction), np.exp(1j * (origin + sign * q[:, k])), atol=1e-9)
+
+
+def test_a_section_without_a_picture_says_so_and_leaves_the_others(tmp_path: Path) -> None:
+    from fastmech.explore.serve import _sections
+
+    told = {one["name"]: one for one in _sections(ROOT / "data" / "small.h5", tmp_path)}
+    assert "nothing is drawn" in told["snap"]["line"]
+    assert not told["snap"]["pictures"]
+    assert any(one["pictures"] and not one["line"] for one in told.values())
+
+
+def test_a_file_with_tolerances_is_explored_at_its_values(tmp_path: Path) -> None:
+    (tmp_path / "d.toml").write_text("[scene]\nc1 = { value = 300.0, plus_minus = 15.0 }\nalpha = 0.0\n")
+    assert opened(str(tmp_path / "d.toml")).about()["parameters"]["c1"]["value"] == 300.0
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("c2 = 200.0", "c2: unknown name"),
+        ("[sceen]", "did you mean 'scene'"),
+        ("scene = 3", "scene = 3: must be a table"),
+    ],
+)
+def test_a_file_is_checked_as_every_request(tmp_path: Path, text: str, line: str) -> None:
+    (tmp_path / "d.toml").write_text(text)
+    with pytest.raises(InputError, match=re.escape(line)):
+        opened(str(tmp_path / "d.toml"))
+
+
+OWN = """import fastmech as fm, sympy
+
+def arm():
+    q, k, b = fm.angles("q"), sympy.Symbol("k"), sympy.Symbol("b")
+    parts = {"points": {"M": (sympy.cos(q), sympy.sin(q))}, "masses": {"M": 1.0}}
+    return fm.Mechanism(q, {"k": 50.0, "b": 0.3}, potential=k * sympy.cos(2 * q) + sympy.sin(q), **parts,
+                        dampers=[fm.Damper((0, 2), "M", b)])
+
+other = fm.mechanisms.double_pendulum()
+"""
+
+
+@pytest.mark.parametrize("values", ["", "k = 60.0\n"])
+def test_a_result_of_one_s_own_mechanism_is_shown_with_it_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, values: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("mine.py").write_text(OWN)
+    Path("r.toml").write_text(f'[scene]\n{values}[scan.rest]\nkind = "equilibria"\n')
+    run_request("r.toml", "r.h5", mechanism=mechanism_named("mine.py:arm"))
+    for wrong in (None, "mine.py:other"):
+        with pytest.raises(InputError, match=r"r\.h5: is of another mechanism; .* --mechanism FILE\.py:NAME"):
+            opened("r.h5", wrong)
+    for what in ("r.h5", "r.toml"):
+        told = opened(what, "mine.py:arm").about()
+        assert told["parameters"]["k"]["value"] == (60.0 if values else 50.0)
+        assert told["source"] == f"{tmp_path.resolve()}/mine.py:arm"  # its lines work in every folder
+    with pytest.raises(InputError, match="another one is given"):
+        opened("double_pendulum", "mine.py:arm")
+
+
+@pytest.mark.parametrize(("what", "zero"), [("double_pendulum", "g"), ("cart_pendulum", "k")])
+def test_where_no_equilibrium_is_proved_the_page_is_told_why(what: str, zero: str) -> None:
+    device = opened(what)
+    ranges = {name: [-3.0, 3.0] for name in device.coordinates}
+    told = {"kind": "equilibria", "id": 1, "axes": ranges, "parameters": {zero: 0.0}}
+    (content,) = replies(device, read_message(json.dumps(told)))
+    header, arrays = numbers(content)
+    found: Any = fm.find_equilibria(device.at({zero: 0.0}))
+    assert header["rows"] == []
+    assert header["certificate"] == found.certificate.sentence
+    assert "not decided" in header["certificate"]
+    assert not header["complete"]
+    assert len(arrays["ends"]) == 1  # drawn at zero
+
+
+def test_an_atlas_says_where_nothing_is_decided() -> None:
+    told = {"kind": "atlas", "id": 1, "axes": {"k": [0.0, 20.0], "g": [1.0, 9.0]}, "halvings": 0}
+    header, arrays = numbers(next(replies(opened("cart_pendulum"), read_message(json.dumps(told)))))
+    assert not header["final"]
+    assert not arrays["decided"][0].any()
+    assert arrays["decided"][1:].all()
+
+
+def test_a_kick_beyond_all_numbers_gives_a_line() -> None:
+    told = {"kind": "strike", "id": 1, "point": "M2", "mass": 12.0, "velocity": [1e300, 0.0]}
+    with pytest.raises(InputError, match=r"strike\.velocity\.0 = 1e\+300"):
+        read_message(json.dumps(told | {"q": [0.3, 0.2], "rates": [0.0, 0.0]}))
+
+
+def test_mechanisms_of_other_parameters_give_what_new_ones_do() -> None:
+    device = opened("pendulum_chain_2")
+    told = {"kind": "equilibria", "id": 1, "axes": {"q1": [-3.0, 3.0], "q2": [-3.0, 3.0]}}
+    message = read_message(json.dumps(told))
+    list(replies(device, message))
+    name = next(iter(device.system.parameters))
+    for value in (2.0, 3.0):
+        parameters = {name: value}
+        (content,) = replies(device, read_message(json.dumps(told | {"parameters": parameters})))
+        (fresh,) = replies(
+            opened("pendulum_chain_2"), read_message(json.dumps(told | {"parameters": parameters}))
+        )
+        assert content == fresh

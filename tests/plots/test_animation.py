@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from PIL import Image
 
 import fastmech as fm
+from fastmech.models.drawing import Element, drawing
 
 SCENE = fm.Scene()
 
@@ -32,6 +33,42 @@ def test_a_gif_has_the_motion_s_pictures_and_they_differ(run: object, tmp_path: 
 def test_a_page_holds_its_pictures(run: object, tmp_path: Path) -> None:
     text = fm.animate(SCENE, run, tmp_path / "motion.html", fps=3).read_text(encoding="utf-8")
     assert text.count("data:image/png;base64") == 3
+
+
+def test_words_do_not_lie_on_rods_or_on_each_other(tmp_path: Path) -> None:
+    times, system = np.linspace(0.0, 2.0, 41), fm.mechanisms.slider_pendulum()
+    run = fm.integrate(SCENE, [[1.0, 0.1, 0.0, 0.0]], 2.0, t_eval=times, dt=0.01)
+    places: list[list[Any]] = []
+    text, annotate, clear = Axes.text, Axes.annotate, Axes.clear
+
+    def written(self: Any, x: float, y: float, words: str, **how: Any) -> Any:
+        places[-1].append((x, y))
+        return text(self, x, y, words, **how)
+
+    def noted(self: Any, words: str, xy: Any, *rest: Any, **how: Any) -> Any:
+        if words and words.endswith(" N"):
+            places[-1].append(xy)
+            assert "xytext" not in how
+        return annotate(self, words, xy, *rest, **how)
+
+    def begun(self: Any) -> None:
+        places.append([])
+        clear(self)
+
+    with pytest.MonkeyPatch.context() as patch:
+        for name, instead in (("text", written), ("annotate", noted), ("clear", begun)):
+            patch.setattr(Axes, name, instead)
+        fm.animate(SCENE, run, tmp_path / "motion.gif", fps=5)
+    frames = np.arange(0.0, 2.0, 0.2)
+    q = np.stack([np.interp(frames, times, run.y[:, 0, k]) for k in range(2)], axis=-1)
+    shown = drawing(system, q)
+    for k, words in enumerate(places[-len(frames) :]):
+        at = np.array(words)
+        apart = np.linalg.norm(at[:, None] - at, axis=-1) + np.eye(len(at))
+        assert apart.min() > 0.08, frames[k]
+        for a, b in shown.ends[k, shown.kind == Element.ROD]:
+            along = np.clip((at - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
+            assert np.linalg.norm(a + along[:, None] * (b - a) - at, axis=1).min() > 0.04, frames[k]
 
 
 def test_arrows_and_angles_are_those_of_the_moment(run: object, tmp_path: Path) -> None:

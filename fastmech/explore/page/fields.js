@@ -1,6 +1,8 @@
 // Views over two states or two parameters: the landscape, the basin map and the atlas.
 import { Plane, canvas, choice, css, draggable, element, panel, short } from "./ink.js";
 
+const NAMED = 40; // classes of starts in a legend at most
+
 // Okabe and Ito's colours and further ones as in the package's pictures; told apart by colour-blind readers.
 const COLORS = ["#56B4E9", "#E69F00", "#009E73", "#F0E442", "#CC79A7", "#0072B2", "#D55E00", "#a7d8ba", "#6200ff", "#4e89ff", "#3b766c", "#a7ffb1", "#62d8ff", "#a7450a", "#76c480", "#ce00a7", "#c4d880", "#62c4c4"];
 const CIVIDIS = [[0, 34, 78], [53, 69, 108], [102, 105, 112], [148, 142, 119], [200, 184, 102], [254, 232, 56]];
@@ -9,8 +11,9 @@ const CIVIDIS = [[0, 34, 78], [53, 69, 108], [102, 105, 112], [148, 142, 119], [
 const MEANS = { fold: "two equilibria meet", pitchfork: "three become one", Hopf: "a swing grows", coalescence: "two modes meet and one grows", transcritical: "two exchange stability" };
 const DASHES = [[], [7, 4], [2, 4], [9, 3, 2, 3]];
 
-const STEPS = 15; // of height in the landscape
+const STEPS = 15, LOWER = 9; // of height in the landscape; up to the highest equilibrium where most lies above it
 
+const GREY = [120, 120, 120]; // not decided
 const rgb = (hex) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16));
 function cividis(s) {
   const t = Math.min(0.9999, Math.max(0, s)) * 5, k = Math.floor(t);
@@ -30,13 +33,13 @@ function picture(nx, ny, of) {
   return c;
 }
 
-// Steps of height with lines between them, two pixels a value.
-function heights(data, nx, ny, low, high) {
-  const w = 2 * nx - 1, h = 2 * ny - 1, levels = new Uint8Array(w * h), scale = STEPS / (high - low || 1);
+// Steps of height with lines between them, two pixels a value; `step` gives a height's.
+function heights(data, nx, ny, step) {
+  const w = 2 * nx - 1, h = 2 * ny - 1, levels = new Uint8Array(w * h);
   for (let j = 0; j < h; j++) for (let i = 0; i < w; i++) {
     const a = Math.min(nx - 2, i >> 1), b = Math.min(ny - 2, j >> 1), x = i / 2 - a, y = j / 2 - b, p = b * nx + a;
     const v = (1 - y) * ((1 - x) * data[p] + x * data[p + 1]) + y * ((1 - x) * data[p + nx] + x * data[p + nx + 1]);
-    levels[j * w + i] = Math.min(STEPS - 1, (v - low) * scale);
+    levels[j * w + i] = Math.min(STEPS - 1, step(v));
   }
   const shades = Array.from({ length: STEPS }, (_, k) => cividis((k + 0.5) / STEPS)), c = document.createElement("canvas");
   c.width = w; c.height = h;
@@ -160,7 +163,6 @@ export class Landscape extends Field {
     this.starts();
   }
   take(header, arrays) {
-    this.panel.tell(this.app.about, "landscape", { ...header.asked, divisions: header.divisions });
     this.shown = header.axes;
     this.proof = header.certificate;
     this.complete = header.complete;
@@ -170,11 +172,16 @@ export class Landscape extends Field {
       const { data, shape } = arrays.landscape, [ny, nx] = shape;
       let low = Infinity, high = -Infinity;
       for (const v of data) { if (v < low) low = v; if (v > high) high = v; }
-      this.note.textContent += ` Energy from ${short(low)} J (dark) to ${short(high)} J (bright), lines every ${short((high - low) / STEPS)} J.`;
-      this.image = heights(data, nx, ny, low, high);
+      // Wells that are shallow beside their surroundings have steps of their own.
+      const top = Math.max(low, ...this.app.rows.filter((row) => row.energy !== null && row.energy < high && this.within(row)).map((row) => row.energy)), deep = top - low;
+      this.knee = deep > 1e-6 * (high - low) && deep < 0.4 * (high - low) ? top : null;
+      const [one, two] = this.knee === null ? [(high - low) / STEPS || 1, 1] : [deep / LOWER, (high - top) / (STEPS - LOWER)];
+      this.note.textContent += ` Energy from ${short(low)} J (dark) to ${short(high)} J (bright)${high > low ? `, lines every ${short(one)} J` : ""}${this.knee === null ? "" : ` up to the highest equilibrium at ${short(top)} J, every ${short(two)} J above`}.`;
+      this.image = heights(data, nx, ny, this.knee === null ? (v) => (v - low) / one : (v) => (v < top ? (v - low) / one : LOWER + (v - top) / two));
       this.span = [low, high];
-    } else this.note.textContent += " The forces are not known to have a potential.";
+    } else { this.span = [0, 0]; this.note.textContent += " The forces are not known to have a potential."; }
     this.note.textContent += this.slice();
+    this.panel.tell(this.app.about, "landscape", { ...header.asked, divisions: header.divisions, potential: Boolean(arrays.landscape), knee: this.knee, steps: this.knee === null ? [STEPS] : [LOWER, STEPS - LOWER] });
     this.plane.later();
   }
   draw() { if (this.image && this.current) this.put(this.image); this.marks(); }
@@ -191,7 +198,9 @@ export class Basins extends Field {
     if (!this.colors.has(name)) {
       // Unturned wells have the first colours, whatever else is in the picture.
       const place = plain ? this.wells.indexOf(well) : this.wells.length + this.turned++;
-      this.colors.set(name, { color: rgb(COLORS[place % COLORS.length]), well, turns });
+      // What comes after the last colour has paler ones: none is another's.
+      const pale = 1 - 0.6 ** Math.floor(place / COLORS.length);
+      this.colors.set(name, { color: rgb(COLORS[place % COLORS.length]).map((v) => v + pale * (255 - v)), well, turns });
     }
     return this.colors.get(name).color;
   }
@@ -212,7 +221,7 @@ export class Basins extends Field {
       const at = r * n + j, w = arrays.well.data[at], p = 4 * ((n - 1 - j) * rows + r);
       if (w === -2) continue;
       const t = arrays.time.data[at];
-      const base = w < 0 ? [120, 120, 120] : this.color(w, Array.from(arrays.turns.data.subarray(at * q, at * q + q)));
+      const base = w < 0 ? GREY : this.color(w, Array.from(arrays.turns.data.subarray(at * q, at * q + q)));
       const shade = w < 0 ? 1 : 1 - 0.35 * Math.min(1, (Number.isFinite(t) ? t : 0) / 10);
       strip.data.set([...base.map((v) => v * shade), 255], p);
     }
@@ -222,9 +231,9 @@ export class Basins extends Field {
     image.getContext("2d").drawImage(c, header.from, 0);
     if (header.last) {
       this.panel.tell(this.app.about, "basins", { ...header, ...header.asked });
-      const shown = [...this.colors.values()].slice(0, 8).flatMap(({ color, well: w, turns }) => [swatch(color), `${header.attractors ? header.attractors[w] : w + 1}${turns.some((t) => t) ? ` after ${turns.join(", ")} turns` : ""}   `]);
+      const shown = [...this.colors.values()].slice(0, NAMED).flatMap(({ color, well: w, turns }) => [swatch(color), `${header.attractors ? header.attractors[w] : w + 1}${turns.some((t) => t) ? ` after ${turns.join(", ")} turns` : ""}   `]);
       const none = well.filter((w) => w === -1).length;
-      this.note.replaceChildren(`${n} × ${n} starts${header.final ? "" : ", refining"}. ${header.attractors ? "They come to " : "Proved to end at equilibrium "}`, ...shown, this.colors.size > 8 ? `and ${this.colors.size - 8} more. ` : "", "Darker: later. ", ...(none ? [swatch([120, 120, 120]), `undecided: ${none}.`] : []), this.slice());
+      this.note.replaceChildren(`${n} × ${n} starts${header.final ? "" : ", refining"}. ${header.attractors ? "They come to " : "Proved to end at equilibrium "}`, ...shown, this.colors.size > NAMED ? `and ${this.colors.size - NAMED} more. ` : "", "Darker: later. ", ...(none ? [swatch(GREY), `undecided: ${none}.`] : []), this.slice());
       this.levels = { ...(this.levels ?? {}), [n]: header.waited };
       this.canvas.dataset.divisions = header.divisions;
     }
@@ -245,13 +254,14 @@ export class Atlas extends Field {
   take(header, arrays) {
     this.panel.tell(this.app.about, "atlas", { ...header.asked, divisions: header.divisions });
     this.shown = header.axes;
-    const { data, shape } = arrays.count, [nx, ny] = shape, stable = arrays.stable.data;
-    const seen = new Map();
-    for (let k = 0; k < data.length; k++) seen.set(100 * data[k] + stable[k], [data[k], stable[k]]);
+    const { data, shape } = arrays.count, [nx, ny] = shape, stable = arrays.stable.data, decided = arrays.decided.data;
+    const seen = new Map(), undecided = decided.filter((one) => !one).length;
+    for (let k = 0; k < data.length; k++) if (decided[k]) seen.set(100 * data[k] + stable[k], [data[k], stable[k]]);
     const kinds = [...seen.keys()].sort((a, b) => a - b);
-    const color = (i, j) => rgb(COLORS[kinds.indexOf(100 * data[i * ny + j] + stable[i * ny + j]) % COLORS.length]);
+    const color = (i, j) => (decided[i * ny + j] ? rgb(COLORS[kinds.indexOf(100 * data[i * ny + j] + stable[i * ny + j]) % COLORS.length]) : GREY);
     this.image = picture(nx, ny, color);
     this.legend = kinds.map((k, index) => [COLORS[index % COLORS.length], `${seen.get(k)[0]} equilibri${seen.get(k)[0] === 1 ? "um" : "a"}, ${seen.get(k)[1]} stable`]);
+    if (undecided) this.legend.push([`rgb(${GREY})`, `not decided: ${undecided} points`]);
     this.curves = header.curves.map((kind, k) => ({ kind, xy: arrays[`curve${k}`] }));
     this.kinds = [...new Set(header.curves)];
     const told = this.kinds.map((kind) => `${header.curves.filter((k) => k === kind).length} of kind ${kind} (${MEANS[kind] ?? "several at once"})`).join(", ");
@@ -269,10 +279,10 @@ export class Atlas extends Field {
     const entries = [...this.legend, ...this.kinds.map((kind, k) => [null, kind, DASHES[k % DASHES.length]])];
     entries.forEach(([color, words, dash], k) => {
       const at = [p.box.left + 8, p.box.top + 8 + 18 * k];
-      p.ink.line([[0, 0], [196, 0], [196, 18], [0, 18]].map((d) => [at[0] - 4 + d[0], at[1] - 4 + d[1]]), { fill: css("paper"), closed: true });
-      if (dash) p.ink.line([[at[0] - 2, at[1] + 5], [at[0] + 28, at[1] + 5]], { color: css("ink"), width: 1.8, dash });
-      else p.ink.line([[0, 0], [12, 0], [12, 10], [0, 10]].map((d) => [at[0] + d[0], at[1] + d[1]]), { fill: color, color: css("ink"), width: 0.5, closed: true });
-      p.ink.text(at[0] + (dash ? 34 : 18), at[1] + 5, words, { color: css("ink"), align: "left", size: 11 });
+      p.ink.line([[0, 0], [196, 0], [196, 18], [0, 18]].map((d) => [at[0] - 4 + d[0], at[1] - 4 + d[1]]), { fill: "#ffffff", closed: true }); // curves are black in both lights
+      if (dash) p.ink.line([[at[0] - 2, at[1] + 5], [at[0] + 28, at[1] + 5]], { color: "#000000", width: 1.8, dash });
+      else p.ink.line([[0, 0], [12, 0], [12, 10], [0, 10]].map((d) => [at[0] + d[0], at[1] + d[1]]), { fill: color, color: "#000000", width: 0.5, closed: true });
+      p.ink.text(at[0] + (dash ? 34 : 18), at[1] + 5, words, { color: "#000000", align: "left", size: 11 });
     });
   }
   over(p) {

@@ -24,7 +24,10 @@ export class Histories {
     this.note = element("p", { class: "note" }, NONE);
     this.sums = element("p", { class: "note" });
     const until = this.until = element("input", { type: "number", class: "number", min: 1, max: 300, value: app.state.t_end, "aria-label": "length of the motion [s]" });
-    until.addEventListener("change", () => app.change({ t_end: Math.min(300, Math.max(0.1, Number(until.value) || 20)) }, "t_end"));
+    until.addEventListener("change", () => {
+      app.change({ t_end: Math.min(300, Math.max(0.1, Number(until.value) || 20)) }, "t_end");
+      until.value = app.state.t_end; // what counts
+    });
     this.panels[0].tools.append(until, " s");
     this.panels[0].body.append(this.note);
     this.panels[1].body.append(this.sums);

@@ -38,21 +38,27 @@ const shown = (name) => ["plt.legend()", `plt.savefig("${name}.png")`];
 const VIEWS = {
   equilibria: [[], () => ["found = fm.find_equilibria(system)", "print(found, [fm.classify(system, e).verdict for e in found])"]],
   landscape: [["import sympy", ...drawn], (about, told) => {
-    const [x, y] = Object.keys(told.axes), place = (n) => (about.coordinates.includes(n) ? `found.position[:, ${about.coordinates.indexOf(n)}]` : "0.0 * found.position[:, 0]");
+    const [x, y] = Object.keys(told.axes), place = (n) => (about.coordinates.includes(n) ? `place[:, ${about.coordinates.indexOf(n)}]` : "0.0 * place[:, 0]");
+    const rest = ["found = fm.find_equilibria(system)", `place = np.reshape(found.position, (-1, ${about.coordinates.length}))`];
+    const marks = [`plt.plot(${place(x)}, ${place(y)}, "ko", label="equilibria")`, ...shown("landscape")];
+    if (!told.potential) return [...rest, `plt.axis(${list([...told.axes[x], ...told.axes[y]])})`, ...marks];
     return [
-      "found = fm.find_equilibria(system)", ...mechanism(about, told.parameters, true), axesOf(told),
+      ...rest, ...mechanism(about, told.parameters, true), axesOf(told),
       "x, y = np.meshgrid(*axes.values())",
       "names = [*mechanism.state, *mechanism.parameters]",
       'energy = sympy.lambdify([sympy.Symbol(n, real=True) for n in names], mechanism.energy(), "numpy")',
       `states = dict.fromkeys(mechanism.state, 0.0) | {"${x}": x, "${y}": y}`,
       "heights = energy(*states.values(), *mechanism.parameters.values()) + 0.0 * x",
-      'plt.contourf(x, y, heights, 15, cmap="cividis")',
-      `plt.plot(${place(x)}, ${place(y)}, "ko", label="equilibria")`, ...shown("landscape"),
+      ...(told.knee === null ? [`levels = ${told.steps[0]}`] : [
+        "low, high = heights.min(), heights.max()",
+        `levels = [*np.linspace(low, ${number(told.knee)}, ${told.steps[0]}, endpoint=False), *np.linspace(${number(told.knee)}, high, ${told.steps[1] + 1})]`,
+      ]),
+      'plt.contourf(x, y, heights, levels, cmap="cividis")', ...marks,
     ];
   }],
   rest: [["from fastmech.plots.equilibria import draw_mechanism, drawing_of", ...drawn], (about, told) => [
     "found = fm.find_equilibria(system)", `force = ${about.scene ? "system.F0" : "0.0"}`,
-    `draw_mechanism(plt.figure().add_subplot(), drawing_of(system, found.position, force), ${told.chosen})`, 'plt.savefig("mechanism.png")',
+    `draw_mechanism(plt.figure().add_subplot(), drawing_of(system, ${told.none ? `np.zeros((1, ${about.coordinates.length}))` : "found.position"}, force), ${told.chosen})`, 'plt.savefig("mechanism.png")',
   ]],
   mechanism: [[], (about, told) => [...motion(about, told), 'fm.animate(system, run, "motion.gif")']],
   motion: [drawn, (about, told) => [
@@ -88,7 +94,7 @@ export function requestOf(about, view, told) {
   lines.push("", "[scene]", ...Object.entries(told.parameters).map(([n, v]) => `${n} = ${number(v)}`), "");
   const axes = () => Object.entries(told.axes).map(([n, [a, b]]) => `axes.${n} = { start = ${number(a)}, stop = ${number(b)}, num = ${told.divisions + 1} }`);
   if (["equilibria", "landscape", "rest"].includes(view)) lines.push("[scan.rest]", 'kind = "equilibria"');
-  else if (view === "basins") lines.push("[scan.basins]", 'kind = "basins"', `t_end = ${number(told.t_end)}`, ...axes());
+  else if (view === "basins") lines.push("[scan.basins]", `kind = "${told.attractors ? "attractors" : "basins"}"`, `t_end = ${number(told.t_end)}`, ...axes());
   else if (view === "atlas") lines.push("[scan.atlas]", 'kind = "equilibrium_map"', ...(scene ? ["# with its folds"] : ["# its curves are fm.critical_curves of the Python lines"]), ...axes());
   else {
     const start = Object.fromEntries(statesOf(about).map((n) => [n, told.start[n] ?? 0]));

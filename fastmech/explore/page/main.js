@@ -22,10 +22,32 @@ function usual(name, parameters) {
   return [of(unit), ...(made[unit] ?? []), 1].find((v) => v > 0 && Number.isFinite(v));
 }
 
+// Asks for one answer at a time: each that comes is shown, and what changes meanwhile waits for it. An answer that takes
+// much longer than the one before is given up for the newest, each time later: in the end one comes.
+class Asking {
+  constructor(ask, least) { Object.assign(this, { ask, least, patience: least, busy: false, again: false }); }
+  want() {
+    this.again = this.busy;
+    if (this.busy) return;
+    this.busy = true;
+    this.timer = setTimeout(() => { this.patience *= 2; this.free(); }, this.patience);
+    this.ask();
+  }
+  answered(waited) { this.patience = Math.max(this.least, 2 * waited); this.free(); }
+  free() {
+    const { again } = this;
+    this.drop();
+    if (again) this.want();
+  }
+  drop() { clearTimeout(this.timer); this.busy = this.again = false; }
+}
+
 class App {
   constructor() {
     this.frame = this.shown = 0;
     this.waits = { answers: [], equilibria: [], motion: [] };
+    this.resting = new Asking(() => this.askEquilibria(), 400);
+    this.moving = new Asking(() => this.sendMotion(), 1000);
     this.talk = new Talk({
       about: (message) => this.begin(message),
       equilibria: (header, arrays) => this.equilibria(header, arrays),
@@ -36,7 +58,7 @@ class App {
       strike: (header) => { this.clear("strike"); this.mechanism.kicked(header); },
       error: (message) => this.refused(message),
       compiling: (told) => this.compiling(told),
-      closed: () => { status.textContent = "the server has ended"; },
+      closed: () => this.ended(),
     });
   }
   // Ranges of sliders and of the atlas: from zero, or above where it must be, to some times the usual value.
@@ -97,7 +119,7 @@ class App {
       if (kept.t_end > 0 && kept.t_end <= 300) this.state.t_end = kept.t_end;
       this.state.start = null;
       if (kept.start && Object.entries(kept.start).every(([n, v]) => known.has(n) && Number.isFinite(v))) this.state.start = kept.start;
-    } catch { error.textContent = "the address holds no state that can be read"; }
+    } catch { this.failed = "address"; error.textContent = "The address holds no state that can be read."; }
   }
   keep() {
     clearTimeout(this.keeping);
@@ -111,11 +133,19 @@ class App {
     const { landscape, table, mechanism, basins, atlas, histories } = this, still = this.motion ? [] : [mechanism];
     const views = { equilibria: [landscape, table, ...still], basins: [basins], atlas: [atlas], motion: [...histories.panels.map((one) => ({ panel: one })), mechanism] }[of] ?? [];
     views.forEach((one) => { one.waits?.(""); one.panel.refuse(line); });
-    if (of === "equilibria" || !views.length) { this.failed = of; error.textContent = line; }
-    if (of === "equilibria") this.free();
-    if (of === "motion") this.stood();
+    if (of === "equilibria" || !views.length) { this.failed = of; error.textContent = line; mechanism.fire = false; }
+    ({ equilibria: this.resting, motion: this.moving })[of]?.free();
   }
   clear(kind) { if (this.failed === kind || this.failed === undefined) error.textContent = ""; }
+  // Nothing follows any more: what is shown is marked, and nothing can be moved away from it.
+  ended() {
+    status.textContent = "the server has ended";
+    error.textContent = "The server has ended: nothing follows any more. Start it again and reload this page.";
+    this.mechanism?.pause();
+    const panels = document.getElementById("panels");
+    panels.inert = true;
+    for (const one of panels.children) one.classList.add("stale");
+  }
   compiling({ name, of, number, about }) {
     clearTimeout(this.told);
     if (name === null) this.told = setTimeout(() => { status.textContent = "ready"; }, 300);
@@ -130,13 +160,15 @@ class App {
   change(change, what) {
     const before = this.state;
     this.state = { ...before, ...change };
+    if (this.failed === "address") this.clear("address");
     this.keep();
     if (what === "parameters" || what === "atlas point") {
       this.parameters.show();
       this.atlas?.plane.moved();
-      this.stop();
       const moved = Object.keys(this.state.parameters).some((n) => !this.state.atlas.includes(n) && this.state.parameters[n] !== before.parameters[n]);
-      if (moved) { clearTimeout(this.later); this.later = setTimeout(() => this.askAtlas(), 200); }
+      this.uncounted ||= moved || this.talk.pending.has("atlas");
+      this.stop();
+      if (this.uncounted) { clearTimeout(this.later); this.later = setTimeout(() => this.askAtlas(), 200); }
       this.refresh();
       this.follow();
     } else if (what === "atlas") this.askAtlas();
@@ -145,8 +177,7 @@ class App {
   }
   // What takes longer leaves the processors to the equilibria, and begins anew when the slider rests.
   stop() {
-    if (this.mapped) this.talk.ask("stop", { what: "basins" });
-    this.mapped = false;
+    for (const kind of ["basins", "atlas"]) if (this.talk.pending.has(kind)) this.talk.drop(kind);
   }
   follow() {
     if (!this.state.start) return;
@@ -155,41 +186,32 @@ class App {
     this.following = setTimeout(() => this.askMotion(), since > 1000 ? 0 : 200);
   }
   refresh() {
-    // While an answer is under way newer changes wait for it: each picture that comes is of the newest.
-    if (this.busy) { this.again = true; return; }
-    this.busy = true;
-    clearTimeout(this.freed);
-    this.freed = setTimeout(() => this.free(), 400);
-    this.landscape.set();
-    this.talk.ask("equilibria", { parameters: this.state.parameters, axes: this.landscape.axes() });
+    this.resting.want();
     clearTimeout(this.mapping);
     this.mapping = setTimeout(() => this.askBasins(), 200);
   }
-  free() {
-    this.busy = false;
-    if (this.again) { this.again = false; this.refresh(); }
+  askEquilibria() {
+    this.landscape.set();
+    this.talk.ask("equilibria", { parameters: this.state.parameters, axes: this.landscape.axes() });
   }
   askBasins() {
-    this.mapped = true;
     this.basins.set();
     this.basins.waits("Starts are being followed.");
     this.talk.ask("basins", { parameters: this.state.parameters, axes: this.basins.axes() });
   }
   askAtlas() {
     if (!this.atlas) return;
+    this.uncounted = false;
+    clearTimeout(this.later);
     this.atlas.set();
     this.atlas.waits("Equilibria are being counted.");
     this.talk.ask("atlas", { parameters: this.held() ? { ...this.state.parameters, alpha: 0 } : this.state.parameters, axes: this.atlas.axes() });
   }
   // Over the force of a scene the atlas is of one that stays: of one that fades nothing is left at rest.
   held() { return this.about.scene && this.state.parameters.alpha > 0 && this.state.atlas.includes("F0"); }
-  askMotion() {
-    if (!this.state.start) return;
-    if (this.moving) { this.movingAgain = true; return; }
-    this.moving = true;
+  askMotion() { if (this.state.start) this.moving.want(); }
+  sendMotion() {
     const { t_end } = this.state;
-    clearTimeout(this.movingFreed);
-    this.movingFreed = setTimeout(() => this.stood(), 1000);
     this.talk.ask("motion", { parameters: this.state.parameters, start: this.state.start, t_end, outputs: Math.min(18001, Math.round(60 * t_end) + 1) });
   }
   equilibria(header, arrays) {
@@ -204,8 +226,7 @@ class App {
     this.mechanism.rest(header, arrays);
     this.basins.plane.later();
     requestAnimationFrame(() => this.waits.equilibria.push(performance.now() - asked)); // when it has been drawn
-    clearTimeout(this.freed);
-    this.free();
+    this.resting.answered(header.waited);
   }
   moves(header, arrays) {
     this.clear("motion");
@@ -216,11 +237,7 @@ class App {
     this.basins.plane.later();
     this.mechanism.moves(header, arrays);
     if (this.play && !this.mechanism.playing) { this.play = false; this.mechanism.start(); }
-    this.stood();
-  }
-  stood() {
-    this.moving = false;
-    if (this.movingAgain) { this.movingAgain = false; this.askMotion(); }
+    this.moving.answered(header.waited);
   }
   frameMoved(frame) {
     this.frame = frame;
@@ -239,7 +256,8 @@ class App {
   rests() {
     clearTimeout(this.following);
     for (const kind of ["motion", "pull", "strike"]) this.talk.drop(kind);
-    Object.assign(this, { motion: null, moving: false, movingAgain: false, play: false });
+    this.moving.drop();
+    Object.assign(this, { motion: null, play: false });
     this.histories.clear();
     this.mechanism.atRest();
     this.landscape.plane.later();
@@ -252,7 +270,7 @@ class App {
     if (still) { this.mechanism.pause(); this.mechanism.frame = 0; }
     this.askMotion();
   }
-  letGo() { this.play = true; if (!this.moving && this.motion) { this.play = false; this.mechanism.start(); } }
+  letGo() { this.play = true; if (!this.moving.busy && this.motion) { this.play = false; this.mechanism.start(); } }
   pull(what) { this.talk.ask("pull", { parameters: this.state.parameters, ...what }); }
   strike(what) { this.talk.ask("strike", { parameters: this.state.parameters, ...what }); }
 }

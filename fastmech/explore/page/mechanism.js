@@ -7,6 +7,29 @@ const [FIXED, POINT, GUIDE, ROD, SPRING, DAMPER, LOAD, MASS] = [0, 1, 2, 3, 4, 5
 const SYMBOLS = { phi: "φ", theta: "θ" };
 const named = (name) => name.replace(/^([A-Za-z])(\d+)$/, (_, letter, digits) => letter + digits.replace(/\d/g, (d) => "₀₁₂₃₄₅₆₇₈₉"[d]));
 
+// Words where they cover least: other words above all, then lines; and within the axes.
+class Labels {
+  constructor({ ink, box }) { Object.assign(this, { ink, bounds: box, words: [], lines: [] }); }
+  // A line that words had better not lie on.
+  keep(a, b) {
+    const n = Math.min(60, Math.ceil(Math.hypot(b[0] - a[0], b[1] - a[1]) / 6));
+    for (let j = 0; j <= n; j++) this.lines.push([a[0] + (b[0] - a[0]) * j / (n || 1), a[1] + (b[1] - a[1]) * j / (n || 1)]);
+  }
+  say(words, at, spots, look) {
+    const { align = "center", size = 12 } = look, w = 0.64 * size * words.length, h = 1.25 * size;
+    let best = null;
+    for (const [k, spot] of spots.entries()) {
+      const { left, right, top, bottom } = this.bounds, clamp = (v, a, b) => Math.max(a, Math.min(b, v));
+      const x = align === "left" ? at[0] + spot[0] : clamp(at[0] + spot[0], left + w / 2, right - w / 2), y = clamp(at[1] + spot[1], top + h / 2, bottom - h / 2), box = [align === "left" ? x : x - w / 2, y - h / 2];
+      const common = (o) => Math.max(0, Math.min(box[0] + w, o[0] + o[2]) - Math.max(box[0], o[0])) * Math.max(0, Math.min(box[1] + h, o[1] + o[3]) - Math.max(box[1], o[1]));
+      const cost = 0.01 * k + this.words.reduce((sum, o) => sum + common(o), 0) + this.lines.filter(([p, q]) => p > box[0] - 2 && p < box[0] + w + 2 && q > box[1] - 1 && q < box[1] + h + 1).length;
+      if (!best || cost < best.cost) best = { cost, x, y, box: [...box, w, h] };
+    }
+    this.words.push(best.box);
+    this.ink.text(best.x, best.y, words, look);
+  }
+}
+
 export class MechanismView {
   constructor(app) {
     this.app = app;
@@ -18,7 +41,7 @@ export class MechanismView {
     this.panel = panel("mechanism", "Mechanism", { planes: () => [this.plane] });
     this.play = element("button", { onclick: () => this.toggle() }, "play");
     this.scrub = element("input", { type: "range", min: 0, max: 1, value: 0, "aria-label": "time" });
-    this.scrub.addEventListener("input", () => { this.pause(); this.frame = Number(this.scrub.value); this.moved(); });
+    this.scrub.addEventListener("input", () => { this.frame = Number(this.scrub.value); this.exact = null; this.pause(); });
     this.speed = element("select", { "aria-label": "speed" }, ...[0.1, 0.25, 0.5, 1, 2, 4].map((s) => element("option", { value: s }, `${s}×`)));
     this.speed.value = 1;
     this.time = element("span", { role: "timer" });
@@ -54,7 +77,7 @@ export class MechanismView {
   atRest() { this.motion = null; this.struck = null; this.fire = false; this.frame = 0; this.time.textContent = ""; this.pause(); this.extent(); this.tell(); }
   tell() {
     if (this.motion) this.panel.tell(this.app.about, this.motion.t_end > 0 ? "mechanism" : "rest", { ...this.motion.asked, chosen: this.app.state.chosen });
-    else if (this.resting) this.panel.tell(this.app.about, "rest", { ...this.resting.asked, chosen: this.app.state.chosen });
+    else if (this.resting) this.panel.tell(this.app.about, "rest", { ...this.resting.asked, chosen: this.app.state.chosen, none: !this.app.rows.length });
   }
   extent() {
     const found = [[Infinity, -Infinity], [Infinity, -Infinity]];
@@ -111,6 +134,9 @@ export class MechanismView {
     const of = this.shown();
     if (!of) return;
     const { ink } = this.plane, X = (p) => [this.plane.x(p[0]), this.plane.y(p[1])], unit = Math.abs(this.plane.x(this.size) - this.plane.x(0));
+    const labels = this.labels = new Labels(this.plane), tied = [SPRING, DAMPER, ROD];
+    of.elements.forEach((kind, k) => { if (tied.includes(kind)) labels.keep(...of.at[k].map(X)); });
+    of.elements.forEach((kind, k) => { const [x, y] = X(of.at[k][0]); if (kind === MASS) labels.keep([x - 8, y], [x + 8, y]); });
     const heaviest = Math.max(...of.masses.map((m) => m ?? 0), 1e-30);
     const order = [GUIDE, SPRING, DAMPER, ROD, FIXED, MASS, POINT];
     const indices = of.elements.map((_, k) => k).sort((a, b) => order.indexOf(of.elements[a]) - order.indexOf(of.elements[b]));
@@ -132,44 +158,52 @@ export class MechanismView {
         ink.line([along(0.3, 9), along(0.8, 9), along(0.8, -9), along(0.3, -9)], look); ink.line([along(0.8, 0), along(1, 0)], look);
       }
     }
+    const pushes = [];
     for (let k = 0, count = of.forces.shape[1]; k < count; k++) {
       const at = 4 * (of.which * count + k), [x, y, u, v] = of.loads.data.subarray(at, at + 4), force = of.forces.data[at / 4];
       const [a, b] = [[x, y], [u, v]].map(X), far = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1;
       const long = 0.17 * unit * Math.max(-3, Math.min(3, force / this.app.arrow)) / far, [dx, dy] = [long * (b[0] - a[0]), long * (b[1] - a[1])];
       if (!force) continue;
       this.arrow(a, [a[0] + dx, a[1] + dy], css("vermillion"));
-      ink.text(a[0] + dx + 12 * Math.sign(dx), a[1] + dy + (Math.abs(dx) > Math.abs(dy) ? -12 : 12 * Math.sign(dy)), `${Number(force.toPrecision(3))} N`, { color: css("vermillion") });
+      const tip = [a[0] + dx, a[1] + dy];
+      labels.keep(a, tip);
+      pushes.push([tip, Math.sign(dx) || 1, Math.sign(dy) || 1, `${Number(force.toPrecision(3))} N`]);
+    }
+    const { coordinates, states } = this.app.about, y = this.position(), { left, top, bottom } = this.plane.box;
+    // What stands in the corners comes first: what follows stands beside it.
+    coordinates.forEach((n, k) => {
+      const degrees = states[n].unit === "rad" ? ` (${fixed(y[k] * 180 / Math.PI, 1)}°)` : "";
+      labels.say(`${SYMBOLS[n] ?? n} = ${fixed(y[k], 3)} ${states[n].unit}${degrees}`, [left + 6, top + 10 + 16 * k], [[0, 0]], { color: css("ink"), align: "left" });
+    });
+    if (of.forces.shape[1]) {
+      const at = [left + 10, bottom - 12], tip = [at[0] + 0.17 * unit, at[1]];
+      this.arrow(at, tip, css("vermillion"));
+      labels.say(`${this.app.arrow} N, arrows are at most three times as long`, [tip[0] + 8, at[1]], [[0, 0]], { color: css("soft"), align: "left", size: 11 });
     }
     of.names.forEach((name, k) => {
-      // Names of fixed points stand below them on the left, of others above on the right: both can be read where they meet.
-      const ground = of.elements[k] === FIXED, [x, y] = X(of.at[k][0]);
-      if (name) ink.text(x + (ground ? -15 : 15), y + (ground ? 16 : -16), named(name), { color: css(ground ? "ink" : "blue"), size: 13 });
+      // Names of fixed points stand below them on the left, of others above on the right, where nothing else is.
+      const ground = of.elements[k] === FIXED, [u, v] = ground ? [-15, 16] : [15, -16];
+      if (name) labels.say(named(name), X(of.at[k][0]), [[u, v], [-u, v], [u, -v], [-u, -v]], { color: css(ground ? "ink" : "blue"), size: 13 });
     });
-    const { coordinates, states } = this.app.about, y = this.position();
-    if (y) {
-      for (const [rod, end, k, sign, origin] of of.angles) {
-        const [x0, y0] = X(of.at[rod][end]), r = 0.17 * unit, q = y[k] - 2 * Math.PI * Math.round(y[k] / (2 * Math.PI));
-        const on = (angle, radius) => [x0 + radius * Math.cos(angle), y0 - radius * Math.sin(angle)], color = css("orange");
-        const arc = Array.from({ length: 33 }, (_, j) => on(origin + sign * q * j / 32, r));
-        ink.line([[x0, y0], on(origin, 1.25 * r)], { color, width: 1, dash: [4, 3] });
-        ink.line(arc, { color, width: 2 });
-        if (Math.abs(q) > 0.25) this.head(arc[28], arc[32], color);
-        ink.text(...on(origin + 0.5 * sign * q, 1.3 * r), SYMBOLS[coordinates[k]] ?? coordinates[k], { color: css("ink"), size: 13 });
-      }
-      coordinates.forEach((n, k) => {
-        const degrees = states[n].unit === "rad" ? ` (${fixed(y[k] * 180 / Math.PI, 1)}°)` : "";
-        ink.text(this.plane.box.left + 6, this.plane.box.top + 10 + 16 * k, `${SYMBOLS[n] ?? n} = ${fixed(y[k], 3)} ${states[n].unit}${degrees}`, { color: css("ink"), align: "left" });
-      });
+    for (const [tip, u, v, words] of pushes) labels.say(words, tip, [[12 * u, -12 * v], [12 * u, 14 * v], [38 * u, 0], [0, -26], [0, 26], [44 * u, -20], [44 * u, 20], [-38 * u, -18], [-38 * u, 18]], { color: css("vermillion") });
+    for (const [rod, end, k, sign, origin] of of.angles) {
+      const [x0, y0] = X(of.at[rod][end]), r = 0.17 * unit, q = y[k] - 2 * Math.PI * Math.round(y[k] / (2 * Math.PI));
+      const on = (angle, radius) => [x0 + radius * Math.cos(angle), y0 - radius * Math.sin(angle)], color = css("orange");
+      const arc = Array.from({ length: 33 }, (_, j) => on(origin + sign * q * j / 32, r));
+      ink.line([[x0, y0], on(origin, 1.25 * r)], { color, width: 1, dash: [4, 3] });
+      ink.line(arc, { color, width: 2 });
+      if (Math.abs(q) > 0.25) this.head(arc[28], arc[32], color);
+      const words = SYMBOLS[coordinates[k]] ?? coordinates[k], aside = 12 + 4 * words.length;
+      const spots = [[0.5, 1.3], [0.5, 0.7], [0.8, 1.35], [0.2, 1.35]].map(([share, far]) => on(origin + share * sign * q, far * r));
+      labels.say(words, [0, 0], [...spots, ...spots.slice(0, 2).flatMap(([u, v]) => [[u + aside, v], [u - aside, v]])], { color: css("ink"), size: 13 });
     }
-    if (of.forces.shape[1]) {
-      const at = [this.plane.box.left + 10, this.plane.box.bottom - 12];
-      this.arrow(at, [at[0] + 0.17 * unit, at[1]], css("vermillion"));
-      ink.text(at[0] + 0.17 * unit + 8, at[1], `${this.app.arrow} N, arrows are at most three times as long`, { color: css("soft"), align: "left", size: 11 });
-    }
+    if (!this.motion && !this.app.rows.length) ink.text(this.plane.box.right - 6, this.plane.box.top + 10, "no equilibrium is proved: drawn at zero", { color: css("ink"), align: "right" });
     if (this.struck) {
       const [a, b] = [X(this.struck.from), X(this.struck.to)];
       this.arrow(a, b, css("orange"));
-      ink.text(b[0], b[1] + (b[1] < a[1] ? -14 : 14), this.struck.words, { color: css("ink"), size: 13 });
+      const side = b[1] < a[1] ? -1 : 1;
+      labels.keep(a, b);
+      labels.say(this.struck.words, b, [14, 30, -14, -30, 46, -46, 62, -62].flatMap((v) => [[0, v * side], [70, v * side], [-70, v * side]]), { color: css("ink"), size: 13 });
     }
   }
   arrow(a, b, color) {
@@ -183,7 +217,7 @@ export class MechanismView {
   position() {
     const n = this.app.about.coordinates.length;
     if (this.motion) return Array.from({ length: n }, (_, k) => this.motion.y.data[this.frame * 2 * n + k]);
-    return this.app.rows?.[this.app.state.chosen]?.position;
+    return this.app.rows?.[this.app.state.chosen]?.position ?? Array(n).fill(0);
   }
   rates() {
     const n = this.app.about.coordinates.length;

@@ -12,11 +12,14 @@ export class Table {
     const held = this.panel.body.contains(document.activeElement);
     const { coordinates, states } = this.app.about;
     const heads = ["", ...coordinates.map((c) => `${c} [${states[c].unit}]`), "energy [J]", "kind", "stability", "decays in [s]"];
+    // Energies that are rounding beside the others' are none.
+    const zero = 1e-12 * Math.max(...this.app.rows.map((row) => Math.abs(row.energy)), ...(this.app.landscape.span ?? []).map(Math.abs));
     const body = this.app.rows.map((row, k) => {
       const button = element("button", { onclick: () => this.app.choose(k), "aria-label": `show equilibrium ${k + 1}`, "aria-pressed": k === this.app.state.chosen ? "true" : "false" }, `${k + 1}`);
-      const cells = [...row.position.map((v) => fixed(v, 6)), short(row.energy), row.kind, row.verdict, short(row.decay_time)];
+      const cells = [...row.position.map((v) => fixed(v, 6)), short(row.energy !== null && Math.abs(row.energy) < zero ? 0 : row.energy), row.kind, row.verdict, short(row.decay_time)];
       return element("tr", { class: k === this.app.state.chosen ? "chosen" : null, title: row.explanation }, element("th", {}, button), ...cells.map((c) => element("td", {}, c)));
     });
+    if (!body.length) body.push(element("tr", {}, element("td", { colspan: heads.length }, "No equilibrium is proved.")));
     const table = element("table", {}, element("thead", {}, element("tr", {}, ...heads.map((h) => element("th", { scope: "col" }, h)))), element("tbody", {}, ...body));
     this.panel.body.replaceChildren(table);
     if (held) table.querySelectorAll("button")[this.app.state.chosen]?.focus();
@@ -30,9 +33,9 @@ export async function sections(about) {
   const found = await (await fetch("/sections")).json();
   if (found.error) { waiting.body.textContent = found.error; return; }
   waiting.section.remove();
-  for (const { name, pictures, python, request } of found) {
+  for (const { name, pictures, line, python, request } of found) {
     const made = panel(`section-${name}`, `${name} in ${about.results}`);
-    made.put(python, request);
+    made.put(python, request, line);
     for (const [k, one] of pictures.entries()) {
       const image = element("img", { src: `/pictures/${one.split("/").map(encodeURIComponent).join("/")}`, alt: `${name}, picture ${k + 1} of ${pictures.length}` });
       const save = element("button", { onclick: () => savePicture(`${name}${k || ""}`, image), "aria-label": `save PNG: ${name}, picture ${k + 1}` }, "save PNG");

@@ -20,6 +20,7 @@ export class Talk {
     this.counter = 0;
     this.asked = {};
     this.sent = {};
+    this.pending = new Set(); // kinds of which an answer is to come
     this.open();
   }
 
@@ -34,12 +35,14 @@ export class Talk {
     if (typeof data === "string") {
       const message = JSON.parse(data);
       if (message.kind !== "error" || message.id === undefined || this.newest[message.of] === message.id) {
+        if (message.kind === "error") this.pending.delete(message.of);
         this.handlers[message.kind](message);
       }
       return;
     }
     const { header, arrays } = readFrame(data);
     if (this.newest[header.kind] !== header.id) return;
+    if (header.final !== false) this.pending.delete(header.kind);
     header.asked = this.sent[header.kind];
     header.waited = performance.now() - this.asked[header.kind];
     this.handlers[header.kind](header, arrays);
@@ -48,6 +51,7 @@ export class Talk {
   // Answers of a kind that are under way count no more.
   drop(kind) {
     this.newest[kind] = ++this.counter;
+    this.pending.delete(kind);
     this.ask("stop", { what: kind });
   }
 
@@ -55,6 +59,7 @@ export class Talk {
     this.newest[kind] = ++this.counter;
     this.asked[kind] = performance.now();
     this.sent[kind] = message;
+    if (kind !== "stop") this.pending.add(kind);
     if (this.socket.readyState === WebSocket.OPEN) {
       this.socket.send(JSON.stringify({ kind, id: this.counter, ...message }));
     }
