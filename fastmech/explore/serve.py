@@ -10,6 +10,7 @@ import asyncio
 import json
 import os
 import shutil
+import signal
 import socket
 import sys
 import tempfile
@@ -238,9 +239,8 @@ def serve(device: Device, port: int, ready: Callable[[str], None]) -> None:
     config = uvicorn.Config(application(device, port), timeout_graceful_shutdown=0, **how)
     # The page's files are served while the libraries are imported: threads take turns that often [s].
     sys.setswitchinterval(5e-4)
+    # At once: a kernel that is being compiled or runs would hold the process.
+    signal.signal(signal.SIGINT, lambda *_: os._exit(0))
     ready(f"http://127.0.0.1:{port}/")
-    with suppress(KeyboardInterrupt):
-        uvicorn.Server(config).run(sockets=[own])
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(0)  # a kernel that is being compiled or runs would hold the process
+    uvicorn.Server(config).run(sockets=[own])
+    os._exit(0)
