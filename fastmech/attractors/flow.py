@@ -57,6 +57,9 @@ MULTIPLES = 64
 #: Times in which states change by about their size that a motion has to come back to a section.
 WAITED = 64.0
 
+#: The scale of a state at least, as a share of the starts': where all motions rest it would be rounding.
+LEAST = 1e-3
+
 #: Motions beyond so many times what a sample went through have escaped.
 FAR = 1e3
 
@@ -271,9 +274,10 @@ def _alike(a: Floats, b: Floats) -> bool:
 
 def spread(sample: Floats, angles: Flags) -> Floats:
     """Half the range of a sample in each state; where it has none the others', a turn of angles is pi."""
-    scale = 0.5 * np.ptp(sample, axis=0)
-    scale[~(scale > 0.0)] = max(float(scale.max()), float(np.abs(sample).max()), 1e-300)
-    return np.where(angles, np.pi, np.where(scale > 1e-250, scale, 1.0))
+    scale = np.where(angles, np.pi, 0.5 * np.ptp(sample, axis=0))
+    sizes = np.abs(sample[:, ~angles]).max(initial=1e-300)
+    scale[~(scale > 0.0)] = max(float(scale.max()), float(sizes))
+    return np.where(scale > 1e-250, scale, 1.0)
 
 
 def _require_repeats(flow: Flow, sample: Floats) -> None:
@@ -295,7 +299,7 @@ def _settled(flow: Flow, sample: Floats) -> Flow:
         return flow
     both = np.concatenate([sample, paths[:, kept].reshape(-1, sample.shape[1])])
     low, high = np.quantile(both, [0.02, 0.98], axis=0)
-    scale = np.where(flow.angles, np.pi, np.maximum(0.5 * (high - low), 1e-6 * flow.scale))
+    scale = np.where(flow.angles, np.pi, np.maximum(0.5 * (high - low), LEAST * flow.scale))
     reach = np.maximum(flow.reach, 0.5 * np.ptp(both, axis=0))
     now = replace(flow, scale=scale, middle=0.5 * (low + high), reach=reach)
     if not flow.forced:  # at least as long as motions took to get there

@@ -91,6 +91,9 @@ FOLLOWED, EXPONENT_PERIODS = 8, 512
 #: V about an orbit's places that motions on it may have, after a period with the longest steps used.
 INSIDE = 0.1
 
+#: How far beside it they begin, as a share of the ball's radius: exactly on it nothing can grow.
+ASIDE = 1e-3
+
 #: Attractors at most: a system without damping has a continuum of motions that stay.
 MOST = 100
 
@@ -208,7 +211,8 @@ class Search:
         self.orbits.append((orbit, own))
         # Steps must be short enough for motions on the orbit to stay in its balls.
         while self.flow.steps < MOST_STEPS:
-            after = self.flow.after(orbit.points, orbit.periods or 1.0, COARSER)
+            beside = orbit.points + ASIDE * own.radius * self.flow.scale
+            after = self.flow.after(beside, orbit.periods or 1.0, COARSER)
             if (levels_of(self.flow, own, after)[1] < INSIDE).all():
                 break
             self.flow = replace(self.flow, steps=2 * self.flow.steps)
