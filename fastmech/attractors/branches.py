@@ -53,6 +53,9 @@ CORRECTIONS, POINTS, BEND = 6, 1000, 0.95
 #: Distance over the scale of a motion after half its period to where it began, that is twice a shorter one.
 HALVED = 0.02
 
+#: Values of the parameter, over its range, at which special points of both halves of a branch are one.
+ONCE = 1e-5
+
 #: Outputs over a period for amplitudes.
 OUTPUTS = 256
 
@@ -430,7 +433,7 @@ def _each_once(family: OrbitFamily, special: list[Special]) -> tuple[Special, ..
     for one in special:
         again = (
             one.kind == other.kind
-            and abs(one.value - other.value) < 1e-5 * (family.between[1] - family.between[0])
+            and abs(one.value - other.value) < ONCE * (family.between[1] - family.between[0])
             and float(np.abs((one.amplitude - other.amplitude) / family.scale).max()) < HALVED
             for other in kept
         )

@@ -35,6 +35,9 @@ STARTS, SAMPLE, ROUNDS = 10_000, 256, 4
 #: all growth and shrinking of volume that is none: what a conservative motion gains it loses again.
 PRESERVING, OVER, BALANCE = 16, 32, 0.05
 
+#: Divergence over a period that is rounding, and the multipliers that differences still tell.
+ROUNDING, LEAST = 1e-6, 1e-8
+
 #: Periods that motions have to arrive: so many times those of the sample's last, and at least and at most.
 LATER, FEWEST, MOST = 8, 256, 1 << 14
 
@@ -194,7 +197,8 @@ def find_attractors(
         arrived by ``t_end``.
 
     Raises:
-        InputError: an argument is wrong, or the system depends on the time and has no period.
+        InputError: an argument is wrong, the system depends on the time and has no period or another one, or
+            it preserves volume, so that nothing attracts.
     """
     if not isinstance(system, System | Mechanism):
         raise InputError(f"system = {shown(system)}: must be a System or a Mechanism")
@@ -243,7 +247,7 @@ def _preserves_volume(flow: Flow, y: Floats) -> bool:
         total, size = total + divergence, size + np.abs(divergence)
     known = np.isfinite(total)
     balance = (np.abs(total) - BALANCE * size)[known] / len(times)
-    return bool(np.median(balance) < 1e-6) if known.any() else False
+    return bool(np.median(balance) < ROUNDING) if known.any() else False
 
 
 def labelled(
@@ -315,9 +319,9 @@ def _of_orbit(flow: Flow, orbit: Orbit, ball: Balls) -> Attractor:
     if isinstance(flow, SectionFlow):
         over = float(flow.passages(orbit.points[:1], np.array([orbit.periods]), FINER)[1][0])
     largest = float(np.abs(orbit.multipliers).max()) if orbit.multipliers.size else 0.0
-    # Differences give multipliers to about 1e-8; along a cycle nothing grows or falls.
-    exponent = 0.0 if orbit.cycle else math.log(max(largest, 1e-8)) / over
-    error = 0.0 if orbit.cycle else 1e-8 / (over * max(largest, 1e-8))
+    # Along a cycle nothing grows or falls.
+    exponent = 0.0 if orbit.cycle else math.log(max(largest, LEAST)) / over
+    error = 0.0 if orbit.cycle else LEAST / (over * max(largest, LEAST))
     points = orbit.points.copy()
     points[:, flow.angles] = flow.away(points, np.zeros_like(points))[:, flow.angles]
     return Attractor(

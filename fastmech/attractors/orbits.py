@@ -104,7 +104,7 @@ def periodic(flow: Flow, guesses: Floats, periods: int) -> list[Orbit]:
 
 
 def visits(flow: Flow, orbit: Orbit, place: Floats) -> bool:
-    """Whether an orbit comes to a place, to within :data:`SAME` or a twentieth of a step along a cycle."""
+    """Whether an orbit comes to a place, to within :data:`SAME`, or a tenth of a step along a cycle."""
     if not orbit.cycle:
         return bool(flow.distance(orbit.points, place).min() < SAME)
     steps = flow.away(np.roll(orbit.points, -1, axis=0), orbit.points) / flow.scale

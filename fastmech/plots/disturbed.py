@@ -55,7 +55,10 @@ def draw_disturbed(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, st
         "linear_range": (_linear_range, {"linear_limit"}),
     }
     with style.style():
-        return {name: draw(dataset) for name, (draw, needed) in pictures.items() if needed <= set(dataset)}
+        figures = {name: draw(dataset) for name, (draw, needed) in pictures.items() if needed <= set(dataset)}
+        for figure in figures.values():
+            style.suptitle(figure, style.setting_of(dataset.attrs, scene))
+        return figures
 
 
 def _outcomes(dataset: Dataset) -> style.Figure:
@@ -433,8 +436,12 @@ def draw_disturbed_motion(dataset: Dataset, scene: Mapping[str, float]) -> dict[
     """Pictures of a dataset of the scan type ``disturbed_motion``; none where there is no equilibrium."""
     if not dataset.sizes["equilibrium"]:
         return {}
+    setting = style.setting_of(dataset.attrs, scene)
     with style.style():
-        return {"angles": _angles(dataset), "norm": _norm(dataset)}
+        figures = {"angles": _angles(dataset), "norm": _norm(dataset)}
+        style.suptitle(figures["angles"], f"Disturbance of each angle\n{setting}")
+        style.suptitle(figures["norm"], f"Size of the disturbance of the angles\n{setting}")
+        return figures
 
 
 def _angles(dataset: Dataset) -> style.Figure:
@@ -478,7 +485,6 @@ def _norm(dataset: Dataset) -> style.Figure:
         if i >= len(nonlinear) - 2:
             axes.set_xlabel(TIME)
             axes.tick_params(labelbottom=True)
-    figure.suptitle("Size of the disturbance of the angles")
     style.legend_below(figure, panels[0, 0], 2)
     return figure
 

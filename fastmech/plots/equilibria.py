@@ -169,6 +169,7 @@ def draw_equilibria(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, s
                 style.legend_below(figures["potential"], axes, 4)
         if dataset.sizes["equilibrium"]:
             figures["eigenvalues"] = _eigenvalues(dataset)
+            told = style.setting_of(dataset.attrs, scene)
             if of_paper:
                 force = float(dataset.attrs["force"])
                 places = np.stack([dataset["phi"].data, dataset["theta"].data], axis=-1)
@@ -177,7 +178,8 @@ def draw_equilibria(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, s
                 figures["positions"] = _positions(dataset, drawn, told)
             elif "drawing" in dataset.groups:
                 drawn = drawing_of(dataset.groups["drawing"])
-                figures["positions"] = _positions(dataset, drawn, style.setting_of(dataset.attrs, scene))
+                figures["positions"] = _positions(dataset, drawn, told)
+            style.suptitle(figures["eigenvalues"], told)
     return figures
 
 

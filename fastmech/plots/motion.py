@@ -31,11 +31,12 @@ def draw_motion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style
         figures = {"angles": _states(dataset, states)}
         if points:
             figures["coordinates"] = _coordinates(dataset, points)
-        for figure in figures.values():
-            style.suptitle(figure, style.setting_of(dataset.attrs, scene))
         if set(_REACTIONS) <= set(dataset):
             figures["reactions"] = _reactions(dataset)
-        return figures | {"energies": _energies(dataset), "residuals": _residuals(dataset, states)}
+        figures |= {"energies": _energies(dataset), "residuals": _residuals(dataset, states)}
+        for figure in figures.values():
+            style.suptitle(figure, style.setting_of(dataset.attrs, scene))
+        return figures
 
 
 def _states(dataset: Dataset, states: tuple[str, ...]) -> style.Figure:

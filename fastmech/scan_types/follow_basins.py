@@ -81,14 +81,16 @@ class FollowBasins(Starts):
         along = np.repeat(np.array(list(tips), dtype=object), [len(one) for one in line])
         unlabelled = np.stack([one.unlabelled for one in lines])
         shape = tuple(len(where[d].data) for d in dims)
+        units = {where[one].units for one in tips}
+        unit = units.pop() if len(units) == 1 else "1"
         kinds = np.where(rows[:, 1] == 1.0, "born", "dies").astype(object)
         changes = {
             "tipping_along": (along, "1", "parameter along which it happens"),
             "tipping_line": (np.concatenate(line).astype(np.int32), "1", "index of the other one's value"),
             "tipping_attractor": (rows[:, 0].astype(np.int32), "1", "number of the attractor"),
             "tipping_kind": (kinds, "1", "born or dies in the order of the values"),
-            "tipping_low": (rows[:, 2], "1", "it happens above, in the parameter's unit"),
-            "tipping_high": (rows[:, 3], "1", "it happens below, in the parameter's unit"),
+            "tipping_low": (rows[:, 2], unit, "it happens above, in its parameter's unit"),
+            "tipping_high": (rows[:, 3], unit, "it happens below, in its parameter's unit"),
         }
         tipping = numbers("tipping", len(rows), "number of the change") | columns(("tipping",), changes)
         ends, about = share.reshape(*shape, most), "share of the starts that end there, NaN: it is not there"

@@ -139,6 +139,20 @@ def test_periods_double_where_the_longer_motion_begins() -> None:
     assert all(t.low <= min(folds) <= t.high for t in born)
 
 
+def test_a_branch_of_twice_the_period_begins_at_a_doubling() -> None:
+    """Thompson's escape equation: the same doubling as on the shorter motion's branch."""
+
+    def escape(t, x, v, F):  # type: ignore[no-untyped-def]
+        return v, -0.1 * v - x + x * x + F * fm.sin(0.85 * t)
+
+    system = fm.System(escape, ["x", "v"], {"F": 0.05}, period=2.0 * math.pi / 0.85)
+    region = {"x": (-0.8, 1.2), "v": (-0.8, 0.8)}
+    (shorter,) = fm.frequency_response(system, "F", (0.095, 0.103), region).special
+    (longer,) = fm.frequency_response(system, "F", (0.095, 0.103), region, periods=2).special
+    assert shorter.kind == longer.kind == "period doubling"
+    assert longer.value == pytest.approx(shorter.value, abs=1e-5)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -457,11 +457,18 @@ def test_a_stopping_condition_ends_motions_that_leave() -> None:
     assert {"captured", "escaped"} == {name for name, count in ended.counts.items() if count}
 
 
-def test_what_keeps_volume_in_the_long_run_is_refused() -> None:
-    """Lotka and Volterra's equations shrink volume here and swell it there."""
-    system = fm.System(lambda t, x, y: (x * (1.0 - y), y * (x - 1.0)), ["x", "y"], {})
+@pytest.mark.parametrize(
+    ("system", "ranges"),
+    [
+        (fm.System(lambda t, x, y: (x * (1.0 - y), y * (x - 1.0)), ["x", "y"], {}), (0.2, 3.0)),
+        (fm.System(lambda t, x, y, z: (y, -x + y * z, 1.0 - y * y), ["x", "y", "z"], {}), (-2.0, 2.0)),
+    ],
+    ids=["Lotka-Volterra", "Nose-Hoover"],
+)
+def test_what_keeps_volume_in_the_long_run_is_refused(system: fm.System, ranges: Any) -> None:
+    """These equations shrink volume here and swell it there."""
     with pytest.raises(fm.InputError, match="preserves volume"):
-        fm.find_attractors(system, {"x": (0.2, 3.0), "y": (0.2, 3.0)}, 50)
+        fm.find_attractors(system, dict.fromkeys(system.state, ranges), 50)
 
 
 def test_a_period_after_which_nothing_repeats_is_refused() -> None:

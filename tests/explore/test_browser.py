@@ -78,10 +78,21 @@ def serving(*what: str) -> Iterator[str]:
     assert process.stdout is not None
     found = re.search(r"http\S+", process.stdout.readline())
     assert found is not None
-    yield found[0]
-    process.send_signal(signal.SIGINT)
-    process.wait(10)
-    process.stdout.close()
+    try:
+        yield found[0]
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.wait(10)
+        process.stdout.close()
+
+
+@contextmanager
+def page_of(browser: Any, *what: str) -> Iterator[Opened]:
+    """A page of the command's own, closed before the server ends."""
+    with serving(*what) as address:
+        page = browser.new_page(viewport={"width": 1600, "height": 1000})
+        yield Opened(page, address)
+        page.close()
 
 
 @pytest.fixture(scope="module")
@@ -346,8 +357,7 @@ def test_lines_of_every_view_make_what_it_shows(
 def test_a_mechanism_without_dampers_says_so_where_the_basins_would_be(
     browser: Any, what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with serving(what) as address:
-        made = Opened(browser.new_page(viewport={"width": 1600, "height": 1000}), address)
+    with page_of(browser, what) as made:
         made.until("document.querySelector('#basins .refusal').textContent.includes('has no dampers')", 60)
         assert made.page.inner_text("#error") == ""
         assert made.page.locator("#basins button", has_text="copy Python").is_disabled()
@@ -364,7 +374,6 @@ def test_a_mechanism_without_dampers_says_so_where_the_basins_would_be(
             assert elsewhere == sum(abs(np.sin(r[2] / 2)) > 1e-6 for r in fm.find_equilibria(
                 fm.mechanisms.pendulum_chain(3)).position)  # fmt: skip
         assert made.said == []
-        made.page.close()
 
 
 def test_an_atlas_over_a_mass_begins_above_zero_and_names_what_its_curves_are(
@@ -388,14 +397,12 @@ def test_an_atlas_over_a_mass_begins_above_zero_and_names_what_its_curves_are(
     opened.page.get_by_text("reset all").click()
     select.select_option("F0")
     opened.settle()
-    with serving("ziegler_column") as address:
-        made = Opened(browser.new_page(viewport={"width": 1600, "height": 1000}), address)
+    with page_of(browser, "ziegler_column") as made:
         made.until("explorer.atlas?.curves?.length > 0", 120)
         told = made.page.inner_text("#atlas .note")
         assert "Hopf" in told
         assert "equilibria appear" not in told
         assert made.page.evaluate("explorer.about.parameters.b.low") == 0
-        made.page.close()
 
 
 def test_what_was_chosen_last_counts(opened: Opened) -> None:
@@ -490,8 +497,7 @@ def test_a_change_of_a_parameter_cancels_the_atlas(opened: Opened) -> None:
 
 
 def test_slow_equilibria_follow_a_drag(browser: Any) -> None:
-    with serving("pendulum_chain_4") as address:
-        made = Opened(browser.new_page(viewport={"width": 1600, "height": 1000}), address)
+    with page_of(browser, "pendulum_chain_4") as made:
         made.page.wait_for_timeout(2000)
         made.page.evaluate("explorer.waits.answers = []")
         end, k = time.monotonic() + 6.0, 0
@@ -506,14 +512,12 @@ def test_slow_equilibria_follow_a_drag(browser: Any) -> None:
         asking = "explorer.resting.patience = explorer.resting.least = 1; explorer.parameters.set('g', 9.5)"
         made.page.evaluate(f"{asking}; explorer.parameters.set('g', 9.81)")
         made.until("explorer.landscape.panel.request.includes('g = 9.81')", 30)
-        made.page.close()
 
 
 def test_a_page_without_a_proved_equilibrium_says_so(
     browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with serving("double_pendulum") as address:
-        made = Opened(browser.new_page(viewport={"width": 1600, "height": 1000}), address)
+    with page_of(browser, "double_pendulum") as made:
         made.page.get_by_label(re.compile("^g: .*]$")).press("Home")
         made.until("document.querySelector('#landscape .note').textContent.includes('not decided')", 30)
         assert made.page.inner_text("#error") == ""
@@ -522,25 +526,21 @@ def test_a_page_without_a_proved_equilibrium_says_so(
         for view in ("equilibria", "landscape", "mechanism"):
             lines_of(made, view, tmp_path, monkeypatch)
         assert made.said == []
-        made.page.close()
 
 
 def test_lines_of_a_landscape_without_a_potential_work(
     browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with serving("ziegler_column") as address:
-        made = Opened(browser.new_page(viewport={"width": 1600, "height": 1000}), address)
+    with page_of(browser, "ziegler_column") as made:
         found = lines_of(made, "landscape", tmp_path, monkeypatch)
         assert len(found["found"]) == made.page.locator("#equilibria tbody tr").count()
         assert (tmp_path / "landscape.png").is_file()
-        made.page.close()
 
 
 def test_shallow_wells_have_lines_between_them(
     browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with serving("von_mises_truss") as address:
-        made = Opened(browser.new_page(viewport={"width": 1600, "height": 1000}), address)
+    with page_of(browser, "von_mises_truss") as made:
         found = fm.find_equilibria(fm.mechanisms.von_mises_truss())
         top = max(e.energy for e in found)
         assert made.page.evaluate("explorer.landscape.knee") == pytest.approx(top, rel=1e-6)
@@ -551,7 +551,6 @@ def test_shallow_wells_have_lines_between_them(
             "[...document.querySelectorAll('#equilibria tbody tr')].map(r => r.children[3].textContent)"
         )
         assert "e-" not in "".join(energies)  # rounding is nothing
-        made.page.close()
 
 
 def test_a_page_whose_server_has_ended_says_so_and_cannot_be_moved(browser: Any) -> None:
@@ -615,12 +614,10 @@ made = fm.Mechanism(x, {"F": 0.05, "b": 0.3}, points={"M": (x, 0)}, masses={"M":
 
 def test_the_request_of_basins_under_a_load_that_repeats_runs(browser: Any, tmp_path: Path) -> None:
     (tmp_path / "duffing.py").write_text(DUFFING)
-    with serving(f"{tmp_path}/duffing.py:made") as address:
-        made = Opened(browser.new_page(viewport={"width": 1600, "height": 1000}), address)
+    with page_of(browser, f"{tmp_path}/duffing.py:made") as made:
         made.until("document.querySelector('#basins canvas').dataset.divisions === '25'", 120)
         made.until("explorer.basins.panel.request", 30)
         request = made.page.evaluate("explorer.basins.panel.request")
-        made.page.close()
     (tmp_path / "r.toml").write_text(request)
     own = mechanism_named(f"{tmp_path}/duffing.py:made")
     run_request(tmp_path / "r.toml", tmp_path / "r.h5", mechanism=own)
@@ -711,15 +708,13 @@ def test_a_result_file_opens_with_its_sections_as_panels(browser: Any, tmp_path:
         "phi = 1.0\ntheta = 0.1\nt_end = 2.0\noutputs = 50\n"
     )
     run_request(tmp_path / "r.toml", tmp_path / "r.h5")
-    with serving(str(tmp_path / "r.h5")) as address:
-        made = Opened(browser.new_page(viewport={"width": 1600, "height": 1000}), address)
+    with page_of(browser, str(tmp_path / "r.h5")) as made:
         assert made.page.evaluate("explorer.state.parameters.c2") == 200.0
         for name in ("rest", "swing"):
             made.page.wait_for_selector(f"#section-{name} img", timeout=60_000)
             made.until(f"document.querySelector('#section-{name} img').naturalWidth > 100")
             assert f"results['{name}']" in made.page.locator(f"#section-{name} pre").first.text_content()
         assert made.said == []
-        made.page.close()
 
 
 def test_a_motion_that_a_kernel_cannot_follow_gives_a_line(opened: Opened) -> None:
