@@ -7,13 +7,14 @@ import threading
 import webbrowser
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from fastmech.errors import InputError
-from fastmech.explore.device import Device
-from fastmech.scene import Scene, parse_toml, read_toml
+
+if TYPE_CHECKING:
+    from fastmech.explore.device import Device
 
 
 @click.command(name="explore")
@@ -45,6 +46,9 @@ def opened(what: str | None, own: str | None = None) -> Device:
     Raises:
         InputError: there is no such thing.
     """
+    from fastmech.explore.device import Device
+    from fastmech.scene import Scene, parse_toml, read_toml
+
     if not what and not own:
         return Device(Scene())  # before the libraries are there
     from fastmech.cli.run import mechanism_named
