@@ -24,15 +24,11 @@ PROCESSORS = {
 
 #: Kernels by name and precision, and how many packed products and sums their loop has at least.
 KERNELS = {
-    "lagrange float64": 60,
-    "hamilton float64": 60,
     "own float64": 20,
     "lagrange rk4 float64": 240,
     "lagrange abm8 float64": 160,
     "hamilton tsit5 float64": 300,
     "own ab6 float64": 30,
-    "lagrange float32": 40,
-    "hamilton float32": 40,
     "own float32": 20,
     "lagrange rk4 float32": 160,
     "lagrange abm8 float32": 120,
@@ -61,8 +57,6 @@ def steps(rhs, method, precision):
 kernels = {}
 for precision, chosen in (("float64", lambda rhs: rhs), ("float32", in_single)):
     kernels |= {
-        "lagrange " + precision: chosen(lagrange),
-        "hamilton " + precision: chosen(hamilton),
         "own " + precision: chosen(own),
         "lagrange rk4 " + precision: steps(lagrange, "rk4", precision),
         "lagrange abm8 " + precision: steps(lagrange, "abm8", precision),
@@ -89,10 +83,9 @@ def pendulum(t, x, v, damping):
 starts = np.random.default_rng(3).uniform(-2.0, 2.0, (37, 4))
 own = fm.System(pendulum, ["x", "v"], {"damping": 0.1})
 told = {}
-for method in ("rk4", "abm8"):
-    for name, problem, begun in (("scene", fm.Scene(), starts), ("own", own, starts[:, :2])):
-        y = fm.integrate(problem, begun, 2.0, dt=0.01, method=method).y
-        told[f"{name} {method}"] = hashlib.sha256(y.tobytes()).hexdigest()
+for method, problem, begun in (("rk4", fm.Scene(), starts), ("abm8", own, starts[:, :2])):
+    y = fm.integrate(problem, begun, 2.0, dt=0.01, method=method).y
+    told[method] = hashlib.sha256(y.tobytes()).hexdigest()
 print(json.dumps(told))
 """
 
