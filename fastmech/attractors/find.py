@@ -16,7 +16,7 @@ from fastmech.attractors.flow import DIFFERENCE, FINER, Floats, Flow, SectionFlo
 from fastmech.attractors.orbits import Orbit
 from fastmech.attractors.proof import RestProof
 from fastmech.attractors.search import DENSE, Search
-from fastmech.attractors.settle import Ends, settle
+from fastmech.attractors.settle import Ends, by_only_end, only_end, settle
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import LABELS, counts
@@ -192,7 +192,8 @@ def find_attractors(
         have come into a region about the same attractor in which the map over its period was measured to
         contract (of a system's place of rest a ball that it is proved to attract, where the function can be
         called with symbols), or have visited the cells of a torus or of chaos 24 times in a row. It is
-        ``unsure`` where they come apart with the finest steps too, ``escaped`` where it goes a thousand times
+        ``unsure`` where they come apart with the finest steps too (captured, if all six runs of all such
+        starts, at least 16, arrive at one attractor), ``escaped`` where it goes a thousand times
         as far as motions do or where the system's stopping condition ends it, ``undecided`` where it has not
         arrived by ``t_end``.
 
@@ -254,7 +255,7 @@ def labelled(
     search: Search, starts: Floats, t_end: float | None, progress: Progress | None = None
 ) -> Attractors:
     """Labels of starts by the attractors of a search, and by those that turn up on the way."""
-    flow = search.flow
+    flow, search.only_end = search.flow, -1
     for attempt in range(ROUNDS):
         periods = min(max(LATER * search.latest, FEWEST), MOST)
         if t_end is not None:
@@ -268,6 +269,8 @@ def labelled(
         search.leave_transients()
         if search.changes == before:
             break
+    search.only_end = only_end(ends)
+    ends = by_only_end(search, ends)
     every = [_of_orbit(flow, orbit, ball) for orbit, ball in search.orbits]
     every += [_of_cloud(cloud, flow.forced) for cloud in search.clouds]
     found = np.bincount(ends.label[ends.label >= 0], minlength=len(every))

@@ -107,6 +107,7 @@ class Search:
         self.clouds: list[Cloud] = []
         self.repelling: list[Orbit] = []  #: orbits that motions leave, seen on the way
         self.changes = 0  #: times that one was found, or more of one
+        self.only_end = -1  #: the attractor at which all chaos that passes ends, if there is one
         self.latest = 0  #: periods after which the last motion of a sample had arrived
 
     @property

@@ -3,7 +3,8 @@
 A label counts where both runs arrive at the same attractor and have stayed together on the way. Where they
 have not, a disturbance as small as the steps' error has grown, and the motions run again with finer steps, as
 do those that escaped, once: steps that are too long send a motion away. Cells of the second run are twice as
-wide. Motions that still come apart are unsure.
+wide. Motions that still come apart are unsure, unless every run of every such motion of the starts that were
+searched arrives at one and the same attractor: chaos that passes has but this one end.
 """
 
 from __future__ import annotations
@@ -30,6 +31,9 @@ TOGETHER = 0.02
 #: Visits of a cloud's cells in a row after which a motion has arrived there.
 VISITS = 24
 
+#: Motions that come apart at least, before it is believed that all such end at one attractor.
+MANY = 16
+
 #: Motions followed together at most: the states of a piece are all that is held of them.
 CHUNK = 1 << 15
 
@@ -45,6 +49,7 @@ class Ends(NamedTuple):
     time: Floats  #: of arrival, a look's [s]; NaN: not arrived
     last: Floats  #: states of some that are undecided (m, dim)
     steps: int  #: of all motions together
+    agreed: Integers  #: where all runs arrive of those that come apart, -1: at several (n,)
 
 
 class _Run:
@@ -89,6 +94,7 @@ def settle(search: Search, starts: Floats, periods: int, progress: Progress | No
     flow, n = search.flow, len(starts)
     label, status = np.full(n, -1, dtype=np.int64), np.full(n, Status.UNDECIDED, dtype=np.int8)
     time, last, steps = np.full(n, np.nan), [np.empty((0, starts.shape[1]))], 0
+    agreed = np.full(n, -1, dtype=np.int64)
     chunk = max(FEWEST, min(CHUNK, HELD // (PIECE * starts.shape[1])))
     for first in range(0, n, chunk):
         members = np.arange(first, min(n, first + chunk))
@@ -99,13 +105,31 @@ def settle(search: Search, starts: Floats, periods: int, progress: Progress | No
             found, apart, undecided = _together(search, starts[members], periods, finer)
             for own, new in ((label, found.label), (status, found.status), (time, found.time)):
                 own[members] = new
+            every = finer == REPEATED[0]
+            agreed[members] = np.where(every | (agreed[members] == found.agreed), found.agreed, -1)
             steps += found.steps
             last.append(undecided[: max(0, 256 - sum(map(len, last)))])
-            lost = np.isin(found.status, (Status.ESCAPED, Status.NOT_FINITE)) & (finer == REPEATED[0])
+            lost = np.isin(found.status, (Status.ESCAPED, Status.NOT_FINITE)) & every
             members = members[apart | lost]
         if progress is not None:
             progress(done)
-    return Ends(label, status, time * flow.period, np.concatenate(last), steps)
+    return by_only_end(search, Ends(label, status, time * flow.period, np.concatenate(last), steps, agreed))
+
+
+def only_end(ends: Ends) -> int:
+    """The one attractor at which all runs of motions that come apart arrive, -1: there is no such one."""
+    unsure = ends.agreed[ends.status == Status.UNSURE]
+    return int(unsure[0]) if unsure.size >= MANY and (unsure == unsure[0]).all() else -1
+
+
+def by_only_end(search: Search, ends: Ends) -> Ends:
+    """Motions that come apart labelled by the only end that such motions have, if there is one."""
+    known = (ends.status == Status.UNSURE) & (ends.agreed == search.only_end) & (ends.agreed >= 0)
+    return ends._replace(
+        label=np.where(known, ends.agreed, ends.label),
+        status=np.where(known, Status.CAPTURED, ends.status).astype(np.int8),
+        time=np.where(known | (ends.label >= 0), ends.time, np.nan),
+    )
 
 
 def _together(search: Search, starts: Floats, periods: int, finer: float) -> tuple[Ends, Flags, Floats]:
@@ -137,11 +161,12 @@ def _together(search: Search, starts: Floats, periods: int, finer: float) -> tup
         gone = both & (fine.label[active] < 0) & (fine.status[active] == coarse.status[active])
         apart[active] = both & differ & ~gone
         active = active[~both]
-    label = np.where(apart, -1, fine.label)
-    label[active] = -1
+    fine.label[active] = -1
+    label, agreed = np.where(apart, -1, fine.label), np.where(fine.label == coarse.label, fine.label, -1)
     status = np.where(label >= 0, Status.CAPTURED, fine.status)
     status = np.where(apart, Status.UNSURE, np.where(status == Status.OK, Status.UNDECIDED, status))
     status[active] = Status.UNDECIDED
     status[~ok] = Status.START_NOT_FINITE
-    ends = Ends(label, status.astype(np.int8), np.where(label >= 0, time, np.nan), starts[:0], steps)
+    time[fine.label < 0] = np.nan
+    ends = Ends(label, status.astype(np.int8), time, starts[:0], steps, agreed)
     return ends, apart, fine.y[active]

@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 from fastmech.attractors.find import find_attractors
 from fastmech.attractors.flow import keeps_moving
-from fastmech.attractors.settle import Ends
 from fastmech.basins.convergence import SUBSTEPS, Computations, Indices, lingering, tell_the_same
 from fastmech.basins.labels import Labels, of_attractors, pieces_of
 from fastmech.basins.runs import Paths, follow, rounds_until
@@ -120,7 +119,7 @@ def _by_attractors(
     found = find_attractors(
         scene, starts, t_end=t_end, method=method or "dop853", threads=threads, progress=progress
     )
-    return of_attractors(found, Ends(found.label, found.status, found.time, found.scale, found.steps))
+    return of_attractors(found, found)
 
 
 class How(NamedTuple):

@@ -80,7 +80,7 @@ def _named(tree: Any, k: int) -> str:
     return tree[k].name if isinstance(tree, Attractors) else f"well {k} at {tree.equilibria.place(k)}"
 
 
-def of_attractors(found: Attractors, ends: Ends) -> Labels:
+def of_attractors(found: Attractors, ends: Attractors | Ends) -> Labels:
     """Labels of starts by attractors."""
     n = len(ends.label)
     turns = np.zeros((n, len(found.names) // 2), dtype=np.int32)

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastmech.attractors.find import find_attractors
 from fastmech.attractors.flow import keeps_moving
-from fastmech.attractors.settle import Ends
 from fastmech.basins.label import How, label_states
 from fastmech.basins.labels import Labels, of_attractors, told_ends
 from fastmech.basins.measures.labels import number_turns
@@ -155,8 +154,7 @@ def map_basins(
             attractors = find_attractors(
                 moving, starts, t_end=t_end, method=method or "dop853", threads=threads, progress=tell
             )
-            found = attractors
-            part = of_attractors(found, Ends(found.label, found.status, found.time, starts, found.steps))
+            part = of_attractors(attractors, attractors)
         elif moving is not None:
             part = of_attractors(attractors, attractors.label_starts(starts, tell))
         elif not isinstance(scene, System):

@@ -349,14 +349,37 @@ def test_the_smallest_shock_out_of_a_place_of_rest_reaches_the_saddle_s_manifold
     assert shock.size == pytest.approx(distance, abs=2e-3)
 
 
-def test_intervals_of_shares_count_the_unsure_as_none_and_as_all() -> None:
-    """A driven pendulum whose transient chaos lasts: most starts are unsure, and the interval says so."""
+def driven(t, x, v, F, w):  # type: ignore[no-untyped-def]
+    return v, -0.1 * v - fm.sin(x) + F * fm.cos(w * t)
 
-    def driven(t, x, v, F, w):  # type: ignore[no-untyped-def]
-        return v, -0.1 * v - fm.sin(x) + F * fm.cos(w * t)
 
-    period = 2.0 * np.pi / 0.7
+def test_chaos_that_passes_with_one_end_leaves_nothing_unsure() -> None:
+    """Runs with different steps part in transient chaos; Runge and Kutta's method shows where all end."""
+    period, n = 2.0 * np.pi / 0.7, 100
     system = fm.System(driven, ["x", "v"], {"F": 0.5, "w": 0.7}, period=period, angles=["x"])
+    starts = fm.samplers.Uniform({"x": (-np.pi, np.pi), "v": (-3.0, 3.0)}).draw(n, ("x", "v"))
+    found = fm.find_attractors(system, starts)
+    assert found.counts["captured"] == n
+    assert (found.label_starts(starts).status == found.status).all()
+
+    def rates(t: float, y: Any) -> Any:
+        return np.array([y[1], -0.1 * y[1] - np.sin(y[0]) + 0.5 * np.cos(0.7 * t)])
+
+    y, dt = starts.T.copy(), period / 60
+    for k in range(60 * 600):
+        t = k * dt
+        a = rates(t, y)
+        b = rates(t + dt / 2, y + dt / 2 * a)
+        c = rates(t + dt / 2, y + dt / 2 * b)
+        y += dt / 6 * (a + 2 * b + 2 * c + rates(t + dt, y + dt * c))
+    away = y - found[0].points.T
+    away[0] -= 2.0 * np.pi * np.round(away[0] / (2.0 * np.pi))
+    assert (np.abs(away).max(axis=0) < 1e-3).mean() > 0.9  # the rest is still in chaos
+
+
+def test_intervals_of_shares_count_the_unsure_as_none_and_as_all() -> None:
+    """Transient chaos that may end in any well of a driven pendulum whose turns are counted."""
+    system = fm.System(driven, ["x", "v"], {"F": 0.5, "w": 0.7}, period=2.0 * np.pi / 0.7)
     found = fm.find_attractors(system, {"x": (-np.pi, np.pi), "v": (-3.0, 3.0)}, n=300)
     unsure = found.counts["unsure"] + found.counts["undecided"]
     assert unsure > 30
