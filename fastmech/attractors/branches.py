@@ -2,17 +2,21 @@
 
 A motion of period p T is a fixed point x of the map over p periods: G(x, lambda) = Phi(x, lambda) - x = 0;
 the period T may depend on the parameter. Branches are followed by pseudo-arclength continuation (Keller;
-Allgower and Georg, *Numerical Continuation Methods*, chapter 10). Derivatives are differences, which all run
-side by side on lanes, each in its own time over its own period. Multipliers tell stability: +1 at a fold, -1
-where the period doubles, a pair on the unit circle at a Neimark-Sacker point (Guckenheimer, Holmes, section
-3.5). Branches begin at what Newton's method finds at several values of the parameter from many starts, so
-that isolated ones are found where a start comes near.
+Allgower and Georg, *Numerical Continuation Methods*, chapter 10). Derivatives are products of those of parts
+of a period: differences over the whole of it would lie where the map is no longer linear. All run side by
+side on lanes, each in its own time over its own period. Multipliers tell stability: +1 at a fold, where the
+parameter turns, and at a branch point, where another branch crosses and the determinant of G's derivatives
+and the tangent changes its sign (Allgower and Georg, chapter 8), -1 where the period doubles, a pair on the
+unit circle at a Neimark-Sacker point (Guckenheimer, Holmes, section 3.5). Branches begin at what Newton's
+method finds at several values of the parameter from many starts, so that isolated ones are found where a
+start comes near.
 """
 
 from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -21,7 +25,7 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
+from scipy.optimize import brentq, root
 
 from fastmech.attractors.flow import DIFFERENCE, FINER, Floats, Flow, flow_of, period_of
 from fastmech.attractors.orbits import RESIDUAL, newton
@@ -56,6 +60,12 @@ HALVED = 0.02
 #: Values of the parameter, over its range, at which special points of both halves of a branch are one.
 ONCE = 1e-5
 
+#: Kinds of points where the stability of a branch may change.
+KINDS = ("fold", "branch point", "period doubling", "Neimark-Sacker")
+
+#: Parts of a period of the forcing whose derivatives are taken.
+PARTS = 8
+
 #: Outputs over a period for amplitudes.
 OUTPUTS = 256
 
@@ -63,7 +73,7 @@ OUTPUTS = 256
 class Special(NamedTuple):
     """A point where the stability of a branch may change."""
 
-    kind: str  #: "fold", "period doubling" or "Neimark-Sacker"
+    kind: str  #: one of :data:`KINDS`
     value: float  #: of the parameter
     place: Floats  #: state at the begin of a period (dim,)
     amplitude: Floats  #: of each state (dim,)
@@ -107,7 +117,7 @@ class FrequencyResponse(Drawn):
 
     @property
     def special(self) -> list[Special]:
-        """Folds, period doublings and Neimark-Sacker points of all branches, by the parameter."""
+        """Folds, branch points, doublings and Neimark-Sacker points of all branches, by the parameter."""
         return sorted((s for branch in self.branches for s in branch.special), key=lambda s: s.value)
 
     KIND = "frequency_response"
@@ -122,7 +132,7 @@ class FrequencyResponse(Drawn):
             + (f", {closed} closed" if closed else "")
             + (f", {cut} cut off" if cut else "")
         ]
-        for kind in ("fold", "period doubling", "Neimark-Sacker"):
+        for kind in KINDS:
             values = [f"{s.value:.6g}" for s in self.special if s.kind == kind]
             more = f" and {len(values) - 6} more" if len(values) > 6 else ""
             if values:
@@ -150,15 +160,14 @@ def frequency_response(
         starts: ranges by name, a sampler or states (n, dim), as for :func:`fastmech.find_attractors`.
             Newton's method begins at 64 of them, and at where these are after 48 periods, at nine values.
         periods: how many periods of the forcing a motion takes; motions that take a part of them are branches
-            too. A branch that begins where a shorter motion doubles its period ends there.
+            too.
         seed: of the sampler, by default its own.
         threads: threads to use, all processors by default.
 
     Returns:
-        branches with multipliers, amplitudes, and folds, period doublings and Neimark-Sacker points located
-        to rounding of the map; at the end of a branch of twice the period, to the root of rounding: the
-        shorter motion's branch tells more. A branch that no start leads to is not found, and one of more than
-        2,000 motions is cut off.
+        branches with multipliers, amplitudes, and folds, branch points (pitchforks, exchanges), period
+        doublings and Neimark-Sacker points located to rounding of the map. A branch that no start leads to is
+        not found, and one of more than 2,000 motions is cut off.
 
     Raises:
         InputError: an argument is wrong, or the system does not depend on the time.
@@ -248,11 +257,15 @@ class OrbitFamily:
 
         return _over_periods(own), known
 
-    def run(self, y: Floats, values: Floats, times: Floats) -> Floats:
-        """States (outputs, n, dim) at times in units of the orbits' periods, each with its own value (n,)."""
+    def run(self, y: Floats, values: Floats, times: Floats, begin: Floats | None = None) -> Floats:
+        """States (outputs, n, dim) at times in units of the orbits' periods, each with its own value (n,).
+
+        They begin at the shares ``begin`` (n,) of the period, by default at 0.
+        """
         system, known = self._of_period
         each = {value: known(value) for value in np.unique(values).tolist()}
-        rows = np.array([[*each[v][1], each[v][0]] for v in values.tolist()])
+        starts = np.zeros(len(y)) if begin is None else begin
+        rows = np.array([[*each[v][1], each[v][0], b] for v, b in zip(values.tolist(), starts, strict=True)])
         problem = Problem(
             system.kernel, Parameters(tuple(np.ascontiguousarray(c) for c in rows.T)), system=system
         )
@@ -261,36 +274,42 @@ class OrbitFamily:
 
     def derivative(self, x: Floats, value: float) -> tuple[Floats, Floats, Floats]:
         """G (dim,), its derivative by the state (dim, dim) and by the parameter over the range (dim,)."""
-        h, range_ = DIFFERENCE * self.scale, self.between[1] - self.between[0]
-        hv = DIFFERENCE * range_
-        shifts = np.concatenate([np.zeros((1, self.dim)), np.diag(h), np.diag(-h), np.zeros((2, self.dim))])
+        d, m, h = self.dim, PARTS * self.periods, DIFFERENCE * self.scale
+        hv = DIFFERENCE * (self.between[1] - self.between[0])
+        path = self.run(x[None], np.array([value]), np.arange(1.0, m + 1.0) / m)[:, 0]
+        shifts = np.concatenate([np.diag(h), np.diag(-h), np.zeros((2, d))])
         values = np.full(len(shifts), value)
         values[-2:] += hv, -hv
-        image = self.run(x + shifts, values, np.ones(1))[0]
-        d = self.dim
-        J = (self.away(image[1 : 1 + d], image[1 + d : 1 + 2 * d]) / (2.0 * h[:, None])).T
-        by_value = self.away(image[-2], image[-1]) / (2.0 * DIFFERENCE)
-        return self.away(image[0], x), J, by_value
+        lanes = (np.concatenate([x[None], path[:-1]])[:, None] + shifts).reshape(-1, d)
+        begin = np.repeat(np.arange(m) / m, len(shifts))
+        image = self.run(lanes, np.tile(values, m), np.array([1.0 / m]), begin)[0].reshape(m, -1, d)
+        parts = np.swapaxes(self.away(image[:, :d], image[:, d : 2 * d]) / (2.0 * h[:, None]), 1, 2)
+        slopes = self.away(image[:, -2], image[:, -1]) / (2.0 * DIFFERENCE)
+        J, by_value = np.eye(d), np.zeros(d)
+        for part, slope in zip(parts, slopes, strict=True):
+            J, by_value = part @ J, part @ by_value + slope
+        return self.away(path[-1], x), J, by_value
 
 
 def _over_periods(system: System) -> System:
-    """The same with its period, the last parameter, as the unit of time."""
+    """The same with its period as the unit of time, and the time at which it begins, as last parameters."""
     if system.vector:
         raise InputError("system: branches are followed of systems whose rhs gives a tuple, not of arrays")
     names = [*system.state, *system.parameter_order]
     rates = ", ".join(f"period_ * rate{k}" for k in range(len(system.state)))
     found = ", ".join(f"rate{k}" for k in range(len(system.state)))
     text = (
-        f"def over_periods(t, {', '.join(names)}, period_):\n"
-        f"    {found}, = rhs(t * period_, {', '.join(names)})\n"
+        f"def over_periods(t, {', '.join(names)}, period_, begin_):\n"
+        f"    {found}, = rhs((t + begin_) * period_, {', '.join(names)})\n"
         f"    return {rates},\n"
     )
     rhs: Any = system.rhs
     module = new_module("system", text, [fingerprint(rhs)])
     vars(module)["rhs"] = numba.njit(**FLAGS)(rebuilt(rhs, module.__name__, {}))
     function = run_module(module, text).over_periods
-    assert list(inspect.signature(function).parameters)[1:-1] == names
-    return System(function, list(system.state), {**dict.fromkeys(system.parameters, 0.0), "period_": 1.0})
+    assert list(inspect.signature(function).parameters)[1:-2] == names
+    added = {"period_": 1.0, "begin_": 0.0}
+    return System(function, list(system.state), dict.fromkeys(system.parameters, 0.0) | added)
 
 
 class _Point(NamedTuple):
@@ -299,6 +318,7 @@ class _Point(NamedTuple):
     u: Floats  #: (dim + 1,)
     tangent: Floats
     J: Floats
+    slopes: Floats  #: derivatives of G by u (dim, dim + 1)
 
 
 def _correct(family: OrbitFamily, guess: Floats, tangent: Floats) -> _Point | None:
@@ -312,16 +332,13 @@ def _correct(family: OrbitFamily, guess: Floats, tangent: Floats) -> _Point | No
             return None
         if not (np.isfinite(G).all() and np.isfinite(J).all()):
             return None
-        A = np.zeros((len(u), len(u)))
-        A[:-1, :-1] = (J - np.eye(family.dim)) * family.scale / family.scale[:, None]
-        A[:-1, -1] = by_value / family.scale
-        A[-1] = tangent
+        A = np.vstack([_slopes(family, J, by_value), tangent])
         right = np.append(G / family.scale, tangent @ (u - guess))
         before, size = size, float(np.abs(right).max())
         try:
             if size < RESIDUAL:
                 own = np.linalg.solve(A, np.eye(len(u))[-1])
-                return _Point(u, own / np.linalg.norm(own), J)
+                return _Point(u, own / np.linalg.norm(own), J, A[:-1])
             if size > 2.0 * before:
                 return None
             u = u - np.linalg.solve(A, right)
@@ -330,12 +347,18 @@ def _correct(family: OrbitFamily, guess: Floats, tangent: Floats) -> _Point | No
     return None
 
 
+def _slopes(family: OrbitFamily, J: Floats, by_value: Floats) -> Floats:
+    """Derivatives of G (dim, dim + 1), in scales."""
+    return np.column_stack([(J - np.eye(family.dim)) * family.scale, by_value]) / family.scale[:, None]
+
+
 def _branch(family: OrbitFamily, place: Floats, value: float) -> Branch:
     """The whole branch through a periodic motion."""
     u = np.append(place / family.scale, (value - family.between[0]) / (family.between[1] - family.between[0]))
     start = _correct(family, u, np.eye(len(u))[-1])
     if start is None:  # too near to a fold for the plane of constant parameter
-        start = _Point(u, np.eye(len(u))[-1], family.derivative(place, value)[1])
+        _, J, by_value = family.derivative(place, value)
+        start = _Point(u, np.eye(len(u))[-1], J, _slopes(family, J, by_value))
     forth, end = _follow(family, start)
     back: list[_Point] = []
     begin = end
@@ -389,11 +412,12 @@ def _follow(family: OrbitFamily, start: _Point) -> tuple[list[_Point], str]:
 
 
 def _tests(p: _Point) -> Floats:
-    """What changes its sign at a fold, a period doubling, a Neimark-Sacker point or a neutral saddle."""
+    """What changes its sign at a turn, a branch point, a period doubling, and a pair on the unit circle."""
     values = np.linalg.eigvals(p.J)
     pairs = [values[i] * values[j] - 1.0 for i in range(len(values)) for j in range(i)]
     doubling = np.linalg.det(p.J + np.eye(len(p.J)))
-    return np.array([p.tangent[-1], doubling, np.prod(pairs).real if pairs else 1.0])
+    crossing = np.linalg.det(np.vstack([p.slopes, p.tangent]))
+    return np.array([p.tangent[-1], crossing, doubling, np.prod(pairs).real if pairs else 1.0])
 
 
 def _between(family: OrbitFamily, one: _Point, two: _Point) -> list[Special]:
@@ -402,8 +426,11 @@ def _between(family: OrbitFamily, one: _Point, two: _Point) -> list[Special]:
     direction = two.u - one.u
     gap = float(np.linalg.norm(direction))
     before, after = _tests(one), _tests(two)
-    for kind, k in (("fold", 0), ("period doubling", 1), ("Neimark-Sacker", 2)):
-        if not before[k] * after[k] < 0.0 or not gap:
+    changes = before * after < 0.0
+    if changes[0]:  # a branch that begins at another one turns there
+        changes[1], begins = False, bool(changes[1])
+    for k, kind in enumerate(KINDS):
+        if not changes[k] or not gap:
             continue
 
         def point(share: float) -> _Point | None:
@@ -413,18 +440,59 @@ def _between(family: OrbitFamily, one: _Point, two: _Point) -> list[Special]:
             p = one if share == 0.0 else two if share == 1.0 else point(share)
             return float(before[k] + share * (after[k] - before[k])) if p is None else float(_tests(p)[k])
 
-        share = brentq(test, 0.0, 1.0, xtol=1e-9)
-        p = point(share) or one
-        values = np.linalg.eigvals(p.J)
-        if k == 2 and np.abs(values[np.argmin(np.abs(np.abs(values) - 1.0))].imag) < 1e-4:
+        u = _branch_point(family, one, two) if KINDS[k] == "branch point" or (k == 0 and begins) else None
+        if u is None:
+            share = brentq(test, 0.0, 1.0, xtol=1e-9)
+            p = point(share) or one
+            u = p.u
+            values = np.linalg.eigvals(p.J)
+        if k == 3 and np.abs(values[np.argmin(np.abs(np.abs(values) - 1.0))].imag) < 1e-4:
             continue  # two real multipliers with the product 1: a neutral saddle
-        value = family.between[0] + p.u[-1] * (family.between[1] - family.between[0])
-        place = p.u[:-1] * family.scale
-        if k == 0 and family.periods % 2 == 0:
-            half = family.run(place[None], np.array([value]), np.array([0.5]))[0, 0]
-            kind = "period doubling" if family.distance(half, place) < HALVED else kind
+        value = family.between[0] + u[-1] * (family.between[1] - family.between[0])
+        place = u[:-1] * family.scale
+        if k == 1 or (k == 0 and begins):
+            kind = "period doubling" if _doubles(family, place, value) else "branch point"
         found.append(Special(kind, value, place, _amplitudes(family, place[None], np.array([value]))[0]))
     return found
+
+
+def _doubles(family: OrbitFamily, place: Floats, value: float) -> bool:
+    """Whether a branch point is where a motion of half the period doubles it: its multiplier is -1."""
+    if family.periods % 2:
+        return False
+    shorter = copy(family)
+    shorter.periods, shorter.steps = family.periods // 2, family.steps // 2
+    vars(shorter).pop("_of_period", None)
+    G, J, _ = shorter.derivative(place, value)
+    values = np.linalg.eigvals(J)
+    twice = bool(np.abs(values + 1.0).min() < np.abs(values - 1.0).min())
+    return twice and float(np.abs(G / family.scale).max()) < HALVED
+
+
+def _branch_point(family: OrbitFamily, one: _Point, two: _Point) -> Floats | None:
+    """Where branches cross between two points, in scales (dim + 1,); None: not found.
+
+    Beside it two branches are near to each other, and the plane across one cuts both. So it is a root of its
+    own equations, which are regular there: G(u) + b w = 0, w G' = 0, w w = 1 (Allgower and Georg, chapter 8).
+    """
+    d, low, range_ = family.dim, family.between[0], family.between[1] - family.between[0]
+
+    def equations(z: Floats) -> Floats:
+        u, b, w = z[: d + 1], z[d + 1], z[d + 2 :]
+        try:
+            G, J, by_value = family.derivative(u[:-1] * family.scale, low + u[-1] * range_)
+        except InputError:
+            return np.full(len(z), np.nan)
+        return np.concatenate([G / family.scale + b * w, w @ _slopes(family, J, by_value), [w @ w - 1.0]])
+
+    crossing = [abs(_tests(p)[1]) for p in (one, two)]
+    share = crossing[0] / max(sum(crossing), 1e-300)
+    guess = one.u + share * (two.u - one.u)
+    w = np.linalg.svd(one.slopes + share * (two.slopes - one.slopes))[0][:, -1]
+    found = root(equations, np.concatenate([guess, [0.0], w]), options={"eps": 1e-6, "xtol": 1e-13})
+    u, gap = found.x[: d + 1], float(np.linalg.norm(two.u - one.u))
+    good = np.abs(found.fun).max() < 1e-7 and np.linalg.norm(u - guess) < gap
+    return u if good and abs(found.x[d + 1]) < RESIDUAL else None
 
 
 def _each_once(family: OrbitFamily, special: list[Special]) -> tuple[Special, ...]:

@@ -16,7 +16,7 @@ from fastmech.scene import nearest
 HATCHES = ("", "//", "..", "xx")
 
 #: Marker of each kind of special point.
-MARKERS = {"fold": "o", "period doubling": "s", "Neimark-Sacker": "D"}
+MARKERS = {"fold": "o", "branch point": "^", "period doubling": "s", "Neimark-Sacker": "D"}
 
 
 def draw_frequency_response(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:

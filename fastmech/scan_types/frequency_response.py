@@ -1,7 +1,7 @@
 """Branches of periodic motion over a parameter, such as the frequency of a load.
 
 Layout: in the group ``points`` one row for each point of each branch, in order along it; in ``special`` the
-folds, period doublings and Neimark-Sacker points.
+folds, branch points, period doublings and Neimark-Sacker points.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from fastmech.attractors.branches import FrequencyResponse, frequency_response
+from fastmech.attractors.branches import KINDS, FrequencyResponse, frequency_response
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
@@ -21,8 +21,6 @@ from fastmech.results import Dataset, Variable, columns, numbers, parts, state_u
 from fastmech.scan_types.attractors import Starts, lines_over, shared_axes
 from fastmech.scan_types.request import Axis, Tiling, tile_of
 from fastmech.scene import nearest
-
-KINDS = ("fold", "period doubling", "Neimark-Sacker")
 
 
 class FrequencyResponseScan(Starts):

@@ -6,12 +6,13 @@ import math
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
-from scipy.optimize import fsolve
+from scipy.optimize import fsolve, root
 
 import fastmech as fm
 
@@ -148,9 +149,66 @@ def test_a_branch_of_twice_the_period_begins_at_a_doubling() -> None:
     system = fm.System(escape, ["x", "v"], {"F": 0.05}, period=2.0 * math.pi / 0.85)
     region = {"x": (-0.8, 1.2), "v": (-0.8, 0.8)}
     (shorter,) = fm.frequency_response(system, "F", (0.095, 0.103), region).special
-    (longer,) = fm.frequency_response(system, "F", (0.095, 0.103), region, periods=2).special
-    assert shorter.kind == longer.kind == "period doubling"
-    assert longer.value == pytest.approx(shorter.value, abs=1e-5)
+    both = fm.frequency_response(system, "F", (0.095, 0.103), region, periods=2)
+    assert [len(branch.special) for branch in both.branches] == [1, 1]
+    for one in (shorter, *both.special):
+        assert one.kind == "period doubling"
+        assert one.value == pytest.approx(shorter.value, abs=1e-9)
+
+
+def test_a_pitchfork_is_a_branch_point_of_both_branches() -> None:
+    """x' = m x - x^3 has its pitchfork at m = 0, where a fold's determinant vanishes too."""
+
+    def rates(t, x, y, m):  # type: ignore[no-untyped-def]
+        return m * x - x**3, -y + fm.cos(t)
+
+    system = fm.System(rates, ["x", "y"], {"m": 0.1}, period=2.0 * math.pi)
+    found = fm.frequency_response(system, "m", (-0.37, 0.5), {"x": (-1.0, 1.0), "y": (-1.0, 1.0)})
+    assert len(found.branches) == 2
+    for branch in found.branches:
+        (point,) = branch.special
+        assert point.kind == "branch point"
+        assert abs(point.value) < 1e-9
+
+
+def test_a_driven_pendulum_loses_its_symmetry_where_its_half_period_s_multiplier_says() -> None:
+    """The multiplier of -x(T/2) is -1 there: by shooting with variational equations, DOP853 to 1e-13."""
+
+    def rates(t, x, v, F):  # type: ignore[no-untyped-def]
+        return v, -0.5 * v - fm.sin(x) + F * fm.cos(2.0 / 3.0 * t)
+
+    def equations(u: Any) -> Any:
+        def varied(t: float, s: Any) -> Any:
+            x, v, M = s[0], s[1], s[2:].reshape(2, 2)
+            J = np.array([[0.0, 1.0], [-np.cos(x), -0.5]])
+            return [v, -0.5 * v - np.sin(x) + u[2] * np.cos(2.0 / 3.0 * t), *(J @ M).ravel()]
+
+        s = solve_ivp(
+            varied, (0.0, 1.5 * np.pi), [*u[:2], 1.0, 0.0, 0.0, 1.0], method="DOP853", rtol=1e-12, atol=1e-12
+        ).y[:, -1]
+        return [*(s[:2] + u[:2]), np.linalg.det(s[2:].reshape(2, 2) - np.eye(2))]
+
+    system = fm.System(rates, ["x", "v"], {"F": 1.0}, period=3.0 * math.pi, angles=["x"])
+    found = fm.frequency_response(system, "F", (0.9, 1.02), {"x": (-3.0, 3.0), "v": (-3.0, 3.0)})
+    points = [one for one in found.special if one.kind == "branch point"]
+    assert points
+    for point in points:
+        expected = root(equations, [*point.place, 1.001 * point.value])
+        assert np.abs(expected.fun).max() < 1e-10
+        assert point.value == pytest.approx(expected.x[2], abs=1e-8)
+    assert not [one for one in found.special if one.kind == "fold"]
+
+
+def test_small_multipliers_beside_large_ones_are_known() -> None:
+    """About the upright position of a driven pendulum: their product is exp(-damping T) (Liouville)."""
+
+    def upright(t, x, v, F):  # type: ignore[no-untyped-def]
+        return v, -0.1 * v + 1.5 * fm.sin(x) + F * fm.cos(t)
+
+    system = fm.System(upright, ["x", "v"], {"F": 0.5}, period=2.0 * math.pi)
+    found = fm.frequency_response(system, "F", (0.3, 0.8), {"x": (-0.3, 0.3), "v": (-0.3, 0.3)})
+    values = next(b.multipliers for b in found.branches if np.abs(b.multipliers).max() > 1000.0)
+    np.testing.assert_allclose(np.prod(values, axis=1).real, math.exp(-0.2 * math.pi), rtol=1e-3)
 
 
 @pytest.mark.parametrize(
