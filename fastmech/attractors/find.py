@@ -239,15 +239,16 @@ def _preserves_volume(flow: Flow, y: Floats) -> bool:
     h = DIFFERENCE * flow.scale
     shifts = np.concatenate([np.diag(h), np.diag(-h)])
     times = np.arange(OVER * DENSE) / DENSE
-    total, size = np.zeros(n), np.zeros(n)
+    total, size = np.zeros((2, n)), np.zeros((2, n))  # of the earlier half and the later one
     for k, states in enumerate(np.concatenate([y[None], flow.run(y, times[1:]).y])):
         rates = flow.rates((states[:, None] + shifts).reshape(-1, dim), float(times[k] * flow.period))
         both = np.diagonal(rates.reshape(n, 2, dim, dim), axis1=2, axis2=3)
         with np.errstate(invalid="ignore"):  # of motions that have left
             divergence = ((both[:, 0] - both[:, 1]) / (2.0 * h)).sum(axis=1) * flow.period
-        total, size = total + divergence, size + np.abs(divergence)
-    known = np.isfinite(total)
-    balance = (np.abs(total) - BALANCE * size)[known] / len(times)
+        half = 2 * k // len(times)
+        total[half], size[half] = total[half] + divergence, size[half] + np.abs(divergence)
+    known = np.isfinite(total).all(axis=0)
+    balance = (np.abs(total) - BALANCE * size).max(axis=0)[known] / len(times)
     return bool(np.median(balance) < ROUNDING) if known.any() else False
 
 

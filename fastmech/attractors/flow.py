@@ -63,6 +63,10 @@ LEAST = 1e-3
 #: Motions beyond so many times what a sample went through have escaped.
 FAR = 1e3
 
+#: Unless they stay there: so many times a sample is chosen anew beyond, in windows of so many periods and
+#: twice as many each time, in whose later half they go so many times as far at most as in the earlier one.
+OUTWARD, WATCHED, STAYS = 4, 16, 1.1
+
 
 class Reached(NamedTuple):
     """States after some periods."""
@@ -232,13 +236,28 @@ def flow_of(
     else:
         turning = [name in scene.angles for name in scene.state]
     angles = np.array(turning)
-    scale = spread(sample, angles)
+    one = np.ones(angles.size)
     flow = Flow(
-        scene, problem, period or 1.0, period is not None, angles, scale, np.median(sample, axis=0),
-        find_method(method), scale, threads=threads,
+        scene, problem, period or 1.0, period is not None, angles, scale=one, middle=0.0 * one,
+        method=find_method(method), reach=one, threads=threads,
     )  # fmt: skip
-    few = sample[:CHOOSING]
-    if period is not None:
+    flow = _suiting(flow, sample, sample[:CHOOSING])
+    for _ in range(OUTWARD):
+        beyond = _beyond(flow, sample[:CHOOSING])
+        if not len(beyond):
+            break
+        both = np.concatenate([sample[: CHOOSING // 2], beyond[: CHOOSING // 2]])
+        flow = _suiting(replace(flow, steps=FEWEST, period=period or 1.0), both, both)
+    if isinstance(scene, System) and scene.section is not None:
+        return _section_flow(scene, flow, sample)
+    return flow
+
+
+def _suiting(flow: Flow, sample: Floats, few: Floats) -> Flow:
+    """The same with scale, period and steps that suit a sample (n, dim), as a few of its motions tell."""
+    scale = spread(sample, flow.angles)
+    flow = replace(flow, scale=scale, reach=scale, middle=np.median(sample, axis=0))
+    if flow.forced:
         _require_repeats(flow, few)
     else:
         if any(not _alike(flow.rates(few), flow.rates(few, t)) for t in (0.7320508, 5.1961524, 31.4159)):
@@ -247,10 +266,24 @@ def flow_of(
                 "how many seconds it repeats"
             )
         flow = replace(flow, period=_time_of_change(flow, few))
-    flow = _settled(_with_steps(flow, few), few)
-    if isinstance(scene, System) and scene.section is not None:
-        return _section_flow(scene, flow, sample)
-    return flow
+    return _settled(_with_steps(flow, few), few)
+
+
+def _beyond(flow: Flow, sample: Floats) -> Floats:
+    """States (m, dim) of motions that go far beyond the reach from a sample and stay there."""
+    free, y, window = replace(flow, reach=np.full_like(flow.reach, np.inf)), sample, WATCHED
+    straight = ~flow.angles
+    while len(y) and straight.any() and window <= 16 * WATCHED:
+        paths = free.run(y, np.arange(1.0, window + 1.0), FINER).y
+        paths = paths[:, np.isfinite(paths[-1]).all(axis=1)]
+        size = (np.abs(paths - flow.middle) / flow.reach)[..., straight].max(axis=2, initial=0.0)
+        early, late = size[: window // 2].max(axis=0), size[window // 2 :].max(axis=0)
+        stays = late <= STAYS * early
+        outside = stays & (late > FAR)
+        if outside.any():
+            return np.asarray(paths[window // 2 :, outside].reshape(-1, sample.shape[1])[::-1])
+        y, window = paths[-1, ~stays], 2 * window
+    return sample[:0]
 
 
 def flow_at(flow: Flow, values: Mapping[str, float]) -> Flow:

@@ -119,6 +119,23 @@ def test_a_cycle_of_a_system_without_time_is_one_attractor() -> None:
     assert found[0].forcing_periods is None
 
 
+@pytest.mark.parametrize("half", [1e-3, 1e-6])
+def test_motions_that_leave_a_narrow_range_of_starts_and_stay_have_not_escaped(half: float) -> None:
+    found = fm.find_attractors(VAN_DER_POL, {"x": (-half, half), "v": (-half, half)}, 100)
+    assert found[0].found == 100
+    assert found[0].period == pytest.approx(6.66328685931, abs=1e-9)  # Andersen and Geer 1982
+
+
+def test_a_small_window_of_starts_has_the_attractor_of_the_large_one() -> None:
+    def rates(t, x, v):  # type: ignore[no-untyped-def]
+        return v, -0.05 * v - x - x**3 + fm.cos(1.2 * t)
+
+    system = fm.System(rates, ["x", "v"], {}, period=2.0 * np.pi / 1.2)
+    small, large = (fm.find_attractors(system, {"x": (-h, h)}, 50) for h in (1e-4, 2e-2))
+    assert small[0].found == large[0].found == 50
+    np.testing.assert_allclose(small[0].points, large[0].points, atol=1e-9)
+
+
 def test_three_magnets_share_the_plane_by_symmetry() -> None:
     n = 1500
     found = fm.find_attractors(MAGNETS, {"x": (-2.0, 2.0), "y": (-2.0, 2.0)}, n)
