@@ -274,12 +274,12 @@ def _beyond(flow: Flow, sample: Floats) -> Floats:
     free, y, window = replace(flow, reach=np.full_like(flow.reach, np.inf)), sample, WATCHED
     straight = ~flow.angles
     while len(y) and straight.any() and window <= 16 * WATCHED:
-        paths = free.run(y, np.arange(1.0, window + 1.0), FINER).y
-        paths = paths[:, np.isfinite(paths[-1]).all(axis=1)]
+        reached = free.run(y, np.arange(1.0, window + 1.0), FINER)
+        paths = reached.y[:, reached.goes_on]
         size = (np.abs(paths - flow.middle) / flow.reach)[..., straight].max(axis=2, initial=0.0)
         early, late = size[: window // 2].max(axis=0), size[window // 2 :].max(axis=0)
         stays = late <= STAYS * early
-        outside = stays & (late > FAR)
+        outside = stays & (late > FAR) & (late < FAR**OUTWARD)
         if outside.any():
             return np.asarray(paths[window // 2 :, outside].reshape(-1, sample.shape[1])[::-1])
         y, window = paths[-1, ~stays], 2 * window
