@@ -28,8 +28,8 @@ class Sampler:
     n: int | None = field(default=None, kw_only=True)  #: how many, where the function is not told
     seed: int = field(default=0, kw_only=True)
 
-    def draw(self, n: int, names: Sequence[str], seed: int = 0) -> Floats:
-        """The first n starts, shape (n, len(names)), in the order of ``names``.
+    def draw(self, n: int, names: Sequence[str], seed: int | None = None) -> Floats:
+        """The first n starts, shape (n, len(names)), in the order of ``names``; by default of its own seed.
 
         Raises:
             InputError: a name is unknown, or a range is no pair of finite numbers that does not fall.
@@ -38,9 +38,12 @@ class Sampler:
         ranged = np.flatnonzero(high > low)
         starts = np.tile(low, (n, 1))
         if ranged.size:
-            unit: Any = self._unit(n, [names[k] for k in ranged.tolist()], seed)
+            unit: Any = self._unit(n, [names[k] for k in ranged.tolist()], self._seed(seed))
             starts[:, ranged] += (high - low)[ranged] * unit
         return starts
+
+    def _seed(self, given: int | None) -> int:
+        return self.seed if given is None else given
 
     def _unit(self, n: int, names: Sequence[str], seed: int) -> Floats:
         """Points (n, len(names)) of the unit cube."""
@@ -137,10 +140,10 @@ class Grid(Sampler):
 class Gaussian(Sampler):
     """Independent normal starts, of which (low, high) is one standard deviation about the mean."""
 
-    def draw(self, n: int, names: Sequence[str], seed: int = 0) -> Floats:
+    def draw(self, n: int, names: Sequence[str], seed: int | None = None) -> Floats:
         """As of any sampler."""
         low, high = self._ends(names)
-        z = np.random.default_rng(seed).standard_normal((n, len(names)))
+        z = np.random.default_rng(self._seed(seed)).standard_normal((n, len(names)))
         return np.asarray(0.5 * (low + high) + 0.5 * (high - low) * z)
 
 
@@ -148,11 +151,11 @@ class Gaussian(Sampler):
 class Ball(Sampler):
     """Uniform in the ellipsoid that fills the ranges: a ball of radius 1 in the norm of their halves."""
 
-    def draw(self, n: int, names: Sequence[str], seed: int = 0) -> Floats:
+    def draw(self, n: int, names: Sequence[str], seed: int | None = None) -> Floats:
         """As of any sampler."""
         low, high = self._ends(names)
         ranged = high > low
-        z = np.random.default_rng(seed).standard_normal((n, len(names) + 1))
+        z = np.random.default_rng(self._seed(seed)).standard_normal((n, len(names) + 1))
         size = np.linalg.norm(z[:, :-1][:, ranged], axis=1)
         from scipy.stats import norm
 

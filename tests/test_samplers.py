@@ -52,6 +52,8 @@ def test_checked_starts_know_their_number_and_seed() -> None:
     sampler = Sobol({"x": (0.0, 2.0)}, n=8, seed=3)
     np.testing.assert_array_equal(starts("y0", sampler, NAMES), sampler.draw(8, NAMES, 3))
     np.testing.assert_array_equal(starts("y0", sampler, NAMES, n=2, seed=4), sampler.draw(2, NAMES, 4))
+    np.testing.assert_array_equal(starts("y0", sampler, NAMES), sampler.draw(8, NAMES))
+    assert (sampler.draw(8, NAMES) != Sobol({"x": (0.0, 2.0)}).draw(8, NAMES)).any()
     assert len(starts("y0", Grid({"x": (0.0, 1.0)}, {"x": 5}), NAMES)) == 5
     assert len(starts("y0", {"x": (0.0, 1.0)}, NAMES, default=7)) == 7
     np.testing.assert_array_equal(starts("y0", np.eye(3), NAMES, n=2), np.eye(3)[:2])
