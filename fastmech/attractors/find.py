@@ -273,7 +273,7 @@ def labelled(
     search.only_end = only_end(ends)
     ends = by_only_end(search, ends)
     every = [_of_orbit(flow, orbit, ball) for orbit, ball in search.orbits]
-    every += [_of_cloud(cloud, flow.forced) for cloud in search.clouds]
+    every += [_of_cloud(flow, cloud) for cloud in search.clouds]
     found = np.bincount(ends.label[ends.label >= 0], minlength=len(every))
     order = np.argsort(-found, kind="stable")
     rank = np.empty(len(every) + 1, dtype=np.int64)
@@ -295,15 +295,20 @@ def labelled(
     ).of(flow.scene)
 
 
-def _of_cloud(cloud: Cloud, forced: bool) -> Attractor:
+def _within_turn(flow: Flow, points: Floats) -> Floats:
+    """The same with angles between -pi and pi."""
+    return np.where(flow.angles, flow.away(points, np.zeros_like(points)), points)
+
+
+def _of_cloud(flow: Flow, cloud: Cloud) -> Attractor:
     kind = "chaos" if cloud.exponent > 3.0 * cloud.error else "torus"
     if cloud.continuum:
         kind = "continuum"
     elif cloud.still:
-        kind = "periodic" if forced else "fixed point"
+        kind = "periodic" if flow.forced else "fixed point"
     return Attractor(
         kind,
-        cloud.points,
+        _within_turn(flow, cloud.points),
         None,
         None,
         None,
@@ -323,14 +328,14 @@ def _of_orbit(flow: Flow, orbit: Orbit, ball: Balls) -> Attractor:
     if isinstance(flow, SectionFlow):
         over = float(flow.passages(orbit.points[:1], np.array([orbit.periods]), FINER)[1][0])
     largest = float(np.abs(orbit.multipliers).max()) if orbit.multipliers.size else 0.0
-    # Along a cycle nothing grows or falls.
-    exponent = 0.0 if orbit.cycle else math.log(max(largest, LEAST)) / over
-    error = 0.0 if orbit.cycle else LEAST / (over * max(largest, LEAST))
-    points = orbit.points.copy()
-    points[:, flow.angles] = flow.away(points, np.zeros_like(points))[:, flow.angles]
+    # Along a cycle nothing grows or falls. Of each period differences tell what is not below LEAST.
+    each = max(1.0, orbit.periods)
+    of_period = max(largest ** (1.0 / each), LEAST)
+    exponent = 0.0 if orbit.cycle else each * math.log(of_period) / over
+    error = 0.0 if orbit.cycle else each * LEAST / (over * of_period)
     return Attractor(
         kind="fixed point" if rest else "periodic",
-        points=points,
+        points=_within_turn(flow, orbit.points),
         period=None if rest else over,
         forcing_periods=round(orbit.periods) if flow.forced and not passages else None,
         multipliers=orbit.multipliers,

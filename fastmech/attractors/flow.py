@@ -142,14 +142,24 @@ class Flow:
         return found.T
 
     def derivative(self, y: Floats, periods: float) -> tuple[Floats, Floats]:
-        """The map of states (n, dim) over so many periods, and its Jacobian (n, dim, dim), by differences."""
-        n, dim = y.shape
-        h = DIFFERENCE * self.scale
+        """The map of states (n, dim) over so many periods, and its Jacobian (n, dim, dim).
+
+        It is the product of those of single periods by differences, which lie where the map is linear.
+        """
+        (n, dim), parts = y.shape, math.ceil(periods)
+        h, begin = DIFFERENCE * self.scale, y[None]
+        if parts > 1:
+            path = self.run(y, periods / parts * np.arange(1.0, parts), FINER).y
+            begin = np.concatenate([begin, path])
         shifts = np.concatenate([np.zeros((1, dim)), np.diag(h), np.diag(-h)])
-        lanes = (y[:, None] + shifts).reshape(-1, dim)
-        image = self.after(lanes, periods, FINER).reshape(n, 1 + 2 * dim, dim)
-        J = self.away(image[:, 1 : 1 + dim], image[:, 1 + dim :]) / (2.0 * h[:, None])
-        return image[:, 0], np.swapaxes(J, 1, 2)
+        lanes = (begin[:, :, None] + shifts).reshape(-1, dim)
+        image = self.after(lanes, periods / parts, FINER).reshape(parts, n, 1 + 2 * dim, dim)
+        slopes = self.away(image[:, :, 1 : 1 + dim], image[:, :, 1 + dim :]) / (2.0 * h[:, None])
+        J = np.broadcast_to(np.eye(dim), (n, dim, dim))
+        with np.errstate(over="ignore", invalid="ignore"):  # of motions that have left
+            for part in np.swapaxes(slopes, 2, 3):
+                J = part @ J
+        return image[-1, :, 0], J
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,7 @@ from fastmech.attractors.flow import COARSER, Flags, Floats, Flow, statuses
 from fastmech.attractors.flow import MOST as MOST_STEPS
 from fastmech.attractors.orbits import (
     RESIDUAL,
+    SAME,
     Orbit,
     attracts,
     cycle,
@@ -56,7 +57,8 @@ NEAR = 0.15
 #: How far from an orbit that repels motions have to be, over the scale, to have left it.
 LEFT = 0.05
 
-#: Longest period looked for, in forcing periods; guesses for Newton's method in a window, of cycles too.
+#: Longest period looked for on the way, in forcing periods; guesses for Newton's method in a window, and of
+#: cycles.
 LONGEST, GUESSES, CYCLES = 32, 32, 16
 
 #: Multipliers beyond this are no rounding of 1: motions leave.
@@ -244,10 +246,18 @@ class Search:
             stays = self._later(seen, np.arange(1, STAYS * dense + 1) / dense)
             points = np.concatenate([seen, stays.reshape(-1, dim)])
             points = points[:: -(-len(points) // MOST_POINTS)]
+            if flow.forced:
+                self._find_long_orbits(stays)
             left = ~np.isin(keys_of(flow, size, stays), np.unique(keys[:, members]))
             if left.mean() < 0.2 and self._stay(stays[-1]):
                 still = bool((np.ptp(stays, axis=0) < size).all())
                 self._add_cloud(Cloud(points, size, still), stays[-1])
+
+    def _find_long_orbits(self, paths: Floats) -> None:
+        """Look for orbits on which motions (k, n, dim) have settled, of any period that they show twice."""
+        back = self.flow.distance(paths[-1], paths[-2 : -2 - len(paths) // 2 : -1]) < SAME
+        for i in np.flatnonzero(back.any(axis=0)):
+            self._try(paths[-1, i : i + 1], int(np.argmax(back[:, i])) + 1)
 
     def _later(self, points: Floats, times: Floats) -> Floats:
         """Where motions from some of the points (n, dim) are at times [periods] (k, m, dim)."""

@@ -136,6 +136,43 @@ def test_a_small_window_of_starts_has_the_attractor_of_the_large_one() -> None:
     np.testing.assert_allclose(small[0].points, large[0].points, atol=1e-9)
 
 
+@pytest.mark.parametrize("q", [33, 40])
+def test_a_phase_locked_for_many_periods_is_periodic(q: int) -> None:
+    """u = q x - t obeys u' = 0.2 sin u: u = pi attracts with the exponent -0.2, so that x turns once in q."""
+
+    def rates(t, x):  # type: ignore[no-untyped-def]
+        return ((1.0 + 0.2 * fm.sin(q * x - t)) / q,)
+
+    system = fm.System(rates, ["x"], {}, period=2.0 * np.pi, angles=["x"])
+    found = fm.find_attractors(system, {"x": (-np.pi, np.pi)}, 100)
+    assert found[0].found == 100
+    assert (found[0].kind, found[0].forcing_periods) == ("periodic", q)
+    assert found[0].exponent == pytest.approx(-0.2, abs=1e-4)
+
+
+def test_motions_just_beyond_a_doubling_are_no_torus() -> None:
+    """They nearly come back after half their period: SciPy's DOP853 goes once around."""
+
+    def rates(t, x, v):  # type: ignore[no-untyped-def]
+        return v, -0.1 * v - fm.sin(x) + 0.8 * fm.cos(0.9 * t)
+
+    system = fm.System(rates, ["x", "v"], {}, period=2.0 * np.pi / 0.9, angles=["x"])
+    found = fm.find_attractors(system, {"x": (-3.1, 3.1), "v": (-3.0, 3.0)}, 300)
+    eights = [one for one in found if one.forcing_periods == 8]
+    assert len(eights) == 2
+    assert not [one for one in found if one.kind == "torus"]
+    for one in eights:
+        assert one.period is not None
+        run = solve_ivp(
+            lambda t, y: (y[1], -0.1 * y[1] - np.sin(y[0]) + 0.8 * np.cos(0.9 * t)), (0.0, one.period),
+            one.points[0], method="DOP853", rtol=1e-12, atol=1e-12, dense_output=True,
+        )  # fmt: skip
+        away = [run.sol(share * one.period) - one.points[0] for share in (0.5, 1.0)]
+        distance = [abs(np.exp(1j * a[0]) - 1.0) + abs(a[1]) for a in away]
+        assert distance[0] > 1e-3
+        assert distance[1] < 1e-7
+
+
 def test_three_magnets_share_the_plane_by_symmetry() -> None:
     n = 1500
     found = fm.find_attractors(MAGNETS, {"x": (-2.0, 2.0), "y": (-2.0, 2.0)}, n)
