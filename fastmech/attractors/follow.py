@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -92,7 +93,29 @@ class BasinsAlong(Drawn):
             lines.append(f"  {t.attractor} {t.kind} between {self.parameter} = {t.low:.6g} and {t.high:.6g}")
         if len(self.tipping) > 5:
             lines[-1] = f"  and {len(self.tipping) - 4} more"
+        lines += [
+            f"  {k} from {before} to {after} between {self.parameter} = {low:.6g} and {high:.6g}"
+            for k, before, after, low, high in self.changes[:5]
+        ]
         return "\n".join(lines)
+
+    @property
+    def changes(self) -> list[tuple[int, str, str, float, float]]:
+        """Attractors that go on as another kind, or with another period: number, before, after, between."""
+        found = []
+        for k, (one, two) in enumerate(pairwise(self.attractors)):
+            for number in sorted(set(one) & set(two)):
+                before, after = (_kind(there[number]) for there in (one, two))
+                if before != after:
+                    found.append((number, before, after, float(self.values[k]), float(self.values[k + 1])))
+        return found
+
+
+def _kind(one: Attractor | AttractorPlace) -> str:
+    if isinstance(one, AttractorPlace):
+        return "no periodic motion" if one.period is None else "periodic"
+    periods = one.forcing_periods
+    return one.kind if periods is None else f"period {periods} of the forcing"
 
 
 @dataclass(frozen=True, repr=False)
