@@ -166,6 +166,26 @@ def test_help_on_a_scene_shows_parameters_and_hides_how_they_are_checked() -> No
     assert str(inspect.signature(fm.Scene)).startswith("(*, m1: float = 10.0")
 
 
+@pytest.mark.parametrize(
+    ("element", "units"),
+    [
+        (fm.Body, {"mass": "kg", "inertia": "kg m2", "angle": "rad"}),
+        (fm.Spring, {"stiffness": "N/m", "free_length": "m"}),
+        (fm.TorsionSpring, {"angle": "rad", "stiffness": "N m/rad", "free_angle": "rad"}),
+        (fm.Damper, {"coefficient": "N s/m"}),
+        (fm.TorsionDamper, {"angle": "rad", "coefficient": "N m s/rad"}),
+        (fm.Force, {"load": "N"}),
+        (fm.Torque, {"angle": "rad", "load": "N m"}),
+    ],
+)
+def test_help_on_an_element_tells_what_it_takes_with_units(element: Any, units: dict[str, str]) -> None:
+    about = " ".join(str(inspect.getdoc(element)).split())
+    assert all(f"``{name}``" in about for name in inspect.signature(element).parameters)
+    for name, unit in units.items():
+        assert re.search(rf"``{name}``[^;.]*\[{re.escape(unit)}\]", about), name
+    assert "tuple" not in pydoc.render_doc(element, renderer=pydoc.plaintext)
+
+
 def test_scenes_are_values() -> None:
     scene = fm.Scene(c1=300.0)
     assert pickle.loads(pickle.dumps(scene)) == copy.deepcopy(scene) == scene
