@@ -184,6 +184,7 @@ def _rising(name: str, values: ArrayLike) -> Floats:
     steps = np.diff(along)
     if along.ndim != 1 or along.size < 2 or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
         raise InputError(f"{name}: must be two or more rising or falling numbers")
+    checks.refuse_range(name, values)
     return along
 
 

@@ -262,6 +262,7 @@ def _checked_axes(
             raise InputError(f"axes.{name}: must be numbers") from None
         if array.ndim != 1 or not array.size or not np.isfinite(array).all():
             raise InputError(f"axes.{name}: must be a row of finite, strictly rising values")
+        checks.refuse_range(f"axes.{name}", values)
         checks.one_way(f"axes.{name}", values, array)
         if array[-1] < array[0]:
             raise InputError(f"axes.{name}: falls from {array[0]:g} to {array[-1]:g}, must rise")
