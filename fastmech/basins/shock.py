@@ -63,8 +63,8 @@ class Shock(Printed):
         if not self.undecided_from < (self.size if np.isfinite(self.size) else np.inf):
             return line
         return (
-            f"{line}\n  undecided from {self.undecided_from:.6g} on: smaller ones may leave; "
-            "a longer t_end may tell"
+            f"{line}\n  not all ends are known from size {self.undecided_from:.6g} on: "
+            "smaller ones may leave; a longer t_end may tell"
         )
 
 

@@ -109,11 +109,15 @@ class ShockLimit(Printed):
     def told(self) -> str:
         """What is proved, what was found, and how hard was searched."""
         found = "none was found" if math.isnan(self.found.impulse) else self.found.told()
+        known = (
+            ""
+            if math.isnan(self.undecided_from)
+            else f"; not all ends are known from {self.undecided_from:.4g} N s on"
+        )
         return (
             f"blows on {self.on}: no smaller one leaves (proved): {self.proved.told()}\n"
-            f"  least found to leave: {found}\n"
-            f"  {self.trajectories:,} blows followed, up to {self.tried_to:.4g} N s"
-            + ("" if math.isnan(self.undecided_from) else f"; undecided from {self.undecided_from:.4g} N s")
+            f"  least found to leave (also by a full turn): {found}\n"
+            f"  {self.trajectories:,} blows followed, up to {self.tried_to:.4g} N s{known}"
         )
 
 
@@ -131,10 +135,11 @@ def shock_limit(
     An impulse J gives the energy J.W J / 2 with the point's mobility W = B a^-1 B^T (B: the point's Jacobian,
     a: the metric, paper (11)). While that is less than the well's depth, the mechanism does not leave. So the
     bound ``sqrt(2 depth / w)`` is proved for every damper, with w = u.W u in the direction u, or W's largest
-    eigenvalue over all directions. Above it, directions and sizes are searched for blows that end elsewhere,
-    in another well or some turns further, as :func:`fastmech.label_starts` proves. Grids are made
-    finer until nothing less is found; a window between the blows of the finest one, as the result tells how
-    far they are apart, may have been missed.
+    eigenvalue over all directions. Above it, directions and sizes are searched for blows that leave: that
+    end in another well, or in the same one some full turns away (a turn counts as leaving, although the place
+    of rest is the same), as :func:`fastmech.label_starts` proves. Grids are made finer until nothing less is
+    found; a window between the blows of the finest one, as the result tells how far they are apart, may have
+    been missed.
 
     All is NaN where the point cannot be struck so: M3 across its rail or at a dead centre, M1 along OM1, M2
     along M1M2 where crank and rod are in line. ``found`` is NaN too without damper, for nothing comes to rest
