@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
     from fastmech.results import Dataset
 
-#: Lines that an object prints, and their width.
-LINES, WIDTH = 6, 110
+#: Lines that an object prints, their width, and up to how many values it prints one by one.
+LINES, WIDTH, EACH = 6, 110, 6
 
 
 class Field(NamedTuple):
@@ -60,8 +60,8 @@ class Printed:
         name = "".join(f" {c.lower()}" if c.isupper() else c for c in type(self).__name__).strip()
         own: Any = self
         known = self.FIELDS or {f.name: Field("", "1", f.name.replace("_", " ")) for f in fields(own)}
-        each = [_told(field, self.value_of(key)) for key, field in known.items()]
-        return "; ".join([f"{name}: {each[0]}" if each else name, *each[1:]])
+        each = "; ".join(filter(None, (_told(field, self.value_of(key)) for key, field in known.items())))
+        return f"{name}: {each}" if each else name
 
     def __repr__(self) -> str:
         lines = [
@@ -145,20 +145,27 @@ class Drawn(Result):
         return ax
 
 
+def counted(number: int, noun: str) -> str:
+    """A number and its noun, in the plural but for one."""
+    if number != 1:
+        noun = f"{noun[:-1]}ies" if noun.endswith("ry") else f"{noun}{'es' if noun.endswith('ch') else 's'}"
+    return f"{number:,} {noun}"
+
+
 def _told(field: Field, value: Any) -> str:
-    """A field in words."""
+    """A field in words; nothing of an empty text."""
     unit = "" if field.unit in ("1", "") or field.unit.startswith("@") else f" {field.unit}"
     if value is None:
         return f"{field.about}: not known"
     if isinstance(value, str | bool | np.bool_):
-        return f"{field.about}: {value}"
+        return f"{field.about}: {value}" if value != "" else ""
     array = np.asarray(value)
-    if array.size == 1:
-        return (
-            f"{field.about}: {array.item():.6g}{unit}"
-            if array.dtype.kind in "iuf"
-            else f"{field.about}: {value}"
-        )
-    if array.dtype.kind not in "iuf" or not np.isfinite(array).any():
-        return f"{field.about}: {len(value) if isinstance(value, Sequence) else array.size:,} values"
-    return f"{field.about}: {np.nanmin(array):.4g} to {np.nanmax(array):.4g}{unit} ({array.size:,} values)"
+    if array.dtype.kind not in "iuf":
+        number = len(value) if isinstance(value, Sequence) else array.size
+        return f"{field.about}: {value if array.size == 1 else counted(number, 'value')}"
+    if 1 <= array.size <= EACH:
+        return f"{field.about}: {', '.join(f'{x:.6g}' for x in array.ravel())}{unit}"
+    if not np.isfinite(array).any():
+        return f"{field.about}: {array.size:,} values"
+    span = f"from {np.nanmin(array):.4g} to {np.nanmax(array):.4g}{unit}"
+    return f"{field.about}: {span}, {array.size:,} values"

@@ -17,7 +17,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import fastmech as fm
-from fastmech.objects import Drawn, Printed, Result
+from fastmech.objects import Drawn, Field, Printed, Result, counted
 
 matplotlib.use("Agg")
 
@@ -142,6 +142,26 @@ PLAIN = {
 }  # fmt: skip
 
 found: dict[str, Any] = {}
+
+
+class Numbers(Printed):
+    """Some numbers and texts."""
+
+    FIELDS = {"few": Field("x", "m", "few"), "many": Field("x", "1", "many"), "why": Field("", "1", "why")}
+    few, many, why = np.array([0.25, 0.75]), np.arange(7.0), ""
+
+
+def test_short_arrays_print_their_values_and_empty_texts_nothing() -> None:
+    assert repr(Numbers()) == "numbers: few: 0.25, 0.75 m; many: from 0 to 6, 7 values"
+
+
+@pytest.mark.parametrize(
+    ("number", "noun", "told"),
+    [(1, "cusp", "1 cusp"), (0, "cusp", "0 cusps"), (1, "trajectory", "1 trajectory"),
+     (2, "trajectory", "2 trajectories"), (1200, "branch", "1,200 branches")],
+)  # fmt: skip
+def test_one_of_a_kind_is_singular(number: int, noun: str, told: str) -> None:
+    assert counted(number, noun) == told
 
 
 def test_every_public_function_is_walked() -> None:

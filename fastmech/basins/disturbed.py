@@ -38,7 +38,7 @@ from fastmech.ensembles.status import ENDS, FAILURES, Status, failure_counts, fa
 from fastmech.errors import InputError, StepWarning
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism, short_way
-from fastmech.objects import Drawn, Field
+from fastmech.objects import Drawn, Field, counted
 from fastmech.samplers import Starts
 from fastmech.scene import Scene
 from fastmech.slider.equilibria import Equilibrium
@@ -121,8 +121,8 @@ class DisturbedEnsemble(Drawn):
         ):
             ended["elsewhere"] += f" ({turned:,} of them at this {kind}, full turns away)"
         lines = [
-            f"{self.outcome.size:,} disturbances of the {kind} at {self.equilibria.place(self.index)}, "
-            f"followed for {self.t_end:g} s",
+            f"{counted(self.outcome.size, 'disturbance')} of the {kind} at "
+            f"{self.equilibria.place(self.index)}, followed for {self.t_end:g} s",
             "  ended: " + ", ".join(ended.values()),
             f"  returned: {shares.fraction:.2%}, at most {shares.at_most:.2%} "
             f"(95 % interval {shares.lower:.2%} to {shares.upper:.2%})",

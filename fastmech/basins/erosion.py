@@ -37,7 +37,7 @@ from fastmech.ensembles.run import Progress
 from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism, short_way
-from fastmech.objects import Drawn
+from fastmech.objects import Drawn, counted
 from fastmech.scene import Scene
 from fastmech.slider.atlas.map import sheets_of_wells
 
@@ -98,7 +98,8 @@ class ErosionProfile(Drawn):
     def told(self) -> str:
         """Over which values each well exists, and how its share and its smallest shock change."""
         unit = "" if self.system is None else " " + self.system.described()[self.parameter][1]
-        lines = [f"erosion of {self.sheet.size} wells along {self.parameter}, {self.values.size} values"]
+        wells, values = counted(self.sheet.size, "well"), counted(self.values.size, "value")
+        lines = [f"erosion of {wells} along {self.parameter}, {values}"]
         for w in range(self.sheet.size):
             there = np.flatnonzero(np.isfinite(self.stability[:, w]))
             if there.size:

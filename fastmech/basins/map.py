@@ -115,7 +115,8 @@ def map_basins(
             computed have no times.
         parameters: of a system, values of parameters by name that differ between starts, each of a shape that
             broadcasts to the map's: ``values[:, None]`` changes along the first of two axes.
-        dt: coarsest step [s], see :func:`fastmech.label_starts`; a system needs one.
+        dt: coarsest step [s], see :func:`fastmech.label_starts`; a system with a stopping condition needs
+            one, for attractors it does not apply.
         method: name of the integration method; ``dop853`` by default, of a scene see there.
         settle_radius: see there; a scene's only.
         threads: threads to use, all processors by default. The result does not depend on it.

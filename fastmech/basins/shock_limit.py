@@ -28,7 +28,7 @@ from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import require_own, state_matrix
-from fastmech.objects import Printed
+from fastmech.objects import Printed, counted
 from fastmech.scene import Scene
 from fastmech.slider.atlas.map import ROUNDING
 from fastmech.slider.coefficients import reduce
@@ -117,7 +117,7 @@ class ShockLimit(Printed):
         return (
             f"blows on {self.on}: no smaller one leaves (proved): {self.proved.told()}\n"
             f"  least found to leave (also by a full turn): {found}\n"
-            f"  {self.trajectories:,} blows followed, up to {self.tried_to:.4g} N s{known}"
+            f"  {counted(self.trajectories, 'blow')} followed, up to {self.tried_to:.4g} N s{known}"
         )
 
 

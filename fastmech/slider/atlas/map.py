@@ -24,7 +24,7 @@ from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError
 from fastmech.jit import CUBE, MATRIX, STATUSES, kernel, named_tuple
 from fastmech.models.mechanism import Mechanism
-from fastmech.objects import Drawn
+from fastmech.objects import Drawn, counted
 from fastmech.outcome import Outcome
 from fastmech.scene import Scene
 from fastmech.slider.atlas.axes import check_axes, grid_coefficients
@@ -270,7 +270,7 @@ class EquilibriumMap(Drawn, Slab):
 
     def told(self) -> str:
         """The grid, how many equilibria where, and what is proved."""
-        return told_map(self, ("phi", "theta"), f"  {len(self.sheet_morse_index)} sheets")
+        return told_map(self, ("phi", "theta"), f"  {counted(len(self.sheet_morse_index), 'sheet')}")
 
 
 Progress = Callable[[int], None]
