@@ -8,6 +8,8 @@ that draws it into axes. Both lie in layers above and are loaded by name when th
 
 from __future__ import annotations
 
+import inspect
+import sys
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
@@ -143,6 +145,33 @@ class Drawn(Result):
         if own:
             _load("plots.style:make_room")(ax)
         return ax
+
+
+def tell_result(function: Any) -> None:
+    """Say in a function's docstring what the objects that it returns hold: attributes, then methods."""
+    told = ""
+    for name in str(function.__annotations__["return"]).split(" | "):
+        kind: Any = sys.modules[function.__module__]
+        for part in name.split("."):
+            kind = getattr(kind, part, None)
+        if not isinstance(kind, type) or not kind.__module__.startswith("fastmech."):
+            continue
+        own = [*getattr(kind, "__dataclass_fields__", getattr(kind, "_fields", ())), *dir(kind)]
+        own = [one for one in dict.fromkeys(own) if one[0] != "_" and one not in _UNTOLD]
+        own = [one for one in own if getattr(kind, one, None) is not getattr(tuple, one, kind)]
+        calls = [one for one in own if callable(getattr(kind, one, None))]
+        each = ", ".join([*(one for one in own if one not in calls), *(f"{one}()" for one in calls)])
+        told += textwrap.indent(textwrap.fill(f"{kind.__name__}: {each}.", WIDTH - 10), "    ") + "\n"
+    head, begin, rest = (inspect.getdoc(function) or "").partition("Returns:\n")
+    if told and not begin:
+        head, raises, errors = head.partition("Raises:\n")
+        head, rest = head.rstrip() + "\n\n", raises and f"\n{raises}{errors}"
+    if told:
+        function.__doc__ = f"{head}Returns:\n{told}{rest}"
+
+
+#: What objects have for the rest of this package.
+_UNTOLD = {"FIELDS", "KIND", "LAYOUT", "PICTURE", "told", "of", "value_of", "dataset", "system"}
 
 
 def counted(number: int, noun: str) -> str:
