@@ -147,7 +147,7 @@ def test_what_a_device_has_not_is_said(small, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("tolerances", "line"),
     [
-        ({"c3": 1.0}, "did you mean 'm3'"),
+        ({"c3": 1.0}, "did you mean 'c1' or 'c2'"),
         ({"c1": -1.0}, "must be a number > 0 N/m"),
         ({"m1": 11.0}, "scene.m1 = -1"),
     ],

@@ -297,3 +297,11 @@ def test_a_direction_in_degrees_is_refused() -> None:
         fm.shock_limit(FREE, fm.find_equilibria(FREE)[0], "M2", 90.0)
     with pytest.raises(fm.InputError, match=r"direction = 90\.0: must lie within"):
         fm.impulse_start(FREE, fm.find_equilibria(FREE)[0], 1.0, "M2", 90.0)
+
+
+def test_a_fixed_point_cannot_be_struck() -> None:
+    pendulum = fm.mechanisms.double_pendulum()
+    rest = fm.find_equilibria(pendulum)[0]
+    for on in ("O", "A", "M9"):
+        with pytest.raises(fm.InputError, match=rf"^on = '{on}': must be a point that moves: M1, M2$"):
+            fm.impulse_start(pendulum, rest, 1.0, on)
